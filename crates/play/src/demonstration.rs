@@ -1,7 +1,7 @@
 //! A script that is shown: its steps in the time that they take, and what it injects as its lines begin.
 
-use endowire_core::Result;
 use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
+use endowire_core::{Error, Result};
 
 use crate::hand::Motion;
 use crate::{TICKS_PER_S, USUAL_DEG_PER_S, USUAL_MM_PER_S};
@@ -59,7 +59,11 @@ impl Demonstration {
     /// As [`ScriptRun::next`].
     pub(crate) fn next(&mut self, simulation: &Simulation) -> Result<Next> {
         let Some(step) = self.run.next(simulation)? else { return Ok(Next::End) };
-        let took_s = if step.time_s.is_some() { step.duration_s } else { usual_s(step.moves) }.max(LEAST_S);
+        if step.detach.is_some() {
+            let mend = "hands cannot leave a coil behind yet: carry the script out with `endowire run`";
+            return Err(Error::parameter("script.detach", true, mend));
+        }
+        let took_s = if step.time_s.is_some() { step.duration_s } else { usual_s(&step.moves) }.max(LEAST_S);
         let end_s = self.done_s + took_s;
         if end_s * TICKS_PER_S > self.ticks as f64 + EARLY {
             return Ok(Next::Later);

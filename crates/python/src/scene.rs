@@ -99,7 +99,7 @@ impl Scene {
         let mut hand = script.begin();
         let mut step = |simulation: &mut insertion::Simulation| -> endowire_core::Result<bool> {
             let Some(next) = hand.next(simulation)? else { return Ok(false) };
-            simulation.step_until(next.moves, next.time_s)?;
+            next.carry_out(simulation)?;
             hand.carried_out();
             Ok(true)
         };

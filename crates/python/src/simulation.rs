@@ -97,14 +97,20 @@ impl Simulation {
 
     /// The instruments as the viewer sees them; nothing of those that are out.
     pub(crate) fn views(&self, py: Python<'_>) -> Vec<DeviceView> {
-        let (shape, lengths_mm) =
-            self.with(py, |simulation| (simulation.shape().clone(), simulation.report().lengths_mm()));
+        let (shape, lengths_mm, coils) = self.with(py, |simulation| {
+            (simulation.shape().clone(), simulation.report().lengths_mm(), simulation.coils().to_vec())
+        });
+        let left = coils.iter().map(|coil| {
+            let instrument = &self.pushed()[coil.instrument];
+            DeviceView::of_device(&coil.shape, &instrument.device, &instrument.parts)
+        });
         let line_mm = line_mm(lengths_mm.iter().copied());
         let each = self.pushed().iter().zip(lengths_mm);
         each.map(|(instrument, mm)| match mm {
             0.0 => DeviceView::default(),
             mm => DeviceView::of_device(&shape.behind(line_mm - mm), &instrument.device, &instrument.parts),
         })
+        .chain(left)
         .collect()
     }
 
@@ -213,6 +219,25 @@ impl Simulation {
         let (moves, solves) = (self.moves(advance_mm, rotate_rad)?, natural("solves", solves)?);
         let ticked = self.with(py, |simulation| simulation.tick(&moves, solves, time_s).cloned());
         ticked.map(StepReport::new).map_err(exception)
+    }
+
+    /// Leaves the coil of an instrument behind, where it comes to rest, and takes its pusher out. Returns the StepReport.
+    ///
+    /// Raises InputError for an instrument that is no coil, is detached already or is not out yet, ComputationError where it does not come to
+    /// rest; then everything is as before.
+    #[pyo3(signature = (instrument=0))]
+    fn detach(&self, py: Python<'_>, instrument: i64) -> PyResult<StepReport> {
+        let place = usize::try_from(instrument).unwrap_or(usize::MAX);
+        let done = self.with(py, |simulation| simulation.detach(place).cloned());
+        done.map(StepReport::new).map_err(exception)
+    }
+
+    /// Coils that were detached, in their order: a list of pairs of an instrument and the points of its coil, from the end that was detached to
+    /// the tip, mm, shape (n, 3).
+    #[getter]
+    fn coils<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyArray2<f64>>)>> {
+        let coils = self.with(py, |simulation| simulation.coils().to_vec());
+        coils.into_iter().map(|coil| Ok((coil.instrument, points(py, coil.shape.positions_mm)?))).collect()
     }
 
     /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and rotate_rad. Returns the last

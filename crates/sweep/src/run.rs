@@ -173,12 +173,12 @@ impl Run<'_> {
                 return Err(Interrupted::Stopped);
             }
             let failed = |error: endowire_core::Error| Some(StepFailure::new(steps + 1, &error));
-            let (moves, time_s) = match hand.next(&simulation) {
-                Ok(Some(step)) => (step.moves.to_vec(), step.time_s),
+            let step = match hand.next(&simulation) {
+                Ok(Some(step)) => step.into_owned(),
                 Ok(None) => break None,
                 Err(error) => break failed(error),
             };
-            if let Err(error) = simulation.step_until(&moves, time_s) {
+            if let Err(error) = step.carry_out(&mut simulation) {
                 break failed(error);
             }
             hand.carried_out();
@@ -187,7 +187,9 @@ impl Run<'_> {
             if let Some(recorder) = &mut recorder {
                 // What comes next is asked twice, and changes nothing.
                 let last = matches!(hand.clone().next(&simulation), Ok(None));
-                recorder.step(&moves, time_s, last, &simulation).map_err(Interrupted::Unrecorded)?;
+                recorder
+                    .step(&step.moves, step.time_s, last, &simulation)
+                    .map_err(Interrupted::Unrecorded)?;
             }
         };
         let outcome = RunOutcome::new(&simulation, &hand, (steps, script.len()), tally, failure);

@@ -1,6 +1,7 @@
 //! What is pushed, as the viewer sees it: the device, or each of several instruments.
 
 use endowire_core::device::{Device, Kind, Stack, line_mm};
+use endowire_core::insertion::DetachedCoil;
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
@@ -22,6 +23,8 @@ pub struct Pushed {
     kinds: Vec<Option<Kind>>,
     /// The names of their parts, where files say so.
     part_names: Vec<Vec<String>>,
+    /// Coils that were left behind.
+    coils: Vec<DetachedCoil>,
 }
 
 impl Pushed {
@@ -53,7 +56,7 @@ impl Pushed {
             parts[0] = own.to_vec();
             part_names[0].clear();
         }
-        let pushed = Self { stack, parts, kinds, part_names };
+        let pushed = Self { stack, parts, kinds, part_names, coils: Vec::new() };
         let through_tip = spec.injection.iter().position(|one| one.at_tip);
         if let Some(number) = through_tip.filter(|_| !(0..pushed.parts.len()).any(|i| pushed.has_lumen(i))) {
             let mend =
@@ -61,6 +64,20 @@ impl Pushed {
             return Err(Error::parameter(format!("view.injection[{number}].at_tip"), true, mend));
         }
         Ok(pushed)
+    }
+
+    /// Has views show these coils, which were detached from instruments of the stack, after all that is in.
+    ///
+    /// # Errors
+    /// A coil of an instrument that is not there.
+    pub fn leave(&mut self, coils: &[DetachedCoil]) -> Result<()> {
+        let count = self.stack.instruments().len();
+        if let Some(other) = coils.iter().find(|coil| coil.instrument >= count) {
+            let mend = format!("there are {count} instruments, the innermost is 0");
+            return Err(Error::parameter("coil.instrument", other.instrument, mend));
+        }
+        self.coils = coils.to_vec();
+        Ok(())
     }
 
     /// Whether medium can come through an instrument.
@@ -110,7 +127,12 @@ impl Pushed {
         let view = |(((device, parts), _), shape): (((&Device, &Vec<DevicePart>), &f64), &Shape)| {
             DeviceView::of_device(shape, device, parts)
         };
-        each.zip(shapes).map(view).collect()
+        let left = self.coils.iter().map(|coil| {
+            let (device, parts) =
+                (&self.stack.instruments()[coil.instrument].device, &self.parts[coil.instrument]);
+            DeviceView::of_device(&coil.shape, device, parts)
+        });
+        each.zip(shapes).map(view).chain(left).collect()
     }
 }
 

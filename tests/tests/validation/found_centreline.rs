@@ -27,7 +27,7 @@ fn inserted_mm(scene: &Scene, script: &Script) -> f64 {
     let mut simulation = scene.simulation(&NoStore).unwrap();
     let mut run = script.begin();
     while let Some(step) = run.next(&simulation).unwrap() {
-        simulation.step_until(step.moves, step.time_s).unwrap();
+        step.carry_out(&mut simulation).unwrap();
         run.carried_out();
     }
     simulation.report().inserted_mm

@@ -20,7 +20,7 @@ pub(crate) use inputs::{
 };
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{
-    CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
+    CoilArgs, CoilKind, CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
 };
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.

@@ -53,6 +53,64 @@ pub(crate) enum ExperimentCommand {
     Loop(LoopArgs),
     /// Experiment 4: shape in the curved tube against a ground truth (the paper's Table 2)
     Deformation(DeformationArgs),
+    /// Coils that fill the sac of an aneurysm, pushed out of a microcatheter and detached one after another
+    Coil(CoilArgs),
+}
+
+/// What a coil is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum CoilKind {
+    /// It frames the sac.
+    Framing,
+    /// It fills what is framed.
+    Filling,
+    /// It fills what is left.
+    Finishing,
+}
+
+impl CoilKind {
+    /// What it is called.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Framing => "framing",
+            Self::Filling => "filling",
+            Self::Finishing => "finishing",
+        }
+    }
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CoilArgs {
+    /// Coils in their order, as often as they are named
+    #[arg(
+        long,
+        visible_alias = "coil",
+        value_delimiter = ',',
+        default_value = "framing,filling,finishing",
+        value_name = "KIND,…"
+    )]
+    pub(crate) coils: Vec<CoilKind>,
+    /// Volume of the sac, mm³
+    #[arg(long, default_value_t = 60.0, value_name = "MM3", allow_negative_numbers = true)]
+    pub(crate) volume_mm3: f64,
+    /// Length of each coil, mm
+    #[arg(long, default_value_t = 60.0, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) length_mm: f64,
+    /// Increment by which coils are pushed, mm
+    #[arg(long, default_value_t = 0.5, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) step_mm: f64,
+    /// Element length, mm
+    #[arg(long, default_value_t = 0.75, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) element_mm: f64,
+    /// Coefficient of friction of the wall
+    #[arg(long, default_value_t = 0.1, value_name = "MU", allow_negative_numbers = true)]
+    pub(crate) friction: f64,
+    /// Folder for coil.csv, .json, .svg and .png
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, clap::Args)]

@@ -2,10 +2,12 @@
 
 use endowire_core::Vec3;
 use endowire_core::device::{Stack, line_mm};
+use endowire_core::insertion::DetachedCoil;
 
 use crate::args::ExportArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::coils;
 use crate::output::instruments::Lengths;
 use crate::output::recording::Recording;
 use crate::output::vtk::{PointArray, PolyData, write_series};
@@ -23,6 +25,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let stack = scene.stack().map_err(in_scene)?;
     let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;
     let lengths = Lengths::read(&args.dir, &stack)?;
+    let left = coils::read(&args.dir, &stack)?;
     let steps = folder::step_times(&args.dir)?;
     let out = &args.vtk;
     std::fs::create_dir_all(out).map_err(|e| Failure::write(out, &e))?;
@@ -42,7 +45,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     for (row, (step, time_s)) in (1..=recording.steps()).zip(steps) {
         let lengths_mm = lengths.after(step, &recording.shape(row))?;
         let name = format!("step_{step:06}.vtp");
-        write(&name, &step_data(&recording, row, &stack, &lengths_mm))?;
+        write(&name, &step_data(&recording, row, &stack, (&lengths_mm, &coils::after(&left, step))))?;
         files.push((time_s, name));
         bar.inc(1);
     }
@@ -53,16 +56,23 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The line of each instrument that is in, and the contacts.
-fn step_data(recording: &Recording, row: usize, stack: &Stack, lengths_mm: &[f64]) -> PolyData {
+/// The line of each instrument that is in and of each coil that was left behind, and the contacts.
+fn step_data(
+    recording: &Recording,
+    row: usize,
+    stack: &Stack,
+    (lengths_mm, coils): (&[f64], &[DetachedCoil]),
+) -> PolyData {
     let line = recording.shape(row);
     let line_mm = line_mm(lengths_mm.iter().copied());
     let mut data = PolyData::default();
     let (mut of, mut from_tip_mm, mut radius_mm) = (Vec::new(), Vec::new(), Vec::new());
     let (mut tangents, mut forces_n) = (Vec::new(), Vec::new());
-    for (index, (device, mm)) in stack.devices().zip(lengths_mm).enumerate().filter(|(_, (_, mm))| **mm > 0.0)
-    {
-        let shape = line.behind(line_mm - mm);
+    let in_line = lengths_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0);
+    let in_line = in_line.map(|(index, mm)| (index, line.behind(line_mm - mm)));
+    let left = coils.iter().map(|coil| (coil.instrument, coil.shape.clone()));
+    for (index, shape) in in_line.chain(left) {
+        let device = &stack.instruments()[index].device;
         let first = data.points_mm.len();
         data.lines.push((first..first + shape.len()).collect());
         data.points_mm.extend_from_slice(&shape.positions_mm);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use endowire_core::insertion::{Script, Simulation, Tally};
+use endowire_core::insertion::{DetachedCoil, Script, Simulation, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, VesselMotion};
 use endowire_viewer::{ContactView, FrameTime};
@@ -64,6 +64,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
             moment,
             shape: &now.shape,
             inserted_mm: &now.inserted_mm,
+            coils: &now.coils,
             contacts: &now.contacts,
             before: None,
             displacement: now.displacement.as_ref(),
@@ -82,6 +83,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
 struct Now {
     shape: Shape,
     inserted_mm: Vec<f64>,
+    coils: Vec<DetachedCoil>,
     contacts: Vec<ContactView>,
     injections: Vec<Injected>,
     /// Where the vessel is.
@@ -103,11 +105,11 @@ fn after(
     let mut run = script.begin();
     let (mut injections, mut taken, mut tally) = (Vec::new(), 0, Tally::default());
     for index in 0..=steps {
-        let step = run.next(simulation)?.map(|step| (step.moves.to_vec(), step.time_s));
+        let step = run.next(simulation)?.map(Step::into_owned);
         injections.extend(Injected::begun(&run, injections.len(), frames_per_s, simulation));
         // A condition may have ended the script before.
-        let Some((moves, time_s)) = step.filter(|_| index < steps) else { break };
-        simulation.step_until(&moves, time_s).map_err(|e| {
+        let Some(step) = step.filter(|_| index < steps) else { break };
+        step.carry_out(simulation).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
         run.carried_out();
@@ -121,6 +123,7 @@ fn after(
     Ok(Now {
         shape: simulation.shape().clone(),
         inserted_mm: report.lengths_mm(),
+        coils: simulation.coils().to_vec(),
         contacts: contacts
             .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
             .collect(),

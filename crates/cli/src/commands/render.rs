@@ -11,6 +11,7 @@ use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::coils;
 use crate::output::folder::step_times;
 use crate::output::injections::{self, Injected};
 use crate::output::instruments::Lengths;
@@ -65,6 +66,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
+    let left = coils::read(&args.dir, &stack)?;
     let bar = progress::bar(frames, "frame");
     // Steps whose tips are told.
     let mut told = 0;
@@ -97,6 +99,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             moment: moment(k),
             shape: &shape,
             inserted_mm: &inserted_mm,
+            coils: &coils::after(&left, step),
             contacts: &contacts,
             displacement: displacement.as_ref(),
             before: before.map(|(inserted_mm, shape, time_s)| Seen { shape, inserted_mm, time_s: *time_s }),

@@ -4,6 +4,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use super::coils::COILS;
 use super::film::FILMS;
 use super::injections::INJECTIONS;
 use super::instruments::INSTRUMENTS;
@@ -116,7 +117,7 @@ fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
     let mut removed = vec![];
     // A film is ours in a recording alone, as frames are.
     let films = FILMS.iter().copied().filter(|_| recording);
-    for name in [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, arrays::PACKED].into_iter().chain(films) {
+    for name in [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, arrays::PACKED].into_iter().chain(films) {
         let path = folder.join(name);
         // Not the end of a link: a link itself is replaced.
         if path.symlink_metadata().is_ok() {

@@ -2,6 +2,7 @@
 
 mod arrays;
 pub(crate) mod chart;
+pub(crate) mod coils;
 pub(crate) mod film;
 pub(crate) mod folder;
 pub(crate) mod frames;

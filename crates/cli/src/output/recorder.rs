@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use endowire_core::device::Stack;
-use endowire_core::insertion::{Move, Simulation};
+use endowire_core::insertion::{DetachedCoil, Move, Simulation};
 use endowire_sweep::RunOutcome;
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
+use super::coils::{self, Left};
 use super::folder::{self, Claim};
 use super::frames::PlaneTold;
 use super::instruments::InstrumentTable;
@@ -102,6 +103,8 @@ pub(crate) struct Recorder {
     instruments: Option<InstrumentTable>,
     arrays: ShapeArrays,
     steps: usize,
+    /// Coils that were left behind so far.
+    left: Vec<Left>,
     /// Frames written so far, relative to the folder.
     pub(crate) frames: Vec<String>,
     checkpoint: Option<Instant>,
@@ -124,6 +127,7 @@ impl Recorder {
             instruments,
             arrays,
             steps: 0,
+            left: Vec::new(),
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -175,6 +179,9 @@ impl Recorder {
             Ok((table, InstrumentTable::go_on(folder, at.stack(), steps)?, arrays))
         };
         let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let mut left = coils::read(folder, at.stack())?;
+        left.retain(|left| left.step <= steps);
+        coils::write(folder, &left, at.stack())?;
         let table = csv::WriterBuilder::new().has_headers(kept.bytes == 0).from_writer(table);
         let recorder = Self {
             folder: folder.to_path_buf(),
@@ -182,6 +189,7 @@ impl Recorder {
             instruments,
             arrays,
             steps,
+            left,
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -246,7 +254,18 @@ impl Recorder {
         let pushed = self.arrays.push(shape, report, write_row);
         pushed.map_err(|error| Failure::write(&self.folder, &error))?;
         self.steps += 1;
+        let begun = simulation.coils().iter().skip(self.left.len());
+        let begun: Vec<Left> = begun.map(|coil| Left { step: self.steps, coil: coil.clone() }).collect();
+        if !begun.is_empty() {
+            self.left.extend(begun);
+            coils::write(&self.folder, &self.left, simulation.stack())?;
+        }
         Ok(())
+    }
+
+    /// Coils that lay there after a step.
+    pub(crate) fn coils(&self, step: usize) -> Vec<DetachedCoil> {
+        coils::after(&self.left, step)
     }
 
     /// Now and then, writes the summary as it is: what a run that is killed leaves.

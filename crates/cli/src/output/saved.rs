@@ -18,7 +18,7 @@ use super::whole;
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 14";
+const FORMAT: &str = "endowire state 15";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
@@ -104,7 +104,8 @@ fn replayed<'a>(
     let run = script.go_on(course, |step| {
         // Where it has a time, the vessel is elsewhere after it.
         numbers.extend(step.time_s.into_iter().flat_map(f64::to_le_bytes));
-        for one in step.moves {
+        numbers.extend(step.detach.into_iter().flat_map(|instrument| (instrument as u64).to_le_bytes()));
+        for one in &*step.moves {
             if several {
                 numbers.extend((one.instrument as u64).to_le_bytes());
             }

@@ -169,3 +169,27 @@ fn wrong_names_and_points_are_bad_input() {
         refused(&["deformation", "--measured", path], says);
     }
 }
+
+#[test]
+fn coils_follow_each_other_into_a_sac_and_what_it_cannot_hold_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let small =
+        ["coil", "--coils", "filling,finishing", "--length-mm", "8", "--step-mm", "1", "--element-mm", "1"];
+    let found = told(&experiment(&[&small[..], &["--out", out, "--json"]].concat()));
+    assert_written(folder.path(), "coil", &found);
+    let packing: Vec<f64> = rows(&found).iter().map(|row| row["packing"].as_f64().unwrap()).collect();
+    assert!(packing.windows(2).all(|pair| pair[0] <= pair[1] + 1e-9), "{packing:?}");
+    let whole_mm3 = 2.0 * 8.0 * std::f64::consts::FRAC_PI_4 * 0.254 * 0.254;
+    let expected = whole_mm3 / found["sac"]["volume_mm3"].as_f64().unwrap();
+    assert!((packing[packing.len() - 1] / expected - 1.0).abs() < 1e-6, "{packing:?} {expected}");
+    assert!(rows(&found).iter().all(|row| row["crossings"] == 0 && row["herniated"] == false));
+    for (flags, word) in [
+        (["--length-mm", "900"], "holds no more than 50 %"),
+        (["--volume-mm3", "1"], "--volume-mm3 1: give a number from 5 to 2000"),
+    ] {
+        let refused = experiment(&[&small[..1], &flags[..]].concat());
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(said(&refused).contains(word), "{}", said(&refused));
+    }
+}

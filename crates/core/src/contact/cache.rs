@@ -123,6 +123,12 @@ impl KnownPoints {
         self.points.clear();
     }
 
+    /// Keeps what the last points know, whose distances from the tip are others by so much, mm.
+    pub(crate) fn keep_last(&mut self, points: usize, farther_mm: f64) {
+        self.points.drain(..self.points.len().saturating_sub(points));
+        self.points.iter_mut().for_each(|known| known.from_tip_mm += farther_mm);
+    }
+
     /// Number of points.
     pub(crate) fn len(&self) -> usize {
         self.points.len()

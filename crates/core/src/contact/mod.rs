@@ -29,6 +29,7 @@ pub use distance::{Distance, Nearness, SmoothWall};
 pub use drag::Drag;
 pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place, SETTLED};
 pub use moved::MovedWall;
+pub(crate) use pairs::{Pressing, RodPlace, Still};
 pub use pairs::{SelfContact, Skin, Touching};
 pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;

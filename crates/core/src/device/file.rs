@@ -181,7 +181,15 @@ impl FileTable {
             parts.push(table.resolve(begin_mm, length_mm, kind.is_tube(), self.source.as_deref())?);
             begin_mm += length_mm;
         }
-        let device = Device::new(parts.iter().flat_map(Part::sections).collect())?;
+        let mut device = Device::new(parts.iter().flat_map(Part::sections).collect())?;
+        if kind == Kind::Coil {
+            // What is wound is the coil; behind it is the pusher.
+            let wound = self.part.iter().zip(&parts).take_while(|(table, _)| table.is_wound());
+            let coil_mm: f64 = wound.map(|(_, part)| part.from_tip_mm[1] - part.from_tip_mm[0]).sum();
+            if coil_mm > 0.0 && coil_mm < device.length_mm() {
+                device = device.with_coil(coil_mm)?;
+            }
+        }
         Ok((parts, device))
     }
 

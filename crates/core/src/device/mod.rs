@@ -122,6 +122,8 @@ impl Section {
 pub struct Device {
     sections: Vec<Section>,
     length_mm: f64,
+    /// Length from the tip that can be left behind, mm; 0 where nothing can.
+    coil_mm: f64,
 }
 
 /// Longest device accepted, mm. Ten metres: three times the longest exchange wire made; more is a unit mistake.
@@ -158,7 +160,38 @@ impl Device {
         }
         let length_mm = sections.iter().map(|s| s.length_mm).sum();
         crate::error::in_range("device length (sum of section lengths) in mm", length_mm, LENGTH_LIMIT_MM)?;
-        Ok(Self { sections, length_mm })
+        Ok(Self { sections, length_mm, coil_mm: 0.0 })
+    }
+
+    /// The same device as a coil on its pusher: so much of it, from the tip on, can be detached.
+    ///
+    /// # Errors
+    /// A length that is not above 0 and less than that of the device.
+    pub fn with_coil(self, coil_mm: f64) -> Result<Self> {
+        if coil_mm > 0.0 && coil_mm < self.length_mm {
+            return Ok(Self { coil_mm, ..self });
+        }
+        let mend = format!(
+            "must be above 0 and less than the device, {} mm: what is left is the pusher",
+            self.length_mm
+        );
+        Err(Error::parameter("device.coil_mm", coil_mm, mend))
+    }
+
+    /// Length from the tip that can be detached, mm; 0 of devices that are no coils.
+    pub fn coil_mm(&self) -> f64 {
+        self.coil_mm
+    }
+
+    /// Volume of the coil, the circle of its outer radius along its length, mm³; 0 of devices that are no coils.
+    pub fn coil_mm3(&self) -> f64 {
+        let mut left_mm = self.coil_mm;
+        let each = self.sections.iter().map(|section| {
+            let length_mm = left_mm.clamp(0.0, section.length_mm);
+            left_mm -= section.length_mm;
+            std::f64::consts::PI * section.radius_mm.powi(2) * length_mm
+        });
+        each.sum()
     }
 
     /// A device that is the same everywhere.

@@ -208,6 +208,11 @@ impl PartTable {
         format!("part \"{}\"", self.name)
     }
 
+    /// Whether it is wound of a wire.
+    pub(super) fn is_wound(&self) -> bool {
+        self.winding.is_some()
+    }
+
     /// Its length, if it says one, mm.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ pub struct Instrument {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
     instruments: Vec<Instrument>,
-    /// Set of material angles of each, where it has one.
+    /// Set of material angles of each, where it has one; coils, of which one is in at a time, share one.
     sets: Vec<Option<usize>>,
     /// Coefficient of friction between each and those outside it.
     frictions: Vec<f64>,
@@ -33,6 +33,28 @@ pub struct Stack {
 const MOST: usize = 16;
 /// Slack in inserted lengths, mm: the rounding of thousands of summed increments.
 pub(crate) const LENGTH_SLACK_MM: f64 = 1e-6;
+
+/// Sets of angles that are given out.
+#[derive(Default)]
+struct Angles {
+    count: usize,
+    coils: Option<usize>,
+}
+
+impl Angles {
+    /// The set of a device.
+    fn of(&mut self, device: &Device) -> usize {
+        let is_coil = device.coil_mm() > 0.0;
+        if let Some(set) = self.coils.filter(|_| is_coil) {
+            return set;
+        }
+        self.count += 1;
+        if is_coil {
+            self.coils = Some(self.count - 1);
+        }
+        self.count - 1
+    }
+}
 
 impl From<Device> for Stack {
     /// A device alone, named `device`.
@@ -53,20 +75,24 @@ impl Stack {
             let mend = format!("give 1 to {MOST} instruments, the innermost first");
             return Err(Error::parameter("instrument", instruments.len(), mend));
         }
-        let (mut sets, mut angles) = (Vec::with_capacity(instruments.len()), 0);
+        let (mut sets, mut angles) = (Vec::with_capacity(instruments.len()), Angles::default());
         for (index, instrument) in instruments.iter().enumerate() {
             let name = &instrument.name;
             if name.is_empty() || instruments[..index].iter().any(|other| other.name == *name) {
                 let mend = "every instrument has a name of its own: commands call it by that";
                 return Err(Error::parameter(format!("instrument[{index}].name"), format!("{name:?}"), mend));
             }
-            let shaped = instrument.device.is_shaped();
-            sets.push(shaped.then_some(angles));
-            angles += usize::from(shaped);
+            sets.push(instrument.device.is_shaped().then(|| angles.of(&instrument.device)));
         }
-        if angles > MAX_ANGLES {
-            let mend = format!("at most {MAX_ANGLES} instruments on one line may have a shape of their own");
-            return Err(Error::parameter("instrument", format!("{angles} with rest curvature"), mend));
+        if angles.count > MAX_ANGLES {
+            let mend = format!(
+                "at most {MAX_ANGLES} instruments on one line, coils counting as one, may have a shape of their own"
+            );
+            return Err(Error::parameter(
+                "instrument",
+                format!("{} with rest curvature", angles.count),
+                mend,
+            ));
         }
         let (frictions, valves_n) = (vec![0.0; instruments.len()], vec![0.0; instruments.len()]);
         Ok(Self { instruments, sets, frictions, valves_n })
@@ -133,16 +159,23 @@ impl Stack {
     /// The same instruments with a set of material angles each: friction twists straight ones too.
     ///
     /// # Errors
-    /// More than three instruments.
+    /// More than three instruments, coils counting as one.
     pub fn twisted(mut self) -> Result<Self> {
-        if self.sets.len() > MAX_ANGLES {
+        let mut angles = Angles::default();
+        let sets = self.devices().map(|device| Some(angles.of(device))).collect();
+        if angles.count > MAX_ANGLES {
             let mend = format!(
                 "friction twists every instrument, and at most {MAX_ANGLES} on one line may be twisted: leave some out, or set friction to 0"
             );
-            return Err(Error::parameter("instrument", self.sets.len(), mend));
+            return Err(Error::parameter("instrument", angles.count, mend));
         }
-        self.sets.iter_mut().enumerate().for_each(|(index, set)| *set = Some(index));
+        self.sets = sets;
         Ok(self)
+    }
+
+    /// Sets of material angles on the line.
+    pub(crate) fn angles(&self) -> usize {
+        self.sets.iter().flatten().max().map_or(0, |last| last + 1)
     }
 
     /// The instruments, the innermost first.

@@ -3,18 +3,20 @@
 mod batch;
 mod builder;
 mod nodes;
+mod packing;
 mod script;
 mod simulation;
 mod tally;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::{
-    Command, Energy, InstrumentReport, Jump, LateralForce, Move, Sheath, State, StepReport, Surroundings,
-    WallForce,
+    Command, DetachedCoil, Energy, InstrumentReport, Jump, LateralForce, Move, Sheath, State, StepReport,
+    Surroundings, WallForce,
 };
 pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use nodes::nodes_from_tip;
+pub use packing::Packing;
 pub use script::{
     Condition, Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
     script_commands,

@@ -7,7 +7,7 @@ use crate::device::{Device, LENGTH_SLACK_MM, Stack, line_mm};
 use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
 use crate::methods::{
-    Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings, WallForce,
+    Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings, WallForce,
 };
 use crate::shape::Shape;
 use crate::vessel::{Displacement, Lumen, VesselMotion};
@@ -125,6 +125,37 @@ impl Simulation {
         Err(Error::parameter("time_s", time_s, mend))
     }
 
+    /// Leaves the coil of an instrument behind, where it comes to rest, and takes its pusher out. After an error the state is as before, to the
+    /// bit.
+    ///
+    /// # Errors
+    /// An instrument that is not there, is no coil, is detached already or not out yet ([`Error::Parameter`]); a coil, or what is left in the vessel,
+    /// that does not come to rest ([`Error::Computation`]).
+    pub fn detach(&mut self, instrument: usize) -> Result<&StepReport> {
+        let instruments = self.scene.stack.instruments().len();
+        if instrument >= instruments {
+            let mend = format!("there are {instruments}, the innermost is 0");
+            return Err(Error::parameter("detach", instrument, mend));
+        }
+        self.method.detach(&self.scene.surroundings([self.time_s; 2]), instrument)?;
+        Ok(self.method.report())
+    }
+
+    /// Coils that were detached, in their order.
+    pub fn coils(&self) -> &[DetachedCoil] {
+        self.method.coils()
+    }
+
+    /// Refuses to advance an instrument whose coil was left behind.
+    fn check_attached(&self, command: Command, instrument: usize) -> Result<()> {
+        if command.advance_mm <= 0.0 || self.coils().iter().all(|coil| coil.instrument != instrument) {
+            return Ok(());
+        }
+        let name = &self.scene.stack.instruments()[instrument].name;
+        let mend = "its coil is detached: advance the next one";
+        Err(Error::parameter("advance_mm", format!("{} of {name:?}", command.advance_mm), mend))
+    }
+
     fn check_moves(&self, moves: &[Move]) -> Result<()> {
         let report = self.method.report();
         let instruments = self.scene.stack.instruments();
@@ -141,6 +172,7 @@ impl Simulation {
                 let mend = format!("{:?} is moved twice: add its motions up", instrument.name);
                 return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
             }
+            self.check_attached(one.command, one.instrument)?;
             let checked = check_command(one.command, inserted(one.instrument), instrument.device.length_mm());
             // A device alone has no name that a user has given it.
             let several = instruments.len() > 1;

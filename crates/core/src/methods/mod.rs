@@ -2,12 +2,14 @@
 //! they tell.
 
 mod command;
+mod detached;
 pub mod kirchhoff;
 mod report;
 mod sheath;
 mod state;
 
 pub use command::{Command, Move};
+pub use detached::DetachedCoil;
 pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
@@ -103,6 +105,20 @@ pub trait Method: Send {
             return self.step_together(surroundings, moves);
         }
         self.step(surroundings, moves.first().map_or_else(Command::default, |one| one.command))
+    }
+
+    /// Leaves the coil of an instrument behind and takes its pusher out; asked of methods that know coils, and of no other.
+    ///
+    /// # Errors
+    /// An instrument that is no coil, is detached already or is not out yet (input); a coil, or what is left, that does not come to rest
+    /// (computation).
+    fn detach(&mut self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
+    }
+
+    /// Coils that were detached, in their order.
+    fn coils(&self) -> &[DetachedCoil] {
+        &[]
     }
 
     /// The inserted centre line.

@@ -17,8 +17,10 @@ pub const PLACES: usize = 8;
 /// Derivatives of an energy of two points.
 #[derive(Debug, Clone, Copy)]
 pub struct Couple {
-    /// The elements.
-    pub elements: [usize; 2],
+    /// The element of the first point.
+    pub first: usize,
+    /// That of the second; none where it stays where it is, and only the derivatives in the first count.
+    pub second: Option<usize>,
     /// First derivatives.
     pub gradient: [Vec3; PLACES],
     /// Those under which tangents turn: the first derivatives, or where forces are unknowns of their own, what these are.
@@ -33,8 +35,9 @@ type Way = (usize, usize, Vec3);
 impl<const C: usize> Assembly<C> {
     /// Adds the energy of two points.
     pub(super) fn add_coupled(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple) {
-        let ways = ways::<C>(elements, state, couple.elements);
-        for (row, place, way) in &ways {
+        let (ways, count) = ways::<C>(elements, state, couple);
+        let ways = &ways[..count];
+        for (row, place, way) in ways {
             self.residual[*row] += way.dot(&couple.gradient[*place]);
         }
         if !self.hessian {
@@ -47,7 +50,7 @@ impl<const C: usize> Assembly<C> {
             }
         }
         let l = Layout::<C>;
-        for (side, e) in couple.elements.into_iter().enumerate() {
+        for (side, e) in couple.sides() {
             for (node, place) in [(e, 4 * side + 1), (e + 1, 4 * side + 3)] {
                 let back = elements[e].length * couple.carried[place].dot(&state.frames[node].t);
                 for row in [l.tangent(node), l.tangent(node) + 1] {
@@ -68,17 +71,23 @@ impl<const C: usize> Assembly<C> {
     }
 }
 
-/// The unknowns of both elements.
-fn ways<const C: usize>(elements: &[ElementData], state: &RodState, pair: [usize; 2]) -> [Way; 20] {
+impl Couple {
+    /// The points that move, by number, and their elements.
+    fn sides(&self) -> impl Iterator<Item = (usize, usize)> {
+        [Some(self.first), self.second].into_iter().flatten().enumerate()
+    }
+}
+
+/// The unknowns of the elements that move, and their number.
+fn ways<const C: usize>(elements: &[ElementData], state: &RodState, couple: &Couple) -> ([Way; 20], usize) {
     let l = Layout::<C>;
     let mut ways = [(0, 0, Vec3::zeros()); 20];
-    let mut next = ways.iter_mut();
+    let mut count = 0;
     let mut put = |way: Way| {
-        if let Some(place) = next.next() {
-            *place = way;
-        }
+        ways[count] = way;
+        count += 1;
     };
-    for (side, e) in pair.into_iter().enumerate() {
+    for (side, e) in couple.sides() {
         let h = elements[e].length;
         for (end, node) in [e, e + 1].into_iter().enumerate() {
             let place = 4 * side + 2 * end;
@@ -90,5 +99,5 @@ fn ways<const C: usize>(elements: &[ElementData], state: &RodState, pair: [usize
             put((l.tangent(node) + 1, place + 1, frame.v * h));
         }
     }
-    ways
+    (ways, count)
 }

@@ -1,6 +1,6 @@
 //! What holds the ends: the first node directly, the last one through multipliers.
 //!
-//! The first node never moves; its tangent and angle are held or free. Conditions on the last node are equations with
+//! The first node does not move unless all of it is free; its tangent and angle are held or free. Conditions on the last node are equations with
 //! multipliers, so a shape may start anywhere and the multipliers are the reactions. Their rows carry a flexibility far
 //! below that of the rod: it decides nothing (each Newton step removes what the last one left), but lets a rod that is
 //! held twice along its axis be factored.
@@ -18,6 +18,8 @@ const SUPPORT_FLEXIBILITY: f64 = 1e-12;
 /// Supports of both ends.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Supports {
+    /// The first node is as free as any other.
+    pub start_free: bool,
     /// The first node's tangent is held.
     pub start_tangent: bool,
     /// The first node's angles are held.
@@ -155,6 +157,9 @@ impl Supports {
     pub fn held<const C: usize>(&self) -> [Option<usize>; 5 + MAX_ANGLES] {
         let l = Layout::<C>;
         let mut held = [None; 5 + MAX_ANGLES];
+        if self.start_free {
+            return held;
+        }
         for (a, row) in held.iter_mut().enumerate().take(3) {
             *row = Some(l.position(0) + a);
         }

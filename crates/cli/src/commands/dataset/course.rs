@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::Vec3;
-use endowire_core::insertion::Tally;
+use endowire_core::insertion::{Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::Scene;
@@ -85,10 +85,14 @@ impl Course {
                 contacts: contacts.collect(),
                 displacement: simulation.displacement(),
             });
-            let step = run.next(&simulation)?.map(|step| (step.moves.to_vec(), step.time_s));
+            let step = run.next(&simulation)?.map(Step::into_owned);
             injected.extend(Injected::begun(&run, injected.len(), view.frames_per_s, &simulation));
-            let Some((moves, ends_s)) = step else { break };
-            if let Err(error) = simulation.step_until(&moves, ends_s) {
+            let Some(next) = step else { break };
+            if next.detach.is_some() {
+                let text = "its script leaves a coil behind, which pictures for learning do not label yet: leave script.detach out";
+                return Err(Failure::Input(format!("{}: {text}", file.display())));
+            }
+            if let Err(error) = next.carry_out(&mut simulation) {
                 let step = moments.len();
                 tell(format_args!(
                     "endowire: {}: step {step}: {error}; pictures are of those before",
@@ -98,7 +102,7 @@ impl Course {
             }
             run.carried_out();
             tally.count(moments.len(), &simulation);
-            step_time_s = ends_s.unwrap_or(moments.len() as f64 / view.frames_per_s);
+            step_time_s = next.time_s.unwrap_or(moments.len() as f64 / view.frames_per_s);
         }
         if let (Some(remarks), true) = (tally.remarks(moments.len() - 1), tally.unconverged_steps > 0) {
             tell(format_args!("endowire: {}: {remarks}", file.display()));

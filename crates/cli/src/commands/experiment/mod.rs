@@ -1,7 +1,8 @@
-//! `endowire experiment`: the four experiments of Li et al. 2011.
+//! `endowire experiment`: the four experiments of Li et al. 2011, and coils in an aneurysm.
 
 mod camera;
 mod catalogue;
+mod coil;
 mod deformation;
 mod lines;
 mod looping;
@@ -23,6 +24,7 @@ pub(crate) fn experiment(command: &ExperimentCommand) -> Result<(), Failure> {
         ExperimentCommand::Timing(args) => timing::timing(args),
         ExperimentCommand::Navigation(args) => navigation::navigation(args),
         ExperimentCommand::Loop(args) => looping::looping(args),
+        ExperimentCommand::Coil(args) => coil::coil(args),
         ExperimentCommand::Deformation(args) => deformation::deformation(args),
     }
 }

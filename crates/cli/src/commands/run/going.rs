@@ -18,14 +18,6 @@ use crate::output::provenance::Provenance;
 use crate::output::recorder::{Recorder, Summary};
 use crate::output::saved::{Course, Saver};
 
-/// The moves of a step and its time.
-type OwnStep = (Vec<Move>, Option<f64>);
-
-/// The moves of a step and its time, on their own.
-pub(super) fn own(step: Option<Step<'_>>) -> Option<OwnStep> {
-    step.map(|step| (step.moves.to_vec(), step.time_s))
-}
-
 /// What has come of a run.
 pub(super) struct SoFar<'a> {
     pub(super) scene: &'a Scene,
@@ -67,10 +59,10 @@ impl SoFar<'_> {
         self.failure = Some(StepFailure::new(after + 1, error));
     }
 
-    /// Moves the instruments.
-    fn simulate(&mut self, moves: &[Move], time_s: Option<f64>) -> endowire_core::Result<()> {
+    /// Carries out a step.
+    fn simulate(&mut self, step: &Step<'_>) -> endowire_core::Result<()> {
         let clock = Instant::now();
-        let result = self.simulation.step_until(moves, time_s);
+        let result = step.carry_out(&mut self.simulation).map(|_| ());
         self.course.step_time_s += clock.elapsed().as_secs_f64();
         result?;
         self.course.tally.count(self.course.steps + 1, &self.simulation);
@@ -116,7 +108,7 @@ impl Going<'_> {
     /// Carries out `next` and all steps after it, until one fails.
     pub(super) fn carry_out(
         &mut self,
-        mut next: Option<OwnStep>,
+        mut next: Option<Step<'static>>,
         interrupted: &AtomicBool,
         bar: &ProgressBar,
     ) {
@@ -136,21 +128,21 @@ impl Going<'_> {
     }
 
     /// Carries out a step and records it; the next one, if there is one and nothing failed.
-    fn step(&mut self, (moves, time_s): OwnStep) -> Option<OwnStep> {
+    fn step(&mut self, step: Step<'static>) -> Option<Step<'static>> {
         let before = self.so_far.course.steps;
-        if let Err(error) = self.so_far.simulate(&moves, time_s) {
+        if let Err(error) = self.so_far.simulate(&step) {
             self.so_far.fail(before, &error);
             return None;
         }
-        let time_s = time_s.unwrap_or_else(|| self.so_far.frames.time_s(before + 1));
+        let time_s = step.time_s.unwrap_or_else(|| self.so_far.frames.time_s(before + 1));
         let next = match self.so_far.hand.next(&self.so_far.simulation) {
-            Ok(step) => own(step),
+            Ok(step) => step.map(Step::into_owned),
             Err(error) => {
                 self.so_far.fail(before, &error);
                 None
             }
         };
-        if let Err(error) = self.record(&moves, time_s, next.is_none()) {
+        if let Err(error) = self.record(&step.moves, time_s, next.is_none()) {
             let (step, reason) = (before + 1, error.to_string());
             self.so_far.failure = Some(StepFailure { step, reason, kind: EndedBy::Unrecorded });
             self.ahead = self.recorder.steps() == before;

@@ -8,7 +8,7 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use endowire_core::insertion::Simulation;
+use endowire_core::insertion::{Simulation, Step};
 
 use crate::args::RunArgs;
 use crate::cache::Cache;
@@ -21,7 +21,7 @@ use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
 use crate::output::{frames::FrameWriter, progress, tell, whole};
 use crate::scenes;
-use going::{Going, SoFar, own};
+use going::{Going, SoFar};
 
 /// Runs the scene's script and records every step.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         })?,
         None => script.begin(),
     };
-    let next = own(hand.next(&simulation)?);
+    let next = hand.next(&simulation)?.map(Step::into_owned);
     let provenance = Provenance::of_scene(&scene, &args.set.set)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let course = saved.map_or_else(Course::begin, |saved| saved.course());

@@ -5,7 +5,7 @@ mod wishes;
 
 use std::path::{Path, PathBuf};
 
-use endowire_core::insertion::Tally;
+use endowire_core::insertion::{DetachedCoil, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
@@ -33,6 +33,8 @@ pub(super) struct Still<'a> {
     pub(super) shape: &'a Shape,
     /// Length in of the device, or of each instrument, mm.
     pub(super) inserted_mm: &'a [f64],
+    /// Coils that were left behind.
+    pub(super) coils: &'a [DetachedCoil],
     pub(super) contacts: &'a [ContactView],
     /// Where the vessel is, if it moves.
     pub(super) displacement: Option<&'a Displacement>,
@@ -207,6 +209,7 @@ impl<'a> Studio<'a> {
     }
 
     fn draw_all(&mut self, still: &Still) -> Result<(), Failure> {
+        self.plan.pushed.leave(still.coils)?;
         let views = self.plan.pushed.views(still.shape, still.inserted_mm);
         let orbited = match self.plan.args.orbit.filter(|_| self.plan.spec.wants(View::ThreeD)) {
             Some(orbit_deg) => Some(self.orbited(orbit_deg, &views, still)?),

@@ -57,6 +57,11 @@ fn is_open(state: &RodState) -> bool {
 }
 
 impl SelfContact {
+    /// Whether there is nothing but a rod that cannot touch itself.
+    fn is_alone_and_open(&self, state: &RodState) -> bool {
+        self.others.is_empty() && is_open(state)
+    }
+
     /// Whether nothing is near, at the base and at a state, and no step between them leads by anything.
     pub(super) fn stays_clear(&self, elements: &[ElementData], state: &RodState) -> bool {
         let most_mm = FREE * 2.0 * self.largest_radius_mm;
@@ -71,7 +76,7 @@ impl SelfContact {
         if self.closed {
             return false;
         }
-        if is_open(state) {
+        if self.is_alone_and_open(state) {
             self.clear = Some(Clear::default());
             return true;
         }
@@ -97,24 +102,27 @@ impl SelfContact {
         state: &RodState,
         advance_mm: f64,
     ) -> bool {
-        if advance_mm <= 0.0 || self.skins.is_empty() || is_open(state) {
+        if advance_mm <= 0.0 || self.skins.is_empty() || self.is_alone_and_open(state) {
             return false;
         }
         self.is_placed = false;
-        self.tree.place(&super::Curve { elements, state, closed: false });
+        self.tree.place(&super::Curve { elements, state, others: &self.others, closed: false });
         let tip = state.positions[elements.len()];
         let from = tip - state.frames[elements.len()].t * advance_mm;
-        self.tree.is_near_segment((&from, &tip), advance_mm + self.apart_mm(), self.largest_radius_mm)
+        let tip_mm = self.skins[elements.len() - 1].radius_mm;
+        let reach_mm = |e: usize| 0.5 * (self.skin(e).radius_mm + tip_mm);
+        self.tree.is_near_segment((&from, &tip), advance_mm + self.apart_mm(), reach_mm)
     }
 
     /// Whether the way from one state to another leads through the rod itself.
     pub(crate) fn crosses(&mut self, elements: &[ElementData], from: &RodState, to: &RodState) -> bool {
-        if self.skins.is_empty() || (is_open(from) && is_open(to)) {
+        if self.skins.is_empty() || (self.is_alone_and_open(from) && is_open(to)) {
             return false;
         }
         self.is_placed = false;
-        self.tree.place(&super::Curve { elements, state: from, closed: self.closed });
-        self.tree.move_to(&super::Curve { elements, state: to, closed: self.closed });
+        let curve = |state| super::Curve { elements, state, others: &self.others, closed: self.closed };
+        self.tree.place(&curve(from));
+        self.tree.move_to(&curve(to));
         self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0
     }
 }

@@ -1,8 +1,9 @@
 //! The centre line as a curve: places on it, and its derivatives there.
 //!
 //! On an element of length h it is the cubic of [`hermite`], in the parameter s = h ξ. Neighbouring elements share place and tangent, so that it
-//! is continuously differentiable in s, from one end to the other.
+//! is continuously differentiable in s, from one end to the other. Elements of other rods ([`Still`]) come after those of the rod itself.
 
+use super::Skin;
 use crate::Vec3;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
@@ -24,58 +25,113 @@ pub(super) struct Jet {
     pub(super) second: Vec3,
 }
 
-/// A rod's centre line.
+/// An element of another rod, which stays where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Still {
+    /// Places and tangents of its nodes.
+    pub(crate) nodes: [(Vec3, Vec3); 2],
+    pub(crate) length_mm: f64,
+    pub(crate) skin: Skin,
+    /// Number of its rod, and arc length from the begin of that, mm.
+    pub(crate) rod: usize,
+    pub(crate) begin_mm: f64,
+}
+
+/// The centre line of a rod, and those of the others.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Curve<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) state: &'a RodState,
-    /// Whether its end is its start.
+    pub(super) others: &'a [Still],
+    /// Whether the rod's end is its start.
     pub(super) closed: bool,
 }
 
 impl Curve<'_> {
     /// Position and derivatives at a place.
     pub(super) fn jet(&self, place: Place) -> Jet {
-        let (e, h) = (place.element, self.elements[place.element].length);
-        let (x0, x1) = (&self.state.positions[e], &self.state.positions[e + 1]);
-        let (t0, t1) = (self.state.frames[e].t, self.state.frames[e + 1].t);
+        let h = self.length_mm(place.element);
+        let [(x0, t0), (x1, t1)] = self.nodes(place.element);
         let [w0, s0, w1, s1] = hermite(place.xi);
         let (first, second) = Point::at(place.xi, 0.0).derivatives((x1 - x0) / h, t0, t1);
         Jet { at: x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * h, first, second: second / h }
     }
 
+    /// Number of all elements.
+    pub(super) fn len(&self) -> usize {
+        self.elements.len() + self.others.len()
+    }
+
+    /// The element, if it is one of another rod.
+    pub(super) fn other(&self, e: usize) -> Option<&Still> {
+        e.checked_sub(self.elements.len()).map(|k| &self.others[k])
+    }
+
+    /// Length of an element, mm.
+    pub(super) fn length_mm(&self, e: usize) -> f64 {
+        self.other(e).map_or_else(|| self.elements[e].length, |still| still.length_mm)
+    }
+
+    /// Places and tangents of the nodes of an element.
+    fn nodes(&self, e: usize) -> [(Vec3, Vec3); 2] {
+        self.other(e).map_or_else(
+            || [e, e + 1].map(|node| (self.state.positions[node], self.state.frames[node].t)),
+            |still| still.nodes,
+        )
+    }
+
+    /// The element before one on its rod.
+    pub(super) fn before(&self, e: usize) -> Option<usize> {
+        match self.other(e) {
+            Some(still) => (still.begin_mm > 0.0).then(|| e - 1),
+            None if e == 0 => self.closed.then(|| self.elements.len() - 1),
+            None => Some(e - 1),
+        }
+    }
+
+    /// The element after one on its rod.
+    pub(super) fn after(&self, e: usize) -> Option<usize> {
+        let next = e + 1;
+        match self.other(e) {
+            Some(still) => (next < self.len() && self.other(next)?.rod == still.rod).then_some(next),
+            None if next == self.elements.len() => self.closed.then_some(0),
+            None => Some(next),
+        }
+    }
+
     /// The place so far along the centre line from another, or the end on the way there.
     pub(super) fn walk(&self, from: Place, by: f64) -> Place {
         let Place { mut element, xi } = from;
-        let mut s = xi * self.elements[element].length + by;
-        let n = self.elements.len();
-        while s < 0.0 && (element > 0 || self.closed) {
-            element = (element + n - 1) % n;
-            s += self.elements[element].length;
+        let mut s = xi * self.length_mm(element) + by;
+        while s < 0.0
+            && let Some(before) = self.before(element)
+        {
+            element = before;
+            s += self.length_mm(element);
         }
-        while s > self.elements[element].length && (element + 1 < n || self.closed) {
-            s -= self.elements[element].length;
-            element = (element + 1) % n;
+        while s > self.length_mm(element)
+            && let Some(after) = self.after(element)
+        {
+            s -= self.length_mm(element);
+            element = after;
         }
-        Place { element, xi: (s / self.elements[element].length).clamp(0.0, 1.0) }
+        Place { element, xi: (s / self.length_mm(element)).clamp(0.0, 1.0) }
     }
 
     /// Whether a place is the end of the rod in this direction, 1 or −1.
     pub(super) fn ends(&self, place: Place, direction: f64) -> bool {
-        if self.closed {
-            false
-        } else if direction > 0.0 {
-            place.element + 1 == self.elements.len() && place.xi == 1.0
+        if direction > 0.0 {
+            place.xi == 1.0 && self.after(place.element).is_none()
         } else {
-            place.element == 0 && place.xi == 0.0
+            place.xi == 0.0 && self.before(place.element).is_none()
         }
     }
 
     /// The four control points of an element: it lies in their hull.
     pub(super) fn controls(&self, e: usize) -> [Vec3; 4] {
-        let third = self.elements[e].length / 3.0;
-        let (x0, x1) = (self.state.positions[e], self.state.positions[e + 1]);
-        [x0, x0 + self.state.frames[e].t * third, x1 - self.state.frames[e + 1].t * third, x1]
+        let third = self.length_mm(e) / 3.0;
+        let [(x0, t0), (x1, t1)] = self.nodes(e);
+        [x0, x0 + t0 * third, x1 - t1 * third, x1]
     }
 }
 

@@ -1,6 +1,6 @@
 //! What pairs exert: on the system of a step, in the merit along it, and as it is told.
 
-use super::curve::Curve;
+use super::curve::{Curve, Place};
 use super::gap::Gap;
 use super::{Pair, SelfContact};
 use crate::Vec3;
@@ -11,11 +11,13 @@ use crate::solve::{ContactMerit, Moved};
 /// Roundings of a coordinate by which a distance is off.
 const ROUNDING: f64 = 4.0;
 
-/// Where a rod presses on itself.
+/// Where a rod presses on itself or on another one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touching {
-    /// Arc lengths of the two points from the first node, mm.
+    /// Arc lengths of the two points from the first node of their rod, mm.
     pub arcs_mm: [f64; 2],
+    /// Number of the other rod on which the second point is; none where it is on the rod itself.
+    pub other: Option<usize>,
     /// Where they are, mm.
     pub positions_mm: [Vec3; 2],
     /// From the second to the first, unit length.
@@ -26,22 +28,52 @@ pub struct Touching {
     pub penetration_mm: f64,
 }
 
+/// Element and ξ.
+pub(crate) type RodPlace = (usize, f64);
+
+/// Two places of a rod, or of it and another one, that press on each other, as its elements have them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pressing {
+    /// Element and ξ of both; none of the second on another rod.
+    pub(crate) places: (RodPlace, Option<RodPlace>),
+    /// Force on the first; on the second it is the opposite, N.
+    pub(crate) force_n: Vec3,
+    /// Element of the site that feels it, by the length of which it counts, …
+    pub(crate) site: usize,
+    /// … and what is stored there, mJ.
+    pub(crate) energy_mj: f64,
+}
+
 impl SelfContact {
+    /// What presses at the base: at the last state of a solution.
+    pub(crate) fn pressing(&self) -> impl Iterator<Item = Pressing> + '_ {
+        let pressed = self.pairs.iter().filter(|pair| pair.depth_mm() > 0.0);
+        pressed.map(|pair| Pressing {
+            places: {
+                let [a, b] = pair.gap.at.map(|place| (place.element, place.xi));
+                (a, (!pair.of_other).then_some(b))
+            },
+            force_n: pair.gap.direction() * (pair.spring_n_per_mm * pair.depth_mm()),
+            site: self.sites[pair.site].place.element,
+            energy_mj: 0.5 * pair.spring_n_per_mm * pair.depth_mm().powi(2),
+        })
+    }
+
     /// Adds what presses at the base.
     pub(super) fn press(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        let mut rounding_n: f64 = 0.0;
         let curve = self.curve(elements, state);
-        self.rounding_n = 0.0;
         for pair in self.pairs.iter().filter(|pair| pair.at_base) {
             let depth_mm = pair.depth_mm();
             into.add_value(0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2));
             let farthest_mm =
-                pair.gap.at.map(|p| state.positions[p.element].amax()).into_iter().fold(0.0, f64::max);
-            self.rounding_n =
-                self.rounding_n.max(ROUNDING * f64::EPSILON * pair.spring_n_per_mm * farthest_mm);
+                pair.gap.at.map(|place| curve.jet(place).at.amax()).into_iter().fold(0.0, f64::max);
+            rounding_n = rounding_n.max(ROUNDING * f64::EPSILON * pair.spring_n_per_mm * farthest_mm);
             let force_n = pair.spring_n_per_mm * depth_mm;
             let couple = pair.couple(&curve, -force_n, pair.force_n, pair.spring_n_per_mm);
             into.add_couple(elements, state, &couple);
         }
+        self.rounding_n = rounding_n;
     }
 
     /// Merit of all pairs at a state, or what they store there if no forces are aimed at, mJ.
@@ -117,8 +149,13 @@ impl SelfContact {
     /// Where the rod presses on itself at the base: at the last state of a solution.
     pub fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         let curve = self.curve(elements, state);
+        let arc_mm = |place: Place| match curve.other(place.element) {
+            Some(still) => still.begin_mm + place.xi * still.length_mm,
+            None => self.tree.arc(place.element, place.xi),
+        };
         let of = |pair: &Pair| Touching {
-            arcs_mm: pair.gap.at.map(|place| self.tree.arc(place.element, place.xi)),
+            arcs_mm: pair.gap.at.map(arc_mm),
+            other: curve.other(pair.gap.at[1].element).map(|still| still.rod),
             positions_mm: pair.gap.at.map(|place| curve.jet(place).at),
             normal: pair.gap.between / pair.gap.between.norm(),
             force_n: pair.spring_n_per_mm * pair.depth_mm() * pair.gap.direction().norm(),
@@ -139,7 +176,8 @@ impl Pair {
             }
         }
         Couple {
-            elements: self.gap.at.map(|place| place.element),
+            first: self.gap.at[0].element,
+            second: (!self.of_other).then_some(self.gap.at[1].element),
             gradient: of.gradient.map(|g| g * first),
             carried: of.gradient.map(|g| g * -force_n),
             hessian: of.hessian,

@@ -161,7 +161,7 @@ impl Gap {
         let now = value(&a, &b, self.slide);
         let r = self.between;
         let c = self.weights();
-        let [ca, cb] = self.at.map(|place| slopes(place.xi, curve.elements[place.element].length));
+        let [ca, cb] = self.at.map(|place| slopes(place.xi, curve.length_mm(place.element)));
         let mut by_s = [Vec3::zeros(); PLACES];
         let mut by_t = [Vec3::zeros(); PLACES];
         for k in 0..PLACES {

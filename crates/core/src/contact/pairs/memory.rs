@@ -1,5 +1,7 @@
 //! Which pairs there are at a base, and what is kept of those before.
 
+use std::sync::Arc;
+
 use super::curve::{Curve, Place};
 use super::gap::Gap;
 use super::{KNOWN, LOOKED_AT, Pair, SelfContact};
@@ -22,7 +24,8 @@ impl SelfContact {
             self.pairs.clear();
             return;
         }
-        let curve = self.curve(elements, state);
+        let others = Arc::clone(&self.others);
+        let curve = Curve { elements, state, others: &others, closed: self.closed };
         self.place_tree(elements);
         self.counters.searches += 1;
         let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
@@ -33,7 +36,9 @@ impl SelfContact {
         self.pairs.clear();
         for (a, b) in &near {
             self.find_between(&curve, *a, *b, reach_mm);
-            self.find_between(&curve, *b, *a, reach_mm);
+            if curve.other(*b).is_none() {
+                self.find_between(&curve, *b, *a, reach_mm);
+            }
         }
         self.near = near;
         self.pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
@@ -44,15 +49,14 @@ impl SelfContact {
 
     /// Finds the pairs of the sites of element `a` with element `b`: where the distance from a site to `b` has a minimum in it.
     fn find_between(&mut self, curve: &Curve<'_>, a: usize, b: usize, reach_mm: f64) {
-        let elements = curve.elements;
         let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
         for site in self.first_sites[a]..self.first_sites[a + 1] {
             let place = self.sites[site].place;
             let x = curve.jet(place).at;
             let rises = |end: &super::curve::Jet| -(x - end.at).dot(&end.first);
             let (down, up) = (rises(&from), rises(&to));
-            let starts_here = down < 0.0 || (b == 0 && up >= 0.0 && !curve.closed);
-            let ends_here = up >= 0.0 || (b + 1 == elements.len() && down < 0.0 && !curve.closed);
+            let starts_here = down < 0.0 || (up >= 0.0 && curve.before(b).is_none());
+            let ends_here = up >= 0.0 || (down < 0.0 && curve.after(b).is_none());
             if !(starts_here && ends_here) {
                 continue;
             }
@@ -60,25 +64,27 @@ impl SelfContact {
             if (x - curve.jet(Place { element: b, xi }).at).norm() > reach_mm {
                 continue;
             }
-            let touch_mm = self.skins[a].radius_mm + self.skins[b].radius_mm;
+            let touch_mm = self.skin(a).radius_mm + self.skin(b).radius_mm;
             let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, touch_mm);
             if gap.distance < KNOWN * touch_mm {
-                self.pairs.extend(self.pair(elements, site, gap, touch_mm));
+                self.pairs.extend(self.pair(curve, site, gap, touch_mm));
             }
         }
     }
 
     /// The pair of a site with this gap, unless that is of its own stretch.
-    fn pair(&self, elements: &[ElementData], site: usize, gap: Gap, touch_mm: f64) -> Option<Pair> {
+    fn pair(&self, curve: &Curve<'_>, site: usize, gap: Gap, touch_mm: f64) -> Option<Pair> {
         let [a, b] = gap.at.map(|place| place.element);
         let [here_mm, arc_mm] = gap.at.map(|place| self.tree.arc(place.element, place.xi));
-        if a.abs_diff(b) < 2 || self.tree.between(here_mm, arc_mm) < self.apart_mm() {
+        let of_other = curve.other(b).is_some();
+        if !of_other && (a.abs_diff(b) < 2 || self.tree.between(here_mm, arc_mm) < self.apart_mm()) {
             return None;
         }
-        let [one, other] = [a, b].map(|e| &self.skins[e]);
+        let [one, other] = [a, b].map(|e| self.skin(e));
         let softer = 2.0 / (1.0 / one.modulus_n_per_mm2 + 1.0 / other.modulus_n_per_mm2);
-        let weight_mm = 0.5 * self.sites[site].weight_mm;
-        let element = &elements[a];
+        // Of two stretches of the rod each has sites that feel the other.
+        let weight_mm = if of_other { 1.0 } else { 0.5 } * self.sites[site].weight_mm;
+        let element = &curve.elements[a];
         Some(Pair {
             site,
             gap,
@@ -86,6 +92,7 @@ impl SelfContact {
             spring_n_per_mm: weight_mm * softer,
             penalty_n_per_mm: weight_mm * element.bending[1] * PENALTY / element.length.powi(4),
             arc_mm,
+            of_other,
             force_n: 0.0,
             at_base: false,
             presses: false,
@@ -117,7 +124,8 @@ impl SelfContact {
     /// Has the hierarchy be that of the base.
     pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
         if !std::mem::replace(&mut self.is_placed, true) {
-            self.tree.place(&Curve { elements, state: &self.base, closed: self.closed });
+            let (state, others) = (&self.base, &*self.others);
+            self.tree.place(&Curve { elements, state, others, closed: self.closed });
         }
     }
 
@@ -128,7 +136,7 @@ impl SelfContact {
             return *part;
         }
         self.place_tree(elements);
-        self.tree.move_to(&Curve { elements, state: to, closed: self.closed });
+        self.tree.move_to(&Curve { elements, state: to, others: &self.others, closed: self.closed });
         let part = self.tree.safe_part(self.apart_mm());
         self.checked.0.copy_from(to);
         self.checked.1 = part;

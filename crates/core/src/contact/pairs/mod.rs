@@ -8,7 +8,8 @@
 //! ```
 //!
 //! the wall's law ([`super::potential`]), where the half stands since each of two stretches has sites that feel the other. Stretches are other ones where they are
-//! at least half a turn of the least radius apart along the rod: a rod cannot be bent to a smaller one than its own.
+//! at least half a turn of the least radius apart along the rod: a rod cannot be bent to a smaller one than its own. Other rods, which stay where they
+//! are, are touched as loops are; they have no sites, so that wᵢ counts whole there.
 //!
 //! Forces of pairs are unknowns of their own, as those of the wall are: derived in [`super::wall`] (`wall/forces.rs`), with G in the place of d,
 //!
@@ -30,11 +31,15 @@ mod model;
 mod tests;
 mod tree;
 
+use std::sync::Arc;
+
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
 
+pub(crate) use curve::Still;
 use curve::{Curve, Place};
 pub use forces::Touching;
+pub(crate) use forces::{Pressing, RodPlace};
 use gap::Gap;
 use tree::Tree;
 
@@ -90,6 +95,8 @@ struct Pair {
     penalty_n_per_mm: f64,
     /// Arc length of the nearest point of the stretch, mm.
     arc_mm: f64,
+    /// Whether the stretch is one of another rod.
+    of_other: bool,
     /// Force of its own, N.
     force_n: f64,
     /// Whether it presses in the system at the base, …
@@ -130,6 +137,8 @@ pub struct PairCounters {
 #[derive(Debug, Clone, Default)]
 pub struct SelfContact {
     skins: Vec<Skin>,
+    /// The other rods.
+    others: Arc<[Still]>,
     sites: Vec<Site>,
     /// First site of each element, and one past the last.
     first_sites: Vec<usize>,
@@ -193,8 +202,19 @@ impl SelfContact {
         Self { closed: true, ..self }
     }
 
-    fn curve<'a>(&self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
-        Curve { elements, state, closed: self.closed }
+    /// Has these rods be the others.
+    pub(crate) fn beside(&mut self, others: &Arc<[Still]>) {
+        self.others = Arc::clone(others);
+        self.clear = None;
+    }
+
+    fn curve<'a>(&'a self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
+        Curve { elements, state, others: &self.others, closed: self.closed }
+    }
+
+    /// The surface of an element.
+    fn skin(&self, e: usize) -> Skin {
+        e.checked_sub(self.skins.len()).map_or_else(|| self.skins[e], |k| self.others[k].skin)
     }
 
     /// What was asked so far.

@@ -1,5 +1,8 @@
 //! The model of a step: gaps to first order, and springs where they close. See `wall/model.rs`, of which this is the other one.
 
+use std::sync::Arc;
+
+use super::curve::{Curve, Place};
 use super::{Pair, SelfContact};
 use crate::contact::point::FOLLOW;
 use crate::rod::{ElementData, RodState, Stencils};
@@ -11,8 +14,10 @@ impl Pair {
         if !self.foreseen {
             return 0.0;
         }
-        let [a, b] = self.gap.at.map(|place| moved((place.element, place.xi, 0)).0);
-        self.gap.direction().dot(&(a - b))
+        let way = |place: Place| moved((place.element, place.xi, 0)).0;
+        let [a, b] = self.gap.at;
+        let away = if self.of_other { way(a) } else { way(a) - way(b) };
+        self.gap.direction().dot(&away)
     }
 
     /// Force of its spring in the system after a step that changes its gap so much, N.
@@ -47,7 +52,8 @@ impl SelfContact {
         moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
-        let curve = self.curve(elements, base);
+        let others = Arc::clone(&self.others);
+        let curve = Curve { elements, state: base, others: &others, closed: self.closed };
         let mut changed = 0;
         for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
             pair.change_mm = pair.change(moved);

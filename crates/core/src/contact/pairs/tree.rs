@@ -48,10 +48,15 @@ pub(super) struct Tree {
     motions: Vec<Controls>,
     /// Of each half: places and motions. The children of `i` are 2i + 1 and 2i + 2.
     boxes: Vec<[Extent; 2]>,
-    /// Arc length at the begin of each element, and at the end of the last.
-    starts: Vec<f64>,
+    /// Arc lengths at the ends of each element; those of other rods follow far behind the rod's own.
+    arcs: Vec<[f64; 2]>,
+    /// Elements of the rod itself, which come first. Others are looked at against these alone.
+    own: usize,
     closed: bool,
 }
+
+/// Arc length between the end of the rod and the others, mm: more than any reach.
+const APART_MM: f64 = 1e3;
 
 /// A stretch of elements, and the number of its box.
 type Stretch = (usize, std::ops::Range<usize>);
@@ -64,18 +69,21 @@ fn halves((at, range): &Stretch) -> [Stretch; 2] {
 impl Tree {
     /// That of a rod where it is, without a motion.
     pub(super) fn place(&mut self, curve: &Curve<'_>) {
-        let n = curve.elements.len();
+        let n = curve.len();
+        self.own = curve.elements.len();
         self.closed = curve.closed;
         self.controls.clear();
         self.controls.extend((0..n).map(|e| curve.controls(e)));
         self.motions.clear();
         self.motions.resize(n, [Vec3::zeros(); 4]);
-        self.starts.clear();
-        self.starts.push(0.0);
-        self.starts.extend(curve.elements.iter().scan(0.0, |s, e| {
-            *s += e.length;
-            Some(*s)
-        }));
+        self.arcs.clear();
+        let mut end = 0.0;
+        for e in 0..n {
+            let begin =
+                end + if curve.other(e).is_some() && curve.before(e).is_none() { APART_MM } else { 0.0 };
+            end = begin + curve.length_mm(e);
+            self.arcs.push([begin, end]);
+        }
         self.boxes.clear();
         self.boxes.resize(2 * n.next_power_of_two() * 2, [Extent::EMPTY; 2]);
         self.enclose(&(0, 0..n));
@@ -105,22 +113,30 @@ impl Tree {
 
     /// Arc length from the first node to ξ of an element.
     pub(super) fn arc(&self, e: usize, xi: f64) -> f64 {
-        self.starts[e] + xi * (self.starts[e + 1] - self.starts[e])
+        let [begin, end] = self.arcs[e];
+        begin + xi * (end - begin)
     }
 
     /// Whether two elements, the first before the second, are so far apart along the rod that they can touch.
     fn may_touch(&self, a: usize, b: usize, apart: f64) -> bool {
-        let n = self.controls.len();
-        let around = self.starts[a] + self.starts[n] - self.starts[b + 1];
+        if b >= self.own {
+            return a < self.own;
+        }
+        let around = self.arcs[a][0] + self.length() - self.arcs[b][1];
         a + 1 < b
-            && self.starts[b] - self.starts[a + 1] >= apart
-            && !(self.closed && (a + n == b + 1 || around < apart))
+            && self.arcs[b][0] - self.arcs[a][1] >= apart
+            && !(self.closed && (a + self.own == b + 1 || around < apart))
     }
 
-    /// Arc length between two places, the shorter way round of a closed rod.
+    /// Length of the rod itself.
+    fn length(&self) -> f64 {
+        self.own.checked_sub(1).map_or(0.0, |last| self.arcs[last][1])
+    }
+
+    /// Arc length between two places of the rod itself, the shorter way round of a closed one.
     pub(super) fn between(&self, a: f64, b: f64) -> f64 {
         let apart = (a - b).abs();
-        if self.closed { apart.min(self.starts[self.controls.len()] - apart) } else { apart }
+        if self.closed { apart.min(self.length() - apart) } else { apart }
     }
 
     /// Elements (a, b), a before b, that may be nearer to each other than `reach`, and are at least `apart` from each other along the rod.
@@ -135,12 +151,17 @@ impl Tree {
         self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
     }
 
-    /// Whether an element at least `behind` from the rod's end comes nearer to a segment than `reach`.
-    pub(super) fn is_near_segment(&self, (from, to): (&Vec3, &Vec3), behind: f64, reach: f64) -> bool {
-        let n = self.controls.len();
+    /// Whether an element at least `behind` from the rod's end, or one of another rod, comes nearer to a segment than its `reach`.
+    pub(super) fn is_near_segment(
+        &self,
+        (from, to): (&Vec3, &Vec3),
+        behind: f64,
+        reach: impl Fn(usize) -> f64,
+    ) -> bool {
+        let (n, length) = (self.controls.len(), self.length());
         let segment = [*from, from + (to - from) / 3.0, to - (to - from) / 3.0, *to];
-        let others = (0..n).filter(|e| self.starts[n] - self.starts[e + 1] >= behind);
-        others.into_iter().any(|e| lower_distance(&self.controls[e], &segment) < reach)
+        let others = (0..n).filter(|e| *e >= self.own || length - self.arcs[*e][1] >= behind);
+        others.into_iter().any(|e| is_near(&self.controls[e], &segment, reach(e), SPLITS))
     }
 
     /// Part, at most all, of the motion in which no two points of elements at least `apart` along the rod come nearer to each other by more than half
@@ -169,12 +190,14 @@ impl Tree {
         is_near: &dyn Fn(&Stretch, &Stretch) -> bool,
         leaf: &mut dyn FnMut(usize, usize),
     ) {
-        if stretch.1.len() <= 1 {
+        if stretch.1.len() <= 1 || stretch.1.start >= self.own {
             return;
         }
         let [a, b] = halves(stretch);
         self.visit_within(&a, is_near, leaf);
-        visit_between(&a, &b, is_near, leaf);
+        // What is not of the rod itself stays where it is.
+        let is_near_rod = |a: &Stretch, b: &Stretch| a.1.start < self.own && is_near(a, b);
+        visit_between(&a, &b, &is_near_rod, leaf);
         self.visit_within(&b, is_near, leaf);
     }
 }
@@ -227,6 +250,14 @@ fn safe_part(a: &(Controls, Controls), b: &(Controls, Controls), part: f64, spli
         }
     }
     part
+}
+
+/// Whether a curve comes nearer to a segment than `reach`, but for what is left of its bulge.
+fn is_near(curve: &Controls, segment: &Controls, reach: f64, splits: usize) -> bool {
+    if lower_distance(curve, segment) >= reach {
+        return false;
+    }
+    splits == 0 || split(curve).iter().any(|half| is_near(half, segment, reach, splits - 1))
 }
 
 /// The two halves of a curve (de Casteljau).

@@ -18,7 +18,7 @@ const LONGEST_S: f64 = 1e6;
 /// One line of a script: a motion and the increments it is cut into.
 ///
 /// `advance_mm`, `retract_mm` or `withdraw`, with or without `rotate_deg`; given together they happen together. `exchange` is two motions.
-/// `inject` may stand alone: nothing moves then, and no time goes by. With `wait_s`, alone or beside it, hands rest and time goes by.
+/// `detach` stands alone: a coil is left behind. `inject` may stand alone: nothing moves then, and no time goes by. With `wait_s`, alone or beside it, hands rest and time goes by.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScriptLine {
@@ -49,6 +49,8 @@ pub struct ScriptLine {
     pub wait_s: Option<f64>,
     /// Largest increment of that time, s; 0.1 if absent.
     pub step_s: Option<f64>,
+    /// Whether the coil of the instrument, which is out, is left behind; its pusher is taken out.
+    pub detach: bool,
     /// Contrast medium that is injected from the start of the line on.
     pub inject: Option<Inject>,
     /// Lines of other instruments, which move at the same time; increments are as many as the one that needs most of them has.
@@ -75,6 +77,9 @@ impl ScriptLine {
             let inject = self.inject.as_ref();
             inject.map(|inject| Bolus::new(format!("{name}.inject"), inject, own, stack)).transpose()
         };
+        if self.detach {
+            return Ok(vec![self.detachment(name, stack)?]);
+        }
         let wait = self.wait(name)?;
         if wait.is_some() || self.only_injects() {
             let named = self.inject.as_ref().is_some_and(|inject| inject.through.is_some());
@@ -82,7 +87,7 @@ impl ScriptLine {
             let own = if asked { self.number(name, stack)? } else { 0 };
             let inject = bolus(own)?;
             let name = name.to_owned();
-            return Ok(vec![Motion { name, parts: vec![], wait, until: None, inject, exchange: None }]);
+            return Ok(vec![Motion { wait, inject, ..Motion::resting(name) }]);
         }
         let mut parts: Vec<Part> = Vec::new();
         for (name, line) in self.together(name)? {
@@ -100,7 +105,7 @@ impl ScriptLine {
         let until = self.until.as_ref().map(until).transpose()?;
         let Some(other) = &self.exchange else {
             let name = name.to_owned();
-            return Ok(vec![Motion { name, parts, wait: None, until, inject, exchange: None }]);
+            return Ok(vec![Motion { parts, until, inject, ..Motion::resting(name) }]);
         };
         // The line's own part is that of the instrument which comes in: its keys are those of the way in.
         let key = format!("{name}.exchange");
@@ -118,18 +123,30 @@ impl ScriptLine {
         let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
         let until = until.map(|condition| Condition { instrument, ..condition });
         let incoming = Incoming { key, instrument, name: other.clone() };
-        let motion = |part| Motion {
-            name: name.to_owned(),
-            parts: vec![part],
-            wait: None,
-            until: None,
-            inject: None,
-            exchange: None,
-        };
+        let motion = |part| Motion { parts: vec![part], ..Motion::resting(name.to_owned()) };
         Ok(vec![
             Motion { inject, exchange: Some(incoming), ..motion(withdrawn) },
             Motion { until, ..motion(inserted) },
         ])
+    }
+
+    /// The step that leaves a coil behind.
+    fn detachment(&self, name: &str, stack: &Stack) -> Result<Motion> {
+        let alone = Self { instrument: self.instrument.clone(), detach: true, ..Self::default() };
+        if *self != alone {
+            let mend = "stands alone with its instrument: leave all that moves, waits or injects to lines of their own";
+            return Err(Error::parameter(format!("{name}.detach"), true, mend));
+        }
+        let instrument = self.number(name, stack)?;
+        let one = &stack.instruments()[instrument];
+        if one.device.coil_mm() == 0.0 {
+            let mend = format!(
+                "{:?} is no coil: a device file of kind coil whose first part has a winding is one",
+                one.name
+            );
+            return Err(Error::parameter(format!("{name}.detach"), true, mend));
+        }
+        Ok(Motion { detach: Some(instrument), ..Motion::resting(name.to_owned()) })
     }
 
     /// Whether nothing moves in it.
@@ -215,7 +232,8 @@ impl ScriptLine {
                 Err(Error::parameter(format!("{name}.retract_mm"), r, mend))
             }
             (None, None, false) if self.rotate_deg.is_none() && self.exchange.is_none() => {
-                let mend = "give advance_mm, retract_mm, withdraw, rotate_deg, exchange, wait_s or inject";
+                let mend =
+                    "give advance_mm, retract_mm, withdraw, rotate_deg, exchange, detach, wait_s or inject";
                 Err(Error::parameter(name, "{}", mend))
             }
             (_, _, true) => Ok(Travel::Out),
@@ -246,8 +264,9 @@ impl ScriptLine {
                 return Err(Error::parameter(format!("{name}.with"), line.with.len(), mend));
             }
             let waits = line.wait_s.is_some() || line.step_s.is_some();
-            let keys = [line.until.is_some(), line.exchange.is_some(), line.inject.is_some(), waits];
-            for (key, given) in ["until", "exchange", "inject", "wait_s"].into_iter().zip(keys) {
+            let keys =
+                [line.until.is_some(), line.exchange.is_some(), line.inject.is_some(), waits, line.detach];
+            for (key, given) in ["until", "exchange", "inject", "wait_s", "detach"].into_iter().zip(keys) {
                 if given {
                     let mend = "belongs to the line itself, not to those with it";
                     return Err(Error::parameter(format!("{name}.{key}"), "given", mend));

@@ -90,11 +90,15 @@ impl Script {
     /// The moves of all steps, where they are known beforehand.
     ///
     /// # Errors
-    /// A line with a condition: where it ends is known only when it is carried out.
+    /// A line with a condition: where it ends is known only when it is carried out. One that leaves a coil behind.
     pub fn moves(&self) -> Result<Vec<Vec<Move>>> {
         if let Some(line) = self.conditional() {
             let mend = "where the line ends is not known beforehand: carry the script out step by step";
             return Err(Error::parameter(format!("{line}.until"), "given", mend));
+        }
+        if let Some(motion) = self.motions.iter().find(|motion| motion.detach.is_some()) {
+            let mend = "moves alone do not tell it: carry the script out step by step";
+            return Err(Error::parameter(format!("{}.detach", motion.name), true, mend));
         }
         let mut run = self.begin();
         let mut moves = Vec::with_capacity(self.len());
@@ -125,22 +129,52 @@ impl Script {
 struct Bounds {
     low: Lengths,
     high: Lengths,
+    /// The instruments whose coils were left behind.
+    detached: Vec<bool>,
 }
 
 impl Bounds {
     fn at(inserted_mm: &[f64]) -> Self {
         let lengths = Lengths { now_mm: inserted_mm.to_vec(), before_mm: inserted_mm.to_vec() };
-        Self { low: lengths.clone(), high: lengths }
+        Self { low: lengths.clone(), high: lengths, detached: vec![false; inserted_mm.len()] }
+    }
+
+    /// Leaves a coil behind: once, and nothing of it goes in again.
+    fn detach(&mut self, motion: &Motion, instrument: usize, stack: &Stack) -> Result<usize> {
+        let one = &stack.instruments()[instrument];
+        let refused = |mend: String| {
+            Err(Error::parameter(format!("{}.detach", motion.name), format!("{:?}", one.name), mend))
+        };
+        if std::mem::replace(&mut self.detached[instrument], true) {
+            return refused("is detached already: push the next coil".into());
+        }
+        let (high_mm, coil_mm) = (self.high.now_mm[instrument], one.device.coil_mm());
+        if high_mm < coil_mm {
+            return refused(format!("{high_mm} of {coil_mm} mm of the coil are in: advance it before"));
+        }
+        for lengths in [&mut self.low, &mut self.high] {
+            lengths.before_mm.clone_from(&lengths.now_mm);
+            lengths.now_mm[instrument] = 0.0;
+        }
+        Ok(1)
     }
 
     /// Goes through a motion; the number of its steps at most.
     fn go(&mut self, motion: &Motion, stack: &Stack) -> Result<usize> {
+        for part in motion.parts.iter().filter(|part| self.detached[part.instrument]) {
+            let name = &stack.instruments()[part.instrument].name;
+            let mend = "its coil is detached: advance the next one";
+            return Err(Error::parameter(format!("{}.instrument", part.name), format!("{name:?}"), mend));
+        }
         let steps = motion.steps(&self.high)?;
         if let Some(bolus) = &motion.inject {
             bolus.check_in(&self.high)?;
         }
         if let Some(incoming) = &motion.exchange {
             incoming.check_out(&self.low)?;
+        }
+        if let Some(instrument) = motion.detach {
+            return self.detach(motion, instrument, stack);
         }
         let (low, high) = (self.low.clone(), self.high.clone());
         if low == high {

@@ -56,6 +56,8 @@ pub(super) struct Motion {
     pub(super) inject: Option<Bolus>,
     /// The instrument that comes in by the next motion, where one leaves for it.
     pub(super) exchange: Option<Incoming>,
+    /// The instrument whose coil is left behind; then it is one step, and there are no parts.
+    pub(super) detach: Option<usize>,
 }
 
 /// An instrument that takes the place of another.
@@ -137,6 +139,11 @@ impl Part {
 }
 
 impl Motion {
+    /// One in which nothing is done.
+    pub(super) fn resting(name: String) -> Self {
+        Self { name, parts: Vec::new(), wait: None, until: None, inject: None, exchange: None, detach: None }
+    }
+
     /// Whether it takes time that is known.
     pub(super) fn is_timed(&self) -> bool {
         let has_speed = |part: &Part| part.speed_mm_per_s.is_some() || part.speed_deg_per_s.is_some();
@@ -148,7 +155,8 @@ impl Motion {
     /// # Errors
     /// More steps than a script may have.
     pub(super) fn steps(&self, lengths: &Lengths) -> Result<Steps> {
-        let (mut count, mut duration_s) = (usize::from(!self.parts.is_empty()), 0.0_f64);
+        let (mut count, mut duration_s) =
+            (usize::from(!self.parts.is_empty() || self.detach.is_some()), 0.0_f64);
         for part in &self.parts {
             let mm = part.travel_mm(lengths);
             count = count.max(part.increments(mm)?);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::motion::{Lengths, Steps};
 use super::until::Condition;
 use super::{Injection, Met, Script};
-use crate::insertion::{Move, Simulation};
+use crate::insertion::{Move, Simulation, StepReport};
 use crate::{Error, Result};
 
 /// What a script has come to: all that is needed, beside the script, to go on.
@@ -27,10 +27,12 @@ pub struct LineCourse {
 }
 
 /// A step of a script.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Step<'a> {
     /// What moves.
-    pub moves: &'a [Move],
+    pub moves: Cow<'a, [Move]>,
+    /// The instrument whose coil is left behind; then nothing moves.
+    pub detach: Option<usize>,
     /// Time at its end since the start of the script, s; none where the script has no speeds.
     pub time_s: Option<f64>,
     /// How long it takes, s; 0 where the script has no speeds.
@@ -49,6 +51,25 @@ pub struct ScriptRun<'a> {
     /// Steps carried out.
     done: usize,
     injections: Vec<Injection>,
+}
+
+impl Step<'_> {
+    /// The same on its own.
+    pub fn into_owned(self) -> Step<'static> {
+        let Self { moves, detach, time_s, duration_s } = self;
+        Step { moves: Cow::Owned(moves.into_owned()), detach, time_s, duration_s }
+    }
+
+    /// Carries it out.
+    ///
+    /// # Errors
+    /// As [`Simulation::step_until`] and [`Simulation::detach`].
+    pub fn carry_out<'a>(&self, simulation: &'a mut Simulation) -> Result<&'a StepReport> {
+        match self.detach {
+            Some(instrument) => simulation.detach(instrument),
+            None => simulation.step_until(&self.moves, self.time_s),
+        }
+    }
 }
 
 impl Script {
@@ -131,7 +152,13 @@ impl<'a> ScriptRun<'a> {
         }
         let duration_s = self.steps.as_ref().map_or(0.0, |steps| steps.step_s);
         let time_s = self.script.is_timed().then_some(self.time_s + duration_s);
-        Ok(self.steps.as_ref().map(|steps| Step { moves: &steps.moves, time_s, duration_s }))
+        let detach = self.script.motions[self.course.motions.len() - 1].detach;
+        Ok(self.steps.as_ref().map(|steps| Step {
+            moves: Cow::Borrowed(&steps.moves),
+            detach,
+            time_s,
+            duration_s,
+        }))
     }
 
     /// Says that the step that was told last has been carried out.
@@ -142,6 +169,9 @@ impl<'a> ScriptRun<'a> {
         self.time_s += steps.step_s;
         for one in &steps.moves {
             self.lengths.now_mm[one.instrument] += one.command.advance_mm;
+        }
+        if let Some(instrument) = self.script.motions[self.course.motions.len() - 1].detach {
+            self.lengths.now_mm[instrument] = 0.0;
         }
     }
 

@@ -403,3 +403,47 @@ fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_lin
     assert!(outcome.starts_with("script[1].inject = 1 ml: the instrument is not in"), "{outcome}");
     assert!(script.begin().next_where(|_| None).is_ok(), "the twin: it is in then");
 }
+
+/// Two coils of 20 mm, and a catheter.
+fn coils() -> Stack {
+    let coil = || {
+        let sections = vec![Section::straight(20.0, 0.1, 1e-3), Section::straight(80.0, 0.1, 1.0)];
+        Device::new(sections).unwrap().with_coil(20.0).unwrap()
+    };
+    let catheter = Section { inner_radius_mm: Some(0.2), ..Section::straight(50.0, 0.3, 5.0) };
+    let one = |name: &str, device| Instrument { name: name.to_owned(), device, may_lead: true };
+    Stack::new(vec![
+        one("framing", coil()),
+        one("filling", coil()),
+        one("catheter", Device::new(vec![catheter]).unwrap()),
+    ])
+    .unwrap()
+}
+
+#[test]
+fn a_coil_is_detached_by_a_line_of_its_own_and_the_next_one_follows() {
+    let by = |instrument: &str, mm: f64| ScriptLine { advance_mm: Some(mm), ..line(instrument) };
+    let detach = |instrument: &str| ScriptLine { detach: true, ..line(instrument) };
+    let made = |lines: &[ScriptLine]| Script::new(lines, &coils(), &[0.0, 0.0, 5.0], None);
+    let lines = [by("framing", 26.0), detach("framing"), by("filling", 26.0)];
+    let script = made(&lines).unwrap();
+    assert_eq!(script.len(), 53);
+    let (mut run, mut detached) = (script.begin(), Vec::new());
+    while let Some(step) = run.next_where(|_| None).unwrap() {
+        detached.push(step.detach);
+        run.carried_out();
+    }
+    assert!(detached[26] == Some(0) && detached.iter().flatten().count() == 1);
+    assert!(script.moves().unwrap_err().to_string().starts_with("script[1].detach"));
+    let told = |lines: &[ScriptLine]| made(lines).unwrap_err().to_string();
+    for (lines, expected) in [
+        (&[by("framing", 26.0), detach("framing"), detach("framing")][..], "script[2].detach = \"framing\""),
+        (&[by("framing", 26.0), detach("framing"), by("framing", 1.0)], "script[2].instrument = \"framing\""),
+        (&[by("framing", 10.0), detach("framing")], "10 of 20 mm of the coil are in"),
+        (&[detach("catheter")], "is no coil"),
+        (&[by("framing", 26.0), by("filling", 1.0)], "has no lumen"),
+        (&[ScriptLine { detach: true, ..by("framing", 26.0) }], "stands alone"),
+    ] {
+        assert!(told(lines).contains(expected), "{}", told(lines));
+    }
+}

@@ -55,8 +55,8 @@ impl Balance {
             let (was, is) = (before.hand(index), after.hand(index));
             let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
             // With nothing inserted a hand feels nothing, and all that comes out of the sheath may pull at it.
-            let at_first =
-                if was.inserted_mm == 0.0 { -from_sheath_mj.abs() / is.inserted_mm } else { push(&was) };
+            let comes_in = was.inserted_mm == 0.0 && is.inserted_mm > 0.0;
+            let at_first = if comes_in { -from_sheath_mj.abs() / is.inserted_mm } else { push(&was) };
             add(at_first, push(&is), is.inserted_mm - was.inserted_mm);
             add(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
         }

@@ -1,6 +1,8 @@
 //! One command: in one sub-step where that will do, in several where it will not, and to where the device comes to rest as it can where
 //! the way is lost.
 
+use std::sync::Arc;
+
 use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::carried;
@@ -71,6 +73,35 @@ impl Sum {
 }
 
 impl<const C: usize> Workspace<C> {
+    /// Begins with moves, and what ticks have left over, from the state `from`.
+    ///
+    /// # Errors
+    /// [`PhysicalEnd`](crate::PhysicalEnd) of a tip that has left the vessel and would be pushed on.
+    pub(super) fn begin(
+        &mut self,
+        environment: &Environment<'_>,
+        from: &KirchhoffState,
+        moves: &[Move],
+    ) -> Result<()> {
+        let Self { tools, now, next, most: (elements, points), way, .. } = self;
+        now.own(*elements, *points);
+        next.own(*elements, *points);
+        for state in [now.parts().1, next.parts().1] {
+            state.coils = Arc::clone(&from.coils);
+        }
+        tools.touch(&from.coils, environment.surroundings.stack);
+        tools.work = Work::default();
+        let surroundings = &environment.surroundings;
+        way.begin(surroundings.stack, &from.report, moves);
+        let advance_mm = line_mm(lengths(&way.target)) - line_mm(lengths(&way.start));
+        if advance_mm > 0.0 {
+            let displaced = surroundings.displacement(0.0);
+            let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
+            check_inside(surroundings.lumen.openings(), &tip_mm, advance_mm)?;
+        }
+        Ok(())
+    }
+
     /// Carries out a command from the state `from`, and leaves the new state in `now`.
     ///
     /// # Errors
@@ -81,20 +112,13 @@ impl<const C: usize> Workspace<C> {
         from: &KirchhoffState,
         moves: &[Move],
     ) -> Result<()> {
-        let Self { tools, mesh, now, next, most: (elements, points), way, hands } = self;
-        now.own(*elements, *points);
-        next.own(*elements, *points);
+        self.begin(environment, from, moves)?;
+        let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
         let displacement = |part: f64| surroundings.displacement(part);
         let mut displaced = displacement(0.0);
-        way.begin(surroundings.stack, &from.report, moves);
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
-        if target > start {
-            let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
-            check_inside(surroundings.lumen.openings(), &tip_mm, target - start)?;
-        }
         let (mut sum, mut balanced) = (Sum::default(), true);
-        tools.work = Work::default();
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD);
         let work = (WORK * travel.max(1.0)) as usize;

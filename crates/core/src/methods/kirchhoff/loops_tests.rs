@@ -3,7 +3,7 @@
 use super::{Kirchhoff, KirchhoffOptions};
 use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
-use crate::insertion::{Command, Sheath, Simulation, WallProperties};
+use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use crate::methods::{Method, Surroundings};
 use crate::random::{splitmix64, unit};
 use crate::rod::TWISTED;
@@ -14,7 +14,7 @@ use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Lumen, NoStor
 const RADIUS_MM: f64 = 0.2;
 
 /// A soft wire whose rest shape is a helix of 3 mm radius, a tube of this radius, and a sheath beside its axis.
-fn parts(tube_mm: f64) -> (GeneratedWall, Device, Sheath) {
+pub(super) fn parts(tube_mm: f64) -> (GeneratedWall, Device, Sheath) {
     let node = |i: usize| CentrelineNode {
         position_mm: Vec3::z() * (20.0 * i as f64),
         radius_mm: tube_mm,
@@ -44,7 +44,7 @@ fn curling(tube_mm: f64, self_contact: bool) -> Simulation {
 }
 
 /// Points of the device's axis, a twentieth of a millimetre apart or less.
-fn axis(shape: &Shape) -> Vec<Vec3> {
+pub(super) fn axis(shape: &Shape) -> Vec<Vec3> {
     let mut points = Vec::new();
     for e in 0..shape.len() - 1 {
         let h = shape.from_tip_mm[e] - shape.from_tip_mm[e + 1];
@@ -192,13 +192,53 @@ fn wires_pushed_and_turned_at_random_do_not_pass_through_themselves() {
     assert!(twins > 3, "{twins}");
 }
 
-#[test]
-fn several_instruments_are_told_that_their_loops_do_not_touch() {
-    let (made, device, sheath) = parts(4.0);
-    let outer = Section { inner_radius_mm: Some(0.3), ..Section::straight(100.0, 0.5, 1.0) };
+/// A wire that curls, in a catheter that stands 6 mm out of the sheath.
+fn through_catheter(self_contact: bool) -> Simulation {
+    let (made, wire, sheath) = parts(4.0);
+    let catheter = Section { inner_radius_mm: Some(0.3), ..Section::straight(100.0, 0.5, 0.5) };
     let one = |name: &str, device: Device| Instrument { name: name.to_owned(), device, may_lead: true };
-    let outer = Device::new(vec![outer]).unwrap();
-    let stack = Stack::new(vec![one("wire", device), one("catheter", outer)]).unwrap();
-    let builder = Simulation::builder(made.wall, stack, sheath).method(&method(true)).build();
-    assert!(builder.err().unwrap().to_string().contains("method.self_contact"));
+    let catheter = Device::new(vec![catheter]).unwrap();
+    let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
+    let builder = Simulation::builder(made.wall, stack, sheath).properties(properties());
+    let mut simulation = builder.method(&method(self_contact)).build().unwrap();
+    let together = [0, 1].map(|instrument| Move { instrument, command: Command::advance(1.0) });
+    for _ in 0..3 {
+        simulation.step_together(&together).unwrap();
+    }
+    simulation
+}
+
+#[test]
+fn hands_of_several_instruments_feel_what_loops_do() {
+    let run = |self_contact: bool| {
+        let mut simulation = through_catheter(self_contact);
+        let mut least_mm = f64::INFINITY;
+        while simulation.report().inserted_mm < 30.0 {
+            simulation.step(Command::advance(0.5)).unwrap();
+            least_mm = least_mm.min(least_distance_mm(simulation.shape()));
+        }
+        (simulation, least_mm)
+    };
+    let (simulation, least_mm) = run(true);
+    assert!(!simulation.touching().is_empty() && least_mm > 1.98 * RADIUS_MM, "{least_mm}");
+    // A slope of the energy is what the hand puts in, beside what comes out of the sheath.
+    let straightened_n = [simulation.device().section_at(50.0).straightening_n(), 0.0];
+    for instrument in [0, 1] {
+        let energy = |mm: f64| {
+            let mut beside = simulation.clone();
+            let moves = [Move { instrument, command: Command::advance(mm) }];
+            beside.step_together(&moves).unwrap().energy.total()
+        };
+        let step_mm = 0.01;
+        let [a, b, d, e] = [-2.0, -1.0, 1.0, 2.0].map(|k| energy(k * step_mm));
+        let slope_n = (8.0 * (d - b) - (e - a)) / (12.0 * step_mm) - straightened_n[instrument];
+        let felt_n = simulation.report().instruments[instrument].push_force_n.unwrap();
+        assert!(
+            (felt_n - slope_n).abs() < 2e-3 * slope_n.abs().max(1e-3),
+            "{instrument}: {felt_n} {slope_n}"
+        );
+    }
+    // The twin: without it the wire passes through itself.
+    let (twin, least_mm) = run(false);
+    assert!(twin.touching().is_empty() && least_mm < RADIUS_MM, "{least_mm}");
 }

@@ -23,6 +23,9 @@ mod coaxial_friction_tests;
 mod coaxial_tests;
 mod command;
 mod configuration;
+mod detach;
+#[cfg(test)]
+mod detach_tests;
 #[cfg(test)]
 mod drag_tests;
 mod extrapolation;
@@ -65,7 +68,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
-use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -144,7 +147,7 @@ fn several(
     surroundings: &Surroundings<'_>,
     store: &dyn WallStore,
 ) -> Result<Box<dyn Method>> {
-    Ok(match surroundings.stack.sets().iter().flatten().count() {
+    Ok(match surroundings.stack.angles() {
         0 => Box::new(Kirchhoff::<PLAIN>::new(options, surroundings, store)?),
         1 => Box::new(Kirchhoff::<TWISTED>::new(options, surroundings, store)?),
         2 => Box::new(Kirchhoff::<{ PLAIN + 8 }>::new(options, surroundings, store)?),
@@ -241,10 +244,6 @@ impl<const C: usize> Kirchhoff<C> {
             );
             return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, mend));
         }
-        if options.self_contact && surroundings.stack.is_several() {
-            let mend = "loops of several instruments on one line do not feel each other yet: leave it out";
-            return Err(Error::parameter("method.self_contact", true, mend));
-        }
         if options.self_contact && surroundings.motion.is_some() {
             let mend =
                 "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
@@ -269,18 +268,18 @@ impl<const C: usize> Kirchhoff<C> {
         Ok(method)
     }
 
-    /// Has the workspace work on what is left to do, if anything is, and takes its new state if it says that there is one.
-    fn work<T>(
+    /// Whether nothing is left to do: hands and vessel rest, and so does the device.
+    fn rests(&self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
+        let still = moves.iter().all(|one| one.command == Command::default());
+        still && !surroundings.moves() && self.state.report.behind.is_empty()
+    }
+
+    /// Has the workspace work on, and goes on to the state that it leaves if it says that there is a new one; where that fails, to none.
+    fn work_on<T>(
         &mut self,
         surroundings: &Surroundings<'_>,
-        moves: &[Move],
         work: impl FnOnce(&mut Workspace<C>, &Environment<'_>, &KirchhoffState) -> Result<(bool, T)>,
-    ) -> Result<Option<T>> {
-        let rests = moves.iter().all(|one| one.command == Command::default());
-        if rests && !surroundings.moves() && self.state.report.behind.is_empty() {
-            Arc::make_mut(&mut self.state).report.rest();
-            return Ok(None);
-        }
+    ) -> Result<T> {
         let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut workspace = match self.workspace.take() {
             Some(workspace) => workspace,
@@ -298,7 +297,7 @@ impl<const C: usize> Kirchhoff<C> {
             self.write_shape(&workspace.mesh.from_tip_mm);
         }
         self.workspace = Some(workspace);
-        Ok(Some(done?.1))
+        done.map(|(_, told)| told)
     }
 
     /// Checks that a state may be one of this simulation where the hands are at `hands`, and returns the mesh that it has then.
@@ -316,6 +315,7 @@ impl<const C: usize> Kirchhoff<C> {
         let mut mesh = Mesh::default();
         meshed(&environment, hands, &mut mesh);
         state.check(&Belongs {
+            stack: surroundings.stack,
             surface: &self.surface,
             sheath: surroundings.sheath,
             elements: mesh.elements.len(),
@@ -358,22 +358,29 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
-        self.work(surroundings, moves, |workspace, environment, state| {
+        if self.rests(surroundings, moves) {
+            Arc::make_mut(&mut self.state).report.rest();
+            return Ok(());
+        }
+        self.work_on(surroundings, |workspace, environment, state| {
             workspace.carry_out(environment, state, moves).map(|()| (true, ()))
-        })?;
-        Ok(())
+        })
     }
 
     fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
-        let ticked = self.work(surroundings, moves, |workspace, environment, state| {
+        if self.rests(surroundings, moves) {
+            Arc::make_mut(&mut self.state).report.rest();
+            return Ok(());
+        }
+        let ticked = self.work_on(surroundings, |workspace, environment, state| {
             let ticked = workspace.tick(environment, state, moves, solves)?;
             Ok((matches!(ticked, Ticked::Moved), ticked))
         });
         match ticked {
-            Ok(None | Some(Ticked::Moved)) => Ok(()),
+            Ok(Ticked::Moved) => Ok(()),
             // Time goes on: what the vessel does to the device cannot wait.
-            Ok(Some(Ticked::Overtaken)) => self.step_together(surroundings, moves),
-            Ok(Some(Ticked::Rests(longest_mm, begun))) => {
+            Ok(Ticked::Overtaken) => self.step_together(surroundings, moves),
+            Ok(Ticked::Rests(longest_mm, begun)) => {
                 let state = Arc::make_mut(&mut self.state);
                 (state.stride.part_mm, state.tick) = (longest_mm, begun);
                 let nodes_solved = state.report.nodes_solved;
@@ -392,6 +399,16 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 Err(error)
             }
         }
+    }
+
+    fn detach(&mut self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        self.work_on(surroundings, |workspace, environment, state| {
+            workspace.detach(environment, state, instrument).map(|()| (true, ()))
+        })
+    }
+
+    fn coils(&self) -> &[DetachedCoil] {
+        &self.state.coils
     }
 
     fn shape(&self) -> &Shape {
@@ -427,7 +444,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
-        let mut loops = SelfContact::new(&mesh.elements, loops::skins(&mesh).collect());
+        let mut loops = SelfContact::new(&mesh.elements, loops::skins(&mesh, surroundings.stack).collect());
+        loops.beside(&DetachedCoil::elements(&self.state.coils, surroundings.stack).into());
         loops.touching_at(&mesh.elements, &self.state.rod)
     }
 

@@ -4,7 +4,7 @@ use super::Environment;
 use super::configuration::Configuration;
 use super::hands::Hand;
 use super::inner_friction::LEAST_SLIP_MM;
-use super::slopes::write_instruments;
+use super::slopes::{Acting, write_instruments};
 use super::workspace::Tools;
 use crate::Vec3;
 use crate::contact::Drag;
@@ -38,8 +38,7 @@ impl<const C: usize> Tools<C> {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
             if surroundings.stack.is_several() {
-                let touching = (&[][..], &[][..], None);
-                write_instruments::<C>(environment, hands, None, touching, at);
+                write_instruments::<C>(environment, hands, None, Acting::default(), at);
             }
             return 0.0;
         }
@@ -58,7 +57,12 @@ impl<const C: usize> Tools<C> {
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
             let between = self.friction.between.places();
-            write_instruments::<C>(environment, hands, Some(&clamp), (&self.touches, between, drag), at);
+            let loops: Vec<_> = match environment.options.self_contact {
+                true => self.loops.pressing().collect(),
+                false => Vec::new(),
+            };
+            let acting = Acting { wall: &self.touches, between, loops: &loops, drag };
+            write_instruments::<C>(environment, hands, Some(&clamp), acting, at);
             self.rub(at);
             let taken_mj = self.rub_in_valves(surroundings.stack, at);
             return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);

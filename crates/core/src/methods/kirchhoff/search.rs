@@ -18,10 +18,10 @@
 
 use super::guess::Guess;
 use super::substep::Effort;
-use crate::contact::{SETTLED, SelfContact, WallContact};
+use crate::contact::{SETTLED, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
-use crate::solve::{Newton, NewtonOptions, NewtonReport, Together};
+use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 
 /// Newton iterations of a solution near its prediction: from another one, nearer by, it is found in fewer.
 pub(super) const MOST_NEAR: usize = 60;
@@ -43,8 +43,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) newton: &'a mut Newton<C>,
     pub(super) guess: &'a mut Guess,
     pub(super) contact: &'a mut WallContact<'b>,
-    /// What the device's loops do to each other, if they touch.
-    pub(super) loops: Option<&'a mut SelfContact>,
+    /// What acts beside the wall: loops, if they touch.
+    pub(super) beside: Vec<&'a mut dyn External>,
     pub(super) supports: &'a mut Supports,
     pub(super) elements: &'a [ElementData],
     /// The prediction, and then what was found.
@@ -120,12 +120,12 @@ impl<const C: usize> Search<'_, '_, C> {
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);
-        let found = match self.loops.as_deref_mut() {
-            Some(loops) => {
-                let mut outside = Together(vec![&mut *self.contact, loops]);
-                self.newton.solve(elements, supports, &mut outside, self.state, &options)
-            }
-            None => self.newton.solve(elements, supports, self.contact, self.state, &options),
+        let found = if self.beside.is_empty() {
+            self.newton.solve(elements, supports, self.contact, self.state, &options)
+        } else {
+            let mut outside: Vec<&mut dyn External> = vec![&mut *self.contact];
+            outside.extend(self.beside.iter_mut().map(|other| &mut **other as &mut dyn External));
+            self.newton.solve(elements, supports, &mut Together(outside), self.state, &options)
         };
         self.iterations += found.iterations;
         self.solves += found.solves;

@@ -3,7 +3,7 @@
 //! By the envelope theorem the derivative of the discrete energy with respect to an inserted length is that in the mesh alone, while
 //! tangents, chords over lengths and angles stay as they are: ends of the instrument and of its sections take their nodes along, and so do
 //! its contact points. It is exact for the mesh. Few elements change with it, of which differences of energies are taken; contact points
-//! move, and do the work of the forces that they have. Where an instrument is twisted, what comes to lie at a node has another angle than what was there:
+//! and places where loops press on each other move, and do the work of the forces that they have. Where an instrument is twisted, what comes to lie at a node has another angle than what was there:
 //! unless the node goes with it, it turns on the way by τ a length, against the couples of friction between instruments. What the sheath no longer stores, ½EI|κ⁰|² a length, is part of it.
 
 use super::Environment;
@@ -12,10 +12,11 @@ use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use crate::Vec3;
-use crate::contact::{ContactPoint, Drag, Place, Touch};
+use crate::contact::{ContactPoint, Drag, Place, Pressing, RodPlace, Touch};
 use crate::device::line_mm;
 use crate::methods::InstrumentReport;
-use crate::rod::{Clamp, RodState, element_energy};
+use crate::rod::quadrature::hermite;
+use crate::rod::{Clamp, ElementData, RodState, element_energy};
 
 /// Step of the differences, as a part of the shortest element.
 const STEP: f64 = 1e-5;
@@ -25,20 +26,31 @@ const MEET: f64 = 4.0;
 /// A contact point that presses on the wall, by its number.
 pub(super) type Pressed = (usize, Touch);
 
+/// What acts on instruments from outside their line, and between them.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Acting<'a> {
+    pub(super) wall: &'a [Pressed],
+    /// Friction between instruments.
+    pub(super) between: &'a [Place],
+    /// Loops that press on each other.
+    pub(super) loops: &'a [Pressing],
+    pub(super) drag: Option<&'a Drag>,
+}
+
 /// Sets the reports of several instruments whose hands are there.
 pub(super) fn write_instruments<const C: usize>(
     environment: &Environment<'_>,
     hands: &[Hand],
     clamp: Option<&Clamp>,
-    (pressed, between, drag): (&[Pressed], &[Place], Option<&Drag>),
+    acting: Acting<'_>,
     at: &mut Configuration,
 ) {
     let sets = environment.surroundings.stack.sets();
     let inserted: Vec<f64> = lengths(hands).collect();
     let line = line_mm(lengths(hands));
     let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.fineness());
-    let turning = turning(between, at.start());
-    let touching = (pressed, &turning[..], drag);
+    let turning = turning(acting.between, at.start());
+    let touching = (acting, &turning[..]);
     let mut told = Vec::with_capacity(hands.len());
     for (index, hand) in hands.iter().enumerate() {
         let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
@@ -76,7 +88,7 @@ fn push_force<const C: usize>(
     environment: &Environment<'_>,
     nodes: &Nodes,
     (together, inserted_mm): (&[usize], &[f64]),
-    (pressed, between, drag): (&[Pressed], &[Turning], Option<&Drag>),
+    (acting, turning): (Acting<'_>, &[Turning]),
     at: Start<'_>,
 ) -> Option<f64> {
     let stack = environment.surroundings.stack;
@@ -93,12 +105,13 @@ fn push_force<const C: usize>(
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
     // Where a point that presses comes or goes on one side, the other tells.
-    let wall = match (on.wall_slope(pressed, at, step), back.wall_slope(pressed, at, -step)) {
+    let wall = match (on.wall_slope(acting.wall, at, step), back.wall_slope(acting.wall, at, -step)) {
         (Some(on), Some(back)) => 0.5 * (on + back),
         (one, other) => one.or(other)?,
     };
-    let turned = (on.turning_against(between, at) - back.turning_against(between, at)) / (2.0 * step);
-    let dragged = drag.map_or(0.0, |drag| {
+    let loops = (on.pressing_mj(acting.loops, at) - back.pressing_mj(acting.loops, at)) / (2.0 * step);
+    let turned = (on.turning_against(turning, at) - back.turning_against(turning, at)) / (2.0 * step);
+    let dragged = acting.drag.map_or(0.0, |drag| {
         // Where a point comes or goes on one side, the other tells.
         let each = at.mesh.points.iter().enumerate().filter_map(|(index, point)| {
             let way = match (on.moved_mm(point, at, step), back.moved_mm(point, at, step)) {
@@ -111,7 +124,7 @@ fn push_force<const C: usize>(
     });
     let straightened_n =
         together.iter().map(|index| stack.instruments()[*index].device.section_at(own).straightening_n());
-    Some(stored + wall + turned - dragged - straightened_n.sum::<f64>())
+    Some(stored + wall + loops + turned - dragged - straightened_n.sum::<f64>())
 }
 
 /// Step of the differences, mm.
@@ -130,6 +143,13 @@ fn twist_per_mm(at: Start<'_>, i: usize, set: usize) -> f64 {
         count += 1.0;
     }
     if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// Where ξ of an element is.
+fn place_mm(elements: &[ElementData], rod: &RodState, (e, xi): RodPlace) -> Vec3 {
+    let [w0, s0, w1, s1] = hermite(xi);
+    let (x, frames) = (&rod.positions, &rod.frames);
+    x[e] * w0 + x[e + 1] * w1 + (frames[e].t * s0 + frames[e + 1].t * s1) * elements[e].length
 }
 
 /// A node at which friction between two instruments, the inner one first, holds what is twisted.
@@ -202,6 +222,20 @@ impl Beside {
             let moved = |k: usize| label(&self.mesh, k) - label(at.mesh, k);
             let work = |k: usize| moved(place.instruments[k]) * place.twists_per_mm[k];
             place.couple_nmm * (work(0) - work(1))
+        });
+        each.sum()
+    }
+
+    /// By how much more loops store that press on each other, whose places move against their forces and stand for more or less length, mJ.
+    fn pressing_mj(&self, loops: &[Pressing], at: Start<'_>) -> f64 {
+        let each = loops.iter().map(|pair| {
+            let moved_mm = |place: RodPlace| {
+                place_mm(&self.mesh.elements, &self.rod, place)
+                    - place_mm(&at.mesh.elements, &at.state.rod, place)
+            };
+            let (a, b) = (moved_mm(pair.places.0), pair.places.1.map_or_else(Vec3::zeros, moved_mm));
+            let widened = self.mesh.elements[pair.site].length / at.mesh.elements[pair.site].length - 1.0;
+            widened * pair.energy_mj - pair.force_n.dot(&(a - b))
         });
         each.sum()
     }

@@ -9,6 +9,7 @@ use super::hands::Hand;
 use super::step_control::Stride;
 use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce};
 use crate::device::Stack;
+use crate::methods::detached::{Coils, DetachedCoil};
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
 use crate::solve::Neighbourhood;
@@ -29,6 +30,9 @@ pub struct KirchhoffState {
     pub(super) stride: Stride,
     /// What ticks have begun.
     pub(super) tick: Ticking,
+    /// Coils that were detached.
+    #[serde(with = "crate::methods::state::shared")]
+    pub(super) coils: Coils,
     pub(super) report: StepReport,
 }
 
@@ -61,6 +65,7 @@ pub(super) struct UnderWay {
 
 /// What a mesh says of the states that belong to it.
 pub(super) struct Belongs<'a> {
+    pub(super) stack: &'a Stack,
     pub(super) surface: &'a ContactSurface,
     pub(super) sheath: &'a Sheath,
     /// Elements and contact points of the inserted length.
@@ -79,7 +84,7 @@ impl KirchhoffState {
         let (sheath, stack) = (surroundings.sheath, surroundings.stack);
         let mut rod = RodState::default();
         rod.frames.push(Frame::new(sheath.direction, None));
-        rod.angles.resize(stack.sets().iter().flatten().count().max(1), 0.0);
+        rod.angles.resize(stack.angles().max(1), 0.0);
         rod.positions.push(sheath.position_mm);
         let instruments = if stack.is_several() {
             vec![InstrumentReport::default(); stack.instruments().len()]
@@ -92,6 +97,7 @@ impl KirchhoffState {
             inner_friction: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
+            coils: Coils::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
             tick: Ticking::Rest,
             report: StepReport { converged: true, instruments, ..StepReport::default() },
@@ -134,9 +140,12 @@ impl KirchhoffState {
             self.rod.angles[0] = hands[0].turn_rad;
             return;
         }
-        for (set, hand) in stack.sets().iter().zip(hands) {
-            if let Some(set) = set {
-                self.rod.angles[*set] = hand.turn_rad;
+        // Where coils share angles those are that of the one which is in.
+        for is_in in [false, true] {
+            for (set, hand) in stack.sets().iter().zip(hands) {
+                if let Some(set) = set.filter(|_| is_in == (hand.inserted_mm > 0.0)) {
+                    self.rod.angles[set] = hand.turn_rad;
+                }
             }
         }
     }
@@ -179,6 +188,7 @@ impl KirchhoffState {
             );
             return Err(other("known", self.known.len(), mend));
         }
+        self.coils.iter().try_for_each(|coil| DetachedCoil::check(coil, belongs.stack))?;
         let part_mm = self.stride.part_mm;
         if !(part_mm.is_finite() && part_mm > 0.0) {
             return Err(other("stride.part_mm", part_mm, "a way that is longer than 0"));

@@ -14,7 +14,7 @@ use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
-use crate::solve::StopReason;
+use crate::solve::{External, StopReason};
 
 /// How a part of a command is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,7 +168,7 @@ impl<const C: usize> Tools<C> {
         let mut loops = options.self_contact.then_some(&mut self.loops);
         let mut in_its_own_way = false;
         if let Some(loops) = &mut loops {
-            loops.renew(&mesh.elements, skins(mesh));
+            loops.renew(&mesh.elements, skins(mesh, surroundings.stack));
             let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
             in_its_own_way = loops.blocks_its_tip(&mesh.elements, rod, advance_mm);
         }
@@ -192,7 +192,7 @@ impl<const C: usize> Tools<C> {
             newton: &mut self.newton,
             guess: &mut self.guess,
             contact: &mut contact,
-            loops,
+            beside: loops.map(|loops| loops as &mut dyn External).into_iter().collect(),
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,

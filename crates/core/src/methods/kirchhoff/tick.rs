@@ -18,7 +18,7 @@ use super::search::{LONGEST, MOST_NEAR};
 use super::state::{KirchhoffState, Ticking, UnderWay};
 use super::step_control::{FOLD_MM, HELD_MM, NEARER};
 use super::substep::{Attempt, Effort, Found, Lost};
-use super::workspace::{Work, Workspace};
+use super::workspace::Workspace;
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
 use crate::methods::{Command, Move, StepReport};
@@ -96,9 +96,8 @@ impl<const C: usize> Workspace<C> {
         moves: &[Move],
         solves: usize,
     ) -> Result<Ticked> {
-        let Self { tools, mesh, now, next, most: (elements, points), way, hands } = self;
-        now.own(*elements, *points);
-        next.own(*elements, *points);
+        self.begin(environment, from, moves)?;
+        let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
         let was = Start { mesh, state: from };
         let (before, after) = (surroundings.displacement(0.0), surroundings.displacement(1.0));
@@ -111,16 +110,6 @@ impl<const C: usize> Workspace<C> {
         let here = taken.as_ref().map_or(was, |state| Start { mesh, state });
         let [at_start, there] = [&before, &after].map(|at| environment.displaced(at.as_ref()));
         let left = passage.map(|passage| (was, passage));
-        way.begin(surroundings.stack, &from.report, moves);
-        let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
-        if target > start {
-            check_inside(
-                surroundings.lumen.openings(),
-                &at_start.wall().material(&from.tip_mm()),
-                target - start,
-            )?;
-        }
-        tools.work = Work::default();
         // What a device with friction does from a part of this length on it may do near by.
         let let_go_mm = if surroundings.properties.has_friction() { HELD_MM } else { FOLD_MM };
         let mut longest_mm = from.stride.part_mm;
@@ -199,7 +188,10 @@ impl<const C: usize> Workspace<C> {
                 // It stays where it has come to.
                 Err(_) if holds_still => return Ok(Ticked::Rests(longest_mm, Ticking::Rest)),
                 Err(lost) if effort == Effort::Moving && part_mm <= FOLD_MM => {
-                    let told = format!("kirchhoff: no equilibrium beyond {start:.3} mm inserted: {lost}");
+                    let told = format!(
+                        "kirchhoff: no equilibrium beyond {:.3} mm inserted: {lost}",
+                        line_mm(lengths(&way.start))
+                    );
                     return Err(Error::Computation(told));
                 }
                 Err(_) if effort == Effort::Near && part_mm <= let_go_mm => {

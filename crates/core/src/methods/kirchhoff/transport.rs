@@ -126,6 +126,11 @@ pub(super) fn transport_together(
     out.bubbles.resize(count * n, 0.0);
     for (index, set) in sets.iter().enumerate() {
         let Some(set) = *set else { continue };
+        // One that is out leaves the angles to a coil in its place.
+        let is_in = |index: usize| to.inserted_mm[index] > 0.0;
+        if !is_in(index) && (0..sets.len()).any(|other| sets[other] == Some(set) && is_in(other)) {
+            continue;
+        }
         let inserted = from.inserted_mm.get(index).copied().unwrap_or(0.0);
         // The angle that the same piece of the instrument had.
         let angle = |from_line_tip: f64| {

@@ -1,5 +1,7 @@
 //! What a step works with. None of it reaches the next step: it can be dropped and made anew at any moment.
 
+use std::sync::Arc;
+
 use super::configuration::{Configuration, largest};
 use super::guess::Guess;
 use super::hands::{Hand, Way};
@@ -7,7 +9,9 @@ use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact, Touch};
+use crate::device::Stack;
 use crate::methods::StepReport;
+use crate::methods::detached::{Coils, DetachedCoil};
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -37,6 +41,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) drag: Drag,
     /// What its loops do to each other; nothing is known of them where they do not touch.
     pub(super) loops: SelfContact,
+    /// Coils that these touch.
+    pub(super) coils: Coils,
     /// Points that press in the equilibrium found last, and what happens there.
     pub(super) touches: Vec<(usize, Touch)>,
     /// What the sub-steps of the command took.
@@ -71,6 +77,16 @@ impl Work {
     }
 }
 
+impl<const C: usize> Tools<C> {
+    /// Has loops touch the coils that were detached.
+    pub(super) fn touch(&mut self, coils: &Coils, stack: &Stack) {
+        if !Arc::ptr_eq(&self.coils, coils) {
+            self.coils = Arc::clone(coils);
+            self.loops.beside(&DetachedCoil::elements(coils, stack).into());
+        }
+    }
+}
+
 impl<const C: usize> Workspace<C> {
     /// Memory for the whole device, so that steps take none.
     pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
@@ -84,6 +100,7 @@ impl<const C: usize> Workspace<C> {
             cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
             loops: SelfContact::default(),
+            coils: Coils::default(),
             touches: Vec::new(),
             work: Work::default(),
             counters: Counters::default(),

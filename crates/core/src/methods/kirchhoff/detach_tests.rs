@@ -1,0 +1,118 @@
+//! Coils that are left behind.
+
+use super::KirchhoffOptions;
+use super::loops_tests::{axis, parts};
+use crate::Vec3;
+use crate::device::{Device, Instrument, Section, Stack};
+use crate::insertion::{Command, DetachedCoil, Move, Sheath, Simulation, State, WallProperties};
+
+const COIL_MM: f64 = 30.0;
+/// What must be out for it to be free: its end has the distance of touch from the catheter's.
+const OUT_MM: f64 = COIL_MM + 0.5;
+const RADIUS_MM: f64 = 0.15;
+const CATHETER: usize = 2;
+
+/// A coil that curls to a radius of 2 mm, on a pusher.
+fn coil() -> Device {
+    let wound = Section {
+        rest_curvature_per_mm: [0.5, 0.05],
+        torsional_stiffness_nmm2: Some(0.002),
+        ..Section::straight(COIL_MM, RADIUS_MM, 0.002)
+    };
+    Device::new(vec![wound, Section::straight(150.0, RADIUS_MM, 0.5)]).unwrap().with_coil(COIL_MM).unwrap()
+}
+
+/// Two coils, and a catheter that stands 3 mm out of the sheath.
+fn two_coils(friction: f64, self_contact: bool) -> Simulation {
+    let (made, _, sheath) = parts(4.0);
+    let catheter = Section { inner_radius_mm: Some(0.2), ..Section::straight(100.0, 0.3, 0.5) };
+    let catheter = Device::new(vec![catheter]).unwrap();
+    let one = |name: &str, device: Device| Instrument { name: name.to_owned(), device, may_lead: true };
+    let stack = vec![one("framing", coil()), one("filling", coil()), one("catheter", catheter)];
+    let properties = WallProperties { modulus_n_per_mm2: 1.0, friction, ..WallProperties::default() };
+    let method = KirchhoffOptions { element_mm: 0.75, self_contact, ..KirchhoffOptions::default() };
+    let sheath = Sheath { direction: Vec3::new(1.0, 0.2, 0.1).normalize(), ..sheath };
+    let builder = Simulation::builder(made.wall, Stack::new(stack).unwrap(), sheath);
+    let mut simulation = builder.properties(properties).method(&method).build().unwrap();
+    advance(&mut simulation, &[0, CATHETER], 3.0).unwrap();
+    simulation
+}
+
+/// Advances instruments by 0.5 mm a step.
+fn advance(simulation: &mut Simulation, instruments: &[usize], mm: f64) -> crate::Result<()> {
+    let moves: Vec<Move> = instruments
+        .iter()
+        .map(|instrument| Move { instrument: *instrument, command: Command::advance(0.5) })
+        .collect();
+    for step in 0..(2.0 * mm) as usize {
+        let report = simulation.step_together(&moves)?;
+        assert!(report.converged, "step {step}: {}", report.imbalance);
+    }
+    Ok(())
+}
+
+/// Least distance of the coil from what is in, mm.
+fn clearance_mm(simulation: &Simulation, coil: &DetachedCoil) -> f64 {
+    let (coil, line) = (axis(&coil.shape), axis(simulation.shape()));
+    let each = coil.iter().flat_map(|a| line.iter().map(move |b| (a - b).norm()));
+    each.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn a_coil_that_is_detached_stays_and_the_next_one_does_not_pass_it() {
+    for friction in [0.0, 0.1] {
+        let mut simulation = two_coils(friction, true);
+        advance(&mut simulation, &[0], OUT_MM).unwrap();
+        let was = axis(simulation.shape());
+        let report = simulation.detach(0).unwrap();
+        assert!(report.converged && !report.jumped && report.inserted_mm == 3.0, "{report:?}");
+        let coil = simulation.coils()[0].clone();
+        assert_eq!((coil.instrument, coil.shape.from_tip_mm[0]), (0, COIL_MM));
+        // It springs back where the pusher had held it, and stays near where it was.
+        let moved_mm = (coil.shape.tip_mm().unwrap() - was[was.len() - 1]).norm();
+        assert!(moved_mm < 1.0, "{moved_mm}");
+        let (mut least_mm, mut touched) = (f64::INFINITY, false);
+        for step in 0..40 {
+            simulation.step_together(&[Move { instrument: 1, command: Command::advance(0.5) }]).unwrap();
+            let clearance_mm = clearance_mm(&simulation, &coil);
+            assert!(clearance_mm > 1.95 * RADIUS_MM, "{friction}, step {step}: {clearance_mm}");
+            least_mm = least_mm.min(clearance_mm);
+            touched |= simulation.touching().iter().any(|touch| touch.other == Some(0));
+        }
+        assert!(touched && least_mm < 2.01 * RADIUS_MM, "they do not touch: {least_mm}");
+        assert_eq!(simulation.coils(), [coil]);
+        // A state knows it.
+        let saved = serde_json::to_string(&simulation.state()).unwrap();
+        let mut again = two_coils(friction, true);
+        again.restore(&serde_json::from_str::<State>(&saved).unwrap()).unwrap();
+        assert_eq!(again.coils(), simulation.coils());
+        let step = |of: &mut Simulation| {
+            of.step_together(&[Move { instrument: 1, command: Command::advance(-0.5) }]).unwrap().clone()
+        };
+        assert_eq!(step(&mut again), step(&mut simulation));
+    }
+}
+
+#[test]
+fn what_cannot_be_detached_is_refused_and_nothing_is_lost() {
+    let mut simulation = two_coils(0.0, true);
+    advance(&mut simulation, &[0], 20.0).unwrap();
+    let before = serde_json::to_string(&simulation.state()).unwrap();
+    let told = |simulation: &mut Simulation, instrument: usize| {
+        simulation.detach(instrument).unwrap_err().to_string()
+    };
+    assert!(told(&mut simulation, 0).contains("not out yet: advance it by 10.450 mm"));
+    assert!(told(&mut simulation, 1).contains("not out yet"));
+    assert!(told(&mut simulation, CATHETER).contains("is no coil"));
+    assert!(told(&mut simulation, 3).contains("there are 3"));
+    assert_eq!(serde_json::to_string(&simulation.state()).unwrap(), before);
+    advance(&mut simulation, &[0], 10.5).unwrap();
+    simulation.detach(0).unwrap();
+    assert!(told(&mut simulation, 0).contains("detached already"));
+    let again = advance(&mut simulation, &[0], 0.5).unwrap_err().to_string();
+    assert!(again.contains("its coil is detached"), "{again}");
+    // Where nothing would feel it.
+    let mut blind = two_coils(0.0, false);
+    advance(&mut blind, &[0], OUT_MM).unwrap();
+    assert!(told(&mut blind, 0).contains("self_contact"));
+}
