@@ -89,7 +89,8 @@ impl ContactSurface {
         Ok(Self { reach_mm: mesh.reach_mm, felt: Felt::Mesh(Box::new(mesh)), thinnest_mm })
     }
 
-    /// Prepares the wall of `lumen`. One that is given by a centre line is felt as it is, unless the wall has regions: those are laid over the vertices
+    /// Prepares the wall of `lumen`. One that is given by a centre line is felt as it is, unless the device nearly fills it somewhere (there the distance
+    /// has a crest along the axis, which the smooth wall of a mesh rounds off), or the wall has regions: those are laid over the vertices
     /// of a mesh.
     ///
     /// # Errors
@@ -101,7 +102,9 @@ impl ContactSurface {
         store: &dyn WallStore,
     ) -> Result<Self> {
         match lumen {
-            Lumen::Swept(vessel) if properties.region.is_empty() => {
+            Lumen::Swept(vessel)
+                if properties.region.is_empty() && vessel.least_radius_mm() > (1.0 + FOLLOW) * radii_mm.1 =>
+            {
                 let reach_mm = reach_mm(radii_mm.1, 0.0);
                 let felt = Felt::Swept(vessel.field(reach_mm), radii_mm.1);
                 Ok(Self { felt, thinnest_mm: radii_mm.0, reach_mm })

@@ -50,12 +50,14 @@ fn a_wire_goes_the_way_that_it_goes_in_a_fine_mesh() {
 }
 
 #[test]
-fn no_mesh_is_made_to_feel_a_centre_line_unless_the_wall_has_regions() {
+fn a_centre_line_is_felt_by_a_mesh_where_the_wall_has_regions_or_the_device_fills_it() {
     let lumen = swept(&anatomy::tree("curved_tube").unwrap());
-    let felt = |properties: &WallProperties| {
-        ContactSurface::of(&lumen, (0.2, 0.2), properties, &NoStore).unwrap().mesh().is_some()
+    let meshed = |radius_mm: f64, properties: &WallProperties| {
+        ContactSurface::of(&lumen, (0.2, radius_mm), properties, &NoStore).unwrap().mesh().is_some()
     };
-    assert!(!felt(&WallProperties::default()));
+    let plain = WallProperties::default();
+    // The tube's radius is 4 mm.
+    assert!(!meshed(0.2, &plain) && !meshed(2.6, &plain) && meshed(2.7, &plain));
     let place_mm = lumen.openings()[0].centre_mm;
     let region = WallRegion {
         centre_mm: place_mm.into(),
@@ -64,5 +66,5 @@ fn no_mesh_is_made_to_feel_a_centre_line_unless_the_wall_has_regions() {
         modulus_n_per_mm2: Some(10.0),
         friction: None,
     };
-    assert!(felt(&WallProperties { region: vec![region], ..WallProperties::default() }));
+    assert!(meshed(0.2, &WallProperties { region: vec![region], ..plain }));
 }

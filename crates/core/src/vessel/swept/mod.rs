@@ -19,7 +19,7 @@ use super::generate::{
 };
 use super::lumen::Meshed;
 use super::opening::{self, Opening};
-use super::{CentrelineTree, Resolution, Wall, WallRecipe, WallStore};
+use super::{CentrelineTree, Resolution, WallRecipe, WallStore};
 use crate::{Error, Result, Vec3};
 use axis::{Axis, End};
 use blocks::Blocks;
@@ -33,10 +33,6 @@ const AROUND: usize = 12;
 const BETWEEN: usize = 2;
 /// Two stretches of a tube are not neighbours in a bend where the way between them is this part of π/2 times their distance.
 const NEIGHBOURS: f64 = 1.05;
-
-/// Where branches meet in a crease, or come near each other, a mesh may fail that a finer one does not: so many are tried, and how much finer
-/// each is.
-const FINER: (usize, f64) = (4, 0.8);
 
 /// A vessel swept by circles along a centre-line tree.
 #[derive(Debug)]
@@ -83,6 +79,12 @@ impl SweptVessel {
     /// How fine its mesh is.
     pub fn resolution(&self) -> Resolution {
         self.resolution
+    }
+
+    /// Radius of its narrowest place, mm.
+    pub(crate) fn least_radius_mm(&self) -> f64 {
+        let knots = self.field.axes.iter().flat_map(|axis| (0..axis.len()).map(|knot| axis.radius(knot)));
+        knots.fold(f64::INFINITY, f64::min)
     }
 
     /// Its openings, numbered as those of its mesh; without a mesh they have no boundary.
@@ -133,25 +135,11 @@ impl SweptVessel {
         if let Some(known) = self.meshed.get() {
             return Ok(known);
         }
-        let mut wall = self.wall(store, self.resolution)?;
+        let recipe = WallRecipe::Generated { tree: &self.tree, resolution: self.resolution };
+        let mut wall = store.wall(&recipe)?;
         wall.number_openings_as(&self.openings)?;
         let made = Meshed::new(wall);
         Ok(self.meshed.get_or_init(|| made))
-    }
-
-    /// A mesh of it, finer than that where none comes of it.
-    fn wall(&self, store: &dyn WallStore, resolution: Resolution) -> Result<Wall> {
-        let mut wanted = resolution;
-        for _ in 0..FINER.0 {
-            let made = store.wall(&WallRecipe::Generated { tree: &self.tree, resolution: wanted });
-            match (made, wanted) {
-                (Err(Error::Mesh(_) | Error::Computation(_)), Resolution::EdgeMm(edge_mm)) => {
-                    wanted = Resolution::EdgeMm(FINER.1 * edge_mm);
-                }
-                (made, _) => return made,
-            }
-        }
-        store.wall(&WallRecipe::Generated { tree: &self.tree, resolution })
     }
 }
 

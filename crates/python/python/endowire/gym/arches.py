@@ -194,8 +194,8 @@ def arch(rng: np.random.Generator) -> tuple[Array, int]:
 class ArchVariety:
     """An arch of type I for each episode, drawn with edges of about ``edge_mm``; devices feel the surface that the centre line says.
 
-    With ``count``, there are so many, made from ``seed`` when they first come, and kept; with None there is
-    a new one for each episode.
+    With ``count``, there are so many, made from ``seed`` when they first come, and kept; each can be drawn. With None there is a new one for each
+    episode, which takes no mesh to be felt: of one in twenty none comes, and a picture of it raises InputError or ComputationError.
     """
 
     #: What the widest and highest arches reach.
@@ -226,6 +226,8 @@ class ArchVariety:
             table, aorta = arch(rng)
             try:
                 vessel = Vessel.generate(table, edge_mm=self.edge_mm)
+                if self.count is not None:
+                    _ = vessel.triangles
             except (InputError, ComputationError) as refused:
                 last = refused
                 continue
