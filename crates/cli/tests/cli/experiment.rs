@@ -174,7 +174,8 @@ fn wrong_names_and_points_are_bad_input() {
 fn coils_follow_each_other_into_a_sac_and_what_it_cannot_hold_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let small = ["coil", "--coils", "filling,finishing", "--length-mm", "8", "--step-mm", "1", "--element-mm", "1"];
+    let small =
+        ["coil", "--coils", "filling,finishing", "--length-mm", "8", "--step-mm", "1", "--element-mm", "1"];
     let found = told(&experiment(&[&small[..], &["--out", out, "--json"]].concat()));
     assert_written(folder.path(), "coil", &found);
     let packing: Vec<f64> = rows(&found).iter().map(|row| row["packing"].as_f64().unwrap()).collect();
