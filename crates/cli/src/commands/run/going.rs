@@ -119,7 +119,7 @@ impl Going<'_> {
                 break;
             }
             let recorded = self.times_s.len();
-            next = self.step(step);
+            next = self.step(&step);
             if self.times_s.len() > recorded {
                 bar.set_message(live(self.so_far.simulation.report(), &self.so_far.course.tally));
                 bar.inc(1);
@@ -128,9 +128,9 @@ impl Going<'_> {
     }
 
     /// Carries out a step and records it; the next one, if there is one and nothing failed.
-    fn step(&mut self, step: Step<'static>) -> Option<Step<'static>> {
+    fn step(&mut self, step: &Step<'_>) -> Option<Step<'static>> {
         let before = self.so_far.course.steps;
-        if let Err(error) = self.so_far.simulate(&step) {
+        if let Err(error) = self.so_far.simulate(step) {
             self.so_far.fail(before, &error);
             return None;
         }

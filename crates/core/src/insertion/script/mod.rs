@@ -161,7 +161,7 @@ impl Bounds {
 
     /// Goes through a motion; the number of its steps at most.
     fn go(&mut self, motion: &Motion, stack: &Stack) -> Result<usize> {
-        for part in motion.parts.iter().filter(|part| self.detached[part.instrument]) {
+        if let Some(part) = motion.parts.iter().find(|part| self.detached[part.instrument]) {
             let name = &stack.instruments()[part.instrument].name;
             let mend = "its coil is detached: advance the next one";
             return Err(Error::parameter(format!("{}.instrument", part.name), format!("{name:?}"), mend));

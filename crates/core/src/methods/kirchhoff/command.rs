@@ -1,8 +1,6 @@
 //! One command: in one sub-step where that will do, in several where it will not, and to where the device comes to rest as it can where
 //! the way is lost.
 
-use std::sync::Arc;
-
 use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::carried;
@@ -86,10 +84,7 @@ impl<const C: usize> Workspace<C> {
         let Self { tools, now, next, most: (elements, points), way, .. } = self;
         now.own(*elements, *points);
         next.own(*elements, *points);
-        for state in [now.parts().1, next.parts().1] {
-            state.coils = Arc::clone(&from.coils);
-        }
-        tools.touch(&from.coils, environment.surroundings.stack);
+        tools.touch(&from.coils, environment.surroundings.stack, [&mut *now, &mut *next]);
         tools.work = Work::default();
         let surroundings = &environment.surroundings;
         way.begin(surroundings.stack, &from.report, moves);

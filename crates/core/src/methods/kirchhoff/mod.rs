@@ -41,6 +41,7 @@ mod loops_tests;
 mod mesh;
 #[cfg(test)]
 mod motion_tests;
+mod options;
 mod readout;
 mod search;
 mod slopes;
@@ -60,11 +61,10 @@ mod transport_tests;
 mod workspace;
 
 pub use mesh::{Fineness, Mesh};
+pub use options::{Accuracy, KirchhoffOptions};
 pub use state::KirchhoffState;
 
 use std::sync::Arc;
-
-use serde::{Deserialize, Serialize};
 
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
@@ -80,43 +80,6 @@ use lateral::Line;
 use state::{Belongs, Ticking};
 use tick::Ticked;
 use workspace::Workspace;
-
-/// Options of the exact rod.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct KirchhoffOptions {
-    /// Element length, mm.
-    pub element_mm: f64,
-    /// Force or moment that an equilibrium leaves at a node, over the largest in the device, its wall and its supports.
-    pub tolerance: f64,
-    /// Most Newton iterations of one solution; a command may take ten times as many.
-    pub max_iterations: usize,
-    /// Most distance of contact points, in radii of the device. At 1.5 a sharp crest between two of them is felt when it is two thirds of a
-    /// radius from the axis, above 2 it may not be felt at all. On walls without sharp crests a few radii save time for little.
-    pub contact_spacing_radii: f64,
-    /// Whether loops of the device touch each other. Off: most vessels are too narrow for a device to come back to itself in them, and
-    /// where it cannot, nothing is gained by looking; on wherever a loop has room.
-    pub self_contact: bool,
-}
-
-impl KirchhoffOptions {
-    /// How finely it meshes.
-    fn fineness(&self) -> Fineness {
-        Fineness { element_mm: self.element_mm, contact_spacing_radii: self.contact_spacing_radii }
-    }
-}
-
-impl Default for KirchhoffOptions {
-    fn default() -> Self {
-        Self {
-            element_mm: 2.0,
-            tolerance: 1e-9,
-            max_iterations: 500,
-            contact_spacing_radii: Fineness::CONTACT_SPACING_RADII,
-            self_contact: false,
-        }
-    }
-}
 
 impl MethodChoice for KirchhoffOptions {
     fn name(&self) -> &'static str {

@@ -78,8 +78,11 @@ impl Work {
 }
 
 impl<const C: usize> Tools<C> {
-    /// Has loops touch the coils that were detached.
-    pub(super) fn touch(&mut self, coils: &Coils, stack: &Stack) {
+    /// Has loops touch the coils that were detached, which lie there in what a command leads to.
+    pub(super) fn touch(&mut self, coils: &Coils, stack: &Stack, to: [&mut Configuration; 2]) {
+        for configuration in to {
+            configuration.parts().1.coils = Arc::clone(coils);
+        }
         if !Arc::ptr_eq(&self.coils, coils) {
             self.coils = Arc::clone(coils);
             self.loops.beside(&DetachedCoil::elements(coils, stack).into());

@@ -1,0 +1,119 @@
+//! Settings of the exact rod, one by one or together.
+
+use serde::{Deserialize, Serialize};
+
+use super::mesh::Fineness;
+
+/// How exact equilibria are: `method.accuracy` sets length of elements, distance of contact points and tolerance together.
+///
+/// What each takes and how far lines are off those of elements of 1 mm with points a quarter of a radius apart, at nine of ten commands, measures
+/// `cargo run --release -p endowire-benches --bin precision`; for wires of 0.5 to 0.9 mm in arteries of 2 to 12 mm radius.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Accuracy {
+    /// Elements of 6 mm, points 1.5 radii apart, tolerance 10⁻⁴: 0.05 mm, for learning and by hand.
+    Fast,
+    /// Elements of 4 mm, points 0.75 radii apart, tolerance 10⁻⁵: 0.01 mm.
+    Balanced,
+    /// Elements of 2 mm, points half a radius apart, tolerance 10⁻⁹: 0.003 mm.
+    Fine,
+}
+
+/// Options as they are written: what is left out is that of the accuracy, if one is given.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    accuracy: Option<Accuracy>,
+    element_mm: Option<f64>,
+    tolerance: Option<f64>,
+    max_iterations: Option<usize>,
+    contact_spacing_radii: Option<f64>,
+    self_contact: Option<bool>,
+}
+
+impl From<Written> for KirchhoffOptions {
+    fn from(written: Written) -> Self {
+        let of = written.accuracy.map_or_else(Self::default, Self::of);
+        Self {
+            element_mm: written.element_mm.unwrap_or(of.element_mm),
+            tolerance: written.tolerance.unwrap_or(of.tolerance),
+            max_iterations: written.max_iterations.unwrap_or(of.max_iterations),
+            contact_spacing_radii: written.contact_spacing_radii.unwrap_or(of.contact_spacing_radii),
+            self_contact: written.self_contact.unwrap_or(of.self_contact),
+        }
+    }
+}
+
+/// Options of the exact rod.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Written")]
+pub struct KirchhoffOptions {
+    /// Element length, mm.
+    pub element_mm: f64,
+    /// Force or moment that an equilibrium leaves at a node, over the largest in the device, its wall and its supports.
+    pub tolerance: f64,
+    /// Most Newton iterations of one solution; a command may take ten times as many.
+    pub max_iterations: usize,
+    /// Most distance of contact points, in radii of the device. At 1.5 a sharp crest between two of them is felt when it is two thirds of a
+    /// radius from the axis, above 2 it may not be felt at all. On walls without sharp crests a few radii save time for little.
+    pub contact_spacing_radii: f64,
+    /// Whether loops of the device touch each other. Off: most vessels are too narrow for a device to come back to itself in them, and
+    /// where it cannot, nothing is gained by looking; on wherever a loop has room.
+    pub self_contact: bool,
+}
+
+impl KirchhoffOptions {
+    /// Those of an accuracy.
+    pub fn of(accuracy: Accuracy) -> Self {
+        let (element_mm, contact_spacing_radii, tolerance) = match accuracy {
+            Accuracy::Fast => (6.0, 1.5, 1e-4),
+            Accuracy::Balanced => (4.0, 0.75, 1e-5),
+            Accuracy::Fine => (2.0, 0.5, 1e-9),
+        };
+        Self { element_mm, contact_spacing_radii, tolerance, ..Self::default() }
+    }
+
+    /// How finely it meshes.
+    pub(super) fn fineness(&self) -> Fineness {
+        Fineness { element_mm: self.element_mm, contact_spacing_radii: self.contact_spacing_radii }
+    }
+}
+
+impl Default for KirchhoffOptions {
+    fn default() -> Self {
+        Self {
+            element_mm: 2.0,
+            tolerance: 1e-9,
+            max_iterations: 500,
+            contact_spacing_radii: Fineness::CONTACT_SPACING_RADII,
+            self_contact: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::OwnMethod;
+
+    #[test]
+    fn an_accuracy_sets_what_is_not_said() {
+        let read = |text: &str| toml::from_str::<OwnMethod>(text);
+        let options = |text: &str| {
+            let OwnMethod::Kirchhoff(options) = read(&format!("name = \"kirchhoff\"\n{text}")).unwrap();
+            options
+        };
+        assert_eq!(options(""), KirchhoffOptions::default());
+        for (name, accuracy) in
+            [("fast", Accuracy::Fast), ("balanced", Accuracy::Balanced), ("fine", Accuracy::Fine)]
+        {
+            let of = KirchhoffOptions::of(accuracy);
+            assert_eq!(options(&format!("accuracy = {name:?}")), of);
+            let own = options(&format!("accuracy = {name:?}\nelement_mm = 3.0"));
+            assert_eq!(own, KirchhoffOptions { element_mm: 3.0, ..of });
+        }
+        let wrong = read("name = \"kirchhoff\"\naccuracy = \"best\"").unwrap_err().to_string();
+        assert!(wrong.contains("balanced"), "{wrong}");
+        assert!(read("name = \"kirchhoff\"\nelement = 2.0").is_err());
+    }
+}
