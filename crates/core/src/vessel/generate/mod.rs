@@ -118,17 +118,12 @@ impl GeneratedWall {
     }
 
     fn with_count(branches: &[curve::Branch], count: usize) -> Result<Self> {
-        let mut edge = (branch_area(branches) * TRIANGLES_PER_FACE / count as f64).sqrt();
+        let mut edge = edge_of_count(branches, count);
         let mut best: Option<(f64, Self)> = None;
         let mut nets = None;
         for _ in 0..COUNT_ATTEMPTS {
-            // The edge length is ours; what was asked for is the count.
-            let made = Self::with_edge(branches, edge, &mut nets).map_err(|error| match error {
-                Error::Parameter { name, mend, .. } if name == "edge_mm" => {
-                    Error::parameter("triangles", count, format!("means edges of {edge:.1e} mm: {mend}"))
-                }
-                other => other,
-            })?;
+            let made =
+                Self::with_edge(branches, edge, &mut nets).map_err(|error| of_count(error, count, edge))?;
             let ratio = made.wall.mesh().triangles.len() as f64 / count as f64;
             let miss = (ratio - 1.0).abs();
             if best.as_ref().is_none_or(|(least, _)| miss < *least) {
@@ -190,7 +185,25 @@ pub(super) fn check_resolution(branches: &[curve::Branch], resolution: Resolutio
     match resolution {
         Resolution::EdgeMm(edge_mm) => checked_grid(branches, edge_mm).map(|_| ()),
         Resolution::Triangles(0) => Err(Error::parameter("triangles", 0, "must be positive")),
-        Resolution::Triangles(_) => Ok(()),
+        Resolution::Triangles(count) => {
+            let edge = edge_of_count(branches, count);
+            checked_grid(branches, edge).map(|_| ()).map_err(|error| of_count(error, count, edge))
+        }
+    }
+}
+
+/// The edge length that so many triangles have, about, mm.
+fn edge_of_count(branches: &[curve::Branch], count: usize) -> f64 {
+    (branch_area(branches) * TRIANGLES_PER_FACE / count as f64).sqrt()
+}
+
+/// What is wrong with an edge length is wrong with the count that was asked for.
+fn of_count(error: Error, count: usize, edge: f64) -> Error {
+    match error {
+        Error::Parameter { name, mend, .. } if name == "edge_mm" => {
+            Error::parameter("triangles", count, format!("means edges of {edge:.1e} mm: {mend}"))
+        }
+        other => other,
     }
 }
 
