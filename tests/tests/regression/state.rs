@@ -346,7 +346,7 @@ fn a_state_with_numbers_out_of_place_is_refused() {
     };
     for (change, told) in [
         (rod(&|s| drop(s["rod"]["angles"].as_array_mut().unwrap().pop())), "state.rod"),
-        (rod(&|s| s["known"]["points"][0]["triangle"] = 4_000_000_000u32.into()), "state.known"),
+        (rod(&|s| s["known"]["points"][0]["piece"] = 4_000_000_000u32.into()), "state.known"),
         (rod(&|s| drop(s["forces"].as_array_mut().unwrap().pop())), "state.forces"),
         (rod(&|s| drop(s["correction"]["turns"].as_array_mut().unwrap().pop())), "state.correction"),
         (rod(&|s| s["report"]["inserted_mm"] = (-1.0).into()), "state.inserted_mm"),

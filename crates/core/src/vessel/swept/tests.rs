@@ -32,11 +32,23 @@ fn cone(end_mm: f64) -> CentrelineTree {
     tree(&(0..=10).map(row).collect::<Vec<_>>())
 }
 
-/// A tube of 2 mm along z, and a branch as wide that leaves it and runs beside it from z = 24 mm on, 0.3 mm apart.
+/// A tube of 2 mm along z, and a branch as wide that leaves it and runs beside it from z = 24 mm to 50 mm, 0.3 mm apart.
 fn side_by_side() -> CentrelineTree {
     let trunk = |k: usize| ([0.0, 0.0, 10.0 * k as f64 - 30.0, 2.0], k.checked_sub(1));
-    let mut rows: Vec<_> = (0..9).map(trunk).collect();
-    let way = [[6.0, 1.0], [8.0, 6.0], [6.5, 14.0], [4.3, 24.0], [4.3, 32.0], [4.3, 40.0], [4.3, 50.0]];
+    let mut rows: Vec<_> = (0..15).map(trunk).collect();
+    let way = [
+        [6.0, 1.0],
+        [8.0, 6.0],
+        [6.5, 14.0],
+        [4.3, 24.0],
+        [4.3, 32.0],
+        [4.3, 40.0],
+        [4.3, 50.0],
+        [4.3, 60.0],
+        [5.5, 70.0],
+        [10.0, 78.0],
+        [16.0, 84.0],
+    ];
     for (k, [x, z]) in way.into_iter().enumerate() {
         rows.push(([x, 0.0, z, 2.0], Some(if k == 0 { 3 } else { rows.len() - 1 })));
     }
@@ -125,10 +137,11 @@ fn the_wall_is_that_which_is_meshed() {
         let off = |x: &Vec3| closest(&field, x).distance_mm();
         let vertices = &made.wall.mesh().vertices_mm;
         let worst = vertices.iter().step_by(3).map(|x| off(x).abs()).fold(0.0, f64::max);
-        assert!(worst < 1e-4, "{name}: {worst}");
+        assert!(worst < 2e-3, "{name}: {worst}");
         // A place in a triangle lies inside of the wall by its sag.
         let sag = (0..300).map(|t| off(&(made.wall.mesh().corners(t).iter().sum::<Vec3>() / 3.0)).abs());
-        assert!(sag.fold(0.0, f64::max) > 1e-3, "{name}");
+        let sag_mm = sag.fold(0.0, f64::max);
+        assert!(sag_mm > 4e-3, "{name}: {sag_mm}");
     }
 }
 
