@@ -50,14 +50,13 @@ struct Told {
     push_force_n: f64,
 }
 
-/// A run of a scene's script with this length of elements, mm, distance of points, radii, and tolerance: what each command told, and the time of one, s.
+/// A scene's script from its start: what each command told, and time, s, and iterations of one in the mean.
 fn run(scene: &Scene, start: &Simulation) -> Result<(Vec<Told>, f64, f64)> {
     let mut simulation = start.clone();
     let script = scene.steps(simulation.stack(), &NoStore)?;
     let mut run = script.begin();
     let (mut told, mut seconds, mut iterations) = (Vec::new(), 0.0, 0u64);
-    loop {
-        let Some(step) = run.next(&simulation)? else { break };
+    while let Some(step) = run.next(&simulation)? {
         let (moves, time_s) = (step.moves.to_vec(), step.time_s);
         run.carried_out();
         let begun = Instant::now();

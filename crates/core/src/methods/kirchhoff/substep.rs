@@ -14,7 +14,7 @@ use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
-use crate::solve::{External, StopReason};
+use crate::solve::{External, NewtonReport, StopReason};
 
 /// How a part of a command is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +62,23 @@ pub(super) enum Lost {
     Unsolved(StopReason, f64),
     /// The linear solves of a tick were used up first.
     UnderWay,
+}
+
+impl Lost {
+    /// What is wrong with a solution that is so far `off` its prediction, which it is to be `near` or not, and which may have `used_up` its
+    /// linear solves.
+    fn of(found: &NewtonReport, (near, used_up): (bool, bool), balanced: bool, off: f64) -> Option<Self> {
+        let folded = !found.residual.is_finite() || found.reason == StopReason::Folded;
+        let reason = match (near, found.converged) {
+            (true, false) if used_up => return Some(Self::UnderWay),
+            (true, false) => found.reason,
+            (true, true) if !balanced => StopReason::Unsettled,
+            (true, true) if off > 1.0 => StopReason::Left,
+            (false, _) if folded => found.reason,
+            _ => return None,
+        };
+        Some(Self::Unsolved(reason, found.residual))
+    }
 }
 
 impl std::fmt::Display for Lost {
@@ -215,20 +232,10 @@ impl<const C: usize> Tools<C> {
         // What has come to rest is in equilibrium as exactly as friction is with the wall elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let used_up = found.reason == StopReason::MaxIterations && taken.1 >= attempt.solves;
-        let wrong = match (near, &found) {
-            (true, found) if !found.converged && used_up => Some(Lost::UnderWay),
-            (true, found) if !found.converged => Some(Lost::Unsolved(found.reason, found.residual)),
-            (true, found) if !balanced => Some(Lost::Unsolved(StopReason::Unsettled, found.residual)),
-            (true, found) if off > 1.0 => Some(Lost::Unsolved(StopReason::Left, found.residual)),
-            (false, found) if !found.residual.is_finite() || found.reason == StopReason::Folded => {
-                Some(Lost::Unsolved(found.reason, found.residual))
-            }
-            _ => {
-                contact.know_whole_base(&mesh.elements);
-                let passes = contact.passes_through(&mesh.elements, rod);
-                passes.then_some(Lost::Passed)
-            }
-        };
+        let wrong = Lost::of(&found, (near, used_up), balanced, off).or_else(|| {
+            contact.know_whole_base(&mesh.elements);
+            contact.passes_through(&mesh.elements, rod).then_some(Lost::Passed)
+        });
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut self.touches);
             if effort == Effort::Moving && !balanced {

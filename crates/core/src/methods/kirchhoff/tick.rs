@@ -84,6 +84,14 @@ impl<'a> Part<'a> {
     }
 }
 
+/// Tells of a part what was found, and whether the device rests there.
+fn tell(report: &mut StepReport, found: &Found, effort: Effort, rests: bool) {
+    (report.slides, report.relaxations) = (found.slides, u32::from(effort == Effort::Moving));
+    (report.converged, report.dissipated_mj) = (rests, found.dissipated_mj);
+    (report.jump, report.jumped) = (found.jump, found.jump.is_some());
+    report.imbalance = if rests { 0.0 } else { found.residual.max(found.unsettled) };
+}
+
 impl<const C: usize> Workspace<C> {
     /// Carries out moves, and what earlier ticks left over, from the state `from` in about `solves` linear solves. A new state is left in `now`.
     ///
@@ -158,12 +166,8 @@ impl<const C: usize> Workspace<C> {
                     if goes_on && report.behind.is_empty() {
                         report.behind.resize(hands.len(), Command::default());
                     }
-                    (report.substeps, report.slides) = (attempt, found.slides);
-                    report.relaxations = u32::from(effort == Effort::Moving);
-                    (report.converged, report.dissipated_mj) = (rests, found.dissipated_mj);
-                    (report.jump, report.jumped) = (found.jump, found.jump.is_some());
-                    report.imbalance = if rests { 0.0 } else { found.residual.max(found.unsettled) };
-                    report.angles = from.report.angles;
+                    (report.substeps, report.angles) = (attempt, from.report.angles);
+                    tell(report, &found, effort, rests);
                     tools.work.write(report, from.report.nodes_solved);
                     return Ok(Ticked::Moved);
                 }
