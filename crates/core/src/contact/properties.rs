@@ -30,7 +30,7 @@ pub struct WallProperties {
     /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
     pub friction: f64,
     /// How far the surface may be moved to be smooth, mm; where the lumen's radius is less than twenty times this, a twentieth of the radius.
-    /// How far the wall that is felt comes to be says [`ContactSurface::deviation`](super::ContactSurface::deviation). 0 leaves it as it is meshed, for surfaces whose meshes are known to be good.
+    /// How far the wall that is felt comes to be says [`ContactSurface::deviation`](super::FeltMesh::deviation). 0 leaves it as it is meshed, for surfaces whose meshes are known to be good.
     pub deviation_mm: f64,
     /// Where the wall is another, each laid over those before it.
     pub region: Vec<WallRegion>,

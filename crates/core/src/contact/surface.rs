@@ -1,5 +1,5 @@
 //! The wall as a device feels it: that of a surface, evenly meshed, extended beyond its openings, smooth and ready for queries
-//! ([`FeltMesh`]), or that of a centre line, which is all of this by itself ([`SweptField`]).
+//! ([`FeltMesh`]), or that of a centre line, which is all of this by itself (`vessel::swept`).
 //!
 //! What a point of a device knows of the wall about it is the *piece* that is next to it: a triangle of the felt mesh, or a place on the
 //! centre line. A point looks for the wall through space, near a piece ([`Hint::Near`]); one that has sunk in follows it along the wall

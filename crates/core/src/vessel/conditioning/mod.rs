@@ -82,7 +82,7 @@ impl Conditioning {
     }
 }
 
-/// A conditioned surface. How far the wall that is made of it is from the given one says [`ContactSurface::deviation`](crate::contact::ContactSurface::deviation).
+/// A conditioned surface. How far the wall that is made of it is from the given one says [`ContactSurface::deviation`](crate::contact::FeltMesh::deviation).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditioned<'a> {
     /// The mesh, counter-clockwise from outside as the given one; that one itself if it is even already.
