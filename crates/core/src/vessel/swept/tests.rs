@@ -32,29 +32,6 @@ fn cone(end_mm: f64) -> CentrelineTree {
     tree(&(0..=10).map(row).collect::<Vec<_>>())
 }
 
-/// A tube of 2 mm along z, and a branch as wide that leaves it and runs beside it from z = 24 mm to 50 mm, 0.3 mm apart.
-fn side_by_side() -> CentrelineTree {
-    let trunk = |k: usize| ([0.0, 0.0, 10.0 * k as f64 - 30.0, 2.0], k.checked_sub(1));
-    let mut rows: Vec<_> = (0..15).map(trunk).collect();
-    let way = [
-        [6.0, 1.0],
-        [8.0, 6.0],
-        [6.5, 14.0],
-        [4.3, 24.0],
-        [4.3, 32.0],
-        [4.3, 40.0],
-        [4.3, 50.0],
-        [4.3, 60.0],
-        [5.5, 70.0],
-        [10.0, 78.0],
-        [16.0, 84.0],
-    ];
-    for (k, [x, z]) in way.into_iter().enumerate() {
-        rows.push(([x, 0.0, z, 2.0], Some(if k == 0 { 3 } else { rows.len() - 1 })));
-    }
-    tree(&rows)
-}
-
 /// Places in front of the wall by up to `depth_mm` and behind it by a fifth of that, all over a vessel.
 fn places(field: &SweptField, depth_mm: f64, count: u64) -> impl Iterator<Item = Vec3> + '_ {
     (0..count).map(move |k| {
@@ -181,25 +158,6 @@ fn ways_leave_the_lumen_where_they_meet_the_mesh() {
         }
     }
     assert!(left > 200 && stayed > 10, "{left} {stayed}");
-}
-
-#[test]
-fn what_has_sunk_into_a_septum_keeps_its_side() {
-    let field = vessel(side_by_side()).field(2.0);
-    let side = field.near(&Vec3::new(4.3, 0.0, 36.0)).piece;
-    for depth in [-0.5, -0.1, 0.1, 0.28, 0.8, 1.5] {
-        // From the lumen of the branch to that of the tube: beyond 0.3 mm it is in the other one.
-        let x = Vec3::new(2.3 - depth, 0.0, 36.0);
-        let found = field.closest(&x, From::Side(side)).unwrap();
-        assert!((found.distance_mm() + depth).abs() < 0.02, "{depth}: {}", found.distance_mm());
-        assert!(found.normal().x > 0.99);
-        let space_mm = closest(&field, &x).distance_mm();
-        assert_eq!(space_mm > 0.0, !(0.0..0.3).contains(&depth), "{depth}: {space_mm}");
-    }
-    // Where the branch begins there is no wall to keep to: the tube is open there.
-    let begin = field.near(&Vec3::new(2.2, 0.0, 0.4)).piece;
-    let found = field.closest(&Vec3::new(-1.0, 0.0, 0.5), From::Side(begin)).unwrap();
-    assert!(found.distance_mm() > 0.8, "{}", found.distance_mm());
 }
 
 #[test]
