@@ -56,7 +56,10 @@ def test_a_simulation_of_a_scene_goes_on(copied):
     assert copied(scene).name == scene.name
 
 
-def test_a_batch_goes_on_and_its_vessel_is_in_a_pickle_once(simulation, copied):
+def test_a_batch_goes_on_and_its_vessel_is_in_a_pickle_once(vessel, wire, copied):
+    # A surface: a centre line is smaller than a state.
+    surface = endowire.Vessel.from_arrays(vessel.vertices_mm, vessel.triangles)
+    simulation = endowire.Simulation(surface, wire, wall={"friction": 0.1})
     batch, moves = endowire.Batch([simulation] * 6), np.arange(12.0).reshape(6, 1, 2)
     batch.step(moves)
     other = copied(batch)
