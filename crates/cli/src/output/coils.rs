@@ -1,7 +1,6 @@
 //! Coils that a script has left behind: coils.csv, beside steps.csv. Each row is a point of a coil's centre line, from the end that was detached to its
 //! tip.
 
-use std::io;
 use std::path::Path;
 
 use endowire_core::Vec3;
@@ -10,7 +9,7 @@ use endowire_core::insertion::DetachedCoil;
 use endowire_core::shape::Shape;
 use serde::{Deserialize, Serialize};
 
-use super::whole;
+use super::rows;
 use crate::failure::Failure;
 
 /// The table; there is none where nothing was detached.
@@ -39,50 +38,34 @@ struct Row {
     tangent_z: f64,
 }
 
-/// Writes the table of a recording: whole each time, for there are few coils.
+/// Writes the table of a recording.
 pub(crate) fn write(folder: &Path, left: &[Left], stack: &Stack) -> Result<(), Failure> {
-    let path = folder.join(COILS);
-    let written = if left.is_empty() { whole::remove(&path) } else { write_rows(&path, left, stack) };
-    written.map_err(|e| Failure::write(&path, &e))
-}
-
-fn write_rows(path: &Path, left: &[Left], stack: &Stack) -> io::Result<()> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for (number, Left { step, coil }) in left.iter().enumerate() {
+    let rows = left.iter().enumerate().flat_map(|(number, Left { step, coil })| {
         let Shape { positions_mm, tangents, from_tip_mm } = &coil.shape;
-        for ((x, t), from_tip_mm) in positions_mm.iter().zip(tangents).zip(from_tip_mm) {
-            table.serialize(Row {
-                coil: number,
-                instrument: stack.instruments()[coil.instrument].name.clone(),
-                step: *step,
-                from_tip_mm: *from_tip_mm,
-                x_mm: x.x,
-                y_mm: x.y,
-                z_mm: x.z,
-                tangent_x: t.x,
-                tangent_y: t.y,
-                tangent_z: t.z,
-            })?;
-        }
-    }
-    whole::write_bytes(path, &table.into_inner().map_err(csv::IntoInnerError::into_error)?)
+        let points = positions_mm.iter().zip(tangents).zip(from_tip_mm);
+        points.map(move |((x, t), from_tip_mm)| Row {
+            coil: number,
+            instrument: stack.instruments()[coil.instrument].name.clone(),
+            step: *step,
+            from_tip_mm: *from_tip_mm,
+            x_mm: x.x,
+            y_mm: x.y,
+            z_mm: x.z,
+            tangent_x: t.x,
+            tangent_y: t.y,
+            tangent_z: t.z,
+        })
+    });
+    rows::write(&folder.join(COILS), &rows.collect::<Vec<_>>())
 }
 
 /// What was left behind in a recorded run of these instruments.
 pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Vec<Left>, Failure> {
     let path = folder.join(COILS);
-    let refuse = |what: String| {
-        let mend = "run the scene again (endowire run)";
-        Failure::Input(format!("{}: {what}; {mend}", path.display()))
-    };
-    let text = match std::fs::read(&path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(vec![]),
-        read => read.map_err(|e| refuse(e.to_string()))?,
-    };
-    let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
-    let rows: Vec<Row> = rows.collect::<Result<_, _>>().map_err(|e| refuse(e.to_string()))?;
+    let rows: Vec<Row> = rows::read(&path)?;
     let each = rows.chunk_by(|a, b| a.coil == b.coil).map(|rows| {
-        let instrument = stack.find(&rows[0].instrument).map_err(|e| refuse(e.to_string()))?;
+        let instrument = stack.find(&rows[0].instrument);
+        let instrument = instrument.map_err(|e| rows::refused(&path, &e.to_string()))?;
         let shape = Shape {
             positions_mm: rows.iter().map(|row| Vec3::new(row.x_mm, row.y_mm, row.z_mm)).collect(),
             tangents: rows.iter().map(|row| Vec3::new(row.tangent_x, row.tangent_y, row.tangent_z)).collect(),

@@ -1,14 +1,13 @@
 //! Contrast medium that a script has injected: injections.csv, beside steps.csv. Each row has the place of the tip as it began, from
 //! where the medium streams.
 
-use std::io;
 use std::path::Path;
 
 use endowire_core::insertion::{Injection, ScriptRun, Simulation};
 use endowire_viewer::InjectionSpec;
 use serde::{Deserialize, Serialize};
 
-use super::whole;
+use super::rows;
 use crate::failure::Failure;
 
 /// The table; there is none where nothing was injected.
@@ -68,30 +67,12 @@ impl Injected {
     }
 }
 
-/// Writes the table of a recording: whole each time, for there are few rows.
+/// Writes the table of a recording.
 pub(crate) fn write(folder: &Path, injected: &[Injected]) -> Result<(), Failure> {
-    let path = folder.join(INJECTIONS);
-    let written = if injected.is_empty() { whole::remove(&path) } else { write_rows(&path, injected) };
-    written.map_err(|e| Failure::write(&path, &e))
-}
-
-fn write_rows(path: &Path, injected: &[Injected]) -> io::Result<()> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    injected.iter().try_for_each(|row| table.serialize(row))?;
-    whole::write_bytes(path, &table.into_inner().map_err(csv::IntoInnerError::into_error)?)
+    rows::write(&folder.join(INJECTIONS), injected)
 }
 
 /// What was injected in a recorded run.
 pub(crate) fn read(folder: &Path) -> Result<Vec<Injected>, Failure> {
-    let path = folder.join(INJECTIONS);
-    let refuse = |what: String| {
-        let mend = "run the scene again (endowire run)";
-        Failure::Input(format!("{}: {what}; {mend}", path.display()))
-    };
-    let text = match std::fs::read(&path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(vec![]),
-        read => read.map_err(|e| refuse(e.to_string()))?,
-    };
-    let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
-    rows.collect::<Result<_, _>>().map_err(|e| refuse(e.to_string()))
+    rows::read(&folder.join(INJECTIONS))
 }

@@ -14,6 +14,7 @@ pub(crate) mod progress;
 pub(crate) mod provenance;
 pub(crate) mod recorder;
 pub(crate) mod recording;
+mod rows;
 pub(crate) mod saved;
 pub(crate) mod session;
 pub(crate) mod vtk;

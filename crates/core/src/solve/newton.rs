@@ -132,26 +132,21 @@ impl<const C: usize> Newton<C> {
         options: &NewtonOptions,
     ) -> NewtonReport {
         self.solves = 0;
-        let report = self.iterate(elements, supports, external, state, options);
+        // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
+        let minimum = options.minimum && external.is_conservative();
+        let problem = Problem { elements, supports, external, options, minimum };
+        let report = self.iterate(problem, state);
         NewtonReport { solves: self.solves, ..report }
     }
 
-    fn iterate(
-        &mut self,
-        elements: &[ElementData],
-        supports: &mut Supports,
-        external: &mut dyn External,
-        state: &mut RodState,
-        options: &NewtonOptions,
-    ) -> NewtonReport {
+    fn iterate(&mut self, mut problem: Problem<'_>, state: &mut RodState) -> NewtonReport {
+        let (elements, options, minimum) = (problem.elements, problem.options, problem.minimum);
+        let supports = &*problem.supports;
         let mut report = NewtonReport::of(elements.len() + supports.conditions());
         self.trial.copy_from(state);
         self.other.copy_from(state);
         self.steps.clear();
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
-        // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
-        let minimum = options.minimum && external.is_conservative();
-        let mut problem = Problem { elements, supports, external, options, minimum };
         let mut progress = Progress::default();
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;

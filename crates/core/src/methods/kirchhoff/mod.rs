@@ -231,10 +231,14 @@ impl<const C: usize> Kirchhoff<C> {
         Ok(method)
     }
 
-    /// Whether nothing is left to do: hands and vessel rest, and so does the device.
-    fn rests(&self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
+    /// Whether nothing is left to do: hands and vessel rest, and so does the device; its report then says so.
+    fn rests(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
         let still = moves.iter().all(|one| one.command == Command::default());
-        still && !surroundings.moves() && self.state.report.behind.is_empty()
+        let rests = still && !surroundings.moves() && self.state.report.behind.is_empty();
+        if rests {
+            Arc::make_mut(&mut self.state).report.rest();
+        }
+        rests
     }
 
     /// Has the workspace work on, and goes on to the state that it leaves if it says that there is a new one; where that fails, to none.
@@ -322,7 +326,6 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
         if self.rests(surroundings, moves) {
-            Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
         self.work_on(surroundings, |workspace, environment, state| {
@@ -332,7 +335,6 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
         if self.rests(surroundings, moves) {
-            Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
         let ticked = self.work_on(surroundings, |workspace, environment, state| {
