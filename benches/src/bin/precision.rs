@@ -1,12 +1,13 @@
-//! Work and precision: what a step takes and how far it is off, over lengths of elements, distances of contact points and tolerances.
+//! Work and precision: what a command takes and how far it is off, over length of elements, distance of contact points, tolerance, the wall's mesh and length of steps.
 //!
 //! ```sh
 //! cargo run --release -p endowire-benches --bin precision [SCENE] > precision.tsv
 //! ```
 //!
-//! A row for each scene and setting: time a command, the median of three runs; how far the device's line is off that of the finest setting at the same
-//! place of the device, at nine of ten commands and at most; and how far the push force is, over the largest. Rows that another one beats in both
-//! are not on the front. At a snap lines may be apart by as much as they snap: the 90th percentile tells what a setting is worth, the largest where it snaps elsewhere.
+//! A row for each scene and setting: time a command, the median of three runs; how far the device's line is off that of the finest setting with the
+//! hands at the same place, at nine of ten commands and at most; and how far the push force is, over the largest. Settings are the accuracies of
+//! `method.accuracy`, and the defaults with one thing varied at a time. Steps are held against the finest setting in steps of a quarter. At a snap
+//! lines may be apart by as much as they snap: the 90th percentile tells what a setting is worth, the largest where it snaps elsewhere.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a table is what it is for")]
 
 use std::path::Path;
@@ -14,7 +15,7 @@ use std::time::Instant;
 
 use endowire_core::insertion::Simulation;
 use endowire_core::methods::OwnMethod;
-use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::methods::kirchhoff::{Accuracy, KirchhoffOptions};
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
 use endowire_core::{Error, Result, Vec3};
@@ -31,66 +32,174 @@ const SCENES: [&str; 9] = [
     "benches/hard/pair_mu0.1",
     "benches/hard/noisy_arch_iii",
 ];
-/// Lengths of elements, mm, …
-const ELEMENTS_MM: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];
+/// What is varied: lengths of elements, mm, …
+const ELEMENTS_MM: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 /// … distances of contact points, radii, …
 const SPACINGS: [f64; 5] = [0.5, 0.75, 1.0, 1.5, 3.0];
-/// … and tolerances.
-const TOLERANCES: [f64; 3] = [1e-9, 1e-6, 1e-4];
-/// What the others are held against.
-const FINEST: [f64; 3] = [1.0, 0.25, 1e-10];
+/// … tolerances, …
+const TOLERANCES: [f64; 5] = [1e-9, 1e-7, 1e-6, 1e-5, 1e-4];
+/// … triangles of the wall, where the vessel's centre line is felt itself otherwise, …
+const TRIANGLES: [usize; 3] = [5_000, 20_000, 80_000];
+/// … and lengths of steps, over those of the script.
+const STEPS: [f64; 3] = [0.5, 2.0, 4.0];
+/// Steps that they are held against.
+const FINEST_STEPS: f64 = 0.25;
 /// Places of a line that are compared, mm apart.
 const PLACES_MM: f64 = 2.0;
 /// Runs of which the median is taken.
 const RUNS: usize = 3;
 
+/// How a scene is simulated.
+#[derive(Clone, Copy)]
+struct Setting {
+    options: KirchhoffOptions,
+    triangles: Option<usize>,
+    steps: f64,
+}
+
+impl Setting {
+    fn of(options: KirchhoffOptions) -> Self {
+        Self { options, triangles: None, steps: 1.0 }
+    }
+
+    /// What everything is held against.
+    fn finest(steps: f64) -> Self {
+        let options = KirchhoffOptions {
+            element_mm: 1.0,
+            contact_spacing_radii: 0.25,
+            tolerance: 1e-10,
+            ..KirchhoffOptions::default()
+        };
+        Self { steps, ..Self::of(options) }
+    }
+
+    /// All that a scene is run in, with their names.
+    fn all(has_tree: bool) -> Vec<(String, Self)> {
+        let usual = KirchhoffOptions::default();
+        let of = |name: String, options| (name, Self::of(options));
+        let mut all = vec![of("defaults".into(), usual)];
+        for accuracy in [Accuracy::Fast, Accuracy::Balanced, Accuracy::Fine] {
+            let name = format!("{accuracy:?}").to_lowercase();
+            all.push(of(name, KirchhoffOptions::of(accuracy)));
+        }
+        for element_mm in ELEMENTS_MM {
+            all.push(of(format!("element_mm {element_mm}"), KirchhoffOptions { element_mm, ..usual }));
+        }
+        for contact_spacing_radii in SPACINGS {
+            let name = format!("contact_spacing_radii {contact_spacing_radii}");
+            all.push(of(name, KirchhoffOptions { contact_spacing_radii, ..usual }));
+        }
+        for tolerance in TOLERANCES {
+            all.push(of(format!("tolerance {tolerance:e}"), KirchhoffOptions { tolerance, ..usual }));
+        }
+        for triangles in TRIANGLES.into_iter().filter(|_| has_tree) {
+            all.push((
+                format!("triangles {triangles}"),
+                Self { triangles: Some(triangles), ..Self::of(usual) },
+            ));
+        }
+        for steps in STEPS {
+            all.push((format!("steps {steps}"), Self { steps, ..Self::of(usual) }));
+        }
+        all
+    }
+
+    /// The script of the scene of a file in this setting, the median of so many runs in time.
+    fn run(self, path: &Path, runs: usize) -> Result<Run> {
+        let mut scene = Scene::read(path)?;
+        scene.method = OwnMethod::Kirchhoff(self.options);
+        for line in &mut scene.script {
+            line.step_mm = Some(self.steps * line.step_mm.unwrap_or(1.0));
+            line.step_deg = Some(self.steps * line.step_deg.unwrap_or(5.0));
+            for other in &mut line.with {
+                other.step_mm = Some(self.steps * other.step_mm.unwrap_or(1.0));
+            }
+        }
+        let lumen = match self.triangles {
+            None => scene.lumen(&NoStore)?,
+            Some(_) => {
+                (scene.vessel.edge_mm, scene.vessel.triangles) = (None, self.triangles);
+                scene.wall(&NoStore)?.into()
+            }
+        };
+        let start = scene.simulation_in(lumen, &NoStore)?;
+        let mut runs: Vec<_> = (0..runs).map(|_| Run::of(&scene, start.clone())).collect::<Result<_>>()?;
+        runs.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        Ok(runs.swap_remove(runs.len() / 2))
+    }
+}
+
+/// What a run told of each command, and the time, s, and iterations of all.
+struct Run {
+    told: Vec<Told>,
+    seconds: f64,
+    iterations: u64,
+}
+
 /// What a run tells of a command.
 struct Told {
+    /// Where each hand is: length that is in, mm, and turn, rad.
+    hands: Vec<[f64; 2]>,
     line_mm: Vec<Vec3>,
     push_force_n: f64,
 }
 
-/// A scene's script from its start: what each command told, and time, s, and iterations of one in the mean.
-fn run(scene: &Scene, start: &Simulation) -> Result<(Vec<Told>, f64, f64)> {
-    let mut simulation = start.clone();
-    let script = scene.steps(simulation.stack(), &NoStore)?;
-    let mut run = script.begin();
-    let (mut told, mut seconds, mut iterations) = (Vec::new(), 0.0, 0u64);
-    while let Some(step) = run.next(&simulation)? {
-        let (moves, time_s) = (step.moves.to_vec(), step.time_s);
-        run.carried_out();
-        let begun = Instant::now();
-        let done =
-            simulation.step_until(&moves, time_s).map(|report| (report.push_force_n, report.iterations));
-        seconds += begun.elapsed().as_secs_f64();
-        let Ok((push_force_n, its)) = done else { break };
-        iterations += u64::from(its);
-        let line = simulation.shape();
-        let count = (simulation.report().inserted_mm / PLACES_MM) as usize;
-        let line_mm = (0..count).filter_map(|k| line.position_at(PLACES_MM * k as f64)).collect();
-        told.push(Told { line_mm, push_force_n });
+impl Told {
+    fn same_hands(&self, other: &Self) -> bool {
+        self.hands.iter().flatten().zip(other.hands.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6)
     }
-    let commands = told.len().max(1) as f64;
-    Ok((told, seconds / commands, iterations as f64 / commands))
+}
+
+impl Run {
+    /// A scene's script from its start.
+    fn of(scene: &Scene, mut simulation: Simulation) -> Result<Self> {
+        let script = scene.steps(simulation.stack(), &NoStore)?;
+        let mut script = script.begin();
+        let mut run = Self { told: Vec::new(), seconds: 0.0, iterations: 0 };
+        while let Some(step) = script.next(&simulation)? {
+            let begun = Instant::now();
+            let done = step.carry_out(&mut simulation).map(|report| (report.push_force_n, report.iterations));
+            run.seconds += begun.elapsed().as_secs_f64();
+            script.carried_out();
+            let Ok((push_force_n, iterations)) = done else { break };
+            run.iterations += u64::from(iterations);
+            let report = simulation.report();
+            let mut hands = vec![[report.inserted_mm, report.rotation_rad]];
+            hands.extend(report.instruments.iter().map(|i| [i.inserted_mm, i.rotation_rad]));
+            let line = simulation.shape();
+            let count = (report.inserted_mm / PLACES_MM) as usize;
+            let line_mm = (0..count).filter_map(|k| line.position_at(PLACES_MM * k as f64)).collect();
+            run.told.push(Told { hands, line_mm, push_force_n });
+        }
+        Ok(run)
+    }
+
+    /// How far it is off another: lines, mm, at nine of ten commands and at most, and push forces at nine of ten, over the largest.
+    fn off(&self, exact: &Self) -> [f64; 3] {
+        let largest_n =
+            exact.told.iter().map(|told| told.push_force_n.abs()).fold(f64::MIN_POSITIVE, f64::max);
+        let (mut lines, mut pushes) = (Vec::new(), Vec::new());
+        // Hands go to and fro: of commands with the same place, the next.
+        let mut rest = exact.told.iter();
+        for told in &self.told {
+            let ahead = rest.clone();
+            let Some(same) = rest.find(|other| told.same_hands(other)) else {
+                rest = ahead;
+                continue;
+            };
+            let apart = told.line_mm.iter().zip(&same.line_mm).map(|(a, b)| (a - b).norm());
+            lines.push(apart.fold(0.0, f64::max));
+            pushes.push((told.push_force_n - same.push_force_n).abs() / largest_n);
+        }
+        lines.sort_by(f64::total_cmp);
+        pushes.sort_by(f64::total_cmp);
+        [percentile(&lines, 0.9), percentile(&lines, 1.0), percentile(&pushes, 0.9)]
+    }
 }
 
 /// A percentile of values in ascending order.
 fn percentile(sorted: &[f64], part: f64) -> f64 {
     sorted.get(((sorted.len().saturating_sub(1)) as f64 * part) as usize).copied().unwrap_or(f64::NAN)
-}
-
-/// How far a run is off another: lines, mm, at nine of ten commands and at most, and push forces at nine of ten, over the largest.
-fn off(run: &[Told], exact: &[Told]) -> [f64; 3] {
-    let line = |(a, b): (&Told, &Told)| {
-        a.line_mm.iter().zip(&b.line_mm).map(|(x, y)| (x - y).norm()).fold(0.0, f64::max)
-    };
-    let mut lines: Vec<f64> = run.iter().zip(exact).map(line).collect();
-    let largest_n = exact.iter().map(|told| told.push_force_n.abs()).fold(f64::MIN_POSITIVE, f64::max);
-    let push = |(a, b): (&Told, &Told)| (a.push_force_n - b.push_force_n).abs() / largest_n;
-    let mut pushes: Vec<f64> = run.iter().zip(exact).map(push).collect();
-    lines.sort_by(f64::total_cmp);
-    pushes.sort_by(f64::total_cmp);
-    [percentile(&lines, 0.9), percentile(&lines, 1.0), percentile(&pushes, 0.9)]
 }
 
 fn main() -> Result<()> {
@@ -102,49 +211,22 @@ fn main() -> Result<()> {
         let mend = format!("is in none of {}", SCENES.join(", "));
         return Err(Error::parameter("SCENE", only.unwrap_or_default(), mend));
     }
-    println!(
-        "scene\telement_mm\tspacing_radii\ttolerance\tms\titerations\toff_90_mm\toff_most_mm\tpush_90\tcommands\tfront"
-    );
-    for name in chosen {
-        let path = root.join(format!("{name}.toml"));
-        let mut scene = Scene::read(&path)?;
-        let mut simulated = |[element_mm, contact_spacing_radii, tolerance]: [f64; 3]| {
-            let options = KirchhoffOptions {
-                element_mm,
-                contact_spacing_radii,
-                tolerance,
-                ..KirchhoffOptions::default()
-            };
-            scene.method = OwnMethod::Kirchhoff(options);
-            let start = scene.simulation(&NoStore)?;
-            let mut runs: Vec<_> = (0..RUNS).map(|_| run(&scene, &start)).collect::<Result<_>>()?;
-            runs.sort_by(|a, b| a.1.total_cmp(&b.1));
-            Ok::<_, Error>(runs.swap_remove(RUNS / 2))
-        };
-        let (exact, ..) = simulated(FINEST)?;
-        let mut rows = Vec::new();
-        for element_mm in ELEMENTS_MM {
-            for spacing in SPACINGS {
-                for tolerance in TOLERANCES {
-                    let (told, seconds, iterations) = simulated([element_mm, spacing, tolerance])?;
-                    rows.push((
-                        [element_mm, spacing, tolerance],
-                        seconds,
-                        iterations,
-                        off(&told, &exact),
-                        told.len(),
-                    ));
-                }
-            }
-        }
-        for ([element_mm, spacing, tolerance], seconds, iterations, [near, most, push], commands) in &rows {
-            let beaten = rows.iter().any(|other| other.1 < *seconds && other.3[0] < *near);
+    println!("scene\tsetting\tms\titerations\toff_90_mm\toff_most_mm\tpush_90\tcommands");
+    for path in chosen {
+        let name = path.rsplit('/').next().unwrap_or(path);
+        let path = root.join(format!("{path}.toml"));
+        let exact = Setting::finest(1.0).run(&path, 1)?;
+        let exact_steps = Setting::finest(FINEST_STEPS).run(&path, 1)?;
+        for (of, setting) in Setting::all(Scene::read(&path)?.vessel.tree.is_some()) {
+            let run = setting.run(&path, RUNS)?;
+            let stepped = (setting.steps - 1.0).abs() > f64::EPSILON;
+            let [near, most, push] = run.off(if stepped { &exact_steps } else { &exact });
+            let commands = run.told.len().max(1) as f64;
             println!(
-                "{}\t{element_mm}\t{spacing}\t{tolerance:e}\t{:.4}\t{iterations:.2}\t{near:.5}\t{most:.4}\t{push:.5}\t{commands}/{}\t{}",
-                name.rsplit('/').next().unwrap_or(name),
-                1e3 * seconds,
-                exact.len(),
-                if beaten { "" } else { "*" },
+                "{name}\t{of}\t{:.4}\t{:.2}\t{near:.5}\t{most:.4}\t{push:.5}\t{}",
+                1e3 * run.seconds / commands,
+                run.iterations as f64 / commands,
+                run.told.len(),
             );
         }
     }

@@ -133,10 +133,17 @@ impl<'a> WallContact<'a> {
         let x = self.material(index, elements, to);
         let known = &self.cache.points[index];
         let safe_mm = SAFE * known.base_clearance_mm / self.surface.stretch();
-        if known.side.is_some() || fraction * (x - known.base).norm() <= safe_mm {
+        let way_mm = (x - known.base).norm();
+        if known.side.is_some() || fraction * way_mm <= safe_mm {
+            return fraction;
+        }
+        // Between two places that are as far from the wall as from each other there is none.
+        let to_mm = self.read(index, &x).distance_mm();
+        if way_mm <= safe_mm + SAFE * to_mm / self.surface.stretch() {
             return fraction;
         }
         self.counters.queries += 1;
+        let known = &self.cache.points[index];
         let Some(met) = self.surface.crossing(&known.base, &x, fraction / SAFE) else {
             return fraction;
         };

@@ -477,7 +477,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    fn simulation_in(&self, lumen: Lumen, store: &dyn WallStore) -> Result<Simulation> {
+    /// [`SceneOf::simulation`] in a vessel that is at hand: its mesh instead of its centre line, one that several scenes share.
+    ///
+    /// # Errors
+    /// As [`SceneOf::simulation`].
+    pub fn simulation_in(&self, lumen: Lumen, store: &dyn WallStore) -> Result<Simulation> {
         let sheath = self.sheath(&lumen)?;
         let stack = self.stack()?;
         let inserted_mm = self.inserted_mm(&stack)?;

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::methods::kirchhoff::{Accuracy, KirchhoffOptions};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall, anatomy};
 use endowire_core::{Error, Result, Vec3};
@@ -129,7 +129,7 @@ impl Case {
             truth: Truth::Tip(Vec3::zeros()),
         };
         let shape = |elements: usize| -> Result<Shape> {
-            let tolerance = KirchhoffOptions::default().tolerance;
+            let tolerance = KirchhoffOptions::of(Accuracy::Fine).tolerance;
             let mut simulation = scene.start("kirchhoff", elements, tolerance)?;
             for _ in 0..scene.steps() {
                 simulation.step(Command::advance(scene.step_mm))?;

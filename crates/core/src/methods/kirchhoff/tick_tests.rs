@@ -176,8 +176,8 @@ fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
     assert!(jumps == 1 && moving > 5 && ticks < 200, "{jumps} {moving} {ticks}");
     let [a, b] = [&ticking, &stepping].map(|each| each.shape().tip_mm().unwrap());
     assert!((a - b).norm() < 1e-3, "{a} {b}");
-    // On its way it stays within the wall.
-    assert!(deepest_mm < 0.4, "{deepest_mm}");
+    // On its way its axis stays in the lumen, but for what the wall that is felt stands off its triangles.
+    assert!(deepest_mm < 0.4 + 0.01, "{deepest_mm}");
 }
 
 #[test]

@@ -18,17 +18,21 @@ const JUMPS: usize = 4;
 /// Last of these steps, in distances of the samples: what is left of the way is of the order of its square.
 const FOOT: f64 = 1e-6;
 
-/// A knot of the spline.
+/// A knot of the spline, and the cubics from there to the next.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
     position: Vec3,
     /// Derivative of the course, of nearly unit length, …
     tangent: Vec3,
-    /// … and the second one, 1/mm.
+    /// … the second one, 1/mm, …
     moment: Vec3,
+    /// … and the third one up to the next knot, 1/mm².
+    third: Vec3,
     radius: f64,
-    /// Slope of the radius.
+    /// Slope of the radius, …
     slope: f64,
+    /// … and the factors of the square and the cube of the way in its course.
+    flare: [f64; 2],
 }
 
 /// The knot next to a point.
@@ -102,14 +106,21 @@ impl Axis {
             let bend = if k == a { moments[a] * -2.0 - moments[b] } else { moments[a] + moments[b] * 2.0 };
             chord + bend * (branch.step / 6.0)
         };
-        let knots = branch.samples.iter().enumerate().map(|(k, sample)| Knot {
-            position: sample.position,
-            tangent: tangent(k),
-            moment: moments[k],
-            radius: sample.radius,
-            slope: sample.slope,
+        let h = branch.step;
+        let knots = branch.samples.iter().enumerate().map(|(k, sample)| {
+            let next = &branch.samples[(k + 1).min(last)];
+            let (rise, sa, sb) = (next.radius - sample.radius, sample.slope * h, next.slope * h);
+            Knot {
+                position: sample.position,
+                tangent: tangent(k),
+                moment: moments[k],
+                third: (moments[(k + 1).min(last)] - moments[k]) / h,
+                radius: sample.radius,
+                slope: sample.slope,
+                flare: [(3.0 * rise - 2.0 * sa - sb) / (h * h), (sa + sb - 2.0 * rise) / (h * h * h)],
+            }
         });
-        Self { knots: knots.collect(), step: branch.step, ends }
+        Self { knots: knots.collect(), step: h, ends }
     }
 
     /// Number of knots.
@@ -171,20 +182,17 @@ impl Axis {
             return self.beyond(self.knots.len() - 1, s - length, s - length);
         }
         let k = ((s / self.step) as usize).min(self.knots.len() - 2);
-        let (a, b, h, u) = (&self.knots[k], &self.knots[k + 1], self.step, s - self.step * k as f64);
-        let third = (b.moment - a.moment) / h;
-        let slope = (b.position - a.position) / h - (a.moment * 2.0 + b.moment) * (h / 6.0);
+        let Knot { position, tangent, moment, third, radius, slope, flare: [quadratic, cubic] } =
+            self.knots[k];
+        let u = s - self.step * k as f64;
         // Positions relative to a knot, so that far-away anatomies lose no digits.
-        let position = a.position + (slope + (a.moment * 0.5 + third * (u / 6.0)) * u) * u;
-        let first = slope + (a.moment + third * (0.5 * u)) * u;
-        let second = a.moment + third * u;
-        let (t, rise) = (u / h, b.radius - a.radius);
-        let (sa, sb) = (a.slope * h, b.slope * h);
-        let (quadratic, cubic) = (3.0 * rise - 2.0 * sa - sb, sa + sb - 2.0 * rise);
+        let position = position + (tangent + (moment * 0.5 + third * (u / 6.0)) * u) * u;
+        let first = tangent + (moment + third * (0.5 * u)) * u;
+        let second = moment + third * u;
         let radius = [
-            a.radius + t * (sa + t * (quadratic + t * cubic)),
-            (sa + t * (2.0 * quadratic + 3.0 * t * cubic)) / h,
-            (2.0 * quadratic + 6.0 * t * cubic) / (h * h),
+            radius + u * (slope + u * (quadratic + u * cubic)),
+            slope + u * (2.0 * quadratic + 3.0 * u * cubic),
+            2.0 * quadratic + 6.0 * u * cubic,
         ];
         Place { position, first, second, third, radius }
     }

@@ -14,7 +14,7 @@
 use nalgebra::Matrix3;
 
 use super::blocks::Part;
-use super::field::{Feet, SweptField, Value};
+use super::field::{Depth, Feet, SweptField, Value};
 use crate::Vec3;
 use crate::products::outer;
 
@@ -24,9 +24,9 @@ const STEPS: usize = 40;
 const LONGEST: f64 = 0.5;
 /// … and the last one shorter than this: a step of Newton's method leaves its square.
 const LAST: f64 = 1e-5;
-/// The same where branches are joined, and steps leave a part of their length.
+/// The same where branches are joined and the Hessian is not known: steps leave a part of their length.
 const LAST_IN_JOINT: f64 = 1e-11;
-/// After so many steps the Hessian of a joint is looked for.
+/// Steps from one look for the Hessian of a joint to the next.
 const PATIENCE: usize = 3;
 /// The wall of a branch that lies in the lumen by more than this part of its radius is none: another branch opens there. Where they are joined it does by
 /// a sixth of the joint's width, 0.23 radii.
@@ -105,25 +105,35 @@ impl Closest<'_> {
 
     /// The knot next to the place.
     pub(crate) fn piece(&self) -> u32 {
-        self.field.piece(&self.value)
+        self.field.piece(self.value.branch, self.value.foot)
     }
 }
 
 impl SweptField {
-    /// The knot next to where a value is from.
-    fn piece(&self, value: &Value) -> u32 {
-        self.blocks.piece(value.branch, self.axes[value.branch as usize].knot_at(value.foot) as u32)
+    /// The knot next to an arc length of a branch.
+    fn piece(&self, branch: u32, foot: f64) -> u32 {
+        self.blocks.piece(branch, self.axes[branch as usize].knot_at(foot) as u32)
     }
 
     /// The branch that a point is deepest in, or nearest to.
     pub(crate) fn near(&self, x: &Vec3) -> Near {
-        let mut best: Option<Value> = None;
+        match self.deepest(x) {
+            None => Near { clearance_mm: f64::NAN, piece: 0 },
+            Some(Depth { f, room, branch, foot, .. }) => {
+                Near { clearance_mm: if f < 0.0 { room } else { -f }, piece: self.piece(branch, foot) }
+            }
+        }
+    }
+
+    /// How deep a place is in that branch. None of one that is not finite.
+    fn deepest(&self, x: &Vec3) -> Option<Depth> {
+        let mut best: Option<Depth> = None;
         let mut ask = |part: Part, lowest: &mut f64| {
             let axis = &self.axes[part.branch as usize];
             let near = axis.nearest(x, part.from as usize, part.to as usize).near;
-            let value = self.branch(part.branch as usize, x, near);
-            if value.f < *lowest {
-                (*lowest, best) = (value.f, Some(value));
+            let depth = self.depth(part.branch as usize, x, near);
+            if depth.f < *lowest {
+                (*lowest, best) = (depth.f, Some(depth));
             }
         };
         let mut lowest = f64::INFINITY;
@@ -137,25 +147,24 @@ impl SweptField {
                 ask(part, &mut lowest);
             }
         }
-        let Some(value) = best else { return Near { clearance_mm: f64::NAN, piece: 0 } };
-        let clearance_mm = if value.f < 0.0 { value.room } else { -value.f };
-        Near { clearance_mm, piece: self.piece(&value) }
+        best
     }
 
     /// Whether a point is in the lumen, what goes on beyond open ends included.
     pub(crate) fn contains(&self, x: &Vec3) -> bool {
-        let near = self.near(x);
-        near.clearance_mm > 0.0 || self.level(near, x).is_some_and(|value| value.f < 0.0)
+        self.deepest(x).is_some_and(|depth| depth.f < 0.0 || self.level(&depth, x) < 0.0)
     }
 
     /// f at a place.
     pub(super) fn value_at(&self, x: &Vec3) -> f64 {
-        self.level(self.near(x), x).map_or(f64::NAN, |value| value.f)
+        self.deepest(x).map_or(f64::NAN, |depth| self.level(&depth, x))
     }
 
-    fn level(&self, near: Near, x: &Vec3) -> Option<Value> {
-        let (branch, knot) = self.blocks.knot(near.piece);
-        self.value(&mut self.feet(self.blocks.about(branch, knot), x, 0.0), x)
+    /// f at a place that is so deep in one of the branches.
+    fn level(&self, depth: &Depth, x: &Vec3) -> f64 {
+        let branch = depth.branch as usize;
+        let parts = self.blocks.about(branch, self.axes[branch].knot_at(depth.foot));
+        self.value(&mut self.feet(parts, x, 0.0), x).map_or(f64::NAN, |value| value.f)
     }
 
     /// Where a straight way leaves the lumen, as a part of it, up to `farthest` times its length.
@@ -164,12 +173,12 @@ impl SweptField {
         let mut part = 0.0;
         while part <= farthest && length > 0.0 {
             let x = from + way * part;
-            let near = self.near(&x);
-            let value = self.level(near, &x)?;
-            if value.f >= 0.0 {
+            let depth = self.deepest(&x)?;
+            // What is in no branch may still be where they are joined.
+            if depth.f >= 0.0 && self.level(&depth, &x) >= 0.0 {
                 return Some(part);
             }
-            part += near.clearance_mm.max(STRIDE * value.radius) / length;
+            part += depth.room.max(STRIDE * depth.radius) / length;
         }
         None
     }
@@ -209,10 +218,11 @@ impl SweptField {
         let (branch, knot) = self.blocks.knot(piece);
         let parts = self.blocks.about(branch, knot);
         let mut feet = self.feet(parts, x, 0.0);
-        let Some(value) = self.value(&mut feet, x) else { return Ok(None) };
-        if value.room >= limit_mm {
-            return Err(value.room);
+        let room = self.room(&mut feet, x);
+        if room >= limit_mm {
+            return Err(room);
         }
+        let Some(value) = self.value(&mut feet, x) else { return Ok(None) };
         if value.is_distance {
             let outside = value.f;
             return Ok(Some(Closest { field: self, feet, place: *x, value, outside, is_distance: true }));
@@ -234,8 +244,8 @@ impl SweptField {
             let offset = x - place;
             let outside = offset.dot(&n);
             let across = Matrix3::identity() - outer(&n, &n);
-            if value.is_joint && step % PATIENCE == PATIENCE - 1 {
-                known = Some(self.hessian(&feet, &place, &value));
+            if value.is_joint && step % PATIENCE == 0 {
+                known = Some(self.rough_hessian(&feet, &place, &value));
             }
             let hessian = match known {
                 Some(known) if value.is_joint => known,
@@ -253,7 +263,7 @@ impl SweptField {
             let change = (aside + n * towards).cap_magnitude(LONGEST * value.radius);
             place += change;
             value = self.value(&mut feet, &place)?;
-            let last = if value.is_joint { LAST_IN_JOINT } else { LAST };
+            let last = if value.is_joint && known.is_none() { LAST_IN_JOINT } else { LAST };
             if change.norm() <= last * value.radius {
                 break;
             }

@@ -24,7 +24,7 @@ use super::axis::{Axis, End, NearKnot, stretch};
 use super::blocks::{Blocks, Part};
 use crate::Vec3;
 use crate::products::outer;
-use crate::vessel::generate::{BLEND, BLEND_COSINES, HIDDEN};
+use crate::vessel::generate::{BLEND, BLEND_COSINES, HIDDEN, any_perpendicular};
 
 /// Step of differences over the radius: with what rounding and the third derivative leave, ten digits of a Hessian.
 const DIFFERENCE: f64 = 1e-4;
@@ -54,8 +54,6 @@ pub(crate) struct Value {
     pub(super) is_joint: bool,
     /// Whether f is the distance: a single branch that does not taper.
     pub(super) is_distance: bool,
-    /// No wall is nearer than this, mm: in the lumen of a branch its own wall, for that lumen is part of all.
-    pub(super) room: f64,
     /// The branch that it is of, or most of it, and the arc length of the foot.
     pub(super) branch: u32,
     pub(super) foot: f64,
@@ -81,7 +79,29 @@ fn smooth_step(t: f64) -> (f64, f64) {
     (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t))
 }
 
+/// The field of a single branch at a place, without derivatives.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Depth {
+    /// f, mm: negative in the lumen.
+    pub(super) f: f64,
+    /// No wall is nearer than this, mm: in the lumen of a branch its own wall, for that lumen is part of all.
+    pub(super) room: f64,
+    /// Radius of the vessel, mm.
+    pub(super) radius: f64,
+    /// The branch, and the arc length of the foot.
+    pub(super) branch: u32,
+    pub(super) foot: f64,
+}
+
 impl SweptField {
+    /// How deep a place is in a single branch, whose foot is near an arc length.
+    pub(super) fn depth(&self, branch: usize, x: &Vec3, near: f64) -> Depth {
+        let (foot, place) = self.axes[branch].foot(x, near);
+        let [radius, ..] = place.radius;
+        let f = (x - place.position).norm() - radius;
+        Depth { f, room: -f / self.blocks.steepness(branch), radius, branch: branch as u32, foot }
+    }
+
     /// The field of a single branch, whose foot is near an arc length.
     pub(super) fn branch(&self, branch: usize, x: &Vec3, near: f64) -> Value {
         let axis = &self.axes[branch];
@@ -128,10 +148,20 @@ impl SweptField {
             exposure_slope,
             is_joint: false,
             is_distance: taper == 0.0 && flare == 0.0,
-            room: -f / self.blocks.steepness(branch),
             branch: branch as u32,
             foot: s,
         }
+    }
+
+    /// No wall is nearer to a place with these feet than this, mm: the lumen of each branch is part of all.
+    pub(super) fn room(&self, feet: &mut Feet, x: &Vec3) -> f64 {
+        let mut room = f64::NEG_INFINITY;
+        for (branch, near) in &mut feet.all[..feet.count] {
+            let depth = self.depth(*branch as usize, x, *near);
+            *near = depth.foot;
+            room = room.max(depth.room);
+        }
+        room
     }
 
     /// What of these parts of branches, in their order, may count at a place and within `way` mm of it.
@@ -194,20 +224,45 @@ impl SweptField {
         Some(joined.map_or(done, |before| join(&before, &done)))
     }
 
-    /// ∇∇f at a place where the field is that.
+    /// ∇∇f at a place where the field is that, but for its part along the normal on both sides, which no wall has a use for.
     pub(super) fn hessian(&self, feet: &Feet, x: &Vec3, value: &Value) -> Matrix3<f64> {
         if !value.is_joint {
             return value.turning;
         }
         let step = DIFFERENCE * value.radius;
-        let gradient =
-            |x: Vec3| self.value(&mut feet.clone(), &x).map_or(value.gradient, |value| value.gradient);
-        let column = |axis: usize| {
-            let way = Vec3::ith(axis, step);
-            (gradient(x + way) - gradient(x - way)) / (2.0 * step)
-        };
-        let hessian = Matrix3::from_columns(&[column(0), column(1), column(2)]);
-        (hessian + hessian.transpose()) * 0.5
+        Self::tangential(value, |way| {
+            (self.gradient_at(feet, &(x + way * step), value)
+                - self.gradient_at(feet, &(x - way * step), value))
+                / (2.0 * step)
+        })
+    }
+
+    /// The same, good enough for the next step to the wall.
+    pub(super) fn rough_hessian(&self, feet: &Feet, x: &Vec3, value: &Value) -> Matrix3<f64> {
+        let step = DIFFERENCE * value.radius;
+        Self::tangential(value, |way| {
+            (self.gradient_at(feet, &(x + way * step), value) - value.gradient) / step
+        })
+    }
+
+    /// ∇f at a place next to that of a value.
+    fn gradient_at(&self, feet: &Feet, x: &Vec3, value: &Value) -> Vec3 {
+        self.value(&mut feet.clone(), x).map_or(value.gradient, |value| value.gradient)
+    }
+
+    /// A symmetric matrix of what it makes of the two ways along the wall.
+    fn tangential(value: &Value, of: impl Fn(Vec3) -> Vec3) -> Matrix3<f64> {
+        let n = value.gradient.normalize();
+        let u = any_perpendicular(&n);
+        let v = n.cross(&u);
+        let [of_u, of_v] = [of(u), of(v)];
+        let across = 0.5 * (u.dot(&of_v) + v.dot(&of_u));
+        let [along_u, along_v] = [n.dot(&of_u), n.dot(&of_v)];
+        let sum = outer(&u, &u) * (0.5 * u.dot(&of_u))
+            + outer(&v, &v) * (0.5 * v.dot(&of_v))
+            + outer(&u, &v) * across
+            + outer(&n, &(u * along_u + v * along_v));
+        sum + sum.transpose()
     }
 }
 
@@ -256,7 +311,6 @@ fn join(a: &Value, b: &Value) -> Value {
             + k_slope * (high.exposure - low.exposure),
         is_joint: true,
         is_distance: false,
-        room: low.room,
         branch: low.branch,
         foot: low.foot,
     }
