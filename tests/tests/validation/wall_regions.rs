@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties, WallRegion};
+use endowire_core::methods::kirchhoff::{Accuracy, KirchhoffOptions};
 use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
 use endowire_tests::crossing::CrossingTest;
 
@@ -36,7 +37,11 @@ fn in_curved_tube(properties: WallProperties) -> Simulation {
     let made = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.2)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let wire = Device::uniform(400.0, 0.445, BENDING_NMM2).unwrap();
-    Simulation::builder(made.wall, wire, sheath).properties(properties).build().unwrap()
+    Simulation::builder(made.wall, wire, sheath)
+        .properties(properties)
+        .method(&KirchhoffOptions::of(Accuracy::Fine))
+        .build()
+        .unwrap()
 }
 
 fn advance(simulation: &mut Simulation, length_mm: f64, step_mm: f64) -> StepReport {

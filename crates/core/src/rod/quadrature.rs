@@ -28,6 +28,7 @@ pub struct Point {
 
 impl Point {
     /// The weights at `xi`.
+    #[inline]
     pub const fn at(xi: f64, weight: f64) -> Self {
         Self {
             xi,
@@ -58,6 +59,7 @@ pub const GAUSS: [Point; 3] =
     [Point::at(0.5 - OUTER, 5.0 / 18.0), Point::at(0.5, 8.0 / 18.0), Point::at(0.5 + OUTER, 5.0 / 18.0)];
 
 /// Weights of (x₀, h t₀, x₁, h t₁) in the centre line at ξ.
+#[inline]
 pub fn hermite(xi: f64) -> [f64; 4] {
     let (a, b) = (xi, 1.0 - xi);
     [b * b * (1.0 + 2.0 * a), a * b * b, a * a * (1.0 + 2.0 * b), -a * a * b]

@@ -26,24 +26,35 @@ pub(super) struct Clear {
 
 impl Clear {
     fn of(state: &RodState) -> Self {
-        let nodes = state.positions.iter().zip(&state.frames);
-        Self { nodes: nodes.map(|(x, frame)| (*x, frame.t)).collect() }
+        Self { nodes: nodes(state).collect() }
     }
 
     /// Whether no point of a rod has moved by more than this to another state, mm.
     fn holds(&self, elements: &[ElementData], state: &RodState, most_mm: f64) -> bool {
-        let moved = |(x, t): &(Vec3, Vec3), i: usize| {
-            ((state.positions[i] - x).norm(), (state.frames[i].t - t).norm())
-        };
-        let mut last = self.nodes.first().map_or((0.0, 0.0), |node| moved(node, 0));
         self.nodes.len() == state.positions.len()
-            && self.nodes.iter().enumerate().skip(1).all(|(i, node)| {
-                let here = moved(node, i);
-                let most = last.0.max(here.0) + BULGE * elements[i - 1].length * (last.1 + here.1);
-                last = here;
-                most <= most_mm
-            })
+            && motions_mm(elements, self.nodes.iter().copied(), state).all(|mm| mm <= most_mm)
     }
+}
+
+/// Of each element, by how much its points move at most from nodes with these places and tangents to a state, mm.
+pub(super) fn motions_mm(
+    elements: &[ElementData],
+    nodes: impl Iterator<Item = (Vec3, Vec3)>,
+    to: &RodState,
+) -> impl Iterator<Item = f64> {
+    let moved = nodes.zip(&to.positions).zip(&to.frames);
+    let mut moved = moved.map(|(((x, t), there), frame)| ((there - x).norm(), (frame.t - t).norm()));
+    let mut last = moved.next().unwrap_or_default();
+    moved.zip(elements).map(move |(here, element)| {
+        let most_mm = last.0.max(here.0) + BULGE * element.length * (last.1 + here.1);
+        last = here;
+        most_mm
+    })
+}
+
+/// Places and tangents of the nodes of a state.
+pub(super) fn nodes(state: &RodState) -> impl Iterator<Item = (Vec3, Vec3)> {
+    state.positions.iter().zip(&state.frames).map(|(x, frame)| (*x, frame.t))
 }
 
 /// Whether a rod is bent so little that it cannot touch itself.

@@ -1,5 +1,6 @@
 //! What pairs exert: on the system of a step, in the merit along it, and as it is told.
 
+use super::clear::{motions_mm, nodes};
 use super::curve::{Curve, Place};
 use super::gap::Gap;
 use super::{Pair, SelfContact};
@@ -79,7 +80,12 @@ impl SelfContact {
     /// Merit of all pairs at a state, or what they store there if no forces are aimed at, mJ.
     pub(super) fn stored_or_merit_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
         let curve = self.curve(elements, state);
+        // The distance of two stretches changes by no more than both move.
+        let motion_mm = 2.0 * motions_mm(elements, nodes(&self.base), state).fold(0.0, f64::max);
         let of = |pair: &Pair| {
+            if -pair.depth_mm() > motion_mm && !(self.aimed && pair.foreseen && pair.aim_n > 0.0) {
+                return 0.0;
+            }
             let [_, to] = pair.gap.at;
             let gap = Gap::find(&curve, self.sites[pair.site].place, pair.gap.slide, to, pair.touch_mm);
             let depth_mm = pair.touch_mm - gap.distance;

@@ -29,6 +29,8 @@ impl SelfContact {
         self.place_tree(elements);
         self.counters.searches += 1;
         let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
+        self.site_positions.clear();
+        self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
         let mut near = std::mem::take(&mut self.near);
         self.tree.near(reach_mm, self.apart_mm(), &mut near);
         self.counters.elements += near.len() as u64;
@@ -51,8 +53,7 @@ impl SelfContact {
     fn find_between(&mut self, curve: &Curve<'_>, a: usize, b: usize, reach_mm: f64) {
         let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
         for site in self.first_sites[a]..self.first_sites[a + 1] {
-            let place = self.sites[site].place;
-            let x = curve.jet(place).at;
+            let x = self.site_positions[site];
             let rises = |end: &super::curve::Jet| -(x - end.at).dot(&end.first);
             let (down, up) = (rises(&from), rises(&to));
             let starts_here = down < 0.0 || (up >= 0.0 && curve.before(b).is_none());
@@ -65,6 +66,7 @@ impl SelfContact {
                 continue;
             }
             let touch_mm = self.skin(a).radius_mm + self.skin(b).radius_mm;
+            let place = self.sites[site].place;
             let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, touch_mm);
             if gap.distance < KNOWN * touch_mm {
                 self.pairs.extend(self.pair(curve, site, gap, touch_mm));

@@ -33,6 +33,7 @@ mod tree;
 
 use std::sync::Arc;
 
+use crate::Vec3;
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
 
@@ -142,6 +143,8 @@ pub struct SelfContact {
     sites: Vec<Site>,
     /// First site of each element, and one past the last.
     first_sites: Vec<usize>,
+    /// Where they are at the base.
+    site_positions: Vec<Vec3>,
     largest_radius_mm: f64,
     /// Whether the rod's end is its start.
     closed: bool,

@@ -4,7 +4,7 @@ use super::coaxial::Nodes;
 use super::mesh::{Fineness, Mesh};
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, LateralForce, Move, Sheath, Simulation, WallProperties};
-use crate::methods::kirchhoff::KirchhoffOptions;
+use crate::methods::kirchhoff::{Accuracy, KirchhoffOptions};
 use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
 use crate::{Result, Vec3};
 
@@ -54,7 +54,11 @@ pub(super) fn rubbing(
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.4 * radius_mm)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let properties = WallProperties { friction, ..WallProperties::default() };
-    Simulation::builder(made.wall, stack, sheath).properties(properties).build().unwrap()
+    Simulation::builder(made.wall, stack, sheath)
+        .properties(properties)
+        .method(&KirchhoffOptions::of(Accuracy::Fine))
+        .build()
+        .unwrap()
 }
 
 /// Straight for 30 mm, then an arc of radius 40 mm.
@@ -318,7 +322,10 @@ fn in_the_arch_no_energy_jumps_and_hands_feel_its_slope() {
     let tree = anatomy::tree("aortic_arch").unwrap();
     let made = GeneratedWall::new(&tree, anatomy::asset_resolution("aortic_arch")).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
-    let mut simulation = Simulation::builder(made.wall, wire_in_catheter(), sheath).build().unwrap();
+    let mut simulation = Simulation::builder(made.wall, wire_in_catheter(), sheath)
+        .method(&KirchhoffOptions::of(Accuracy::Fine))
+        .build()
+        .unwrap();
     push(&mut simulation, &[(WIRE, 20.0)]).unwrap();
     for _ in 0..44 {
         push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();

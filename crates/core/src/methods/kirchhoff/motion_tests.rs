@@ -2,7 +2,7 @@
 
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
-use crate::methods::kirchhoff::KirchhoffOptions;
+use crate::methods::kirchhoff::{Accuracy, KirchhoffOptions};
 use crate::vessel::motion::{Around, Displacement, MotionMode, Turn, VesselMotion, Waveform};
 use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use crate::{Result, Vec3};
@@ -40,7 +40,7 @@ fn wire_in(wall: Wall, direction: Vec3, setting: Setting, motion: &[MotionMode])
     Simulation::builder(wall, device, Sheath::new(Vec3::z() * 6.0, direction).unwrap())
         .properties(properties)
         .motion(VesselMotion::new(motion).unwrap())
-        .method(&KirchhoffOptions { tolerance: TOLERANCE, ..KirchhoffOptions::default() })
+        .method(&KirchhoffOptions { tolerance: TOLERANCE, ..KirchhoffOptions::of(Accuracy::Fine) })
         .build()
         .unwrap()
 }
@@ -244,7 +244,7 @@ fn several_instruments_breathe_and_come_back() {
         Sheath::new(Vec3::z() * 6.0, Vec3::z()).unwrap(),
     )
     .motion(VesselMotion::new(&[breathing()]).unwrap())
-    .method(&KirchhoffOptions { tolerance: TOLERANCE, ..KirchhoffOptions::default() })
+    .method(&KirchhoffOptions { tolerance: TOLERANCE, ..KirchhoffOptions::of(Accuracy::Fine) })
     .build()
     .unwrap();
     let go = |instrument, mm| Move { instrument, command: Command::advance(mm) };
