@@ -15,6 +15,9 @@ use crate::output::provenance::Provenance;
 /// Folder of the subjects that are called by their names.
 pub(crate) const FOLDER: &str = "assets/subjects";
 
+/// Largest file that is looked at whether it is one, bytes: input files are no larger.
+const LARGEST_FILE: u64 = 16 << 20;
+
 /// A score with where it comes from.
 #[derive(Serialize)]
 pub(crate) struct ScoreDocument<'a> {
@@ -58,10 +61,12 @@ pub(crate) fn read(which: &Path) -> Result<Subject, Failure> {
 
 /// The same of what may be a scene too: none then.
 pub(crate) fn if_meant(which: &Path) -> Result<Option<Subject>, Failure> {
-    let meant = match std::fs::read_to_string(which) {
-        Ok(text) => Subject::is_meant(&text),
-        // What is wrong with a file that is there its reader tells.
-        Err(_) => !which.exists() && named(which).is_file(),
+    let meant = if which.exists() {
+        // What is wrong with a file its reader tells.
+        let bytes = endowire_core::file::read(which, LARGEST_FILE).unwrap_or_default();
+        std::str::from_utf8(&bytes).is_ok_and(Subject::is_meant)
+    } else {
+        named(which).is_file()
     };
     meant.then(|| read(which)).transpose()
 }

@@ -144,24 +144,48 @@ fn a_hand_that_goes_to_and_fro_unseen_arrives_and_does_not_pass() {
     assert_eq!((passed("turns"), score["score"].as_f64()), (None, Some(60.0)));
 }
 
-#[test]
-fn a_reference_that_pushes_too_hard_fails() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("bend.toml");
-    let shipped = std::fs::read_to_string(subject_file("curved_tube")).unwrap();
-    let scenes = assets().join("scenes");
-    let strict = shipped
-        .replace("../scenes", text(&scenes))
-        .replace("references/", text(&assets().join("subjects/references/")))
-        .replace("at_most = 0.02", "at_most = 0.001");
-    std::fs::write(&file, strict).unwrap();
-    let out = folder.path().join("out");
-    let output =
-        endowire().args(["subject", "run", text(&file), "--json", "--out", text(&out)]).output().unwrap();
+/// A shipped subject with changes, in a file of its own; its score, and what was said, where it does not pass.
+fn failed(name: &str, folder: &Path, changes: &[(&str, &str)]) -> (Value, String) {
+    let file = folder.join(format!("{name}.toml"));
+    let shipped = std::fs::read_to_string(subject_file(name)).unwrap();
+    let own =
+        [("\"../scenes", assets().join("scenes")), ("\"references", assets().join("subjects/references"))];
+    let shipped =
+        own.iter().fold(shipped, |shipped, (from, to)| shipped.replace(from, &format!("\"{}", to.display())));
+    let changed = changes.iter().fold(shipped, |changed, (piece, other)| {
+        assert!(changed.contains(piece), "{piece}");
+        changed.replace(piece, other)
+    });
+    std::fs::write(&file, changed).unwrap();
+    let out = folder.join("out");
+    let args = ["subject", "run", text(&file), "--json", "--out", text(&out)];
+    let output = endowire().args(args).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     let score: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((output.status.code(), &score["passed"]), (Some(1), &json!(false)));
+    assert_eq!(score["passed"], json!(false));
+    (score, said(&output))
+}
+
+#[test]
+fn a_reference_that_misses_a_threshold_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let (score, said) = failed("curved_tube", folder.path(), &[("at_most = 0.02", "at_most = 0.001")]);
+    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("goal"), &json!(80.0)));
     assert_eq!(metric(&score, "hand_force_n")["passed"], json!(false));
-    assert!(said(&output).contains("bend.toml: the reference script does not pass"), "{}", said(&output));
+    assert!(said.contains("curved_tube.toml: the reference script does not pass"), "{said}");
+}
+
+#[test]
+fn who_pushes_on_in_a_wrong_branch_is_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    // Without the turn that leads up to the liver.
+    let pushes = "[[script]]\nrotate_deg = 270.0\n\n[[script]]\nadvance_mm = 320.0\nstep_mm = 1.0\n";
+    let reference = folder.path().join("pushes.toml");
+    std::fs::write(&reference, pushes).unwrap();
+    let shipped = assets().join("subjects/references/right_hepatic.toml");
+    let (score, _) = failed("right_hepatic", folder.path(), &[(text(&shipped), text(&reference))]);
+    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("wall_force"), &json!(0.0)));
+    assert_eq!(metric(&score, "wall_force_n")["passed"], json!(false));
 }
 
 #[test]
