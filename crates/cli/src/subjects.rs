@@ -66,7 +66,8 @@ pub(crate) fn if_meant(which: &Path) -> Result<Option<Subject>, Failure> {
         let bytes = endowire_core::file::read(which, LARGEST_FILE).unwrap_or_default();
         std::str::from_utf8(&bytes).is_ok_and(Subject::is_meant)
     } else {
-        named(which).is_file()
+        // A name without an ending is hardly that of a scene.
+        named(which).is_file() || which.extension().is_none()
     };
     meant.then(|| read(which)).transpose()
 }

@@ -202,6 +202,7 @@ fn what_is_no_subject_or_does_not_belong_to_it_is_refused_by_name() {
             vec!["subject", "show", "inominate"],
             "inominate: is no file and no subject of assets/subjects; did you mean innominate?",
         ),
+        (vec!["play", "inominate", "--headless"], "did you mean innominate?"),
         (vec!["subject", "list", "assets/nothing"], "assets/nothing"),
         (
             vec!["subject", "show", wrong],
