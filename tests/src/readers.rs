@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use endowire_assess::Record;
+use endowire_assess::{Record, Subject};
 use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, State};
 use endowire_core::statics::{StaticCase, StaticProblem};
@@ -63,6 +63,14 @@ pub fn vtk(bytes: &[u8]) -> Result<()> {
 /// As [`Record::from_session`].
 pub fn session(bytes: &[u8]) -> Result<()> {
     Record::from_session(bytes, Path::new("a.session.json")).map(drop)
+}
+
+/// A training subject; the files that it names are not opened.
+///
+/// # Errors
+/// As [`Subject::from_toml`].
+pub fn subject(bytes: &[u8]) -> Result<()> {
+    Subject::from_toml(text(bytes)?, Path::new("a.toml")).map(drop)
 }
 
 /// A table of a centre-line tree.

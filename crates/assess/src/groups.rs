@@ -3,15 +3,12 @@
 use endowire_core::Vec3;
 
 use crate::metric::{Better, Group, Metric};
-use crate::record::Record;
+use crate::record::{REST_MM, Record};
 use crate::smoothness::{spectral_arc_length, speeds, submovements};
 use crate::way::Way;
 
 /// Part of the time in which forces are at most that of the 95th percentile.
 const MOST_OF_TIME: f64 = 0.95;
-/// Motions of hands below these are rest: lengths, mm, and turns, rad.
-const REST_MM: f64 = 1e-9;
-const REST_RAD: f64 = 1e-9;
 /// A tip is held against a wall by more than this, N.
 const AGAINST_WALL_N: f64 = 1e-3;
 /// Shortest way to which one that was gone is compared, mm.
@@ -54,8 +51,7 @@ pub fn assess(record: &Record, way: Option<&Way>) -> Vec<Metric> {
 }
 
 fn rests(record: &Record) -> impl Iterator<Item = (f64, f64)> {
-    let moves = |hand: &crate::Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
-    let rest = record.timed().filter(move |(_, sample)| !sample.hands.iter().any(moves));
+    let rest = record.timed().filter(|(_, sample)| sample.rests());
     rest.map(|(took_s, sample)| (sample.time_s - took_s, sample.time_s))
 }
 
@@ -146,6 +142,11 @@ fn contrast(record: &Record) -> Vec<Metric> {
 /// The tips in order.
 fn tips(record: &Record) -> Vec<Vec3> {
     record.samples.iter().filter_map(|sample| sample.tip_mm).collect()
+}
+
+/// The same beside the centre line.
+fn on_centreline(record: &Record) -> Vec<Vec3> {
+    record.samples.iter().filter_map(crate::Sample::on_centreline_mm).collect()
 }
 
 fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
@@ -277,14 +278,15 @@ fn safety(record: &Record) -> Vec<Metric> {
 
 fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let wrong = way.map(|way| {
-        let branches: Vec<Option<usize>> = tips(record).iter().map(|tip| way.wrong_branch(tip)).collect();
+        let branches: Vec<Option<usize>> =
+            on_centreline(record).iter().map(|tip| way.wrong_branch(tip)).collect();
         let first = branches.first().is_some_and(Option::is_some);
         let entered = branches.windows(2).filter(|pair| pair[1].is_some() && pair[0] != pair[1]).count();
         (entered + usize::from(first)) as f64
     });
     let up_s = way.and_then(|way| {
         let past = |sample: &&crate::Sample| {
-            sample.tip_mm.is_some_and(|tip| way.is_past_first_fork(&tip) == Some(true))
+            sample.on_centreline_mm().is_some_and(|tip| way.is_past_first_fork(&tip) == Some(true))
         };
         record.samples.iter().find(past).map(|sample| sample.time_s)
     });
@@ -308,7 +310,7 @@ fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
 }
 
 fn task(record: &Record, way: Option<&Way>) -> Vec<Metric> {
-    let last = tips(record).last().copied();
+    let last = on_centreline(record).last().copied();
     let target = way.and_then(Way::target_mm);
     let error = target.map(|(target, _)| last.map_or(f64::INFINITY, |tip| (tip - target).norm()));
     let arrived = target.zip(error).map(|((_, within_mm), mm)| f64::from(u8::from(mm <= within_mm)));

@@ -4,6 +4,9 @@
 //! seven groups. Every measure says its unit, how it is defined, whether less or more of it is better and in which study it was used; one
 //! that needs what was not recorded has no value.
 //!
+//! A [`Subject`] is a task for trainees: a goal in a scene, limits, and thresholds of measures. An [`Exam`] follows a record until the goal
+//! is reached or a limit is passed, and gives its [`Score`].
+//!
 //! ```
 //! use endowire_assess::{Record, assess};
 //!
@@ -11,13 +14,19 @@
 //! assert!(metrics.iter().all(|metric| !metric.definition.is_empty()));
 //! ```
 
+mod exam;
 mod groups;
 mod metric;
 mod record;
+mod score;
 mod smoothness;
+mod subject;
 mod way;
 
+pub use exam::{Ended, EndedBy, Exam, Standing, Used};
 pub use groups::assess;
 pub use metric::{Better, Group, Metric};
 pub use record::{BEAM, BeamState, Hand, Injection, Record, Sample};
+pub use score::{Score, Scored, Verdict};
+pub use subject::{Goal, Limits, Subject, Threshold};
 pub use way::Way;

@@ -51,6 +51,16 @@ pub enum Better {
     Higher,
 }
 
+impl Better {
+    /// In a sentence: "less" or "more".
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Lower => "less",
+            Self::Higher => "more",
+        }
+    }
+}
+
 /// A measure of a procedure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Metric {

@@ -9,6 +9,10 @@ use serde::{Deserialize, Serialize};
 /// File of what the beam did, beside steps.csv or a session's script; there is none where no beam was recorded.
 pub const BEAM: &str = "beam.csv";
 
+/// Motions of hands below these are rest: lengths, mm, and turns, rad.
+pub(crate) const REST_MM: f64 = 1e-9;
+const REST_RAD: f64 = 1e-9;
+
 /// What one hand did in a step, and felt after it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hand {
@@ -31,6 +35,9 @@ pub struct Sample {
     pub time_s: f64,
     /// Where the foremost tip is; none while nothing is in.
     pub tip_mm: Option<Vec3>,
+    /// Where that is in the vessel at rest; none where the vessel does not move, or it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_at_rest_mm: Option<Vec3>,
     /// The hands, the innermost instrument first.
     pub hands: Vec<Hand>,
     /// Sum of the sizes of wall forces, and of those at the tip.
@@ -39,6 +46,19 @@ pub struct Sample {
     pub tip_force_n: f64,
     /// Whether the device snapped from one equilibrium to another.
     pub jumped: bool,
+}
+
+impl Sample {
+    /// Where the tip is beside the centre line, which is that of the vessel at rest.
+    pub(crate) fn on_centreline_mm(&self) -> Option<Vec3> {
+        self.tip_at_rest_mm.or(self.tip_mm)
+    }
+
+    /// Whether no hand moves.
+    pub(crate) fn rests(&self) -> bool {
+        let moves = |hand: &Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
+        !self.hands.iter().any(moves)
+    }
 }
 
 /// Contrast medium that was injected.
@@ -149,6 +169,27 @@ impl Record {
         Some(on.map(|(state, end_s)| (end_s.min(to_s) - state.time_s.max(from_s)).max(0.0)).sum())
     }
 
+    /// When the beam has been on for so long, s; none where it was not, or was not recorded.
+    pub(crate) fn beam_used_up_s(&self, limit_s: f64) -> Option<f64> {
+        let mut left_s = limit_s;
+        self.beam_stretches()?.filter(|(state, _)| state.on).find_map(|(state, end_s)| {
+            let took_s = end_s - state.time_s;
+            let used_up = (took_s > left_s).then_some(state.time_s + left_s);
+            left_s -= took_s;
+            used_up
+        })
+    }
+
+    /// The same until an end: as far as a sample of this number, which is cut at a time.
+    pub(crate) fn until(&self, sample: usize, time_s: f64) -> Self {
+        let mut samples = self.samples[..=sample].to_vec();
+        samples[sample].time_s = time_s;
+        let injections = self.injections.iter().filter(|one| one.time_s <= time_s).copied().collect();
+        let states =
+            |beam: &Vec<BeamState>| beam.iter().filter(|one| one.time_s <= time_s).copied().collect();
+        Self { samples, injections, beam: self.beam.as_ref().map(states) }
+    }
+
     /// States of the beam with the times at which they end.
     pub(crate) fn beam_stretches(&self) -> Option<impl Iterator<Item = (&BeamState, f64)>> {
         let beam = self.beam.as_ref()?;
@@ -192,6 +233,7 @@ impl Step {
         Sample {
             time_s: self.time_s,
             tip_mm: (self.nodes > 0).then_some(tip_mm),
+            tip_at_rest_mm: None,
             hands,
             wall_force_n: self.wall_force_sum_n,
             tip_force_n: self.wall_force_tip_n,

@@ -28,6 +28,7 @@ fn sample(time_s: f64, [x, y]: [f64; 2], advance_mm: f64, wall_force_n: f64) -> 
     Sample {
         time_s,
         tip_mm: Some(Vec3::new(x, y, 0.0)),
+        tip_at_rest_mm: None,
         hands: vec![hand],
         wall_force_n,
         tip_force_n: 0.5 * wall_force_n,

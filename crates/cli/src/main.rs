@@ -8,6 +8,7 @@ mod failure;
 mod output;
 mod scenes;
 mod studies;
+mod subjects;
 
 use std::process::ExitCode;
 
@@ -21,6 +22,7 @@ fn main() -> ExitCode {
             | args::Command::Sweep(_)
             | args::Command::Render(_)
             | args::Command::Play(_)
+            | args::Command::Subject(_)
             | args::Command::Fluoro(_)
             | args::Command::Dataset(_)
             | args::Command::Doctor { .. }

@@ -32,6 +32,17 @@ impl Motion {
         let command = Command { advance_mm: self.advance_mm, rotate_rad: self.rotate_deg.to_radians() };
         Move { instrument: self.instrument, command }
     }
+
+    /// Adds it to what instruments do in the same tick.
+    pub(crate) fn add_to(self, motions: &mut Vec<Self>) {
+        match motions.iter_mut().find(|one| one.instrument == self.instrument) {
+            Some(one) => {
+                one.advance_mm += self.advance_mm;
+                one.rotate_deg += self.rotate_deg;
+            }
+            None => motions.push(self),
+        }
+    }
 }
 
 /// A hand that holds an instrument.

@@ -1,5 +1,6 @@
 //! What the operator reads.
 
+use endowire_assess::Standing;
 use endowire_core::insertion::StepReport;
 use endowire_viewer::Mode;
 use serde::Serialize;
@@ -49,6 +50,8 @@ pub enum EventKind {
     Limit,
     /// The script that is shown is at its end, or a hand has taken over.
     Script,
+    /// The subject has ended: its goal is reached, or one of its limits is passed.
+    Ended,
 }
 
 /// One instrument.
@@ -141,6 +144,9 @@ pub struct Readout {
     pub wall_force_n: f64,
     /// The room.
     pub lab: LabReadout,
+    /// How the subject stands, if it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subject: Option<Standing>,
     /// What has happened last.
     pub event: Option<Event>,
     /// How many events there were.

@@ -1,5 +1,8 @@
 //! The state machine: inputs and ticks in, readouts and snapshots out.
 
+mod exam;
+
+use endowire_assess::Exam;
 use endowire_core::insertion::{InstrumentReport, Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, NoStore};
@@ -37,6 +40,8 @@ pub struct Session {
     events: Vec<Event>,
     events_in_all: usize,
     telemetry: Telemetry,
+    /// What is to be done, if it is a subject.
+    exam: Option<Exam>,
 }
 
 /// What is drawn of a moment.
@@ -100,6 +105,7 @@ impl Session {
             events: Vec::new(),
             events_in_all: 0,
             telemetry: Telemetry::default(),
+            exam: None,
         })
     }
 
@@ -233,9 +239,10 @@ impl Session {
         self.ticks += 1;
         self.lab.tick();
         if let Some(shown) = self.demonstration.take_if(|shown| !shown.paused) {
-            self.demonstration = self.show(shown);
+            let mut motions = Vec::new();
+            self.demonstration = self.show(shown, &mut motions);
             self.moving = false;
-            self.note(&[]);
+            self.note(&motions);
             return;
         }
         let lengths_mm = self.simulation.report().lengths_mm();
@@ -270,6 +277,7 @@ impl Session {
         // The beam of a tick is that at its beginning.
         let beam = self.lab.beam((time_s - 1.0 / TICKS_PER_S).max(0.0));
         self.telemetry.tick(time_s, motions, &self.simulation, beam);
+        self.examine();
     }
 
     /// What hands, beam and injector have done so far, for those who assess it: undone or not, rests included.
@@ -277,8 +285,8 @@ impl Session {
         self.telemetry.record()
     }
 
-    /// Carries out what a script does in this tick; it, where it goes on.
-    fn show(&mut self, mut shown: Demonstration) -> Option<Demonstration> {
+    /// Carries out what a script does in this tick, which is added to `done`; it, where it goes on.
+    fn show(&mut self, mut shown: Demonstration, done: &mut Vec<Motion>) -> Option<Demonstration> {
         shown.tick();
         loop {
             let next = shown.next(&self.simulation);
@@ -298,9 +306,10 @@ impl Session {
                         self.history.begin_motion();
                     }
                     let rests = motions.is_empty() && !moves_by_itself(&self.simulation);
-                    if !rests && !self.step(motions, per_s) {
+                    if !rests && !self.step(motions.clone(), per_s) {
                         return None;
                     }
+                    motions.into_iter().for_each(|motion| motion.add_to(done));
                 }
                 Err(error) => {
                     self.happened(EventKind::Refused, error.to_string());
@@ -443,6 +452,7 @@ impl Session {
                 beam_s: self.lab.beam_s(),
                 dose_ugy: self.lab.dose_ugy(),
             },
+            subject: self.standing(),
             event: self.events.last().cloned(),
             events: self.events_in_all,
         }

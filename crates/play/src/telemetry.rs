@@ -35,9 +35,11 @@ impl Telemetry {
                 torque_nmm: told.torque_nmm,
             }
         });
+        let tip_mm = simulation.shape().tip_mm();
         let sample = Sample {
             time_s,
-            tip_mm: simulation.shape().tip_mm(),
+            tip_mm,
+            tip_at_rest_mm: simulation.displacement().zip(tip_mm).map(|(now, tip)| now.material(&tip)),
             hands: hands.collect(),
             wall_force_n: force.sum_n,
             tip_force_n: force.tip_n,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use endowire_assess::{Record, Way};
+use endowire_assess::{Exam, Record, Subject, Way};
 use endowire_core::vessel::CentrelineTree;
 use pyo3::prelude::*;
 
@@ -47,4 +47,24 @@ pub(crate) fn assess<'py>(
         Ok::<_, endowire_core::Error>(endowire_assess::assess(&record, way.as_ref()))
     })?;
     document::write(py, &measured.map_err(exception)?)
+}
+
+/// Scores a session of `endowire play` (*.session.json) or the folder of a recorded run by a training subject, the file of one, as
+/// `endowire assess --subject` does. `centreline` is the table of the vessel's centre line, which names the subject's target.
+///
+/// Returns a dictionary: subject, passed, score (0 to 100), ended (None, or what ended it and when), and metrics, which are those of assess
+/// with threshold and passed, None where nothing was asked. Raises InputError for files that do not fit.
+#[pyfunction]
+#[pyo3(signature = (path, subject, *, centreline))]
+pub(crate) fn score<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    subject: PathBuf,
+    centreline: PathBuf,
+) -> PyResult<Bound<'py, PyAny>> {
+    let scored = interruptible(py, move || {
+        let exam = Exam::new(Subject::read(&subject)?, &CentrelineTree::read(&centreline)?)?;
+        Ok::<_, endowire_core::Error>(exam.score(&Record::read(&path)?))
+    })?;
+    document::write(py, &*scored.map_err(exception)?)
 }

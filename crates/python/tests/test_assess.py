@@ -23,3 +23,20 @@ def test_what_is_refused(tmp_path):
         endowire.assess(tmp_path)
     with pytest.raises(endowire.InputError, match="centreline"):
         endowire.assess(tmp_path, target="left carotid")
+
+
+def test_a_run_is_scored_by_a_subject(tmp_path):
+    (tmp_path / "steps.csv").write_text(STEPS)
+    assets = endowire.assets_path()
+    subject = assets / "subjects" / "left_carotid.toml"
+    arch = assets / "vessels" / "aortic_arch.csv"
+    score = endowire.score(tmp_path, subject, centreline=arch)
+    assert (score["subject"], score["passed"], score["score"]) == ("left_carotid", False, 0.0)
+    assert score["ended"] == {"by": "wall_force", "time_s": 2.0}
+    metrics = {metric["name"]: metric for metric in score["metrics"]}
+    assert metrics["total_s"]["passed"] is True and metrics["total_s"]["threshold"]["at_most"] == 90.0
+    assert metrics["wall_force_n"]["passed"] is False, "0.4 N"
+    assert metrics["beam_on_s"]["passed"] is False, "it was not recorded"
+    assert metrics["turns"]["passed"] is None and metrics["turns"]["threshold"] is None
+    with pytest.raises(endowire.InputError, match="goal.target"):
+        endowire.score(tmp_path, subject, centreline=assets / "vessels" / "hepatic.csv")

@@ -219,6 +219,11 @@ fn damaged_scenes() {
 }
 
 #[test]
+fn damaged_subjects() {
+    reads_or_refuses(&assets("subjects", "toml"), &TOML, readers::subject);
+}
+
+#[test]
 fn damaged_rod_cases() {
     reads_or_refuses(&assets("cases", "toml"), &TOML, readers::rod_case);
 }

@@ -8,6 +8,7 @@
 mod inputs;
 mod pictures;
 mod studies;
+mod subjects;
 
 use std::path::PathBuf;
 
@@ -22,6 +23,7 @@ pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, Render
 pub(crate) use studies::{
     CoilArgs, CoilKind, CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
 };
+pub(crate) use subjects::{SubjectCommand, SubjectRunArgs};
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
 ///
@@ -44,6 +46,9 @@ pub(crate) enum Command {
     Play(PlayArgs),
     /// Score sessions of play, or recorded runs, by what studies of trainees measure: time, radiation, contrast, motion, safety, way, task
     Assess(AssessArgs),
+    /// Training subjects: a task in a scene with a goal, limits and thresholds of measures
+    #[command(subcommand)]
+    Subject(SubjectCommand),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
     /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
@@ -91,7 +96,7 @@ pub(crate) enum Command {
 }
 
 /// What a scene has otherwise than its file.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct SetArgs {
     /// Give a key of the scene another value than its file does (repeatable). Keys are called from the top of the scene, as in a sweep:
     /// vessel.wall.friction=0.1, script[0].step_mm=2, device.part[0].length_mm=60 (of a device file too), view.every=10. Values are
@@ -171,6 +176,9 @@ pub(crate) struct AssessArgs {
     /// Name of the point of the centre line that was to be reached; that of the script's last line with one if absent
     #[arg(long, value_name = "NAME")]
     pub(crate) target: Option<String>,
+    /// Score them by a training subject, by its file or its name in assets/subjects: until its goal is reached or a limit is passed
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["target", "within_mm", "scene"])]
+    pub(crate) subject: Option<PathBuf>,
     /// Distance from it at which the tip has arrived
     #[arg(long, default_value_t = 5.0, value_name = "MM", allow_negative_numbers = true)]
     pub(crate) within_mm: f64,
@@ -198,9 +206,11 @@ pub(crate) struct NewArgs {
     pub(crate) device: Option<PathBuf>,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub(crate) struct PlayArgs {
-    /// Scene file (TOML)
+    /// Scene file (TOML); or a training subject, by its file or its name in assets/subjects: then the task is shown, what was asked for is told
+    /// while it goes, and what was done is scored
+    #[arg(value_name = "SCENE|SUBJECT")]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) set: SetArgs,
@@ -214,7 +224,7 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) script: Option<PathBuf>,
     /// File for what hands have done: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
-    /// SCENE/played.toml if absent
+    /// SCENE/played.toml, or that of the subject, if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and time goes by as inputs say
@@ -289,7 +299,7 @@ pub(crate) enum SweepCommand {
 }
 
 /// Whether walls are kept from run to run.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub(crate) struct CacheArgs {
     /// Make the vessel's wall anew and keep nothing of it. Otherwise a wall that takes long to make is kept, up to 1 GiB in all, in the
     /// folder walls of $ENDOWIRE_CACHE, or of endowire where the system has the caches of a user (Linux: $XDG_CACHE_HOME or ~/.cache;

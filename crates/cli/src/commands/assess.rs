@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_assess::{Better, Metric, Record, Way};
+use endowire_assess::{Metric, Record, Score, Subject, Way};
 use endowire_methods::Scene;
+use endowire_sweep::Setting;
 use serde::Serialize;
 
 use crate::args::AssessArgs;
@@ -13,7 +14,7 @@ use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::RecordedSummary;
 use crate::output::session::SessionFile;
 use crate::output::{SUMMARY, answer};
-use crate::scenes;
+use crate::{scenes, subjects};
 
 /// The document of one session.
 #[derive(Serialize)]
@@ -40,6 +41,31 @@ struct Assessed {
     metrics: Vec<Metric>,
 }
 
+/// A session and its score.
+#[derive(Serialize)]
+struct ScoredSession<'a> {
+    session: &'a Path,
+    #[serde(flatten)]
+    score: Score,
+}
+
+/// The document of one that is scored.
+#[derive(Serialize)]
+struct ScoreOf<'a> {
+    #[serde(flatten)]
+    provenance: Provenance,
+    #[serde(flatten)]
+    session: &'a ScoredSession<'a>,
+}
+
+/// That of several.
+#[derive(Serialize)]
+struct ScoresOf<'a> {
+    #[serde(flatten)]
+    provenance: Provenance,
+    sessions: &'a [ScoredSession<'a>],
+}
+
 /// Measures each session and tells the values.
 pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     if !(args.within_mm > 0.0 && args.within_mm.is_finite()) {
@@ -47,6 +73,9 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     }
     let mut inputs = vec![];
     let mut all = vec![];
+    if let Some(which) = &args.subject {
+        return score(args, &subjects::read(which)?);
+    }
     for session in &args.sessions {
         inputs.push(read_input(&if session.is_dir() { session.join("steps.csv") } else { session.clone() })?);
         all.push(assessed(args, session)?);
@@ -64,13 +93,70 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     }
 }
 
+/// What a session or a run says of its scene.
+fn read_summary(session: &Path) -> Result<RecordedSummary, Failure> {
+    if session.is_dir() {
+        RecordedSummary::read(&session.join(SUMMARY))
+    } else {
+        SessionFile::read_summary(session)
+    }
+}
+
+/// Scores each session by a subject.
+fn score(args: &AssessArgs, subject: &Subject) -> Result<(), Failure> {
+    let path = subject.resolve(&subject.scene);
+    let settings = subjects::settings(subject)?;
+    let scene = scenes::read(&path, &settings)?;
+    let exam = subjects::exam(subject.clone(), &scene, &Cache::new(&args.cache))?;
+    let provenance = Provenance::of_scene(&scene, &settings)?;
+    let mut sessions = vec![];
+    for session in &args.sessions {
+        check_scene(session, &read_summary(session)?, &path, &settings)?;
+        let score = exam.clone().score(&Record::read(session)?);
+        sessions.push(ScoredSession { session, score: (*score).clone() });
+    }
+    let text = || {
+        let each =
+            |one: &ScoredSession<'_>| format!("{}\n{}", one.session.display(), subjects::text(&one.score));
+        sessions.iter().map(each).collect::<Vec<_>>().join("\n")
+    };
+    match sessions.as_slice() {
+        [session] => answer(&ScoreOf { provenance, session }, args.json, text),
+        _ => answer(&ScoresOf { provenance, sessions: &sessions }, args.json, text),
+    }
+}
+
+/// Refuses a session that was recorded in another scene than the subject's.
+fn check_scene(
+    session: &Path,
+    recorded: &RecordedSummary,
+    scene: &Path,
+    settings: &[Setting],
+) -> Result<(), Failure> {
+    let same = match (recorded.scene_file.canonicalize(), scene.canonicalize()) {
+        (Ok(recorded), Ok(scene)) => recorded == scene,
+        // A scene that has gone elsewhere cannot be told from the subject's.
+        _ => recorded.scene_file.file_name() == scene.file_name(),
+    };
+    let set: Vec<String> = settings.iter().map(ToString::to_string).collect();
+    if same && recorded.set == set {
+        return Ok(());
+    }
+    let told = |scene: &Path, set: &[String]| {
+        let set: String = set.iter().map(|setting| format!(" --set '{setting}'")).collect();
+        format!("{}{set}", scene.display())
+    };
+    Err(Failure::Input(format!(
+        "{}: was recorded in {}, and the subject is in {}: name the subject that it was recorded with",
+        session.display(),
+        told(&recorded.scene_file, &recorded.set),
+        told(scene, &set)
+    )))
+}
+
 fn assessed(args: &AssessArgs, session: &Path) -> Result<Assessed, Failure> {
     let record = Record::read(session)?;
-    let summary = if session.is_dir() {
-        RecordedSummary::read(&session.join(SUMMARY))?
-    } else {
-        SessionFile::read_summary(session)?
-    };
+    let summary = read_summary(session)?;
     let (path, scene) = scenes::of_recording(&summary, args.scene.as_deref(), &[])?;
     let cache = Cache::new(&args.cache);
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
@@ -109,11 +195,7 @@ fn table(sessions: &[Assessed]) -> String {
                 None => format!(" {:>11}", "-"),
             };
         }
-        let better = match metric.better {
-            Better::Lower => "less is better",
-            Better::Higher => "more is better",
-        };
-        text += &format!("  {:<8} {better}\n", metric.unit);
+        text += &format!("  {:<8} {} is better\n", metric.unit, metric.better.words());
     }
     text.pop();
     text

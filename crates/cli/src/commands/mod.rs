@@ -21,6 +21,7 @@ mod run;
 mod sac;
 mod shell;
 mod studio;
+mod subject;
 mod surfaces;
 mod sweep;
 mod verify;
@@ -38,6 +39,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Sweep(args) => sweep::sweep(args),
         Command::Play(args) => play::play(args),
         Command::Assess(args) => assess::assess(args),
+        Command::Subject(command) => subject::subject(command),
         Command::Render(args) => render::render(args),
         Command::Export(args) => export::export(args),
         Command::Fluoro(args) => fluoro::fluoro(args),

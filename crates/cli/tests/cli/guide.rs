@@ -107,7 +107,7 @@ fn copy(from: &Path, to: &Path) {
 fn follow(chapter: &str) -> Result<Vec<Vec<String>>, String> {
     let actions = actions(chapter)?;
     let folder = tempfile::tempdir().unwrap();
-    for part in ["cases", "devices", "scenes", "vessels"] {
+    for part in ["cases", "devices", "scenes", "subjects", "vessels"] {
         copy(&workspace().join("assets").join(part), &folder.path().join("assets").join(part));
     }
     let mut run = Vec::new();
@@ -148,7 +148,7 @@ fn every_command_of_the_guide_works() {
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
     // That nothing is run would also be no failure.
-    let all = "assess compare completions dataset device doctor experiment export fluoro man new play render report rod run sweep verify vessel";
+    let all = "assess compare completions dataset device doctor experiment export fluoro man new play render report rod run subject sweep verify vessel";
     assert_eq!(commands.into_iter().collect::<Vec<_>>().join(" "), all);
 }
 

@@ -27,6 +27,7 @@ mod report;
 mod resume;
 mod rod;
 mod set;
+mod subject;
 mod surfaces;
 mod sweep;
 mod terminal;

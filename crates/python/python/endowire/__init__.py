@@ -19,6 +19,7 @@ from ._endowire import (
     assess,
     check_vessel,
     merge_sweeps,
+    score,
     solve_rod,
     sweep,
 )
@@ -43,13 +44,14 @@ __all__ = [
     "assets_path",
     "check_vessel",
     "merge_sweeps",
+    "score",
     "solve_rod",
     "sweep",
 ]
 
 
 def assets_path() -> _Path:
-    """The folder of what comes with the package: ``scenes``, ``devices`` (the catalogue) and ``vessels``.
+    """The folder of what comes with the package: ``scenes``, ``devices`` (the catalogue), ``vessels`` and ``subjects``.
 
     ``endowire.Scene(endowire.assets_path() / "scenes" / "arch_carotid.toml")`` reads one of them."""
     return _Path(__file__).parent / "assets"

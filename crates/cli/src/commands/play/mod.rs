@@ -14,6 +14,9 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 
+use endowire_assess::{Score, Subject};
+use endowire_core::insertion::Script;
+use endowire_methods::Scene;
 use endowire_play::{Input, Limits, Pictures, Session, Went};
 use endowire_viewer::ViewSpec;
 use serde::Serialize;
@@ -22,49 +25,83 @@ use crate::args::PlayArgs;
 use crate::cache::Cache;
 use crate::commands::run::interrupts;
 use crate::failure::Failure;
+use crate::output::provenance::Provenance;
 use crate::output::{print_json, tell};
-use crate::scenes;
+use crate::{scenes, subjects};
 use live::Message;
-use record::Record;
+pub(crate) use record::Record;
 pub(crate) use socket::Address;
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Document {
+struct Document<'a> {
     #[serde(flatten)]
     pace: live::Pace,
     #[serde(flatten)]
     went: Went,
+    /// Of a subject.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    score: Option<&'a Score>,
 }
 
 /// Opens a session in the way that was asked for, and records what was done.
 pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
+    match subjects::if_meant(&args.scene)? {
+        Some(subject) => play_in(&in_subject(args, &subject)?, Some(subject)),
+        None => play_in(args, None),
+    }
+}
+
+/// The same arguments with what a subject says in place of its name.
+fn in_subject(args: &PlayArgs, subject: &Subject) -> Result<PlayArgs, Failure> {
+    if let Some(setting) = args.set.set.first() {
+        return Err(Failure::Input(format!(
+            "--set {setting}: a subject is the same for all: change `set` in {}",
+            subject.path().display()
+        )));
+    }
+    let mut args = args.clone();
+    args.scene = subject.resolve(&subject.scene);
+    args.set.set = subjects::settings(subject)?;
+    args.record.get_or_insert_with(|| Path::new("out").join(subject.stem()).join("played.toml"));
+    let reference = subject.reference.as_ref().map(|file| subject.resolve(file));
+    args.script = args.script.or(reference.filter(|_| args.watch || args.after_script));
+    Ok(args)
+}
+
+fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
     let scene = scenes::with_script(&args.scene, &args.set.set, args.script.as_deref())?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let cache = Cache::new(&args.cache);
-    let mut view = ViewSpec::of_scene(&scene, &args.scene)?;
-    let simulation = scene.simulation(&cache).map_err(in_scene)?;
-    // Kept by the cache before the session asks for it.
-    simulation.lumen().wall(&cache).map_err(in_scene)?;
     let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
-    let script = scene.steps(simulation.stack(), &cache).map_err(in_scene)?;
-    scenes::let_medium_flow(&mut view, &scene, &cache).map_err(in_scene)?;
-    scenes::tell_found_centreline(&args.scene, &scene);
-    let session = Session::new(simulation, view, args.size, limits).map_err(in_scene)?;
-    let session = begun(session.with_script(script), args).map_err(in_scene)?;
+    let (mut session, script) = open(&scene, &args.scene, &cache, args.size, limits)?;
+    // Who does a subject by hand is not shown how, unless that was asked for.
+    if subject.is_none() || args.watch || args.after_script || args.script.is_some() {
+        session = session.with_script(script);
+    }
+    let record =
+        args.record.clone().unwrap_or_else(|| Path::new("out").join(&scene.name).join("played.toml"));
+    let mut record = Record::new(record, &args.scene, &args.set.set);
+    if let Some(subject) = subject {
+        session = session.with_exam(subjects::exam(subject, &scene, &cache)?);
+        record = record.scored(Provenance::of_scene(&scene, &args.set.set)?);
+    }
+    let session = begun(session, args).map_err(in_scene)?;
     let wall = session.simulation().lumen().wall(&cache).map_err(in_scene)?.clone();
     let pictures = Pictures::new(&scene, &session.snapshot(), wall).map_err(in_scene)?;
-    let mut record = Record::new(args, &scene);
     let (sender, messages) = mpsc::channel();
     if let Some(address) = args.listen {
         socket::listen(address.allowed(args.allow_remote)?, record.folder(), &sender)?;
     }
+    tell_task(&session);
     if args.headless {
         read_inputs(args.inputs.as_deref(), sender.clone())?;
     }
     if args.headless && !args.realtime {
         let session = lockstep::run(session, pictures, &messages, &mut record)?;
-        return record.finish(&session);
+        record.finish(&session)?;
+        tell_score(&session);
+        return Ok(());
     }
     let (session, pace) = if args.headless {
         live::without_window(session, pictures, (sender, messages), &mut record)?
@@ -72,11 +109,48 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
         in_window(args, session, pictures, (sender, messages), &mut record)?
     };
     record.finish(&session)?;
+    tell_score(&session);
     if args.json && !args.headless {
-        return print_json(&Document { pace, went: session.went() });
+        let score = session.score();
+        return print_json(&Document { pace, went: session.went(), score: score.as_deref() });
     }
     tell(pace);
     Ok(())
+}
+
+/// A session of a scene at its start, with the script that belongs to it.
+pub(crate) fn open(
+    scene: &Scene,
+    path: &Path,
+    cache: &Cache,
+    side_px: u32,
+    limits: Limits,
+) -> Result<(Session, Script), Failure> {
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+    let mut view = ViewSpec::of_scene(scene, path)?;
+    let simulation = scene.simulation(cache).map_err(in_scene)?;
+    // Kept by the cache before the session asks for it.
+    simulation.lumen().wall(cache).map_err(in_scene)?;
+    let script = scene.steps(simulation.stack(), cache).map_err(in_scene)?;
+    scenes::let_medium_flow(&mut view, scene, cache).map_err(in_scene)?;
+    scenes::tell_found_centreline(path, scene);
+    let session = Session::new(simulation, view, side_px, limits).map_err(in_scene)?;
+    Ok((session, script))
+}
+
+/// Tells what is to be done, if it is a subject.
+fn tell_task(session: &Session) {
+    if let Some(standing) = session.standing() {
+        let task = &standing.task;
+        tell(format_args!("{}, level {}\n{}", task.name, task.level, task.text.trim()));
+    }
+}
+
+/// Tells what has come of it.
+fn tell_score(session: &Session) {
+    if let Some(score) = session.score() {
+        tell(subjects::text(&score));
+    }
 }
 
 /// The session with its script on its way, or carried out, if that was asked for.

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use endowire_methods::Scene;
 use endowire_play::{Session, Went};
+use endowire_sweep::Setting;
 
-use crate::args::PlayArgs;
 use crate::failure::Failure;
+use crate::output::provenance::Provenance;
 use crate::output::session::SessionFile;
-use crate::output::{tell, whole};
+use crate::output::{tell, to_json, whole};
+use crate::subjects::ScoreDocument;
 
 /// How often a session that goes on is written.
 const EVERY: Duration = Duration::from_secs(2);
@@ -20,25 +21,31 @@ pub(crate) struct Record {
     head: String,
     scene: PathBuf,
     set: Vec<String>,
+    /// Where the score comes from, of a subject.
+    provenance: Option<Provenance>,
     written: Instant,
 }
 
 impl Record {
-    pub(crate) fn new(args: &PlayArgs, scene: &Scene) -> Self {
-        let path =
-            args.record.clone().unwrap_or_else(|| Path::new("out").join(&scene.name).join("played.toml"));
+    /// A record in a file of what is done in a scene with these settings.
+    pub(crate) fn new(path: PathBuf, scene: &Path, settings: &[Setting]) -> Self {
         // A name with a line break would end the comment.
         let shown = |path: &Path| path.display().to_string().replace(char::is_control, " ");
-        let set = args.set.set.iter().filter(|setting| setting.key.begins() != "script");
+        let set = settings.iter().filter(|setting| setting.key.begins() != "script");
         let set: String =
             set.map(|setting| format!(" --set '{setting}'").replace(char::is_control, " ")).collect();
         let head = format!(
             "# What hands have done in {0}; carried out again by\n# endowire run {0} --script {1}{set}\n\n",
-            shown(&args.scene),
+            shown(scene),
             shown(&path)
         );
-        let set = args.set.set.iter().map(ToString::to_string).collect();
-        Self { path, head, scene: args.scene.clone(), set, written: Instant::now() }
+        let set = settings.iter().map(ToString::to_string).collect();
+        Self { path, head, scene: scene.to_path_buf(), set, provenance: None, written: Instant::now() }
+    }
+
+    /// The same of a subject: its score is written too.
+    pub(crate) fn scored(self, provenance: Provenance) -> Self {
+        Self { provenance: Some(provenance), ..self }
     }
 
     /// The folder that the script goes into.
@@ -71,6 +78,11 @@ impl Record {
             record: session.record().clone(),
         };
         of_session.write(&SessionFile::beside(&self.path))?;
+        if let Some((provenance, score)) = self.provenance.as_ref().zip(session.score()) {
+            let path = self.path.with_extension("score.json");
+            let text = to_json(&ScoreDocument { provenance, score: &score })?;
+            whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
+        }
         let Went { unconverged_steps, jumps, relaxations } = session.went();
         let counts = [
             (unconverged_steps, "without an equilibrium"),

@@ -3,6 +3,7 @@
 #[cfg(feature = "gamepad")]
 mod gamepad;
 mod screen;
+mod task;
 mod text;
 
 use std::num::NonZeroU32;

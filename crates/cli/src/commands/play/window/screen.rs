@@ -4,15 +4,16 @@ use endowire_play::{InstrumentReadout, Readout};
 use endowire_viewer::{Image, Mode, PixelFormat};
 
 use super::super::live::Shown;
+use super::task;
 use super::text::{Canvas, Writer};
 
 const BACK: u32 = 0x10_1418;
 const PANEL: u32 = 0x1a_2026;
-const TEXT: u32 = 0xd8_dee4;
+pub(super) const TEXT: u32 = 0xd8_dee4;
 const FAINT: u32 = 0x86_9098;
-const WARN: u32 = 0xff_5a4a;
+pub(super) const WARN: u32 = 0xff_5a4a;
 const LIVE: u32 = 0xff_c020;
-const CHOSEN: u32 = 0x5a_c8fa;
+pub(super) const CHOSEN: u32 = 0x5a_c8fa;
 /// Height of what is below the pictures, and of a line of text, at the usual size.
 const PANEL_PX: usize = 172;
 
@@ -84,6 +85,12 @@ pub(super) fn compose(
     over_picture(writer, &mut canvas, readout, layout);
     canvas.fill([0, layout.panel], [size[0], size[1] - layout.panel], PANEL);
     panel(writer, &mut canvas, shown, gamepad, layout);
+    if let Some(standing) = &readout.subject {
+        let left = layout.three_d.0[0];
+        let below = ([left, layout.panel], [size[0] - left, size[1] - layout.panel]);
+        let places = task::Places { over: layout.three_d, below };
+        task::show(writer, &mut canvas, standing, readout.step > 0, &places);
+    }
     if let Some(help) = help {
         show_help(writer, &mut canvas, help);
     }

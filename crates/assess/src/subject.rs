@@ -1,0 +1,241 @@
+//! Training subjects: what is to be done in a scene, when it ends, and what is asked of it. A file of TOML, written without code.
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::error::{in_range, nearest_name};
+use endowire_core::input::{from_toml, parse_toml};
+use endowire_core::{Error, Result};
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
+
+use crate::metric::{Better, Metric};
+use crate::record::Record;
+
+/// Levels, from the easiest on.
+const LEVELS: std::ops::RangeInclusive<u8> = 1..=4;
+/// Largest distance, time, volume, force and number of points that can be meant.
+const LARGEST: f64 = 1e6;
+
+/// A subject as its file says it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subject {
+    /// Its title.
+    pub name: String,
+    /// How hard it is, 1 to 4.
+    pub level: u8,
+    /// The task: what to do, why, and what counts.
+    pub text: String,
+    /// Scene file, from the folder of the subject; its script is a demonstration alone.
+    pub scene: PathBuf,
+    /// Keys of the scene that have other values here, `KEY=VALUE`.
+    #[serde(default)]
+    pub set: Vec<String>,
+    /// File of `[[script]]` tables by which the subject can be done, from the same folder; the scene's own script if absent.
+    pub reference: Option<PathBuf>,
+    /// What is to be reached.
+    pub goal: Goal,
+    /// What ends it early.
+    #[serde(default)]
+    pub limits: Limits,
+    /// What is asked of the measures.
+    #[serde(default)]
+    pub threshold: Vec<Threshold>,
+    #[serde(skip)]
+    path: PathBuf,
+}
+
+/// What ends a subject well: as `until` of a script's line, for the foremost tip.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Goal {
+    /// Name of a point of the vessel's centre line.
+    pub target: String,
+    /// How near the foremost tip must come to it, mm.
+    pub tip_within_mm: f64,
+    /// Contrast medium that must then be injected there, ml; none if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inject_ml: Option<f64>,
+}
+
+/// Beyond one of these a subject ends, and is not passed.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Time, s.
+    pub time_s: Option<f64>,
+    /// Time with the beam on, s.
+    pub beam_s: Option<f64>,
+    /// Contrast medium, ml.
+    pub contrast_ml: Option<f64>,
+    /// Sum of the sizes of wall forces, N.
+    pub wall_force_n: Option<f64>,
+}
+
+/// What is asked of a measure.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Threshold {
+    /// Name of the measure ([`Metric::name`]).
+    #[serde(skip_serializing)]
+    pub metric: String,
+    /// Its largest value, where less is better.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_most: Option<f64>,
+    /// Its smallest value, where more is better.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_least: Option<f64>,
+    /// What it counts in the score; 1 if absent. With 0 it is told and need not be kept.
+    #[serde(default = "one")]
+    pub points: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Threshold {
+    /// Whether a value is as it should be; what was not measured is not.
+    pub(crate) fn holds(&self, value: Option<f64>) -> bool {
+        let at_most = |value: f64| self.at_most.is_none_or(|most| value <= most);
+        let at_least = |value: f64| self.at_least.is_none_or(|least| value >= least);
+        value.is_some_and(|value| at_most(value) && at_least(value))
+    }
+
+    /// Checks it beside the measure of its name; `key` is what messages call it.
+    fn check(&self, key: &str, metrics: &[Metric]) -> Result<()> {
+        let Some(metric) = metrics.iter().find(|metric| metric.name == self.metric) else {
+            let nearest = nearest_name(metrics.iter().map(|metric| metric.name), &self.metric);
+            let mend = format!(
+                "is no measure; did you mean {:?}? `endowire assess` tells all of them",
+                nearest.unwrap_or_default()
+            );
+            return Err(Error::parameter(format!("{key}.metric"), format!("{:?}", self.metric), mend));
+        };
+        let (right, wrong, limit, other) = match metric.better {
+            Better::Lower => ("at_most", "at_least", self.at_most, self.at_least),
+            Better::Higher => ("at_least", "at_most", self.at_least, self.at_most),
+        };
+        if let Some(other) = other {
+            let mend = format!("of {} {} is better: give {right}", metric.name, metric.better.words());
+            return Err(Error::parameter(format!("{key}.{wrong}"), other, mend));
+        }
+        match limit {
+            Some(limit) if limit.is_finite() => {}
+            Some(limit) => {
+                return Err(Error::parameter(format!("{key}.{right}"), limit, "must be a finite number"));
+            }
+            None => {
+                let mend = format!("which value of {} is asked for? give {right}", metric.name);
+                return Err(Error::parameter(format!("{key}.{right}"), "none", mend));
+            }
+        }
+        if !(0.0..=LARGEST).contains(&self.points) {
+            let mend = format!("must be a number from 0 to {LARGEST}; 0 has it told alone");
+            return Err(Error::parameter(format!("{key}.points"), self.points, mend));
+        }
+        Ok(())
+    }
+}
+
+impl Subject {
+    /// Reads a subject.
+    ///
+    /// # Errors
+    /// [`Error::Content`] with file, key and value of what does not fit, a scene or a reference that is not there among it.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (subject, _): (Self, String) = from_toml(path)?;
+        let subject = subject.of_file(path)?;
+        let reference = subject.reference.iter().map(|file| ("reference", file));
+        for (key, file) in std::iter::once(("scene", &subject.scene)).chain(reference) {
+            if !subject.resolve(file).is_file() {
+                let mend = format!("there is no such file from {}: name one", subject.folder().display());
+                let error = Error::parameter(key, format!("{:?}", file.display().to_string()), mend);
+                return Err(Error::content(path, error.to_string()));
+            }
+        }
+        Ok(subject)
+    }
+
+    /// Reads a subject from the text of its file, which `path` names; the files that it names are not looked for.
+    ///
+    /// # Errors
+    /// As [`Self::read`], less those of files.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        parse_toml::<Self>(text, path)?.of_file(path)
+    }
+
+    /// Whether a text is meant to be a subject and no scene: it names a scene.
+    pub fn is_meant(text: &str) -> bool {
+        #[derive(Deserialize)]
+        struct Head {
+            #[serde(rename = "scene")]
+            _scene: IgnoredAny,
+        }
+        parse_toml::<Head>(text, Path::new("")).is_ok()
+    }
+
+    fn of_file(mut self, path: &Path) -> Result<Self> {
+        self.path = path.to_path_buf();
+        self.check().map_err(|error| Error::content(path, error.to_string()))?;
+        Ok(self)
+    }
+
+    fn check(&self) -> Result<()> {
+        for (key, text) in [("name", &self.name), ("text", &self.text)] {
+            if text.trim().is_empty() {
+                return Err(Error::parameter(key, "\"\"", "must not be empty"));
+            }
+        }
+        if !LEVELS.contains(&self.level) {
+            let mend = format!("must be from {} to {}", LEVELS.start(), LEVELS.end());
+            return Err(Error::parameter("level", self.level, mend));
+        }
+        let Self { goal, limits, .. } = self;
+        in_range("goal.tip_within_mm", goal.tip_within_mm, LARGEST)?;
+        for (key, limit) in [
+            ("goal.inject_ml", goal.inject_ml),
+            ("limits.time_s", limits.time_s),
+            ("limits.beam_s", limits.beam_s),
+            ("limits.contrast_ml", limits.contrast_ml),
+            ("limits.wall_force_n", limits.wall_force_n),
+        ] {
+            limit.map_or(Ok(()), |limit| in_range(key, limit, LARGEST))?;
+        }
+        if let (Some(asked), Some(most)) = (goal.inject_ml, limits.contrast_ml)
+            && asked > most
+        {
+            let mend = format!("more than limits.contrast_ml = {most}: raise that, or ask for less");
+            return Err(Error::parameter("goal.inject_ml", asked, mend));
+        }
+        let metrics = crate::assess(&Record::default(), None);
+        for (index, threshold) in self.threshold.iter().enumerate() {
+            threshold.check(&format!("threshold[{index}]"), &metrics)?;
+            if self.threshold[..index].iter().any(|before| before.metric == threshold.metric) {
+                let mend = "has a threshold already: keep one of the two";
+                let key = format!("threshold[{index}].metric");
+                return Err(Error::parameter(key, format!("{:?}", threshold.metric), mend));
+            }
+        }
+        Ok(())
+    }
+
+    /// What commands call it: the stem of its file.
+    pub fn stem(&self) -> String {
+        self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    /// Its file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn folder(&self) -> &Path {
+        self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    }
+
+    /// A path of the subject, seen from the working directory.
+    pub fn resolve(&self, file: &Path) -> PathBuf {
+        self.folder().join(file)
+    }
+}

@@ -1,0 +1,274 @@
+//! Subjects and exams by hand: a file is refused by its key, and a record is scored until its end.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::Path;
+
+use endowire_assess::{BeamState, EndedBy, Exam, Hand, Injection, Record, Sample, Score, Subject};
+use endowire_core::Vec3;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
+
+const FILE: &str = r#"
+name = "To the end"
+level = 2
+text = "Push on."
+scene = "scene.toml"
+
+[goal]
+target = "end"
+tip_within_mm = 5.0
+
+[limits]
+time_s = 30.0
+beam_s = 12.0
+contrast_ml = 10.0
+wall_force_n = 2.0
+
+[[threshold]]
+metric = "wall_force_n"
+at_most = 1.0
+points = 3
+
+[[threshold]]
+metric = "total_s"
+at_most = 20.0
+
+[[threshold]]
+metric = "spectral_arc_length"
+at_least = -100.0
+points = 0
+"#;
+
+fn subject(changes: &[(&str, &str)]) -> Result<Subject, String> {
+    let text = changes.iter().fold(FILE.to_owned(), |text, (piece, other)| {
+        assert!(text.contains(piece), "{piece}");
+        text.replacen(piece, other, 1)
+    });
+    Subject::from_toml(&text, Path::new("subjects/end.toml")).map_err(|error| error.to_string())
+}
+
+/// A straight line of 100 mm.
+fn tree() -> CentrelineTree {
+    let node =
+        |x: f64, parent| CentrelineNode { position_mm: Vec3::new(x, 0.0, 0.0), radius_mm: 5.0, parent };
+    let nodes = vec![node(0.0, None), node(100.0, Some(0))];
+    let target = |name: &str, row| Target { name: name.to_owned(), row };
+    CentrelineTree::new(nodes).unwrap().with_targets(vec![target("start", 0), target("end", 1)]).unwrap()
+}
+
+/// Pushes by 10 mm a second, up to 97 mm, with a force at each second.
+fn pushed(force_n: impl Fn(usize) -> f64) -> Record {
+    let sample = |k: usize| Sample {
+        time_s: k as f64,
+        tip_mm: Some(Vec3::new((10.0 * k as f64).min(97.0), 0.0, 0.0)),
+        hands: vec![Hand { advance_mm: 10.0, ..Hand::default() }],
+        wall_force_n: force_n(k),
+        ..Sample::default()
+    };
+    Record { samples: (1..=10).map(sample).collect(), ..Record::default() }
+}
+
+fn beam(time_s: f64, on: bool) -> BeamState {
+    BeamState {
+        time_s,
+        on,
+        frames_per_s: 10.0,
+        dose_ngy: 30.0,
+        field_mm2: 1e4,
+        primary_deg: 0.0,
+        secondary_deg: 0.0,
+    }
+}
+
+fn exam(subject: Subject) -> Exam {
+    Exam::new(subject, &tree()).unwrap()
+}
+
+fn score(record: &Record) -> Score {
+    (*exam(subject(&[]).unwrap()).score(record)).clone()
+}
+
+fn end(score: &Score) -> Option<(EndedBy, f64)> {
+    score.verdict.ended.map(|ended| (ended.by, ended.time_s))
+}
+
+#[test]
+fn a_record_is_scored_by_its_thresholds_until_its_goal() {
+    let clean = score(&pushed(|_| 0.5));
+    assert_eq!(end(&clean), Some((EndedBy::Goal, 10.0)));
+    assert_eq!((clean.verdict.passed, clean.verdict.score, clean.subject.as_str()), (true, 100.0, "end"));
+    let total = clean.metrics.iter().find(|one| one.metric.name == "total_s").unwrap();
+    assert_eq!((total.metric.value, total.passed), (Some(10.0), Some(true)));
+    assert_eq!(clean.asked().count(), 3);
+
+    // Who pushes too hard keeps one point of four, and does not pass; who pushes much too hard is stopped.
+    let hard = score(&pushed(|k| if k == 4 { 1.5 } else { 0.5 }));
+    assert_eq!(
+        (hard.verdict.passed, hard.verdict.score, end(&hard).unwrap().0),
+        (false, 25.0, EndedBy::Goal)
+    );
+    let rough = score(&pushed(|k| if k == 4 { 2.5 } else { 0.5 }));
+    assert_eq!((rough.verdict.passed, rough.verdict.score), (false, 0.0));
+    assert_eq!(end(&rough), Some((EndedBy::WallForce, 4.0)));
+
+    // What is told alone need not be kept, and what was not measured is not kept.
+    let told = subject(&[("at_least = -100.0", "at_least = 100.0")]).unwrap();
+    assert!(exam(told).score(&pushed(|_| 0.5)).verdict.passed);
+    let beam = subject(&[("\"total_s\"", "\"beam_on_s\"")]).unwrap();
+    let unseen = exam(beam).score(&pushed(|_| 0.5));
+    assert_eq!((unseen.verdict.passed, unseen.verdict.score), (false, 75.0));
+
+    // What comes after the end does not count, and who stops before it has no score.
+    let mut longer = pushed(|_| 0.5);
+    longer.samples.push(Sample { time_s: 40.0, wall_force_n: 9.0, ..longer.samples[9].clone() });
+    assert_eq!(score(&longer), clean);
+    let mut shorter = pushed(|_| 0.5);
+    shorter.samples.truncate(8);
+    let left = score(&shorter);
+    assert_eq!((left.verdict.passed, left.verdict.score, left.verdict.ended), (false, 0.0, None));
+}
+
+#[test]
+fn limits_end_it_when_they_are_passed() {
+    // The tip rests at 50 mm until 40 s.
+    let mut slow = pushed(|_| 0.5);
+    slow.samples.truncate(5);
+    slow.samples.push(Sample { time_s: 40.0, hands: vec![Hand::default()], ..slow.samples[4].clone() });
+    assert_eq!(end(&score(&slow)), Some((EndedBy::Time, 30.0)));
+    slow.beam = Some(vec![beam(0.0, true), beam(4.0, false), beam(6.0, true)]);
+    assert_eq!(end(&score(&slow)), Some((EndedBy::Beam, 14.0)));
+    let ml = |time_s, volume_ml| Injection { time_s, volume_ml, rate_ml_per_s: 5.0 };
+    slow.injections = vec![ml(2.0, 8.0), ml(9.0, 2.0), ml(11.0, 1.0)];
+    assert_eq!(end(&score(&slow)), Some((EndedBy::Contrast, 11.0)));
+    let contrast = score(&slow).metrics.iter().find(|one| one.metric.name == "contrast_ml").unwrap().clone();
+    assert_eq!(contrast.metric.value, Some(11.0));
+}
+
+#[test]
+fn contrast_medium_counts_where_the_tip_is_at_its_target() {
+    let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
+    let ml = |time_s, volume_ml| Injection { time_s, volume_ml, rate_ml_per_s: 5.0 };
+    let mut record = pushed(|_| 0.5);
+    record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
+    for (injections, expected) in [
+        (vec![ml(3.0, 4.0)], None),
+        (vec![ml(12.0, 4.0)], Some((EndedBy::Goal, 12.0))),
+        (vec![ml(12.0, 3.0), ml(15.0, 1.0)], Some((EndedBy::Goal, 15.0))),
+    ] {
+        record.injections = injections;
+        assert_eq!(end(&exam(asked.clone()).score(&record)), expected);
+    }
+}
+
+#[test]
+fn it_ends_alike_tick_by_tick_and_whole() {
+    // Ticks of a tenth of a second; the tip comes to its target by itself, and rests are one sample.
+    let mut record = Record { beam: Some(vec![beam(0.0, true)]), ..Record::default() };
+    let mut followed = exam(subject(&[]).unwrap());
+    let mut at_the_end = None;
+    for tick in 1..=120 {
+        let time_s = f64::from(tick) * 0.1;
+        let x = if tick < 60 { 0.5 * f64::from(tick) } else { 98.0 };
+        let advance_mm = if tick < 60 { 0.5 } else { 0.0 };
+        let tip_mm = Some(Vec3::new(x, 0.0, 0.0));
+        let hands = vec![Hand { advance_mm, ..Hand::default() }];
+        let sample = Sample { time_s, tip_mm, hands, ..Sample::default() };
+        match record.samples.last_mut() {
+            Some(last) if (Sample { time_s: last.time_s, ..sample.clone() }) == *last && tick > 60 => {
+                last.time_s = time_s;
+            }
+            _ => record.samples.push(sample),
+        }
+        let ended = followed.follow(&record).cloned();
+        assert!(ended.is_none() || at_the_end.is_none(), "it ends once");
+        at_the_end = at_the_end.or(ended);
+    }
+    let whole = exam(subject(&[]).unwrap()).score(&record);
+    assert_eq!(at_the_end, Some(whole.clone()));
+    assert_eq!(end(&whole).unwrap().0, EndedBy::Goal);
+    assert_eq!(followed.standing(&record).verdict, Some(whole.verdict));
+}
+
+#[test]
+fn a_vessel_that_moves_takes_its_target_along() {
+    let mut record = pushed(|_| 0.5);
+    let aside = Vec3::new(0.0, 12.0, 0.0);
+    for sample in &mut record.samples {
+        sample.tip_at_rest_mm = sample.tip_mm;
+        sample.tip_mm = sample.tip_mm.map(|tip| tip + aside);
+    }
+    assert!(score(&record).verdict.passed);
+    record.samples.iter_mut().for_each(|sample| sample.tip_at_rest_mm = None);
+    assert!(!score(&record).verdict.passed, "12 mm beside it");
+}
+
+#[test]
+fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
+    let file = "subjects/end.toml: ";
+    for (from, to, told) in [
+        (
+            "\"wall_force_n\"\n",
+            "\"wall_force\"\n",
+            "threshold[0].metric = \"wall_force\": is no measure; did you mean \"wall_force_n\"",
+        ),
+        (
+            "at_most = 1.0",
+            "at_least = 1.0",
+            "threshold[0].at_least = 1: of wall_force_n less is better: give at_most",
+        ),
+        (
+            "at_least = -100.0",
+            "at_most = -1.0",
+            "threshold[2].at_most = -1: of spectral_arc_length more is better: give at_least",
+        ),
+        ("at_most = 1.0", "", "threshold[0].at_most = none: which value of wall_force_n"),
+        ("at_most = 1.0", "at_most = nan", "threshold[0].at_most = NaN"),
+        ("points = 3", "points = -1.0", "threshold[0].points = -1: must be a number from 0"),
+        (
+            "\"total_s\"",
+            "\"wall_force_n\"",
+            "threshold[1].metric = \"wall_force_n\": has a threshold already",
+        ),
+        ("level = 2", "level = 5", "level = 5: must be from 1 to 4"),
+        ("level = 2", "level = \"hard\"", "line 3: level: invalid type"),
+        ("text = \"Push on.\"", "text = \" \"", "text = \"\": must not be empty"),
+        ("tip_within_mm = 5.0", "tip_within_mm = 0.0", "goal.tip_within_mm = 0: must be a number above 0"),
+        ("time_s = 30.0", "time_s = -1.0", "limits.time_s = -1: must be a number above 0"),
+        (
+            "tip_within_mm = 5.0",
+            "tip_within_mm = 5.0\ninject_ml = 11.0",
+            "goal.inject_ml = 11: more than limits.contrast_ml = 10",
+        ),
+        ("wall_force_n = 2.0", "wal_force_n = 2.0", "did you mean `wall_force_n`?"),
+        ("points = 3", "weight = 3", "unknown field `weight`"),
+    ] {
+        let error = subject(&[(from, to)]).unwrap_err();
+        assert!(error.starts_with(file) && error.contains(told), "{error}\n{told}");
+    }
+    for (target, told) in
+        [("ende", "goal.target = \"ende\": did you mean \"end\"?"), ("start", "where the centre line begins")]
+    {
+        let wrong = subject(&[("target = \"end\"", &format!("target = \"{target}\""))]).unwrap();
+        let error = Exam::new(wrong, &tree()).unwrap_err().to_string();
+        assert!(error.starts_with(file) && error.contains(told), "{error}");
+    }
+    assert!(
+        Subject::is_meant(FILE)
+            && !Subject::is_meant("[vessel]\nfile = \"a.stl\"")
+            && !Subject::is_meant("scene")
+    );
+}
+
+#[test]
+fn a_scene_or_a_reference_that_is_not_there_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("end.toml");
+    std::fs::write(&path, FILE).unwrap();
+    let error = Subject::read(&path).unwrap_err().to_string();
+    assert!(error.contains("end.toml: scene = \"scene.toml\": there is no such file"), "{error}");
+    std::fs::write(folder.path().join("scene.toml"), "").unwrap();
+    assert_eq!(Subject::read(&path).unwrap().stem(), "end");
+    std::fs::write(&path, FILE.replace("scene = ", "reference = \"hand.toml\"\nscene = ")).unwrap();
+    let error = Subject::read(&path).unwrap_err().to_string();
+    assert!(error.contains("reference = \"hand.toml\""), "{error}");
+}

@@ -1,0 +1,130 @@
+//! What a trainee reads of a subject: the task at first and the score at the end over the 3D view, and how it stands below.
+
+use endowire_assess::{Score, Standing, Subject, Threshold};
+
+use super::screen::{CHOSEN, TEXT, WARN};
+use super::text::{Canvas, Writer};
+use crate::subjects::{asked, kept, verdict};
+
+/// Size of letters, their width and the distance of lines, pixels.
+const LETTER_PX: u32 = 15;
+const COLUMN_PX: usize = 9;
+const LINE_PX: usize = 22;
+const MARGIN_PX: usize = 12;
+const BACK: u32 = 0x08_0c10;
+/// Parts of a limit from which on it is shown as a warning.
+const NEARLY: f64 = 0.8;
+
+/// A line and its colour.
+type Line = (u32, String);
+
+/// Where it is written: task and score over the 3D view, how it stands in the panel below, each a corner and a size.
+pub(super) struct Places {
+    pub(super) over: ([usize; 2], [usize; 2]),
+    pub(super) below: ([usize; 2], [usize; 2]),
+}
+
+/// Writes what is to be read of a subject, as far as there is room; `begun` once an instrument has moved.
+pub(super) fn show(
+    writer: &mut Writer,
+    canvas: &mut Canvas,
+    standing: &Standing,
+    begun: bool,
+    places: &Places,
+) {
+    write(writer, canvas, &standing_lines(standing), places.below);
+    match &standing.score {
+        Some(score) => write(writer, canvas, &score_lines(score), places.over),
+        None if !begun => write(writer, canvas, &task_lines(&standing.task), places.over),
+        None => {}
+    }
+}
+
+/// Writes lines into a box, which is no higher than they are.
+fn write(
+    writer: &mut Writer,
+    canvas: &mut Canvas,
+    lines: &[Line],
+    ([left, top], [width, height]): ([usize; 2], [usize; 2]),
+) {
+    let columns = width.saturating_sub(2 * MARGIN_PX) / COLUMN_PX;
+    let room = height.saturating_sub(MARGIN_PX) / LINE_PX;
+    if columns == 0 {
+        return;
+    }
+    let lines = lines
+        .iter()
+        .flat_map(|(colour, text)| wrapped(text, columns).into_iter().map(move |line| (*colour, line)));
+    let lines: Vec<Line> = lines.take(room).collect();
+    canvas.fill([left, top], [width, LINE_PX * lines.len() + MARGIN_PX], BACK);
+    for (number, (colour, line)) in lines.iter().enumerate() {
+        let at = [left + MARGIN_PX, top + LINE_PX * (number + 1)];
+        writer.write(canvas, at, LETTER_PX, *colour, line);
+    }
+}
+
+fn task_lines(task: &Subject) -> Vec<Line> {
+    let row = |threshold: &Threshold| (TEXT, format!("  {}: {}", threshold.metric, asked(threshold)));
+    let head = (CHOSEN, format!("{} (level {})", task.name, task.level));
+    let text = (TEXT, task.text.clone());
+    [head, text].into_iter().chain(task.threshold.iter().map(row)).collect()
+}
+
+fn standing_lines(standing: &Standing) -> Vec<Line> {
+    let goal = &standing.task.goal;
+    let to_go = standing.distance_mm.map_or_else(|| "not in yet".to_owned(), |mm| format!("{mm:.1} mm"));
+    let mut lines =
+        vec![(CHOSEN, format!("to {}: {to_go}, there at {} mm", goal.target, goal.tip_within_mm))];
+    if let Some(ml) = goal.inject_ml {
+        lines.push((CHOSEN, format!("injected there: {:.1} of {ml} ml", standing.injected_there_ml)));
+    }
+    lines.extend(standing.used.iter().map(|used| {
+        let colour = if used.value > NEARLY * used.limit { WARN } else { TEXT };
+        let digits = if used.unit == "N" { 3 } else { 1 };
+        (colour, format!("{}: {:.digits$} of {} {}", used.what, used.value, used.limit, used.unit))
+    }));
+    lines
+}
+
+fn score_lines(score: &Score) -> Vec<Line> {
+    let head = (if score.verdict.passed { CHOSEN } else { WARN }, verdict(score));
+    let rows = score.asked().map(|(scored, threshold)| {
+        let (kept, value) = kept(scored);
+        let colour = if scored.passed == Some(true) { TEXT } else { WARN };
+        (colour, format!("  {kept:<6} {}: {value}, {}", scored.metric.name, asked(threshold)))
+    });
+    let end = (TEXT, "What is done now does not count. Esc ends.".to_owned());
+    std::iter::once(head).chain(rows).chain([end]).collect()
+}
+
+/// A text in lines of so many letters, words kept whole; one that begins with a blank is a row of a table, and is cut.
+fn wrapped(text: &str, columns: usize) -> Vec<String> {
+    if text.starts_with(' ') {
+        return vec![text.chars().take(columns).collect()];
+    }
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let last = lines.len() - 1;
+        if lines[last].is_empty() {
+            lines[last] = word.to_owned();
+        } else if lines[last].chars().count() + 1 + word.chars().count() <= columns {
+            lines[last] += &format!(" {word}");
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_kept_whole_and_rows_of_tables_as_they_are() {
+        assert_eq!(wrapped("push the\nwire on", 9), ["push the", "wire on"]);
+        assert_eq!(wrapped("unbreakable", 4), ["unbreakable"], "a word that is too long leaves the box");
+        assert_eq!(wrapped("  a    b", 20), ["  a    b"]);
+        assert_eq!(wrapped("", 4), [""]);
+    }
+}

@@ -1,0 +1,183 @@
+//! `endowire subject`: what there is to train, and how the project itself does it.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use endowire_assess::{Goal, Limits, Subject, Threshold};
+use endowire_play::{Input, Limits as Warnings};
+use endowire_viewer::Mode;
+use serde::Serialize;
+
+use crate::args::{SubjectCommand, SubjectRunArgs};
+use crate::cache::Cache;
+use crate::commands::play::{self, Record};
+use crate::commands::run::interrupts;
+use crate::failure::Failure;
+use crate::output::answer;
+use crate::output::provenance::{Provenance, read_input};
+use crate::scenes;
+use crate::subjects::{self, ScoreDocument, asked};
+
+/// Side of pictures, which nobody sees here, pixels.
+const SIDE_PX: u32 = 64;
+
+/// The document of `subject list`.
+#[derive(Serialize)]
+struct Listed {
+    #[serde(flatten)]
+    provenance: Provenance,
+    folder: PathBuf,
+    subjects: Vec<Row>,
+}
+
+/// One subject of a folder.
+#[derive(Serialize)]
+struct Row {
+    subject: String,
+    level: u8,
+    name: String,
+    target: String,
+}
+
+/// The document of `subject show`.
+#[derive(Serialize)]
+struct Shown<'a> {
+    #[serde(flatten)]
+    provenance: Provenance,
+    subject: String,
+    name: &'a str,
+    level: u8,
+    text: &'a str,
+    scene: PathBuf,
+    /// What of the scene is set.
+    scene_set: &'a [String],
+    goal: &'a Goal,
+    limits: Limits,
+    thresholds: Vec<Named<'a>>,
+}
+
+/// A threshold with the measure that it is of.
+#[derive(Serialize)]
+struct Named<'a> {
+    metric: &'a str,
+    #[serde(flatten)]
+    threshold: &'a Threshold,
+}
+
+/// Runs the command that was asked for.
+pub(crate) fn subject(command: &SubjectCommand) -> Result<(), Failure> {
+    match command {
+        SubjectCommand::List { folder, json } => list(folder, *json),
+        SubjectCommand::Show { subject, json } => show(subject, *json),
+        SubjectCommand::Run(args) => run(args),
+    }
+}
+
+fn list(folder: &Path, json: bool) -> Result<(), Failure> {
+    let paths = subjects::files(folder)?;
+    if paths.is_empty() {
+        return Err(Failure::Input(format!("{}: has no subject files (.toml)", folder.display())));
+    }
+    let inputs = paths.iter().map(|path| read_input(path)).collect::<Result<Vec<_>, _>>()?;
+    let mut subjects = vec![];
+    for path in &paths {
+        let subject = Subject::read(path)?;
+        let (stem, level) = (subject.stem(), subject.level);
+        subjects.push(Row { subject: stem, level, name: subject.name, target: subject.goal.target });
+    }
+    subjects.sort_by_key(|row| row.level);
+    let document = Listed { provenance: Provenance::new(&inputs, 0), folder: folder.to_path_buf(), subjects };
+    answer(&document, json, || {
+        let row = |row: &Row| format!("{}  {:<22} {}", row.level, row.subject, row.name);
+        document.subjects.iter().map(row).collect::<Vec<_>>().join("\n")
+    })
+}
+
+fn show(which: &Path, json: bool) -> Result<(), Failure> {
+    let subject = subjects::read(which)?;
+    let document = Shown {
+        provenance: Provenance::new(&[read_input(subject.path())?], 0),
+        subject: subject.stem(),
+        name: &subject.name,
+        level: subject.level,
+        text: subject.text.trim(),
+        scene: subject.resolve(&subject.scene),
+        scene_set: &subject.set,
+        goal: &subject.goal,
+        limits: subject.limits,
+        thresholds: subject
+            .threshold
+            .iter()
+            .map(|threshold| Named { metric: &threshold.metric, threshold })
+            .collect(),
+    };
+    answer(&document, json, || text_of(&document))
+}
+
+fn text_of(shown: &Shown<'_>) -> String {
+    let mut lines =
+        vec![format!("{}: {}, level {}", shown.subject, shown.name, shown.level), shown.text.to_owned()];
+    let set: String = shown.scene_set.iter().map(|setting| format!(" --set '{setting}'")).collect();
+    lines.push(format!("scene      {}{set}", shown.scene.display()));
+    let inject = shown.goal.inject_ml.map_or_else(String::new, |ml| format!(", and {ml} ml injected there"));
+    lines.push(format!(
+        "goal       tip within {} mm of {}{inject}",
+        shown.goal.tip_within_mm, shown.goal.target
+    ));
+    let Limits { time_s, beam_s, contrast_ml, wall_force_n } = shown.limits;
+    let limits = [
+        ("time", time_s, "s"),
+        ("beam", beam_s, "s"),
+        ("contrast", contrast_ml, "ml"),
+        ("wall force", wall_force_n, "N"),
+    ];
+    let limits: Vec<String> = limits
+        .iter()
+        .filter_map(|(what, limit, unit)| limit.map(|limit| format!("{what} {limit} {unit}")))
+        .collect();
+    if !limits.is_empty() {
+        lines.push(format!("ends at    {}", limits.join(", ")));
+    }
+    lines.extend(shown.thresholds.iter().map(|Named { metric, threshold }| {
+        format!("threshold  {metric:<22} {:<16} points {}", asked(threshold), threshold.points)
+    }));
+    lines.join("\n")
+}
+
+/// Does a subject by its reference script.
+fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
+    let subject = subjects::read(&args.subject)?;
+    let (stem, place) = (subject.stem(), subject.path().display().to_string());
+    let path = subject.resolve(&subject.scene);
+    let reference = subject.reference.as_ref().map(|file| subject.resolve(file));
+    let settings = subjects::settings(&subject)?;
+    let scene = scenes::with_script(&path, &settings, reference.as_deref())?;
+    let cache = Cache::new(&args.cache);
+    let exam = subjects::exam(subject, &scene, &cache)?;
+    let (session, script) = play::open(&scene, &path, &cache, SIDE_PX, Warnings::default())?;
+    let mut session = session.with_script(script).with_exam(exam);
+    let begun = [Input::Pedal { down: true, mode: Some(Mode::Fluoro) }, Input::Script {}];
+    begun
+        .iter()
+        .try_for_each(|input| session.apply(input))
+        .map_err(|error| Failure::from(error).at(&place))?;
+    let interrupted = interrupts();
+    while session.demonstrates() && !interrupted.load(Ordering::Relaxed) {
+        session.tick();
+    }
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&stem));
+    let provenance = Provenance::of_scene(&scene, &settings)?;
+    let record = Record::new(folder.join("played.toml"), &path, &settings).scored(provenance.clone());
+    record.finish(&session)?;
+    let Some(score) = session.score() else { return Ok(()) };
+    answer(&ScoreDocument { provenance: &provenance, score: &score }, args.json, || subjects::text(&score))?;
+    if score.verdict.passed {
+        return Ok(());
+    }
+    // A script that did not come to its end has said why.
+    let event = session.events().last().filter(|_| score.verdict.ended.is_none());
+    let last = event.map_or_else(String::new, |event| format!(" ({})", event.text));
+    Err(Failure::Computation(format!(
+        "{place}: the reference script does not pass{last}: change it, or limits and thresholds"
+    )))
+}

@@ -1,0 +1,232 @@
+//! `endowire subject`, and subjects that are played and assessed: what is shipped can be done, and what is done badly does not pass.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::{Value, json};
+
+use crate::common::{assets, document, endowire, said, scene, text, told, workspace};
+
+/// The program where it finds subjects by their names.
+fn in_workspace() -> Command {
+    let mut command = endowire();
+    command.current_dir(workspace());
+    command
+}
+
+fn subject_file(name: &str) -> PathBuf {
+    assets().join("subjects").join(format!("{name}.toml"))
+}
+
+/// Does a subject by its reference; its score and its session.
+fn done(name: &str, folder: &Path) -> (Value, PathBuf) {
+    let out = folder.join(name);
+    let score =
+        told(&in_workspace().args(["subject", "run", name, "--json", "--out", text(&out)]).output().unwrap());
+    (score, out.join("played.session.json"))
+}
+
+fn metric<'a>(score: &'a Value, name: &str) -> &'a Value {
+    score["metrics"].as_array().unwrap().iter().find(|metric| metric["name"] == name).unwrap()
+}
+
+/// Plays a subject without a window; its answers and its score.
+fn played(name: &str, folder: &Path, lines: &[Value]) -> (Vec<Value>, Value) {
+    let record = folder.join("played.toml");
+    let mut command = in_workspace();
+    command.args(["play", name, "--headless", "--size", "64", "--record", text(&record)]);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let lines: String = lines.iter().map(|line| format!("{line}\n")).collect();
+    child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let answers = String::from_utf8(output.stdout.clone()).unwrap();
+    let answers = answers.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let verdict = said(&output);
+    assert!(verdict.contains("level 1") && verdict.contains(&format!("{name}: ")), "{verdict}");
+    (answers, document(folder.join("played.score.json")))
+}
+
+#[test]
+fn every_subject_can_be_done_by_its_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let listed = told(&in_workspace().args(["subject", "list", "--json"]).output().unwrap());
+    let subjects = listed["subjects"].as_array().unwrap();
+    assert!(subjects.len() >= 8);
+    for level in 1..=4 {
+        assert!(subjects.iter().filter(|subject| subject["level"] == level).count() >= 2, "level {level}");
+    }
+    for subject in subjects {
+        let name = subject["subject"].as_str().unwrap();
+        let (score, session) = done(name, folder.path());
+        assert_eq!((&score["passed"], &score["score"]), (&json!(true), &json!(100.0)), "{score}");
+        assert_eq!((&score["subject"], &score["ended"]["by"]), (&json!(name), &json!("goal")));
+        // The session says the same to those who assess it later.
+        let again = in_workspace().args(["assess", text(&session), "--subject", name, "--json"]).output();
+        let again = told(&again.unwrap());
+        for key in ["subject", "passed", "score", "ended", "metrics"] {
+            assert_eq!(again[key], score[key], "{name}: {key}");
+        }
+        for key in ["name", "group", "value", "unit", "better", "threshold", "passed"] {
+            assert!(score["metrics"][0].get(key).is_some(), "{key}");
+        }
+    }
+}
+
+#[test]
+fn what_a_reference_has_done_is_run_with_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let (score, session) = done("curved_tube", folder.path());
+    let session = document(session);
+    let last = session["record"]["samples"].as_array().unwrap().last().unwrap().clone();
+    let script = folder.path().join("curved_tube/played.toml");
+    let run = |script: &Path| {
+        let out = folder.path().join("again");
+        let mut command = endowire();
+        command.arg("run").arg(scene("curved_tube_friction.toml")).arg("--script").arg(script);
+        told(&command.args(["--json", "--out", text(&out)]).output().unwrap())
+    };
+    assert_eq!(run(&script)["tip_mm"], last["tip_mm"]);
+    // A script that is another is seen.
+    let other = folder.path().join("other.toml");
+    std::fs::write(&other, "[[script]]\nadvance_mm = 100.0\n").unwrap();
+    assert_ne!(run(&other)["tip_mm"], last["tip_mm"]);
+    // And once more.
+    let second = tempfile::tempdir().unwrap();
+    assert_eq!(done("curved_tube", second.path()).0["metrics"], score["metrics"]);
+}
+
+#[test]
+fn a_hand_is_told_how_it_stands_and_is_scored_at_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let (answers, score) = played(
+        "straight_tube",
+        folder.path(),
+        &[
+            json!({"do": "read"}),
+            json!({"do": "script"}),
+            json!({"do": "pedal", "down": true}),
+            json!({"do": "move", "mm_per_s": 10}),
+            json!({"do": "wait", "ticks": 300}),
+            json!({"do": "wait", "ticks": 360}),
+        ],
+    );
+    let standing = |k: usize| &answers[k]["readout"]["subject"];
+    assert_eq!(
+        (&standing(0)["subject"], &standing(0)["distance_mm"]),
+        (&json!("straight_tube"), &Value::Null)
+    );
+    assert_eq!(answers[1]["ok"], json!(false), "the script is not shown unless that was asked for");
+    let to_go_mm = standing(4)["distance_mm"].as_f64().unwrap();
+    assert!((40.0..60.0).contains(&to_go_mm), "{to_go_mm}");
+    assert_eq!(standing(4)["used"][0]["limit"], json!(60.0));
+    assert!(standing(4)["verdict"].is_null());
+    assert_eq!(standing(5)["verdict"]["passed"], json!(true));
+    assert_eq!(answers[5]["readout"]["event"]["kind"], json!("ended"));
+    // The hand was told to rest when it was there.
+    assert!(standing(5)["distance_mm"].as_f64().unwrap() > 7.0);
+    assert_eq!((&score["passed"], &score["score"]), (&json!(true), &json!(100.0)));
+}
+
+#[test]
+fn a_hand_that_goes_to_and_fro_unseen_arrives_and_does_not_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let push = |mm_per_s: i32| json!({"do": "move", "mm_per_s": mm_per_s});
+    let wait = |ticks: u32| json!({"do": "wait", "ticks": ticks});
+    let lines = [push(20), wait(120), push(-20), wait(60), push(20), wait(300)];
+    let (_, score) = played("straight_tube", folder.path(), &lines);
+    assert_eq!((&score["ended"]["by"], &score["passed"]), (&json!("goal"), &json!(false)));
+    let passed = |name: &str| metric(&score, name)["passed"].as_bool();
+    assert_eq!((passed("reversals"), passed("moving_without_beam_s")), (Some(false), Some(false)));
+    assert_eq!((passed("total_s"), passed("wall_force_n")), (Some(true), Some(true)));
+    assert_eq!((passed("turns"), score["score"].as_f64()), (None, Some(60.0)));
+}
+
+/// A shipped subject with changes, in a file of its own; its score, and what was said, where it does not pass.
+fn failed(name: &str, folder: &Path, changes: &[(&str, &str)]) -> (Value, String) {
+    let file = folder.join(format!("{name}.toml"));
+    let shipped = std::fs::read_to_string(subject_file(name)).unwrap();
+    let own =
+        [("\"../scenes", assets().join("scenes")), ("\"references", assets().join("subjects/references"))];
+    let shipped =
+        own.iter().fold(shipped, |shipped, (from, to)| shipped.replace(from, &format!("\"{}", to.display())));
+    let changed = changes.iter().fold(shipped, |changed, (piece, other)| {
+        assert!(changed.contains(piece), "{piece}");
+        changed.replace(piece, other)
+    });
+    std::fs::write(&file, changed).unwrap();
+    let out = folder.join("out");
+    let args = ["subject", "run", text(&file), "--json", "--out", text(&out)];
+    let output = endowire().args(args).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let score: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(score["passed"], json!(false));
+    (score, said(&output))
+}
+
+#[test]
+fn a_reference_that_misses_a_threshold_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let (score, said) = failed("curved_tube", folder.path(), &[("at_most = 0.02", "at_most = 0.001")]);
+    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("goal"), &json!(80.0)));
+    assert_eq!(metric(&score, "hand_force_n")["passed"], json!(false));
+    assert!(said.contains("curved_tube.toml: the reference script does not pass"), "{said}");
+}
+
+#[test]
+fn who_pushes_on_in_a_wrong_branch_is_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    // Without the turn that leads up to the liver.
+    let pushes = "[[script]]\nrotate_deg = 270.0\n\n[[script]]\nadvance_mm = 320.0\nstep_mm = 1.0\n";
+    let reference = folder.path().join("pushes.toml");
+    std::fs::write(&reference, pushes).unwrap();
+    let shipped = assets().join("subjects/references/right_hepatic.toml");
+    let (score, _) = failed("right_hepatic", folder.path(), &[(text(&shipped), text(&reference))]);
+    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("wall_force"), &json!(0.0)));
+    assert_eq!(metric(&score, "wall_force_n")["passed"], json!(false));
+}
+
+#[test]
+fn what_is_no_subject_or_does_not_belong_to_it_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = folder.path().join("wrong.toml");
+    let shipped = std::fs::read_to_string(subject_file("curved_tube")).unwrap();
+    std::fs::write(&wrong, shipped.replace("\"hand_force_n\"", "\"hand_force\"")).unwrap();
+    let (_, session) = done("curved_tube", folder.path());
+    let session = text(&session);
+    let wrong = text(&wrong);
+    for (args, named) in [
+        (
+            vec!["subject", "show", "inominate"],
+            "inominate: is no file and no subject of assets/subjects; did you mean innominate?",
+        ),
+        (vec!["play", "inominate", "--headless"], "did you mean innominate?"),
+        (vec!["subject", "list", "assets/nothing"], "assets/nothing"),
+        (
+            vec!["subject", "show", wrong],
+            "wrong.toml: threshold[1].metric = \"hand_force\": is no measure; did you mean \"hand_force_n\"",
+        ),
+        (vec!["play", wrong, "--headless"], "wrong.toml: threshold[1].metric"),
+        (
+            vec!["play", "innominate", "--headless", "--set", "seed=2"],
+            "--set seed=2: a subject is the same for all",
+        ),
+        (
+            vec!["assess", session, "--subject", "innominate"],
+            "was recorded in assets/subjects/../scenes/curved_tube_friction.toml, and the subject is in",
+        ),
+        (vec!["assess", session, "--subject", "curved_tube", "--target", "opening 0"], "--subject"),
+    ] {
+        let output = in_workspace().args(&args).stdin(Stdio::null()).output().unwrap();
+        assert!(
+            output.status.code() == Some(2) && said(&output).contains(named),
+            "{args:?}: {}",
+            said(&output)
+        );
+    }
+    let shown = in_workspace().args(["subject", "show", "innominate"]).output().unwrap();
+    let shown = String::from_utf8(shown.stdout).unwrap();
+    assert!(shown.contains("tip within 10 mm of innominate") && shown.contains("level 2"), "{shown}");
+}
