@@ -86,7 +86,7 @@ fn radiation(record: &Record) -> Vec<Metric> {
     let of = |name, unit, value, definition| lower(Group::Radiation, (name, unit), value, definition, REVIEW);
     let sum = |each: fn(&crate::BeamState) -> f64| {
         let on = record.beam_stretches()?.filter(|(state, _)| state.on);
-        Some(on.map(|(state, end_s)| each(state) * (end_s - state.time_s)).sum::<f64>())
+        Some(on.map(|(state, end_s)| each(state) * (end_s - state.time_s)).fold(0.0, |sum, of| sum + of))
     };
     let frames = sum(|state| state.frames_per_s);
     let kerma = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3);

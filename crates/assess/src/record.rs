@@ -166,7 +166,9 @@ impl Record {
     /// Time between two moments during which the beam was on, s; none where it was not recorded.
     pub(crate) fn beam_on_s(&self, from_s: f64, to_s: f64) -> Option<f64> {
         let on = self.beam_stretches()?.filter(|(state, _)| state.on);
-        Some(on.map(|(state, end_s)| (end_s.min(to_s) - state.time_s.max(from_s)).max(0.0)).sum())
+        let each = on.map(|(state, end_s)| (end_s.min(to_s) - state.time_s.max(from_s)).max(0.0));
+        // A sum of nothing is −0.
+        Some(each.fold(0.0, |sum, s| sum + s))
     }
 
     /// When the beam has been on for so long, s; none where it was not, or was not recorded.

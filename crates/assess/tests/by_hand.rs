@@ -129,5 +129,11 @@ fn what_was_not_recorded_has_no_value() {
         assert!(none.contains(&name), "{name} {none:?}");
     }
     assert!(!none.contains(&"total_s") && !none.contains(&"wall_force_n"));
+    // A beam that was never on was on for 0, which has no sign.
+    let dark = assess(&Record { beam: Some(Vec::new()), ..record() }, None);
+    for name in ["beam_on_s", "kerma_ugy"] {
+        let value = dark.iter().find(|metric| metric.name == name).unwrap().value.unwrap();
+        assert!(value == 0.0 && value.is_sign_positive(), "{name} {value}");
+    }
     assert!(Way::to_target(&tree(), "middle", 5.0).unwrap_err().to_string().contains("middle"));
 }
