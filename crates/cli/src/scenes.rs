@@ -126,6 +126,17 @@ pub(crate) fn check_converged(
     }
 }
 
+/// Files of a folder that are in TOML, by their names.
+pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let unusable = |e: std::io::Error| Failure::Input(format!("{}: {e}: name a folder", folder.display()));
+    let entries = std::fs::read_dir(folder).map_err(unusable)?;
+    let mut paths: Vec<PathBuf> =
+        entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>().map_err(unusable)?;
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    paths.sort();
+    Ok(paths)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
+use crate::scenes;
 
 /// Folder of the subjects that are called by their names.
 pub(crate) const FOLDER: &str = "assets/subjects";
@@ -32,17 +33,6 @@ fn named(which: &Path) -> PathBuf {
     Path::new(FOLDER).join(format!("{}.toml", which.display()))
 }
 
-/// Subject files of a folder, by their names.
-pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let unusable = |e: std::io::Error| Failure::Input(format!("{}: {e}: name a folder", folder.display()));
-    let entries = std::fs::read_dir(folder).map_err(unusable)?;
-    let mut paths: Vec<PathBuf> =
-        entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>().map_err(unusable)?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
-    paths.sort();
-    Ok(paths)
-}
-
 /// Reads a subject by its file or its name.
 pub(crate) fn read(which: &Path) -> Result<Subject, Failure> {
     if which.is_file() {
@@ -52,7 +42,7 @@ pub(crate) fn read(which: &Path) -> Result<Subject, Failure> {
     if file.is_file() {
         return Ok(Subject::read(&file)?);
     }
-    let known = files(Path::new(FOLDER)).unwrap_or_default();
+    let known = scenes::files(Path::new(FOLDER)).unwrap_or_default();
     let stems = known.iter().filter_map(|path| path.file_stem()?.to_str());
     let nearest = nearest_name(stems, &which.display().to_string())
         .map_or_else(String::new, |name| format!("; did you mean {name}?"));

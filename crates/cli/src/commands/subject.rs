@@ -74,7 +74,7 @@ pub(crate) fn subject(command: &SubjectCommand) -> Result<(), Failure> {
 }
 
 fn list(folder: &Path, json: bool) -> Result<(), Failure> {
-    let paths = subjects::files(folder)?;
+    let paths = scenes::files(folder)?;
     if paths.is_empty() {
         return Err(Failure::Input(format!("{}: has no subject files (.toml)", folder.display())));
     }

@@ -13,6 +13,7 @@ use self::table::{PartRow, columns, diameters};
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{answer, tell};
+use crate::scenes;
 
 /// The document of `device show`.
 #[derive(Serialize)]
@@ -81,12 +82,7 @@ pub(crate) fn show(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Fa
 
 /// Lists the devices of a folder, and draws them all into `out`.
 pub(crate) fn list(folder: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
-    let unusable = |e: std::io::Error| Failure::Input(format!("{}: {e}: name a folder", folder.display()));
-    let entries = std::fs::read_dir(folder).map_err(unusable)?;
-    let mut paths: Vec<PathBuf> =
-        entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>().map_err(unusable)?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
-    paths.sort();
+    let paths = scenes::files(folder)?;
     if paths.is_empty() {
         return Err(Failure::Input(format!("{}: has no device files (.toml)", folder.display())));
     }
