@@ -10,16 +10,26 @@
 //! (M + Δt C + Δt² K) v⁺ = M v + Δt τ,    d ← d + Δt v⁺
 //! ```
 //!
-//! Springs of joints and contacts are implicit (K), loads are not. The mass matrix couples every link with every other and is
-//! factored as such: O(n³) a time step. Mass and dampers are free in a search for equilibrium; they are given in the
+//! Springs of joints and contacts are implicit (K), loads are not. Mass and dampers are free in a search for equilibrium; they are given in the
 //! units of the device (its length, EI, and EI/L⁴ for the mass per length).
 //!
+//! M and the contacts couple every link with every other, and yet a step takes O(n), as the recursions for chains of bodies do (Featherstone,
+//! *The calculation of robot dynamics using articulated-body inertias*, Int. J. Robotics Research 2, 1983). With the velocity xⱼ of node j beside those of the links,
+//! xⱼ = xⱼ₋₁ + lⱼ vⱼ, the step is the minimum of
+//!
+//! ```text
+//! Σⱼ ½ xⱼᵀ (mⱼ + Δt² kⱼ nⱼnⱼᵀ) xⱼ + ½ Kⱼ vⱼ² − κⱼ vⱼ·vⱼ₋₁ − rⱼ·vⱼ
+//! ```
+//!
+//! and what all beyond a link adds to it is a quadratic function of its velocity and that of its node: a recursion from the tip with
+//! blocks of five, and back.
+//!
 //! # What it cannot do
-//! Links do not twist: no torque, and no shaped tips. The cost grows with the cube of the number of links.
+//! Links do not twist: no torque, and no shaped tips.
 
 use endowire_core::device::Device;
 use endowire_core::{Result, Vec3};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2};
 
 use crate::links::Links;
 use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, refuse_shape};
@@ -66,11 +76,11 @@ impl RodModel for RigidLinks {
         for iteration in 0..=self.max_iterations {
             links.place(chain, load, posture);
             system.assemble(chain, &links);
-            if iteration > 0 && system.torque.amax() <= links.allowed {
+            if iteration > 0 && system.largest_torque() <= links.allowed {
                 return Outcome { iterations: iteration, converged: true };
             }
             if iteration == self.max_iterations
-                || !self.step(chain, load.trusted_mm(), &mut system, &mut links.directions, &mut velocity)
+                || !self.step(chain, load.trusted_mm(), &mut system, &mut links, &mut velocity)
             {
                 break;
             }
@@ -86,118 +96,156 @@ impl RigidLinks {
         chain: &Chain,
         trusted_mm: f64,
         system: &mut System,
-        links: &mut [Vec3],
+        links: &mut Links,
         velocity: &mut [Vec3],
     ) -> bool {
-        let n = links.len();
         let dt = self.time_step;
-        let mut v = DVector::zeros(2 * n);
-        for i in 0..n {
-            for a in 0..2 {
-                v[2 * i + a] = velocity[i].dot(&system.basis[i][a]);
-            }
-        }
-        let rhs = &system.mass * v + &system.torque * dt;
-        let matrix =
-            &system.mass + &system.joints * (dt * (dt + self.damping)) + &system.contacts * (dt * dt);
-        let Some(factor) = matrix.cholesky() else { return false };
-        let v = factor.solve(&rhs);
+        let Some(fastest) = system.solve(chain, links, (dt, self.damping), velocity) else { return false };
         let (mut x, mut farthest) = (Vec3::zeros(), 0.0f64);
-        for i in 0..n {
-            let [p, q] = system.basis[i];
-            velocity[i] = p * v[2 * i] + q * v[2 * i + 1];
-            x += velocity[i] * (chain.lengths_mm[i] * dt);
+        for (v, length_mm) in velocity.iter().zip(&chain.lengths_mm) {
+            x += v * (length_mm * dt);
             farthest = farthest.max(x.norm());
         }
-        let scale = (self.largest_turn_rad / (dt * v.amax())).min(trusted_mm / farthest).min(1.0);
-        for i in 0..n {
-            velocity[i] *= scale;
-            links[i] = (links[i] + velocity[i] * dt).normalize();
+        let scale = (self.largest_turn_rad / (dt * fastest)).min(trusted_mm / farthest).min(1.0);
+        for (v, direction) in velocity.iter_mut().zip(&mut links.directions) {
+            *v *= scale;
+            *direction = (*direction + *v * dt).normalize();
         }
-        v.amax().is_finite()
+        fastest.is_finite()
     }
 }
 
-/// Torques on the links and the matrices of the motion, in two directions across each link.
+/// A link in the equations of motion, in two directions across it.
+#[derive(Debug, Clone, Copy)]
+struct Body {
+    across: Matrix3x2<f64>,
+    torque: Vector2<f64>,
+    /// Mass at its far node.
+    mass: f64,
+    /// Stiffness of its joints, N·mm: its own, and with that of the next one.
+    joint: f64,
+    joints: f64,
+}
+
+/// Where the motion beyond a link has its least cost: its velocity v is `by_node` x + `by_link` v′ + `alone`, of the node and the link before it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Answer {
+    by_node: Matrix2x3<f64>,
+    by_link: Matrix2<f64>,
+    alone: Vector2<f64>,
+}
+
+/// What all beyond a link adds to the cost: ½ of a quadratic form of its node's velocity x and its own v, and a linear one.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cost {
+    xx: Matrix3<f64>,
+    vx: Matrix2x3<f64>,
+    vv: Matrix2<f64>,
+    x: Vec3,
+    v: Vector2<f64>,
+}
+
+/// The equations of motion.
 struct System {
-    basis: Vec<[Vec3; 2]>,
-    torque: DVector<f64>,
-    mass: DMatrix<f64>,
-    joints: DMatrix<f64>,
-    contacts: DMatrix<f64>,
+    bodies: Vec<Body>,
+    answers: Vec<Answer>,
 }
 
 impl System {
     fn new(n: usize) -> Self {
-        let square = DMatrix::zeros(2 * n, 2 * n);
-        Self {
-            basis: vec![[Vec3::zeros(); 2]; n],
-            torque: DVector::zeros(2 * n),
-            mass: square.clone(),
-            joints: square.clone(),
-            contacts: square,
-        }
+        let (across, torque) = (Matrix3x2::zeros(), Vector2::zeros());
+        let body = Body { across, torque, mass: 0.0, joint: 0.0, joints: 0.0 };
+        Self { bodies: vec![body; n], answers: vec![Answer::default(); n] }
+    }
+
+    fn largest_torque(&self) -> f64 {
+        self.bodies.iter().fold(0.0, |most, body| most.max(body.torque.amax()))
     }
 
     fn assemble(&mut self, chain: &Chain, Links { directions: links, pushes, .. }: &Links) {
         let n = links.len();
-        for (i, d) in links.iter().enumerate() {
-            let u = d.cross(&if d.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() }).normalize();
-            self.basis[i] = [u, d.cross(&u)];
-        }
         let density = chain.force_unit() / chain.length_mm().powi(2);
-        self.joints.fill(0.0);
-        self.contacts.fill(0.0);
-        // Force, mass and stiffness of everything beyond a link: it moves all of that.
-        let (mut force, mut mass, mut yielding) = (Vec3::zeros(), 0.0, Matrix3::zeros());
+        // Force on everything beyond a link: it moves all of that.
+        let mut force = Vec3::zeros();
         for i in (0..n).rev() {
-            let (l, push) = (chain.lengths_mm[i], pushes[i]);
-            force += push.force_n;
-            yielding += push.normal * push.normal.transpose() * push.stiffness_n_per_mm;
-            mass += 0.5 * density * (l + chain.lengths_mm.get(i + 1).unwrap_or(&0.0));
+            let (d, l) = (links[i], chain.lengths_mm[i]);
+            let u = d.cross(&if d.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() }).normalize();
+            let across = Matrix3x2::from_columns(&[u, d.cross(&u)]);
+            force += pushes[i].force_n;
             let before = if i == 0 { chain.direction } else { links[i - 1] };
-            let mut pull = force * l + before * spring(chain, i, &before, &links[i]);
-            let mut stiffness = chain.joint_stiffness(i);
+            let mut pull = force * l + before * spring(chain, i, &before, &d);
+            let joint = chain.joint_stiffness(i);
+            let mut joints = joint;
             if i + 1 < n {
-                pull += links[i + 1] * spring(chain, i + 1, &links[i], &links[i + 1]);
-                stiffness += chain.joint_stiffness(i + 1);
+                pull += links[i + 1] * spring(chain, i + 1, &d, &links[i + 1]);
+                joints += chain.joint_stiffness(i + 1);
             }
-            for a in 0..2 {
-                self.torque[2 * i + a] = pull.dot(&self.basis[i][a]);
-                self.joints[(2 * i + a, 2 * i + a)] = stiffness;
-            }
-            if i > 0 {
-                let k = chain.joint_stiffness(i);
-                self.couple(i, i - 1, |p, q| -k * p.dot(q), |system| &mut system.joints);
-            }
-            for j in 0..=i {
-                let lever = l * chain.lengths_mm[j];
-                self.couple(i, j, |p, q| mass * lever * p.dot(q), |system| &mut system.mass);
-                if yielding != Matrix3::zeros() {
-                    let felt = yielding * lever;
-                    self.couple(i, j, |p, q| p.dot(&(felt * q)), |system| &mut system.contacts);
-                }
-            }
+            let mass = 0.5 * density * (l + chain.lengths_mm.get(i + 1).unwrap_or(&0.0));
+            self.bodies[i] = Body { across, torque: across.tr_mul(&pull), mass, joint, joints };
         }
     }
 
-    /// Writes what couples links i and j, in both halves of a symmetric matrix.
-    fn couple(
+    /// Replaces the velocities of links by those after a time step with that damping. Returns the fastest, or none where the matrix is not
+    /// positive definite.
+    fn solve(
         &mut self,
-        i: usize,
-        j: usize,
-        value: impl Fn(&Vec3, &Vec3) -> f64,
-        matrix: impl Fn(&mut Self) -> &mut DMatrix<f64>,
-    ) {
-        let (p, q) = (self.basis[i], self.basis[j]);
-        let matrix = matrix(self);
-        for a in 0..2 {
-            for b in 0..2 {
-                let value = value(&p[a], &q[b]);
-                matrix[(2 * i + a, 2 * j + b)] = value;
-                matrix[(2 * j + b, 2 * i + a)] = value;
-            }
+        chain: &Chain,
+        links: &Links,
+        (dt, damping): (f64, f64),
+        velocity: &mut [Vec3],
+    ) -> Option<f64> {
+        // Momentum of everything beyond a link.
+        let mut momentum: Vec<Vec3> = Vec::with_capacity(velocity.len());
+        let mut x = Vec3::zeros();
+        for ((v, body), l) in velocity.iter().zip(&self.bodies).zip(&chain.lengths_mm) {
+            x += v * *l;
+            momentum.push(x * body.mass);
         }
+        let (implicit, mut beyond) = (dt * (dt + damping), Vec3::zeros());
+        let mut cost = Cost::default();
+        for i in (0..velocity.len()).rev() {
+            let (Body { across, torque, mass, joint, joints }, l) = (self.bodies[i], chain.lengths_mm[i]);
+            let push = links.pushes[i];
+            beyond += momentum[i];
+            let wanted = across.tr_mul(&beyond) * l + torque * dt;
+            let node = cost.xx
+                + Matrix3::identity() * mass
+                + push.normal * push.normal.transpose() * (dt * dt * push.stiffness_n_per_mm);
+            // Of x = x′ + l v the cost in v is ½ vᵀ own v + v·(by_node x′ + by_link v′ − alone).
+            let turn = cost.vx * across * l;
+            let own = across.tr_mul(&(node * across)) * (l * l)
+                + Matrix2::identity() * (joints * implicit)
+                + turn
+                + turn.transpose()
+                + cost.vv;
+            let by_node = across.tr_mul(&node) * l + cost.vx;
+            let before = if i == 0 { Matrix3x2::zeros() } else { self.bodies[i - 1].across };
+            let by_link = across.tr_mul(&before) * (-joint * implicit);
+            let alone = wanted - across.tr_mul(&cost.x) * l - cost.v;
+            let factor = own.cholesky()?;
+            let answer = Answer {
+                by_node: -factor.solve(&by_node),
+                by_link: -factor.solve(&by_link),
+                alone: factor.solve(&alone),
+            };
+            cost = Cost {
+                xx: node + by_node.tr_mul(&answer.by_node),
+                vx: by_link.tr_mul(&answer.by_node),
+                vv: by_link.tr_mul(&answer.by_link),
+                x: cost.x + by_node.tr_mul(&answer.alone),
+                v: by_link.tr_mul(&answer.alone),
+            };
+            self.answers[i] = answer;
+        }
+        let (mut x, mut v, mut fastest) = (Vec3::zeros(), Vector2::zeros(), 0.0f64);
+        for (i, link) in velocity.iter_mut().enumerate() {
+            let Answer { by_node, by_link, alone } = self.answers[i];
+            v = by_node * x + by_link * v + alone;
+            fastest = fastest.max(v.amax());
+            *link = self.bodies[i].across * v;
+            x += *link * chain.lengths_mm[i];
+        }
+        Some(fastest)
     }
 }
 
@@ -205,4 +253,79 @@ impl System {
 fn spring(chain: &Chain, i: usize, before: &Vec3, after: &Vec3) -> f64 {
     let (sine, cosine) = (before.cross(after).norm(), before.dot(after));
     chain.joint_stiffness(i) * if sine > 1e-9 { sine.atan2(cosine) / sine } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Push;
+    use nalgebra::{DMatrix, DVector};
+
+    /// The recursion against the matrix that it never forms.
+    #[test]
+    fn a_step_of_the_recursion_is_that_of_the_dense_matrix() {
+        let n = 7;
+        let mut count = 0.0f64;
+        let mut vector = || {
+            Vec3::from_fn(|_, _| {
+                count += 1.0;
+                (count * count).sin()
+            })
+        };
+        let lengths_mm = (0..n).map(|i| 1.0 + 0.3 * i as f64).collect();
+        let chain = Chain { lengths_mm, ..Chain::uniform(1.0, n, 3.0) };
+        let links = Links {
+            directions: (0..n).map(|_| (Vec3::x() * 2.0 + vector()).normalize()).collect(),
+            pushes: (0..n)
+                .map(|i| Push {
+                    force_n: vector(),
+                    normal: vector().normalize(),
+                    stiffness_n_per_mm: if i % 2 == 0 { 4.0 } else { 0.0 },
+                })
+                .collect(),
+            allowed: 0.0,
+        };
+        let (dt, damping) = (0.25, 0.2);
+        let mut system = System::new(n);
+        system.assemble(&chain, &links);
+        let start: Vec<Vec3> =
+            system.bodies.iter().map(|body| body.across * body.across.tr_mul(&vector())).collect();
+        let across = |i: usize| system.bodies[i].across;
+        let mut matrix = DMatrix::zeros(2 * n, 2 * n);
+        let mut rhs = DVector::zeros(2 * n);
+        for i in 0..n {
+            rhs.rows_mut(2 * i, 2).copy_from(&(system.bodies[i].torque * dt));
+            let joints = Matrix2::identity() * (system.bodies[i].joints * dt * (dt + damping));
+            matrix.view_mut((2 * i, 2 * i), (2, 2)).copy_from(&joints);
+            for j in 0..n {
+                let lever = chain.lengths_mm[i] * chain.lengths_mm[j];
+                for k in i.max(j)..n {
+                    let (mass, push) = (system.bodies[k].mass, links.pushes[k]);
+                    let inertia = Matrix3::identity() * mass;
+                    let yielding =
+                        push.normal * push.normal.transpose() * (dt * dt * push.stiffness_n_per_mm);
+                    let block = across(i).tr_mul(&((inertia + yielding) * across(j))) * lever;
+                    let mut to = matrix.view_mut((2 * i, 2 * j), (2, 2));
+                    to += block;
+                    let mut to = rhs.rows_mut(2 * i, 2);
+                    to += across(i).tr_mul(&start[j]) * (mass * lever);
+                }
+                if j + 1 == i || i + 1 == j {
+                    let stiffness = system.bodies[i.max(j)].joint * dt * (dt + damping);
+                    let mut to = matrix.view_mut((2 * i, 2 * j), (2, 2));
+                    to -= across(i).tr_mul(&across(j)) * stiffness;
+                }
+            }
+        }
+        let expected = matrix.cholesky().unwrap().solve(&rhs);
+        let mut velocity = start.clone();
+        system.solve(&chain, &links, (dt, damping), &mut velocity).unwrap();
+        for (i, v) in velocity.iter().enumerate() {
+            let off = system.bodies[i].across.tr_mul(v) - expected.rows(2 * i, 2);
+            assert!(off.norm() < 1e-12 * expected.norm(), "{i}: {off:?}");
+        }
+        // What it began with is something else.
+        let moved = velocity.iter().zip(&start).map(|(v, s)| (v - s).norm()).fold(0.0, f64::max);
+        assert!(moved > 0.1 * expected.norm(), "{moved}");
+    }
 }

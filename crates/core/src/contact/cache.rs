@@ -9,7 +9,7 @@ use super::distance::{Distance, Nearness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::ProximityCache;
 use super::surface::Hint;
-use super::wall::{Foreseen, Slip, Slipping, Span};
+use super::wall::{Aside, Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
 
@@ -96,8 +96,10 @@ pub struct ContactCache {
     /// all of them are looked at many times a step.
     pub(super) readings: Vec<TakenReading>,
     pub(super) proximity: ProximityCache,
-    /// What a step does to the points near the wall, to first order, …
+    /// What a step does to the points that it leads to the wall, to first order, …
     pub(super) foreseen: Vec<Foreseen>,
+    /// … those near it that no step has led there, …
+    pub(super) aside: Vec<Aside>,
     /// … and to those with friction.
     pub(super) slipping: Vec<Slipping>,
     /// Whether forces are aimed at.
@@ -153,6 +155,7 @@ impl ContactCache {
             readings: Vec::new(),
             proximity,
             foreseen: Vec::new(),
+            aside: Vec::new(),
             slipping: Vec::new(),
             aimed: false,
             ends: (Vec::new(), Vec::new()),
@@ -165,6 +168,7 @@ impl ContactCache {
         self.spans.reserve(points.saturating_sub(self.spans.len()));
         self.pressing.reserve(points.saturating_sub(self.pressing.len()));
         self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
+        self.aside.reserve(points.saturating_sub(self.aside.len()));
         self.slipping.reserve(points.saturating_sub(self.slipping.len()));
         self.ends.0.reserve(points.saturating_sub(self.ends.0.len()));
         self.ends.1.reserve(points.saturating_sub(self.ends.1.len()));

@@ -72,6 +72,8 @@ impl Distance {
 pub enum Nearness {
     /// As far as was asked or farther: the distance, mm.
     Beyond(f64),
+    /// The same, and no wall is within that of it.
+    Clear(f64),
     /// Nearer.
     Within(Distance),
 }
@@ -80,7 +82,7 @@ impl Nearness {
     /// The distance, mm.
     pub fn value_mm(&self) -> f64 {
         match self {
-            Self::Beyond(value_mm) => *value_mm,
+            Self::Beyond(value_mm) | Self::Clear(value_mm) => *value_mm,
             Self::Within(distance) => distance.value_mm,
         }
     }
@@ -319,7 +321,7 @@ impl SmoothWall {
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
         match self.within(x, triangle, f64::INFINITY)? {
             (Nearness::Within(distance), _) => Some(distance),
-            (Nearness::Beyond(_), _) => None,
+            (Nearness::Beyond(_) | Nearness::Clear(_), _) => None,
         }
     }
 

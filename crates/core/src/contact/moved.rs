@@ -97,6 +97,7 @@ impl<'a> MovedWall<'a> {
         let wanted_mm = limit_mm.max(self.surface.reach_mm) * displacement.stretch();
         match self.surface.nearness(material, hint, wanted_mm) {
             Nearness::Beyond(value_mm) => Nearness::Beyond(value_mm / displacement.stretch()),
+            Nearness::Clear(value_mm) => Nearness::Clear(value_mm / displacement.stretch()),
             Nearness::Within(distance) => {
                 let moved = moved(&distance, &displacement.local(material));
                 if moved.value_mm < limit_mm {

@@ -163,7 +163,7 @@ impl ContactSurface {
             Felt::Mesh(mesh) => mesh.smooth.distance(x, piece),
             Felt::Swept(..) => match self.nearness(x, Hint::Near(piece), f64::INFINITY) {
                 Nearness::Within(distance) => Some(distance),
-                Nearness::Beyond(_) => None,
+                Nearness::Beyond(_) | Nearness::Clear(_) => None,
             },
         }
     }
@@ -178,7 +178,7 @@ impl ContactSurface {
         let closest = match field.closer_than(x, from(hint), limit_mm.max(thickest_mm)) {
             Ok(Some(closest)) => closest,
             Ok(None) => return Nearness::Beyond(self.reach_mm),
-            Err(room_mm) => return Nearness::Beyond(room_mm),
+            Err(room_mm) => return Nearness::Clear(room_mm),
         };
         let value_mm = closest.distance_mm();
         if value_mm < limit_mm {

@@ -29,7 +29,7 @@ use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
 
 pub(super) use clear::Span;
-pub(super) use model::Foreseen;
+pub(super) use model::{Aside, Foreseen};
 use reading::Reading;
 pub(super) use slipping::{Slip, Slipping};
 

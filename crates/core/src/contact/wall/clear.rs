@@ -186,6 +186,7 @@ impl WallContact<'_> {
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.cache.pressing.clear();
         self.cache.foreseen.clear();
+        self.cache.aside.clear();
         self.cache.slipping.clear();
         self.cache.aimed = false;
         for span in 0..self.cache.spans.len() {

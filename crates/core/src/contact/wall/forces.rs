@@ -38,6 +38,7 @@ use super::model::straighten;
 use super::{ROUNDING, WallContact};
 use crate::Vec3;
 use crate::contact::force::{PENALTY, merit};
+use crate::contact::point::FOLLOW;
 use crate::contact::regions::Stiffness;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{ContactMerit, Moved};
@@ -131,18 +132,19 @@ impl WallContact<'_> {
     ) -> f64 {
         let (point, x) = (self.points[index], self.material(index, elements, state));
         let radius_mm = point.potential.radius_mm;
-        let limit_mm = self.asked_mm(radius_mm);
+        let foreseen = &self.cache.foreseen;
+        *next += foreseen[*next..].partition_point(|contact| contact.index < index);
+        let contact = foreseen.get(*next).filter(|contact| self.cache.aimed && contact.index == index);
+        let force_n = contact.map_or(0.0, |contact| contact.aim_n);
+        // Where a force is aimed at, how far off the wall it is counts as well.
+        let limit_mm = if force_n > 0.0 { (1.0 + FOLLOW) * radius_mm } else { self.asked_mm(radius_mm) };
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
+        if force_n == 0.0 && depth_mm <= 0.0 {
+            return 0.0;
+        }
         let stiffness = self.surface.stiffness(&x, self.cache.points[index].piece);
         if !self.cache.aimed {
             return stiffness.factor * point.weight_mm * point.potential.value(radius_mm - depth_mm);
-        }
-        let foreseen = &self.cache.foreseen;
-        *next += foreseen[*next..].partition_point(|contact| contact.index < index);
-        let contact = foreseen.get(*next).filter(|contact| contact.index == index);
-        let force_n = contact.map_or(0.0, |contact| contact.aim_n);
-        if force_n == 0.0 && depth_mm <= 0.0 {
-            return 0.0;
         }
         let rho = self.penalty_n_per_mm(index, elements);
         merit(self.spring_with(index, &stiffness), rho, force_n, depth_mm).0

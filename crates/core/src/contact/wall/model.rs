@@ -1,7 +1,7 @@
 //! The model of a step that Newton's method asks contacts for: gaps to first order, and springs where they close.
 //!
 //! Point i has the gap gᵢ = dᵢ − r at the base and gᵢ + ∇dᵢ·δx at the end of a step, and presses there with κᵢ times that where it is negative. Planes are
-//! known of all points that may come to touch, whether they do at the base or not. See [`crate::solve`] for what the model is for, and
+//! known of all points that a step may lead there, whether they touch at the base or not: planes of others change nothing. See [`crate::solve`] for what the model is for, and
 //! [`super::forces`] for the merit along the step to its minimum.
 
 use nalgebra::Matrix3;
@@ -12,6 +12,9 @@ use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
+
+/// Steepest gradient of a distance that is foreseen: the smooth wall of a mesh is steeper than 1 near crests.
+const STEEPEST: f64 = 2.0;
 
 /// A contact in a step, and what that does to it.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +41,19 @@ pub(in crate::contact) struct Foreseen {
     presses: bool,
     /// f⁺: the force that the step leads to, N.
     pub(super) aim_n: f64,
+}
+
+/// A point near the wall that no step has led there.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::contact) struct Aside {
+    /// Number of the point.
+    index: usize,
+    /// No more than g at the base, mm.
+    clear_mm: f64,
+    /// ρ, N/mm.
+    penalty_n_per_mm: f64,
+    /// How the step moves it, mm.
+    way: Vec3,
 }
 
 impl Foreseen {
@@ -84,32 +100,60 @@ pub(super) fn straighten(
 impl WallContact<'_> {
     /// See [`Contacts::foresee`](crate::solve::Contacts::foresee).
     pub(super) fn foresee_contacts(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
-        let mut foreseen = std::mem::take(&mut self.cache.foreseen);
-        if foreseen.is_empty() {
+        if self.cache.foreseen.is_empty() && self.cache.aside.is_empty() {
             for span in 0..self.cache.spans.len() {
                 for index in self.near(span, elements, base).into_iter().flatten() {
-                    foreseen.extend(self.at_base(index, elements));
+                    self.note(index, elements);
                 }
             }
         }
-        for contact in &mut foreseen {
+        self.take_note_of_ways(moved);
+        for contact in &mut self.cache.foreseen {
             contact.change_mm = moved(self.points[contact.index].place()).0.dot(&contact.gradient);
             contact.carried_n = contact.linear_n(contact.change_mm);
         }
-        self.cache.foreseen = foreseen;
+    }
+
+    /// Notes a point that presses at the base, or is near the wall there.
+    fn note(&mut self, index: usize, elements: &[ElementData]) {
+        let penalty_n_per_mm = self.penalty_n_per_mm(index, elements);
+        let (known, radius_mm) = (&self.cache.points[index], self.points[index].potential.radius_mm);
+        if known.presses {
+            let contact = self.at_base(index, penalty_n_per_mm);
+            self.cache.foreseen.extend(contact);
+        } else if known.base_clearance_mm < (1.0 + FOLLOW) * radius_mm {
+            let clear_mm = known.base_clearance_mm - radius_mm;
+            self.cache.aside.push(Aside { index, clear_mm, penalty_n_per_mm, way: Vec3::zeros() });
+        }
+    }
+
+    /// Foresees the points aside that a step may lead to the wall. What the others have of a plane it does not reach.
+    fn take_note_of_ways(&mut self, moved: &Moved<'_>) {
+        let mut aside = std::mem::take(&mut self.cache.aside);
+        let before = self.cache.foreseen.len();
+        aside.retain(|point| {
+            let way_mm = moved(self.points[point.index].place()).0.norm();
+            let stays = STEEPEST * way_mm <= point.clear_mm;
+            if !stays && let Some(mut contact) = self.at_base(point.index, point.penalty_n_per_mm) {
+                contact.change_mm = point.way.dot(&contact.gradient);
+                self.cache.foreseen.push(contact);
+            }
+            stays
+        });
+        self.cache.aside = aside;
+        if self.cache.foreseen.len() > before {
+            self.cache.foreseen.sort_unstable_by_key(|contact| contact.index);
+        }
     }
 
     /// What is known at the base of a point that may come to touch.
-    fn at_base(&mut self, index: usize, elements: &[ElementData]) -> Option<Foreseen> {
+    fn at_base(&mut self, index: usize, penalty_n_per_mm: f64) -> Option<Foreseen> {
         let radius_mm = self.points[index].potential.radius_mm;
         let at_base = self.cache.points[index].presses;
         let d = if at_base {
             *self.cache.pressed(index)?
         } else {
             let (x, near_mm) = (self.cache.points[index].base, (1.0 + FOLLOW) * radius_mm);
-            if self.cache.points[index].base_clearance_mm >= near_mm {
-                return None;
-            }
             let Reading::Pressed(d) = self.read_within(index, &x, near_mm) else { return None };
             d
         };
@@ -121,7 +165,7 @@ impl WallContact<'_> {
             gradient: d.gradient,
             spring_n_per_mm,
             slope_per_mm,
-            penalty_n_per_mm: self.penalty_n_per_mm(index, elements),
+            penalty_n_per_mm,
             carried_n: 0.0,
             at_base,
             presses: at_base,
@@ -137,6 +181,9 @@ impl WallContact<'_> {
         moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
+        for point in &mut self.cache.aside {
+            point.way = moved(self.points[point.index].place()).0;
+        }
         let mut changed = 0;
         for contact in &mut self.cache.foreseen {
             let point = &self.points[contact.index];
@@ -152,6 +199,7 @@ impl WallContact<'_> {
 
     /// See [`Contacts::look_towards`](crate::solve::Contacts::look_towards).
     pub(super) fn look_towards_contacts(&mut self, moved: &Moved<'_>) {
+        self.take_note_of_ways(moved);
         let (mut ends, mut slips) = std::mem::take(&mut self.cache.ends);
         ends.clear();
         ends.extend(self.cache.foreseen.iter().map(|contact| {

@@ -123,6 +123,13 @@ impl WallContact<'_> {
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
         }
         let (hint, looked_at) = (Hint::Near(known.piece?), known.looked_at);
+        if let TakenReading { at_mm, nearness: Nearness::Clear(ball_mm), .. } = self.cache.readings[index] {
+            let left_mm = ball_mm - (x - at_mm).norm() * stretch;
+            if left_mm >= limit_mm.max(radius) {
+                self.counters.avoided += 1;
+                return Some(Reading::Free(left_mm));
+            }
+        }
         if let Some(reading) = self.read_there(index, x, hint, limit_mm) {
             self.counters.avoided += 1;
             return Some(reading);

@@ -20,8 +20,10 @@ use crate::contact::point::ContactPoint;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
 
-/// A point's friction has changed in a step where its force is off by more than this part of the largest that it can be.
+/// Friction at a point is worth another round where its force is off by more than this part of the largest that it can be; …
 const CHANGED: f64 = 0.05;
+/// … and a round has it as it is where it is off by more than this: left as it was, steps were uphill by what it was off.
+const RENEWED: f64 = 5e-3;
 
 /// How far a step moves a point, mm, and turns it, rad.
 pub(super) type Motion = (Vec3, f64);
@@ -146,8 +148,9 @@ impl WallContact<'_> {
                 continue;
             };
             let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&slipping.way));
-            if off.0.norm() > CHANGED * self.friction.largest_n(index) {
-                changed += 1;
+            let (off_n, largest_n) = (off.0.norm(), self.friction.largest_n(index));
+            changed += usize::from(off_n > CHANGED * largest_n);
+            if off_n > RENEWED * largest_n {
                 slipping.switch(&f, (point, &elements[point.element]), base, into);
             }
         }
