@@ -39,6 +39,11 @@ EVALUATION = (
     "way_mm",
     "safety",
     "failure",
+    "path_length_mm",
+    "largest_wall_force_n",
+    "largest_tip_force_n",
+    "safe_success",
+    "wall_time_s",
     "out_of_time",
     "processor_s",
 )
@@ -200,11 +205,12 @@ def evaluate(out, episodes, names, most_s):
 def tell(name, rows):
     reached = [row for row in rows if str(row["reached"]) == "True"]
     low, high = evaluation.interval(len(reached), len(rows))
+    safe = sum(str(row["safe_success"]) == "True" for row in rows)
     steps = np.median([int(row["steps"]) for row in reached]) if reached else np.nan
     lost = sum(str(row["out_of_time"]) == "True" for row in rows)
     spent = np.median([float(row["processor_s"]) for row in rows])
     print(
-        f"{name:11}{len(reached):4} of {len(rows)}, {len(reached) / len(rows):5.1%}, 95 % {low:.1%} to {high:.1%}; "
+        f"{name:11}{len(reached):4} of {len(rows)}, {len(reached) / len(rows):5.1%}, 95 % {low:.1%} to {high:.1%}, safe {safe}; "
         f"median of those that arrived {steps:.0f} steps; out of time {lost}; {spent:.1f} s an episode",
         flush=True,
     )

@@ -232,6 +232,17 @@ impl Batch {
         self.of_each(py, |report| report.contacts.iter().map(|c| c.force_n).fold(0.0, f64::max))
     }
 
+    /// How hard the wall holds the instruments, N, shape (n, 2): the largest force at a contact, and the sum of those at the tip; normal force
+    /// and friction together. 0 without contact.
+    #[getter]
+    fn wall_forces_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (rows, list) = self.with(py, |members| {
+            let forces = members.batch.simulations().iter().map(insertion::Simulation::wall_force);
+            (members.starts.len(), forces.flat_map(|f| [f.largest_n, f.tip_n]).collect::<Vec<f64>>())
+        });
+        array(py, list, [rows, 2])
+    }
+
     /// Openings through which the tips have left the vessel, shape (n,); -1 inside.
     #[getter]
     fn left_through<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {

@@ -1,5 +1,7 @@
 """Hands, policies, evaluation, and the vector of stable-baselines3."""
 
+import dataclasses
+import json
 import pickle
 
 import numpy as np
@@ -157,10 +159,36 @@ def test_evaluation_is_of_the_episodes_of_its_seeds(task):
     singles = [alone(task, policies.Straight(), seed) for seed in seeds]
     assert [(o.seed, o.reached, o.steps, o.way_mm) for o in told] == singles
     assert len({o.steps for o in told}) > 1 and all(o.failure == "" and o.safety == 1.0 for o in told)
+    document = json.loads(json.dumps(evaluation.table(told)))
+    assert [row["seed"] for row in document["episodes"]] == seeds
+    of_all = document["summary"]
+    assert of_all["success_rate"] == sum(o.reached for o in told) / 5
+    low, high = of_all["safe_success_rate_interval"]
+    assert low <= of_all["safe_success_rate"] <= min(high, of_all["success_rate"])
+    assert all(o.path_length_mm >= 0.9 * o.steps and o.wall_time_s > 0.0 for o in told)
     steered = evaluation.evaluate(task, policies.Steered("follow_path"), seeds[:2], num_envs=2)
     assert [o.seed for o in steered] == seeds[:2]
     drawn = [evaluation.evaluate(task, policies.Uniform(seed), [1]) for seed in (0, 0, 1)]
     assert drawn[0] == drawn[1] != drawn[2]
+
+
+def test_success_is_safe_where_no_force_of_the_episode_was_above_the_limit(task):
+    task = dataclasses.replace(task, ends=[ends.TargetReached(), ends.StepLimit(200)])
+    (easy,) = evaluation.evaluate(task, policies.Steered("follow_path"), [5])
+    assert easy.reached and easy.safe_success and easy.largest_wall_force_n > 0.0
+    strict = dataclasses.replace(task, force_limit_n=0.5 * easy.largest_wall_force_n)
+    (hard,) = evaluation.evaluate(strict, policies.Steered("follow_path"), [5])
+    assert hard.reached and not hard.safe_success
+    # The largest force of an episode is the largest that any of its steps has told.
+    env, seen = InsertionEnv(task), []
+    env.reset(seed=5)
+    for _ in range(40):
+        *_, info = env.step(np.array([[0.8, 0.2]]))
+        seen.append((info["wall_force_n"], info["tip_force_n"]))
+        assert info["largest_wall_force_n"] == max(wall for wall, _ in seen)
+        assert info["largest_tip_force_n"] == max(tip for _, tip in seen)
+        assert info["tip_force_n"] >= 0.0 and info["wall_time_s"] == 0.0
+    assert max(wall for wall, _ in seen) > 0.0 and info["steps"] == 40
 
 
 def test_what_cannot_be_evaluated_is_refused(task):
@@ -168,6 +196,7 @@ def test_what_cannot_be_evaluated_is_refused(task):
     assert evaluation.evaluate(task, policies.Straight(), np.array([], dtype=int)) == []
     for wrong, words in (
         (lambda: evaluation.evaluate(task, policies.Straight(), [1], num_envs=0), "num_envs = 0: must be 1"),
+        (lambda: evaluation.table([]), "episodes = 0: must be 1 or more"),
         (lambda: evaluation.interval(0, 0), "episodes = 0: must be 1 or more"),
         (lambda: evaluation.interval(4, 3), "successes = 4: must be 0 to 3"),
         (lambda: policies.Steered("next"), "kind = 'next': give follow_path or search_ahead"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,12 @@ class Episodes:
         self.steps = np.zeros(n, dtype=int)
         #: Steps after which no contact pressed harder than the task's limit, shape (n,).
         self.safe_steps = np.zeros(n, dtype=int)
+        #: The largest force of the wall at a contact, and that at the tip, N, shape (n, 2): now, and in the episode.
+        self.force_n, self.largest_force_n = np.zeros((n, 2)), np.zeros((n, 2))
+        #: How far the tip has gone in the episode, mm, shape (n,): the sum of its ways from step to step.
+        self.path_length_mm = np.zeros(n)
+        #: When the episode began, s of the machine's clock, shape (n,).
+        self._begun_s = np.zeros(n)
         #: Number of the frame that shows it, shape (n,): seeds the noise of pictures.
         self.frame = np.zeros(n, dtype=np.int64)
         #: Last velocities within the limits, mm/s and rad/s, shape (n, n_instruments, 2); one that was no number leaves that before it.
@@ -77,6 +84,8 @@ class Episodes:
             self._ways.put(k, site.centreline, self.target_mm[k])
             self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
             self.steps[k], self.safe_steps[k], self.action[k] = 0, 0, 0.0
+            self.force_n[k] = self.largest_force_n[k] = 0.0
+            self.path_length_mm[k], self._begun_s[k] = 0.0, perf_counter()
             self.failures.pop(k, None)
         self._look()
         for k in generators:
@@ -103,8 +112,12 @@ class Episodes:
         self.steps += moving
         self.safe_steps += moving & (self.batch.largest_contact_force_n <= self.task.force_limit_n)
         self.frame += moving
+        self.force_n = np.where(moving[:, None], self.batch.wall_forces_n, self.force_n)
+        self.largest_force_n = np.maximum(self.largest_force_n, self.force_n)
+        tip_before_mm = self.tip_mm
         self.way_before_mm = self.way_mm.copy()
         self._look()
+        self.path_length_mm += np.where(moving, np.linalg.norm(self.tip_mm - tip_before_mm, axis=1), 0.0)
 
     def check_begun(self, what: str) -> None:
         """Raises ResetNeeded of Gymnasium where no episode has begun: there is nothing to step or to draw."""
@@ -143,6 +156,17 @@ class Episodes:
         safety = np.where(self.steps > 0, self.safe_steps / np.maximum(self.steps, 1), 1.0)
         told = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
         told |= {"safety": safety, "failure": failed}
+        told |= {"steps": self.steps.copy(), "path_length_mm": self.path_length_mm.copy()}
+        told |= {"wall_force_n": self.force_n[:, 0].copy(), "tip_force_n": self.force_n[:, 1].copy()}
+        told |= {
+            "largest_wall_force_n": self.largest_force_n[:, 0].copy(),
+            "largest_tip_force_n": self.largest_force_n[:, 1].copy(),
+        }
+        # Every force of the episode below the task's limit; the tip's is a sum of contacts, and may be above where none of them is.
+        is_safe = (self.largest_force_n <= self.task.force_limit_n).all(axis=1)
+        # A clock's time is that of no seed: it is told of episodes that are over.
+        took_s = np.where(np.logical_or(*self.ended()), perf_counter() - self._begun_s, 0.0)
+        told |= {"safe_success": self.reached & is_safe, "wall_time_s": took_s}
         if self.task.stand_in:
             told["stand_in"] = np.full(len(self.sites), self.task.stand_in, dtype=object)
         return told

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import islice
 from math import sqrt
+from statistics import fmean
+from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -14,6 +16,8 @@ from .. import InputError
 from .episodes import Episodes
 from .policies import Policy
 from .task import Task
+
+_FORCES = ("path_length_mm", "largest_wall_force_n", "largest_tip_force_n")
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,15 @@ class Outcome:
     safety: float
     #: What went wrong, or nothing.
     failure: str
+    #: How far the tip went, mm: the sum of its ways from step to step.
+    path_length_mm: float
+    #: The largest force of the wall at a contact, and the largest sum of those at the tip, N.
+    largest_wall_force_n: float
+    largest_tip_force_n: float
+    #: Whether it arrived, and none of these was above the task's limit.
+    safe_success: bool
+    #: Time that the episode took on this machine, s: of environments side by side that of all of them.
+    wall_time_s: float = field(compare=False)
 
 
 def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8) -> list[Outcome]:
@@ -60,6 +73,9 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
                 float(info["way_mm"][k]),
                 float(info["safety"][k]),
                 str(info["failure"][k]),
+                *(float(info[name][k]) for name in _FORCES),
+                bool(info["safe_success"][k]),
+                float(info["wall_time_s"][k]),
             )
             following = next(waiting, None)
             if following is not None:
@@ -68,6 +84,30 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
         if begun:
             episodes.begin(begun)
     return [outcomes[place] for place in range(len(seeds))]
+
+
+def table(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """What episodes come to, as a document of JSON: shares with their intervals (`interval`), means, and a row for each episode.
+
+    Contrast medium is a column of such tables; no action injects any, and it is 0 ml. Raises InputError where there is no episode.
+    """
+    n = len(outcomes)
+    shares = {
+        "success_rate": sum(o.reached for o in outcomes),
+        "safe_success_rate": sum(o.safe_success for o in outcomes),
+        "failure_rate": sum(bool(o.failure) for o in outcomes),
+    }
+    of_all: dict[str, Any] = {"episodes": n}
+    for name, count in shares.items():
+        of_all[f"{name}_interval"] = list(interval(count, n))
+        of_all[name] = count / n
+    for name in ("steps", "path_length_mm", "safety", "wall_time_s"):
+        of_all[f"mean_{name}"] = fmean(getattr(o, name) for o in outcomes)
+    for name in ("largest_wall_force_n", "largest_tip_force_n"):
+        of_all[name] = max(getattr(o, name) for o in outcomes)
+    steps, time_s = sum(o.steps for o in outcomes), sum(o.wall_time_s for o in outcomes)
+    of_all["steps_per_s"] = steps / time_s if time_s > 0.0 else 0.0
+    return {"summary": of_all, "episodes": [asdict(o) | {"contrast_ml": 0.0} for o in outcomes]}
 
 
 def interval(successes: int, episodes: int, z: float = 1.959964) -> tuple[float, float]:
