@@ -17,9 +17,6 @@ from .episodes import Episodes
 from .policies import Policy
 from .task import Task
 
-_FORCES = ("path_length_mm", "largest_wall_force_n", "largest_tip_force_n")
-
-
 @dataclass(frozen=True)
 class Outcome:
     """How an episode ended."""
@@ -73,7 +70,9 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
                 float(info["way_mm"][k]),
                 float(info["safety"][k]),
                 str(info["failure"][k]),
-                *(float(info[name][k]) for name in _FORCES),
+                float(info["path_length_mm"][k]),
+                float(info["largest_wall_force_n"][k]),
+                float(info["largest_tip_force_n"][k]),
                 bool(info["safe_success"][k]),
                 float(info["wall_time_s"][k]),
             )
