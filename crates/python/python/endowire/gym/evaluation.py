@@ -17,6 +17,7 @@ from .episodes import Episodes
 from .policies import Policy
 from .task import Task
 
+
 @dataclass(frozen=True)
 class Outcome:
     """How an episode ended."""
