@@ -1,9 +1,10 @@
 //! A script that is shown: its steps in the time that they take, and what it injects as its lines begin.
 
 use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
-use endowire_core::{Error, Result};
+use endowire_core::Result;
 
 use crate::hand::Motion;
+use crate::history::Done;
 use crate::{TICKS_PER_S, USUAL_DEG_PER_S, USUAL_MM_PER_S};
 
 /// Least time of a step, s: a tick carries out no more than so many.
@@ -33,11 +34,9 @@ pub(crate) enum Next {
     Later,
     /// The script is at its end.
     End,
-    /// A step; without motions hands rest.
+    /// A step.
     Step {
-        motions: Vec<Motion>,
-        /// So many of them take a second.
-        per_s: f64,
+        step: Done,
         /// Whether it is the first of its line.
         begins: bool,
     },
@@ -59,10 +58,6 @@ impl Demonstration {
     /// As [`ScriptRun::next`].
     pub(crate) fn next(&mut self, simulation: &Simulation) -> Result<Next> {
         let Some(step) = self.run.next(simulation)? else { return Ok(Next::End) };
-        if step.detach.is_some() {
-            let mend = "hands cannot leave a coil behind yet: carry the script out with `endowire run`";
-            return Err(Error::parameter("script.detach", true, mend));
-        }
         let took_s = if step.time_s.is_some() { step.duration_s } else { usual_s(&step.moves) }.max(LEAST_S);
         let end_s = self.done_s + took_s;
         if end_s * TICKS_PER_S > self.ticks as f64 + EARLY {
@@ -70,12 +65,12 @@ impl Demonstration {
         }
         let motions =
             step.moves.iter().map(shown).filter(|one| one.advance_mm != 0.0 || one.rotate_deg != 0.0);
-        let motions = motions.collect();
+        let step = Done { motions: motions.collect(), per_s: 1.0 / took_s, detach: step.detach };
         self.run.carried_out();
         self.done_s = end_s;
         let lines = self.run.course().motions.len();
         let begins = std::mem::replace(&mut self.lines, lines) != lines;
-        Ok(Next::Step { motions, per_s: 1.0 / took_s, begins })
+        Ok(Next::Step { step, begins })
     }
 
     /// What is injected now: by lines that have begun since this was asked last.

@@ -36,14 +36,19 @@ pub(crate) struct Done {
     pub(crate) motions: Vec<Motion>,
     /// How many such steps a second has.
     pub(crate) per_s: f64,
+    /// The instrument that leaves its coil behind in this step, in which nothing else moves.
+    pub(crate) detach: Option<usize>,
 }
 
 impl Done {
     /// Carries the step out; where the vessel moves, time goes by as it does in the script's line.
     ///
     /// # Errors
-    /// As [`Simulation::step_until`].
+    /// As [`Simulation::step_until`] and [`Simulation::detach`].
     pub(crate) fn carry_out<'a>(&self, simulation: &'a mut Simulation) -> Result<&'a StepReport> {
+        if let Some(instrument) = self.detach {
+            return simulation.detach(instrument);
+        }
         let moves: Vec<Move> = self.motions.iter().map(|motion| motion.as_move()).collect();
         let until_s = moves_by_itself(simulation).then(|| simulation.time_s() + script::step_s(self, 1));
         simulation.step_until(&moves, until_s)
@@ -207,8 +212,8 @@ mod tests {
         let mut went = vec![history.went()];
         for k in 0..150 {
             let advance_mm = if k % 5 == 4 { -0.3 } else { 0.7 };
-            let step =
-                Done { motions: vec![Motion { instrument: 0, advance_mm, rotate_deg: 0.0 }], per_s: 60.0 };
+            let motions = vec![Motion { instrument: 0, advance_mm, rotate_deg: 0.0 }];
+            let step = Done { motions, per_s: 60.0, detach: None };
             step.carry_out(&mut simulation).unwrap();
             history.push(step, &simulation);
             tips.push(simulation.shape().tip_mm());

@@ -52,6 +52,11 @@ pub enum Input {
         /// Rate, ml/s.
         ml_per_s: f64,
     },
+    /// Leaves the coil of an instrument behind, where it comes to rest, and takes its pusher out.
+    Detach {
+        /// Name of the instrument.
+        instrument: Option<String>,
+    },
     /// Brings the C-arm to these angles.
     CArm {
         /// As they are said: "LAO 40 CRA 10".

@@ -17,6 +17,7 @@ pub const KEYS: &[(&str, &str)] = &[
     ("Space, C, V, B (hold)", "fluoroscopy, cine, DSA, roadmap"),
     ("Enter", "fluoroscopy on or off without holding"),
     ("I, Shift I", "inject 5 ml, 20 ml of contrast medium"),
+    ("D", "detach the coil of the instrument in the hand"),
     ("J L, O K", "C-arm RAO LAO, cranial caudal, by 5°"),
     ("drag the live picture", "move the table"),
     ("+ -, wheel", "magnify"),
@@ -148,6 +149,7 @@ impl Keys {
                 let ml = if self.shift() { 20.0 } else { 5.0 };
                 vec![Input::Inject { ml, ml_per_s: ml }]
             }
+            "KeyD" if press => vec![Input::Detach { instrument: None }],
             "KeyJ" if down => vec![Input::TurnCArm { lao_deg: -5.0, cra_deg: 0.0 }],
             "KeyL" if down => vec![Input::TurnCArm { lao_deg: 5.0, cra_deg: 0.0 }],
             "KeyO" if down => vec![Input::TurnCArm { lao_deg: 0.0, cra_deg: 5.0 }],

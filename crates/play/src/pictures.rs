@@ -188,6 +188,7 @@ impl Pictures {
         let revision = snapshot.lab.revisions()[0];
         let specs = snapshot.lab.fluoro().planes();
         self.planes.resize_with(specs.len(), Plane::default);
+        self.pushed.leave(&snapshot.coils)?;
         let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
         let mut images = Vec::with_capacity(specs.len());
         for (plane, spec) in self.planes.iter_mut().zip(specs) {
@@ -213,6 +214,7 @@ impl Pictures {
     /// As [`Renderer::new`] and [`Renderer::render_at`].
     pub fn three_d(&mut self, snapshot: &Snapshot) -> Result<Image> {
         let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
+        self.pushed.leave(&snapshot.coils)?;
         let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
         let renderer = made(&mut self.three_d, None, room, &self.wall)?;
         renderer.move_vessel(snapshot.displacement.as_ref())?;

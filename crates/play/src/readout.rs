@@ -48,6 +48,8 @@ pub enum EventKind {
     Left,
     /// A force or torque of a hand is beyond its limit.
     Limit,
+    /// A coil was left behind.
+    Detached,
     /// The script that is shown is at its end, or a hand has taken over.
     Script,
     /// The subject has ended: its goal is reached, or one of its limits is passed.

@@ -45,12 +45,15 @@ impl Lines<'_> {
 
     /// Whether a line of `count` such steps is cut into them to the bit.
     fn cuts_evenly(self, step: &Done, count: usize) -> bool {
+        if step.detach.is_some() {
+            return count == 1;
+        }
         moves_evenly(&step.motions, count) && !(self.timed && step_s(step, count) != step_s(step, 1))
     }
 }
 
 /// How long each step of a line of `count` such steps takes, s, as `Motion::steps` of scripts has it to the bit.
-pub(crate) fn step_s(Done { motions, per_s }: &Done, count: usize) -> f64 {
+pub(crate) fn step_s(Done { motions, per_s, .. }: &Done, count: usize) -> f64 {
     let many = count as f64;
     let each = motions.iter().map(|one| {
         let (mm, deg) = (one.advance_mm.abs(), (one.rotate_deg * many).to_radians().to_degrees().abs());
@@ -76,7 +79,14 @@ fn moves_evenly(motions: &[Motion], count: usize) -> bool {
 }
 
 /// Writes a line of a script.
-fn line(text: &mut String, stack: &Stack, Done { motions, per_s }: &Done, count: usize) {
+fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach }: &Done, count: usize) {
+    if let Some(instrument) = detach {
+        let name = &stack.instruments()[*instrument].name;
+        let key = if stack.is_several() { format!("instrument = {name:?}\n") } else { String::new() };
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "[[script]]\n{key}detach = true\n");
+        return;
+    }
     let keys = |one: &Motion| {
         let mut keys = Vec::new();
         if stack.is_several() {
@@ -101,7 +111,6 @@ fn line(text: &mut String, stack: &Stack, Done { motions, per_s }: &Done, count:
         return;
     };
     let with: Vec<String> = others.iter().map(|one| format!("{{ {} }}", keys(one).join(", "))).collect();
-    // Writing into a string cannot fail.
     let _ = writeln!(text, "[[script]]\n{}", keys(first).join("\n"));
     if !with.is_empty() {
         let _ = writeln!(text, "with = [{}]", with.join(", "));

@@ -3,7 +3,7 @@
 mod exam;
 
 use endowire_assess::Exam;
-use endowire_core::insertion::{InstrumentReport, Script, Simulation};
+use endowire_core::insertion::{DetachedCoil, InstrumentReport, Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, NoStore};
 use endowire_core::{Error, PhysicalEnd, Result, Vec3};
@@ -20,6 +20,15 @@ use crate::telemetry::Telemetry;
 
 /// Events that are kept.
 const MOST_EVENTS: usize = 1000;
+
+/// The kind of event that an error is.
+fn kind_of(error: &Error) -> EventKind {
+    match error {
+        Error::End(PhysicalEnd::Left { .. }) => EventKind::Left,
+        error if error.is_input() => EventKind::Refused,
+        _ => EventKind::Blocked,
+    }
+}
 
 /// A session of instruments moved by hand.
 pub struct Session {
@@ -55,6 +64,8 @@ pub struct Snapshot {
     pub contacts: Vec<ContactView>,
     /// Where the vessel is; none where it never moves.
     pub displacement: Option<Displacement>,
+    /// Coils that were left behind.
+    pub coils: Vec<DetachedCoil>,
     /// The room.
     pub lab: Lab,
     /// Number and time of the frame.
@@ -123,7 +134,7 @@ impl Session {
     pub fn apply(&mut self, input: &Input) -> Result<()> {
         let done = self.carry_out(input);
         if let Err(error) = &done {
-            self.happened(EventKind::Refused, error.to_string());
+            self.happened(kind_of(error), error.to_string());
         }
         done
     }
@@ -150,6 +161,7 @@ impl Session {
             Input::Script {} => self.demonstrate()?,
             Input::Pedal { down, mode } => self.lab.pedal(*down, *mode)?,
             Input::Inject { ml, ml_per_s } => self.inject(self.injects_through(), *ml, *ml_per_s)?,
+            Input::Detach { instrument } => self.detach(self.index(instrument.as_deref())?)?,
             Input::CArm { pose } => self.lab.pose(*pose)?,
             Input::TurnCArm { lao_deg, cra_deg } => self.lab.turn_c_arm([*lao_deg, *cra_deg])?,
             Input::Table { right_mm, down_mm, second } => {
@@ -195,6 +207,13 @@ impl Session {
         self.stop();
         self.demonstration = Some(Demonstration::new(script));
         Ok(())
+    }
+
+    /// Leaves the coil of an instrument behind: a motion of its own.
+    fn detach(&mut self, instrument: usize) -> Result<()> {
+        self.take_over();
+        self.stop();
+        self.advance(Done { motions: vec![], per_s: TICKS_PER_S, detach: Some(instrument) }, true)
     }
 
     /// A hand moves: what was shown is at its end.
@@ -256,16 +275,14 @@ impl Session {
             }
         }
         if !motions.is_empty() {
-            if !self.moving {
-                self.history.begin_motion();
-            }
-            let done = self.step(motions.clone(), TICKS_PER_S);
+            let step = Done { motions: motions.clone(), per_s: TICKS_PER_S, detach: None };
+            let done = self.step(step, !self.moving);
             self.note(if done { &motions } else { &[] });
             self.moving = true;
             return;
         }
         if self.demonstration.is_none() && !self.holds_still && moves_by_itself(&self.simulation) {
-            self.step(vec![], TICKS_PER_S);
+            self.step(Done { motions: vec![], per_s: TICKS_PER_S, detach: None }, false);
         }
         self.moving = false;
         self.note(&[]);
@@ -301,12 +318,10 @@ impl Session {
                     self.happened(EventKind::Script, "the script is at its end".to_owned());
                     return None;
                 }
-                Ok(Next::Step { motions, per_s, begins }) => {
-                    if begins {
-                        self.history.begin_motion();
-                    }
-                    let rests = motions.is_empty() && !moves_by_itself(&self.simulation);
-                    if !rests && !self.step(motions.clone(), per_s) {
+                Ok(Next::Step { step, begins }) => {
+                    let moves = !step.motions.is_empty() || step.detach.is_some();
+                    let motions = step.motions.clone();
+                    if (moves || moves_by_itself(&self.simulation)) && !self.step(step, begins) {
                         return None;
                     }
                     motions.into_iter().for_each(|motion| motion.add_to(done));
@@ -319,37 +334,42 @@ impl Session {
         }
     }
 
-    /// Carries out a step, so many of which a second has; whether it was possible.
-    fn step(&mut self, motions: Vec<Motion>, per_s: f64) -> bool {
-        let before = self.simulation.report();
-        let (was_out, warned) = (before.left_through, self.warns());
-        let step = Done { motions, per_s };
-        match step.carry_out(&mut self.simulation) {
-            Ok(report) => {
-                let (jumped, out) = (report.jumped, report.left_through);
-                self.holds_still = false;
-                self.history.push(step, &self.simulation);
-                if jumped {
-                    self.happened(EventKind::Jumped, "jumped: it let go of energy".to_owned());
-                }
-                if let (Some(opening), None) = (out, was_out) {
-                    self.happened(EventKind::Left, format!("the tip has left through opening {opening}"));
-                }
-                if self.warns() && !warned {
-                    self.happened(EventKind::Limit, "force or torque is beyond its limit".to_owned());
-                }
-                true
-            }
+    /// Carries out a step; whether it was possible.
+    fn step(&mut self, step: Done, begins: bool) -> bool {
+        match self.advance(step, begins) {
+            Ok(()) => true,
             Err(error) => {
-                let kind = match &error {
-                    Error::End(PhysicalEnd::Left { .. }) => EventKind::Left,
-                    error if error.is_input() => EventKind::Refused,
-                    _ => EventKind::Blocked,
-                };
-                self.happened(kind, error.to_string());
+                self.happened(kind_of(&error), error.to_string());
                 false
             }
         }
+    }
+
+    /// Carries out a step, with which a motion `begins` or goes on.
+    fn advance(&mut self, step: Done, begins: bool) -> Result<()> {
+        if begins {
+            self.history.begin_motion();
+        }
+        let (was_out, warned) = (self.simulation.report().left_through, self.warns());
+        let report = step.carry_out(&mut self.simulation)?;
+        let (jumped, out, detached) = (report.jumped, report.left_through, step.detach);
+        self.holds_still = false;
+        self.history.push(step, &self.simulation);
+        if jumped {
+            self.happened(EventKind::Jumped, "jumped: it let go of energy".to_owned());
+        }
+        if let Some(instrument) = detached {
+            let name = &self.simulation.stack().instruments()[instrument].name;
+            let text = format!("the coil of {name:?} is detached: it stays, and its pusher is out");
+            self.happened(EventKind::Detached, text);
+        }
+        if let (Some(opening), None) = (out, was_out) {
+            self.happened(EventKind::Left, format!("the tip has left through opening {opening}"));
+        }
+        if self.warns() && !warned {
+            self.happened(EventKind::Limit, "force or torque is beyond its limit".to_owned());
+        }
+        Ok(())
     }
 
     /// Notes an event; one that goes on is noted once.
@@ -419,6 +439,7 @@ impl Session {
             inserted_mm: report.lengths_mm(),
             contacts: report.contacts.iter().map(contact).collect(),
             displacement: self.simulation.displacement(),
+            coils: self.simulation.coils().to_vec(),
             lab: self.lab.clone(),
             moment: FrameTime { frame, time_s: self.time_s() },
             readout: self.readout(),

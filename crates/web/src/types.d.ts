@@ -6,7 +6,7 @@ export type Input =
   | { do: "select"; instrument: string }
   | { do: "move"; instrument?: string; mm_per_s?: number; deg_per_s?: number }
   | { do: "nudge"; instrument?: string; mm?: number; deg?: number }
-  | { do: "stop" } | { do: "script" } | { do: "undo" } | { do: "redo" }
+  | { do: "stop" } | { do: "script" } | { do: "detach"; instrument?: string } | { do: "undo" } | { do: "redo" }
   | { do: "pedal"; down: boolean; mode?: "fluoro" | "cine" | "dsa" | "roadmap" }
   | { do: "inject"; ml: number; ml_per_s: number }
   | { do: "c_arm"; pose: string }
