@@ -95,6 +95,11 @@ impl Pushed {
         }
     }
 
+    /// Whether an instrument is a coil on its pusher: its file says so.
+    pub fn is_coil(&self, instrument: usize) -> bool {
+        self.kinds[instrument] == Some(Kind::Coil)
+    }
+
     /// What the file of an instrument calls a part that is drawn, by its number.
     pub fn part_name(&self, instrument: usize, part: usize) -> Option<&str> {
         self.part_names[instrument].get(part).map(String::as_str)

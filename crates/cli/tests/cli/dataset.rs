@@ -109,7 +109,7 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
     let ids: BTreeSet<u64> = annotations.iter().map(|row| row["id"].as_u64().unwrap()).collect();
     assert!(ids.len() == annotations.len() && !ids.contains(&0), "0 is no match for pycocotools");
     for category in categories {
-        let is_device = ["guidewire", "catheter"].contains(&category["name"].as_str().unwrap());
+        let is_device = ["guidewire", "catheter", "coil"].contains(&category["name"].as_str().unwrap());
         let tip = is_device.then(|| serde_json::json!(["tip"]));
         assert_eq!(category.get("keypoints"), tip.as_ref());
         assert_eq!(category.get("skeleton").is_some(), tip.is_some());
@@ -278,4 +278,53 @@ fn a_dataset_leaves_the_files_of_others() {
     std::fs::write(out.join("notes.txt"), "mine").unwrap();
     told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
     assert_eq!(files(&out)["notes.txt"], b"mine");
+}
+
+#[test]
+fn coils_are_labelled_on_their_pushers_and_where_they_were_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let part = |name: &str, mm: f64, more: &str| {
+        format!("[[part]]\nname = \"{name}\"\nlength_mm = {mm:?}\nouter_diameter_mm = 0.5\n{more}\n")
+    };
+    let winding = "winding = { wire_diameter_mm = 0.05, modulus_gpa = 170.0, poisson_ratio = 0.38 }\nmaterial = \"platinum\"";
+    let pusher = "bending_stiffness_nmm2 = 0.5\nmaterial = \"steel_316l\"";
+    let [coil, pusher] = [part("winding", 10.0, winding), part("pusher", 300.0, pusher)];
+    write("coil.toml", &format!("name = \"coil\"\nkind = \"coil\"\n{coil}{pusher}"));
+    write("tube.csv", "x_mm,y_mm,z_mm,radius_mm,parent\n0,0,0,4,-1\n0,0,40,4,0\n");
+    write(
+        "scene.toml",
+        r#"
+        name = "coils"
+        vessel.tree = "tube.csv"
+        sheath = { opening = 0, depth_mm = 2.0 }
+        method = { name = "kirchhoff", element_mm = 1.5, self_contact = true }
+        instrument = [{ name = "first", file = "coil.toml" }, { name = "second", file = "coil.toml" }]
+        script = [
+            { instrument = "first", advance_mm = 14.0, step_mm = 2.0 },
+            { instrument = "first", detach = true },
+            { instrument = "second", advance_mm = 14.0, step_mm = 2.0 },
+        ]
+        "#,
+    );
+    write(
+        "spec.toml",
+        "scenes = [\"scene.toml\"]\nposes = 1\nmoments = 2\n[vary]\nprogress = [1.0, 1.0]\n[view]\nsize_px = [256, 256]\nbackend = \"cpu\"\n",
+    );
+    let (spec, out) = (folder.path().join("spec.toml"), folder.path().join("out"));
+    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    let document = document(out.join("annotations.json"));
+    // The one that is in comes first, and then what was left behind, without a pusher.
+    assert_eq!(document["images"][0]["instruments"], serde_json::json!(["second", "first"]));
+    let of = |instrument: &str, key: &str, value: &Value| {
+        let rows = document["annotations"].as_array().unwrap().iter();
+        let mut rows = rows.filter(|row| row["instrument"] == instrument && row["image_id"] == 0);
+        rows.any(|row| row[key] == *value)
+    };
+    for instrument in ["first", "second"] {
+        assert!(of(instrument, "category_id", &5.into()), "{instrument}");
+        assert!(!of(instrument, "category_id", &2.into()), "{instrument}");
+        assert!(of(instrument, "part", &"winding".into()), "{instrument}");
+    }
+    assert!(of("second", "part", &"pusher".into()) && !of("first", "part", &"pusher".into()));
 }

@@ -24,15 +24,17 @@ const VESSEL: u32 = 1;
 const GUIDEWIRE: u32 = 2;
 const CATHETER: u32 = 3;
 const PART: u32 = 4;
+const COIL: u32 = 5;
 
-/// All categories: microwires are guidewires, and all that has a lumen is a catheter.
-pub(super) fn categories() -> [Category; 4] {
+/// All categories: microwires are guidewires, all that has a lumen is a catheter, and a coil is one on its pusher and without.
+pub(super) fn categories() -> [Category; 5] {
     let tip = Points { keypoints: ["tip"], skeleton: [] };
     [
         (VESSEL, "vessel", "anatomy", None),
         (GUIDEWIRE, "guidewire", "device", Some(tip.clone())),
-        (CATHETER, "catheter", "device", Some(tip)),
+        (CATHETER, "catheter", "device", Some(tip.clone())),
         (PART, "part", "device", None),
+        (COIL, "coil", "device", Some(tip)),
     ]
     .map(|(id, name, supercategory, points)| Category { id, name, supercategory, points })
 }
@@ -111,12 +113,12 @@ const MOST: usize = 1000;
 
 /// What is seen in a picture; things that no pixel shows are left out.
 ///
-/// `in_line` are the numbers and names of the instruments that the devices are.
+/// `drawn` are the numbers and names of the instruments that the devices are, or were before they were detached.
 pub(super) fn annotations(
     image: usize,
     labels: &Labels,
     pushed: &Pushed,
-    in_line: &[(usize, &str)],
+    drawn: &[(usize, &str)],
 ) -> Vec<Annotation> {
     let mut rows = Vec::new();
     let mut add = |category_id: u32, mask: &Mask, finish: &dyn Fn(&mut Annotation)| {
@@ -144,8 +146,14 @@ pub(super) fn annotations(
     if let Some(vessel) = &labels.vessel {
         add(VESSEL, vessel, &|_| {});
     }
-    for (device, &(instrument, name)) in labels.devices.iter().zip(in_line) {
-        let category = if pushed.is_wire(instrument) { GUIDEWIRE } else { CATHETER };
+    for (device, &(instrument, name)) in labels.devices.iter().zip(drawn) {
+        let category = if pushed.is_coil(instrument) {
+            COIL
+        } else if pushed.is_wire(instrument) {
+            GUIDEWIRE
+        } else {
+            CATHETER
+        };
         add(category, &device.mask, &|row| {
             row.instrument = Some(name.to_owned());
             let tip = keypoint(device, labels.size_px);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::Vec3;
-use endowire_core::insertion::{Step, Tally};
+use endowire_core::insertion::{DetachedCoil, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::Scene;
@@ -34,6 +34,8 @@ pub(super) struct FrameTime {
     pub(super) shape: Shape,
     pub(super) inserted_mm: Vec<f64>,
     pub(super) contacts: Vec<ContactView>,
+    /// Coils that were left behind.
+    pub(super) coils: Vec<DetachedCoil>,
     /// Where the vessel is, if it moves.
     pub(super) displacement: Option<Displacement>,
 }
@@ -83,15 +85,12 @@ impl Course {
                 shape: simulation.shape().clone(),
                 inserted_mm: report.lengths_mm(),
                 contacts: contacts.collect(),
+                coils: simulation.coils().to_vec(),
                 displacement: simulation.displacement(),
             });
             let step = run.next(&simulation)?.map(Step::into_owned);
             injected.extend(Injected::begun(&run, injected.len(), view.frames_per_s, &simulation));
             let Some(next) = step else { break };
-            if next.detach.is_some() {
-                let text = "its script leaves a coil behind, which pictures for learning do not label yet: leave script.detach out";
-                return Err(Failure::Input(format!("{}: {text}", file.display())));
-            }
             if let Err(error) = next.carry_out(&mut simulation) {
                 let step = moments.len();
                 tell(format_args!(

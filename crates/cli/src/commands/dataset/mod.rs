@@ -33,7 +33,7 @@ use spec::Spec;
 struct Document {
     info: Info,
     images: Vec<ImageRow>,
-    categories: [Category; 4],
+    categories: [Category; 5],
     annotations: Vec<Annotation>,
 }
 

@@ -50,6 +50,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         renderers.push(course.renderer.beside(view)?);
     }
     let mut part = Part { images: vec![], annotations: vec![] };
+    let mut pushed = course.pushed.clone();
     for m in 0..spec.moments {
         let of = draw.of(m);
         let last = course.moments.len() - 1;
@@ -57,11 +58,12 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let moment = &course.moments[(progress * last as f64).round() as usize];
         let time_s = moment.time_s + of.within(What::Time, spec.vary.time_s);
         let way = course.way_of_tip(moment);
-        let devices = course.pushed.views(&moment.shape, &moment.inserted_mm);
-        let all = course.instruments.iter().zip(&moment.inserted_mm).enumerate();
-        let in_line: Vec<(usize, &str)> =
-            all.filter(|(_, one)| *one.1 > 0.0).map(|(i, one)| (i, one.0.as_str())).collect();
-        let names: Vec<String> = in_line.iter().map(|one| one.1.to_owned()).collect();
+        pushed.leave(&moment.coils)?;
+        let devices = pushed.views(&moment.shape, &moment.inserted_mm);
+        let in_line = moment.inserted_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0).map(|(i, _)| i);
+        let drawn = in_line.chain(moment.coils.iter().map(|coil| coil.instrument));
+        let drawn: Vec<(usize, &str)> = drawn.map(|i| (i, course.instruments[i].as_str())).collect();
+        let names: Vec<String> = drawn.iter().map(|one| one.1.to_owned()).collect();
         let contacts: Vec<Vec3> = moment.contacts.iter().map(|c| c.position_mm).collect();
         for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
             let id = (shot * spec.moments + m) * spec.views() + plane;
@@ -74,7 +76,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
             image.write_png(folder.join(&file_name))?;
             let path = folder.join(&arrays);
             write_arrays(&path, &label_arrays(&labels)).map_err(|e| Failure::write(&path, &e))?;
-            part.annotations.extend(annotations(id, &labels, &course.pushed, &in_line));
+            part.annotations.extend(annotations(id, &labels, &pushed, &drawn));
             let angles = view.c_arm.angles_deg();
             part.images.push(ImageRow {
                 id,
