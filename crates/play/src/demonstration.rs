@@ -1,7 +1,7 @@
 //! A script that is shown: its steps in the time that they take, and what it injects as its lines begin.
 
-use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
 use endowire_core::Result;
+use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
 
 use crate::hand::Motion;
 use crate::history::Done;

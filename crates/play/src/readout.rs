@@ -1,7 +1,7 @@
 //! What the operator reads.
 
 use endowire_assess::Standing;
-use endowire_core::insertion::StepReport;
+use endowire_core::insertion::{Packing, StepReport};
 use endowire_viewer::Mode;
 use serde::Serialize;
 
@@ -50,6 +50,8 @@ pub enum EventKind {
     Limit,
     /// A coil was left behind.
     Detached,
+    /// Loops of coils have come out of the neck of the sac that they fill.
+    Herniated,
     /// The script that is shown is at its end, or a hand has taken over.
     Script,
     /// The subject has ended: its goal is reached, or one of its limits is passed.
@@ -146,6 +148,9 @@ pub struct Readout {
     pub wall_force_n: f64,
     /// The room.
     pub lab: LabReadout,
+    /// What coils fill of the scene's sac, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub packing: Option<Packing>,
     /// How the subject stands, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<Standing>,

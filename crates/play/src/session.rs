@@ -3,9 +3,9 @@
 mod exam;
 
 use endowire_assess::Exam;
-use endowire_core::insertion::{DetachedCoil, InstrumentReport, Script, Simulation};
+use endowire_core::insertion::{DetachedCoil, InstrumentReport, Packing, Script, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::vessel::{Displacement, NoStore};
+use endowire_core::vessel::{Displacement, NoStore, Sac};
 use endowire_core::{Error, PhysicalEnd, Result, Vec3};
 use endowire_viewer::{ContactView, FrameTime, ViewSpec};
 
@@ -49,6 +49,8 @@ pub struct Session {
     events: Vec<Event>,
     events_in_all: usize,
     telemetry: Telemetry,
+    /// The sac that coils fill, and what they do of it now.
+    sac: Option<(Sac, Option<Packing>)>,
     /// What is to be done, if it is a subject.
     exam: Option<Exam>,
 }
@@ -116,6 +118,7 @@ impl Session {
             events: Vec::new(),
             events_in_all: 0,
             telemetry: Telemetry::default(),
+            sac: None,
             exam: None,
         })
     }
@@ -125,6 +128,22 @@ impl Session {
     pub fn with_script(mut self, script: Script) -> Self {
         self.script = Some(script);
         self
+    }
+
+    /// The same where coils fill a sac, of which readouts tell.
+    #[must_use]
+    pub fn with_sac(mut self, sac: Sac) -> Self {
+        self.sac = Some((sac, None));
+        self.pack();
+        self
+    }
+
+    /// Measures anew what coils fill. Whether loops have come out of the neck.
+    fn pack(&mut self) -> bool {
+        let Some((sac, packing)) = &mut self.sac else { return false };
+        let before = packing.is_some_and(|packing| packing.herniated);
+        *packing = Packing::of(&self.simulation, sac).ok();
+        !before && packing.is_some_and(|packing| packing.herniated)
     }
 
     /// Takes an input. What is refused is an event too, and changes nothing else.
@@ -231,6 +250,7 @@ impl Session {
         self.holds_still = true;
         let before = self.history.steps();
         self.history.go_to(step, &mut self.simulation)?;
+        self.pack();
         let again = self.history.inject_again(before, self.time_s());
         self.lab.flow_again(self.history.undone_injections().map(|one| &one.flow), again)
     }
@@ -363,6 +383,9 @@ impl Session {
             let text = format!("the coil of {name:?} is detached: it stays, and its pusher is out");
             self.happened(EventKind::Detached, text);
         }
+        if self.pack() {
+            self.happened(EventKind::Herniated, "loops have come out of the neck of the sac".to_owned());
+        }
         if let (Some(opening), None) = (out, was_out) {
             self.happened(EventKind::Left, format!("the tip has left through opening {opening}"));
         }
@@ -473,6 +496,7 @@ impl Session {
                 beam_s: self.lab.beam_s(),
                 dose_ugy: self.lab.dose_ugy(),
             },
+            packing: self.sac.as_ref().and_then(|(_, packing)| *packing),
             subject: self.standing(),
             event: self.events.last().cloned(),
             events: self.events_in_all,

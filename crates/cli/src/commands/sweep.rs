@@ -141,10 +141,11 @@ impl Recordings<'_> {
     fn recording(&self, run: &Run<'_>, simulation: &Simulation) -> Result<Recording, Failure> {
         let name = format!("{:06}", run.number());
         let (folder, scene_file) = (self.folder.join(&name), self.folder.join(name + ".toml"));
-        let recorder = Recorder::new(&folder, false, simulation.stack())?;
+        let mut recorder = Recorder::new(&folder, false, simulation.stack())?;
         let text = run.standalone()?;
         whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
         let scene = Scene::read(&scene_file)?;
+        scene.sac(simulation.lumen(), self.store)?.map_or(Ok(()), |sac| recorder.tell_of(sac))?;
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
         Ok(Recording {
             frames: FrameWriter::new(&scene_file, &scene, drawn, self.store)?,
@@ -188,6 +189,7 @@ impl endowire_sweep::Recorder for Recording {
             method: self.scene.method.name(),
             centreline_found: self.scene.finds_centreline(),
             outcome: outcome.clone(),
+            packing: self.recorder.packed(),
             step_time_s: self.steps.as_secs_f64(),
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),

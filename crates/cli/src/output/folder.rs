@@ -8,6 +8,7 @@ use super::coils::COILS;
 use super::film::FILMS;
 use super::injections::INJECTIONS;
 use super::instruments::INSTRUMENTS;
+use super::packing::PACKING;
 use super::{SUMMARY, arrays, tell, whole};
 use crate::failure::Failure;
 
@@ -117,7 +118,9 @@ fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
     let mut removed = vec![];
     // A film is ours in a recording alone, as frames are.
     let films = FILMS.iter().copied().filter(|_| recording);
-    for name in [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, arrays::PACKED].into_iter().chain(films) {
+    for name in
+        [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, PACKING, arrays::PACKED].into_iter().chain(films)
+    {
         let path = folder.join(name);
         // Not the end of a link: a link itself is replaced.
         if path.symlink_metadata().is_ok() {

@@ -1,7 +1,6 @@
 //! What each of several instruments does, step by step: instruments.csv, beside steps.csv.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,7 @@ use endowire_core::insertion::{Move, Simulation};
 use endowire_core::shape::Shape;
 use serde::{Deserialize, Serialize};
 
+use super::step_table::StepTable;
 use crate::failure::Failure;
 
 /// The table.
@@ -41,35 +41,20 @@ struct Row {
 
 /// Writes the table of a run; a device alone has none.
 pub(crate) struct InstrumentTable {
-    table: csv::Writer<File>,
+    table: StepTable,
 }
 
 impl InstrumentTable {
     /// The table of a recording in `folder` that begins.
     pub(crate) fn new(folder: &Path, stack: &Stack) -> io::Result<Option<Self>> {
-        if !stack.is_several() {
-            return Ok(None);
-        }
-        let table = csv::Writer::from_writer(File::create(folder.join(INSTRUMENTS))?);
-        Ok(Some(Self { table }))
+        let several = stack.is_several().then(|| StepTable::new(&folder.join(INSTRUMENTS)));
+        Ok(several.transpose()?.map(|table| Self { table }))
     }
 
     /// The table of a recording that goes on after step `steps`: rows of later ones are dropped.
     pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> io::Result<Option<Self>> {
-        let path = folder.join(INSTRUMENTS);
-        if !stack.is_several() || !path.exists() {
-            return Self::new(folder, stack);
-        }
-        let text = std::fs::read(&path)?;
-        let kept = text.split_inclusive(|byte| *byte == b'\n').enumerate().take_while(|(index, line)| {
-            let number = || std::str::from_utf8(line).ok()?.split(',').next()?.parse::<usize>().ok();
-            line.ends_with(b"\n") && (*index == 0 || number().is_some_and(|step| step <= steps))
-        });
-        let bytes: usize = kept.map(|(_, line)| line.len()).sum();
-        let file = OpenOptions::new().append(true).open(&path)?;
-        file.set_len(bytes as u64)?;
-        let table = csv::WriterBuilder::new().has_headers(bytes == 0).from_writer(file);
-        Ok(Some(Self { table }))
+        let several = stack.is_several().then(|| StepTable::go_on(&folder.join(INSTRUMENTS), steps));
+        Ok(several.transpose()?.map(|table| Self { table }))
     }
 
     /// Adds the rows of a step.
@@ -82,7 +67,7 @@ impl InstrumentTable {
             let tip = simulation.tip_of_mm(index);
             let outside = report.instruments[index + 1..].iter().map(|other| other.inserted_mm);
             let felt_mm = (told.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
-            self.table.serialize(Row {
+            self.table.push(Row {
                 step,
                 instrument: instrument.name.clone(),
                 advance_mm: command.advance_mm,
@@ -105,7 +90,7 @@ impl InstrumentTable {
 
     /// Waits until all rows are on the disk itself.
     pub(crate) fn sync(&self) -> io::Result<()> {
-        self.table.get_ref().sync_data()
+        self.table.sync()
     }
 }
 

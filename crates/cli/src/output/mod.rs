@@ -10,6 +10,7 @@ pub(crate) mod injections;
 pub(crate) mod instruments;
 pub(crate) mod manifest;
 pub(crate) mod npz;
+pub(crate) mod packing;
 pub(crate) mod progress;
 pub(crate) mod provenance;
 pub(crate) mod recorder;
@@ -17,6 +18,7 @@ pub(crate) mod recording;
 mod rows;
 pub(crate) mod saved;
 pub(crate) mod session;
+mod step_table;
 pub(crate) mod vtk;
 
 use std::fmt::Display;

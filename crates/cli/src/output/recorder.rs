@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use endowire_core::device::Stack;
 use endowire_core::insertion::{DetachedCoil, Move, Simulation};
+use endowire_core::vessel::Sac;
 use endowire_sweep::RunOutcome;
 use serde::Serialize;
 
@@ -16,6 +17,7 @@ use super::coils::{self, Left};
 use super::folder::{self, Claim};
 use super::frames::PlaneTold;
 use super::instruments::InstrumentTable;
+use super::packing::{Packed, PackingTable};
 use super::provenance::Provenance;
 use super::recording::Recording;
 use super::{SUMMARY, to_json, whole};
@@ -41,6 +43,9 @@ pub(crate) struct Summary {
     /// What it has come to.
     #[serde(flatten)]
     pub(crate) outcome: RunOutcome,
+    /// What coils have filled of the scene's sac, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) packing: Option<Packed>,
     /// Time of the simulation, s, without recording and frames.
     pub(crate) step_time_s: f64,
     /// Time of the whole run, s.
@@ -101,6 +106,7 @@ pub(crate) struct Recorder {
     folder: PathBuf,
     table: csv::Writer<File>,
     instruments: Option<InstrumentTable>,
+    packing: Option<PackingTable>,
     arrays: ShapeArrays,
     steps: usize,
     /// Coils that were left behind so far.
@@ -125,6 +131,7 @@ impl Recorder {
             folder: folder.to_path_buf(),
             table: csv::Writer::from_writer(table),
             instruments,
+            packing: None,
             arrays,
             steps: 0,
             left: Vec::new(),
@@ -187,6 +194,7 @@ impl Recorder {
             folder: folder.to_path_buf(),
             table,
             instruments,
+            packing: None,
             arrays,
             steps,
             left,
@@ -195,6 +203,12 @@ impl Recorder {
             _claim: claim,
         };
         Ok((recorder, recording))
+    }
+
+    /// Has it tell what coils fill of a sac, from the next step on.
+    pub(crate) fn tell_of(&mut self, sac: Sac) -> Result<(), Failure> {
+        self.packing = Some(PackingTable::go_on(&self.folder, sac, self.steps)?);
+        Ok(())
     }
 
     /// Adds one step, which ends at `time_s`; where that fails, the steps before it stay.
@@ -248,6 +262,9 @@ impl Recorder {
             if let Some(instruments) = &mut self.instruments {
                 instruments.push(row.step, moves, simulation)?;
             }
+            if let Some(packing) = &mut self.packing {
+                packing.push(row.step, simulation)?;
+            }
             self.table.serialize(row)?;
             self.table.flush()
         };
@@ -261,6 +278,11 @@ impl Recorder {
             coils::write(&self.folder, &self.left, simulation.stack())?;
         }
         Ok(())
+    }
+
+    /// What coils have filled of the scene's sac, if it has one.
+    pub(crate) fn packed(&self) -> Option<Packed> {
+        self.packing.as_ref().map(PackingTable::told)
     }
 
     /// Coils that lay there after a step.
@@ -283,7 +305,8 @@ impl Recorder {
     /// Waits until all steps are on the disk itself.
     pub(crate) fn sync(&self) -> Result<(), Failure> {
         let instruments = || self.instruments.as_ref().map_or(Ok(()), InstrumentTable::sync);
-        let synced = self.arrays.sync().and_then(|()| instruments());
+        let packing = || self.packing.as_ref().map_or(Ok(()), PackingTable::sync);
+        let synced = self.arrays.sync().and_then(|()| instruments()).and_then(|()| packing());
         let synced = synced.and_then(|()| self.table.get_ref().sync_data());
         synced.map_err(|e| Failure::write(&self.folder, &e))
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{endowire, said, scene_text};
+use crate::common::{endowire, said, scene_text, text, told};
 use serde_json::Value;
 
 /// The wire in the vertebral catheter, with small pictures of the end alone; each change replaces a piece of the text.
@@ -147,4 +147,56 @@ fn what_instruments_cannot_do_is_told_before_anything_moves() {
         assert!(said(&output).contains(told), "{told}: {}", said(&output));
         assert!(!out.exists(), "{told}");
     }
+}
+
+#[test]
+fn what_a_coil_fills_of_a_sac_is_told_step_by_step_and_by_a_run_that_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |line: &str, sac: &str| {
+        let text = scene_text(
+            "coil.toml",
+            &[
+                ("advance_mm = 60.0\nstep_mm = 0.5", line),
+                ("dome_mm = [2.0, 6.0, 36.0]", sac),
+                ("element_mm = 0.75", "element_mm = 1.0"),
+                ("views = [\"3d\", \"fluoro\"]", "views = []"),
+            ],
+        );
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text).unwrap();
+        file
+    };
+    let dome = "dome_mm = [2.0, 6.0, 36.0]";
+    let file = scene("advance_mm = 6.0\nstep_mm = 0.5", dome);
+    let (out, state) = (folder.path().join("out"), folder.path().join("state"));
+    let run = |more: &[&str]| {
+        let mut args = vec!["run", text(&file), "--out", text(&out), "--save-state", text(&state), "--json"];
+        args.extend(more);
+        told(&endowire().args(&args).output().unwrap())
+    };
+    let first = run(&[]);
+    let table = || -> Vec<Vec<f64>> {
+        let text = std::fs::read_to_string(out.join("packing.csv")).unwrap();
+        let number = |cell: &str| cell.parse().unwrap_or(f64::from(u8::from(cell == "true")));
+        text.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect()
+    };
+    assert_eq!(table().len(), 12);
+    let packing = &first["packing"];
+    let diameter_mm = 0.0125 * 25.4;
+    let inside_mm = 6.0 - packing["outside_mm"].as_f64().unwrap();
+    let expected = std::f64::consts::FRAC_PI_4 * diameter_mm * diameter_mm * inside_mm;
+    let density = packing["density"].as_f64().unwrap();
+    assert!((density * packing["sac_mm3"].as_f64().unwrap() / expected - 1.0).abs() < 1e-6, "{packing}");
+    assert_eq!(packing["herniated_steps"], 0);
+    assert!(table().windows(2).all(|pair| pair[0][2] < pair[1][2]));
+    // More of the same script, from where it was.
+    scene("advance_mm = 8.0\nstep_mm = 0.5", dome);
+    let second = run(&["--resume", text(&state)]);
+    assert_eq!(table().len(), 16);
+    assert!(second["packing"]["density"].as_f64().unwrap() > density);
+    // A place that is not in the vessel, by its key.
+    scene("advance_mm = 6.0\nstep_mm = 0.5", "dome_mm = [90.0, 6.0, 36.0]");
+    let refused = endowire().args(["run", text(&file), "--out", text(&out)]).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("vessel.sac.dome_mm = "), "{}", said(&refused));
 }

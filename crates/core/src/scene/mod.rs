@@ -54,8 +54,10 @@ mod centreline;
 #[cfg(test)]
 mod memory_tests;
 mod method_table;
+mod sac;
 mod spec;
 mod tables;
 
+pub use sac::SacSpec;
 pub use spec::{Scene, SceneOf};
 pub use tables::{DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};

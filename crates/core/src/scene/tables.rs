@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
+use super::sac::SacSpec;
 use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
@@ -36,6 +37,8 @@ pub struct VesselSpec {
     pub motion: Vec<MotionMode>,
     /// What flows through its centre line and drags at devices; nothing if absent.
     pub flow: Option<VesselFlow>,
+    /// The sac that coils fill; none if absent.
+    pub sac: Option<SacSpec>,
 }
 
 impl VesselSpec {

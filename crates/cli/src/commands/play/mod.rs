@@ -134,7 +134,12 @@ pub(crate) fn open(
     let script = scene.steps(simulation.stack(), cache).map_err(in_scene)?;
     scenes::let_medium_flow(&mut view, scene, cache).map_err(in_scene)?;
     scenes::tell_found_centreline(path, scene);
+    let sac = scene.sac(simulation.lumen(), cache).map_err(in_scene)?;
     let session = Session::new(simulation, view, side_px, limits).map_err(in_scene)?;
+    let session = match sac {
+        Some(sac) => session.with_sac(sac),
+        None => session,
+    };
     Ok((session, script))
 }
 

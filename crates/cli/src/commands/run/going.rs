@@ -45,6 +45,7 @@ impl SoFar<'_> {
             method: self.scene.method.name(),
             centreline_found: self.scene.finds_centreline(),
             outcome: RunOutcome::new(&self.simulation, &self.hand, steps, tally, failure),
+            packing: recorder.packed(),
             step_time_s,
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),

@@ -42,6 +42,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             tell(format_args!("{}: {hint}", args.scene.display()));
         }
     }
+    let sac = scene.sac(simulation.lumen(), &cache).map_err(in_scene)?;
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation), &cache)?;
     if !args.quiet {
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let provenance = Provenance::of_scene(&scene, &args.set.set)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let course = saved.map_or_else(Course::begin, |saved| saved.course());
-    let recorder = if resume.is_some() {
+    let mut recorder = if resume.is_some() {
         let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
         let times = (times_s.as_slice(), next.is_none());
         let seen = (earlier.as_ref(), course.injected.as_slice());
@@ -74,6 +75,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
         recorder
     };
+    sac.map_or(Ok(()), |sac| recorder.tell_of(sac))?;
 
     // From here on something is recorded: whatever happens, it is kept.
     let so_far = SoFar {

@@ -110,6 +110,7 @@ fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
         "  steps          {}",
         remarks.unwrap_or_else(|| "all in equilibrium, no jump".to_owned())
     ));
+    lines.extend(summary.packing.map(|packed| format!("  sac            {}", packed.text())));
     if let Some(opening) = outcome.left_through {
         lines.push(format!("  left           the tip is out of opening {opening}"));
     }

@@ -142,7 +142,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         instrument(writer, canvas, one, y, chosen);
     }
     let lab = &readout.lab;
-    let beam = format!(
+    let mut beam = format!(
         "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {} (most {:.3} N)",
         (lab.beam_s / 60.0).floor(),
         lab.beam_s % 60.0,
@@ -150,6 +150,10 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         readout.contacts,
         readout.wall_force_n
     );
+    if let Some(packing) = &readout.packing {
+        let (full, out_mm) = (100.0 * packing.density, packing.outside_mm);
+        beam += &format!("   sac {full:.1} % full, {out_mm:.1} mm of coils outside");
+    }
     let y = top + 28 + 26 * readout.instruments.len() + 8;
     writer.write(canvas, [12, y], 15, TEXT, &beam);
     let frame = |ms: f64| format!("   {:.1} ms a step   {ms:.1} ms a frame", shown.moment.step_ms);

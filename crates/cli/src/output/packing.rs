@@ -1,0 +1,127 @@
+//! What coils fill of the scene's sac, step by step: packing.csv, beside steps.csv.
+
+use std::io;
+use std::path::Path;
+
+use endowire_core::insertion::{Packing, Simulation};
+use endowire_core::vessel::Sac;
+use serde::{Deserialize, Serialize};
+
+use super::rows;
+use super::step_table::StepTable;
+use crate::failure::Failure;
+
+/// The table.
+pub(crate) const PACKING: &str = "packing.csv";
+
+/// One line of it.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Row {
+    step: usize,
+    coils_mm3: f64,
+    packing: f64,
+    neck_coverage: f64,
+    outside_mm: f64,
+    herniated: bool,
+    dome_force_n: f64,
+}
+
+/// What the summary tells of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Packed {
+    /// Volume of the sac, mm³, and diameter of its neck, mm.
+    pub(crate) sac_mm3: f64,
+    pub(crate) neck_diameter_mm: f64,
+    /// At the end: volume of the coils over that of the sac, …
+    pub(crate) density: f64,
+    /// … the part of the neck that is behind coils, …
+    pub(crate) neck_coverage: f64,
+    /// … and length of coils outside the neck, mm.
+    pub(crate) outside_mm: f64,
+    /// Steps after which loops had herniated, and the first of them.
+    pub(crate) herniated_steps: usize,
+    pub(crate) first_herniated_step: Option<usize>,
+}
+
+/// Writes the table of a run in a vessel with a sac.
+pub(crate) struct PackingTable {
+    table: StepTable,
+    sac: Sac,
+    told: Packed,
+}
+
+impl PackingTable {
+    /// The table of a recording that goes on after step `steps`, or begins: rows of later ones are dropped.
+    pub(crate) fn go_on(folder: &Path, sac: Sac, steps: usize) -> Result<Self, Failure> {
+        let path = folder.join(PACKING);
+        let table = StepTable::go_on(&path, steps).map_err(|e| Failure::write(&path, &e))?;
+        let mut told = Packed::none(&sac);
+        rows::read::<Row>(&path)?.iter().for_each(|row| told.add(row));
+        Ok(Self { table, told, sac })
+    }
+
+    /// Adds the row of a step.
+    pub(crate) fn push(&mut self, step: usize, simulation: &Simulation) -> io::Result<()> {
+        let packing = Packing::of(simulation, &self.sac).map_err(io::Error::other)?;
+        let row = Row {
+            step,
+            coils_mm3: packing.coils_mm3,
+            packing: packing.density,
+            neck_coverage: packing.neck_coverage,
+            outside_mm: packing.outside_mm,
+            herniated: packing.herniated,
+            dome_force_n: packing.dome_force_n,
+        };
+        self.told.add(&row);
+        self.table.push(row)?;
+        self.table.flush()
+    }
+
+    /// What the summary tells of it.
+    pub(crate) fn told(&self) -> Packed {
+        self.told
+    }
+
+    /// Waits until all rows are on the disk itself.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.table.sync()
+    }
+}
+
+impl Packed {
+    fn none(sac: &Sac) -> Self {
+        Self {
+            sac_mm3: sac.volume_mm3,
+            neck_diameter_mm: sac.neck_diameter_mm,
+            density: 0.0,
+            neck_coverage: 0.0,
+            outside_mm: 0.0,
+            herniated_steps: 0,
+            first_herniated_step: None,
+        }
+    }
+
+    fn add(&mut self, row: &Row) {
+        (self.density, self.neck_coverage, self.outside_mm) =
+            (row.packing, row.neck_coverage, row.outside_mm);
+        if row.herniated {
+            self.herniated_steps += 1;
+            self.first_herniated_step.get_or_insert(row.step);
+        }
+    }
+
+    /// In words.
+    pub(crate) fn text(&self) -> String {
+        let mut text = format!(
+            "{:.1} % of {:.1} mm³ filled, {:.0} % of the neck covered, {:.1} mm of coils outside",
+            100.0 * self.density,
+            self.sac_mm3,
+            100.0 * self.neck_coverage,
+            self.outside_mm
+        );
+        if let Some(first) = self.first_herniated_step {
+            text += &format!("; loops herniated in {} steps, the first step {first}", self.herniated_steps);
+        }
+        text
+    }
+}
