@@ -143,12 +143,12 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     }
     let lab = &readout.lab;
     let mut beam = format!(
-        "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {} (most {:.3} N)",
+        "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {} (most {})",
         (lab.beam_s / 60.0).floor(),
         lab.beam_s % 60.0,
         lab.dose_ugy,
         readout.contacts,
-        readout.wall_force_n
+        force(readout.wall_force_n)
     );
     if let Some(packing) = &readout.packing {
         let (full, out_mm) = (100.0 * packing.density, packing.outside_mm);
@@ -182,13 +182,22 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
     let length =
         format!("{mark} {:<12} {:>7.1} mm in  {:>8.0}°", one.name, one.inserted_mm, one.rotation_deg);
     let x = writer.write(canvas, [12, y], 16, colour, &length);
-    let push = one.push_force_n.map_or_else(|| "   --  ".to_owned(), |n| format!("{n:>7.3}"));
-    let force = format!("  push {push} N  torque {:>7.3} N·mm", one.torque_nmm);
+    let push = one.push_force_n.map_or_else(|| "--".to_owned(), force);
+    let force = format!("  push {push:>9}  torque {:>7.3} N·mm", one.torque_nmm);
     let colour = if one.warns { WARN } else { TEXT };
     let x = writer.write(canvas, [x, y], 16, colour, &force);
     if one.warns {
         writer.write(canvas, [x + 20, y], 16, WARN, "LIMIT");
     }
+}
+
+/// A force with its unit: those of microwires and coils are millinewtons.
+fn force(newtons: f64) -> String {
+    let (value, unit) = if newtons.abs() < 0.1 { (1000.0 * newtons, "mN") } else { (newtons, "N") };
+    let digits = if unit == "N" { 3 } else { 1 };
+    // Rounding leaves no minus before a zero.
+    let text = format!("{value:.digits$} {unit}");
+    if text.starts_with("-0.0 ") { text.trim_start_matches('-').to_owned() } else { text }
 }
 
 fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help]) {
