@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use endowire_core::{Error, Result};
 use endowire_tests::passages::{HEAD, Row};
 
-/// Seeds, unless told.
+/// Seeds, unless set.
 const SEEDS: [u64; 2] = [0, 100];
 /// Part of the questions in which both must agree.
 const AGREE: f64 = 0.95;

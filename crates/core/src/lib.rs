@@ -3,7 +3,7 @@
 //! Units everywhere: millimetre, newton, second, radian; energy in N·mm = mJ.
 //!
 //! A scene file becomes a [`scene::Scene`], that builds an [`insertion::Simulation`], which is stepped by
-//! [`insertion::Command`]s and always tells its [`shape::Shape`] and an [`insertion::StepReport`].
+//! [`insertion::Command`]s and always has its [`shape::Shape`] and an [`insertion::StepReport`].
 //!
 //! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
 //! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`].

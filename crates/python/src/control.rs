@@ -52,7 +52,7 @@ impl Controller {
         Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers)?, arrived_mm)))
     }
 
-    /// Tries turns of the instruments `turned` (that which leads, unless told) on copies of the simulation, pushes and pulls for 20 mm
+    /// Tries turns of the instruments `turned` (that which leads, unless set) on copies of the simulation, pushes and pulls for 20 mm
     /// after each, and does what brought the tip farthest along the way.
     ///
     /// Raises InputError for a path that is none.

@@ -121,7 +121,7 @@ impl Renderer {
     }
 
     /// Draws the views of a simulation as it is. `frame` is the number of the frame, which seeds its noise and tells its time; the next one
-    /// unless told.
+    /// unless set.
     ///
     /// Raises InputError for a negative frame, and for a simulation that cannot be drawn.
     #[pyo3(signature = (simulation, frame=None))]

@@ -1,4 +1,4 @@
-//! What a step tells.
+//! The report of a step.
 
 use endowire_core::insertion::{self, InstrumentReport};
 use numpy::{PyArray1, PyArray2};

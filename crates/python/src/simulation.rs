@@ -128,7 +128,7 @@ impl Simulation {
 impl Simulation {
     /// Instruments at the mouth of a sheath in a vessel, nothing inserted.
     ///
-    /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 unless told), or at `position_mm` with a `direction`; told
+    /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 unless set), or at `position_mm` with a `direction`; told
     /// nothing, at the inlet of the vessel's centre line, and of one without at the lowest of its wide openings. `wall` has the keys of `[vessel.wall]`
     /// of a scene file (modulus_n_per_mm2, friction, region), `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the
     /// friction of the sheath's valve, N, and `sheath_friction` the coefficient in its mouth.
@@ -202,7 +202,7 @@ impl Simulation {
     }
 
     /// As `step` in a tick of fixed cost, for haptics and screens that must have an answer in time: about so many linear solves
-    /// (`StepReport.solves`), whether the instruments come to rest in them or not. What is left over is told (`StepReport.behind`), and the next
+    /// (`StepReport.solves`), whether the instruments come to rest in them or not. What is left over is reported (`StepReport.behind`), and the next
     /// tick or step goes on with it; with hands at rest ticks lead to an equilibrium. Eight solves follow hands at 1 kHz.
     ///
     /// Raises what `step` raises, except where no equilibrium is found within the tick; what hands have done and the instruments have not is
@@ -252,7 +252,7 @@ impl Simulation {
         Ok(self.report(py))
     }
 
-    /// What the last step told.
+    /// the report of the last step.
     #[getter]
     pub(crate) fn report(&self, py: Python<'_>) -> StepReport {
         StepReport::new(self.with(py, |simulation| simulation.report().clone()))

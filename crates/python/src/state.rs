@@ -40,7 +40,7 @@ impl State {
         self.state.method()
     }
 
-    /// What the step that led to it told.
+    /// The report of the step that led to it.
     #[getter]
     fn report(&self) -> StepReport {
         StepReport::new(self.state.report().clone())

@@ -16,7 +16,7 @@ use crate::interrupt::{interruptible, stoppable};
 const PROGRAM: Program =
     Program { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION") };
 
-/// Does the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (the number of cores unless told), and writes
+/// Does the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (the number of cores unless set), and writes
 /// runs.parquet there when all have one, as `endowire sweep` does. `shard` is the part to do: "1/4" is the first of four.
 ///
 /// Returns a dictionary of `runs`, `earlier` (those that had a row before), `failed`, `unconverged` (those with steps that are no equilibria) and `table` (its path). Ctrl-C stops it; the same call goes on.

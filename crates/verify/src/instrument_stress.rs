@@ -269,7 +269,7 @@ impl InstrumentRow {
 
 /// A state as it is saved.
 pub fn bytes(simulation: &Simulation) -> Vec<u8> {
-    // Writing into memory does not fail; were it to, no two states would be told apart, which the tests would not miss.
+    // Writing into memory does not fail; were it to, no two states would be distinguished, which the tests would not miss.
     postcard::to_allocvec(&simulation.state()).unwrap_or_default()
 }
 

@@ -44,7 +44,7 @@ pub struct Seen<'a> {
 
 impl Pushed {
     /// Devices at even times of the pulse that ends `now`, as a renderer's next frame is to show them; `before` is what was recorded last. Empty where
-    /// nothing is to be told apart: without pulses (`xray.pulse_ms`), without a moment before, or where nothing moves.
+    /// nothing is to be distinguished: without pulses (`xray.pulse_ms`), without a moment before, or where nothing moves.
     pub fn pulse(
         &self,
         before: Option<Seen<'_>>,

@@ -1,6 +1,6 @@
 //! Matrices that couple neighbouring nodes alone, and their factorisations.
 //!
-//! [`matrix`] holds the symmetric block tridiagonal ones, [`ldlt`] factors them without pivoting and tells their inertia.
+//! [`matrix`] holds the symmetric block tridiagonal ones, [`ldlt`] factors them without pivoting and reports their inertia.
 
 /// Runs a block for every index below `$end` ≤ 12, each on its own: loops whose bounds hang on another index would not be unrolled,
 /// and their rows not kept in registers.

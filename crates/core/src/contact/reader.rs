@@ -31,7 +31,7 @@ impl WallReader {
 
     /// How near `x` is to the wall, with derivatives below `limit_mm`, and the piece of wall that is nearest to its surroundings.
     ///
-    /// Where the wall is farther than the limit, or the radius of the device, by more than half of that radius, no piece is told, and a
+    /// Where the wall is farther than the limit, or the radius of the device, by more than half of that radius, no piece is returned, and a
     /// distance that may be less than it is; past the end of the vessel that is infinite.
     pub fn read(&mut self, surface: &ContactSurface, x: &Vec3, limit_mm: f64) -> (Nearness, Option<u32>) {
         let near_mm = limit_mm.max(surface.thinnest_mm) + self.near_mm;

@@ -13,7 +13,7 @@ use crate::rod::MAX_ANGLES;
 use crate::vessel::{Lumen, NoStore, VesselMotion, WallStore};
 use crate::{Error, Result};
 
-/// A simulation to be built: vessel, device and sheath, and what else is told.
+/// A simulation to be built: vessel, device and sheath, and what else is given.
 pub struct SimulationBuilder<'a> {
     lumen: Lumen,
     stack: Stack,
@@ -35,35 +35,35 @@ impl<'a> SimulationBuilder<'a> {
         Self { lumen, stack, sheath, properties, motion: None, flow: None, method: None, store: &NoStore }
     }
 
-    /// How the wall yields and rubs; [`WallProperties::default`] unless told.
+    /// How the wall yields and rubs; [`WallProperties::default`] unless set.
     #[must_use]
     pub fn properties(mut self, properties: WallProperties) -> Self {
         self.properties = properties;
         self
     }
 
-    /// How the vessel moves; not at all unless told.
+    /// How the vessel moves; not at all unless set.
     #[must_use]
     pub fn motion(mut self, motion: Option<VesselMotion>) -> Self {
         self.motion = motion;
         self
     }
 
-    /// What flows through the vessel and drags at the device; nothing unless told.
+    /// What flows through the vessel and drags at the device; nothing unless set.
     #[must_use]
     pub fn flow(mut self, flow: Option<BloodFlow>) -> Self {
         self.flow = flow;
         self
     }
 
-    /// How equilibria are found; [`KirchhoffOptions::default`], the exact rod, unless told.
+    /// How equilibria are found; [`KirchhoffOptions::default`], the exact rod, unless set.
     #[must_use]
     pub fn method(mut self, method: &'a dyn MethodChoice) -> Self {
         self.method = Some(method);
         self
     }
 
-    /// Where walls that take long to make are kept; nowhere unless told.
+    /// Where walls that take long to make are kept; nowhere unless set.
     #[must_use]
     pub fn store(mut self, store: &'a dyn WallStore) -> Self {
         self.store = store;

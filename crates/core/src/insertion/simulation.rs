@@ -77,7 +77,7 @@ impl Simulation {
         self.step_until(moves, None)
     }
 
-    /// As [`Simulation::step_together`], while time goes on evenly until `time_s`, with the vessel if it moves; no time goes by where none is told.
+    /// As [`Simulation::step_together`], while time goes on evenly until `time_s`, with the vessel if it moves; no time goes by where none is given.
     ///
     /// # Errors
     /// As [`Simulation::step_together`], and a time before that of the last step or none at all.
@@ -98,7 +98,7 @@ impl Simulation {
     /// As [`Simulation::step_until`] in a tick of fixed cost: in about `solves` linear solves ([`StepReport::solves`]), whether the device comes to rest in them or not.
     /// For haptics and screens that must have an answer in time.
     ///
-    /// What is left over is told ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step goes on with it; with hands at rest ticks lead to
+    /// What is left over is reported ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step goes on with it; with hands at rest ticks lead to
     /// an equilibrium. No state lies beyond a wall: hands whose way is blocked in the tick wait. Where the vessel moves and so many solves do not do, the tick takes
     /// what a step takes. Methods other than `kirchhoff` step.
     ///

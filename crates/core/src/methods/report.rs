@@ -1,4 +1,4 @@
-//! What a step tells.
+//! The report of a step.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ impl Energy {
 }
 
 impl StepReport {
-    /// What a step tells in which the hand does nothing.
+    /// The report of a step in which the hand does nothing.
     pub(crate) fn rest(&mut self) {
         (self.iterations, self.solves, self.substeps) = (0, 0, 0);
         (self.dissipated_mj, self.jumped, self.jump) = (0.0, false, None);
@@ -153,7 +153,7 @@ pub struct StepReport {
     pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,
-    /// Energy that friction took in this step, mJ; in jumps it is not told apart ([`Jump`]).
+    /// Energy that friction took in this step, mJ; in jumps it is not separated ([`Jump`]).
     pub dissipated_mj: f64,
     /// Where the wall holds the device.
     pub contacts: Vec<Contact>,
@@ -177,7 +177,7 @@ pub struct StepReport {
     pub imbalance: f64,
     /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
     pub jumped: bool,
-    /// What was set free, and where; none where nothing was, or the method does not tell.
+    /// What was set free, and where; none where nothing was, or the method does not report it.
     pub jump: Option<Jump>,
     /// Whether the device carries material angles: only with a shape or friction.
     pub angles: bool,

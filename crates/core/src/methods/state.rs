@@ -61,7 +61,7 @@ pub(super) mod shared {
 pub struct ChainState {
     /// The centre line.
     pub shape: Shape,
-    /// What the last step told.
+    /// The report of the last step.
     pub report: StepReport,
     /// The plane that each node touches, **tip first**: so nodes keep their index.
     pub touched: Vec<Option<TouchedPlane>>,
@@ -93,7 +93,7 @@ pub struct NodesState {
     pub from_tip_mm: Vec<f64>,
     /// Turn of the clamp, rad.
     pub turn_rad: f64,
-    /// What the last step told.
+    /// The report of the last step.
     pub report: StepReport,
 }
 
@@ -118,7 +118,7 @@ impl State {
         &self.method
     }
 
-    /// What the step that led to it told.
+    /// The report of the step that led to it.
     pub fn report(&self) -> &StepReport {
         match &self.content {
             Content::Kirchhoff(state) => state.report(),

@@ -13,7 +13,7 @@ use crate::device::Device;
 use crate::vessel::CentrelinePath;
 use crate::{Error, Result, Vec3};
 
-/// Force along a device that is taken for none, N, unless told: some tenths of what a haemostatic valve holds it with (an assumption).
+/// Force along a device that is taken for none, N, unless set: some tenths of what a haemostatic valve holds it with (an assumption).
 pub const NO_FORCE_N: f64 = 0.1;
 /// A way is tight where there is less room than this part of the device's radius.
 const TIGHT: f64 = 0.1;

@@ -10,7 +10,7 @@
 //!
 //!   [K + γCᵀC, Cᵀ; C, −D/(1 − γD)](dq, m) = −(r + γCᵀc, c)
 //!
-//! with the same dq: an augmentation of the linear algebra, not of the mechanics. Its inertia tells minima from saddle
+//! with the same dq: an augmentation of the linear algebra, not of the mechanics. Its inertia distinguishes minima from saddle
 //! points just as that of the first form does.
 
 use super::batch::MOST;

@@ -39,7 +39,7 @@ impl<'de, M: MethodChoice + Deserialize<'de> + Default> Visitor<'de> for Table<M
 /// A table, with a name at its end where it has none.
 struct Named<A> {
     table: A,
-    /// The name, until the table has told one.
+    /// The name, until the table has given one.
     missing: Option<&'static str>,
     /// Whether the table has come to its end.
     ended: bool,

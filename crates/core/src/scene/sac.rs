@@ -8,7 +8,7 @@ use crate::methods::MethodChoice;
 use crate::vessel::{Lumen, Sac, WallStore};
 use crate::{Error, Result, Vec3};
 
-/// `[vessel.sac]`: the sac of an aneurysm, of which is told what coils fill.
+/// `[vessel.sac]`: the sac of an aneurysm, whose filling by coils is reported.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SacSpec {

@@ -19,7 +19,7 @@ pub struct VesselSpec {
     pub file: Option<PathBuf>,
     /// Millimetres per unit of the surface file; 1 if absent.
     pub unit_mm: Option<f64>,
-    /// Axes of the surface file, in place of those that its header tells.
+    /// Axes of the surface file, in place of those given by its header.
     pub axes: Option<PatientAxes>,
     /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
     pub tree: Option<PathBuf>,
@@ -71,7 +71,7 @@ pub struct DeviceSpec {
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
-    /// What it is, where it is told by parts: as in a device file.
+    /// What it is, where it is given by parts: as in a device file.
     kind: Option<Kind>,
     length_mm: Option<f64>,
     length_cm: Option<f64>,
@@ -106,7 +106,7 @@ pub struct InstrumentSpec {
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
-    /// What it is, where it is told by parts: as in a device file.
+    /// What it is, where it is given by parts: as in a device file.
     kind: Option<Kind>,
     length_mm: Option<f64>,
     length_cm: Option<f64>,

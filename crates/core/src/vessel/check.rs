@@ -49,7 +49,7 @@ pub struct CheckReport {
     pub stray_edges: usize,
     /// The loops of open edges.
     pub openings: Vec<OpeningReport>,
-    /// The number of the opening that devices come in by unless told ([`Wall::inlet`]).
+    /// The number of the opening that devices come in by unless another is given ([`Wall::inlet`]).
     pub inlet: Option<usize>,
     /// Pairs of openings of like size that face each other within a radius: a vessel that is cut through there.
     pub facing_openings: Vec<[usize; 2]>,

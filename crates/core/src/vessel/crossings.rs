@@ -2,7 +2,7 @@
 //!
 //! Triangles are put in the order of a space-filling curve (Morton), and a binary tree of boxes stands over that order: building
 //! it is one sort, and neighbours lie side by side. Nearly all pairs whose boxes meet are neighbours of a smooth surface; simple
-//! tests in plain arithmetic, each with a margin far above its rounding, tell most of them apart before exact predicates decide.
+//! tests in plain arithmetic, each with a margin far above its rounding, distinguish most of them before exact predicates decide.
 
 use super::intersect::triangles_intersect;
 use super::{SurfaceMesh, sliver};

@@ -68,7 +68,7 @@ impl Lumen {
         }
     }
 
-    /// The opening that devices come in by unless told: that at the root of a centre line, of a surface as [`Wall::inlet`] says.
+    /// The opening that devices come in by unless another is given: that at the root of a centre line, of a surface as [`Wall::inlet`] says.
     pub fn inlet(&self) -> Option<&Opening> {
         match self {
             Self::Meshed(meshed) => meshed.wall.inlet(),

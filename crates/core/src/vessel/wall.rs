@@ -256,7 +256,7 @@ impl Wall {
         Ok(())
     }
 
-    /// The opening that devices come in by unless told: the lowest (least z: the nearest to the feet, in patient axes) of those that have
+    /// The opening that devices come in by unless another is given: the lowest (least z: the nearest to the feet, in patient axes) of those that have
     /// at least 0.4 of the widest one's radius, as from the groin. None where there is no opening. A vessel made from a tree begins at its
     /// root instead ([`GeneratedWall::inlet`](super::GeneratedWall::inlet)), and blood has a rule of its own
     /// ([`VesselFlow::inlet_mm`](crate::flow::VesselFlow::inlet_mm)): it comes from the heart.

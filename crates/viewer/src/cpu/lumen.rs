@@ -117,7 +117,7 @@ mod tests {
             let exact: Vec<u32> = edge.iter().copied().filter(|&i| eight[i as usize] >= 32).collect();
             let off = covered.iter().filter(|i| !exact.contains(i)).count()
                 + exact.iter().filter(|i| !covered.contains(i)).count();
-            // Rays that graze are told apart by rounding alone.
+            // Rays that graze are distinguished by rounding alone.
             assert!(edge.len() > 100 && off * 100 <= edge.len(), "{radius_mm}: {off} of {}", edge.len());
             // The twin: what two of four rays told.
             let rough = edge.iter().filter(|&&i| two[i as usize] >= 2).count();

@@ -18,7 +18,7 @@ const WINDOW_ABOVE: f32 = 0.4;
 const OUTLIERS: f64 = 0.01;
 /// The window is fitted to this part of the frame's width and height, around its middle.
 const FITTED: f64 = 0.8;
-/// Signals below this are told apart no more.
+/// Signals below this are distinguished no more.
 const DARKEST: f32 = 1e-6;
 
 /// Values shown white and black.

@@ -13,7 +13,7 @@ use super::{Image, Pace, PixelFormat};
 
 /// Of so many pixels one is looked at to choose 256 colours.
 const SAMPLED: i32 = 30;
-/// Bits of each colour by which pixels are told apart when the nearest of the 256 is looked for: once for each, not for each pixel.
+/// Bits of each colour by which pixels are distinguished when the nearest of the 256 is looked for: once for each, not for each pixel.
 const BITS: u32 = 6;
 
 /// Writes frames into one moving picture as they come.

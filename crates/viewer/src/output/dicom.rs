@@ -85,7 +85,7 @@ impl Angiogram<'_> {
         file.write_to_file(path).map_err(|e| failed(&e))
     }
 
-    /// A number of pixels, geometry and what else is told.
+    /// A number of pixels, geometry and what else is given.
     fn content(&self, frames: &[Image]) -> u128 {
         let opening = self.c_arm.opening_px().into_iter().flatten();
         let [current_ma, pulse_ms] = self.exposure.pulse.map_or([0.0; 2], |p| [p.current_ma, p.pulse_ms]);

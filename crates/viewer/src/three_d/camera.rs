@@ -9,7 +9,7 @@ use crate::spec::CameraSpec;
 const HALF_ANGLE_DEG: f64 = 14.0;
 /// Part of the frame that the vessel may fill.
 const FILL: f64 = 0.88;
-/// Where the camera looks from unless told: front, slightly from the left and above.
+/// Where the camera looks from unless set: front, slightly from the left and above.
 const AZIMUTH_DEG: f64 = 25.0;
 const ELEVATION_DEG: f64 = 18.0;
 /// A view that shows less than this part of the largest possible spread of the vessel is exchanged for one

@@ -1,4 +1,4 @@
-//! What pairs exert: on the system of a step, in the merit along it, and as it is told.
+//! What pairs exert: on the system of a step, in the merit along it, and in reports.
 
 use super::clear::{motions_mm, nodes};
 use super::curve::{Curve, Place};

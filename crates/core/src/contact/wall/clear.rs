@@ -111,7 +111,7 @@ impl WallContact<'_> {
         (x0.max(x1) + BULGE * length_mm * (t0 + t1)) * self.surface.stretch()
     }
 
-    /// The points of a span, unless none can touch the wall at a state; those that are told are known where they are at the base.
+    /// The points of a span, unless none can touch the wall at a state; those returned are known where they are at the base.
     pub(super) fn near(
         &mut self,
         span: usize,

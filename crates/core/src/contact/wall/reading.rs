@@ -1,7 +1,7 @@
 //! How near a point of a device stands to the wall, from what is known of its surroundings.
 //!
 //! Places here are material points of the vessel, which is not where the device is while the vessel is displaced ([`crate::contact::MovedWall`]).
-//! So are lengths between them, and clearances that are remembered; what a reading tells is a distance in space.
+//! So are lengths between them, and clearances that are remembered; a reading is a distance in space.
 //!
 //! On the way from a base what a point reads hangs on where it is alone, not on other steps that were tried: within half its radius of
 //! where the wall was looked for at the base, it is read about the piece of wall that was found there.
@@ -64,7 +64,7 @@ impl WallContact<'_> {
         if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY }
     }
 
-    /// The reading that was taken at `x` with that hint, if it tells enough.
+    /// The reading that was taken at `x` with that hint, if it says enough.
     pub(super) fn read_there(&self, index: usize, x: &Vec3, hint: Hint, limit_mm: f64) -> Option<Reading> {
         let TakenReading { at_mm, hint: taken, nearness } = self.cache.readings[index];
         let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;

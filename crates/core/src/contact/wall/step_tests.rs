@@ -93,7 +93,7 @@ fn a_rod_slides_around_a_hard_wall_in_few_steps() {
     assert!(few <= 12 && many > few, "{few} iterations, {many} without contacts foreseen");
 }
 
-/// Pushes the tip of a rod along the wall of a tube on which it rubs, and lets the push go; tells the iterations of both, and how far the tip
+/// Pushes the tip of a rod along the wall of a tube on which it rubs, and lets the push go; returns the iterations of both, and how far the tip
 /// went and came back, mm.
 fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
     let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);

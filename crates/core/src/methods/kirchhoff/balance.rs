@@ -76,7 +76,7 @@ impl Balance {
     }
 
     /// What friction took and what a jump set free. Without a jump friction took what was lost, as far as its forces reach. In one they are not
-    /// told apart: the normal forces on its way are not those at its ends.
+    /// distinguished: the normal forces on its way are not those at its ends.
     pub(super) fn lost_mj(&self, jumps: bool) -> (f64, f64) {
         let lost_mj = self.mean_mj - self.stored_mj;
         let (least_mj, most_mj) = self.rubbed_mj;

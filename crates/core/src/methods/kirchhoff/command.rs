@@ -189,7 +189,7 @@ impl<const C: usize> Workspace<C> {
                 // From the same place the same comes of it.
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
-                    // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
+                    // No equilibrium: if the vessel is too narrow to go on, the error says so, here and below.
                     if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
                         refuse_narrow(&at_start, was, &way.commands)?;
                         return Err(Error::Computation(format!(

@@ -89,7 +89,7 @@ fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usi
     }
     let share = (from_sheath_mm - place(*known)) / (place(*known + 1) - place(*known));
     let at = |i: usize| inner_friction[most * i + inner].pressure_n_per_mm;
-    // In the sheath's mouth nothing is told.
+    // In the sheath's mouth nothing is reported.
     let near = if *known == 0 { at(1) } else { at(*known) };
     near + (at(*known + 1) - near) * share.clamp(0.0, 1.0)
 }

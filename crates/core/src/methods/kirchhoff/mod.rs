@@ -118,7 +118,7 @@ fn several(
     })
 }
 
-/// A residual above this tells nothing of an equilibrium.
+/// A residual above this says nothing about an equilibrium.
 const LARGEST_TOLERANCE: f64 = 1e-2;
 /// Contact points farther apart than this leave most of a device unfelt.
 const LARGEST_CONTACT_SPACING_RADII: f64 = 10.0;

@@ -1,4 +1,4 @@
-//! What a step tells: energies, contacts, and what the hand feels.
+//! The report of a step: energies, contacts, and what the hand feels.
 
 use super::Environment;
 use super::configuration::Configuration;

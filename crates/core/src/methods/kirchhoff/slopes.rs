@@ -104,7 +104,7 @@ fn push_force<const C: usize>(
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
-    // Where a point that presses comes or goes on one side, the other tells.
+    // Where a point that presses comes or goes on one side, the other side's is taken.
     let wall = match (on.wall_slope(acting.wall, at, step), back.wall_slope(acting.wall, at, -step)) {
         (Some(on), Some(back)) => 0.5 * (on + back),
         (one, other) => one.or(other)?,
@@ -112,7 +112,7 @@ fn push_force<const C: usize>(
     let loops = (on.pressing_mj(acting.loops, at) - back.pressing_mj(acting.loops, at)) / (2.0 * step);
     let turned = (on.turning_against(turning, at) - back.turning_against(turning, at)) / (2.0 * step);
     let dragged = acting.drag.map_or(0.0, |drag| {
-        // Where a point comes or goes on one side, the other tells.
+        // Where a point comes or goes on one side, the other side's is taken.
         let each = at.mesh.points.iter().enumerate().filter_map(|(index, point)| {
             let way = match (on.moved_mm(point, at, step), back.moved_mm(point, at, step)) {
                 (Some(on), Some(back)) => (on - back) / (2.0 * step),

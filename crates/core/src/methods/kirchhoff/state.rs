@@ -16,7 +16,7 @@ use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
 
 /// The state of the exact rod: where it lies and with which forces, what the predictor has learnt, what its contact points know of the
-/// wall, and what the last step told.
+/// wall, and the report of the last step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct KirchhoffState {
     pub(super) rod: RodState,
@@ -104,7 +104,7 @@ impl KirchhoffState {
         }
     }
 
-    /// What the step that led here told.
+    /// The report of the step that led here.
     pub fn report(&self) -> &StepReport {
         &self.report
     }

@@ -45,7 +45,7 @@ impl Evenness {
             let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
             let (x, y) = (at(b) - at(a), at(c) - at(a));
             let (sine, cosine) = (x.cross(&y).norm(), x.dot(&y));
-            // The sine of what it is larger by tells nearly all apart, and takes no arc tangent.
+            // The sine of what it is larger by distinguishes nearly all, and takes no arc tangent.
             let beyond = sine * least.1 - cosine * least.0;
             if beyond.is_nan() || beyond <= DOUBT * (sine + cosine.abs()) * (least.0 + least.1.abs()) {
                 let angle = libm::atan2(sine, cosine);

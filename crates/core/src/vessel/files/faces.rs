@@ -3,7 +3,7 @@
 use super::Reason;
 use crate::vessel::SurfaceMesh;
 
-/// Faces of a file, kept until all of its vertices are known, with a number that tells where each is.
+/// Faces of a file, kept until all of its vertices are known, with a number that says where each is.
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     /// Corners of all faces, counted from 0.

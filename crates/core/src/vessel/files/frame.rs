@@ -52,7 +52,7 @@ impl PatientAxes {
 pub struct SurfaceFrame {
     /// Millimetres per unit of the file: 1 for millimetres, 10 for centimetres, 1000 for metres.
     pub unit_mm: f64,
-    /// Axes of the file. `None`: those that its header tells (`SPACE=RAS` or `SPACE=LPS`, as 3D Slicer writes them), else LPS.
+    /// Axes of the file. `None`: those given by its header (`SPACE=RAS` or `SPACE=LPS`, as 3D Slicer writes them), else LPS.
     pub axes: Option<PatientAxes>,
 }
 
@@ -79,7 +79,7 @@ impl SurfaceFrame {
 /// What introduces the axes in a title or comment.
 const SPACE: &str = "SPACE=";
 
-/// The axes as headers tell them: the value behind `SPACE=`.
+/// The axes as headers write them: the value behind `SPACE=`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct ToldAxes(Option<String>);
 
@@ -97,7 +97,7 @@ impl ToldAxes {
         self.0.get_or_insert_with(|| value.chars().take(20).collect());
     }
 
-    /// The axes, LPS if none were told.
+    /// The axes, LPS if none were given.
     pub(super) fn axes(&self) -> std::result::Result<PatientAxes, Reason> {
         match &self.0 {
             None => Ok(PatientAxes::Lps),

@@ -1,4 +1,4 @@
-//! Surface meshes in files: STL, OBJ, PLY and VTK's two formats, told apart by extension.
+//! Surface meshes in files: STL, OBJ, PLY and VTK's two formats, distinguished by extension.
 //!
 //! Files carry no unit, so the caller gives one: millimetres per file unit. Axes are those that the caller or the file says
 //! ([`SurfaceFrame`]); surfaces are handed on in those of scenes, LPS.
@@ -117,12 +117,12 @@ impl SurfaceMesh {
     pub fn read_of(files: &dyn Files, path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
         let frame = frame.into();
         frame.check()?;
-        // A name that tells no format is refused before a large file is read.
+        // A name without a known format is refused before a large file is read.
         format_of(path)?;
         Self::from_bytes(&files.read(path, SIZE_LIMIT)?, path, frame)
     }
 
-    /// Reads a surface from the bytes of a file; the extension of `path` tells the format, and errors name it.
+    /// Reads a surface from the bytes of a file; the format follows from the extension of `path`, and errors name it.
     ///
     /// # Errors
     /// As [`Self::read`], less those of reading a file.

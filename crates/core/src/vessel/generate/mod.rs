@@ -107,7 +107,7 @@ impl GeneratedWall {
     /// # Errors
     /// [`Error::Parameter`] for an edge length that is not positive, larger than the largest radius, or so small that more than
     /// five million triangles would come out; for a bend tighter than the vessel is wide; for a branch that ends
-    /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot tell them apart.
+    /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot distinguish them.
     pub fn new(tree: &CentrelineTree, resolution: Resolution) -> Result<Self> {
         let branches = curve::branches(tree)?;
         check_resolution(&branches, resolution)?;

@@ -19,7 +19,7 @@ const PATCH: f64 = 0.3;
 /// wide, is off by a tenth or more.
 const BESIDE: f64 = 0.05;
 
-/// Drops open pieces that lie on larger ones everywhere, and tells how many pieces and triangles they were.
+/// Drops open pieces that lie on larger ones everywhere, and returns how many pieces and triangles they were.
 pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {

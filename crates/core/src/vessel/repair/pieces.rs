@@ -70,7 +70,7 @@ pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped 
     dropped
 }
 
-/// Drops the triangles of some pieces, and tells how many they were; `piece_of` has the piece of each.
+/// Drops the triangles of some pieces, and returns how many they were; `piece_of` has the piece of each.
 pub(super) fn drop_triangles(
     mesh: &mut SurfaceMesh,
     piece_of: &[u32],
