@@ -64,3 +64,37 @@ pub fn hermite(xi: f64) -> [f64; 4] {
     let (a, b) = (xi, 1.0 - xi);
     [b * b * (1.0 + 2.0 * a), a * b * b, a * a * (1.0 + 2.0 * b), -a * a * b]
 }
+
+/// The largest of ξ (1 − ξ)².
+const BULGE: f64 = 4.0 / 27.0;
+
+/// By how much a point of an element of length h moves at most, mm, whose nodes move by |Δx| and have tangents that change by |Δt|: a point is a mean of
+/// its nodes and a part of their tangents ([`hermite`]), so that it is
+///
+/// ```text
+/// max |Δxₖ| + 4/27 h (|Δt₀| + |Δt₁|),    ξ (1 − ξ)² ≤ 4/27
+/// ```
+pub(crate) fn largest_motion(length_mm: f64, [(x0, t0), (x1, t1)]: [(f64, f64); 2]) -> f64 {
+    x0.max(x1) + BULGE * length_mm * (t0 + t1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_point_moves_by_more_than_is_said_and_one_moves_by_as_much() {
+        let h = 2.0;
+        let moved = |xi: f64, [(x0, t0), (x1, t1)]: [(f64, f64); 2]| {
+            let [a, b, c, d] = hermite(xi);
+            (a * x0 + b * h * t0 + c * x1 + d * h * t1).abs()
+        };
+        let largest = |by| (0..=300).map(|k| moved(f64::from(k) / 300.0, by)).fold(0.0, f64::max);
+        for by in [[(0.3, 0.5), (0.1, -0.2)], [(0.0, 1.0), (0.0, -1.0)], [(-0.4, 0.0), (0.2, 0.3)]] {
+            let sizes = by.map(|(x, t): (f64, f64)| (x.abs(), t.abs()));
+            assert!(largest(by) <= largest_motion(h, sizes), "{by:?}");
+        }
+        let alone = [(0.0, 1.0), (0.0, 0.0)];
+        assert!((largest(alone) / largest_motion(h, alone) - 1.0).abs() < 1e-4);
+    }
+}

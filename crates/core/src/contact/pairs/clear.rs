@@ -9,14 +9,13 @@
 
 use super::{CLEAR, SelfContact, tree};
 use crate::Vec3;
+use crate::rod::quadrature::largest_motion;
 use crate::rod::{ElementData, RodState};
 
 /// Turn of a rod, rad, up to which nothing of it touches itself.
 const TURN: f64 = 2.0;
 /// Part of the distance of touch by which points may move where nothing was near.
 const FREE: f64 = 0.75;
-/// The largest of ξ (1 − ξ)².
-const BULGE: f64 = 4.0 / 27.0;
 
 /// Places and tangents of nodes where nothing was near.
 #[derive(Debug, Clone, Default)]
@@ -46,7 +45,7 @@ pub(super) fn motions_mm(
     let mut moved = moved.map(|(((x, t), there), frame)| ((there - x).norm(), (frame.t - t).norm()));
     let mut last = moved.next().unwrap_or_default();
     moved.zip(elements).map(move |(here, element)| {
-        let most_mm = last.0.max(here.0) + BULGE * element.length * (last.1 + here.1);
+        let most_mm = largest_motion(element.length, [last, here]);
         last = here;
         most_mm
     })

@@ -1,13 +1,8 @@
 //! Elements of the rod that are clear of the wall.
 //!
 //! All of a device is looked at several times in every iteration, and most of it is nowhere near a wall. Where none of the points of an
-//! element can touch, whatever the direction, as long as it moves by less than s, its points are not looked at again until it has. A point
-//! at ξ of an element of length h is a mean of its nodes and a part of their tangents ([`hermite`](crate::rod::quadrature::hermite)), so
-//! that none moves by more than
-//!
-//! ```text
-//! max |Δxₖ| + 4/27 h (|Δt₀| + |Δt₁|),    ξ (1 − ξ)² ≤ 4/27
-//! ```
+//! element can touch, whatever the direction, as long as it moves by less than s, its points are not looked at again until it has. By how
+//! much they move is bounded by how its nodes do ([`largest_motion`]).
 //!
 //! What its points would read is what they have read: they are free by s, their [`Room`], whatever the direction. So nothing that is felt hangs
 //! on what is left out. Only where they are at the base is not noted, and they are looked at there before they are at any trial. Of two places
@@ -19,10 +14,8 @@ use super::{Reading, SAFE, SUNK, WallContact};
 use crate::Vec3;
 use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::contact::surface::Hint;
+use crate::rod::quadrature::largest_motion;
 use crate::rod::{ElementData, RodState};
-
-/// The largest of ξ (1 − ξ)².
-const BULGE: f64 = 4.0 / 27.0;
 
 /// Places and tangents of the two nodes of an element.
 type Nodes = [Vec3; 4];
@@ -108,7 +101,7 @@ impl WallContact<'_> {
     /// How far a material point of the vessel at which a point of an element is moves at most, mm.
     fn motion_mm(&self, from: &Nodes, to: &Nodes, length_mm: f64) -> f64 {
         let [x0, x1, t0, t1] = [0, 1, 2, 3].map(|k| (to[k] - from[k]).norm());
-        (x0.max(x1) + BULGE * length_mm * (t0 + t1)) * self.surface.stretch()
+        largest_motion(length_mm, [(x0, t0), (x1, t1)]) * self.surface.stretch()
     }
 
     /// The points of a span, unless none can touch the wall at a state; those returned are known where they are at the base.
