@@ -19,14 +19,17 @@ mod groups;
 mod metric;
 mod record;
 mod score;
+mod session;
 mod smoothness;
 mod subject;
 mod way;
+mod words;
 
 pub use exam::{Ended, EndedBy, Exam, Standing, Used};
 pub use groups::assess;
 pub use metric::{Better, Group, Metric};
 pub use record::{BEAM, BeamState, Hand, Injection, Record, Sample};
 pub use score::{Score, Scored, Verdict};
+pub use session::SessionFile;
 pub use subject::{Goal, Limits, Subject, Threshold};
 pub use way::Way;
