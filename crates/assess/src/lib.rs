@@ -21,6 +21,7 @@ mod record;
 mod score;
 mod session;
 mod smoothness;
+mod spectrum;
 mod subject;
 mod way;
 mod words;
