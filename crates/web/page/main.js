@@ -17,13 +17,12 @@ const element = (id) => document.getElementById(id);
 /** The scene that is open. */
 let open = { path: "", name: "" };
 
-/** Opens a scene or a subject, with a script in place of its own if one is given. What is wrong goes to who asked. */
-export async function openScene(path, script) {
+/** Opens a scene or a subject, with a script in place of its own if one is given; the task of a subject. */
+async function load(path, script) {
   screen.tell("opening …", false, 60);
   const files = await filesOf(path, script);
   const task = await ask("open", { files, path, side: SIDE });
   screen.clear();
-  const repeated = open.path === path;
   open = { path, name: path.split("/").pop().replace(/\.toml$/, "") };
   document.title = `endowire: ${open.name}`;
   const menu = element("scenes");
@@ -32,12 +31,17 @@ export async function openScene(path, script) {
   menu.value = own.has(path) ? "own" : path;
   const how = matchMedia("(pointer: coarse)").matches ? "drag the round field up to push, sideways to turn" : "push with ↑ or the round field; F1 shows all keys";
   screen.tell(script ? "" : how);
-  // The task is known to who begins again, and to who looks at what was done.
-  training.open(task, !repeated && !script);
+  return task;
 }
+
+/** The same for who sees it for the first time: a task is read, unless a script shows what was done. What is wrong goes to who asked. */
+export const openScene = async (path, script) => training.open(await load(path, script), !script);
 
 /** The same where nobody waits: what is wrong is told on the page. */
 const tryScene = (path, script) => openScene(path, script).catch((error) => screen.tell(error.message, true, 60));
+
+/** Begins the scene once more, at once. */
+const again = () => load(open.path).then((task) => training.open(task, false), (error) => screen.tell(error.message, true, 60));
 
 let inputsMs = [];
 on.frame = (frame) => {
@@ -129,7 +133,7 @@ element("scenes").addEventListener("change", ({ target }) => {
   history.replaceState(null, "", `#scene=${target.value}`);
   tryScene(target.value);
 });
-element("again").addEventListener("click", () => tryScene(open.path));
+element("again").addEventListener("click", again);
 element("save-script").addEventListener("click", saveScript);
 element("save-session").addEventListener("click", saveSession);
 element("save-table").addEventListener("click", saveTable);
@@ -139,7 +143,7 @@ element("share").addEventListener("click", share);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => button.blur());
 
 dialogs.prepare(openScene, () => open.path);
-training.prepare(() => tryScene(open.path), saveSession, saveReport);
+training.prepare(again, saveSession, saveReport);
 hands.buttons();
 hands.field(element("hand"), element("knob"));
 hands.gamepad();

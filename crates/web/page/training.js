@@ -53,7 +53,7 @@ function read() {
 /** Shows how it stands; the score as soon as it has ended. */
 export function stand({ step, subject }) {
   hasBegun = step > 0;
-  if (!task || !subject) return;
+  if (!task || !subject || scored) return;
   const toGo = subject.distance_mm === null ? "not in yet" : `${subject.distance_mm.toFixed(1)} mm`;
   const injected = task.inject_ml === null ? "" : `, injected there ${subject.injected_there_ml.toFixed(1)} of ${task.inject_ml} ml`;
   element("to-go").textContent = `to ${task.target}: ${toGo}, there at ${task.tip_within_mm} mm${injected}`;
@@ -66,11 +66,12 @@ export function stand({ step, subject }) {
     chip.style.setProperty("--share", Math.min(1, value / limit));
     chip.classList.toggle("nearly", value > NEARLY * limit);
   });
-  if (subject.verdict && !scored) {
-    scored = true;
-    hear("letGo");
-    score();
-  }
+  if (!subject.verdict) return;
+  scored = true;
+  const { passed, score: points } = subject.verdict;
+  element("to-go").textContent = `${passed ? "passed" : "not passed"}, ${points.toFixed(0)} of 100; what is done now does not count`;
+  hear("letGo");
+  score();
 }
 
 async function score() {
@@ -91,6 +92,8 @@ async function score() {
 
 /** Makes the dialogs ready: `again` begins the subject once more, the others save its session and its report. */
 export function prepare(again, saveSession, saveReport) {
+  // A button that keeps the focus would be pressed by the pedal's key.
+  for (const id of ["show-task", "show-score"]) element(id).addEventListener("click", ({ target }) => target.blur());
   element("show-task").addEventListener("click", read);
   element("show-score").addEventListener("click", score);
   element("task-dialog").addEventListener("close", () => wait(false));
