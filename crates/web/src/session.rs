@@ -206,7 +206,7 @@ impl Session {
         object(self.played.session.record())
     }
 
-    /// What stands above it in the script file `name`: of which scene it is, whose file is seen from where `folder` is, and the command that carries it out.
+    /// What stands above the `script` in its file `name`: of which scene it is, whose file is seen from where `folder` is, and the command that carries it out.
     #[wasm_bindgen(js_name = scriptHead)]
     pub fn script_head(&self, folder: &str, name: &str) -> String {
         self.played.script_head(Path::new(folder), Path::new(name))
