@@ -42,10 +42,13 @@ impl Scored {
 
     /// Its value with its unit.
     pub fn value_words(&self) -> String {
-        // Numbers and ratios have the unit 1.
-        let unit = if self.metric.unit == "1" { "" } else { self.metric.unit };
-        let value = self.metric.value.map(|value| format!("{value:.3} {unit}"));
-        value.map_or_else(|| "not measured".to_owned(), |value| value.trim_end().to_owned())
+        match (self.metric.value, self.metric.unit) {
+            (None, _) => "not measured".to_owned(),
+            // Numbers and ratios.
+            (Some(value), "1") if value.fract() == 0.0 => value.to_string(),
+            (Some(value), "1") => format!("{value:.3}"),
+            (Some(value), unit) => format!("{value:.3} {unit}"),
+        }
     }
 }
 
@@ -58,5 +61,25 @@ impl Verdict {
             None => "left before the goal was reached".to_owned(),
         };
         format!("{how}, {:.0} of 100: {end}", self.score)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Record;
+
+    #[test]
+    fn numbers_are_whole_where_they_count_and_have_their_units() {
+        let metrics = crate::assess(&Record::default(), None);
+        let words = |name: &str, value: Option<f64>| {
+            let metric = *metrics.iter().find(|metric| metric.name == name).unwrap();
+            let metric = crate::Metric { value, ..metric };
+            Scored { metric, threshold: None, passed: None }.value_words()
+        };
+        assert_eq!(words("reversals", Some(6.0)), "6");
+        assert_eq!(words("path_ratio", Some(1.23456)), "1.235");
+        assert_eq!(words("total_s", Some(9.2)), "9.200 s");
+        assert_eq!(words("arrived", None), "not measured");
     }
 }

@@ -146,7 +146,15 @@ fn a_subject_is_shown_by_its_reference_and_one_that_does_not_fit_is_told() {
     assert_eq!(browser.eval("document.getElementById('score-words').className"), "passed");
     assert_eq!(browser.eval("document.getElementById('score-watched').hidden"), false);
     browser.eval("document.getElementById('score-dialog').close()");
-    // One of a teacher, with a target that the vessel does not name.
+    // One of a teacher, and one with a target that the vessel does not name.
+    crate::drop_file(
+        &mut browser,
+        "harder.toml",
+        "(await (await fetch('assets/subjects/straight_tube.toml')).text()).replace('level = 1', 'level = 3')",
+    );
+    browser.wait(&is_open("task-dialog"));
+    browser.wait("document.getElementById('task-name').textContent.endsWith('(level 3)')");
+    browser.eval("document.getElementById('task-dialog').close()");
     crate::drop_file(
         &mut browser,
         "own.toml",
@@ -175,11 +183,11 @@ fn a_session_is_reported_as_one_page_that_needs_nothing_else() {
     browser.wait("Boolean(window.saved)");
     let page = browser.eval("window.saved");
     let page = page.as_str().unwrap();
-    let steps = browser.eval("(async () => (await import('./screen.js')).readout.step)()");
     let (_, data) = page.split_once("const data = ").unwrap();
     let data: Value = serde_json::from_str(data.split_once(";\n").unwrap().0).unwrap();
-    let shapes = data["steps"].as_array().unwrap();
-    assert_eq!((&data["summary"]["steps"], &shapes[shapes.len() - 1]["step"]), (&steps, &steps));
+    let (steps, shapes) = (&data["summary"]["steps"], data["steps"].as_array().unwrap());
+    assert_eq!(&shapes[shapes.len() - 1]["step"], steps);
+    browser.wait(&format!("(async () => (await import('./screen.js')).readout.step === {steps})()"));
     assert_eq!(data["series"]["inserted_mm"].as_array().unwrap().len(), steps.as_u64().unwrap() as usize);
     assert_eq!(data["frames"].as_array().unwrap().len(), 2);
     assert!(browser.console.is_empty(), "{:?}", browser.console);
@@ -187,7 +195,7 @@ fn a_session_is_reported_as_one_page_that_needs_nothing_else() {
     let file = tempfile::Builder::new().suffix(".html").tempfile().unwrap();
     std::fs::write(file.path(), page).unwrap();
     browser.call("Page.navigate", &json!({ "url": format!("file://{}", file.path().display()) }));
-    browser.wait("Boolean(document.documentElement.dataset.drawnMs)");
+    browser.wait("Boolean(document.documentElement?.dataset.drawnMs)");
     let told = browser.eval("document.getElementById('now').textContent");
     assert!(told.as_str().unwrap().starts_with(&format!("step {steps}: ")), "{told}");
     browser.wait(
