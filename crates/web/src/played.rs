@@ -154,6 +154,9 @@ impl Played {
         summary["beam_s"] = readout.lab.beam_s.into();
         summary["dose_ugy"] = readout.lab.dose_ugy.into();
         summary["unconverged_steps"] = readout.went.unconverged_steps.into();
+        if !self.settings.is_empty() {
+            summary["set"] = self.settings.iter().map(ToString::to_string).collect();
+        }
         if let Some(score) = self.session.score() {
             summary["subject"] = score.subject.as_str().into();
             summary["score"] = score.verdict.words().into();
