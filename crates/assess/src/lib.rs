@@ -14,19 +14,26 @@
 //! assert!(metrics.iter().all(|metric| !metric.definition.is_empty()));
 //! ```
 
+// A score has the same bits on every machine.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod exam;
 mod groups;
 mod metric;
 mod record;
 mod score;
+mod session;
 mod smoothness;
+mod spectrum;
 mod subject;
 mod way;
+mod words;
 
 pub use exam::{Ended, EndedBy, Exam, Standing, Used};
 pub use groups::assess;
 pub use metric::{Better, Group, Metric};
 pub use record::{BEAM, BeamState, Hand, Injection, Record, Sample};
 pub use score::{Score, Scored, Verdict};
+pub use session::SessionFile;
 pub use subject::{Goal, Limits, Subject, Threshold};
 pub use way::Way;

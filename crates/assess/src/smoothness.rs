@@ -1,8 +1,7 @@
 //! How smooth a motion is: of the tip's speed, at even times.
 
-use realfft::RealFftPlanner;
-
 use crate::record::Record;
+use crate::spectrum::amplitudes;
 
 /// Even times are so far apart, s: hands do nothing faster than ten times a second.
 const STEP_S: f64 = 0.05;
@@ -47,17 +46,15 @@ pub(crate) fn spectral_arc_length(speeds: &[f64]) -> Option<f64> {
         return None;
     }
     let length = speeds.len().next_power_of_two() << PADDING;
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
-    let mut padded = transform.make_input_vec();
-    padded[..speeds.len()].copy_from_slice(speeds);
-    let mut spectrum = transform.make_output_vec();
-    transform.process(&mut padded, &mut spectrum).ok()?;
-    let amplitudes: Vec<f64> = spectrum.iter().map(|value| value.norm()).collect();
+    let mut padded = speeds.to_vec();
+    padded.resize(length, 0.0);
+    let amplitudes = amplitudes(&padded);
     let largest = amplitudes.iter().copied().fold(0.0, f64::max);
     let last = amplitudes.iter().rposition(|value| *value >= LEAST_AMPLITUDE * largest)?;
     let step = 1.0 / last.max(1) as f64;
     let pieces = amplitudes[..=last].windows(2);
-    let of_piece = |pair: &[f64]| step.hypot((pair[1] - pair[0]) / largest);
+    // Roots have the same bits on every machine, `hypot` has not.
+    let of_piece = |pair: &[f64]| (step * step + ((pair[1] - pair[0]) / largest).powi(2)).sqrt();
     Some(-pieces.map(of_piece).sum::<f64>())
 }
 

@@ -4,8 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use endowire_core::insertion::Tally;
-use endowire_methods::Scene;
-use endowire_sweep::{Setting, scene_with};
+use endowire_methods::{Scene, Setting, scene_with};
 use endowire_viewer::ViewSpec;
 
 use crate::cache::Cache;

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use endowire_assess::{Exam, Score, Scored, Subject, Threshold};
 use endowire_core::error::nearest_name;
-use endowire_methods::Scene;
-use endowire_sweep::Setting;
+use endowire_methods::{Scene, Setting};
 use serde::Serialize;
 
 use crate::cache::Cache;
@@ -75,37 +74,16 @@ pub(crate) fn exam(subject: Subject, scene: &Scene, cache: &Cache) -> Result<Exa
     Ok(Exam::new(subject, tree)?)
 }
 
-/// What a threshold asks for.
-pub(crate) fn asked(threshold: &Threshold) -> String {
-    let most = threshold.at_most.map(|most| format!("at most {most}"));
-    most.or_else(|| threshold.at_least.map(|least| format!("at least {least}"))).unwrap_or_default()
-}
-
 /// What has come of a subject, on one line.
 pub(crate) fn verdict(score: &Score) -> String {
-    let verdict = &score.verdict;
-    let how = if verdict.passed { "passed" } else { "not passed" };
-    let end = match verdict.ended {
-        Some(ended) => format!("{} after {:.1} s", ended.by.words(), ended.time_s),
-        None => "left before the goal was reached".to_owned(),
-    };
-    format!("{}: {how}, {:.0} of 100: {end}", score.subject, verdict.score)
-}
-
-/// Whether a threshold is kept, and the value that it is of.
-pub(crate) fn kept(scored: &Scored) -> (&'static str, String) {
-    // Numbers and ratios have the unit 1.
-    let unit = if scored.metric.unit == "1" { "" } else { scored.metric.unit };
-    let value = scored.metric.value.map(|value| format!("{value:.3} {unit}"));
-    let kept = if scored.passed == Some(true) { "kept" } else { "missed" };
-    (kept, value.map_or_else(|| "not measured".to_owned(), |value| value.trim_end().to_owned()))
+    format!("{}: {}", score.subject, score.verdict.words())
 }
 
 /// A score for a person.
 pub(crate) fn text(score: &Score) -> String {
     let row = |(scored, threshold): (&Scored, &Threshold)| {
-        let (kept, value) = kept(scored);
-        let (name, asked, points) = (scored.metric.name, asked(threshold), threshold.points);
+        let (kept, value) = (scored.kept_words(), scored.value_words());
+        let (name, asked, points) = (scored.metric.name, threshold.words(), threshold.points);
         format!("  {kept:<6}  {name:<22} {value:>14}  {asked:<16} points {points}")
     };
     std::iter::once(verdict(score)).chain(score.asked().map(row)).collect::<Vec<_>>().join("\n")

@@ -1,6 +1,6 @@
 //! The methods by name, and the field's for catheters and guidewires beside the core's own, each as its paper has it.
 //!
-//! [`AnyMethod`] is what `[method]` of a scene may say, and [`Scene`] a scene file that is read so.
+//! [`AnyMethod`] is what `[method]` of a scene may say, and [`Scene`] a scene file that is read so; [`scene_with`] gives its keys other values.
 //!
 //! | name | module | paper |
 //! |---|---|---|
@@ -27,12 +27,14 @@ pub mod chord_energy;
 pub mod discrete_rod;
 mod explicit;
 pub mod insertion;
+mod key;
 pub mod li2011;
 mod links;
 pub mod mass_spring;
 pub mod options;
 mod registry;
 pub mod rigid_links;
+mod setting;
 mod wall_load;
 
 pub use beam_fem::BeamFem;
@@ -41,9 +43,11 @@ pub use chain::{Chain, NodalLoad, Posture, Push, TipForce};
 pub use chord_energy::ChordEnergy;
 pub use discrete_rod::DiscreteRod;
 pub use insertion::{Inserted, Insertion, InsertionOptions};
+pub use key::Key;
 pub use mass_spring::MassSpring;
 pub use registry::{AnyMethod, MODEL_NAMES, NAMES, Scene, static_model};
 pub use rigid_links::RigidLinks;
+pub use setting::{SceneTables, Setting, scene_with, scene_with_of};
 
 use std::fmt::Debug;
 

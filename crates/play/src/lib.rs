@@ -24,6 +24,7 @@ pub use lab::Lab;
 pub use pad::{Button, PAD, Pad};
 pub use pictures::{Pictures, Sharpened, Sharpening};
 pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
+pub use script::script_head;
 pub use session::{Delivered, Session, Snapshot};
 
 /// Ticks of a session in a second.

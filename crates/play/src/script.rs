@@ -1,14 +1,30 @@
 //! What hands have done as a script, which does it again to the bit: motions, how fast they were, and contrast medium.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use endowire_core::device::Stack;
+use endowire_methods::Setting;
 
 use crate::hand::Motion;
 use crate::history::{Done, Injected};
 
 /// Least increment of a line, mm and degrees: less than that a line does in one step.
 const LEAST: f64 = 1e-9;
+
+/// The head of a script that stands in `file`: of which scene it is, and the command that carries it out again with these settings of the scene.
+pub fn script_head(scene: &Path, settings: &[Setting], file: &Path) -> String {
+    // A name with a line break would end the comment.
+    let shown = |path: &Path| path.display().to_string().replace(char::is_control, " ");
+    let set = settings.iter().filter(|setting| setting.key.begins() != "script");
+    let set: String =
+        set.map(|setting| format!(" --set '{setting}'").replace(char::is_control, " ")).collect();
+    format!(
+        "# What hands have done in {0}; carried out again by\n# endowire run {0} --script {1}{set}\n\n",
+        shown(scene),
+        shown(file)
+    )
+}
 
 /// How steps become lines.
 #[derive(Debug, Clone, Copy)]

@@ -1,11 +1,11 @@
 //! Axes: a key of the scene and the values that it takes.
 
 use endowire_core::{Error, Result};
+use endowire_methods::Key;
 use serde::Deserialize;
 use toml::Value;
 
 use crate::draw::Stream;
-use crate::key::Key;
 
 /// Most values of one axis, and most runs of a sweep.
 pub(crate) const RUN_LIMIT: usize = 1_000_000;

@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use endowire_core::file::FileSystem;
 use endowire_core::input::{from_toml, parse_toml};
 use endowire_core::{Error, Result};
-use endowire_methods::Scene;
+use endowire_methods::{Key, Scene, SceneTables, Setting};
 use serde::Deserialize;
 use toml::Value;
 
 use crate::axis::{Axis, AxisSpec, RUN_LIMIT};
-use crate::key::Key;
 use crate::provenance::hash_inputs;
 use crate::row::{Columns, ParameterKind};
-use crate::setting::{Setting, assign, document_of, scene_of, text_of, try_in};
 
 /// A sweep file as it is written.
 #[derive(Debug, Deserialize)]
@@ -43,9 +43,8 @@ pub enum Recorded {
 /// One scene and the values that its keys take.
 #[derive(Debug)]
 pub struct Sweep {
-    scene_path: PathBuf,
     /// The scene with what `[set]` says.
-    base: Value,
+    base: SceneTables,
     pub(crate) axes: Vec<Axis>,
     pub(crate) samples: usize,
     recorded: Option<Recorded>,
@@ -94,12 +93,12 @@ impl Sweep {
             }
             other => other,
         })?;
-        let mut base = document_of(&scene, &scene_path)?;
+        let mut base = SceneTables::of_file(scene.text(), &scene_path, Arc::new(FileSystem))?;
         for (key, value) in &spec.set {
             let key = Key::parse(key).map_err(at_path)?;
-            let tried = try_in(&scene_path, &base, &key, value, |_| Ok(()));
+            let tried = base.check(&key, value, |_| Ok(()));
             tried.map_err(|e| in_table(path, "[set]", &e))?;
-            assign(&scene_path, &mut base, &key, value).map_err(at_path)?;
+            base.set(&key, value).map_err(at_path)?;
         }
         let samples = samples(spec).map_err(at_path)?;
         let axes = spec.axis.iter().enumerate();
@@ -108,17 +107,17 @@ impl Sweep {
         check_axes(&axes, spec).map_err(at_path)?;
         for (index, axis) in axes.iter().enumerate() {
             for value in axis.examples() {
-                let tried = try_in(&scene_path, &base, &axis.key, &value, |_| Ok(()));
+                let tried = base.check(&axis.key, &value, |_| Ok(()));
                 tried.map_err(|e| in_table(path, &format!("axis[{index}]"), &e))?;
             }
         }
-        let base_scene = scene_of(&scene_path, &base)?;
+        let base_scene = base.scene()?;
         if base_scene.script.is_empty() && axes.iter().all(|axis| axis.key.begins() != "script") {
             let reason = "script = []: give at least one [[script]] table, what the hand does";
             return Err(Error::content(&scene_path, reason));
         }
         // What is set may have come from files that the scene does not name any more.
-        let set = text_of(&scene_path, &base)?;
+        let set = base.text()?;
         let mut inputs = vec![text.into_bytes(), scene.text().as_bytes().to_vec(), set.into_bytes()];
         for input in base_scene.input_paths() {
             inputs.push(endowire_core::file::read(&input, u64::MAX)?);
@@ -127,7 +126,7 @@ impl Sweep {
         let instruments = base_scene.instrument.iter().map(|one| one.name.clone());
         let columns = Columns { parameters: parameters.collect(), instruments: instruments.collect() };
         let recorded = spec.record;
-        let sweep = Self { scene_path, base, axes, samples, recorded, columns, hash: hash_inputs(&inputs) };
+        let sweep = Self { base, axes, samples, recorded, columns, hash: hash_inputs(&inputs) };
         sweep.check_devices().map_err(at_path)?;
         Ok(sweep)
     }
@@ -138,16 +137,12 @@ impl Sweep {
         if self.axes.iter().all(|axis| !axis.key.is_of_device()) {
             return Ok(());
         }
-        let device = |number| self.scene(&self.run(number).values).and_then(|scene| self.stack_of(&scene));
+        let device = |number| self.scene(&self.run(number).values)?.scene()?.stack();
         let mut tried = (0..self.len().min(TRIED)).map(device);
         match tried.next() {
             Some(Err(error)) if tried.all(|other| other.is_err()) => Err(error),
             _ => Ok(()),
         }
-    }
-
-    fn stack_of(&self, scene: &Value) -> Result<()> {
-        scene_of(&self.scene_path, scene)?.stack().map(drop)
     }
 
     /// What its reader should know before it is carried out: an axis that changes nothing. None where there is none.
@@ -184,7 +179,7 @@ impl Sweep {
     }
 
     /// The scene with these values of the axes.
-    pub(crate) fn scene(&self, values: &[Value]) -> Result<Value> {
+    pub(crate) fn scene(&self, values: &[Value]) -> Result<SceneTables> {
         let mut scene = self.base.clone();
         let of_device = |axis: &&(&Axis, &Value)| axis.0.key.is_of_device();
         let pairs: Vec<(&Axis, &Value)> = self.axes.iter().zip(values).collect();
@@ -192,14 +187,14 @@ impl Sweep {
         for (axis, value) in
             pairs.iter().filter(|pair| !of_device(pair)).chain(pairs.iter().filter(of_device))
         {
-            assign(&self.scene_path, &mut scene, &axis.key, value)?;
+            scene.set(&axis.key, value)?;
         }
         Ok(scene)
     }
 
     /// The file that all scenes are variants of: paths start from its folder.
     pub(crate) fn scene_path(&self) -> &Path {
-        &self.scene_path
+        self.base.path()
     }
 }
 

@@ -6,14 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use endowire_core::Result;
 use endowire_core::insertion::{Move, Script, Simulation, Tally};
 use endowire_core::vessel::WallStore;
-use endowire_methods::Scene;
 use toml::Value;
 
 use crate::file::Sweep;
 use crate::outcome::{RunOutcome, StepFailure};
 use crate::provenance::{Program, hash_inputs};
 use crate::row::{Row, json};
-use crate::setting::text_of;
 use crate::shared::Shared;
 
 /// One run: the scene of a sweep with a value for each axis.
@@ -107,8 +105,8 @@ impl Run<'_> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let folder = std::path::absolute(folder.join(".")).unwrap_or_else(|_| folder.to_path_buf());
         let mut scene = self.sweep.scene(&self.values)?;
-        make_absolute(&mut scene, &folder);
-        text_of(path, &scene)
+        make_absolute(scene.tables_mut(), &folder);
+        scene.text()
     }
 
     /// Carries it out; what fails is in its row.
@@ -137,11 +135,10 @@ impl Run<'_> {
 
     /// The simulation at the start, and the script.
     fn begin(&self, workshop: &Workshop<'_>, row: &mut Row) -> Result<(Simulation, Script)> {
-        let path = self.sweep.scene_path();
-        let mut document = self.sweep.scene(&self.values)?;
-        let text = text_of(path, &document)?;
+        let mut tables = self.sweep.scene(&self.values)?;
+        let text = tables.text()?;
         row.scene_hash = hash_inputs(&[&text]);
-        let scene = Scene::from_toml(&text, path)?;
+        let scene = tables.scene()?;
         let mut inputs = vec![text.into_bytes()];
         row.seed = scene.seed;
         for input in scene.input_paths() {
@@ -149,10 +146,10 @@ impl Run<'_> {
         }
         row.scene_hash = hash_inputs(&inputs);
         let script = scene.steps(&scene.stack()?, workshop.store)?;
-        if let Value::Table(table) = &mut document {
+        if let Value::Table(table) = tables.tables_mut() {
             table.retain(|key, _| !LATER.contains(&key));
         }
-        let key = text_of(path, &document)?;
+        let key = tables.text()?;
         let simulation = workshop.starts.get(key.as_bytes(), || scene.simulation(workshop.store))?;
         Ok((simulation, script))
     }

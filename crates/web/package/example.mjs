@@ -1,15 +1,16 @@
 // A wire pushed into the left carotid artery, in Node.js or a bundler: node example.mjs ASSETS, the folder `assets` of the page.
 import { readFile, writeFile } from "node:fs/promises";
 import { join } from "node:path";
-import init, { Session, sceneFiles } from "./endowire.js";
+import init, { Session, missingFiles } from "./endowire.js";
 
 await init({ module_or_path: await readFile(new URL("endowire_bg.wasm", import.meta.url)) });
 
 const assets = process.argv[2] ?? "../assets";
 const path = "scenes/arch_carotid.toml";
-const text = await readFile(join(assets, path), "utf8");
 const files = new Map();
-for (const name of sceneFiles(text, path)) files.set(name, new Uint8Array(await readFile(join(assets, name))));
+for (let missing; (missing = missingFiles(files, path)).length; ) {
+  for (const name of missing) files.set(name, new Uint8Array(await readFile(join(assets, name))));
+}
 
 const session = new Session(files, path, 256);
 session.apply({ do: "pedal", down: true });

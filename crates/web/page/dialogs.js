@@ -1,5 +1,5 @@
 // Own vessels, devices and scenes, by a dialog or dropped on the page, and the help.
-import { own, readText, write } from "./files.js";
+import { own, read, readText, write } from "./files.js";
 import { DEVICES } from "./listed.js";
 import * as screen from "./screen.js";
 import { ask } from "./simulator.js";
@@ -117,9 +117,9 @@ async function compose(title, about, list, path, go) {
   element("text-dialog").showModal();
 }
 
-/** Opens a text as a scene of its own. */
-async function ownScene(text, folder = "scenes") {
-  // Beside the scenes of the page, whose paths it may have.
+/** Opens a text as a scene or a subject of its own. */
+async function ownScene(text, folder = /^\s*\[goal\]/m.test(text) ? "subjects" : "scenes") {
+  // Beside those of the page, whose paths it may have.
   const path = `${folder}/own.toml`;
   write(path, text);
   await openScene(path);
@@ -128,7 +128,8 @@ async function ownScene(text, folder = "scenes") {
 /** The device of a scene as a text to write in. */
 async function device() {
   const path = current();
-  const names = await ask("names", { text: await readText(path), path });
+  if (path.startsWith("subjects/")) return screen.tell("a subject is the same for all: change `set` in its text", true);
+  const names = await ask("missing", { files: new Map([[path, await read(path)]]), path });
   const file = names.find((name) => name.includes("devices/"));
   if (!file) return screen.tell("this scene says itself what its device is: change it in the scene's text", true);
   const plain = `devices/${file.split("/").pop()}`;

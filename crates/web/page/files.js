@@ -18,16 +18,20 @@ export const read = async (path) => own.get(path) ?? fetched(path);
 /** The text of a file. */
 export const readText = async (path) => new TextDecoder().decode(await read(path));
 
-/** All files that a scene needs, with the script that takes the place of its own. */
+/** All files that a scene or a subject needs, with the script that takes the place of its own. */
 export async function filesOf(path, script) {
-  const bytes = await read(path);
-  const files = new Map([[path, bytes]]);
-  const names = await ask("names", { text: new TextDecoder().decode(bytes), path });
-  await Promise.all(names.slice(1).map(async (name) => {
-    // What is not there is told by the scene, with the key that names it.
-    const found = await read(name).catch(() => null);
-    if (found) files.set(name, found);
-  }));
+  const files = new Map([[path, await read(path)]]);
+  const asked = new Set();
+  for (;;) {
+    const missing = (await ask("missing", { files, path })).filter((name) => !asked.has(name));
+    if (missing.length === 0) break;
+    await Promise.all(missing.map(async (name) => {
+      asked.add(name);
+      // What is not there is told by the scene, with the key that names it.
+      const found = await read(name).catch(() => null);
+      if (found) files.set(name, found);
+    }));
+  }
   if (script) files.set("script.toml", encoder.encode(script));
   return files;
 }

@@ -92,7 +92,7 @@ export function field(hand, knob) {
     const share = (at, from, size) => Math.max(-1, Math.min(1, (at - from - size / 2) / (size * 0.4)));
     move(-share(event.clientY, box.top, box.height), share(event.clientX, box.left, box.width));
   });
-  for (const end of ["pointerup", "pointercancel"]) hand.addEventListener(end, () => move(0, 0));
+  for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) hand.addEventListener(end, () => move(0, 0));
 }
 
 /** Asks for the first gamepad's state with each picture of the screen, and tells changes. */

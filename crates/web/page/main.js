@@ -2,9 +2,11 @@
 import * as dialogs from "./dialogs.js";
 import { filesOf, ofFragment, own, save, toFragment, write } from "./files.js";
 import * as hands from "./hands.js";
+import { SUBJECTS } from "./listed.js";
 import { SCENES } from "./scenes.js";
 import * as screen from "./screen.js";
 import { ask, hear, hide, on, shown, started } from "./simulator.js";
+import * as training from "./training.js";
 
 /** Pixels a side of each picture. */
 const SIDE = 384;
@@ -15,11 +17,11 @@ const element = (id) => document.getElementById(id);
 /** The scene that is open. */
 let open = { path: "", name: "" };
 
-/** Opens a scene, with a script in place of its own if one is given. What is wrong goes to who asked. */
-export async function openScene(path, script) {
+/** Opens a scene or a subject, with a script in place of its own if one is given; the task of a subject. */
+async function load(path, script) {
   screen.tell("opening …", false, 60);
   const files = await filesOf(path, script);
-  await ask("open", { files, path, side: SIDE });
+  const task = await ask("open", { files, path, side: SIDE });
   screen.clear();
   open = { path, name: path.split("/").pop().replace(/\.toml$/, "") };
   document.title = `endowire: ${open.name}`;
@@ -28,15 +30,23 @@ export async function openScene(path, script) {
   if (own.has(path)) menu.prepend(new Option("Own scene", "own"));
   menu.value = own.has(path) ? "own" : path;
   const how = matchMedia("(pointer: coarse)").matches ? "drag the round field up to push, sideways to turn" : "push with ↑ or the round field; F1 shows all keys";
-  screen.tell(script ? "the script is shown: move to take over" : how);
+  screen.tell(script ? "" : how);
+  return task;
 }
+
+/** The same for who sees it for the first time: a task is read, unless a script shows what was done. What is wrong goes to who asked. */
+export const openScene = async (path, script) => training.open(await load(path, script), !script);
 
 /** The same where nobody waits: what is wrong is told on the page. */
 const tryScene = (path, script) => openScene(path, script).catch((error) => screen.tell(error.message, true, 60));
 
+/** Begins the scene once more, at once. */
+const again = () => load(open.path).then((task) => training.open(task, false), (error) => screen.tell(error.message, true, 60));
+
 let inputsMs = [];
 on.frame = (frame) => {
   screen.show(frame);
+  training.stand(frame.readout);
   if (frame.inputAt !== null) inputsMs.push(performance.now() - frame.inputAt);
   shown();
 };
@@ -47,15 +57,11 @@ on.pace = (pace) => {
 on.failed = (text) => screen.tell(text, true);
 on.broken = (text) => screen.tell(`the simulator has stopped, load the page again: ${text}`, true, 1e6);
 
-function head() {
-  const path = own.has(open.path) ? "SCENE" : `assets/${open.path}`;
-  return `# What hands have done in ${open.name}; carried out again by\n# endowire run ${path} --script played.toml\n\n`;
-}
+/** Where the scene's file is for the program: own ones are wherever they come from. */
+const folder = () => ({ folder: own.has(open.path) ? "" : "assets" });
 
-async function saveSession() {
-  const session = { scene_file: own.has(open.path) ? "scene.toml" : `assets/${open.path}`, set: [], record: await ask("record") };
-  save("played.session.json", JSON.stringify(session), "application/json");
-}
+const saveScript = async () => save("played.toml", await ask("scriptHead", folder()) + await ask("script"), "text/plain");
+const saveSession = async () => save("played.session.json", await ask("sessionFile", folder()), "application/json");
 
 async function saveTable() {
   const { samples } = await ask("record");
@@ -68,14 +74,22 @@ async function saveTable() {
   save(`${open.name}.csv`, [[...head, ...felt].join(","), ...rows, ""].join("\n"), "text/csv");
 }
 
+/** The views that are there. */
+const views = () => [screen.fluoro, screen.second, screen.three].filter((canvas) => !canvas.parentElement.hidden);
+
 async function savePicture() {
-  const pictures = [screen.fluoro, screen.second, screen.three].filter((canvas) => !canvas.parentElement.hidden);
+  const pictures = views();
   const whole = document.createElement("canvas");
   whole.width = pictures.reduce((width, one) => width + one.width, 0);
   whole.height = Math.max(...pictures.map((one) => one.height));
   const context = whole.getContext("2d");
   pictures.reduce((left, one) => (context.drawImage(one, left, 0), left + one.width), 0);
   whole.toBlob((blob) => save(`${open.name}.png`, blob));
+}
+
+async function saveReport() {
+  const frames = views().map((canvas) => ({ view: canvas.parentElement.id, png: canvas.toDataURL("image/png").split(",")[1] }));
+  await ask("report", { frames }).then((page) => save(`${open.name}.html`, page, "text/html"), (error) => screen.tell(error.message, true));
 }
 
 async function share() {
@@ -105,22 +119,31 @@ async function begin() {
   }
 }
 
-element("scenes").append(...SCENES.map(([path, title]) => new Option(title, path)));
+for (const [label, options] of [
+  ["Scenes", SCENES.map(([path, title]) => new Option(title, path))],
+  ["Training subjects, by level", SUBJECTS.map(([path, title, level]) => new Option(`${level} · ${title}`, path))],
+]) {
+  const group = Object.assign(document.createElement("optgroup"), { label });
+  group.append(...options);
+  element("scenes").append(group);
+}
 element("scenes").addEventListener("change", ({ target }) => {
   target.blur();
   own.clear();
   history.replaceState(null, "", `#scene=${target.value}`);
   tryScene(target.value);
 });
-element("again").addEventListener("click", () => tryScene(open.path));
-element("save-script").addEventListener("click", async () => save("played.toml", head() + await ask("script"), "text/plain"));
+element("again").addEventListener("click", again);
+element("save-script").addEventListener("click", saveScript);
 element("save-session").addEventListener("click", saveSession);
 element("save-table").addEventListener("click", saveTable);
 element("save-picture").addEventListener("click", savePicture);
+element("save-report").addEventListener("click", saveReport);
 element("share").addEventListener("click", share);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => button.blur());
 
 dialogs.prepare(openScene, () => open.path);
+training.prepare(again, saveSession, saveReport);
 hands.buttons();
 hands.field(element("hand"), element("knob"));
 hands.gamepad();

@@ -7,6 +7,7 @@ export const SCENES = [
   ["scenes/arch_plaque.toml", "Arch: aneurysm and plaque"],
   ["scenes/arch_angiography.toml", "Arch: angiography"],
   ["scenes/aortic_arch.toml", "Arch: shaped wire in a patient"],
+  ["scenes/coil.toml", "Aneurysm: coil into its sac"],
   ["scenes/hepatic.toml", "Liver: arteries at rest"],
   ["scenes/hepatic_breathing.toml", "Liver: breathing"],
   ["scenes/curved_tube_exact.toml", "Curved tube"],

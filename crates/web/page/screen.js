@@ -93,7 +93,7 @@ function place({ text, warns }) {
 function happened(now) {
   const recent = now.event && now.time_s - now.event.time_s < 6;
   if (recent) return place({ text: now.event.text, warns: true });
-  if (performance.now() < notice.until) return place(notice);
+  if (notice.text && performance.now() < notice.until) return place(notice);
   const contacts = `${now.contacts} contacts, at most ${newtons(now.wall_force_n)}`;
   place({ text: now.demonstrates ? "the script is shown: move to take over" : `step ${now.step}, ${contacts}`, warns: false });
 }

@@ -49,3 +49,6 @@ export const shown = () => worker.postMessage({ shown: true });
 
 /** Has time stand still while nobody looks. */
 export const hide = (hidden) => worker.postMessage({ hidden });
+
+/** Has time stand still while something is read; pictures go on. */
+export const wait = (waits) => worker.postMessage({ waits });

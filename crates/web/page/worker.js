@@ -1,5 +1,5 @@
 // The session on a clock, beside the page: physics sixty times a second, pictures when there is time for them.
-import init, { Graphics, Session, Surface, keys, sceneFiles } from "./pkg/endowire.js";
+import init, { Graphics, Session, Surface, keys, missingFiles } from "./pkg/endowire.js";
 
 const TICK_MS = 1000 / 60;
 const FRAME_MS = 1000 / 30;
@@ -14,7 +14,7 @@ let due = 0, frameDue = 0, frames = 0, ticks = 0, live = 0, wasLive = false;
 let shown = true;
 /** When the oldest input came in that no picture shows. */
 let inputAt = null;
-let hidden = false, stopped = false;
+let hidden = false, waits = false, stopped = false;
 let counted = { at: performance.now(), ticks: 0, live: 0 };
 
 /** The graphics processor, where the browser has one. */
@@ -84,7 +84,8 @@ function pace(now) {
 function turn() {
   if (session && !hidden) {
     guarded(() => {
-      physics(performance.now() + FRAME_MS);
+      if (waits) due = performance.now() + FRAME_MS;
+      else physics(performance.now() + FRAME_MS);
       const now = performance.now();
       if (shown && now >= frameDue) {
         frameDue = Math.max(frameDue + FRAME_MS, now - FRAME_MS);
@@ -110,9 +111,24 @@ const asked = {
     wasLive = false;
     // The link of a session begins where it ends.
     if (files.has("script.toml")) session.apply({ do: "script" });
-    return session.readout();
+    const task = session.task();
+    // Who is tested reads the task first.
+    waits = task !== null;
+    return task;
   },
-  names: ({ text, path }) => sceneFiles(text, path),
+  /** Has the subject done by its reference, under the beam, as `endowire subject run` does it. */
+  watch() {
+    session = session.watched();
+    // By its key, which is pressed once more to end it.
+    session.key("Enter", true, false);
+    session.key("Enter", false, false);
+    session.apply({ do: "script" });
+  },
+  missing: ({ files, path }) => missingFiles(files, path),
+  score: () => session?.score() ?? null,
+  sessionFile: ({ folder }) => session?.sessionFile(folder) ?? "",
+  report: ({ frames }) => session?.report(frames) ?? "",
+  scriptHead: ({ folder }) => session?.scriptHead(folder, "played.toml") ?? "",
   script: () => session?.script() ?? "",
   record: () => session?.record() ?? null,
   positions: () => session?.positions() ?? new Float64Array(),
@@ -140,6 +156,8 @@ onmessage = async ({ data }) => {
     hidden = data.hidden;
     due = frameDue = performance.now();
     shown = true;
+  } else if (data.waits !== undefined) {
+    waits = data.waits;
   } else if (data.ask) {
     try {
       if (stopped) throw new Error("the simulator has stopped: load the page again");

@@ -1,20 +1,24 @@
 //! endowire in a browser: what a page, or a program in JavaScript, sees of scenes and sessions.
 //!
 //! Nothing is computed here. A [`Session`] takes the inputs of `endowire_play` as objects, lets time go by, and tells readouts, shapes and
-//! pictures; a [`Surface`] says of a file what can be done with it. There is no file system: files are a `Map` from their paths to their bytes, and
-//! [`scene_files`] tells which a scene needs.
+//! pictures, and of a training subject its task and its score; a [`Surface`] says of a file what can be done with it. There is no file system: files are a
+//! `Map` from their paths to their bytes, and [`missing_files`] tells which are needed.
 
 mod files;
 mod graphics;
+mod opened;
 mod pad;
 mod played;
 mod session;
+mod subject;
 mod surface;
 
 use std::path::Path;
+use std::sync::Arc;
 
-use js_sys::Array;
+use js_sys::{Array, Map};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use wasm_bindgen::prelude::*;
 
 pub use graphics::Graphics;
@@ -44,14 +48,25 @@ fn object(value: &impl Serialize) -> Result<JsValue, JsError> {
     js_sys::JSON::parse(&text).map_err(|_| thrown("an object cannot be made"))
 }
 
-/// Paths of the files that a scene needs, the scene's own first: each as `new Session` looks for it.
+/// The value that the JSON of an object says.
+fn value<T: DeserializeOwned>(object: &JsValue) -> Result<T, JsError> {
+    let text = js_sys::JSON::stringify(object).ok().and_then(|text| text.as_string());
+    serde_json::from_str(&text.unwrap_or_default()).map_err(thrown)
+}
+
+/// Paths of the files that a scene or a training subject at `path` needs and that are not among `files`, as far as those tell: ask again with
+/// these until nothing is missing. Each path is as `new Session` looks for it.
 ///
 /// # Errors
-/// Names line and key of what is wrong in the scene's text.
-#[wasm_bindgen(js_name = sceneFiles, unchecked_return_type = "string[]")]
-pub fn scene_files(text: &str, path: &str) -> Result<Array, JsError> {
-    let named = played::named(text, Path::new(path)).map_err(thrown)?;
-    Ok(named.into_iter().map(JsValue::from).collect())
+/// Names file, line and key of what is wrong in one of them.
+#[wasm_bindgen(js_name = missingFiles, unchecked_return_type = "string[]")]
+pub fn missing_files(
+    #[wasm_bindgen(unchecked_param_type = "Map<string, Uint8Array>")] files: &Map,
+    path: &str,
+) -> Result<Array, JsError> {
+    let files = Arc::new(files::of_map(files)?);
+    let missing = opened::missing(&files, Path::new(path)).map_err(thrown)?;
+    Ok(missing.iter().map(|path| JsValue::from(path.display().to_string())).collect())
 }
 
 /// Keys of a session with what they do, for people: of the keyboard, and of a gamepad.

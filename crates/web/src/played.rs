@@ -1,54 +1,176 @@
 //! A session with its pictures and keys, from files in memory.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use endowire_assess::{Exam, SessionFile};
 use endowire_core::file::{Files, InMemory};
+use endowire_core::insertion::Script;
+use endowire_core::methods::MethodChoice;
 use endowire_core::vessel::{CentrelineTree, NoStore};
 use endowire_core::{Error, Result};
-use endowire_methods::Scene;
-use endowire_play::{Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot};
+use endowire_methods::Setting;
+use endowire_play::{Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, script_head};
+use endowire_report::{Frame, Recorder, Run, Series, Vessel, events};
 use endowire_viewer::{Backend, Image, PixelFormat, ViewSpec};
+use serde_json::{Value, json};
+
+use crate::opened::Opened;
 
 /// A session as a page shows it.
 #[derive(Debug)]
 pub(crate) struct Played {
     pub(crate) session: Session,
     pub(crate) keys: Keys,
+    /// The scene's file, and its keys that have other values.
+    scene_path: PathBuf,
+    settings: Vec<Setting>,
+    /// The script that was given, or else that of the subject or the scene.
+    script: Script,
+    /// Where a report of it comes from, and what it has of the steps.
+    provenance: Value,
+    recorder: Recorder,
+    /// Steps that it has.
+    noted: usize,
     pictures: Pictures,
     /// What was seen of the room and the line when the 3D view was drawn last.
     drawn_3d: Option<(usize, Option<[f64; 3]>, u64)>,
 }
 
-/// The file that a scene's script is replaced by, where there is one.
+/// The file whose script takes the place of any other, where there is one.
 pub(crate) const SCRIPT: &str = "script.toml";
 
 impl Played {
-    /// The scene at `path` of `files`, with the script of [`SCRIPT`] if that is among them, and pictures of so many pixels a side.
+    /// What the file at `path` of `files` opens, with pictures of so many pixels a side: a scene, or a subject, whose script is not shown.
+    /// With the script of [`SCRIPT`], which is shown in either, if that is among the files.
     ///
     /// # Errors
-    /// As those of scenes, simulations and pictures: what is wrong in which file, by key.
+    /// As those of subjects, scenes, simulations and pictures: what is wrong in which file, by key.
     pub(crate) fn new(files: &Arc<InMemory>, path: &Path, side_px: u32) -> Result<Self> {
-        let mut scene = Scene::read_of(files.clone(), path)?;
-        if files.0.contains_key(Path::new(SCRIPT)) {
-            scene.take_script(Path::new(SCRIPT))?;
+        let opened = Opened::of(files, path)?;
+        let mut scene = opened.read(files)?;
+        let given = files.0.contains_key(Path::new(SCRIPT)).then(|| PathBuf::from(SCRIPT));
+        let is_shown = opened.subject.is_none() || given.is_some();
+        if let Some(script) = given.or_else(|| opened.reference()) {
+            scene.take_script(&script)?;
         }
         let simulation = scene.simulation(&NoStore)?;
         let script = scene.steps(simulation.stack(), &NoStore)?;
-        let view = view(&scene, path, &**files)?;
+        let view = view(opened.view(&scene)?, &**files)?;
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let wall = simulation.lumen().wall(&NoStore)?.clone();
-        let session = Session::new(simulation, view, side_px, Limits::default())?.with_script(script);
+        let mut session = Session::new(simulation, view, side_px, Limits::default())?;
+        if is_shown {
+            session = session.with_script(script.clone());
+        }
+        let Opened { scene: scene_path, settings, subject } = opened;
+        if let Some(subject) = subject {
+            session = session.with_exam(Exam::new(subject, scene.centreline(&NoStore)?)?);
+        }
         let pictures = Pictures::new(&scene, &session.snapshot(), wall)?;
-        Ok(Self { session, keys: Keys::new(names), pictures, drawn_3d: None })
+        let provenance = json!({
+            "scene": scene.name, "method": scene.method.name(), "seed": scene.seed, "version": env!("CARGO_PKG_VERSION"),
+        });
+        Ok(Self {
+            session,
+            keys: Keys::new(names),
+            scene_path,
+            settings,
+            script,
+            provenance,
+            recorder: Recorder::default(),
+            noted: 0,
+            pictures,
+            drawn_3d: None,
+        })
+    }
+
+    /// The same with the script by which a subject can be done.
+    pub(crate) fn watched(self) -> Self {
+        Self { session: self.session.with_script(self.script.clone()), ..self }
+    }
+
+    /// What is assessed of it, with the scene's file seen from where `folder` is.
+    pub(crate) fn session_file(&self, folder: &Path) -> SessionFile {
+        SessionFile {
+            scene_file: folder.join(&self.scene_path),
+            set: self.settings.iter().map(ToString::to_string).collect(),
+            record: self.session.record().clone(),
+        }
+    }
+
+    /// The head of its script where that stands in `file`, likewise.
+    pub(crate) fn script_head(&self, folder: &Path, file: &Path) -> String {
+        script_head(&folder.join(&self.scene_path), &self.settings, file)
     }
 
     /// Takes what keys have come to.
     pub(crate) fn take(&mut self, inputs: &[Input]) {
         for input in inputs {
             // What is refused is an event of the session.
-            let _ = self.session.apply(input);
+            let _ = self.apply(input);
         }
+    }
+
+    /// Takes an input.
+    ///
+    /// # Errors
+    /// As [`Session::apply`].
+    pub(crate) fn apply(&mut self, input: &Input) -> Result<()> {
+        let done = self.session.apply(input);
+        self.note();
+        done
+    }
+
+    /// A sixtieth of a second goes by.
+    pub(crate) fn tick(&mut self) {
+        self.session.tick();
+        self.note();
+    }
+
+    /// Keeps what a report has of a step that was done, or forgets what was undone.
+    fn note(&mut self) {
+        let steps = self.session.steps();
+        if steps != self.noted {
+            self.recorder.note(steps, self.session.simulation());
+            self.noted = steps;
+        }
+    }
+
+    /// What a page shows of the session so far, with these pictures of it.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] before the first step.
+    pub(crate) fn report(&self, frames: Vec<Frame>) -> Result<Run> {
+        if self.noted == 0 {
+            return Err(Error::parameter("step", 0, "there is nothing to report: move an instrument first"));
+        }
+        let readout = self.session.readout();
+        let mut summary = self.provenance.clone();
+        summary["steps"] = self.noted.into();
+        summary["steps_asked"] = self.noted.into();
+        summary["inserted_mm"] = self.session.simulation().report().inserted_mm.into();
+        summary["time_s"] = readout.time_s.into();
+        summary["beam_s"] = readout.lab.beam_s.into();
+        summary["dose_ugy"] = readout.lab.dose_ugy.into();
+        summary["unconverged_steps"] = readout.went.unconverged_steps.into();
+        if !self.settings.is_empty() {
+            summary["set"] = self.settings.iter().map(ToString::to_string).collect();
+        }
+        if let Some(score) = self.session.score() {
+            summary["subject"] = score.subject.as_str().into();
+            summary["score"] = score.verdict.words().into();
+        }
+        let rows = self.recorder.rows();
+        Ok(Run {
+            summary,
+            instruments: readout.instruments.into_iter().map(|one| one.name).collect(),
+            vessel: Vessel::of(self.session.simulation().lumen().wall(&NoStore)?.mesh()),
+            steps: self.recorder.moments().to_vec(),
+            series: Series::of(rows),
+            events: events(rows),
+            frames,
+        })
     }
 
     /// The live fluoroscopic picture of each plane, or the last one.
@@ -116,9 +238,8 @@ impl Played {
     }
 }
 
-/// The `[view]` table of a scene, with what medium flows along.
-fn view(scene: &Scene, path: &Path, files: &dyn Files) -> Result<ViewSpec> {
-    let mut view = ViewSpec::of_scene(scene, path)?;
+/// The `[view]` table of a scene as a page can draw it, with what medium flows along.
+fn view(mut view: ViewSpec, files: &dyn Files) -> Result<ViewSpec> {
     if let Some(ct) = &view.patient.ct {
         let mend = "tomograms are read by the program alone: leave [view.patient.ct] out here";
         return Err(Error::parameter("view.patient.ct.file", ct.file.display(), mend));
@@ -130,19 +251,6 @@ fn view(scene: &Scene, path: &Path, files: &dyn Files) -> Result<ViewSpec> {
         view.flow.centreline = Some(Arc::new(CentrelineTree::read_of(files, &tree)?));
     }
     Ok(view)
-}
-
-/// Paths of the files that a scene needs, its own first.
-///
-/// # Errors
-/// As [`Scene::from_toml`].
-pub(crate) fn named(text: &str, path: &Path) -> Result<Vec<String>> {
-    let scene = Scene::from_toml(text, path)?;
-    let view = ViewSpec::of_scene(&scene, path)?;
-    let mut named = vec![path.to_owned()];
-    named.extend(scene.input_paths());
-    named.extend(view.flow.tree.filter(|tree| !named.contains(tree)));
-    Ok(named.iter().map(|path| path.display().to_string()).collect())
 }
 
 /// Red, green, blue and alpha of each pixel.

@@ -6,14 +6,17 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use endowire_play::{Input, Modifiers, Pad, Sharpened};
+use endowire_report::Frame;
 use endowire_viewer::Image;
-use js_sys::{Array, JSON, Map};
+use js_sys::{Array, Map};
+use serde::Deserialize;
 use wasm_bindgen::Clamped;
 use wasm_bindgen::prelude::*;
 
 use crate::graphics::Graphics;
 use crate::played::{Played, rgba};
-use crate::{files, object, pad, thrown};
+use crate::subject::{Task, Told};
+use crate::{files, object, pad, thrown, value};
 
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &'static str = include_str!("types.d.ts");
@@ -31,8 +34,8 @@ pub struct Session {
 
 #[wasm_bindgen]
 impl Session {
-    /// A session of the scene at `path` of `files`, with the script of `script.toml` in place of its own if that is among them.
-    /// Pictures have `side` pixels a side.
+    /// A session of the scene or the training subject at `path` of `files`, with the script of `script.toml` in place of its own if that is among them.
+    /// Pictures have `side` pixels a side. The script of a subject is not shown, unless it is given or the session is `watched`.
     ///
     /// # Errors
     /// What is wrong in which file, by line and key.
@@ -45,6 +48,12 @@ impl Session {
         let files = Arc::new(files::of_map(files)?);
         let played = Played::new(&files, Path::new(path), side).map_err(thrown)?;
         Ok(Self { played, pad: Pad::default(), graphics: None, sharpened: Rc::default() })
+    }
+
+    /// The same session with the script by which its subject can be done, which `{ do: "script" }` shows. This one is of no use any more.
+    #[must_use]
+    pub fn watched(self) -> Session {
+        Self { played: self.played.watched(), ..self }
     }
 
     /// Has sharp pictures computed by a graphics processor from now on.
@@ -61,9 +70,8 @@ impl Session {
         &mut self,
         #[wasm_bindgen(unchecked_param_type = "Input")] input: &JsValue,
     ) -> Result<(), JsError> {
-        let text = JSON::stringify(input).ok().and_then(|text| text.as_string()).unwrap_or_default();
-        let input: Input = serde_json::from_str(&text).map_err(thrown)?;
-        self.played.session.apply(&input).map_err(thrown)
+        let input: Input = value(input)?;
+        self.played.apply(&input).map_err(thrown)
     }
 
     /// Hears a key that goes down, once more while it is held (`again`), or up, by its `code`.
@@ -95,7 +103,7 @@ impl Session {
 
     /// A sixtieth of a second goes by.
     pub fn tick(&mut self) {
-        self.played.session.tick();
+        self.played.tick();
     }
 
     /// What the operator reads.
@@ -196,6 +204,63 @@ impl Session {
     #[wasm_bindgen(unchecked_return_type = "SessionRecord")]
     pub fn record(&self) -> Result<JsValue, JsError> {
         object(self.played.session.record())
+    }
+
+    /// What stands above the `script` in its file `name`: of which scene it is, whose file is seen from where `folder` is, and the command that carries it out.
+    #[wasm_bindgen(js_name = scriptHead)]
+    pub fn script_head(&self, folder: &str, name: &str) -> String {
+        self.played.script_head(Path::new(folder), Path::new(name))
+    }
+
+    /// The text of a `*.session.json`, as `endowire play` writes it and `endowire assess` reads it: the scene's file, as seen from where `folder` is, what is
+    /// set of it, and the `record`.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(js_name = sessionFile)]
+    pub fn session_file(&self, folder: &str) -> Result<String, JsError> {
+        serde_json::to_string(&self.played.session_file(Path::new(folder))).map_err(thrown)
+    }
+
+    /// What is to be done, if it is a training subject.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "Task | null")]
+    pub fn task(&self) -> Result<JsValue, JsError> {
+        let standing = self.played.session.standing();
+        object(&standing.as_ref().map(|standing| Task::of(&standing.task)))
+    }
+
+    /// The score of a training subject: of all so far where it has not ended.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "Score | null")]
+    pub fn score(&self) -> Result<JsValue, JsError> {
+        let score = self.played.session.score();
+        object(&score.as_deref().map(Told::of))
+    }
+
+    /// The session so far as one page of HTML that any browser shows without a network, as `endowire report` makes it of a recording: shapes in 3D, forces,
+    /// events, and these pictures of it, PNG in Base64.
+    ///
+    /// # Errors
+    /// Before the first step; pictures that are none.
+    pub fn report(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "{ view: string; png: string }[]")] frames: &JsValue,
+    ) -> Result<String, JsError> {
+        #[derive(Deserialize)]
+        struct Picture {
+            view: String,
+            png: String,
+        }
+        let step = self.played.session.steps();
+        let frame = |Picture { view, png }| Frame { step, view, png };
+        let frames: Vec<Picture> = value(frames)?;
+        let run = self.played.report(frames.into_iter().map(frame).collect()).map_err(thrown)?;
+        endowire_report::run_page(&run).map_err(thrown)
     }
 
     /// All motions, and what was injected, as the text of a script that `endowire run` carries out to the bit.

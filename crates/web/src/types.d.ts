@@ -30,7 +30,30 @@ export interface Readout {
     live: boolean; mode: string; lao_deg: number; cra_deg: number; second_deg: [number, number] | null;
     magnification: number; field_mm: number; open: [number, number]; beam_s: number; dose_ugy: number;
   };
+  subject?: {
+    subject: string; distance_mm: number | null; injected_there_ml: number;
+    used: { what: string; value: number; limit: number; unit: string }[]; verdict: Verdict | null;
+  };
   event: { step: number; time_s: number; kind: string; text: string } | null; events: number;
+}
+
+/** What is to be done in a training subject: in words, and what is asked of which measure. */
+export interface Task {
+  name: string; level: number; text: string; target: string; tip_within_mm: number; inject_ml: number | null;
+  goal: string; limits: string[]; counts: { name: string; definition: string; asked: string; points: number }[];
+}
+
+/** What has come of a training subject; `ended` is null where it was left before. */
+export interface Verdict { passed: boolean; score: number; ended: { by: "goal" | "time" | "beam" | "contrast" | "wall_force"; time_s: number } | null; }
+
+/** The score of a training subject: numbers as `endowire assess --json` has them in `metrics`, and in words in `words` and `rows`. */
+export interface Score extends Verdict {
+  subject: string; words: string;
+  metrics: {
+    name: string; group: string; value: number | null; unit: string; better: "lower" | "higher"; definition: string; study: string;
+    threshold: { at_most?: number; at_least?: number; points: number } | null; passed: boolean | null;
+  }[];
+  rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null }[];
 }
 
 /** What hands, beam and injector have done: a sample for each tick, rests that follow each other being one. */

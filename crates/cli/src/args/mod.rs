@@ -13,7 +13,8 @@ mod subjects;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
-use endowire_sweep::{Setting, Shard};
+use endowire_methods::Setting;
+use endowire_sweep::Shard;
 
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, SacArgs,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use endowire_sweep::Setting;
+use endowire_methods::Setting;
 use endowire_viewer::{Mode, Pose};
 
 use super::{CacheArgs, ConvergenceArgs, SetArgs};

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_assess::{Metric, Record, Score, Subject, Way};
-use endowire_methods::Scene;
-use endowire_sweep::Setting;
+use endowire_methods::{Scene, Setting};
 use serde::Serialize;
 
 use crate::args::AssessArgs;
@@ -12,8 +11,7 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::RecordedSummary;
-use crate::output::session::SessionFile;
-use crate::output::{SUMMARY, answer};
+use crate::output::{SUMMARY, answer, session as session_file};
 use crate::{scenes, subjects};
 
 /// The document of one session.
@@ -98,7 +96,7 @@ fn read_summary(session: &Path) -> Result<RecordedSummary, Failure> {
     if session.is_dir() {
         RecordedSummary::read(&session.join(SUMMARY))
     } else {
-        SessionFile::read_summary(session)
+        session_file::read_summary(session)
     }
 }
 

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use endowire_core::vessel::VesselMotion;
-use endowire_methods::Scene;
-use endowire_sweep::Setting;
+use endowire_methods::{Scene, Setting};
 use endowire_viewer::{FrameTime, Seen};
 
 use super::studio::{Plan, Still, Studio};

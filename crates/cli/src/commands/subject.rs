@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
 use crate::scenes;
-use crate::subjects::{self, ScoreDocument, asked};
+use crate::subjects::{self, ScoreDocument};
 
 /// Side of pictures, which nobody sees here, pixels.
 const SIDE_PX: u32 = 64;
@@ -119,27 +119,13 @@ fn text_of(shown: &Shown<'_>) -> String {
         vec![format!("{}: {}, level {}", shown.subject, shown.name, shown.level), shown.text.to_owned()];
     let set: String = shown.scene_set.iter().map(|setting| format!(" --set '{setting}'")).collect();
     lines.push(format!("scene      {}{set}", shown.scene.display()));
-    let inject = shown.goal.inject_ml.map_or_else(String::new, |ml| format!(", and {ml} ml injected there"));
-    lines.push(format!(
-        "goal       tip within {} mm of {}{inject}",
-        shown.goal.tip_within_mm, shown.goal.target
-    ));
-    let Limits { time_s, beam_s, contrast_ml, wall_force_n } = shown.limits;
-    let limits = [
-        ("time", time_s, "s"),
-        ("beam", beam_s, "s"),
-        ("contrast", contrast_ml, "ml"),
-        ("wall force", wall_force_n, "N"),
-    ];
-    let limits: Vec<String> = limits
-        .iter()
-        .filter_map(|(what, limit, unit)| limit.map(|limit| format!("{what} {limit} {unit}")))
-        .collect();
+    lines.push(format!("goal       {}", shown.goal.words()));
+    let limits = shown.limits.words();
     if !limits.is_empty() {
         lines.push(format!("ends at    {}", limits.join(", ")));
     }
     lines.extend(shown.thresholds.iter().map(|Named { metric, threshold }| {
-        format!("threshold  {metric:<22} {:<16} points {}", asked(threshold), threshold.points)
+        format!("threshold  {metric:<22} {:<16} points {}", threshold.words(), threshold.points)
     }));
     lines.join("\n")
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use endowire_methods::Scene;
-use endowire_sweep::{Program, Setting, hash_inputs};
+use endowire_methods::{Scene, Setting};
+use endowire_sweep::{Program, hash_inputs};
 use serde::Serialize;
 
 use crate::failure::Failure;

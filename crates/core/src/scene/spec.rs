@@ -157,6 +157,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         parse_toml::<Self>(text, path)?.of_file(text.to_owned(), path)
     }
 
+    /// The same scene, whose files are looked for among `files`.
+    #[must_use]
+    pub fn with_files(self, files: Arc<dyn Files>) -> Self {
+        Self { files, ..self }
+    }
+
     fn of_file(mut self, text: String, path: &Path) -> Result<Self> {
         self.path = path.to_path_buf();
         self.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();

@@ -5,6 +5,7 @@
 
 mod chromium;
 mod native;
+mod training;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -28,12 +29,17 @@ const READY: &str = "document.querySelector('#instruments')?.children.length > 0
 /// Imports the module beside the page's own; `opened` makes sessions of a scene there, whose text may be changed before, and `session` is
 /// one.
 fn module(browser: &mut Browser, scene: &str, side_px: u32) {
+    module_of(browser, &format!("scenes/{scene}"), side_px);
+}
+
+/// The same of a scene or a subject by its path.
+fn module_of(browser: &mut Browser, path: &str, side_px: u32) {
     browser.wait(READY);
     browser.eval(&format!(
         "(async () => {{
             const module = await import('./pkg/endowire.js');
             await module.default();
-            const path = 'scenes/{scene}';
+            const path = '{path}';
             const files = await (await import('./files.js')).filesOf(path);
             window.opened = (change = (text) => text) => {{
                 const text = change(new TextDecoder().decode(files.get(path)));

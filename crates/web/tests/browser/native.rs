@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_assess::{Exam, Record, Subject};
 use endowire_core::insertion::Simulation;
 use endowire_core::vessel::NoStore;
-use endowire_methods::Scene;
+use endowire_methods::{Scene, Setting, scene_with};
 use endowire_play::{Input, Limits, Pictures, Session};
 use endowire_viewer::{Backend, Image, ViewSpec};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// A scene of `assets`.
 pub(crate) fn scene(name: &str) -> (PathBuf, Scene) {
@@ -26,6 +27,31 @@ pub(crate) fn session(name: &str, side_px: u32) -> (Session, Pictures) {
     let session = Session::new(simulation, view, side_px, Limits::default()).unwrap();
     let pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
     (session, pictures)
+}
+
+/// A training subject of `assets` in its scene, with the session of it that its reference is shown in.
+pub(crate) fn subject(name: &str, side_px: u32) -> (Exam, Session) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/subjects").join(name);
+    let subject = Subject::read(&path).unwrap();
+    let settings: Vec<Setting> = subject.set.iter().map(|text| text.parse().unwrap()).collect();
+    let scene_path = subject.resolve(&subject.scene);
+    let mut scene = scene_with(&scene_path, &settings, |_| Ok(())).unwrap();
+    if let Some(reference) = &subject.reference {
+        scene.take_script(&subject.resolve(reference)).unwrap();
+    }
+    let view = ViewSpec::of_scene(&scene, &scene_path).unwrap();
+    let simulation = scene.simulation(&NoStore).unwrap();
+    let script = scene.steps(simulation.stack(), &NoStore).unwrap();
+    let exam = Exam::new(subject, scene.centreline(&NoStore).unwrap()).unwrap();
+    let session = Session::new(simulation, view, side_px, Limits::default()).unwrap();
+    (exam.clone(), session.with_script(script).with_exam(exam))
+}
+
+/// What `endowire assess FILE --subject` makes of the text of a session's file.
+pub(crate) fn assessed(exam: Exam, text: &str) -> Value {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), text).unwrap();
+    serde_json::to_value(&*exam.score(&Record::read(file.path()).unwrap())).unwrap()
 }
 
 /// Bits of the nodes' coordinates.
@@ -86,7 +112,7 @@ impl Dice {
     }
 
     /// Anything, valid or not, as a page could send it.
-    pub(crate) fn wild(&mut self) -> serde_json::Value {
+    pub(crate) fn wild(&mut self) -> Value {
         let number = self.one(&[0.0, -1.0, 0.2, 7.5, 400.0, -1e308, 1e-308]);
         let second = self.one(&[0.5, -30.0, 1e9, 0.0]);
         match self.below(16) {

@@ -6,8 +6,7 @@ use endowire_core::Vec3;
 use endowire_core::insertion::{DetachedCoil, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
-use endowire_methods::Scene;
-use endowire_sweep::{Key, Setting};
+use endowire_methods::{Key, Scene, Setting};
 use endowire_viewer::{ContactView, Pushed, Renderer, View, ViewSpec};
 use serde_json::{Map, Value};
 

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use endowire_play::{Session, Went};
-use endowire_sweep::Setting;
+use endowire_assess::SessionFile;
+use endowire_methods::Setting;
+use endowire_play::{Session, Went, script_head};
 
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::session::SessionFile;
-use crate::output::{tell, to_json, whole};
+use crate::output::{session as session_file, tell, to_json, whole};
 use crate::subjects::ScoreDocument;
 
 /// How often a session that goes on is written.
@@ -29,16 +29,7 @@ pub(crate) struct Record {
 impl Record {
     /// A record in a file of what is done in a scene with these settings.
     pub(crate) fn new(path: PathBuf, scene: &Path, settings: &[Setting]) -> Self {
-        // A name with a line break would end the comment.
-        let shown = |path: &Path| path.display().to_string().replace(char::is_control, " ");
-        let set = settings.iter().filter(|setting| setting.key.begins() != "script");
-        let set: String =
-            set.map(|setting| format!(" --set '{setting}'").replace(char::is_control, " ")).collect();
-        let head = format!(
-            "# What hands have done in {0}; carried out again by\n# endowire run {0} --script {1}{set}\n\n",
-            shown(scene),
-            shown(&path)
-        );
+        let head = script_head(scene, settings, &path);
         let set = settings.iter().map(ToString::to_string).collect();
         Self { path, head, scene: scene.to_path_buf(), set, provenance: None, written: Instant::now() }
     }
@@ -77,7 +68,7 @@ impl Record {
             set: self.set.clone(),
             record: session.record().clone(),
         };
-        of_session.write(&SessionFile::beside(&self.path))?;
+        session_file::write(&of_session, &session_file::beside(&self.path))?;
         if let Some((provenance, score)) = self.provenance.as_ref().zip(session.score()) {
             let path = self.path.with_extension("score.json");
             let text = to_json(&ScoreDocument { provenance, score: &score })?;

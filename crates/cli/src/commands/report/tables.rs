@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_report::base64;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::base64::base64;
 use crate::failure::Failure;
 
 /// Most rows of a table that a page shows, most pictures, and most bytes of all of them.

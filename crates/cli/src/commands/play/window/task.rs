@@ -4,7 +4,7 @@ use endowire_assess::{Score, Standing, Subject, Threshold};
 
 use super::screen::{CHOSEN, TEXT, WARN};
 use super::text::{Canvas, Writer};
-use crate::subjects::{asked, kept, verdict};
+use crate::subjects::verdict;
 
 /// Size of letters, their width and the distance of lines, pixels.
 const LETTER_PX: u32 = 15;
@@ -64,7 +64,7 @@ fn write(
 }
 
 fn task_lines(task: &Subject) -> Vec<Line> {
-    let row = |threshold: &Threshold| (TEXT, format!("  {}: {}", threshold.metric, asked(threshold)));
+    let row = |threshold: &Threshold| (TEXT, format!("  {}: {}", threshold.metric, threshold.words()));
     let head = (CHOSEN, format!("{} (level {})", task.name, task.level));
     let text = (TEXT, task.text.clone());
     [head, text].into_iter().chain(task.threshold.iter().map(row)).collect()
@@ -89,9 +89,9 @@ fn standing_lines(standing: &Standing) -> Vec<Line> {
 fn score_lines(score: &Score) -> Vec<Line> {
     let head = (if score.verdict.passed { CHOSEN } else { WARN }, verdict(score));
     let rows = score.asked().map(|(scored, threshold)| {
-        let (kept, value) = kept(scored);
+        let (kept, value) = (scored.kept_words(), scored.value_words());
         let colour = if scored.passed == Some(true) { TEXT } else { WARN };
-        (colour, format!("  {kept:<6} {}: {value}, {}", scored.metric.name, asked(threshold)))
+        (colour, format!("  {kept:<6} {}: {value}, {}", scored.metric.name, threshold.words()))
     });
     let end = (TEXT, "What is done now does not count. Esc ends.".to_owned());
     std::iter::once(head).chain(rows).chain([end]).collect()

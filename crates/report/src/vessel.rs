@@ -4,12 +4,32 @@ use std::collections::HashMap;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
+use serde::Serialize;
+
+use crate::run::scaled;
 
 /// Most triangles that a page draws.
 const MOST: usize = 6000;
 
+/// The vessel as a page draws it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Vessel {
+    /// Coordinates x y z of its vertices, tenths of a millimetre.
+    vertices: Vec<i32>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Vessel {
+    /// That of a mesh, with fewer triangles.
+    pub fn of(mesh: &SurfaceMesh) -> Self {
+        let mesh = simplified(mesh);
+        let vertices = mesh.vertices_mm.iter().flat_map(|v| scaled(v, 10.0)).collect();
+        Self { vertices, triangles: mesh.triangles }
+    }
+}
+
 /// The mesh with vertices that are near each other made one, until it has few triangles.
-pub(super) fn simplified(mesh: &SurfaceMesh) -> SurfaceMesh {
+fn simplified(mesh: &SurfaceMesh) -> SurfaceMesh {
     let Some((low, high)) = mesh.bounds_mm() else { return mesh.clone() };
     if mesh.triangles.len() <= MOST {
         return mesh.clone();

@@ -51,12 +51,12 @@ impl Key {
     }
 
     /// Whether what it names is the other, or holds it: giving it a value takes that of the other away.
-    pub(crate) fn holds(&self, other: &Self) -> bool {
+    pub fn holds(&self, other: &Self) -> bool {
         other.parts.starts_with(&self.parts)
     }
 
     /// Whether it may lie in a device file.
-    pub(crate) fn is_of_device(&self) -> bool {
+    pub fn is_of_device(&self) -> bool {
         let of = |key: &Part| matches!(key, Part::Name(key) if OF_DEVICES.contains(&key.as_str()));
         match self.parts.as_slice() {
             [Part::Name(first), key, ..] if first == "device" => of(key),

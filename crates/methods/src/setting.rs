@@ -1,14 +1,16 @@
 //! Keys of a scene that are given other values than its file has: by a sweep, or on a command line.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
-use endowire_core::input::from_toml;
+use endowire_core::file::{FileSystem, Files};
+use endowire_core::input::from_toml_of;
 use endowire_core::{Error, Result};
-use endowire_methods::Scene;
 use toml::{Table, Value};
 
+use crate::Scene;
 use crate::key::Key;
 
 /// A key of a scene and its value, `KEY=VALUE`. The key is one as in a sweep, the value one as in the scene file; text needs no quotes.
@@ -51,74 +53,118 @@ impl fmt::Display for Setting {
 /// # Errors
 /// Those of the file; a key that the scene does not know, with the nearest right one, and a value that its key does not take.
 pub fn scene_with(path: &Path, settings: &[Setting], check: impl Fn(&Scene) -> Result<()>) -> Result<Scene> {
-    let scene = Scene::read(path)?;
+    scene_with_of(Arc::new(FileSystem), path, settings, check)
+}
+
+/// The same of a scene that is among `files`, where those that it names are too.
+///
+/// # Errors
+/// As [`scene_with`].
+pub fn scene_with_of(
+    files: Arc<dyn Files>,
+    path: &Path,
+    settings: &[Setting],
+    check: impl Fn(&Scene) -> Result<()>,
+) -> Result<Scene> {
+    let scene = Scene::read_of(files.clone(), path)?;
     if settings.is_empty() {
         return Ok(scene);
     }
     check(&scene)?;
-    let mut document = document_of(&scene, path)?;
+    let mut tables = SceneTables::of_file(scene.text(), path, files)?;
     let of_device = |setting: &&Setting| setting.key.is_of_device();
     let first = settings.iter().filter(|setting| !of_device(setting));
     for Setting { key, value } in first.chain(settings.iter().filter(of_device)) {
-        let tried = try_in(path, &document, key, value, &check);
+        let tried = tables.check(key, value, &check);
         tried.map_err(|error| match error {
             Error::Parameter { .. } => Error::content(path, format!("--set: {error}")),
             other => other,
         })?;
-        assign(path, &mut document, key, value)?;
+        tables.set(key, value)?;
     }
-    scene_of(path, &document)
+    tables.scene()
 }
 
-/// The tables of a scene.
-pub(crate) fn document_of(scene: &Scene, path: &Path) -> Result<Value> {
-    toml::from_str(scene.text()).map_err(|error| Error::content(path, error.message().to_owned()))
+/// The tables of a scene file, whose keys are given other values.
+#[derive(Debug, Clone)]
+pub struct SceneTables {
+    path: PathBuf,
+    files: Arc<dyn Files>,
+    tables: Value,
 }
 
-/// Gives a key a value in the document of the scene file `path`. Where it is one of a device file, that stands in the scene from then on.
-pub(crate) fn assign(path: &Path, document: &mut Value, key: &Key, value: &Value) -> Result<()> {
-    if let Some(table) = key.device_table(document) {
-        open_device(path, table)?;
+impl SceneTables {
+    /// Those of the text of the scene file `path`, which is among `files`.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for what is no TOML.
+    pub fn of_file(text: &str, path: &Path, files: Arc<dyn Files>) -> Result<Self> {
+        let tables =
+            toml::from_str(text).map_err(|error| Error::content(path, error.message().to_owned()))?;
+        Ok(Self { path: path.to_owned(), files, tables })
     }
-    key.set(document, value.clone())
+
+    /// The scene file: paths start from its folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives a key a value. Where it is one of a device file, what that says stands in the scene from then on.
+    ///
+    /// # Errors
+    /// As [`Key::set`], and those of the device file.
+    pub fn set(&mut self, key: &Key, value: &Value) -> Result<()> {
+        if let Some(table) = key.device_table(&mut self.tables) {
+            open_device(&self.path, &*self.files, table)?;
+        }
+        key.set(&mut self.tables, value.clone())
+    }
+
+    /// Themselves, to change what no key alone says.
+    pub fn tables_mut(&mut self) -> &mut Value {
+        &mut self.tables
+    }
+
+    /// Whether the scene takes this value, and `check` the scene.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] with key and value where it does not.
+    pub fn check(&self, key: &Key, value: &Value, check: impl Fn(&Scene) -> Result<()>) -> Result<()> {
+        let mut tried = self.clone();
+        tried.set(key, value)?;
+        tried.scene().and_then(|scene| check(&scene)).map_err(|error| match error {
+            Error::Content { reason, .. } => Error::parameter(key, value, without_line(&reason)),
+            other => other,
+        })
+    }
+
+    /// The scene that they say.
+    ///
+    /// # Errors
+    /// As [`Scene::from_toml`].
+    pub fn scene(&self) -> Result<Scene> {
+        Ok(Scene::from_toml(&self.text()?, &self.path)?.with_files(self.files.clone()))
+    }
+
+    /// The text of a scene file that says them.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for what TOML cannot say.
+    pub fn text(&self) -> Result<String> {
+        toml::to_string(&self.tables).map_err(|error| Error::content(&self.path, error.to_string()))
+    }
 }
 
-/// Takes what the device file says into the table that names it.
-fn open_device(path: &Path, table: &mut Table) -> Result<()> {
+/// Takes what the device file says into the table of the scene `path` that names it.
+fn open_device(path: &Path, files: &dyn Files, table: &mut Table) -> Result<()> {
     let Some(Value::String(file)) = table.get("file") else { return Ok(()) };
     let file = path.parent().unwrap_or(Path::new("")).join(file);
-    let (mut device, _): (Table, String) = from_toml(&file)?;
+    let (mut device, _): (Table, String) = from_toml_of(files, &file)?;
     // A table of an instrument has a name of its own.
     device.remove("name");
     table.remove("file");
     table.extend(device);
     Ok(())
-}
-
-/// The scene that a document says.
-pub(crate) fn scene_of(path: &Path, document: &Value) -> Result<Scene> {
-    Scene::from_toml(&text_of(path, document)?, path)
-}
-
-/// A document as the text of a scene file.
-pub(crate) fn text_of(path: &Path, document: &Value) -> Result<String> {
-    toml::to_string(document).map_err(|error| Error::content(path, error.to_string()))
-}
-
-/// Whether the scene takes this value.
-pub(crate) fn try_in(
-    path: &Path,
-    document: &Value,
-    key: &Key,
-    value: &Value,
-    check: impl Fn(&Scene) -> Result<()>,
-) -> Result<()> {
-    let mut tried = document.clone();
-    assign(path, &mut tried, key, value)?;
-    scene_of(path, &tried).and_then(|scene| check(&scene)).map_err(|error| match error {
-        Error::Content { reason, .. } => Error::parameter(key, value, without_line(&reason)),
-        other => other,
-    })
 }
 
 /// The reason without the number of a line that nobody has written.

@@ -1,0 +1,205 @@
+//! What the page of a run shows.
+
+use endowire_core::Vec3;
+use endowire_core::insertion::Simulation;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::vessel::Vessel;
+
+/// Most nodes of all shapes together: what fits into a page of a few megabytes.
+pub const MOST_NODES: usize = 120_000;
+
+/// The document in the page.
+#[derive(Debug, Serialize)]
+pub struct Run {
+    /// What `summary.json` of a recording says, or some of it.
+    pub summary: Value,
+    /// Names of the instruments, the innermost first.
+    pub instruments: Vec<String>,
+    /// Where they are.
+    #[serde(flatten)]
+    pub vessel: Vessel,
+    /// Shapes, by their steps; at least one.
+    pub steps: Vec<Moment>,
+    /// Numbers, by their steps; the last step is that of the last shape.
+    pub series: Series,
+    /// What has happened.
+    pub events: Vec<Event>,
+    /// Pictures.
+    pub frames: Vec<Frame>,
+}
+
+/// A step in 3D.
+#[derive(Debug, Clone, Serialize)]
+pub struct Moment {
+    pub(crate) step: usize,
+    /// Coordinates x y z of the line, sheath first, hundredths of a millimetre.
+    line: Vec<i32>,
+    /// Length of each instrument along the line, as a share of it.
+    shares: Vec<f32>,
+    /// Place and force of contacts: hundredths of a millimetre, and newton.
+    contacts: Vec<([i32; 3], [f32; 3])>,
+}
+
+impl Moment {
+    /// The line of all instruments after a step, the sheath first, mm; how much of each is in, mm; and places (mm) and forces (N) of contacts.
+    pub fn new(
+        step: usize,
+        line_mm: &[Vec3],
+        inserted_mm: &[f64],
+        contacts: impl Iterator<Item = (Vec3, Vec3)>,
+    ) -> Self {
+        let whole_mm = inserted_mm.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let contact = |(at_mm, force_n): (Vec3, Vec3)| {
+            (scaled(&at_mm, 100.0), [force_n.x, force_n.y, force_n.z].map(|x| x as f32))
+        };
+        Self {
+            step,
+            line: line_mm.iter().flat_map(|p| scaled(p, 100.0)).collect(),
+            shares: inserted_mm.iter().map(|mm| (mm / whole_mm) as f32).collect(),
+            contacts: contacts.map(contact).collect(),
+        }
+    }
+
+    /// How many nodes its line has.
+    pub(crate) fn nodes(&self) -> usize {
+        self.line.len() / 3
+    }
+}
+
+pub(crate) fn scaled(point_mm: &Vec3, per_mm: f64) -> [i32; 3] {
+    [point_mm.x, point_mm.y, point_mm.z].map(|x| (x * per_mm).round() as i32)
+}
+
+/// The columns of steps.csv that are shown.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Row {
+    pub(crate) step: usize,
+    inserted_mm: f64,
+    push_force_n: f64,
+    torque_nmm: f64,
+    bend_mj: f64,
+    twist_mj: f64,
+    wall_mj: f64,
+    max_penetration_mm: f64,
+    jumped: bool,
+    left_through: Option<usize>,
+    converged: bool,
+    #[serde(default)]
+    relaxations: u32,
+    // None in recordings of versions that did not tell them.
+    imbalance: Option<f64>,
+    wall_force_sum_n: Option<f64>,
+    wall_force_largest_n: Option<f64>,
+    wall_force_tip_n: Option<f64>,
+}
+
+impl Row {
+    /// That of a simulation after a step.
+    pub fn of(step: usize, simulation: &Simulation) -> Self {
+        let (report, force) = (simulation.report(), simulation.wall_force());
+        Self {
+            step,
+            inserted_mm: report.inserted_mm,
+            push_force_n: report.push_force_n,
+            torque_nmm: report.torque_nmm,
+            bend_mj: report.energy.bend,
+            twist_mj: report.energy.twist,
+            wall_mj: report.energy.wall,
+            max_penetration_mm: report.max_penetration_mm,
+            jumped: report.jumped,
+            left_through: report.left_through,
+            converged: report.converged,
+            relaxations: report.relaxations,
+            imbalance: Some(report.imbalance),
+            wall_force_sum_n: Some(force.sum_n),
+            wall_force_largest_n: Some(force.largest_n),
+            wall_force_tip_n: Some(force.tip_n),
+        }
+    }
+}
+
+/// The columns, each a curve.
+#[derive(Debug, Serialize)]
+pub struct Series {
+    step: Vec<usize>,
+    inserted_mm: Vec<f64>,
+    push_force_n: Vec<f64>,
+    torque_nmm: Vec<f64>,
+    energy_mj: Vec<f64>,
+    wall_mj: Vec<f64>,
+    max_penetration_mm: Vec<f64>,
+    wall_force_sum_n: Vec<Option<f64>>,
+    wall_force_largest_n: Vec<Option<f64>>,
+    wall_force_tip_n: Vec<Option<f64>>,
+    imbalance: Vec<Option<f64>>,
+}
+
+impl Series {
+    /// Those of rows, by their steps.
+    pub fn of(rows: &[Row]) -> Self {
+        Self {
+            step: rows.iter().map(|row| row.step).collect(),
+            inserted_mm: rows.iter().map(|row| row.inserted_mm).collect(),
+            push_force_n: rows.iter().map(|row| row.push_force_n).collect(),
+            torque_nmm: rows.iter().map(|row| row.torque_nmm).collect(),
+            energy_mj: rows.iter().map(|row| row.bend_mj + row.twist_mj + row.wall_mj).collect(),
+            wall_mj: rows.iter().map(|row| row.wall_mj).collect(),
+            max_penetration_mm: rows.iter().map(|row| row.max_penetration_mm).collect(),
+            wall_force_sum_n: rows.iter().map(|row| row.wall_force_sum_n).collect(),
+            wall_force_largest_n: rows.iter().map(|row| row.wall_force_largest_n).collect(),
+            wall_force_tip_n: rows.iter().map(|row| row.wall_force_tip_n).collect(),
+            imbalance: rows.iter().map(|row| row.imbalance).collect(),
+        }
+    }
+}
+
+/// Something that has happened in a step.
+#[derive(Debug, Serialize)]
+pub struct Event {
+    /// Number of the step.
+    pub step: usize,
+    /// What kind of thing.
+    pub what: &'static str,
+    /// For people.
+    pub text: String,
+}
+
+/// Events that rows tell of.
+pub fn events(rows: &[Row]) -> Vec<Event> {
+    let mut events = Vec::new();
+    let mut out = None;
+    for row in rows {
+        let mut happened =
+            |what: &'static str, text: String| events.push(Event { step: row.step, what, text });
+        if row.jumped {
+            happened("jumped", format!("at {:.1} mm: let go of energy", row.inserted_mm));
+        }
+        if let (Some(opening), None) = (row.left_through, out) {
+            happened("left", format!("at {:.1} mm: the tip is out of opening {opening}", row.inserted_mm));
+        }
+        if !row.converged {
+            happened("not converged", format!("at {:.1} mm: the step found no equilibrium", row.inserted_mm));
+        }
+        if row.relaxations > 0 {
+            let left = row.imbalance.unwrap_or_default();
+            let text =
+                format!("at {:.1} mm: left to come to rest, {left:.1e} out of balance", row.inserted_mm);
+            happened("last resort", text);
+        }
+        out = row.left_through;
+    }
+    events
+}
+
+/// A picture of a step.
+#[derive(Debug, Serialize)]
+pub struct Frame {
+    /// Number of the step.
+    pub step: usize,
+    /// What it shows.
+    pub view: String,
+    /// The picture as PNG, in Base64.
+    pub png: String,
+}

@@ -1,0 +1,90 @@
+//! What a page shows of a training subject: its task at the start, and its score.
+
+use endowire_assess::{Metric, Record, Score, Scored, Subject, Threshold};
+use serde::Serialize;
+
+/// A task in words.
+#[derive(Debug, Serialize)]
+pub(crate) struct Task<'a> {
+    name: &'a str,
+    level: u8,
+    text: &'a str,
+    /// Name of the point that is to be reached, how near, and what is to be injected there.
+    target: &'a str,
+    tip_within_mm: f64,
+    inject_ml: Option<f64>,
+    /// The same in words.
+    goal: String,
+    /// What ends it early.
+    limits: Vec<String>,
+    counts: Vec<Counts<'a>>,
+}
+
+/// What is asked of a measure.
+#[derive(Debug, Serialize)]
+struct Counts<'a> {
+    name: &'a str,
+    definition: &'static str,
+    asked: String,
+    points: f64,
+}
+
+impl<'a> Task<'a> {
+    pub(crate) fn of(subject: &'a Subject) -> Self {
+        let measures = endowire_assess::assess(&Record::default(), None);
+        Self {
+            name: &subject.name,
+            level: subject.level,
+            text: subject.text.trim(),
+            target: &subject.goal.target,
+            tip_within_mm: subject.goal.tip_within_mm,
+            inject_ml: subject.goal.inject_ml,
+            goal: subject.goal.words(),
+            limits: subject.limits.words(),
+            counts: subject.threshold.iter().map(|threshold| counts(threshold, &measures)).collect(),
+        }
+    }
+}
+
+fn counts<'a>(threshold: &'a Threshold, measures: &[Metric]) -> Counts<'a> {
+    let name = threshold.metric.as_str();
+    let definition = measures.iter().find(|one| one.name == name).map_or("", |one| one.definition);
+    Counts { name, definition, asked: threshold.words(), points: threshold.points }
+}
+
+/// A score, as `endowire assess --json` has it, and in words.
+#[derive(Debug, Serialize)]
+pub(crate) struct Told<'a> {
+    #[serde(flatten)]
+    score: &'a Score,
+    words: String,
+    rows: Vec<Row<'a>>,
+}
+
+/// A measure in words.
+#[derive(Debug, Serialize)]
+struct Row<'a> {
+    name: &'a str,
+    definition: &'a str,
+    value: String,
+    asked: Option<String>,
+    points: Option<f64>,
+    passed: Option<bool>,
+}
+
+impl<'a> Told<'a> {
+    pub(crate) fn of(score: &'a Score) -> Self {
+        Self { score, words: score.verdict.words(), rows: score.metrics.iter().map(row).collect() }
+    }
+}
+
+fn row(scored: &Scored) -> Row<'_> {
+    Row {
+        name: scored.metric.name,
+        definition: scored.metric.definition,
+        value: scored.value_words(),
+        asked: scored.threshold.as_ref().map(Threshold::words),
+        points: scored.threshold.as_ref().map(|threshold| threshold.points),
+        passed: scored.passed,
+    }
+}
