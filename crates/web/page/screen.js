@@ -94,7 +94,8 @@ function happened(now) {
   const recent = now.event && now.time_s - now.event.time_s < 6;
   if (recent) return place({ text: now.event.text, warns: true });
   if (notice.text && performance.now() < notice.until) return place(notice);
-  const contacts = `${now.contacts} contacts, at most ${newtons(now.wall_force_n)}`;
+  const sac = now.packing ? `, sac ${(100 * now.packing.density).toFixed(1)} % full` : "";
+  const contacts = `${now.contacts} contacts, at most ${newtons(now.wall_force_n)}${sac}`;
   place({ text: now.demonstrates ? "the script is shown: move to take over" : `step ${now.step}, ${contacts}`, warns: false });
 }
 

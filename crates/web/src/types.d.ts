@@ -30,6 +30,10 @@ export interface Readout {
     live: boolean; mode: string; lao_deg: number; cra_deg: number; second_deg: [number, number] | null;
     magnification: number; field_mm: number; open: [number, number]; beam_s: number; dose_ugy: number;
   };
+  /** What coils fill of the scene's sac. */
+  packing?: {
+    coils_mm3: number; density: number; neck_coverage: number; outside_mm: number; herniated: boolean; dome_force_n: number;
+  };
   subject?: {
     subject: string; distance_mm: number | null; injected_there_ml: number;
     used: { what: string; value: number; limit: number; unit: string }[]; verdict: Verdict | null;
