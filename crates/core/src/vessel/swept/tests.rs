@@ -216,13 +216,13 @@ fn what_makes_no_vessel_is_refused() {
 
 #[test]
 fn the_far_side_of_a_septum_is_another_wall() {
-    // Two limbs of 1.5 mm, parallel between z = 20 and 44, with 1.5 mm between their walls.
+    // Two limbs of a radius of 1 mm, parallel between z = 20 and 44, with 1.5 mm between their walls.
     let limb = |sign: f64| {
-        let place = |x: f64, z: f64| [x * sign, 0.0, z, 1.5];
-        let along = (0..=12).map(|k| place(2.25, 20.0 + 2.0 * f64::from(k)));
-        [place(1.1, 15.0)].into_iter().chain(along).chain([place(8.0, 56.0)]).collect::<Vec<_>>()
+        let place = |x: f64, z: f64| [x * sign, 0.0, z, 1.0];
+        let along = (0..=12).map(|k| place(1.75, 20.0 + 2.0 * f64::from(k)));
+        [place(0.9, 15.0)].into_iter().chain(along).chain([place(8.0, 56.0)]).collect::<Vec<_>>()
     };
-    let mut rows = vec![([0.0, 0.0, 0.0, 1.5], None), ([0.0, 0.0, 10.0, 1.5], Some(0))];
+    let mut rows = vec![([0.0, 0.0, 0.0, 1.0], None), ([0.0, 0.0, 10.0, 1.0], Some(0))];
     for sign in [-1.0, 1.0] {
         let first = rows.len();
         rows.extend(limb(sign).into_iter().enumerate().map(|(k, row)| {
@@ -232,19 +232,19 @@ fn the_far_side_of_a_septum_is_another_wall() {
     }
     let vessel = vessel(tree(&rows));
     let field = vessel.field(1.0);
-    let piece = field.near(&Vec3::new(2.25, 0.0, 34.0)).piece;
+    let piece = field.near(&Vec3::new(1.75, 0.0, 34.0)).piece;
     for k in 0..20 {
         let z = 34.0 + 0.1 * f64::from(k);
         // From the axis to 1 mm behind the limb's own wall, where that of the other limb is 0.5 mm away.
-        for rho in [0.3, 1.0, 1.45, 1.8, 2.5] {
-            let x = Vec3::new(2.25 - rho, 0.0, z);
+        for rho in [0.3, 0.7, 0.95, 1.3, 2.0] {
+            let x = Vec3::new(1.75 - rho, 0.0, z);
             let own = field.closest(&x, From::Side(piece)).unwrap();
-            assert!((own.distance_mm() - (1.5 - rho)).abs() < 2e-3, "{rho} {z}: {}", own.distance_mm());
+            assert!((own.distance_mm() - (1.0 - rho)).abs() < 2e-3, "{rho} {z}: {}", own.distance_mm());
             assert!((own.normal() - Vec3::x()).norm() < 5e-3, "{rho} {z}");
         }
     }
     // Through space the same place is next to the other limb.
-    let x = Vec3::new(2.25 - 2.5, 0.0, 34.0);
+    let x = Vec3::new(1.75 - 2.0, 0.0, 34.0);
     let other = closest(&field, &x);
     assert!((other.distance_mm() + 0.5).abs() < 2e-3 && other.normal().x < -0.99, "{}", other.distance_mm());
 }
