@@ -39,6 +39,7 @@ export function show({ readout: now, planes, three: view, backend }) {
   element("views").classList.toggle("biplane", Boolean(lab.second_deg));
   element("lock").classList.toggle("on", lab.live);
   element("show").classList.toggle("on", now.demonstrates);
+  element("detach").hidden = !now.packing;
   element("arm").textContent = pose(lab.lao_deg, lab.cra_deg);
   if (lab.second_deg) element("second-arm").textContent = pose(...lab.second_deg);
   element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.dose_ugy.toFixed(1)} µGy`;
