@@ -70,7 +70,7 @@ impl Packing {
             neck_coverage: covered(sac, &inside),
             outside_mm,
             herniated: outside_mm > HERNIATED_MM,
-            dome_force_n: at_dome.map(|contact| contact.force_n).sum(),
+            dome_force_n: at_dome.fold(0.0, |sum, contact| sum + contact.force_n),
         })
     }
 
