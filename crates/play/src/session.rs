@@ -130,10 +130,10 @@ impl Session {
         self
     }
 
-    /// The same where coils fill a sac, of which readouts tell.
+    /// The same in a vessel with this sac, if it has one: readouts say what coils fill of it.
     #[must_use]
-    pub fn with_sac(mut self, sac: Sac) -> Self {
-        self.sac = Some((sac, None));
+    pub fn with_sac(mut self, sac: Option<Sac>) -> Self {
+        self.sac = sac.map(|sac| (sac, None));
         self.pack();
         self
     }

@@ -60,10 +60,7 @@ impl Played {
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
-        let mut session = Session::new(simulation, view, side_px, Limits::default())?;
-        if let Some(sac) = sac {
-            session = session.with_sac(sac);
-        }
+        let mut session = Session::new(simulation, view, side_px, Limits::default())?.with_sac(sac);
         if is_shown {
             session = session.with_script(script.clone());
         }

@@ -145,7 +145,7 @@ impl Recordings<'_> {
         let text = run.standalone()?;
         whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
         let scene = Scene::read(&scene_file)?;
-        scene.sac(simulation.lumen(), self.store)?.map_or(Ok(()), |sac| recorder.tell_of(sac))?;
+        recorder.pack(scene.sac(simulation.lumen(), self.store)?)?;
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
         Ok(Recording {
             frames: FrameWriter::new(&scene_file, &scene, drawn, self.store)?,

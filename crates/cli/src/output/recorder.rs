@@ -205,9 +205,9 @@ impl Recorder {
         Ok((recorder, recording))
     }
 
-    /// Has it tell what coils fill of a sac, from the next step on.
-    pub(crate) fn tell_of(&mut self, sac: Sac) -> Result<(), Failure> {
-        self.packing = Some(PackingTable::go_on(&self.folder, sac, self.steps)?);
+    /// Has it write what coils fill of the scene's sac, if it has one, from the next step on.
+    pub(crate) fn pack(&mut self, sac: Option<Sac>) -> Result<(), Failure> {
+        self.packing = sac.map(|sac| PackingTable::go_on(&self.folder, sac, self.steps)).transpose()?;
         Ok(())
     }
 

@@ -136,11 +136,7 @@ pub(crate) fn open(
     scenes::tell_found_centreline(path, scene);
     let sac = scene.sac(simulation.lumen(), cache).map_err(in_scene)?;
     let session = Session::new(simulation, view, side_px, limits).map_err(in_scene)?;
-    let session = match sac {
-        Some(sac) => session.with_sac(sac),
-        None => session,
-    };
-    Ok((session, script))
+    Ok((session.with_sac(sac), script))
 }
 
 /// Tells what is to be done, if it is a subject.

@@ -75,7 +75,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
         recorder
     };
-    sac.map_or(Ok(()), |sac| recorder.tell_of(sac))?;
+    recorder.pack(sac)?;
 
     // From here on something is recorded: whatever happens, it is kept.
     let so_far = SoFar {

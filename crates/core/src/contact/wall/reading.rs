@@ -123,6 +123,7 @@ impl WallContact<'_> {
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
         }
         let (hint, looked_at) = (Hint::Near(known.piece?), known.looked_at);
+        // A ball that holds no wall holds none where the point has moved within it.
         if let TakenReading { at_mm, nearness: Nearness::Clear(ball_mm), .. } = self.cache.readings[index] {
             let left_mm = ball_mm - (x - at_mm).norm() * stretch;
             if left_mm >= limit_mm.max(radius) {

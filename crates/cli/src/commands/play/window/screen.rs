@@ -193,11 +193,12 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
 
 /// A force with its unit: those of microwires and coils are millinewtons.
 fn force(newtons: f64) -> String {
-    let (value, unit) = if newtons.abs() < 0.1 { (1000.0 * newtons, "mN") } else { (newtons, "N") };
-    let digits = if unit == "N" { 3 } else { 1 };
+    if newtons.abs() >= 0.1 {
+        return format!("{newtons:.3} N");
+    }
+    let text = format!("{:.1} mN", 1000.0 * newtons);
     // Rounding leaves no minus before a zero.
-    let text = format!("{value:.digits$} {unit}");
-    if text.starts_with("-0.0 ") { text.trim_start_matches('-').to_owned() } else { text }
+    if text == "-0.0 mN" { "0.0 mN".to_owned() } else { text }
 }
 
 fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help]) {
