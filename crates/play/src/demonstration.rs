@@ -65,7 +65,8 @@ impl Demonstration {
         }
         let motions =
             step.moves.iter().map(shown).filter(|one| one.advance_mm != 0.0 || one.rotate_deg != 0.0);
-        let step = Done { motions: motions.collect(), per_s: 1.0 / took_s, detach: step.detach };
+        let (detach, solves) = (step.detach, step.solves);
+        let step = Done { motions: motions.collect(), per_s: 1.0 / took_s, detach, solves };
         self.run.carried_out();
         self.done_s = end_s;
         let lines = self.run.course().motions.len();

@@ -1,7 +1,7 @@
 //! All steps of a session, done and undone, and states to go back and forth to.
 
 use endowire_core::Result;
-use endowire_core::insertion::{Move, Simulation, State, StepReport};
+use endowire_core::insertion::{Move, Simulation, State, Step, StepReport};
 use endowire_core::vessel::VesselMotion;
 use endowire_viewer::InjectionSpec;
 
@@ -38,20 +38,21 @@ pub(crate) struct Done {
     pub(crate) per_s: f64,
     /// The instrument that leaves its coil behind in this step, in which nothing else moves.
     pub(crate) detach: Option<usize>,
+    /// Linear solves, where it is a tick.
+    pub(crate) solves: Option<usize>,
 }
 
 impl Done {
     /// Carries the step out; where the vessel moves, time goes by as it does in the script's line.
     ///
     /// # Errors
-    /// As [`Simulation::step_until`] and [`Simulation::detach`].
+    /// As [`Step::carry_out`].
     pub(crate) fn carry_out<'a>(&self, simulation: &'a mut Simulation) -> Result<&'a StepReport> {
-        if let Some(instrument) = self.detach {
-            return simulation.detach(instrument);
-        }
         let moves: Vec<Move> = self.motions.iter().map(|motion| motion.as_move()).collect();
-        let until_s = moves_by_itself(simulation).then(|| simulation.time_s() + script::step_s(self, 1));
-        simulation.step_until(&moves, until_s)
+        let duration_s = script::step_s(self, 1);
+        let time_s = moves_by_itself(simulation).then(|| simulation.time_s() + duration_s);
+        let (detach, solves) = (self.detach, self.solves);
+        Step { moves: moves.into(), detach, solves, time_s, duration_s }.carry_out(simulation)
     }
 }
 
@@ -213,7 +214,7 @@ mod tests {
         for k in 0..150 {
             let advance_mm = if k % 5 == 4 { -0.3 } else { 0.7 };
             let motions = vec![Motion { instrument: 0, advance_mm, rotate_deg: 0.0 }];
-            let step = Done { motions, per_s: 60.0, detach: None };
+            let step = Done { motions, per_s: 60.0, detach: None, solves: None };
             step.carry_out(&mut simulation).unwrap();
             history.push(step, &simulation);
             tips.push(simulation.shape().tip_mm());

@@ -25,7 +25,7 @@ pub use pad::{Button, PAD, Pad};
 pub use pictures::{Pictures, Sharpened, Sharpening};
 pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 pub use script::script_head;
-pub use session::{Delivered, Session, Snapshot};
+pub use session::{Delivered, Session, Snapshot, TICK_SOLVES};
 
 /// Ticks of a session in a second.
 pub const TICKS_PER_S: f64 = 60.0;

@@ -67,6 +67,8 @@ pub struct InstrumentReadout {
     pub length_mm: f64,
     /// Length inserted, mm.
     pub inserted_mm: f64,
+    /// How much farther the hand has pushed than the device has followed in its ticks yet, mm.
+    pub behind_mm: f64,
     /// Turn of the hand, degrees.
     pub rotation_deg: f64,
     /// Force with which the hand pushes, N; none where it jumps.
@@ -117,7 +119,7 @@ impl Went {
     /// With one more step.
     pub(crate) fn and(self, report: &StepReport) -> Self {
         Self {
-            unconverged_steps: self.unconverged_steps + u64::from(!report.converged),
+            unconverged_steps: self.unconverged_steps + u64::from(report.has_failed()),
             jumps: self.jumps + u64::from(report.jumped),
             relaxations: self.relaxations + u64::from(report.relaxations),
         }

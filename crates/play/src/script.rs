@@ -95,7 +95,7 @@ fn moves_evenly(motions: &[Motion], count: usize) -> bool {
 }
 
 /// Writes a line of a script.
-fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach }: &Done, count: usize) {
+fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach, solves }: &Done, count: usize) {
     if let Some(instrument) = detach {
         let name = &stack.instruments()[*instrument].name;
         let key = if stack.is_several() { format!("instrument = {name:?}\n") } else { String::new() };
@@ -121,13 +121,14 @@ fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach }: &Done
         }
         keys
     };
+    let of_tick = solves.map_or(String::new(), |solves| format!("\nsolves = {solves}"));
     let Some((first, others)) = motions.split_first() else {
         let (wait_s, step_s) = (count as f64 / per_s, 1.0 / per_s);
-        let _ = writeln!(text, "[[script]]\nwait_s = {wait_s:?}\nstep_s = {step_s:?}\n");
+        let _ = writeln!(text, "[[script]]\nwait_s = {wait_s:?}\nstep_s = {step_s:?}{of_tick}\n");
         return;
     };
     let with: Vec<String> = others.iter().map(|one| format!("{{ {} }}", keys(one).join(", "))).collect();
-    let _ = writeln!(text, "[[script]]\n{}", keys(first).join("\n"));
+    let _ = writeln!(text, "[[script]]\n{}{of_tick}", keys(first).join("\n"));
     if !with.is_empty() {
         let _ = writeln!(text, "with = [{}]", with.join(", "));
     }

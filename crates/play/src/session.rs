@@ -20,6 +20,8 @@ use crate::telemetry::Telemetry;
 
 /// Events that are kept.
 const MOST_EVENTS: usize = 1000;
+/// Linear solves of a tick for screens ([`Session::with_ticks`]): some milliseconds for a wire in arteries. Most ticks take three or four.
+pub const TICK_SOLVES: usize = 60;
 
 /// The kind of event that an error is.
 fn kind_of(error: &Error) -> EventKind {
@@ -38,6 +40,8 @@ pub struct Session {
     history: History,
     lab: Lab,
     limits: Limits,
+    /// Linear solves of a tick; none where each ends in equilibrium.
+    solves: Option<usize>,
     /// What can be shown, and what is.
     script: Option<Script>,
     demonstration: Option<Demonstration>,
@@ -110,6 +114,7 @@ impl Session {
             history,
             lab,
             limits,
+            solves: None,
             script: None,
             demonstration: None,
             ticks: 0,
@@ -128,6 +133,19 @@ impl Session {
     pub fn with_script(mut self, script: Script) -> Self {
         self.script = Some(script);
         self
+    }
+
+    /// The same with ticks of about so many linear solves ([`Simulation::tick`]): none takes long, and what the device has not followed in one goes on in the
+    /// next. Without, a tick in which the device snaps takes as long as it takes.
+    ///
+    /// # Errors
+    /// No solves at all.
+    pub fn with_ticks(mut self, solves: usize) -> Result<Self> {
+        if solves == 0 {
+            return Err(Error::parameter("solves", 0, "allow at least one in a tick"));
+        }
+        self.solves = Some(solves);
+        Ok(self)
     }
 
     /// The same in a vessel with this sac, if it has one: readouts say what coils fill of it.
@@ -232,7 +250,18 @@ impl Session {
     fn detach(&mut self, instrument: usize) -> Result<()> {
         self.take_over();
         self.stop();
-        self.advance(Done { motions: vec![], per_s: TICKS_PER_S, detach: Some(instrument) }, true)
+        self.catch_up()?;
+        self.advance(Done { detach: Some(instrument), ..Self::resting() }, true)
+    }
+
+    /// A step in which hands rest.
+    fn resting() -> Done {
+        Done { motions: vec![], per_s: TICKS_PER_S, detach: None, solves: None }
+    }
+
+    /// Lets the device follow its hands to where it rests.
+    fn catch_up(&mut self) -> Result<()> {
+        if self.simulation.report().is_under_way() { self.advance(Self::resting(), false) } else { Ok(()) }
     }
 
     /// A hand moves: what was shown is at its end.
@@ -284,7 +313,7 @@ impl Session {
             self.note(&motions);
             return;
         }
-        let lengths_mm = self.simulation.report().lengths_mm();
+        let lengths_mm = self.hands_mm();
         let instruments = self.simulation.stack().instruments();
         let mut motions = Vec::new();
         for (index, hand) in self.hands.iter_mut().enumerate() {
@@ -295,17 +324,26 @@ impl Session {
             }
         }
         if !motions.is_empty() {
-            let step = Done { motions: motions.clone(), per_s: TICKS_PER_S, detach: None };
+            let step = Done { motions: motions.clone(), solves: self.solves, ..Self::resting() };
             let done = self.step(step, !self.moving);
             self.note(if done { &motions } else { &[] });
             self.moving = true;
             return;
         }
-        if self.demonstration.is_none() && !self.holds_still && moves_by_itself(&self.simulation) {
-            self.step(Done { motions: vec![], per_s: TICKS_PER_S, detach: None }, false);
+        let goes_on = moves_by_itself(&self.simulation) || self.simulation.report().is_under_way();
+        if self.demonstration.is_none() && !self.holds_still && goes_on {
+            self.step(Done { solves: self.solves, ..Self::resting() }, false);
         }
         self.moving = false;
         self.note(&[]);
+    }
+
+    /// How far hands have pushed each instrument in, mm: the device may have to follow.
+    fn hands_mm(&self) -> Vec<f64> {
+        let report = self.simulation.report();
+        let mut lengths_mm = report.lengths_mm();
+        lengths_mm.iter_mut().zip(&report.behind).for_each(|(mm, behind)| *mm += behind.advance_mm);
+        lengths_mm
     }
 
     /// Notes what hands have done in this tick.
@@ -372,9 +410,13 @@ impl Session {
         }
         let (was_out, warned) = (self.simulation.report().left_through, self.warns());
         let report = step.carry_out(&mut self.simulation)?;
+        let stopped = step.solves.is_some() && report.has_failed();
         let (jumped, out, detached) = (report.jumped, report.left_through, step.detach);
         self.holds_still = false;
         self.history.push(step, &self.simulation);
+        if stopped {
+            self.happened(EventKind::Blocked, "the wall has stopped the hands".to_owned());
+        }
         if jumped {
             self.happened(EventKind::Jumped, "jumped: it let go of energy".to_owned());
         }
@@ -514,16 +556,18 @@ impl Session {
 
     fn instruments(&self) -> Vec<InstrumentReadout> {
         let each = self.simulation.stack().instruments().iter().zip(self.simulation.report().hands());
-        each.map(|(one, report)| InstrumentReadout {
-            name: one.name.clone(),
-            length_mm: one.device.length_mm(),
-            inserted_mm: report.inserted_mm,
-            rotation_deg: report.rotation_rad.to_degrees(),
-            push_force_n: report.push_force_n,
-            torque_nmm: report.torque_nmm,
-            warns: self.beyond(&report),
-        })
-        .collect()
+        each.zip(self.hands_mm())
+            .map(|((one, report), hand_mm)| InstrumentReadout {
+                name: one.name.clone(),
+                length_mm: one.device.length_mm(),
+                inserted_mm: report.inserted_mm,
+                behind_mm: hand_mm - report.inserted_mm,
+                rotation_deg: report.rotation_rad.to_degrees(),
+                push_force_n: report.push_force_n,
+                torque_nmm: report.torque_nmm,
+                warns: self.beyond(&report),
+            })
+            .collect()
     }
 
     /// What contrast medium goes through: the outermost instrument that is in and has a lumen.

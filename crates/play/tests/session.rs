@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
-use endowire_core::insertion::{Injection, Simulation};
+use endowire_core::insertion::{Injection, Simulation, Step};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
 use endowire_play::{EventKind, Input, Limits, Pictures, Session};
@@ -94,8 +94,8 @@ fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation,
     let mut run = script.begin();
     let moves = simulation.motion().is_some();
     while let Some(step) = run.next(&simulation).unwrap() {
-        let (moves, time_s) = (step.moves.to_vec(), step.time_s.filter(|_| moves));
-        simulation.step_until(&moves, time_s).unwrap();
+        let step = step.into_owned();
+        Step { time_s: step.time_s.filter(|_| moves), ..step }.carry_out(&mut simulation).unwrap();
         run.carried_out();
     }
     let injections = run.injections().to_vec();
@@ -104,7 +104,17 @@ fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation,
 
 #[test]
 fn two_thousand_inputs_replay_with_the_same_bits() {
-    let (scene, mut session) = session("arch_vertebral.toml");
+    let (scene, session) = session("arch_vertebral.toml");
+    two_thousand_inputs_replay(scene, session);
+}
+
+#[test]
+fn two_thousand_inputs_in_ticks_replay_with_the_same_bits() {
+    let (scene, session) = session("arch_vertebral.toml");
+    two_thousand_inputs_replay(scene, session.with_ticks(6).unwrap());
+}
+
+fn two_thousand_inputs_replay(scene: Scene, mut session: Session) {
     let mut dice = Dice(1);
     for _ in 0..2000 {
         let _ = session.apply(&dice.input(&["wire", "catheter"], false));
@@ -116,6 +126,44 @@ fn two_thousand_inputs_replay_with_the_same_bits() {
     let simulation = replayed(scene, &session);
     assert_eq!(simulation.shape(), session.simulation().shape());
     assert_eq!(simulation.report(), session.simulation().report());
+}
+
+#[test]
+fn what_ticks_leave_over_is_followed_while_hands_rest() {
+    // Largest lag of the device, tip at rest.
+    let pushed = |solves: Option<usize>| {
+        let (_, mut session) = session("arch_innominate.toml");
+        if let Some(solves) = solves {
+            session = session.with_ticks(solves).unwrap();
+        }
+        session.apply(&Input::Move { instrument: None, mm_per_s: 40.0, deg_per_s: 0.0 }).unwrap();
+        let mut most_mm: f64 = 0.0;
+        for _ in 0..240 {
+            session.tick();
+            let readout = session.readout();
+            let one = &readout.instruments[0];
+            let hand_mm = 40.0 * readout.time_s;
+            assert!((one.inserted_mm + one.behind_mm - hand_mm).abs() < 1e-9, "{one:?}");
+            most_mm = most_mm.max(one.behind_mm);
+        }
+        session.apply(&Input::Stop {}).unwrap();
+        let moved = (0..2000).take_while(|_| {
+            session.tick();
+            session.simulation().report().is_under_way()
+        });
+        assert!(moved.count() < 2000);
+        assert_eq!(session.went().unconverged_steps, 0);
+        (most_mm, session.simulation().shape().tip_mm().unwrap())
+    };
+    let ((none_mm, whole), (few_mm, few)) = (pushed(None), pushed(Some(2)));
+    assert!(none_mm == 0.0 && few_mm > 0.5, "{none_mm} {few_mm}");
+    assert!((whole - few).norm() < 0.05, "{} mm apart", (whole - few).norm());
+}
+
+#[test]
+fn a_tick_has_solves() {
+    let (_, session) = session("curved_tube.toml");
+    assert!(session.with_ticks(0).unwrap_err().to_string().contains("solves"));
 }
 
 #[test]

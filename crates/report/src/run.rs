@@ -110,7 +110,7 @@ impl Row {
             max_penetration_mm: report.max_penetration_mm,
             jumped: report.jumped,
             left_through: report.left_through,
-            converged: report.converged,
+            converged: !report.has_failed(),
             relaxations: report.relaxations,
             imbalance: Some(report.imbalance),
             wall_force_sum_n: Some(force.sum_n),

@@ -69,7 +69,8 @@ function hands(now) {
     const push = one.push_force_n === null ? "–" : newtons(one.push_force_n);
     const [name, place, felt] = button.children;
     name.textContent = one.name;
-    place.textContent = `${one.inserted_mm.toFixed(1)} mm in, ${minus(one.rotation_deg.toFixed(0))}°`;
+    const ahead = Math.abs(one.behind_mm) < 0.05 ? "" : `, hand ${minus(one.behind_mm.toFixed(1))} mm ahead`;
+    place.textContent = `${one.inserted_mm.toFixed(1)} mm in${ahead}, ${minus(one.rotation_deg.toFixed(0))}°`;
     felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))} N·mm${one.warns ? " – beyond the limit" : ""}`;
     button.classList.toggle("warns", one.warns);
     button.classList.toggle("chosen", now.selected === one.name && now.instruments.length > 1);

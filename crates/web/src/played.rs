@@ -10,7 +10,9 @@ use endowire_core::methods::MethodChoice;
 use endowire_core::vessel::{CentrelineTree, NoStore};
 use endowire_core::{Error, Result};
 use endowire_methods::Setting;
-use endowire_play::{Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, script_head};
+use endowire_play::{
+    Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, TICK_SOLVES, script_head,
+};
 use endowire_report::{Frame, Recorder, Run, Series, Vessel, events};
 use endowire_viewer::{Backend, Image, PixelFormat, ViewSpec};
 use serde_json::{Value, json};
@@ -60,7 +62,8 @@ impl Played {
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
-        let mut session = Session::new(simulation, view, side_px, Limits::default())?.with_sac(sac);
+        let session = Session::new(simulation, view, side_px, Limits::default())?;
+        let mut session = session.with_ticks(TICK_SOLVES)?.with_sac(sac);
         if is_shown {
             session = session.with_script(script.clone());
         }

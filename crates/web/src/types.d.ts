@@ -22,7 +22,7 @@ export interface Readout {
   step: number; time_s: number; demonstrates: boolean; selected: string;
   unconverged_steps: number; jumps: number; relaxations: number;
   instruments: {
-    name: string; length_mm: number; inserted_mm: number; rotation_deg: number;
+    name: string; length_mm: number; inserted_mm: number; behind_mm: number; rotation_deg: number;
     push_force_n: number | null; torque_nmm: number; warns: boolean;
   }[];
   tip_mm: [number, number, number] | null; contacts: number; wall_force_n: number;

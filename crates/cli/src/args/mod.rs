@@ -247,6 +247,10 @@ pub(crate) struct PlayArgs {
     /// Width and height of the fluoroscopic picture in pixels, 64 to 1024
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=1024))]
     pub(crate) size: u32,
+    /// Linear solves in a sixtieth of a second: what the device has not followed by then goes on in the next, so that none takes long. `all`: each ends in
+    /// equilibrium, and takes a second or more where a device snaps
+    #[arg(long, default_value_t, value_name = "N|all")]
+    pub(crate) solves: crate::commands::play::Solves,
     /// Warn where a hand pushes or pulls harder than this
     #[arg(long, default_value_t = 1.0, value_name = "N")]
     pub(crate) warn_n: f64,

@@ -247,7 +247,7 @@ impl Recorder {
             left_through: report.left_through,
             nodes_solved: report.nodes_solved,
             angles: report.angles,
-            converged: report.converged,
+            converged: !report.has_failed(),
             relaxations: report.relaxations,
             imbalance: report.imbalance,
             released_mj: report.jump.map_or(0.0, |jump| jump.released_mj),

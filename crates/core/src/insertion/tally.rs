@@ -7,7 +7,7 @@ use super::{Simulation, WallForce};
 /// What is counted over the steps of a run, whatever carries it out.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Tally {
-    /// Steps that did not meet the method's own convergence test: their shapes are no equilibria.
+    /// Steps that did not meet the method's own convergence test, ticks on their way to an equilibrium left out: their shapes are no equilibria.
     pub unconverged_steps: usize,
     /// The first of them, from 1.
     pub first_unconverged_step: Option<usize>,
@@ -27,7 +27,7 @@ impl Tally {
     /// Counts step number `step`, from 1, which the simulation has just carried out.
     pub fn count(&mut self, step: usize, simulation: &Simulation) {
         let (report, force) = (simulation.report(), simulation.wall_force());
-        if !report.converged {
+        if report.has_failed() {
             self.unconverged_steps += 1;
             self.first_unconverged_step.get_or_insert(step);
         }

@@ -35,6 +35,16 @@ impl StepReport {
 }
 
 impl StepReport {
+    /// Whether the device is on its way still, after ticks: it has not followed its hands, or has not come to rest.
+    pub fn is_under_way(&self) -> bool {
+        !self.behind.is_empty()
+    }
+
+    /// Whether no equilibrium was found, which is another thing than being on the way to one.
+    pub fn has_failed(&self) -> bool {
+        !self.converged && !self.is_under_way()
+    }
+
     /// What one hand has done and feels: that of an instrument, or of a device alone the whole.
     pub fn hand(&self, index: usize) -> InstrumentReport {
         self.instruments.get(index).copied().unwrap_or(InstrumentReport {

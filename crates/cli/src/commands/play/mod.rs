@@ -5,6 +5,7 @@ mod live;
 mod lockstep;
 mod record;
 mod socket;
+mod solves;
 #[cfg(feature = "window")]
 mod window;
 
@@ -31,6 +32,7 @@ use crate::{scenes, subjects};
 use live::Message;
 pub(crate) use record::Record;
 pub(crate) use socket::Address;
+pub(crate) use solves::Solves;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -75,6 +77,9 @@ fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
     let cache = Cache::new(&args.cache);
     let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
     let (mut session, script) = open(&scene, &args.scene, &cache, args.size, limits)?;
+    if let Solves(Some(solves)) = args.solves {
+        session = session.with_ticks(solves).map_err(in_scene)?;
+    }
     // Who does a subject by hand is not shown how, unless that was asked for.
     if subject.is_none() || args.watch || args.after_script || args.script.is_some() {
         session = session.with_script(script);

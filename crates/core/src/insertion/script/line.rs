@@ -49,6 +49,9 @@ pub struct ScriptLine {
     pub wait_s: Option<f64>,
     /// Largest increment of that time, s; 0.1 if absent.
     pub step_s: Option<f64>,
+    /// Linear solves of each step, which is a tick then ([`Simulation::tick`](crate::insertion::Simulation::tick)): what the device has not followed in it
+    /// goes on in the next.
+    pub solves: Option<usize>,
     /// Whether the coil of the instrument, which is out, is left behind; its pusher is taken out.
     pub detach: bool,
     /// Contrast medium that is injected from the start of the line on.
@@ -80,14 +83,25 @@ impl ScriptLine {
         if self.detach {
             return Ok(vec![self.detachment(name, stack)?]);
         }
+        let solves = self.solves;
         let wait = self.wait(name)?;
+        let of_solves =
+            |mend: &str| Err(Error::parameter(format!("{name}.solves"), solves.unwrap_or(0), mend));
+        if solves == Some(0) {
+            return of_solves(
+                "allow at least one in each step, or leave it out for steps that end in equilibrium",
+            );
+        }
+        if solves.is_some() && wait.is_none() && self.only_injects() {
+            return of_solves("a line that only injects has no steps: leave it out");
+        }
         if wait.is_some() || self.only_injects() {
             let named = self.inject.as_ref().is_some_and(|inject| inject.through.is_some());
             let asked = self.instrument.is_some() || (self.inject.is_some() && !named);
             let own = if asked { self.number(name, stack)? } else { 0 };
             let inject = bolus(own)?;
             let name = name.to_owned();
-            return Ok(vec![Motion { wait, inject, ..Motion::resting(name) }]);
+            return Ok(vec![Motion { wait, inject, solves, ..Motion::resting(name) }]);
         }
         let mut parts: Vec<Part> = Vec::new();
         for (name, line) in self.together(name)? {
@@ -105,7 +119,7 @@ impl ScriptLine {
         let until = self.until.as_ref().map(until).transpose()?;
         let Some(other) = &self.exchange else {
             let name = name.to_owned();
-            return Ok(vec![Motion { parts, until, inject, ..Motion::resting(name) }]);
+            return Ok(vec![Motion { parts, until, inject, solves, ..Motion::resting(name) }]);
         };
         // The line's own part is that of the instrument which comes in: its keys are those of the way in.
         let key = format!("{name}.exchange");
@@ -123,7 +137,7 @@ impl ScriptLine {
         let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
         let until = until.map(|condition| Condition { instrument, ..condition });
         let incoming = Incoming { key, instrument, name: other.clone() };
-        let motion = |part| Motion { parts: vec![part], ..Motion::resting(name.to_owned()) };
+        let motion = |part| Motion { parts: vec![part], solves, ..Motion::resting(name.to_owned()) };
         Ok(vec![
             Motion { inject, exchange: Some(incoming), ..motion(withdrawn) },
             Motion { until, ..motion(inserted) },
@@ -264,9 +278,15 @@ impl ScriptLine {
                 return Err(Error::parameter(format!("{name}.with"), line.with.len(), mend));
             }
             let waits = line.wait_s.is_some() || line.step_s.is_some();
-            let keys =
-                [line.until.is_some(), line.exchange.is_some(), line.inject.is_some(), waits, line.detach];
-            for (key, given) in ["until", "exchange", "inject", "wait_s", "detach"].into_iter().zip(keys) {
+            let keys = [
+                ("until", line.until.is_some()),
+                ("exchange", line.exchange.is_some()),
+                ("inject", line.inject.is_some()),
+                ("wait_s", waits),
+                ("detach", line.detach),
+                ("solves", line.solves.is_some()),
+            ];
+            for (key, given) in keys {
                 if given {
                     let mend = "belongs to the line itself, not to those with it";
                     return Err(Error::parameter(format!("{name}.{key}"), "given", mend));

@@ -90,7 +90,7 @@ impl Script {
     /// The moves of all steps, where they are known beforehand.
     ///
     /// # Errors
-    /// A line with a condition: where it ends is known only when it is carried out. One that leaves a coil behind.
+    /// A line with a condition: where it ends is known only when it is carried out. One that leaves a coil behind, or has ticks for steps.
     pub fn moves(&self) -> Result<Vec<Vec<Move>>> {
         if let Some(line) = self.conditional() {
             let mend = "where the line ends is not known beforehand: carry the script out step by step";
@@ -99,6 +99,12 @@ impl Script {
         if let Some(motion) = self.motions.iter().find(|motion| motion.detach.is_some()) {
             let mend = "moves alone do not tell it: carry the script out step by step";
             return Err(Error::parameter(format!("{}.detach", motion.name), true, mend));
+        }
+        if let Some((name, solves)) =
+            self.motions.iter().find_map(|motion| Some((&motion.name, motion.solves?)))
+        {
+            let mend = "moves alone do not tell ticks: carry the script out step by step";
+            return Err(Error::parameter(format!("{name}.solves"), solves, mend));
         }
         let mut run = self.begin();
         let mut moves = Vec::with_capacity(self.len());

@@ -58,6 +58,8 @@ pub(super) struct Motion {
     pub(super) exchange: Option<Incoming>,
     /// The instrument whose coil is left behind; then it is one step, and there are no parts.
     pub(super) detach: Option<usize>,
+    /// Linear solves of each step, where it is a tick.
+    pub(super) solves: Option<usize>,
 }
 
 /// An instrument that takes the place of another.
@@ -141,7 +143,16 @@ impl Part {
 impl Motion {
     /// One in which nothing is done.
     pub(super) fn resting(name: String) -> Self {
-        Self { name, parts: Vec::new(), wait: None, until: None, inject: None, exchange: None, detach: None }
+        Self {
+            name,
+            parts: Vec::new(),
+            wait: None,
+            until: None,
+            inject: None,
+            exchange: None,
+            detach: None,
+            solves: None,
+        }
     }
 
     /// Whether it takes time that is known.

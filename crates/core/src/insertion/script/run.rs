@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::motion::{Lengths, Steps};
+use super::motion::{Lengths, Motion, Steps};
 use super::until::Condition;
 use super::{Injection, Met, Script};
 use crate::insertion::{Move, Simulation, StepReport};
@@ -33,6 +33,8 @@ pub struct Step<'a> {
     pub moves: Cow<'a, [Move]>,
     /// The instrument whose coil is left behind; then nothing moves.
     pub detach: Option<usize>,
+    /// Linear solves, where it is a tick.
+    pub solves: Option<usize>,
     /// Time at its end since the start of the script, s; none where the script has no speeds.
     pub time_s: Option<f64>,
     /// How long it takes, s; 0 where the script has no speeds.
@@ -56,18 +58,24 @@ pub struct ScriptRun<'a> {
 impl Step<'_> {
     /// The same on its own.
     pub fn into_owned(self) -> Step<'static> {
-        let Self { moves, detach, time_s, duration_s } = self;
-        Step { moves: Cow::Owned(moves.into_owned()), detach, time_s, duration_s }
+        Step { moves: Cow::Owned(self.moves.into_owned()), ..self }
     }
 
-    /// Carries it out.
+    /// Carries it out. In a tick the wall may stop hands that earlier ones have moved: that is what the tick has come to, and no failure.
     ///
     /// # Errors
-    /// As [`Simulation::step_until`] and [`Simulation::detach`].
+    /// As [`Simulation::step_until`], [`Simulation::tick`] and [`Simulation::detach`].
     pub fn carry_out<'a>(&self, simulation: &'a mut Simulation) -> Result<&'a StepReport> {
-        match self.detach {
-            Some(instrument) => simulation.detach(instrument),
-            None => simulation.step_until(&self.moves, self.time_s),
+        match (self.detach, self.solves) {
+            (Some(instrument), _) => simulation.detach(instrument),
+            (None, None) => simulation.step_until(&self.moves, self.time_s),
+            (None, Some(solves)) => {
+                let under_way = simulation.report().is_under_way();
+                match simulation.tick(&self.moves, solves, self.time_s) {
+                    Err(error) if !under_way || error.is_input() => Err(error),
+                    _ => Ok(simulation.report()),
+                }
+            }
         }
     }
 }
@@ -152,10 +160,11 @@ impl<'a> ScriptRun<'a> {
         }
         let duration_s = self.steps.as_ref().map_or(0.0, |steps| steps.step_s);
         let time_s = self.script.is_timed().then_some(self.time_s + duration_s);
-        let detach = self.script.motions[self.course.motions.len() - 1].detach;
+        let Motion { detach, solves, .. } = self.script.motions[self.course.motions.len() - 1];
         Ok(self.steps.as_ref().map(|steps| Step {
             moves: Cow::Borrowed(&steps.moves),
             detach,
+            solves,
             time_s,
             duration_s,
         }))

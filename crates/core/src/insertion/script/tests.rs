@@ -266,6 +266,36 @@ fn hands_that_rest_take_steps_of_time_and_move_nothing() {
 }
 
 #[test]
+fn a_line_with_solves_has_ticks_for_steps() {
+    let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
+    let script = |line: ScriptLine| Script::new(&[line], &stack, &[0.0], None);
+    let solves = |solves: usize, line: ScriptLine| ScriptLine { solves: Some(solves), ..line };
+    let wait = ScriptLine { wait_s: Some(1.0), ..Default::default() };
+    for (line, count) in [(advance(2.0, 1.0), 2), (wait, 10)] {
+        let ticks = script(solves(6, line.clone())).unwrap();
+        let (mut run, mut seen) = (ticks.begin(), 0);
+        while let Some(step) = run.next_where(|_| None).unwrap() {
+            assert_eq!(step.solves, Some(6));
+            seen += 1;
+            run.carried_out();
+        }
+        assert_eq!(seen, count);
+        assert!(ticks.moves().unwrap_err().to_string().starts_with("script[0].solves = 6: moves alone"));
+        assert!(script(line).unwrap().moves().is_ok());
+    }
+    let inject = ScriptLine { inject: inject(1.0, 1.0, None), ..Default::default() };
+    let with = ScriptLine { with: vec![solves(6, advance(1.0, 1.0))], ..advance(1.0, 1.0) };
+    for (line, words) in [
+        (solves(0, advance(1.0, 1.0)), "script[0].solves = 0: allow at least one"),
+        (solves(6, inject), "script[0].solves = 6: a line that only injects"),
+        (with, "script[0].with[0].solves = given"),
+    ] {
+        let told = script(line).unwrap_err().to_string();
+        assert!(told.starts_with(words), "{told}");
+    }
+}
+
+#[test]
 fn what_ends_a_line_is_checked_and_lengths_after_it_are_known_within_bounds() {
     let tree = crate::vessel::anatomy::tree("aortic_arch").unwrap();
     let until = |until: Until, mm| ScriptLine { until: Some(until), ..advance(mm, 1.0) };

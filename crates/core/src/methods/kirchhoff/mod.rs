@@ -358,9 +358,13 @@ impl<const C: usize> Method for Kirchhoff<C> {
             }
             Err(error) => {
                 // The wall has stopped the hands.
-                let state = Arc::make_mut(&mut self.state);
-                state.tick = Ticking::Rest;
-                state.report.behind.clear();
+                if self.state.report.is_under_way() {
+                    let state = Arc::make_mut(&mut self.state);
+                    state.tick = Ticking::Rest;
+                    state.report.rest();
+                    state.report.behind.clear();
+                    state.report.converged = false;
+                }
                 Err(error)
             }
         }

@@ -16,6 +16,8 @@ const LIVE: u32 = 0xff_c020;
 pub(super) const CHOSEN: u32 = 0x5a_c8fa;
 /// Height of what is below the pictures, and of a line of text, at the usual size.
 const PANEL_PX: usize = 172;
+/// A hand that is ahead of its device by less than this, mm, is not shown to be.
+const LAG_MM: f64 = 0.05;
 
 /// Keys, and what they do.
 pub(super) type Help = (&'static str, &'static str);
@@ -186,8 +188,9 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
     let force = format!("  push {push:>9}  torque {:>7.3} N·mm", one.torque_nmm);
     let colour = if one.warns { WARN } else { TEXT };
     let x = writer.write(canvas, [x, y], 16, colour, &force);
-    if one.warns {
-        writer.write(canvas, [x + 20, y], 16, WARN, "LIMIT");
+    let x = if one.warns { writer.write(canvas, [x + 20, y], 16, WARN, "LIMIT") } else { x };
+    if one.behind_mm.abs() >= LAG_MM {
+        writer.write(canvas, [x + 20, y], 16, FAINT, &format!("hand {:+.1} mm ahead", one.behind_mm));
     }
 }
 
