@@ -18,7 +18,10 @@ impl Default for Solves {
 
 impl fmt::Display for Solves {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.map_or_else(|| f.write_str("all"), |solves| solves.fmt(f))
+        match self.0 {
+            Some(solves) => solves.fmt(f),
+            None => f.write_str("all"),
+        }
     }
 }
 
