@@ -138,6 +138,11 @@ impl Exam {
         &self.subject
     }
 
+    /// The way to its target.
+    pub fn way(&self) -> &Way {
+        &self.way
+    }
+
     /// Looks at what a record has more than before; the score as soon as it ends.
     pub fn follow(&mut self, record: &Record) -> Option<&Arc<Score>> {
         if self.score.is_some() {

@@ -9,8 +9,6 @@ use crate::way::Way;
 
 /// Part of the time in which forces are at most that of the 95th percentile.
 const MOST_OF_TIME: f64 = 0.95;
-/// A tip is held against a wall by more than this, N.
-const AGAINST_WALL_N: f64 = 1e-3;
 /// Shortest way to which one that was gone is compared, mm.
 const SHORTEST_MM: f64 = 1.0;
 
@@ -121,11 +119,8 @@ fn contrast(record: &Record) -> Vec<Metric> {
         |name, unit, value, definition| lower(Group::Contrast, (name, unit), Some(value), definition, REVIEW);
     let volume = record.injections.iter().map(|one| one.volume_ml).sum();
     let fastest = record.injections.iter().map(|one| one.rate_ml_per_s).fold(0.0, f64::max);
-    let against = |one: &&crate::Injection| {
-        let during = record.samples.iter().find(|sample| sample.time_s >= one.time_s);
-        during.or(record.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
-    };
-    let at_wall = record.injections.iter().filter(against).map(|one| one.volume_ml).sum();
+    let against = record.injections.iter().filter(|one| record.is_against_wall(one));
+    let at_wall = against.map(|one| one.volume_ml).sum();
     vec![
         of("contrast_ml", "ml", volume, "contrast medium injected"),
         of("injections", "1", record.injections.len() as f64, "how often it was injected"),
@@ -229,10 +224,7 @@ fn safety(record: &Record) -> Vec<Metric> {
     });
     let torque = most(&|sample| sample.hands.iter().map(|hand| hand.torque_nmm.abs()).fold(0.0, f64::max));
     let several = samples.iter().any(|sample| sample.hands.len() > 1);
-    let ahead = |sample: &crate::Sample| {
-        sample.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
-    };
-    let ahead_s: f64 = record.timed().filter(|(_, sample)| ahead(sample)).map(|(s, _)| s).sum();
+    let ahead_s: f64 = record.timed().filter(|(_, sample)| sample.is_ahead()).map(|(s, _)| s).sum();
     let idle_s = idle_s(record);
     let blind_s = record
         .beam_on_s(0.0, record.end_s())

@@ -12,6 +12,8 @@ pub const BEAM: &str = "beam.csv";
 /// Motions of hands below these are rest: lengths, mm, and turns, rad.
 pub(crate) const REST_MM: f64 = 1e-9;
 const REST_RAD: f64 = 1e-9;
+/// A tip is held against a wall by more than this, N.
+pub(crate) const AGAINST_WALL_N: f64 = 1e-3;
 
 /// What one hand did in a step, and felt after it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -58,6 +60,11 @@ impl Sample {
     pub(crate) fn rests(&self) -> bool {
         let moves = |hand: &Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
         !self.hands.iter().any(moves)
+    }
+
+    /// Whether an instrument is farther in than the one in it.
+    pub(crate) fn is_ahead(&self) -> bool {
+        self.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
     }
 }
 
@@ -182,6 +189,12 @@ impl Record {
         })
     }
 
+    /// Whether an injection began with the tip held by a wall.
+    pub(crate) fn is_against_wall(&self, injection: &Injection) -> bool {
+        let during = self.samples.iter().find(|sample| sample.time_s >= injection.time_s);
+        during.or(self.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
+    }
+
     /// The same until an end: as far as a sample of this number, which is cut at a time.
     pub(crate) fn until(&self, sample: usize, time_s: f64) -> Self {
         let mut samples = self.samples[..=sample].to_vec();
@@ -190,6 +203,15 @@ impl Record {
         let states =
             |beam: &Vec<BeamState>| beam.iter().filter(|one| one.time_s <= time_s).copied().collect();
         Self { samples, injections, beam: self.beam.as_ref().map(states) }
+    }
+
+    /// The same until a time.
+    pub fn before(&self, time_s: f64) -> Self {
+        let after = self.samples.partition_point(|sample| sample.time_s < time_s);
+        match self.samples.get(after) {
+            Some(_) => self.until(after, time_s),
+            None => self.clone(),
+        }
     }
 
     /// States of the beam with the times at which they end.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::exam::{Ended, EndedBy};
 use crate::metric::Metric;
-use crate::subject::{Subject, Threshold};
+use crate::subject::{Limits, Subject, Threshold};
 
 /// Score of a subject that is done as it should be.
 const BEST: f64 = 100.0;
@@ -40,6 +40,9 @@ pub struct Score {
     /// What has come of it.
     #[serde(flatten)]
     pub verdict: Verdict,
+    /// The limits that there were.
+    #[serde(skip)]
+    pub limits: Limits,
     /// All measures, in the order of their groups.
     pub metrics: Vec<Scored>,
 }
@@ -66,7 +69,7 @@ impl Score {
             (true, false) => BEST * kept / all,
         };
         let verdict = Verdict { passed: reached && all_kept, score, ended };
-        Self { subject: subject.stem(), verdict, metrics }
+        Self { subject: subject.stem(), verdict, limits: subject.limits, metrics }
     }
 
     /// The measures of which something was asked.

@@ -52,7 +52,7 @@ impl Way {
     }
 
     /// The target, and how near to it is there, mm.
-    pub(crate) fn target_mm(&self) -> Option<(Vec3, f64)> {
+    pub fn target_mm(&self) -> Option<(Vec3, f64)> {
         self.target_mm
     }
 

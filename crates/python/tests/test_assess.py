@@ -40,3 +40,24 @@ def test_a_run_is_scored_by_a_subject(tmp_path):
     assert metrics["turns"]["passed"] is None and metrics["turns"]["threshold"] is None
     with pytest.raises(endowire.InputError, match="goal.target"):
         endowire.score(tmp_path, subject, centreline=assets / "vessels" / "hepatic.csv")
+
+
+def test_a_course_of_attempts(tmp_path):
+    folders = []
+    for number, end_s in enumerate([8.0, 6.0, 5.0, 4.0]):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "steps.csv").write_text(STEPS.replace(",2.0\n", f",{end_s}\n"))
+        folders.append(folder)
+    course = endowire.course(folders)
+    lines = {line["name"]: line for line in course["metrics"]}
+    assert lines["total_s"]["values"] == [8.0, 6.0, 5.0, 4.0]
+    assert (lines["total_s"]["trend"], lines["total_s"]["best"]) == ("better", 4.0)
+    assert lines["wall_force_n"]["trend"] == "none" and lines["beam_on_s"]["first"] is None
+    assert course["score"] is None and course["passed"] is None
+    assets = endowire.assets_path()
+    task = {"subject": assets / "subjects" / "left_carotid.toml", "centreline": assets / "vessels" / "aortic_arch.csv"}
+    scored = endowire.course(folders[:2], **task)
+    assert scored["passed"] == [False, False] and scored["score"]["values"] == [0.0, 0.0]
+    with pytest.raises(endowire.InputError, match="target"):
+        endowire.course(folders, target="left carotid", **task)

@@ -91,11 +91,12 @@ impl Played {
         Self { session: self.session.with_script(self.script.clone()), ..self }
     }
 
-    /// What is assessed of it, with the scene's file seen from where `folder` is.
-    pub(crate) fn session_file(&self, folder: &Path) -> SessionFile {
+    /// What is assessed of it, with the scene's file seen from where `folder` is, recorded at this time.
+    pub(crate) fn session_file(&self, folder: &Path, recorded_unix_s: Option<u64>) -> SessionFile {
         SessionFile {
             scene_file: folder.join(&self.scene_path),
             set: self.settings.iter().map(ToString::to_string).collect(),
+            recorded_unix_s,
             record: self.session.record().clone(),
         }
     }
