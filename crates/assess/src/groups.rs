@@ -15,6 +15,7 @@ const SHORTEST_MM: f64 = 1.0;
 const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
 const RAFII: &str = "Rafii-Tari et al. 2017: motion and forces of hands and catheters";
 const BOYLE: &str = "Boyle et al. 2011: scores of errors";
+const SLUZEWSKI: &str = "Sluzewski et al. 2004: packing of aneurysms and compaction of coils";
 const REVIEW: &str =
     "review of simulator studies, European Journal of Vascular and Endovascular Surgery 2016";
 
@@ -302,7 +303,9 @@ fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
 }
 
 fn task(record: &Record, way: Option<&Way>) -> Vec<Metric> {
-    let last = on_centreline(record).last().copied();
+    let instrument = way.and_then(|way| way.instrument);
+    let last = record.samples.iter().rev().find_map(|sample| sample.tip_of_mm(instrument));
+    let packed = record.samples.last().and_then(|sample| sample.packing);
     let target = way.and_then(Way::target_mm);
     let error = target.map(|(target, _)| last.map_or(f64::INFINITY, |tip| (tip - target).norm()));
     let arrived = target.zip(error).map(|((_, within_mm), mm)| f64::from(u8::from(mm <= within_mm)));
@@ -311,15 +314,29 @@ fn task(record: &Record, way: Option<&Way>) -> Vec<Metric> {
             Group::Task,
             ("arrived", "1"),
             arrived,
-            "1 where the tip ends within the target's reach, else 0",
+            "1 where the tip, that of the instrument that the goal names, ends within the target's reach, else 0",
             REVIEW,
         )),
         lower(
             Group::Task,
             ("placement_error_mm", "mm"),
             error.filter(|mm| mm.is_finite()),
-            "distance of the tip from the target at the end",
+            "distance of this tip from the target at the end",
             REVIEW,
+        ),
+        higher(lower(
+            Group::Task,
+            ("packing_density", "1"),
+            packed.map(|packed| packed.density),
+            "volume of coils in the sac over that of the sac at the end",
+            SLUZEWSKI,
+        )),
+        lower(
+            Group::Task,
+            ("coil_outside_mm", "mm"),
+            packed.map(|packed| packed.outside_mm),
+            "length of coils outside the neck of the sac at the end",
+            SLUZEWSKI,
         ),
     ]
 }

@@ -22,9 +22,11 @@
 
 mod course;
 mod exam;
+mod goal;
 mod groups;
 mod metric;
 mod noticed;
+mod reach;
 mod record;
 mod score;
 mod session;
@@ -38,12 +40,14 @@ mod words;
 
 pub use course::{Attempt, Course, Line, MetricLine, Trend};
 pub use exam::{Ended, EndedBy, Exam, Standing, Used};
+pub use goal::{Goal, PackingGoal, PlaceGoal};
 pub use groups::assess;
 pub use metric::{Better, Group, Metric};
 pub use noticed::{Noticed, NoticedKind, noticed};
-pub use record::{BEAM, BeamState, Hand, Injection, Record, Sample};
+pub use reach::Site;
+pub use record::{BEAM, BeamState, Hand, Injection, Packed, Record, Sample};
 pub use score::{Score, Scored, Verdict};
 pub use session::SessionFile;
-pub use subject::{Goal, Limits, Subject, Threshold};
+pub use subject::{Limits, Subject, Threshold};
 pub use timeline::{HandLine, Timeline};
 pub use way::Way;

@@ -28,6 +28,21 @@ pub struct Hand {
     pub push_force_n: Option<f64>,
     /// Torque with which it holds.
     pub torque_nmm: f64,
+    /// Where the tip of its instrument is; none while it is not in, of a device alone ([`Sample::tip_mm`]), and where it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_mm: Option<Vec3>,
+    /// Where that is in the vessel at rest; none where the vessel does not move, or it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_at_rest_mm: Option<Vec3>,
+}
+
+/// What coils do in a sac.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Packed {
+    /// Volume of coils in the sac over that of the sac.
+    pub density: f64,
+    /// Length of coils that is out of the catheter and outside the neck, mm.
+    pub outside_mm: f64,
 }
 
 /// A step.
@@ -48,12 +63,25 @@ pub struct Sample {
     pub tip_force_n: f64,
     /// Whether the device snapped from one equilibrium to another.
     pub jumped: bool,
+    /// What coils do in the vessel's sac; none where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub packing: Option<Packed>,
 }
 
 impl Sample {
     /// Where the tip is beside the centre line, which is that of the vessel at rest.
     pub(crate) fn on_centreline_mm(&self) -> Option<Vec3> {
         self.tip_at_rest_mm.or(self.tip_mm)
+    }
+
+    /// Where the tip of a hand's instrument is, likewise; the foremost one where no hand is named.
+    pub(crate) fn tip_of_mm(&self, hand: Option<usize>) -> Option<Vec3> {
+        match hand {
+            Some(hand) if self.hands.len() > 1 => {
+                self.hands.get(hand).and_then(|hand| hand.tip_at_rest_mm.or(hand.tip_mm))
+            }
+            _ => self.on_centreline_mm(),
+        }
     }
 
     /// Whether no hand moves.
@@ -102,6 +130,9 @@ pub struct BeamState {
 /// A procedure.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
+    /// Names of the instruments, the innermost first; none where they were not recorded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub instruments: Vec<String>,
     /// Its steps, times rising.
     pub samples: Vec<Sample>,
     /// Injections in order.
@@ -111,8 +142,8 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv and
-    /// beam.csv where they are there.
+    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv,
+    /// packing.csv and beam.csv where they are there.
     ///
     /// # Errors
     /// [`Error::Content`] for a file that is not there or does not fit, naming it.
@@ -140,15 +171,24 @@ impl Record {
     fn of_folder(folder: &Path) -> Result<Self> {
         let steps: Vec<Step> = rows(&folder.join("steps.csv"))?;
         let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();
+        let mut instruments: Vec<String> = vec![];
         for row in optional::<InstrumentRow>(&folder.join("instruments.csv"))?.unwrap_or_default() {
             hands.entry(row.step).or_default().push(row.hand());
+            if !instruments.contains(&row.instrument) {
+                instruments.push(row.instrument);
+            }
         }
+        let packing = optional::<PackingRow>(&folder.join("packing.csv"))?.unwrap_or_default();
+        let mut packing: BTreeMap<usize, Packed> =
+            packing.into_iter().map(|row| (row.step, row.packed())).collect();
         let injections = optional::<InjectionRow>(&folder.join("injections.csv"))?.unwrap_or_default();
         let samples = steps.into_iter().map(|step| {
             let alone = || vec![step.hand()];
-            step.sample(hands.remove(&step.step).unwrap_or_else(alone))
+            let packing = packing.remove(&step.step);
+            Sample { packing, ..step.sample(hands.remove(&step.step).unwrap_or_else(alone)) }
         });
         Ok(Self {
+            instruments,
             samples: samples.collect(),
             injections: injections.into_iter().map(InjectionRow::injection).collect(),
             beam: optional(&folder.join(BEAM))?,
@@ -202,7 +242,8 @@ impl Record {
         let injections = self.injections.iter().filter(|one| one.time_s <= time_s).copied().collect();
         let states =
             |beam: &Vec<BeamState>| beam.iter().filter(|one| one.time_s <= time_s).copied().collect();
-        Self { samples, injections, beam: self.beam.as_ref().map(states) }
+        let beam = self.beam.as_ref().map(states);
+        Self { instruments: self.instruments.clone(), samples, injections, beam }
     }
 
     /// The same until a time.
@@ -249,6 +290,7 @@ impl Step {
             inserted_mm: self.inserted_mm,
             push_force_n: Some(self.push_force_n),
             torque_nmm: self.torque_nmm,
+            ..Hand::default()
         }
     }
 
@@ -262,6 +304,7 @@ impl Step {
             wall_force_n: self.wall_force_sum_n,
             tip_force_n: self.wall_force_tip_n,
             jumped: self.jumped,
+            packing: None,
         }
     }
 }
@@ -269,9 +312,13 @@ impl Step {
 #[derive(Debug, Deserialize)]
 struct InstrumentRow {
     step: usize,
+    instrument: String,
     advance_mm: f64,
     rotate_rad: f64,
     inserted_mm: f64,
+    tip_x_mm: Option<f64>,
+    tip_y_mm: Option<f64>,
+    tip_z_mm: Option<f64>,
     push_force_n: Option<f64>,
     torque_nmm: f64,
 }
@@ -279,7 +326,24 @@ struct InstrumentRow {
 impl InstrumentRow {
     fn hand(&self) -> Hand {
         let &Self { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, .. } = self;
-        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm }
+        let tip_mm = match (self.tip_x_mm, self.tip_y_mm, self.tip_z_mm) {
+            (Some(x), Some(y), Some(z)) => Some(Vec3::new(x, y, z)),
+            _ => None,
+        };
+        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, tip_mm, tip_at_rest_mm: None }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+struct PackingRow {
+    step: usize,
+    packing: f64,
+    outside_mm: f64,
+}
+
+impl PackingRow {
+    fn packed(&self) -> Packed {
+        Packed { density: self.packing, outside_mm: self.outside_mm }
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use endowire_assess::{BeamState, EndedBy, Exam, Hand, Injection, Record, Sample, Score, Subject};
+use endowire_assess::{BeamState, EndedBy, Exam, Hand, Injection, Record, Sample, Score, Site, Subject};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -80,8 +80,15 @@ fn beam(time_s: f64, on: bool) -> BeamState {
     }
 }
 
+/// The subject on the line, with a wire in a catheter and no sac.
+fn at_site(subject: Subject) -> Result<Exam, String> {
+    let (tree, instruments) = (tree(), ["wire", "catheter"].map(str::to_owned));
+    let site = Site { tree: Some(&tree), instruments: &instruments, has_sac: false };
+    Exam::new(subject, &site).map_err(|error| error.to_string())
+}
+
 fn exam(subject: Subject) -> Exam {
-    Exam::new(subject, &tree()).unwrap()
+    at_site(subject).unwrap()
 }
 
 fn score(record: &Record) -> Score {
@@ -249,7 +256,7 @@ fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
         [("ende", "goal.target = \"ende\": did you mean \"end\"?"), ("start", "where the centre line begins")]
     {
         let wrong = subject(&[("target = \"end\"", &format!("target = \"{target}\""))]).unwrap();
-        let error = Exam::new(wrong, &tree()).unwrap_err().to_string();
+        let error = at_site(wrong).unwrap_err();
         assert!(error.starts_with(file) && error.contains(told), "{error}");
     }
     assert!(

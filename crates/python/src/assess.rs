@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_assess::{Attempt, Course, Exam, Metric, Record, Score, Subject, Way};
+use endowire_assess::{Attempt, Course, Exam, Metric, Record, Score, Site, Subject, Way};
 use endowire_core::vessel::CentrelineTree;
 use pyo3::prelude::*;
 
@@ -45,9 +45,14 @@ impl Task {
 }
 
 /// Scores a record by a subject.
-fn scored(path: &Path, subject: &Path, centreline: &Path) -> endowire_core::Result<Arc<Score>> {
-    let exam = Exam::new(Subject::read(subject)?, &CentrelineTree::read(centreline)?)?;
-    Ok(exam.score(&Record::read(path)?))
+fn scored(path: &Path, subject: &Path, centreline: Option<&Path>) -> endowire_core::Result<Arc<Score>> {
+    let (subject, record) = (Subject::read(subject)?, Record::read(path)?);
+    let tree = centreline.map(CentrelineTree::read).transpose()?;
+    let has_sac = record.samples.iter().any(|sample| sample.packing.is_some());
+    let site = Site { tree: tree.as_ref(), instruments: &record.instruments, has_sac };
+    let exam = Exam::new(subject, &site)?;
+    exam.check(&record)?;
+    Ok(exam.score(&record))
 }
 
 /// Measures a session of `endowire play` (*.session.json) or the folder of a recorded run, as `endowire assess` does. `centreline` is the
@@ -71,19 +76,20 @@ pub(crate) fn assess<'py>(
 }
 
 /// Scores a session of `endowire play` (*.session.json) or the folder of a recorded run by a training subject, the file of one, as
-/// `endowire assess --subject` does. `centreline` is the table of the vessel's centre line, which names the subject's target.
+/// `endowire assess --subject` does. `centreline` is the table of the vessel's centre line, which names the subject's target; a subject in which a
+/// sac is to be packed needs none.
 ///
 /// Returns a dictionary: subject, passed, score (0 to 100), ended (None, or what ended it and when), and metrics, which are those of assess
 /// with threshold and passed, None where nothing was asked. Raises InputError for files that do not fit.
 #[pyfunction]
-#[pyo3(signature = (path, subject, *, centreline))]
+#[pyo3(signature = (path, subject, *, centreline=None))]
 pub(crate) fn score<'py>(
     py: Python<'py>,
     path: PathBuf,
     subject: PathBuf,
-    centreline: PathBuf,
+    centreline: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let scored = interruptible(py, move || scored(&path, &subject, &centreline))?;
+    let scored = interruptible(py, move || scored(&path, &subject, centreline.as_deref()))?;
     document::write(py, &*scored.map_err(exception)?)
 }
 
@@ -111,18 +117,12 @@ pub(crate) fn course<'py>(
             "a subject says where to go: leave one of the two out",
         ));
     }
-    let line = match (&subject, &task.centreline) {
-        (Some(_), None) => {
-            return Err(refuse("centreline", "None", "a subject's target is a point of one: give its table"));
-        }
-        (_, line) => line.clone().unwrap_or_default(),
-    };
     let course = interruptible(py, move || {
         let mut all: Vec<(Vec<Metric>, Option<Arc<Score>>)> = vec![];
         for path in &paths {
             all.push(match &subject {
                 Some(subject) => {
-                    let score = scored(path, subject, &line)?;
+                    let score = scored(path, subject, task.centreline.as_deref())?;
                     (score.metrics.iter().map(|one| one.metric).collect(), Some(score))
                 }
                 None => (task.measured(path)?, None),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_assess::{Exam, SessionFile};
+use endowire_assess::{Exam, SessionFile, Site};
 use endowire_core::file::{Files, InMemory};
 use endowire_core::insertion::Script;
 use endowire_core::methods::MethodChoice;
@@ -57,7 +57,8 @@ impl Played {
         let simulation = scene.simulation(&NoStore)?;
         let script = scene.steps(simulation.stack(), &NoStore)?;
         let view = view(opened.view(&scene)?, &**files)?;
-        let names = simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
+        let names: Vec<String> =
+            simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
         let mut session = Session::new(simulation, view, side_px, Limits::default())?.with_sac(sac);
@@ -66,7 +67,9 @@ impl Played {
         }
         let Opened { scene: scene_path, settings, subject } = opened;
         if let Some(subject) = subject {
-            session = session.with_exam(Exam::new(subject, scene.centreline(&NoStore)?)?);
+            let tree = subject.goal.target().map(|_| scene.centreline(&NoStore)).transpose()?;
+            let site = Site { tree, instruments: &names, has_sac: scene.vessel.sac.is_some() };
+            session = session.with_exam(Exam::new(subject, &site)?);
         }
         let pictures = Pictures::new(&scene, &session.snapshot(), wall)?;
         let provenance = json!({

@@ -312,7 +312,7 @@ def assess(
     within_mm: float = 5.0,
 ) -> list[dict[str, Any]]: ...
 def score(
-    path: str | PathLike[str], subject: str | PathLike[str], *, centreline: str | PathLike[str]
+    path: str | PathLike[str], subject: str | PathLike[str], *, centreline: str | PathLike[str] | None = None
 ) -> dict[str, Any]: ...
 def course(
     paths: Sequence[str | PathLike[str]],

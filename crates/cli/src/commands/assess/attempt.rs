@@ -143,14 +143,15 @@ pub(super) fn scored(
     for session in files {
         check_scene(session, &read_summary(session)?, &path, &settings)?;
         let record = Record::read(session)?;
+        exam.check(&record).map_err(|error| Failure::from(error).at(session.display()))?;
         let score = exam.clone().score(&record);
         attempts.push(Attempt {
             session: session.clone(),
             recorded_unix_s: recorded_unix_s(session)?,
             place,
-            target: Some(subject.goal.target.clone()),
+            target: subject.goal.target().map(str::to_owned),
             record: score.verdict.ended.map_or_else(|| record.clone(), |ended| record.before(ended.time_s)),
-            way: Some(exam.way().clone()),
+            way: exam.way().cloned(),
             metrics: score.metrics.iter().map(|one| one.metric).collect(),
             score: Some(score),
         });

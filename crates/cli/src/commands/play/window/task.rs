@@ -71,13 +71,8 @@ fn task_lines(task: &Subject) -> Vec<Line> {
 }
 
 fn standing_lines(standing: &Standing) -> Vec<Line> {
-    let goal = &standing.task.goal;
-    let to_go = standing.distance_mm.map_or_else(|| "not in yet".to_owned(), |mm| format!("{mm:.1} mm"));
-    let mut lines =
-        vec![(CHOSEN, format!("to {}: {to_go}, there at {} mm", goal.target, goal.tip_within_mm))];
-    if let Some(ml) = goal.inject_ml {
-        lines.push((CHOSEN, format!("injected there: {:.1} of {ml} ml", standing.injected_there_ml)));
-    }
+    let to_go = standing.to_go.iter().map(|line| (CHOSEN, line.clone()));
+    let mut lines: Vec<Line> = to_go.collect();
     lines.extend(standing.used.iter().map(|used| {
         let colour = if used.value > NEARLY * used.limit { WARN } else { TEXT };
         let digits = if used.unit == "N" { 3 } else { 1 };
