@@ -157,7 +157,7 @@ impl Exam {
     }
 
     fn scored(&self, record: &Record, ended: Option<Ended>) -> Score {
-        Score::new(&self.subject, &assess(record, self.way()), ended)
+        Score::new(&self.subject, record, &assess(record, self.way()), ended)
     }
 
     /// How it stands with a record that was followed.

@@ -35,6 +35,7 @@ mod spectrum;
 mod stretch;
 mod subject;
 mod timeline;
+mod unjudged;
 mod way;
 mod words;
 
@@ -50,4 +51,5 @@ pub use score::{Score, Scored, Verdict};
 pub use session::SessionFile;
 pub use subject::{Limits, Subject, Threshold};
 pub use timeline::{HandLine, Timeline};
+pub use unjudged::Unjudged;
 pub use way::Way;

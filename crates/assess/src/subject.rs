@@ -83,11 +83,9 @@ fn one() -> f64 {
 }
 
 impl Threshold {
-    /// Whether a value is as it should be; what was not measured is not.
-    pub(crate) fn holds(&self, value: Option<f64>) -> bool {
-        let at_most = |value: f64| self.at_most.is_none_or(|most| value <= most);
-        let at_least = |value: f64| self.at_least.is_none_or(|least| value >= least);
-        value.is_some_and(|value| at_most(value) && at_least(value))
+    /// Whether a value is as it should be.
+    pub(crate) fn holds(&self, value: f64) -> bool {
+        self.at_most.is_none_or(|most| value <= most) && self.at_least.is_none_or(|least| value >= least)
     }
 
     /// Checks it beside the measure of its name; `key` is what messages call it.

@@ -72,7 +72,11 @@ impl Threshold {
 impl Scored {
     /// Whether what was asked of it is so.
     pub fn kept_words(&self) -> &'static str {
-        if self.passed == Some(true) { "kept" } else { "missed" }
+        match self.passed {
+            Some(true) => "kept",
+            Some(false) => "missed",
+            None => "not judged",
+        }
     }
 
     /// Its value with its unit.
@@ -110,7 +114,7 @@ mod tests {
         let words = |name: &str, value: Option<f64>| {
             let metric = *metrics.iter().find(|metric| metric.name == name).unwrap();
             let metric = crate::Metric { value, ..metric };
-            Scored { metric, threshold: None, passed: None }.value_words()
+            Scored { metric, threshold: None, passed: None, unjudged: None }.value_words()
         };
         assert_eq!(words("reversals", Some(6.0)), "6");
         assert_eq!(words("path_ratio", Some(1.23456)), "1.235");

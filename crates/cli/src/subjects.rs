@@ -89,7 +89,8 @@ pub(crate) fn text(score: &Score) -> String {
     let row = |(scored, threshold): (&Scored, &Threshold)| {
         let (kept, value) = (scored.kept_words(), scored.value_words());
         let (name, asked, points) = (scored.metric.name, threshold.words(), threshold.points);
-        format!("  {kept:<6}  {name:<22} {value:>14}  {asked:<16} points {points}")
+        format!("  {kept:<10}  {name:<22} {value:>14}  {asked:<16} points {points}")
     };
-    std::iter::once(verdict(score)).chain(score.asked().map(row)).collect::<Vec<_>>().join("\n")
+    let rows = std::iter::once(verdict(score)).chain(score.asked().map(row));
+    rows.chain(score.unjudged_words()).collect::<Vec<_>>().join("\n")
 }

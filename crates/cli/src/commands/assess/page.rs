@@ -70,6 +70,8 @@ struct Measure {
     definition: &'static str,
     asked: Option<String>,
     passed: Option<bool>,
+    /// Why it cannot be judged.
+    unjudged: Option<&'static str>,
 }
 
 /// Gathers the page of attempts and their courses.
@@ -147,6 +149,7 @@ fn shown(attempt: &Attempt, places: &Places<'_>, vessel: usize, pieces: usize) -
             definition: metric.definition,
             asked: scored.and_then(|one| one.threshold.as_ref()).map(Threshold::words),
             passed: scored.and_then(|one| one.passed),
+            unjudged: scored.and_then(|one| one.unjudged),
         }
     });
     Ok(Shown {
@@ -162,7 +165,7 @@ fn shown(attempt: &Attempt, places: &Places<'_>, vessel: usize, pieces: usize) -
         limits: score.map(|score| score.limits).unwrap_or_default(),
         verdict: score.map(|score| score.verdict.words()),
         passed: score.map(|score| score.verdict.passed),
-        unjudged: vec![],
+        unjudged: score.map(endowire_assess::Score::unjudged_words).unwrap_or_default(),
         metrics: measures.collect(),
         noticed: noticed(&attempt.record, attempt.way.as_ref()),
         timeline: Timeline::of(&attempt.record, attempt.way.as_ref(), pieces),
