@@ -81,7 +81,7 @@ async function score() {
   element("score-words").classList.toggle("passed", told.passed);
   element("score-watched").hidden = !watched;
   rows("score-asked", told.rows.filter((one) => one.asked !== null), (one) =>
-    [cell(one.passed ? "kept" : "missed"), measure(one), cell(one.value), cell(one.asked), cell(one.points)]);
+    [cell(one.kept), measure(one), cell(one.value), cell(one.asked), cell(one.points)]);
   for (const row of element("score-asked").tBodies[0].rows) row.className = row.cells[0].textContent;
   rows("score-others", told.rows.filter((one) => one.asked === null), (one) => [measure(one), cell(one.value)]);
   element("task-dialog").close();

@@ -63,6 +63,8 @@ struct Row<'a> {
     asked: Option<String>,
     points: Option<f64>,
     passed: Option<bool>,
+    /// Whether it is kept; none where nothing was asked.
+    kept: Option<&'static str>,
 }
 
 impl<'a> Told<'a> {
@@ -79,5 +81,6 @@ fn row(scored: &Scored) -> Row<'_> {
         asked: scored.threshold.as_ref().map(Threshold::words),
         points: scored.threshold.as_ref().map(|threshold| threshold.points),
         passed: scored.passed,
+        kept: scored.threshold.as_ref().map(|_| scored.kept_words()),
     }
 }

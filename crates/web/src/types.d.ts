@@ -54,12 +54,12 @@ export interface Verdict { passed: boolean; score: number; ended: { by: "goal" |
 
 /** The score of a training subject: numbers as `endowire assess --json` has them in `metrics`, and in words in `words` and `rows`. */
 export interface Score extends Verdict {
-  subject: string; words: string;
+  subject: string; words: string; unjudged?: { what: string; why: string }[];
   metrics: {
     name: string; group: string; value: number | null; unit: string; better: "lower" | "higher"; definition: string; study: string;
-    threshold: { at_most?: number; at_least?: number; points: number } | null; passed: boolean | null;
+    threshold: { at_most?: number; at_least?: number; points: number } | null; passed: boolean | null; unjudged?: string;
   }[];
-  rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null }[];
+  rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null; kept: string | null }[];
 }
 
 /** What hands, beam and injector have done: a sample for each tick, rests that follow each other being one. */

@@ -86,7 +86,7 @@ fn score_lines(score: &Score) -> Vec<Line> {
     let rows = score.asked().map(|(scored, threshold)| {
         let (kept, value) = (scored.kept_words(), scored.value_words());
         let colour = if scored.passed == Some(true) { TEXT } else { WARN };
-        (colour, format!("  {kept:<6} {}: {value}, {}", scored.metric.name, threshold.words()))
+        (colour, format!("  {kept:<10} {}: {value}, {}", scored.metric.name, threshold.words()))
     });
     let end = (TEXT, "What is done now does not count. Esc ends.".to_owned());
     std::iter::once(head).chain(rows).chain([end]).collect()
