@@ -44,7 +44,7 @@ pub(super) struct CourseOf<'a> {
 
 /// Puts attempts into the order in which they were recorded, if all of them say when; sessions of one second stay as they were given.
 pub(super) fn order(attempts: &mut [Attempt]) {
-    if ordered_by(attempts) == OrderedBy::Recorded {
+    if ordered_by(attempts.iter()) == OrderedBy::Recorded {
         attempts.sort_by_key(|attempt| attempt.recorded_unix_s);
     }
 }
