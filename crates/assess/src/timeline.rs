@@ -6,6 +6,9 @@ use serde::Serialize;
 use crate::record::{BeamState, Injection, Record, Sample};
 use crate::way::Way;
 
+/// No piece is shorter, s: hands do little that is faster.
+const SHORTEST_S: f64 = 0.1;
+
 /// What a hand does.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct HandLine {
@@ -45,9 +48,9 @@ pub struct Timeline {
 impl Timeline {
     /// That of a record in at most so many pieces, on a way if one is known.
     pub fn of(record: &Record, way: Option<&Way>, most_pieces: usize) -> Self {
-        let pieces = record.samples.len().min(most_pieces).max(1);
-        let (end_s, hands) =
-            (record.end_s(), record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0));
+        let end_s = record.end_s();
+        let pieces = ((end_s / SHORTEST_S).ceil() as usize).min(most_pieces).max(1);
+        let hands = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
         let mut line = Self {
             piece_s: end_s / pieces as f64,
             end_s,
@@ -137,9 +140,9 @@ mod tests {
         assert_eq!(line.hands[0].inserted_mm, [30.0, 30.0]);
         assert_eq!((line.wall_force_n, line.hands[0].force_n.clone()), (vec![0.5, 0.2], vec![0.5, 0.2]));
         assert_eq!(line.tip_mm[0], Some(Vec3::new(30.0, 0.0, 0.0)));
-        // No more pieces than samples, however many are asked for; what was pushed is all there.
+        // No piece is shorter than a tenth of a second, however many are asked for; what was pushed is all there.
         let fine = Timeline::of(&record, None, 1000);
-        assert_eq!(fine.tip_mm.len(), 3);
+        assert_eq!(fine.tip_mm.len(), 40);
         let pushed_mm: f64 = fine.hands[0].push_mm_per_s.iter().map(|speed| speed * fine.piece_s).sum();
         assert!((pushed_mm - 30.0).abs() < 1e-9, "{pushed_mm}");
         assert_eq!(Timeline::of(&Record::default(), None, 10).tip_mm, [None]);

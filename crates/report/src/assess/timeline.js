@@ -43,7 +43,12 @@ const timeline = (() => {
     for (const one of t.injections) {
       const from = px(one.time_s), wide = Math.max(3, px(Math.min(t.end_s, one.time_s + one.volume_ml / one.rate_ml_per_s)) - from), text = `${short(one.volume_ml)} ml`;
       c.fillStyle = COLOURS[2]; c.fillRect(from, lane.top + 2, wide, lane.high - 4);
-      if (from > free) { c.fillStyle = "#1c2228"; c.textAlign = "left"; const x = Math.min(from + wide + 3, px(t.end_s) - c.measureText(text).width); c.fillText(text, x, lane.top + lane.high / 2 + 4); free = x + c.measureText(text).width + 4; }
+      if (from < free) continue;
+      // To the left where there is no room on the right.
+      const room = from + wide + 3 + c.measureText(text).width < px(t.end_s);
+      c.fillStyle = "#1c2228"; c.textAlign = room ? "left" : "right";
+      c.fillText(text, room ? from + wide + 3 : from - 3, lane.top + lane.high / 2 + 4);
+      free = from + wide + 7 + c.measureText(text).width;
     }
   }
 
