@@ -10,7 +10,9 @@ use crate::metric::{Better, Group, Metric};
 use crate::score::Score;
 
 /// A trend is told where chance makes one as steady no more often than this.
-const CHANCE: f64 = 0.05;
+const CHANCE: f64 = 0.05 + 1e-9;
+/// Values that differ by no more than this part of them are equal.
+const ROUNDING: f64 = 1e-9;
 /// Most attempts of which all orders are counted; of more a normal distribution stands for them.
 const COUNTED: usize = 60;
 
@@ -132,7 +134,7 @@ impl Line {
             Better::Higher => a.max(b),
         });
         let rises = rises(&only);
-        let chance = (only.len() > 1).then(|| chance(only.len(), rises.unsigned_abs()));
+        let chance = (only.len() > 1).then(|| chance(&only, rises.unsigned_abs()));
         let told = chance.is_some_and(|chance| chance <= CHANCE);
         let trend = match (told, (rises > 0) == (better == Better::Higher)) {
             (false, _) => Trend::None,
@@ -151,10 +153,16 @@ impl Line {
     }
 }
 
+/// Whether two values are equal but for rounding.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
 /// Pairs of values that rise, less those that fall.
 fn rises(values: &[f64]) -> i64 {
     let pairs = values.iter().enumerate().flat_map(|(at, a)| values[at + 1..].iter().map(move |b| (a, b)));
-    pairs.map(|(a, b)| i64::from(b > a) - i64::from(b < a)).sum()
+    let apart = pairs.filter(|(a, b)| !same(**a, **b));
+    apart.map(|(a, b)| if b > a { 1 } else { -1 }).sum()
 }
 
 /// Median of the slopes of all pairs.
@@ -170,26 +178,54 @@ fn median_slope(known: &[(f64, f64)]) -> Option<f64> {
     }
 }
 
-/// Part of the orders of so many values in which at least so many more pairs rise than fall. Equal values count as if they were not, which
-/// makes it larger than it is.
-fn chance(count: usize, rises: u64) -> f64 {
-    let pairs = count * (count - 1) / 2;
-    if count > COUNTED {
-        let n = count as f64;
-        let spread = (n * (n - 1.0) * (2.0 * n + 5.0) / 18.0).sqrt();
-        return 0.5 * libm::erfc((rises as f64 - 1.0).max(0.0) / spread * std::f64::consts::FRAC_1_SQRT_2);
+/// Part of the orders of these values in which at least so many more pairs rise than fall; equal values are neither.
+fn chance(values: &[f64], rises: u64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let equal: Vec<usize> = sorted.chunk_by(|a, b| same(*a, *b)).map(<[f64]>::len).collect();
+    if values.len() > COUNTED {
+        let spread = |n: f64| n * (n - 1.0) * (2.0 * n + 5.0);
+        let ties: f64 = equal.iter().map(|count| spread(*count as f64)).sum();
+        let deviation = ((spread(values.len() as f64) - ties).max(1.0) / 18.0).sqrt();
+        return 0.5 * libm::erfc((rises as f64 - 1.0).max(0.0) / deviation * std::f64::consts::FRAC_1_SQRT_2);
     }
-    // Orders by the number of pairs that fall: the next value goes into any place before, on or after those that are there.
+    // Orders by the number of pairs that fall: each set of equal values is put among the smaller ones.
+    let (mut smaller, mut pairs) = (0, 0);
     let mut parts = vec![1.0];
-    for next in 2..=count {
-        let mut longer = vec![0.0; parts.len() + next - 1];
-        for (falls, part) in parts.iter().enumerate() {
-            longer[falls..falls + next].iter_mut().for_each(|sum| *sum += part / next as f64);
-        }
-        parts = longer;
+    for count in equal {
+        parts = product(&parts, &falls_between(smaller, count));
+        pairs += smaller * count;
+        smaller += count;
     }
     let most_falls = (pairs - rises as usize) / 2;
     parts[..=most_falls].iter().sum::<f64>().min(1.0)
+}
+
+/// Parts of the orders of `smaller` and `larger` values in which 0, 1, 2 and more pairs fall. The last value is one of the larger ones, with
+/// which no pair falls, or one of the smaller ones, with which as many fall as there are larger ones.
+fn falls_between(smaller: usize, larger: usize) -> Vec<f64> {
+    let mut with_fewer: Vec<Vec<f64>> = vec![vec![1.0]; smaller + 1];
+    for l in 1..=larger {
+        let mut now: Vec<Vec<f64>> = vec![vec![1.0]];
+        for s in 1..=smaller {
+            let all = (s + l) as f64;
+            let mut parts = vec![0.0; s * l + 1];
+            with_fewer[s].iter().enumerate().for_each(|(falls, part)| parts[falls] += part * l as f64 / all);
+            now[s - 1].iter().enumerate().for_each(|(falls, part)| parts[falls + l] += part * s as f64 / all);
+            now.push(parts);
+        }
+        with_fewer = now;
+    }
+    with_fewer.pop().unwrap_or_default()
+}
+
+/// Coefficients of a product of polynomials.
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut all = vec![0.0; a.len() + b.len() - 1];
+    for (i, a) in a.iter().enumerate() {
+        all[i..i + b.len()].iter_mut().zip(b).for_each(|(sum, b)| *sum += a * b);
+    }
+    all
 }
 
 #[cfg(test)]
@@ -202,16 +238,26 @@ mod tests {
 
     #[test]
     fn chances_are_those_of_all_orders() {
+        let of = |count: u32, rises: u64| chance(&(0..count).map(f64::from).collect::<Vec<_>>(), rises);
         // Of four values one order of 24 rises throughout, and four have at most one pair that falls.
-        assert!((chance(4, 6) - 1.0 / 24.0).abs() < 1e-12);
-        assert!((chance(4, 4) - 4.0 / 24.0).abs() < 1e-12);
-        assert!((chance(3, 3) - 1.0 / 6.0).abs() < 1e-12);
-        assert!((chance(2, 1) - 0.5).abs() < 1e-12);
+        assert!((of(4, 6) - 1.0 / 24.0).abs() < 1e-12);
+        assert!((of(4, 4) - 4.0 / 24.0).abs() < 1e-12);
+        assert!((of(3, 3) - 1.0 / 6.0).abs() < 1e-12);
+        assert!((of(2, 1) - 0.5).abs() < 1e-12);
         // The table of Kendall's tau: of ten values S ≥ 21 in 0.036 of all orders.
-        assert!((chance(10, 21) - 0.036).abs() < 5e-4, "{}", chance(10, 21));
-        // Where counting ends the normal distribution goes on.
-        let (counted, beyond) = (chance(60, 300), chance(61, 308));
-        assert!((counted - beyond).abs() < 0.002, "{counted} {beyond}");
+        assert!((of(10, 21) - 0.036).abs() < 5e-4, "{}", of(10, 21));
+        // Three of one and three of another: 20 orders, of which one has all of the first before.
+        assert!((chance(&[4.0, 4.0, 4.0, 0.0, 0.0, 0.0], 9) - 0.05).abs() < 1e-12);
+        // 1 1 2 3 in twelve orders: one has five pairs that rise and none that falls, two have one that falls.
+        assert!((chance(&[1.0, 1.0, 2.0, 3.0], 5) - 1.0 / 12.0).abs() < 1e-12);
+        assert!((chance(&[1.0, 1.0, 2.0, 3.0], 3) - 3.0 / 12.0).abs() < 1e-12);
+        assert_eq!(chance(&[7.0; 5], 0), 1.0);
+        // Where counting ends the normal distribution goes on, with ties and without.
+        let tied =
+            |count: u32, rises: u64| chance(&(0..count).map(|k| f64::from(k / 3)).collect::<Vec<_>>(), rises);
+        for (counted, beyond) in [(of(60, 300), of(61, 308)), (tied(60, 300), tied(61, 308))] {
+            assert!((counted - beyond).abs() < 0.002, "{counted} {beyond}");
+        }
     }
 
     #[test]
@@ -226,6 +272,7 @@ mod tests {
         assert_eq!(line(&[40.0, 30.0, 25.0, 24.0], Better::Higher).trend, Trend::Worse);
         assert_eq!(line(&[40.0, 30.0, 25.0], Better::Lower).trend, Trend::None, "one order of six");
         assert_eq!(line(&[40.0, 30.0, 35.0, 24.0], Better::Lower).trend, Trend::None);
+        assert_eq!(line(&[4.0, 4.0, 4.0, 0.0, 0.0, 0.0], Better::Lower).trend, Trend::Better);
         // One bad day among seven does not hide what was learnt.
         let bad_day = line(&[40.0, 36.0, 33.0, 90.0, 30.0, 28.0, 27.0], Better::Lower);
         assert_eq!(bad_day.trend, Trend::Better);
@@ -234,8 +281,11 @@ mod tests {
 
     #[test]
     fn what_stays_or_was_not_measured_has_no_trend() {
-        let same = line(&[3.0; 8], Better::Lower);
-        assert_eq!((same.trend, same.per_attempt), (Trend::None, Some(0.0)));
+        let stays = line(&[3.0; 8], Better::Lower);
+        assert_eq!((stays.trend, stays.per_attempt), (Trend::None, Some(0.0)));
+        // What differs by rounding alone stays too.
+        let rounded = line(&[3.0, 3.0 - 1e-15, 3.0 - 2e-15, 3.0 - 3e-15], Better::Lower);
+        assert_eq!((rounded.trend, rounded.chance), (Trend::None, Some(1.0)));
         let gaps = Line::of(vec![None, Some(2.0), None, Some(1.0)], Better::Lower);
         assert_eq!((gaps.first, gaps.last, gaps.per_attempt), (Some(2.0), Some(1.0), Some(-0.5)));
         let none = Line::of(vec![None, None], Better::Lower);

@@ -31,7 +31,9 @@ pub struct Timeline {
     pub end_s: f64,
     /// Where the foremost tip is at the end of each piece, beside the centre line; none while nothing is in.
     pub tip_mm: Vec<Option<Vec3>>,
-    /// Whether that is in a branch that is not on the way.
+    /// The same of the instrument that is to arrive, where the way is for a named one; else empty.
+    pub arriving_mm: Vec<Option<Vec3>>,
+    /// Whether the foremost tip is in a branch that is not on the way.
     pub wrong: Vec<bool>,
     /// Largest sum of wall forces in each piece, N.
     pub wall_force_n: Vec<f64>,
@@ -55,6 +57,7 @@ impl Timeline {
             piece_s: end_s / pieces as f64,
             end_s,
             tip_mm: vec![None; pieces],
+            arriving_mm: vec![],
             wrong: vec![false; pieces],
             wall_force_n: vec![0.0; pieces],
             tip_force_n: vec![0.0; pieces],
@@ -65,8 +68,12 @@ impl Timeline {
         if end_s <= 0.0 {
             return line;
         }
+        let arriving = way.and_then(|way| way.instrument);
+        if arriving.is_some() {
+            line.arriving_mm = vec![None; pieces];
+        }
         for (took_s, sample) in record.timed() {
-            line.add(took_s, sample);
+            line.add(took_s, sample, arriving);
         }
         if let Some(way) = way {
             let wrong = |tip: &Option<Vec3>| tip.is_some_and(|tip| way.wrong_branch(&tip).is_some());
@@ -76,7 +83,7 @@ impl Timeline {
     }
 
     /// Adds a sample to the pieces that it lies in.
-    fn add(&mut self, took_s: f64, sample: &Sample) {
+    fn add(&mut self, took_s: f64, sample: &Sample, arriving: Option<usize>) {
         let (from_s, to_s) = (sample.time_s - took_s, sample.time_s);
         let pieces = self.tip_mm.len();
         let piece_of = |time_s: f64| ((time_s / self.piece_s) as usize).min(pieces - 1);
@@ -89,6 +96,9 @@ impl Timeline {
             // Of a sample that takes no time all is in its piece.
             let share = if took_s > 0.0 { (share_s / took_s).clamp(0.0, 1.0) } else { 1.0 };
             self.tip_mm[piece] = sample.on_centreline_mm();
+            if let Some(tip) = self.arriving_mm.get_mut(piece) {
+                *tip = sample.tip_of_mm(arriving);
+            }
             self.wall_force_n[piece] = self.wall_force_n[piece].max(sample.wall_force_n);
             self.tip_force_n[piece] = self.tip_force_n[piece].max(sample.tip_force_n);
             for (line, hand) in self.hands.iter_mut().zip(&sample.hands) {

@@ -34,6 +34,11 @@ impl Way {
         Self { instrument: Some(hand), ..self }
     }
 
+    /// The hand whose instrument is to arrive; none where the foremost tip is.
+    pub fn instrument(&self) -> Option<usize> {
+        self.instrument
+    }
+
     /// The way to a place nobody named: there is no arrival at it. None where the tree begins.
     pub fn to_place(tree: &CentrelineTree, place_mm: &Vec3) -> Option<Self> {
         Self::to_row(tree, tree.nearest_row(place_mm))

@@ -27,7 +27,7 @@ function trends(of, trend, section) {
 }
 
 function score(of, attempts, section) {
-  const told = of.score, change = told.per_attempt === null ? "" : `, ${told.per_attempt < 0 ? "−" : "+"}${short(Math.abs(told.per_attempt))} from one attempt to the next`;
+  const told = of.score, change = !told.per_attempt ? "" : `, ${told.per_attempt < 0 ? "−" : "+"}${short(Math.abs(told.per_attempt))} from one attempt to the next`;
   const trend = WORDS[told.trend], passed = of.passed.filter(Boolean).length;
   element("h3", "Score", section);
   element("p", `passed ${passed} of ${attempts.length}${change}${trend ? `; ${trend}` : ""}`, section).className = "told";
@@ -69,7 +69,7 @@ function lines(of, section) {
     spark(one, element("td", undefined, row));
     element("td", `${short(one.first)} → ${short(one.last)}`, row).className = "number";
     element("td", short(one.best), row).className = "number wide";
-    element("td", one.per_attempt === null ? "–" : `${one.per_attempt > 0 ? "+" : one.per_attempt < 0 ? "−" : ""}${short(Math.abs(one.per_attempt))}`, row).className = "number wide";
+    element("td", one.per_attempt === null ? "–" : Math.abs(one.per_attempt) < 1e-9 * Math.abs(one.last) ? "0" : `${one.per_attempt > 0 ? "+" : one.per_attempt < 0 ? "−" : ""}${short(Math.abs(one.per_attempt))}`, row).className = "number wide";
     element("td", WORDS[one.trend], row).className = one.trend;
   }
 }
@@ -79,8 +79,8 @@ function spark(one, cell) {
   canvas.className = "spark"; canvas.title = one.values.map(short).join(", "); canvas.setAttribute("role", "img"); canvas.setAttribute("aria-label", canvas.title);
   drawings.push(() => {
     const [c, w, h] = fitted(canvas), known = one.values.filter(v => v !== null), low = Math.min(...known), high = Math.max(...known);
-    const px = place(one.values.length, 0, w - 6), py = v => high > low ? 5 + (h - 10) * (high - v) / (high - low) : h / 2;
+    const px = place(one.values.length, 0, w - 6), differ = high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)), py = v => differ ? 5 + (h - 10) * (high - v) / (high - low) : h / 2;
     through(c, one.values, px, py, "#9aa4ae");
-    one.values.forEach((v, k) => { if (v === null) return; const best = v === one.best && high > low; c.fillStyle = best ? GREEN : "#4a545e"; c.beginPath(); c.arc(px(k), py(v), best ? 3 : 2, 0, 7); c.fill(); });
+    one.values.forEach((v, k) => { if (v === null) return; const best = v === one.best && differ; c.fillStyle = best ? GREEN : "#4a545e"; c.beginPath(); c.arc(px(k), py(v), best ? 3 : 2, 0, 7); c.fill(); });
   });
 }

@@ -19,7 +19,7 @@ function short(value) {
 }
 
 const withUnit = (value, unit) => value === null || unit === "1" ? short(value) : `${short(value)} ${unit}`;
-const measure = name => name.replace(/_(s|n|mm|ml|ns|nmm|ugy|ugycm2|cm2|ml_per_s|mm_per_s)$/, "").replace(/_/g, " ");
+const measure = name => name.replace(/_(s|n|mm|ml|ns|nmm|ugy|ugycm2|cm2|ml_per_s|mm_per_s)$/, "").replace(/_/g, " ").replace(/^c arm/, "C-arm");
 const clock = s => s < 60 ? `${s.toFixed(1)} s` : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")} min`;
 const day = unix_s => unix_s === null || unix_s === undefined ? null : new Date(1000 * unix_s).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 

@@ -59,9 +59,18 @@ const roadmap = (() => {
       }
     }
     c.globalAlpha = 1;
-    const tip = tips[Math.max(0, now)];
+    drawTip(c, tips[Math.max(0, now)], to, COLOURS[0]);
+    // The instrument that is to arrive, where that is not the foremost one.
+    const others = attempt.timeline.arriving_mm;
+    c.strokeStyle = COLOURS[1]; c.lineWidth = 1.6; c.setLineDash([5, 3]); c.beginPath();
+    others.slice(0, now + 1).forEach((tip, k) => { if (tip) others[k - 1] ? c.lineTo(...to(tip)) : c.moveTo(...to(tip)); });
+    c.stroke(); c.setLineDash([]);
+    drawTip(c, others[Math.max(0, now)], to, COLOURS[1]);
+  }
+
+  function drawTip(c, tip, to, colour) {
     if (!tip) return;
-    c.fillStyle = COLOURS[0]; c.strokeStyle = "#fff"; c.lineWidth = 2;
+    c.fillStyle = colour; c.strokeStyle = "#fff"; c.lineWidth = 2;
     c.beginPath(); c.arc(...to(tip), 5.5, 0, 7); c.fill(); c.stroke();
   }
 
@@ -144,6 +153,7 @@ const roadmap = (() => {
     const row = at("way-key"), add = (colour, text) => { const span = element("span", text, row), mark = document.createElement("i"); mark.style.background = colour; span.prepend(mark); };
     row.replaceChildren();
     add(COLOURS[0], "way of the foremost tip");
+    if (attempt.timeline.arriving_mm.length) add(COLOURS[1], `tip of ${attempt.instruments[attempt.arriving]}, which is to arrive`);
     if (attempt.timeline.wrong.some(Boolean)) add(RED, "in a wrong branch");
     if (attempt.target_mm) add(GREEN, "target");
   }

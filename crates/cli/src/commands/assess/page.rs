@@ -50,6 +50,8 @@ struct Shown {
     /// Angles of the C-arm where no beam was recorded.
     pose: [f64; 2],
     instruments: Vec<String>,
+    /// Number of the instrument whose tip is to arrive; none where the foremost one is.
+    arriving: Option<usize>,
     limits: endowire_assess::Limits,
     verdict: Option<String>,
     passed: Option<bool>,
@@ -162,6 +164,7 @@ fn shown(attempt: &Attempt, places: &Places<'_>, vessel: usize, pieces: usize) -
         vessel,
         pose: view.c_arm.angles_deg(),
         instruments: stack.instruments().iter().map(|one| one.name.clone()).collect(),
+        arriving: attempt.way.as_ref().and_then(endowire_assess::Way::instrument),
         limits: score.map(|score| score.limits).unwrap_or_default(),
         verdict: score.map(|score| score.verdict.words()),
         passed: score.map(|score| score.verdict.passed),

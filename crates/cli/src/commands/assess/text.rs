@@ -54,7 +54,12 @@ fn of_course(attempts: &[Attempt], course: &CourseOf<'_>) -> String {
 
 /// What became of something from one attempt to the next.
 fn went(per_attempt: Option<f64>, trend: Trend) -> String {
-    let change = per_attempt.map_or_else(String::new, |change| format!("  {change:+.3} each"));
+    let change = per_attempt.filter(|change| *change != 0.0);
+    let change = change.map_or_else(String::new, |change| {
+        // Three digits that count, whatever the size.
+        let digits = (2.0 - change.abs().log10().floor()).clamp(0.0, 6.0) as usize;
+        format!("  {change:+.digits$} each")
+    });
     let trend = if trend == Trend::None { String::new() } else { format!(", {}", trend.words()) };
     format!("{change}{trend}")
 }
