@@ -168,13 +168,14 @@ fn against_wall(record: &Record) -> Vec<Noticed> {
 /// The longest ways that a hand pulled back without pushing between.
 fn pulls(record: &Record) -> Vec<Noticed> {
     let most = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
-    let mut all: Vec<(f64, Stretch)> = Vec::new();
+    let mut all: Vec<(f64, Stretch, usize)> = Vec::new();
     for hand in 0..most {
-        let mut now: Option<(f64, Stretch)> = None;
+        let mut now: Option<(f64, Stretch, usize)> = None;
         for (took_s, sample) in record.timed() {
             let advance_mm = sample.hands.get(hand).map_or(0.0, |hand| hand.advance_mm);
             if advance_mm < 0.0 {
-                let (mm, stretch) = now.get_or_insert((0.0, (sample.time_s - took_s, sample.time_s)));
+                let (mm, stretch, _) =
+                    now.get_or_insert((0.0, (sample.time_s - took_s, sample.time_s), hand));
                 *mm -= advance_mm;
                 stretch.1 = sample.time_s;
             } else if advance_mm > 0.0 {
@@ -183,11 +184,12 @@ fn pulls(record: &Record) -> Vec<Noticed> {
         }
         all.extend(now);
     }
-    all.retain(|(mm, _)| *mm >= PULLED_MM);
+    all.retain(|(mm, ..)| *mm >= PULLED_MM);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.truncate(MOST);
-    let told = |(mm, (from_s, to_s)): (f64, Stretch)| {
-        let text = format!("{mm:.0} mm pulled back in {:.1} s", to_s - from_s);
+    let told = |(mm, (from_s, to_s), hand): (f64, Stretch, usize)| {
+        let of = record.instruments.get(hand).map_or_else(String::new, |name| format!(" of {name}"));
+        let text = format!("{mm:.0} mm{of} pulled back in {:.1} s", to_s - from_s);
         Noticed { what: NoticedKind::PulledBack, from_s, to_s, text }
     };
     all.into_iter().map(told).collect()

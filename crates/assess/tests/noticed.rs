@@ -64,6 +64,7 @@ fn record() -> Record {
         }
     });
     Record {
+        instruments: ["wire", "catheter"].map(str::to_owned).to_vec(),
         samples: samples.collect(),
         injections: vec![
             Injection { time_s: 0.5, volume_ml: 4.0, rate_ml_per_s: 2.0 },
@@ -94,7 +95,7 @@ fn each_fault_is_noticed_once_with_its_time() {
         ],
         "{told:#?}"
     );
-    assert_eq!(told[5].text, "26 mm pulled back in 2.0 s");
+    assert_eq!(told[5].text, "26 mm of wire pulled back in 2.0 s");
     assert_eq!(told[4].text, "6 ml injected with the tip held by a wall");
 }
 

@@ -1,12 +1,14 @@
 //! `endowire assess` of several sessions: their order, where measures go, and the page for a browser.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
 
-use crate::common::{assets, endowire, said, text, told};
+use crate::common::{assets, document, endowire, play, said, text, told};
 
-/// A session in the straight tube that takes so long, as `endowire play` writes it; recorded on this day if one is given.
+/// A session in the curved tube that takes so long, as `endowire play` writes it; recorded on this day if one is given.
 fn session(folder: &Path, name: &str, total_s: f64, day: Option<u64>) -> PathBuf {
     let sample = |part: f64, wall_force_n: f64| {
         json!({
@@ -117,4 +119,25 @@ fn a_page_has_all_of_it_and_nothing_from_a_network() {
     let nowhere = folder.path().join("no/page.html");
     let output = endowire().arg("assess").arg(&first).arg("--page").arg(&nowhere).output().unwrap();
     assert!(!output.status.success() && said(&output).contains("no/page.html"), "{}", said(&output));
+}
+
+#[test]
+fn a_session_by_the_clock_says_when_and_one_by_its_inputs_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    for (more, by_the_clock) in
+        [(&["--headless", "--size", "64"][..], false), (&["--headless", "--realtime", "--size", "64"], true)]
+    {
+        let mut child = play("curved_tube.toml", &record, more).spawn().unwrap();
+        child.stdin.take().unwrap().write_all(b"{\"do\": \"quit\"}\n").unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+        let recorded = document(folder.path().join("played.session.json")).get("recorded_unix_s").cloned();
+        let since_s = recorded.map(|recorded| {
+            let now_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs();
+            now_s - recorded.as_u64().unwrap()
+        });
+        assert_eq!(since_s.is_some(), by_the_clock);
+        assert!(since_s.is_none_or(|since_s| since_s < 600), "{since_s:?}");
+    }
 }
