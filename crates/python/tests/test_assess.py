@@ -62,3 +62,18 @@ def test_a_course_of_attempts(tmp_path):
     assert scored["passed"] == [False, False] and scored["score"]["values"] == [0.0, 0.0]
     with pytest.raises(endowire.InputError, match="target"):
         endowire.course(folders, target="left carotid", **task)
+
+
+def test_a_sac_needs_no_centreline_and_a_place_does(tmp_path):
+    (tmp_path / "steps.csv").write_text(STEPS)
+    subjects = endowire.assets_path() / "subjects"
+    with pytest.raises(endowire.InputError, match="goal.target"):
+        endowire.score(tmp_path, subjects / "left_carotid.toml")
+    with pytest.raises(endowire.InputError, match="goal.packing_density"):
+        endowire.score(tmp_path, subjects / "first_loops.toml")
+    packing = "step,coils_mm3,packing,neck_coverage,outside_mm,herniated,dome_force_n\n1,0,0.0,0,0,false,0\n2,2,0.012,0,0.5,false,0\n"
+    (tmp_path / "packing.csv").write_text(packing)
+    score = endowire.score(tmp_path, subjects / "first_loops.toml")
+    assert score["ended"]["by"] == "wall_force", "0.4 N is more than is allowed"
+    metrics = {metric["name"]: metric for metric in score["metrics"]}
+    assert (metrics["packing_density"]["value"], metrics["coil_outside_mm"]["passed"]) == (0.012, True)
