@@ -67,10 +67,10 @@ function lines(of, section) {
     const row = element("tr", undefined, body), name = element("td", measure(one.name), row);
     name.append(document.createElement("br"), element("small", `${one.unit === "1" ? "" : `${one.unit}, `}${one.better === "lower" ? "less" : "more"} is better`));
     spark(one, element("td", undefined, row));
-    element("td", `${short(one.first)} → ${short(one.last)}`, row).className = "number";
+    element("td", `${short(one.first)} → ${short(one.last)}`, row).className = "number pair";
     element("td", short(one.best), row).className = "number wide";
     element("td", one.per_attempt === null ? "–" : Math.abs(one.per_attempt) < 1e-9 * Math.abs(one.last) ? "0" : `${one.per_attempt > 0 ? "+" : one.per_attempt < 0 ? "−" : ""}${short(Math.abs(one.per_attempt))}`, row).className = "number wide";
-    element("td", WORDS[one.trend], row).className = one.trend;
+    element("td", WORDS[one.trend].replace("gets ", ""), row).className = one.trend;
   }
 }
 

@@ -32,7 +32,6 @@ function measures(attempt) {
     element("td", measure(one.name), row);
     element("td", withUnit(one.value, one.unit), row).className = "number";
     const asked = element("td", one.asked || "", row);
-    asked.className = "number";
     if (one.asked) element("span", ` ${one.unjudged ? "not judged" : one.passed ? "kept" : "missed"}`, asked).className = one.passed ? "kept" : "missed";
     const definition = element("td", undefined, element("tr", undefined, body));
     definition.colSpan = 3;
