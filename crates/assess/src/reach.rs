@@ -123,8 +123,12 @@ fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
         Err(other) => return Err(other),
     };
     let Some(name) = &goal.instrument else { return Ok(way) };
+    let refuse = |mend: String| Error::parameter("goal.instrument", format!("{name:?}"), mend);
     match site.instruments.iter().position(|one| one == name) {
         Some(hand) => Ok(way.for_instrument(hand)),
+        None if site.instruments.is_empty() => Err(refuse(
+            "no instruments are told: the record is of a device alone, or of an earlier version".to_owned(),
+        )),
         None => {
             let nearest = nearest_name(site.instruments.iter().map(String::as_str), name);
             let mend = format!(
@@ -132,7 +136,7 @@ fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
                 site.instruments.join(", "),
                 nearest.map_or_else(String::new, |nearest| format!("; did you mean {nearest:?}?"))
             );
-            Err(Error::parameter("goal.instrument", format!("{name:?}"), mend))
+            Err(refuse(mend))
         }
     }
 }
