@@ -39,6 +39,8 @@ pub struct Timeline {
     pub wall_force_n: Vec<f64>,
     /// Largest wall force at the tip, N.
     pub tip_force_n: Vec<f64>,
+    /// Volume of coils in the sac over that of the sac at the end of each piece; empty where no sac is packed.
+    pub packing_density: Vec<f64>,
     /// The hands, the innermost instrument first.
     pub hands: Vec<HandLine>,
     /// The beam, from each of these moments on; none where it was not recorded.
@@ -61,6 +63,7 @@ impl Timeline {
             wrong: vec![false; pieces],
             wall_force_n: vec![0.0; pieces],
             tip_force_n: vec![0.0; pieces],
+            packing_density: vec![],
             hands: vec![HandLine::of(pieces); hands],
             beam: record.beam.clone(),
             injections: record.injections.clone(),
@@ -71,6 +74,9 @@ impl Timeline {
         let arriving = way.and_then(|way| way.instrument);
         if arriving.is_some() {
             line.arriving_mm = vec![None; pieces];
+        }
+        if record.samples.iter().any(|sample| sample.packing.is_some()) {
+            line.packing_density = vec![0.0; pieces];
         }
         for (took_s, sample) in record.timed() {
             line.add(took_s, sample, arriving);
@@ -99,6 +105,9 @@ impl Timeline {
             if let Some(tip) = self.arriving_mm.get_mut(piece) {
                 *tip = sample.tip_of_mm(arriving);
             }
+            if let (Some(density), Some(packed)) = (self.packing_density.get_mut(piece), sample.packing) {
+                *density = packed.density;
+            }
             self.wall_force_n[piece] = self.wall_force_n[piece].max(sample.wall_force_n);
             self.tip_force_n[piece] = self.tip_force_n[piece].max(sample.tip_force_n);
             for (line, hand) in self.hands.iter_mut().zip(&sample.hands) {
@@ -122,7 +131,7 @@ impl HandLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Hand;
+    use crate::record::{Hand, Packed};
 
     fn sample(time_s: f64, x: f64, advance_mm: f64, wall_force_n: f64) -> Sample {
         Sample {
@@ -148,7 +157,10 @@ mod tests {
         assert_eq!((line.piece_s, line.end_s, line.tip_mm.len()), (2.0, 4.0, 2));
         assert_eq!(line.hands[0].push_mm_per_s, [15.0, 0.0]);
         assert_eq!(line.hands[0].inserted_mm, [30.0, 30.0]);
-        assert_eq!((line.wall_force_n, line.hands[0].force_n.clone()), (vec![0.5, 0.2], vec![0.5, 0.2]));
+        assert_eq!(
+            (line.wall_force_n.clone(), line.hands[0].force_n.clone()),
+            (vec![0.5, 0.2], vec![0.5, 0.2])
+        );
         assert_eq!(line.tip_mm[0], Some(Vec3::new(30.0, 0.0, 0.0)));
         // No piece is shorter than a tenth of a second, however many are asked for; what was pushed is all there.
         let fine = Timeline::of(&record, None, 1000);
@@ -156,5 +168,11 @@ mod tests {
         let pushed_mm: f64 = fine.hands[0].push_mm_per_s.iter().map(|speed| speed * fine.piece_s).sum();
         assert!((pushed_mm - 30.0).abs() < 1e-9, "{pushed_mm}");
         assert_eq!(Timeline::of(&Record::default(), None, 10).tip_mm, [None]);
+        // Of a sac it has what is packed; of others nothing.
+        assert!(line.packing_density.is_empty());
+        let mut packed = record;
+        packed.samples[1].packing = Some(Packed { density: 0.1, outside_mm: 0.0 });
+        packed.samples[2].packing = Some(Packed { density: 0.2, outside_mm: 0.0 });
+        assert_eq!(Timeline::of(&packed, None, 2).packing_density, [0.1, 0.2]);
     }
 }

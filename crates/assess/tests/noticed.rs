@@ -71,7 +71,6 @@ fn record() -> Record {
             Injection { time_s: 3.5, volume_ml: 6.0, rate_ml_per_s: 3.0 },
         ],
         beam: Some(vec![beam(0.0, true), beam(7.5, false)]),
-        ..Record::default()
     }
 }
 

@@ -16,6 +16,7 @@ const timeline = (() => {
     });
     all.push({ high: 90, name: "wall forces", unit: "N", limit: limits.wall_force_n, curves: [{ of: t.wall_force_n, colour: RED, name: "all" }, { of: t.tip_force_n, colour: COLOURS[3], name: "tip" }] });
     all.push({ high: 64, name: "forces of hands", unit: "N", curves: t.hands.map((hand, k) => ({ of: hand.force_n, colour: COLOURS[k % COLOURS.length], name: t.hands.length > 1 ? instruments[k] || `hand ${k + 1}` : "" })) });
+    if (t.packing_density.length) all.push({ high: 50, name: "sac filled", unit: "%", curves: [{ of: t.packing_density.map(part => 100 * part), colour: COLOURS[2], fill: true }] });
     let top = HEAD;
     for (const lane of all) { lane.top = top + 14; top += lane.high + 14 + GAP; }
     canvas.style.height = `${top + FOOT - GAP}px`;
