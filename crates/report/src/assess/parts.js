@@ -18,6 +18,7 @@ function short(value) {
   return Math.abs(value) >= 1000 ? value.toFixed(0) : String(+value.toPrecision(3));
 }
 
+const newtons = n => n < 0.1 ? `${short(1000 * n)} mN` : `${short(n)} N`;
 const withUnit = (value, unit) => value === null || unit === "1" ? short(value) : `${short(value)} ${unit}`;
 const measure = name => name.replace(/_(s|n|mm|ml|ns|nmm|ugy|ugycm2|cm2|ml_per_s|mm_per_s)$/, "").replace(/_/g, " ").replace(/^c arm/, "C-arm");
 const clock = s => s < 60 ? `${s.toFixed(1)} s` : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")} min`;

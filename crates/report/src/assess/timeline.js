@@ -14,13 +14,23 @@ const timeline = (() => {
       all.push({ high: 64, name: `${name}, pushed or pulled (−)`, unit: "mm/s", curves: [{ of: hand.push_mm_per_s, colour, fill: true }], signed: true });
       if (hand.turn_deg_per_s.some(v => v !== 0)) all.push({ high: 44, name: `${name}, turned`, unit: "°/s", curves: [{ of: hand.turn_deg_per_s, colour, fill: true }], signed: true });
     });
-    all.push({ high: 90, name: "wall forces", unit: "N", limit: limits.wall_force_n, curves: [{ of: t.wall_force_n, colour: RED, name: "all" }, { of: t.tip_force_n, colour: COLOURS[3], name: "tip" }] });
-    all.push({ high: 64, name: "forces of hands", unit: "N", curves: t.hands.map((hand, k) => ({ of: hand.force_n, colour: COLOURS[k % COLOURS.length], name: t.hands.length > 1 ? instruments[k] || `hand ${k + 1}` : "" })) });
+    all.push({ high: 90, name: "wall forces", force: true, limit: limits.wall_force_n, curves: [{ of: t.wall_force_n, colour: RED, name: "all" }, { of: t.tip_force_n, colour: COLOURS[3], name: "tip" }] });
+    all.push({ high: 64, name: "forces of hands", force: true, curves: t.hands.map((hand, k) => ({ of: hand.force_n, colour: COLOURS[k % COLOURS.length], name: t.hands.length > 1 ? instruments[k] || `hand ${k + 1}` : "" })) });
     if (t.packing_density.length) all.push({ high: 50, name: "sac filled", unit: "%", curves: [{ of: t.packing_density.map(part => 100 * part), colour: COLOURS[2], fill: true }] });
+    all.filter(lane => lane.force).forEach(inUnit);
     let top = HEAD;
     for (const lane of all) { lane.top = top + 14; top += lane.high + 14 + GAP; }
     canvas.style.height = `${top + FOOT - GAP}px`;
     return all;
+  }
+
+  // Forces of less than 0.1 N in thousandths: their digits are what is read.
+  function inUnit(lane) {
+    const small = lane.curves.every(curve => curve.of.every(v => v < 0.1));
+    lane.unit = small ? "mN" : "N";
+    if (!small) return;
+    lane.curves = lane.curves.map(curve => ({ ...curve, of: curve.of.map(v => 1000 * v) }));
+    lane.limit = lane.limit && 1000 * lane.limit;
   }
 
   const turned = (a, b) => a.primary_deg !== b.primary_deg || a.secondary_deg !== b.secondary_deg;
@@ -124,7 +134,7 @@ const timeline = (() => {
     const piece = Math.max(0, Math.min(t.tip_mm.length - 1, Math.ceil(shown.time_s / t.piece_s) - 1));
     const hands = t.hands.map((hand, k) => `${instruments[k] || `hand ${k + 1}`} ${short(hand.inserted_mm[piece])} mm in`);
     const state = (t.beam || []).findLast(state => state.time_s <= shown.time_s);
-    const words = [clock(shown.time_s), ...hands, `wall ${short(t.wall_force_n[piece])} N`, t.beam ? `beam ${state?.on ? "on" : "off"}` : ""];
+    const words = [clock(shown.time_s), ...hands, `wall ${newtons(t.wall_force_n[piece])}`, t.beam ? `beam ${state?.on ? "on" : "off"}` : ""];
     at("now").textContent = words.filter(Boolean).join(", ");
   }
 
