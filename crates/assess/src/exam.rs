@@ -3,18 +3,15 @@
 
 use std::sync::Arc;
 
-use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result};
 use serde::Serialize;
 
 use crate::groups::assess;
-use crate::record::{Record, Sample};
+use crate::reach::{Reach, SAME_ML, Site};
+use crate::record::Record;
 use crate::score::{Score, Verdict};
 use crate::subject::Subject;
 use crate::way::Way;
-
-/// Volumes that differ by less are the same, ml: sums are rounded.
-const SAME_ML: f64 = 1e-9;
 
 /// What ends a subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -75,10 +72,15 @@ pub struct Standing {
     /// Title and task, for people.
     #[serde(skip)]
     pub task: Arc<Subject>,
-    /// From the foremost tip to the target, mm; none while nothing is in.
+    /// From the tip to the target, mm; none while it is not in, and where a sac is to be packed.
     pub distance_mm: Option<f64>,
     /// Contrast medium injected at the target so far, ml.
     pub injected_there_ml: f64,
+    /// Volume of coils in the sac over that of the sac; none where there is no sac.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub packing_density: Option<f64>,
+    /// How far it is to the goal, in words: one thing each.
+    pub to_go: Vec<String>,
     /// The limits that there are.
     pub used: Vec<Used>,
     /// What has come of it, once it has ended.
@@ -92,50 +94,41 @@ pub struct Standing {
 #[derive(Debug, Clone)]
 pub struct Exam {
     subject: Arc<Subject>,
-    way: Way,
+    reach: Reach,
     /// Samples before this one have been looked at and do not change any more.
     seen: usize,
-    /// Since when the tip is at the target, s.
-    there_since_s: Option<f64>,
-    injected_there_ml: f64,
     wall_force_n: f64,
     score: Option<Arc<Score>>,
 }
 
 impl Exam {
-    /// A subject in a vessel with this centre line.
+    /// A subject where it is to be done.
     ///
     /// # Errors
-    /// [`Error::Content`] for a target that the vessel does not name, or where its centre line begins.
-    pub fn new(subject: Subject, tree: &CentrelineTree) -> Result<Self> {
-        let (target, within_mm) = (&subject.goal.target, subject.goal.tip_within_mm);
-        let refuse = |value: String, mend: String| {
-            let error = Error::parameter("goal.target", value, mend);
-            Error::content(subject.path(), error.to_string())
-        };
-        let way = match Way::to_target(tree, target, within_mm) {
-            Ok(Some(way)) => way,
-            Ok(None) => {
-                let mend = "is where the centre line begins: name a point farther on".to_owned();
-                return Err(refuse(format!("{target:?}"), mend));
-            }
-            Err(Error::Parameter { value, mend, .. }) => return Err(refuse(value, mend)),
-            Err(other) => return Err(other),
-        };
-        Ok(Self {
-            subject: Arc::new(subject),
-            way,
-            seen: 0,
-            there_since_s: None,
-            injected_there_ml: 0.0,
-            wall_force_n: 0.0,
-            score: None,
-        })
+    /// [`Error::Content`] for a goal that does not fit: a target that the vessel does not name, or where its centre line begins, an instrument that
+    /// is not there, a sac where there is none.
+    pub fn new(subject: Subject, site: &Site<'_>) -> Result<Self> {
+        let reach = Reach::new(&subject.goal, site)
+            .map_err(|error| Error::content(subject.path(), error.to_string()))?;
+        Ok(Self { subject: Arc::new(subject), reach, seen: 0, wall_force_n: 0.0, score: None })
+    }
+
+    /// Refuses a record that does not say what the goal asks: it could not be reached in it.
+    ///
+    /// # Errors
+    /// [`Error::Content`] with the goal's key.
+    pub fn check(&self, record: &Record) -> Result<()> {
+        self.reach.check(record).map_err(|error| Error::content(self.subject.path(), error.to_string()))
     }
 
     /// What is to be done.
     pub fn subject(&self) -> &Subject {
         &self.subject
+    }
+
+    /// The way to its target; none of a sac.
+    pub fn way(&self) -> Option<&Way> {
+        self.reach.way.as_ref()
     }
 
     /// Looks at what a record has more than before; the score as soon as it ends.
@@ -164,7 +157,7 @@ impl Exam {
     }
 
     fn scored(&self, record: &Record, ended: Option<Ended>) -> Score {
-        Score::new(&self.subject, &assess(record, Some(&self.way)), ended)
+        Score::new(&self.subject, record, &assess(record, self.way()), ended)
     }
 
     /// How it stands with a record that was followed.
@@ -179,20 +172,20 @@ impl Exam {
         let used = used
             .into_iter()
             .filter_map(|(what, value, limit, unit)| Some(Used { what, value, limit: limit?, unit }));
-        Standing {
+        let last = record.samples.last();
+        let mut standing = Standing {
             subject: self.subject.stem(),
             task: Arc::clone(&self.subject),
-            distance_mm: record.samples.last().and_then(|sample| self.distance_mm(sample)),
-            injected_there_ml: self.injected_there_ml,
+            distance_mm: last.and_then(|sample| self.reach.distance_mm(sample)),
+            injected_there_ml: self.reach.injected_there_ml,
+            packing_density: last.and_then(|sample| sample.packing).map(|packed| packed.density),
+            to_go: vec![],
             used: used.collect(),
             verdict: self.score.as_ref().map(|score| score.verdict),
             score: self.score.clone(),
-        }
-    }
-
-    fn distance_mm(&self, sample: &Sample) -> Option<f64> {
-        let (target_mm, _) = self.way.target_mm()?;
-        Some((sample.on_centreline_mm()? - target_mm).norm())
+        };
+        standing.to_go = standing.to_go_words();
+        standing
     }
 
     /// The end of the subject, if it is in a sample: that which comes first, limits before the goal.
@@ -202,7 +195,7 @@ impl Exam {
         // A rest that becomes longer has begun with what it is.
         let so_s = if sample.rests() { begun_s } else { sample.time_s };
         self.wall_force_n = self.wall_force_n.max(sample.wall_force_n);
-        let goal_s = self.reached_s(record, sample, so_s);
+        let goal_s = self.reach.reached_s(record, sample, so_s);
         let limits = &self.subject.limits;
         let in_sample = |time_s: &f64| *time_s < sample.time_s;
         let ends = [
@@ -221,29 +214,10 @@ impl Exam {
         let ended = ends.into_iter().filter_map(|(by, time_s)| Some(Ended { by, time_s: time_s? }));
         ended.min_by(|a, b| a.time_s.total_cmp(&b.time_s))
     }
-
-    /// When the goal is reached, if it is in this sample.
-    fn reached_s(&mut self, record: &Record, sample: &Sample, so_s: f64) -> Option<f64> {
-        let within_mm = self.subject.goal.tip_within_mm;
-        if !self.distance_mm(sample).is_some_and(|mm| mm <= within_mm) {
-            (self.there_since_s, self.injected_there_ml) = (None, 0.0);
-            return None;
-        }
-        let since_s = *self.there_since_s.get_or_insert(so_s);
-        self.injected_there_ml = injected_ml(record, since_s, sample.time_s);
-        let Some(asked_ml) = self.subject.goal.inject_ml else { return Some(so_s) };
-        let there = record.injections.iter().filter(|one| (since_s..=sample.time_s).contains(&one.time_s));
-        let mut sum_ml = 0.0;
-        let last = there.into_iter().find(|one| {
-            sum_ml += one.volume_ml;
-            sum_ml >= asked_ml - SAME_ML
-        });
-        last.map(|one| one.time_s.max(so_s))
-    }
 }
 
 /// Contrast medium that was injected from one moment to another, ml.
-fn injected_ml(record: &Record, from_s: f64, to_s: f64) -> f64 {
+pub(crate) fn injected_ml(record: &Record, from_s: f64, to_s: f64) -> f64 {
     let injected = record.injections.iter().filter(|one| (from_s..=to_s).contains(&one.time_s));
     injected.map(|one| one.volume_ml).fold(0.0, |sum, ml| sum + ml)
 }

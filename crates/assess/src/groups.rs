@@ -9,14 +9,13 @@ use crate::way::Way;
 
 /// Part of the time in which forces are at most that of the 95th percentile.
 const MOST_OF_TIME: f64 = 0.95;
-/// A tip is held against a wall by more than this, N.
-const AGAINST_WALL_N: f64 = 1e-3;
 /// Shortest way to which one that was gone is compared, mm.
 const SHORTEST_MM: f64 = 1.0;
 
 const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
 const RAFII: &str = "Rafii-Tari et al. 2017: motion and forces of hands and catheters";
 const BOYLE: &str = "Boyle et al. 2011: scores of errors";
+const SLUZEWSKI: &str = "Sluzewski et al. 2004: packing of aneurysms and compaction of coils";
 const REVIEW: &str =
     "review of simulator studies, European Journal of Vascular and Endovascular Surgery 2016";
 
@@ -121,11 +120,8 @@ fn contrast(record: &Record) -> Vec<Metric> {
         |name, unit, value, definition| lower(Group::Contrast, (name, unit), Some(value), definition, REVIEW);
     let volume = record.injections.iter().map(|one| one.volume_ml).sum();
     let fastest = record.injections.iter().map(|one| one.rate_ml_per_s).fold(0.0, f64::max);
-    let against = |one: &&crate::Injection| {
-        let during = record.samples.iter().find(|sample| sample.time_s >= one.time_s);
-        during.or(record.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
-    };
-    let at_wall = record.injections.iter().filter(against).map(|one| one.volume_ml).sum();
+    let against = record.injections.iter().filter(|one| record.is_against_wall(one));
+    let at_wall = against.map(|one| one.volume_ml).sum();
     vec![
         of("contrast_ml", "ml", volume, "contrast medium injected"),
         of("injections", "1", record.injections.len() as f64, "how often it was injected"),
@@ -229,10 +225,7 @@ fn safety(record: &Record) -> Vec<Metric> {
     });
     let torque = most(&|sample| sample.hands.iter().map(|hand| hand.torque_nmm.abs()).fold(0.0, f64::max));
     let several = samples.iter().any(|sample| sample.hands.len() > 1);
-    let ahead = |sample: &crate::Sample| {
-        sample.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
-    };
-    let ahead_s: f64 = record.timed().filter(|(_, sample)| ahead(sample)).map(|(s, _)| s).sum();
+    let ahead_s: f64 = record.timed().filter(|(_, sample)| sample.is_ahead()).map(|(s, _)| s).sum();
     let idle_s = idle_s(record);
     let blind_s = record
         .beam_on_s(0.0, record.end_s())
@@ -310,7 +303,9 @@ fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
 }
 
 fn task(record: &Record, way: Option<&Way>) -> Vec<Metric> {
-    let last = on_centreline(record).last().copied();
+    let instrument = way.and_then(|way| way.instrument);
+    let last = record.samples.iter().rev().find_map(|sample| sample.tip_of_mm(instrument));
+    let packed = record.samples.last().and_then(|sample| sample.packing);
     let target = way.and_then(Way::target_mm);
     let error = target.map(|(target, _)| last.map_or(f64::INFINITY, |tip| (tip - target).norm()));
     let arrived = target.zip(error).map(|((_, within_mm), mm)| f64::from(u8::from(mm <= within_mm)));
@@ -319,15 +314,29 @@ fn task(record: &Record, way: Option<&Way>) -> Vec<Metric> {
             Group::Task,
             ("arrived", "1"),
             arrived,
-            "1 where the tip ends within the target's reach, else 0",
+            "1 where the tip, that of the instrument that the goal names, ends within the target's reach, else 0",
             REVIEW,
         )),
         lower(
             Group::Task,
             ("placement_error_mm", "mm"),
             error.filter(|mm| mm.is_finite()),
-            "distance of the tip from the target at the end",
+            "distance of this tip from the target at the end",
             REVIEW,
+        ),
+        higher(lower(
+            Group::Task,
+            ("packing_density", "1"),
+            packed.map(|packed| packed.density),
+            "volume of coils in the sac over that of the sac at the end",
+            SLUZEWSKI,
+        )),
+        lower(
+            Group::Task,
+            ("coil_outside_mm", "mm"),
+            packed.map(|packed| packed.outside_mm),
+            "length of coils outside the neck of the sac at the end",
+            SLUZEWSKI,
         ),
     ]
 }

@@ -12,6 +12,8 @@ pub const BEAM: &str = "beam.csv";
 /// Motions of hands below these are rest: lengths, mm, and turns, rad.
 pub(crate) const REST_MM: f64 = 1e-9;
 const REST_RAD: f64 = 1e-9;
+/// A tip is held against a wall by more than this, N.
+pub(crate) const AGAINST_WALL_N: f64 = 1e-3;
 
 /// What one hand did in a step, and felt after it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -26,6 +28,21 @@ pub struct Hand {
     pub push_force_n: Option<f64>,
     /// Torque with which it holds.
     pub torque_nmm: f64,
+    /// Where the tip of its instrument is; none while it is not in, of a device alone ([`Sample::tip_mm`]), and where it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_mm: Option<Vec3>,
+    /// Where that is in the vessel at rest; none where the vessel does not move, or it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_at_rest_mm: Option<Vec3>,
+}
+
+/// What coils do in a sac.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Packed {
+    /// Volume of coils in the sac over that of the sac.
+    pub density: f64,
+    /// Length of coils that is out of the catheter and outside the neck, mm.
+    pub outside_mm: f64,
 }
 
 /// A step.
@@ -46,6 +63,9 @@ pub struct Sample {
     pub tip_force_n: f64,
     /// Whether the device snapped from one equilibrium to another.
     pub jumped: bool,
+    /// What coils do in the vessel's sac; none where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub packing: Option<Packed>,
 }
 
 impl Sample {
@@ -54,10 +74,25 @@ impl Sample {
         self.tip_at_rest_mm.or(self.tip_mm)
     }
 
+    /// Where the tip of a hand's instrument is, likewise; the foremost one where no hand is named.
+    pub(crate) fn tip_of_mm(&self, hand: Option<usize>) -> Option<Vec3> {
+        match hand {
+            Some(hand) if self.hands.len() > 1 => {
+                self.hands.get(hand).and_then(|hand| hand.tip_at_rest_mm.or(hand.tip_mm))
+            }
+            _ => self.on_centreline_mm(),
+        }
+    }
+
     /// Whether no hand moves.
     pub(crate) fn rests(&self) -> bool {
         let moves = |hand: &Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
         !self.hands.iter().any(moves)
+    }
+
+    /// Whether an instrument is farther in than the one in it.
+    pub(crate) fn is_ahead(&self) -> bool {
+        self.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
     }
 }
 
@@ -95,6 +130,9 @@ pub struct BeamState {
 /// A procedure.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
+    /// Names of the instruments, the innermost first; none where they were not recorded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub instruments: Vec<String>,
     /// Its steps, times rising.
     pub samples: Vec<Sample>,
     /// Injections in order.
@@ -104,8 +142,8 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv and
-    /// beam.csv where they are there.
+    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv,
+    /// packing.csv and beam.csv where they are there.
     ///
     /// # Errors
     /// [`Error::Content`] for a file that is not there or does not fit, naming it.
@@ -133,15 +171,24 @@ impl Record {
     fn of_folder(folder: &Path) -> Result<Self> {
         let steps: Vec<Step> = rows(&folder.join("steps.csv"))?;
         let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();
+        let mut instruments: Vec<String> = vec![];
         for row in optional::<InstrumentRow>(&folder.join("instruments.csv"))?.unwrap_or_default() {
             hands.entry(row.step).or_default().push(row.hand());
+            if !instruments.contains(&row.instrument) {
+                instruments.push(row.instrument);
+            }
         }
+        let packing = optional::<PackingRow>(&folder.join("packing.csv"))?.unwrap_or_default();
+        let mut packing: BTreeMap<usize, Packed> =
+            packing.into_iter().map(|row| (row.step, row.packed())).collect();
         let injections = optional::<InjectionRow>(&folder.join("injections.csv"))?.unwrap_or_default();
         let samples = steps.into_iter().map(|step| {
             let alone = || vec![step.hand()];
-            step.sample(hands.remove(&step.step).unwrap_or_else(alone))
+            let packing = packing.remove(&step.step);
+            Sample { packing, ..step.sample(hands.remove(&step.step).unwrap_or_else(alone)) }
         });
         Ok(Self {
+            instruments,
             samples: samples.collect(),
             injections: injections.into_iter().map(InjectionRow::injection).collect(),
             beam: optional(&folder.join(BEAM))?,
@@ -182,6 +229,12 @@ impl Record {
         })
     }
 
+    /// Whether an injection began with the tip held by a wall.
+    pub(crate) fn is_against_wall(&self, injection: &Injection) -> bool {
+        let during = self.samples.iter().find(|sample| sample.time_s >= injection.time_s);
+        during.or(self.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
+    }
+
     /// The same until an end: as far as a sample of this number, which is cut at a time.
     pub(crate) fn until(&self, sample: usize, time_s: f64) -> Self {
         let mut samples = self.samples[..=sample].to_vec();
@@ -189,7 +242,17 @@ impl Record {
         let injections = self.injections.iter().filter(|one| one.time_s <= time_s).copied().collect();
         let states =
             |beam: &Vec<BeamState>| beam.iter().filter(|one| one.time_s <= time_s).copied().collect();
-        Self { samples, injections, beam: self.beam.as_ref().map(states) }
+        let beam = self.beam.as_ref().map(states);
+        Self { instruments: self.instruments.clone(), samples, injections, beam }
+    }
+
+    /// The same until a time.
+    pub fn before(&self, time_s: f64) -> Self {
+        let after = self.samples.partition_point(|sample| sample.time_s < time_s);
+        match self.samples.get(after) {
+            Some(_) => self.until(after, time_s),
+            None => self.clone(),
+        }
     }
 
     /// States of the beam with the times at which they end.
@@ -227,6 +290,7 @@ impl Step {
             inserted_mm: self.inserted_mm,
             push_force_n: Some(self.push_force_n),
             torque_nmm: self.torque_nmm,
+            ..Hand::default()
         }
     }
 
@@ -240,6 +304,7 @@ impl Step {
             wall_force_n: self.wall_force_sum_n,
             tip_force_n: self.wall_force_tip_n,
             jumped: self.jumped,
+            packing: None,
         }
     }
 }
@@ -247,9 +312,13 @@ impl Step {
 #[derive(Debug, Deserialize)]
 struct InstrumentRow {
     step: usize,
+    instrument: String,
     advance_mm: f64,
     rotate_rad: f64,
     inserted_mm: f64,
+    tip_x_mm: Option<f64>,
+    tip_y_mm: Option<f64>,
+    tip_z_mm: Option<f64>,
     push_force_n: Option<f64>,
     torque_nmm: f64,
 }
@@ -257,7 +326,24 @@ struct InstrumentRow {
 impl InstrumentRow {
     fn hand(&self) -> Hand {
         let &Self { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, .. } = self;
-        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm }
+        let tip_mm = match (self.tip_x_mm, self.tip_y_mm, self.tip_z_mm) {
+            (Some(x), Some(y), Some(z)) => Some(Vec3::new(x, y, z)),
+            _ => None,
+        };
+        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, tip_mm, tip_at_rest_mm: None }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+struct PackingRow {
+    step: usize,
+    packing: f64,
+    outside_mm: f64,
+}
+
+impl PackingRow {
+    fn packed(&self) -> Packed {
+        Packed { density: self.packing, outside_mm: self.outside_mm }
     }
 }
 

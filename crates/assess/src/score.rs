@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use crate::exam::{Ended, EndedBy};
 use crate::metric::Metric;
-use crate::subject::{Subject, Threshold};
+use crate::record::Record;
+use crate::subject::{Limits, Subject, Threshold};
+use crate::unjudged::{Unjudged, limits, why_absent};
 
 /// Score of a subject that is done as it should be.
 const BEST: f64 = 100.0;
@@ -17,8 +19,11 @@ pub struct Scored {
     pub metric: Metric,
     /// What was asked of it, if anything was.
     pub threshold: Option<Threshold>,
-    /// Whether it is so; what was not measured is not.
+    /// Whether it is so; none where nothing was asked, or it cannot be judged.
     pub passed: Option<bool>,
+    /// Why it cannot be judged, if that is so. Then it is not kept either.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unjudged: Option<&'static str>,
 }
 
 /// What has come of a subject.
@@ -40,16 +45,24 @@ pub struct Score {
     /// What has come of it.
     #[serde(flatten)]
     pub verdict: Verdict,
+    /// The limits that there were.
+    #[serde(skip)]
+    pub limits: Limits,
+    /// The thresholds and limits that cannot be judged.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unjudged: Vec<Unjudged>,
     /// All measures, in the order of their groups.
     pub metrics: Vec<Scored>,
 }
 
 impl Score {
-    pub(crate) fn new(subject: &Subject, metrics: &[Metric], ended: Option<Ended>) -> Self {
+    /// That of a record, of which these are the measures.
+    pub(crate) fn new(subject: &Subject, record: &Record, metrics: &[Metric], ended: Option<Ended>) -> Self {
         let scored = |metric: &Metric| {
             let threshold = subject.threshold.iter().find(|threshold| threshold.metric == metric.name);
-            let passed = threshold.map(|threshold| threshold.holds(metric.value));
-            Scored { metric: *metric, threshold: threshold.cloned(), passed }
+            let passed = threshold.zip(metric.value).map(|(threshold, value)| threshold.holds(value));
+            let unjudged = threshold.filter(|_| passed.is_none()).map(|_| why_absent(metric, record));
+            Scored { metric: *metric, threshold: threshold.cloned(), passed, unjudged }
         };
         let metrics: Vec<Scored> = metrics.iter().map(scored).collect();
         let points = |of: &dyn Fn(&Scored) -> bool| -> f64 {
@@ -66,7 +79,24 @@ impl Score {
             (true, false) => BEST * kept / all,
         };
         let verdict = Verdict { passed: reached && all_kept, score, ended };
-        Self { subject: subject.stem(), verdict, metrics }
+        let not_measured = metrics
+            .iter()
+            .filter_map(|one| Some(Unjudged { what: one.metric.name.to_owned(), why: one.unjudged? }));
+        let unjudged = not_measured.chain(limits(&subject.limits, record)).collect();
+        Self { subject: subject.stem(), verdict, limits: subject.limits, unjudged, metrics }
+    }
+
+    /// What cannot be judged, by its reason: one sentence each.
+    pub fn unjudged_words(&self) -> Vec<String> {
+        let mut reasons: Vec<(&str, Vec<&str>)> = vec![];
+        for Unjudged { what, why } in &self.unjudged {
+            match reasons.iter_mut().find(|(known, _)| known == why) {
+                Some((_, all)) => all.push(what),
+                None => reasons.push((why, vec![what])),
+            }
+        }
+        let words = |(why, all): (&str, Vec<&str>)| format!("not judged: {}: {why}", all.join(", "));
+        reasons.into_iter().map(words).collect()
     }
 
     /// The measures of which something was asked.

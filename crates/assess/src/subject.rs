@@ -8,13 +8,14 @@ use endowire_core::{Error, Result};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
+use crate::goal::Goal;
 use crate::metric::{Better, Metric};
 use crate::record::Record;
 
 /// Levels, from the easiest on.
 const LEVELS: std::ops::RangeInclusive<u8> = 1..=4;
 /// Largest distance, time, volume, force and number of points that can be meant.
-const LARGEST: f64 = 1e6;
+pub(crate) const LARGEST: f64 = 1e6;
 
 /// A subject as its file says it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -43,19 +44,6 @@ pub struct Subject {
     pub threshold: Vec<Threshold>,
     #[serde(skip)]
     path: PathBuf,
-}
-
-/// What ends a subject well: as `until` of a script's line, for the foremost tip.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Goal {
-    /// Name of a point of the vessel's centre line.
-    pub target: String,
-    /// How near the foremost tip must come to it, mm.
-    pub tip_within_mm: f64,
-    /// Contrast medium that must then be injected there, ml; none if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub inject_ml: Option<f64>,
 }
 
 /// Beyond one of these a subject ends, and is not passed.
@@ -95,11 +83,9 @@ fn one() -> f64 {
 }
 
 impl Threshold {
-    /// Whether a value is as it should be; what was not measured is not.
-    pub(crate) fn holds(&self, value: Option<f64>) -> bool {
-        let at_most = |value: f64| self.at_most.is_none_or(|most| value <= most);
-        let at_least = |value: f64| self.at_least.is_none_or(|least| value >= least);
-        value.is_some_and(|value| at_most(value) && at_least(value))
+    /// Whether a value is as it should be.
+    pub(crate) fn holds(&self, value: f64) -> bool {
+        self.at_most.is_none_or(|most| value <= most) && self.at_least.is_none_or(|least| value >= least)
     }
 
     /// Checks it beside the measure of its name; `key` is what messages call it.
@@ -192,21 +178,14 @@ impl Subject {
             return Err(Error::parameter("level", self.level, mend));
         }
         let Self { goal, limits, .. } = self;
-        in_range("goal.tip_within_mm", goal.tip_within_mm, LARGEST)?;
+        goal.check(limits.contrast_ml)?;
         for (key, limit) in [
-            ("goal.inject_ml", goal.inject_ml),
             ("limits.time_s", limits.time_s),
             ("limits.beam_s", limits.beam_s),
             ("limits.contrast_ml", limits.contrast_ml),
             ("limits.wall_force_n", limits.wall_force_n),
         ] {
             limit.map_or(Ok(()), |limit| in_range(key, limit, LARGEST))?;
-        }
-        if let (Some(asked), Some(most)) = (goal.inject_ml, limits.contrast_ml)
-            && asked > most
-        {
-            let mend = format!("more than limits.contrast_ml = {most}: raise that, or ask for less");
-            return Err(Error::parameter("goal.inject_ml", asked, mend));
         }
         let metrics = crate::assess(&Record::default(), None);
         for (index, threshold) in self.threshold.iter().enumerate() {

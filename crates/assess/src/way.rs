@@ -13,6 +13,8 @@ pub struct Way {
     /// Row where the path's vessel first divides.
     first_fork: Option<usize>,
     target_mm: Option<(Vec3, f64)>,
+    /// The hand whose instrument is to arrive; the foremost tip where there is none.
+    pub(crate) instrument: Option<usize>,
 }
 
 impl Way {
@@ -24,6 +26,17 @@ impl Way {
         let row = tree.target(name)?.row;
         let place_mm = tree.nodes()[row].position_mm;
         Ok(Self::to_row(tree, row).map(|way| Self { target_mm: Some((place_mm, within_mm)), ..way }))
+    }
+
+    /// The same for the tip of a hand's instrument: it is that which arrives.
+    #[must_use]
+    pub fn for_instrument(self, hand: usize) -> Self {
+        Self { instrument: Some(hand), ..self }
+    }
+
+    /// The hand whose instrument is to arrive; none where the foremost tip is.
+    pub fn instrument(&self) -> Option<usize> {
+        self.instrument
     }
 
     /// The way to a place nobody named: there is no arrival at it. None where the tree begins.
@@ -48,11 +61,11 @@ impl Way {
             right[of] = true;
             beyond.extend(&children[of]);
         }
-        Some(Self { tree: tree.clone(), path, right, first_fork, target_mm: None })
+        Some(Self { tree: tree.clone(), path, right, first_fork, target_mm: None, instrument: None })
     }
 
     /// The target, and how near to it is there, mm.
-    pub(crate) fn target_mm(&self) -> Option<(Vec3, f64)> {
+    pub fn target_mm(&self) -> Option<(Vec3, f64)> {
         self.target_mm
     }
 

@@ -1,13 +1,48 @@
 //! Subjects and scores in words, for whoever shows them.
 
+use crate::exam::Standing;
+use crate::goal::{Goal, PackingGoal};
 use crate::score::{Scored, Verdict};
-use crate::subject::{Goal, Limits, Threshold};
+use crate::subject::{Limits, Threshold};
 
 impl Goal {
     /// What is to be reached.
     pub fn words(&self) -> String {
-        let inject = self.inject_ml.map_or_else(String::new, |ml| format!(", and {ml} ml injected there"));
-        format!("tip within {} mm of {}{inject}", self.tip_within_mm, self.target)
+        let goal = match self {
+            Self::Packing(PackingGoal { packing_density }) => {
+                return format!("{} % of the sac filled by coils", percent(*packing_density));
+            }
+            Self::Place(goal) => goal,
+        };
+        let whose = goal.instrument.as_ref().map_or_else(String::new, |name| format!(" of {name}"));
+        let inject = goal.inject_ml.map_or_else(String::new, |ml| format!(", and {ml} ml injected there"));
+        format!("tip{whose} within {} mm of {}{inject}", goal.tip_within_mm, goal.target)
+    }
+}
+
+/// A part in hundredths, with the digits that were given.
+fn percent(part: f64) -> f64 {
+    (part * 1e6).round() / 1e4
+}
+
+impl Standing {
+    /// How far it is to the goal: one thing each.
+    pub(crate) fn to_go_words(&self) -> Vec<String> {
+        let goal = match &self.task.goal {
+            Goal::Packing(PackingGoal { packing_density }) => {
+                let now = self.packing_density.unwrap_or(0.0);
+                return vec![format!("packed: {:.1} of {} %", 100.0 * now, percent(*packing_density))];
+            }
+            Goal::Place(goal) => goal,
+        };
+        let to_go = self.distance_mm.map_or_else(|| "not in yet".to_owned(), |mm| format!("{mm:.1} mm"));
+        let whose = goal.instrument.as_ref().map_or_else(String::new, |name| format!("{name} "));
+        let mut words =
+            vec![format!("{whose}to {}: {to_go}, there at {} mm", goal.target, goal.tip_within_mm)];
+        if let Some(ml) = goal.inject_ml {
+            words.push(format!("injected there: {:.1} of {ml} ml", self.injected_there_ml));
+        }
+        words
     }
 }
 
@@ -37,7 +72,11 @@ impl Threshold {
 impl Scored {
     /// Whether what was asked of it is so.
     pub fn kept_words(&self) -> &'static str {
-        if self.passed == Some(true) { "kept" } else { "missed" }
+        match self.passed {
+            Some(true) => "kept",
+            Some(false) => "missed",
+            None => "not judged",
+        }
     }
 
     /// Its value with its unit.
@@ -75,7 +114,7 @@ mod tests {
         let words = |name: &str, value: Option<f64>| {
             let metric = *metrics.iter().find(|metric| metric.name == name).unwrap();
             let metric = crate::Metric { value, ..metric };
-            Scored { metric, threshold: None, passed: None }.value_words()
+            Scored { metric, threshold: None, passed: None, unjudged: None }.value_words()
         };
         assert_eq!(words("reversals", Some(6.0)), "6");
         assert_eq!(words("path_ratio", Some(1.23456)), "1.235");

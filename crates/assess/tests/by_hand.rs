@@ -28,11 +28,11 @@ fn sample(time_s: f64, [x, y]: [f64; 2], advance_mm: f64, wall_force_n: f64) -> 
     Sample {
         time_s,
         tip_mm: Some(Vec3::new(x, y, 0.0)),
-        tip_at_rest_mm: None,
         hands: vec![hand],
         wall_force_n,
         tip_force_n: 0.5 * wall_force_n,
         jumped: wall_force_n > 0.25,
+        ..Sample::default()
     }
 }
 
@@ -61,6 +61,7 @@ fn record() -> Record {
             Injection { time_s: 4.5, volume_ml: 6.0, rate_ml_per_s: 3.0 },
         ],
         beam: Some(vec![on(0.0, true, 0.0), on(2.0, false, 0.0), on(6.0, true, 30.0), on(8.0, false, 30.0)]),
+        ..Record::default()
     }
 }
 
@@ -112,8 +113,9 @@ fn each_measure_is_what_it_says() {
     }
     assert!(value("spectral_arc_length").unwrap() < -1.0);
     assert_eq!(value("catheter_ahead_s"), None, "of one instrument");
+    assert_eq!((value("packing_density"), value("coil_outside_mm")), (None, None), "without a sac");
     let told: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
-    assert_eq!(told.len(), by_hand.len() + 2);
+    assert_eq!(told.len(), by_hand.len() + 4);
     assert!(Group::ALL.iter().all(|group| metrics.iter().any(|metric| metric.group == *group)));
 }
 

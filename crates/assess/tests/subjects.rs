@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use endowire_assess::{BeamState, EndedBy, Exam, Hand, Injection, Record, Sample, Score, Subject};
+use endowire_assess::{BeamState, EndedBy, Exam, Hand, Injection, Record, Sample, Score, Site, Subject};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -80,8 +80,15 @@ fn beam(time_s: f64, on: bool) -> BeamState {
     }
 }
 
+/// The subject on the line, with a wire in a catheter and no sac.
+fn at_site(subject: Subject) -> Result<Exam, String> {
+    let (tree, instruments) = (tree(), ["wire", "catheter"].map(str::to_owned));
+    let site = Site { tree: Some(&tree), instruments: &instruments, has_sac: false };
+    Exam::new(subject, &site).map_err(|error| error.to_string())
+}
+
 fn exam(subject: Subject) -> Exam {
-    Exam::new(subject, &tree()).unwrap()
+    at_site(subject).unwrap()
 }
 
 fn score(record: &Record) -> Score {
@@ -114,9 +121,18 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     // What is told alone need not be kept, and what was not measured is not kept.
     let told = subject(&[("at_least = -100.0", "at_least = 100.0")]).unwrap();
     assert!(exam(told).score(&pushed(|_| 0.5)).verdict.passed);
-    let beam = subject(&[("\"total_s\"", "\"beam_on_s\"")]).unwrap();
-    let unseen = exam(beam).score(&pushed(|_| 0.5));
+    let of_beam = subject(&[("\"total_s\"", "\"beam_on_s\"")]).unwrap();
+    let unseen = exam(of_beam.clone()).score(&pushed(|_| 0.5));
     assert_eq!((unseen.verdict.passed, unseen.verdict.score), (false, 75.0));
+    // It is not missed either, and the reason is told: the limit of the beam has the same.
+    let threshold = unseen.metrics.iter().find(|one| one.metric.name == "beam_on_s").unwrap();
+    assert_eq!((threshold.passed, threshold.kept_words()), (None, "not judged"));
+    let unjudged: Vec<&str> = unseen.unjudged.iter().map(|one| one.what.as_str()).collect();
+    assert_eq!(unjudged, ["beam_on_s", "limits.beam_s"]);
+    let [words] = unseen.unjudged_words().try_into().unwrap();
+    assert!(words.starts_with("not judged: beam_on_s, limits.beam_s: no beam was recorded"), "{words}");
+    let seen = Record { beam: Some(vec![beam(0.0, true)]), ..pushed(|_| 0.5) };
+    assert!(exam(of_beam).score(&seen).unjudged.is_empty());
 
     // What comes after the end does not count, and who stops before it has no score.
     let mut longer = pushed(|_| 0.5);
@@ -249,7 +265,7 @@ fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
         [("ende", "goal.target = \"ende\": did you mean \"end\"?"), ("start", "where the centre line begins")]
     {
         let wrong = subject(&[("target = \"end\"", &format!("target = \"{target}\""))]).unwrap();
-        let error = Exam::new(wrong, &tree()).unwrap_err().to_string();
+        let error = at_site(wrong).unwrap_err();
         assert!(error.starts_with(file) && error.contains(told), "{error}");
     }
     assert!(

@@ -81,11 +81,10 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
         record.samples.push(Sample {
             time_s: f64::from(ticks) * TICK_S,
             tip_mm: Some(tip),
-            tip_at_rest_mm: None,
             hands: vec![hand],
             wall_force_n: force,
             tip_force_n: 0.0,
-            jumped: false,
+            ..Sample::default()
         });
     };
     for (line, arcs) in ways {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_assess::{Exam, Score, Scored, Subject, Threshold};
+use endowire_assess::{Exam, Score, Scored, Site, Subject, Threshold};
 use endowire_core::error::nearest_name;
 use endowire_methods::{Scene, Setting};
 use serde::Serialize;
@@ -70,8 +70,13 @@ pub(crate) fn settings(subject: &Subject) -> Result<Vec<Setting>, Failure> {
 /// The subject in its scene, to be followed.
 pub(crate) fn exam(subject: Subject, scene: &Scene, cache: &Cache) -> Result<Exam, Failure> {
     let place = subject.path().display().to_string();
-    let tree = scene.centreline(cache).map_err(|error| Failure::from(error).at(place))?;
-    Ok(Exam::new(subject, tree)?)
+    let in_subject = |error: endowire_core::Error| Failure::from(error).at(&place);
+    // Only a place is looked for along the centre line, which may have to be found first.
+    let tree = subject.goal.target().map(|_| scene.centreline(cache)).transpose().map_err(in_subject)?;
+    let stack = scene.stack().map_err(in_subject)?;
+    let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
+    let site = Site { tree, instruments: &instruments, has_sac: scene.vessel.sac.is_some() };
+    Ok(Exam::new(subject, &site)?)
 }
 
 /// What has come of a subject, on one line.
@@ -84,7 +89,8 @@ pub(crate) fn text(score: &Score) -> String {
     let row = |(scored, threshold): (&Scored, &Threshold)| {
         let (kept, value) = (scored.kept_words(), scored.value_words());
         let (name, asked, points) = (scored.metric.name, threshold.words(), threshold.points);
-        format!("  {kept:<6}  {name:<22} {value:>14}  {asked:<16} points {points}")
+        format!("  {kept:<10}  {name:<22} {value:>14}  {asked:<16} points {points}")
     };
-    std::iter::once(verdict(score)).chain(score.asked().map(row)).collect::<Vec<_>>().join("\n")
+    let rows = std::iter::once(verdict(score)).chain(score.asked().map(row));
+    rows.chain(score.unjudged_words()).collect::<Vec<_>>().join("\n")
 }

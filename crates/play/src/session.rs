@@ -351,7 +351,8 @@ impl Session {
         let time_s = self.time_s();
         // The beam of a tick is that at its beginning.
         let beam = self.lab.beam((time_s - 1.0 / TICKS_PER_S).max(0.0));
-        self.telemetry.tick(time_s, motions, &self.simulation, beam);
+        let packing = self.sac.as_ref().and_then(|(_, packing)| *packing);
+        self.telemetry.tick(time_s, motions, (&self.simulation, packing), beam);
         self.examine();
     }
 

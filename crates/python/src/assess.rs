@@ -1,14 +1,59 @@
 //! What sessions and recorded runs are scored by.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use endowire_assess::{Exam, Record, Subject, Way};
+use endowire_assess::{Attempt, Course, Exam, Metric, Record, Score, Site, Subject, Way};
 use endowire_core::vessel::CentrelineTree;
 use pyo3::prelude::*;
 
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::interrupt::interruptible;
+
+/// What is to be reached on which line.
+struct Task {
+    centreline: Option<PathBuf>,
+    target: Option<String>,
+    within_mm: f64,
+}
+
+impl Task {
+    fn new(centreline: Option<PathBuf>, target: Option<String>, within_mm: f64) -> PyResult<Self> {
+        if !(within_mm > 0.0 && within_mm.is_finite()) {
+            return Err(refuse("within_mm", within_mm, "must be a length above 0"));
+        }
+        if let (None, Some(target)) = (&centreline, &target) {
+            let mend = "is a point of a centre line: give centreline too";
+            return Err(refuse("target", format!("{target:?}"), mend));
+        }
+        Ok(Self { centreline, target, within_mm })
+    }
+
+    /// Measures a record.
+    fn measured(&self, path: &Path) -> endowire_core::Result<Vec<Metric>> {
+        let record = Record::read(path)?;
+        let tree = self.centreline.as_deref().map(CentrelineTree::read).transpose()?;
+        let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
+        let way = match (&tree, &self.target, last_mm) {
+            (Some(tree), Some(name), _) => Way::to_target(tree, name, self.within_mm)?,
+            (Some(tree), None, Some(place_mm)) => Way::to_place(tree, &place_mm),
+            _ => None,
+        };
+        Ok(endowire_assess::assess(&record, way.as_ref()))
+    }
+}
+
+/// Scores a record by a subject.
+fn scored(path: &Path, subject: &Path, centreline: Option<&Path>) -> endowire_core::Result<Arc<Score>> {
+    let (subject, record) = (Subject::read(subject)?, Record::read(path)?);
+    let tree = centreline.map(CentrelineTree::read).transpose()?;
+    let has_sac = record.samples.iter().any(|sample| sample.packing.is_some());
+    let site = Site { tree: tree.as_ref(), instruments: &record.instruments, has_sac };
+    let exam = Exam::new(subject, &site)?;
+    exam.check(&record)?;
+    Ok(exam.score(&record))
+}
 
 /// Measures a session of `endowire play` (*.session.json) or the folder of a recorded run, as `endowire assess` does. `centreline` is the
 /// table of the vessel's centre line, and `target` the name of its point that was to be reached, within `within_mm` of it; without a
@@ -25,46 +70,66 @@ pub(crate) fn assess<'py>(
     target: Option<String>,
     within_mm: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    if !(within_mm > 0.0 && within_mm.is_finite()) {
-        return Err(refuse("within_mm", within_mm, "must be a length above 0"));
-    }
-    if let (None, Some(target)) = (&centreline, &target) {
-        return Err(refuse(
-            "target",
-            format!("{target:?}"),
-            "is a point of a centre line: give centreline too",
-        ));
-    }
-    let measured = interruptible(py, move || {
-        let record = Record::read(&path)?;
-        let tree = centreline.map(|table| CentrelineTree::read(&table)).transpose()?;
-        let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
-        let way = match (&tree, &target, last_mm) {
-            (Some(tree), Some(name), _) => Way::to_target(tree, name, within_mm)?,
-            (Some(tree), None, Some(place_mm)) => Way::to_place(tree, &place_mm),
-            _ => None,
-        };
-        Ok::<_, endowire_core::Error>(endowire_assess::assess(&record, way.as_ref()))
-    })?;
+    let task = Task::new(centreline, target, within_mm)?;
+    let measured = interruptible(py, move || task.measured(&path))?;
     document::write(py, &measured.map_err(exception)?)
 }
 
 /// Scores a session of `endowire play` (*.session.json) or the folder of a recorded run by a training subject, the file of one, as
-/// `endowire assess --subject` does. `centreline` is the table of the vessel's centre line, which names the subject's target.
+/// `endowire assess --subject` does. `centreline` is the table of the vessel's centre line, which names the subject's target; a subject in which a
+/// sac is to be packed needs none.
 ///
 /// Returns a dictionary: subject, passed, score (0 to 100), ended (None, or what ended it and when), and metrics, which are those of assess
 /// with threshold and passed, None where nothing was asked. Raises InputError for files that do not fit.
 #[pyfunction]
-#[pyo3(signature = (path, subject, *, centreline))]
+#[pyo3(signature = (path, subject, *, centreline=None))]
 pub(crate) fn score<'py>(
     py: Python<'py>,
     path: PathBuf,
     subject: PathBuf,
-    centreline: PathBuf,
+    centreline: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let scored = interruptible(py, move || {
-        let exam = Exam::new(Subject::read(&subject)?, &CentrelineTree::read(&centreline)?)?;
-        Ok::<_, endowire_core::Error>(exam.score(&Record::read(&path)?))
-    })?;
+    let scored = interruptible(py, move || scored(&path, &subject, centreline.as_deref()))?;
     document::write(py, &*scored.map_err(exception)?)
+}
+
+/// The course of a trainee's attempts at one task, in the order of `paths`, as `endowire assess` tells it of several sessions: sessions of
+/// `endowire play` (*.session.json) or folders of recorded runs. With a `subject`, the file of one, they are scored by it; `centreline`,
+/// `target` and `within_mm` are as those of assess and score.
+///
+/// Returns a dictionary: score and passed (None without a subject), and metrics, a list of dictionaries: name, group, unit, better, values,
+/// first, last, best, per_attempt, chance and trend ("better", "worse" or "none"). Raises InputError for files that do not fit.
+#[pyfunction]
+#[pyo3(signature = (paths, *, subject=None, centreline=None, target=None, within_mm=5.0))]
+pub(crate) fn course<'py>(
+    py: Python<'py>,
+    paths: Vec<PathBuf>,
+    subject: Option<PathBuf>,
+    centreline: Option<PathBuf>,
+    target: Option<String>,
+    within_mm: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let task = Task::new(centreline, target, within_mm)?;
+    if let (Some(_), Some(target)) = (&subject, &task.target) {
+        return Err(refuse(
+            "target",
+            format!("{target:?}"),
+            "a subject says where to go: leave one of the two out",
+        ));
+    }
+    let course = interruptible(py, move || {
+        let mut all: Vec<(Vec<Metric>, Option<Arc<Score>>)> = vec![];
+        for path in &paths {
+            all.push(match &subject {
+                Some(subject) => {
+                    let score = scored(path, subject, task.centreline.as_deref())?;
+                    (score.metrics.iter().map(|one| one.metric).collect(), Some(score))
+                }
+                None => (task.measured(path)?, None),
+            });
+        }
+        let attempts = all.iter().map(|(metrics, score)| Attempt { metrics, score: score.as_deref() });
+        Ok::<_, endowire_core::Error>(Course::of(&attempts.collect::<Vec<_>>()))
+    })?;
+    document::write(py, &course.map_err(exception)?)
 }

@@ -33,7 +33,7 @@ mod _endowire {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use super::assess::{assess, score};
+    use super::assess::{assess, course, score};
     #[pymodule_export]
     use super::batch::Batch;
     #[pymodule_export]

@@ -36,7 +36,44 @@ def test_a_run_is_scored_by_a_subject(tmp_path):
     metrics = {metric["name"]: metric for metric in score["metrics"]}
     assert metrics["total_s"]["passed"] is True and metrics["total_s"]["threshold"]["at_most"] == 90.0
     assert metrics["wall_force_n"]["passed"] is False, "0.4 N"
-    assert metrics["beam_on_s"]["passed"] is False, "it was not recorded"
+    assert metrics["beam_on_s"]["passed"] is None and "no beam was recorded" in metrics["beam_on_s"]["unjudged"]
+    assert "beam_on_s" in [one["what"] for one in score["unjudged"]]
     assert metrics["turns"]["passed"] is None and metrics["turns"]["threshold"] is None
     with pytest.raises(endowire.InputError, match="goal.target"):
         endowire.score(tmp_path, subject, centreline=assets / "vessels" / "hepatic.csv")
+
+
+def test_a_course_of_attempts(tmp_path):
+    folders = []
+    for number, end_s in enumerate([8.0, 6.0, 5.0, 4.0]):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "steps.csv").write_text(STEPS.replace(",2.0\n", f",{end_s}\n"))
+        folders.append(folder)
+    course = endowire.course(folders)
+    lines = {line["name"]: line for line in course["metrics"]}
+    assert lines["total_s"]["values"] == [8.0, 6.0, 5.0, 4.0]
+    assert (lines["total_s"]["trend"], lines["total_s"]["best"]) == ("better", 4.0)
+    assert lines["wall_force_n"]["trend"] == "none" and lines["beam_on_s"]["first"] is None
+    assert course["score"] is None and course["passed"] is None
+    assets = endowire.assets_path()
+    task = {"subject": assets / "subjects" / "left_carotid.toml", "centreline": assets / "vessels" / "aortic_arch.csv"}
+    scored = endowire.course(folders[:2], **task)
+    assert scored["passed"] == [False, False] and scored["score"]["values"] == [0.0, 0.0]
+    with pytest.raises(endowire.InputError, match="target"):
+        endowire.course(folders, target="left carotid", **task)
+
+
+def test_a_sac_needs_no_centreline_and_a_place_does(tmp_path):
+    (tmp_path / "steps.csv").write_text(STEPS)
+    subjects = endowire.assets_path() / "subjects"
+    with pytest.raises(endowire.InputError, match="goal.target"):
+        endowire.score(tmp_path, subjects / "left_carotid.toml")
+    with pytest.raises(endowire.InputError, match="goal.packing_density"):
+        endowire.score(tmp_path, subjects / "first_loops.toml")
+    packing = "step,coils_mm3,packing,neck_coverage,outside_mm,herniated,dome_force_n\n1,0,0.0,0,0,false,0\n2,2,0.012,0,0.5,false,0\n"
+    (tmp_path / "packing.csv").write_text(packing)
+    score = endowire.score(tmp_path, subjects / "first_loops.toml")
+    assert score["ended"]["by"] == "wall_force", "0.4 N is more than is allowed"
+    metrics = {metric["name"]: metric for metric in score["metrics"]}
+    assert (metrics["packing_density"]["value"], metrics["coil_outside_mm"]["passed"]) == (0.012, True)

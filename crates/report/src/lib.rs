@@ -1,7 +1,8 @@
 //! Pages that any browser shows without a network: a run, or tables of results.
 //!
 //! A [`Run`] is what the page of a run has: the vessel, shapes step by step, numbers, events and frames. It comes from a recording on disk, or
-//! from a [`Recorder`] that has followed a simulation. [`run_page`] and [`tables_page`] make one file of it, with all scripts and data in it.
+//! from a [`Recorder`] that has followed a simulation. [`run_page`] and [`tables_page`] make one file of it, with all scripts and data in it;
+//! [`assessed_page`] makes one of what trainees did.
 
 mod base64;
 mod recorder;
@@ -17,6 +18,16 @@ pub use vessel::Vessel;
 /// The pages; their scripts read the data where the mark is.
 const RUN: &str = concat!(include_str!("head.html"), include_str!("page.html"));
 const TABLES: &str = concat!(include_str!("head.html"), include_str!("tables.html"));
+const ASSESSED: &str = concat!(
+    include_str!("head.html"),
+    include_str!("assess/page.html"),
+    include_str!("assess/parts.js"),
+    include_str!("assess/roadmap.js"),
+    include_str!("assess/timeline.js"),
+    include_str!("assess/course.js"),
+    include_str!("assess/page.js"),
+    "</script>\n</body>\n</html>\n"
+);
 const MARK: &str = "/*DATA*/null";
 
 /// The page of a run.
@@ -33,6 +44,14 @@ pub fn run_page(run: &Run) -> serde_json::Result<String> {
 /// What JSON cannot say.
 pub fn tables_page(tables: &impl Serialize) -> serde_json::Result<String> {
     page(TABLES, tables)
+}
+
+/// The page of what trainees did, a document that the scripts of `assess` read.
+///
+/// # Errors
+/// What JSON cannot say.
+pub fn assessed_page(assessed: &impl Serialize) -> serde_json::Result<String> {
+    page(ASSESSED, assessed)
 }
 
 fn page(page: &str, document: &impl Serialize) -> serde_json::Result<String> {

@@ -54,9 +54,7 @@ function read() {
 export function stand({ step, subject }) {
   hasBegun = step > 0;
   if (!task || !subject || scored) return;
-  const toGo = subject.distance_mm === null ? "not in yet" : `${subject.distance_mm.toFixed(1)} mm`;
-  const injected = task.inject_ml === null ? "" : `, injected there ${subject.injected_there_ml.toFixed(1)} of ${task.inject_ml} ml`;
-  element("to-go").textContent = `to ${task.target}: ${toGo}, there at ${task.tip_within_mm} mm${injected}`;
+  element("to-go").textContent = subject.to_go.join(", ");
   const list = element("used");
   while (list.children.length < subject.used.length) list.append(Object.assign(document.createElement("span"), { className: "used" }));
   while (list.children.length > subject.used.length) list.lastChild.remove();
@@ -83,7 +81,7 @@ async function score() {
   element("score-words").classList.toggle("passed", told.passed);
   element("score-watched").hidden = !watched;
   rows("score-asked", told.rows.filter((one) => one.asked !== null), (one) =>
-    [cell(one.passed ? "kept" : "missed"), measure(one), cell(one.value), cell(one.asked), cell(one.points)]);
+    [cell(one.kept), measure(one), cell(one.value), cell(one.asked), cell(one.points)]);
   for (const row of element("score-asked").tBodies[0].rows) row.className = row.cells[0].textContent;
   rows("score-others", told.rows.filter((one) => one.asked === null), (one) => [measure(one), cell(one.value)]);
   element("task-dialog").close();

@@ -126,7 +126,7 @@ const asked = {
   },
   missing: ({ files, path }) => missingFiles(files, path),
   score: () => session?.score() ?? null,
-  sessionFile: ({ folder }) => session?.sessionFile(folder) ?? "",
+  sessionFile: ({ folder }) => session?.sessionFile(folder, Date.now() / 1000) ?? "",
   report: ({ frames }) => session?.report(frames) ?? "",
   scriptHead: ({ folder }) => session?.scriptHead(folder, "played.toml") ?? "",
   script: () => session?.script() ?? "",

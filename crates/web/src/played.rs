@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_assess::{Exam, SessionFile};
+use endowire_assess::{Exam, SessionFile, Site};
 use endowire_core::file::{Files, InMemory};
 use endowire_core::insertion::Script;
 use endowire_core::methods::MethodChoice;
@@ -59,7 +59,8 @@ impl Played {
         let simulation = scene.simulation(&NoStore)?;
         let script = scene.steps(simulation.stack(), &NoStore)?;
         let view = view(opened.view(&scene)?, &**files)?;
-        let names = simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
+        let names: Vec<String> =
+            simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
         let session = Session::new(simulation, view, side_px, Limits::default())?;
@@ -69,7 +70,9 @@ impl Played {
         }
         let Opened { scene: scene_path, settings, subject } = opened;
         if let Some(subject) = subject {
-            session = session.with_exam(Exam::new(subject, scene.centreline(&NoStore)?)?);
+            let tree = subject.goal.target().map(|_| scene.centreline(&NoStore)).transpose()?;
+            let site = Site { tree, instruments: &names, has_sac: scene.vessel.sac.is_some() };
+            session = session.with_exam(Exam::new(subject, &site)?);
         }
         let pictures = Pictures::new(&scene, &session.snapshot(), wall)?;
         let provenance = json!({
@@ -94,11 +97,12 @@ impl Played {
         Self { session: self.session.with_script(self.script.clone()), ..self }
     }
 
-    /// What is assessed of it, with the scene's file seen from where `folder` is.
-    pub(crate) fn session_file(&self, folder: &Path) -> SessionFile {
+    /// What is assessed of it, with the scene's file seen from where `folder` is, recorded at this time.
+    pub(crate) fn session_file(&self, folder: &Path, recorded_unix_s: Option<u64>) -> SessionFile {
         SessionFile {
             scene_file: folder.join(&self.scene_path),
             set: self.settings.iter().map(ToString::to_string).collect(),
+            recorded_unix_s,
             record: self.session.record().clone(),
         }
     }

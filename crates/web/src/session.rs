@@ -213,13 +213,14 @@ impl Session {
     }
 
     /// The text of a `*.session.json`, as `endowire play` writes it and `endowire assess` reads it: the scene's file, as seen from where `folder` is, what is
-    /// set of it, and the `record`.
+    /// set of it, when it was recorded, if the page says so (`Date.now() / 1000`), and the `record`.
     ///
     /// # Errors
     /// None in a browser that is whole.
     #[wasm_bindgen(js_name = sessionFile)]
-    pub fn session_file(&self, folder: &str) -> Result<String, JsError> {
-        serde_json::to_string(&self.played.session_file(Path::new(folder))).map_err(thrown)
+    pub fn session_file(&self, folder: &str, recorded_unix_s: Option<f64>) -> Result<String, JsError> {
+        let recorded_unix_s = recorded_unix_s.map(|s| s as u64);
+        serde_json::to_string(&self.played.session_file(Path::new(folder), recorded_unix_s)).map_err(thrown)
     }
 
     /// What is to be done, if it is a training subject.

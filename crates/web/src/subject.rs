@@ -9,11 +9,7 @@ pub(crate) struct Task<'a> {
     name: &'a str,
     level: u8,
     text: &'a str,
-    /// Name of the point that is to be reached, how near, and what is to be injected there.
-    target: &'a str,
-    tip_within_mm: f64,
-    inject_ml: Option<f64>,
-    /// The same in words.
+    /// What is to be reached, in words.
     goal: String,
     /// What ends it early.
     limits: Vec<String>,
@@ -36,9 +32,6 @@ impl<'a> Task<'a> {
             name: &subject.name,
             level: subject.level,
             text: subject.text.trim(),
-            target: &subject.goal.target,
-            tip_within_mm: subject.goal.tip_within_mm,
-            inject_ml: subject.goal.inject_ml,
             goal: subject.goal.words(),
             limits: subject.limits.words(),
             counts: subject.threshold.iter().map(|threshold| counts(threshold, &measures)).collect(),
@@ -70,6 +63,8 @@ struct Row<'a> {
     asked: Option<String>,
     points: Option<f64>,
     passed: Option<bool>,
+    /// Whether it is kept; none where nothing was asked.
+    kept: Option<&'static str>,
 }
 
 impl<'a> Told<'a> {
@@ -86,5 +81,6 @@ fn row(scored: &Scored) -> Row<'_> {
         asked: scored.threshold.as_ref().map(Threshold::words),
         points: scored.threshold.as_ref().map(|threshold| threshold.points),
         passed: scored.passed,
+        kept: scored.threshold.as_ref().map(|_| scored.kept_words()),
     }
 }

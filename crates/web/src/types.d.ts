@@ -35,7 +35,9 @@ export interface Readout {
     coils_mm3: number; density: number; neck_coverage: number; outside_mm: number; herniated: boolean; dome_force_n: number;
   };
   subject?: {
-    subject: string; distance_mm: number | null; injected_there_ml: number;
+    subject: string; distance_mm: number | null; injected_there_ml: number; packing_density?: number;
+    /** How far it is to the goal, in words: one thing each. */
+    to_go: string[];
     used: { what: string; value: number; limit: number; unit: string }[]; verdict: Verdict | null;
   };
   event: { step: number; time_s: number; kind: string; text: string } | null; events: number;
@@ -43,7 +45,7 @@ export interface Readout {
 
 /** What is to be done in a training subject: in words, and what is asked of which measure. */
 export interface Task {
-  name: string; level: number; text: string; target: string; tip_within_mm: number; inject_ml: number | null;
+  name: string; level: number; text: string;
   goal: string; limits: string[]; counts: { name: string; definition: string; asked: string; points: number }[];
 }
 
@@ -52,20 +54,22 @@ export interface Verdict { passed: boolean; score: number; ended: { by: "goal" |
 
 /** The score of a training subject: numbers as `endowire assess --json` has them in `metrics`, and in words in `words` and `rows`. */
 export interface Score extends Verdict {
-  subject: string; words: string;
+  subject: string; words: string; unjudged?: { what: string; why: string }[];
   metrics: {
     name: string; group: string; value: number | null; unit: string; better: "lower" | "higher"; definition: string; study: string;
-    threshold: { at_most?: number; at_least?: number; points: number } | null; passed: boolean | null;
+    threshold: { at_most?: number; at_least?: number; points: number } | null; passed: boolean | null; unjudged?: string;
   }[];
-  rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null }[];
+  rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null; kept: string | null }[];
 }
 
 /** What hands, beam and injector have done: a sample for each tick, rests that follow each other being one. */
 export interface SessionRecord {
   samples: {
     time_s: number; tip_mm: [number, number, number] | null; wall_force_n: number; tip_force_n: number; jumped: boolean;
-    hands: { advance_mm: number; rotate_rad: number; inserted_mm: number; push_force_n: number | null; torque_nmm: number }[];
+    hands: { advance_mm: number; rotate_rad: number; inserted_mm: number; push_force_n: number | null; torque_nmm: number; tip_mm?: [number, number, number] }[];
+    packing?: { density: number; outside_mm: number };
   }[];
+  instruments?: string[];
   injections: { time_s: number; volume_ml: number; rate_ml_per_s: number }[];
   beam: { time_s: number; on: boolean; frames_per_s: number; dose_ngy: number; field_mm2: number; primary_deg: number; secondary_deg: number }[];
 }

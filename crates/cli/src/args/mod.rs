@@ -171,7 +171,8 @@ pub(crate) struct ReportArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct AssessArgs {
-    /// Sessions of play (*.session.json), or folders of recorded runs; of several the values stand beside each other, in the order given
+    /// Sessions of play (*.session.json), folders of recorded runs, or folders that hold sessions; of several at one task the course is told too:
+    /// in the order in which they were recorded, or in the order given where not all say when that was
     #[arg(required = true, value_name = "SESSION|DIR")]
     pub(crate) sessions: Vec<PathBuf>,
     /// Name of the point of the centre line that was to be reached; that of the script's last line with one if absent
@@ -188,6 +189,10 @@ pub(crate) struct AssessArgs {
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
+    /// Write a page for a browser too: the tip's way on the roadmap, hands, beam, contrast medium and forces over time, what stood out, and of
+    /// several sessions their course
+    #[arg(long, value_name = "FILE")]
+    pub(crate) page: Option<PathBuf>,
     /// Print the measures as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -36,7 +36,10 @@ struct Row {
     subject: String,
     level: u8,
     name: String,
-    target: String,
+    /// What is to be reached, in words.
+    goal: String,
+    /// The point of the centre line that is; none of a sac.
+    target: Option<String>,
 }
 
 /// The document of `subject show`.
@@ -82,8 +85,13 @@ fn list(folder: &Path, json: bool) -> Result<(), Failure> {
     let mut subjects = vec![];
     for path in &paths {
         let subject = Subject::read(path)?;
-        let (stem, level) = (subject.stem(), subject.level);
-        subjects.push(Row { subject: stem, level, name: subject.name, target: subject.goal.target });
+        subjects.push(Row {
+            subject: subject.stem(),
+            level: subject.level,
+            goal: subject.goal.words(),
+            target: subject.goal.target().map(str::to_owned),
+            name: subject.name,
+        });
     }
     subjects.sort_by_key(|row| row.level);
     let document = Listed { provenance: Provenance::new(&inputs, 0), folder: folder.to_path_buf(), subjects };

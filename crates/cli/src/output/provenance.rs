@@ -51,6 +51,12 @@ impl Provenance {
         Self { set: settings.iter().map(Setting::to_string).collect(), ..self }
     }
 
+    /// In words, for the foot of a page.
+    pub(crate) fn words(&self) -> String {
+        let Self { version, git_revision, scene_hash, seed, .. } = self;
+        format!("endowire {version}, revision {git_revision}, inputs {scene_hash}, seed {seed}")
+    }
+
     /// SHA-256 of the inputs.
     pub(crate) fn scene_hash(&self) -> &str {
         &self.scene_hash

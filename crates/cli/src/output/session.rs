@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use endowire_assess::SessionFile;
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::recording::RecordedSummary;
 use super::whole;
@@ -21,6 +22,22 @@ pub(crate) fn read_summary(path: &Path) -> Result<RecordedSummary, Failure> {
         scene_file: PathBuf,
         set: Vec<String>,
     }
+    let Head { scene_file, set } = head(path)?;
+    Ok(RecordedSummary { scene_file, scene_hash: None, set, unconverged_steps: 0, complete: true })
+}
+
+/// When one was recorded, seconds since 1970 began in UTC; none where it does not say.
+pub(crate) fn recorded_unix_s(path: &Path) -> Result<Option<u64>, Failure> {
+    #[derive(Deserialize)]
+    struct Head {
+        #[serde(default)]
+        recorded_unix_s: Option<u64>,
+    }
+    head::<Head>(path).map(|head| head.recorded_unix_s)
+}
+
+/// What of one stands beside its record.
+fn head<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
     let bad = |e: &dyn std::fmt::Display| {
         Failure::Input(format!(
             "{}: {e}; give a session of endowire play or the folder of a run",
@@ -28,8 +45,7 @@ pub(crate) fn read_summary(path: &Path) -> Result<RecordedSummary, Failure> {
         ))
     };
     let text = std::fs::read(path).map_err(|e| bad(&e))?;
-    let Head { scene_file, set } = serde_json::from_slice(&text).map_err(|e| bad(&e))?;
-    Ok(RecordedSummary { scene_file, scene_hash: None, set, unconverged_steps: 0, complete: true })
+    serde_json::from_slice(&text).map_err(|e| bad(&e))
 }
 
 /// Writes it.

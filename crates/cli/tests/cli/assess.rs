@@ -88,8 +88,12 @@ fn what_cannot_be_assessed_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let nothing = folder.path().join("nothing.session.json");
     std::fs::write(&nothing, "{}").unwrap();
+    let empty = folder.path().join("empty");
+    std::fs::create_dir(&empty).unwrap();
     for (args, named) in [
-        (vec![text(folder.path())], "steps.csv"),
+        (vec![text(&empty)], "steps.csv"),
+        // A folder that holds sessions stands for them.
+        (vec![text(folder.path())], "nothing.session.json"),
         (vec![text(&nothing)], "nothing.session.json"),
         (vec![text(&nothing), "--within-mm", "-1"], "--within-mm -1"),
     ] {

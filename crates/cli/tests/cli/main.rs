@@ -8,6 +8,7 @@ mod cache;
 mod centreline;
 mod common;
 mod compare;
+mod course;
 mod dataset;
 mod device;
 mod experiment;

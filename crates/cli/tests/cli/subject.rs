@@ -176,6 +176,53 @@ fn a_reference_that_misses_a_threshold_fails() {
 }
 
 #[test]
+fn a_folder_of_a_run_says_what_of_a_subject_it_cannot_tell() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut run = in_workspace();
+    run.args([
+        "run",
+        "assets/scenes/curved_tube_exact.toml",
+        "--script",
+        "assets/subjects/references/straight_tube.toml",
+    ]);
+    // As the subject sets them.
+    run.args(["--set", "vessel.file=../vessels/straight_tube.stl", "--set", "name=straight_tube"]);
+    told(&run.args(["--json", "--out", text(&out)]).output().unwrap());
+    let assess = |args: &[&str]| {
+        in_workspace().args(["assess", text(&out), "--subject", "straight_tube"]).args(args).output().unwrap()
+    };
+    let score = told(&assess(&["--json"]));
+    assert_eq!((&score["ended"]["by"], &score["passed"]), (&json!("goal"), &json!(false)));
+    // Time, force and the way are there, and judged; of the beam nothing is.
+    for name in ["total_s", "reversals", "wall_force_n"] {
+        let judged = metric(&score, name);
+        assert!(judged["passed"] == json!(true) && judged.get("unjudged").is_none(), "{judged}");
+    }
+    let beam = metric(&score, "moving_without_beam_s");
+    assert!(
+        beam["passed"].is_null() && beam["unjudged"].as_str().unwrap().contains("no beam was recorded"),
+        "{beam}"
+    );
+    let unjudged: Vec<&str> =
+        score["unjudged"].as_array().unwrap().iter().map(|one| one["what"].as_str().unwrap()).collect();
+    assert_eq!(unjudged, ["moving_without_beam_s", "limits.beam_s"]);
+    assert_eq!(score["score"], json!(80.0), "four points of five");
+    let words = String::from_utf8(assess(&[]).stdout).unwrap();
+    assert!(
+        words.contains("not judged: moving_without_beam_s, limits.beam_s: no beam was recorded"),
+        "{words}"
+    );
+    // With the log of the beam beside the steps all is judged.
+    let log =
+        "time_s,on,frames_per_s,dose_ngy,field_mm2,primary_deg,secondary_deg\n0,true,7.5,30,40000,0,0\n";
+    std::fs::write(out.join("beam.csv"), log).unwrap();
+    let score = told(&assess(&["--json"]));
+    assert_eq!((&score["passed"], &score["score"]), (&json!(true), &json!(100.0)));
+    assert!(score.get("unjudged").is_none());
+}
+
+#[test]
 fn who_pushes_on_in_a_wrong_branch_is_stopped() {
     let folder = tempfile::tempdir().unwrap();
     // Without the turn that leads up to the liver.

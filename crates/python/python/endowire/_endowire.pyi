@@ -312,6 +312,14 @@ def assess(
     within_mm: float = 5.0,
 ) -> list[dict[str, Any]]: ...
 def score(
-    path: str | PathLike[str], subject: str | PathLike[str], *, centreline: str | PathLike[str]
+    path: str | PathLike[str], subject: str | PathLike[str], *, centreline: str | PathLike[str] | None = None
+) -> dict[str, Any]: ...
+def course(
+    paths: Sequence[str | PathLike[str]],
+    *,
+    subject: str | PathLike[str] | None = None,
+    centreline: str | PathLike[str] | None = None,
+    target: str | None = None,
+    within_mm: float = 5.0,
 ) -> dict[str, Any]: ...
 def merge_sweeps(folders: Sequence[str | PathLike[str]], out: str | PathLike[str]) -> int: ...

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_assess::{Exam, Record, Subject};
+use endowire_assess::{Exam, Record, Site, Subject};
 use endowire_core::insertion::Simulation;
 use endowire_core::vessel::NoStore;
 use endowire_methods::{Scene, Setting, scene_with};
@@ -42,7 +42,8 @@ pub(crate) fn subject(name: &str, side_px: u32) -> (Exam, Session) {
     let view = ViewSpec::of_scene(&scene, &scene_path).unwrap();
     let simulation = scene.simulation(&NoStore).unwrap();
     let script = scene.steps(simulation.stack(), &NoStore).unwrap();
-    let exam = Exam::new(subject, scene.centreline(&NoStore).unwrap()).unwrap();
+    let tree = Some(scene.centreline(&NoStore).unwrap());
+    let exam = Exam::new(subject, &Site { tree, ..Site::default() }).unwrap();
     let session = Session::new(simulation, view, side_px, Limits::default()).unwrap();
     (exam.clone(), session.with_script(script).with_exam(exam))
 }

@@ -108,6 +108,7 @@ fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
         tell_score(&session);
         return Ok(());
     }
+    record = record.by_the_clock();
     let (session, pace) = if args.headless {
         live::without_window(session, pictures, (sender, messages), &mut record)?
     } else {

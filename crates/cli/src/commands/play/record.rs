@@ -1,7 +1,7 @@
 //! What hands have done, on disk.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use endowire_assess::SessionFile;
 use endowire_methods::Setting;
@@ -23,6 +23,8 @@ pub(crate) struct Record {
     set: Vec<String>,
     /// Where the score comes from, of a subject.
     provenance: Option<Provenance>,
+    /// When it began, of a session that goes by the clock.
+    recorded_unix_s: Option<u64>,
     written: Instant,
 }
 
@@ -31,7 +33,15 @@ impl Record {
     pub(crate) fn new(path: PathBuf, scene: &Path, settings: &[Setting]) -> Self {
         let head = script_head(scene, settings, &path);
         let set = settings.iter().map(ToString::to_string).collect();
-        Self { path, head, scene: scene.to_path_buf(), set, provenance: None, written: Instant::now() }
+        let scene = scene.to_path_buf();
+        Self { path, head, scene, set, provenance: None, recorded_unix_s: None, written: Instant::now() }
+    }
+
+    /// The same of a session that goes by the clock, from now on. One in which time goes by as inputs say has the same bytes at any time.
+    pub(crate) fn by_the_clock(self) -> Self {
+        // A clock that stands before 1970 does not know the day.
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).ok();
+        Self { recorded_unix_s: since.map(|since| since.as_secs()), ..self }
     }
 
     /// The same of a subject: its score is written too.
@@ -66,6 +76,7 @@ impl Record {
         let of_session = SessionFile {
             scene_file: self.scene.clone(),
             set: self.set.clone(),
+            recorded_unix_s: self.recorded_unix_s,
             record: session.record().clone(),
         };
         session_file::write(&of_session, &session_file::beside(&self.path))?;

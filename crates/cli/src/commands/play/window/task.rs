@@ -71,13 +71,8 @@ fn task_lines(task: &Subject) -> Vec<Line> {
 }
 
 fn standing_lines(standing: &Standing) -> Vec<Line> {
-    let goal = &standing.task.goal;
-    let to_go = standing.distance_mm.map_or_else(|| "not in yet".to_owned(), |mm| format!("{mm:.1} mm"));
-    let mut lines =
-        vec![(CHOSEN, format!("to {}: {to_go}, there at {} mm", goal.target, goal.tip_within_mm))];
-    if let Some(ml) = goal.inject_ml {
-        lines.push((CHOSEN, format!("injected there: {:.1} of {ml} ml", standing.injected_there_ml)));
-    }
+    let to_go = standing.to_go.iter().map(|line| (CHOSEN, line.clone()));
+    let mut lines: Vec<Line> = to_go.collect();
     lines.extend(standing.used.iter().map(|used| {
         let colour = if used.value > NEARLY * used.limit { WARN } else { TEXT };
         let digits = if used.unit == "N" { 3 } else { 1 };
@@ -91,7 +86,7 @@ fn score_lines(score: &Score) -> Vec<Line> {
     let rows = score.asked().map(|(scored, threshold)| {
         let (kept, value) = (scored.kept_words(), scored.value_words());
         let colour = if scored.passed == Some(true) { TEXT } else { WARN };
-        (colour, format!("  {kept:<6} {}: {value}, {}", scored.metric.name, threshold.words()))
+        (colour, format!("  {kept:<10} {}: {value}, {}", scored.metric.name, threshold.words()))
     });
     let end = (TEXT, "What is done now does not count. Esc ends.".to_owned());
     std::iter::once(head).chain(rows).chain([end]).collect()

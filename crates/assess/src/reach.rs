@@ -1,0 +1,142 @@
+//! How near a goal is, sample by sample.
+
+use endowire_core::error::nearest_name;
+use endowire_core::vessel::CentrelineTree;
+use endowire_core::{Error, Result};
+
+use crate::exam::injected_ml;
+use crate::goal::{Goal, PackingGoal, PlaceGoal};
+use crate::record::{Record, Sample};
+use crate::way::Way;
+
+/// Volumes that differ by less are the same, ml: sums are rounded.
+pub(crate) const SAME_ML: f64 = 1e-9;
+
+/// Where a goal is looked for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Site<'a> {
+    /// The vessel's centre line, which names places.
+    pub tree: Option<&'a CentrelineTree>,
+    /// Names of the instruments, the innermost first.
+    pub instruments: &'a [String],
+    /// Whether there is a sac of which it is known what coils fill.
+    pub has_sac: bool,
+}
+
+/// A goal on its way.
+#[derive(Debug, Clone)]
+pub(crate) struct Reach {
+    goal: Goal,
+    /// The way to its place.
+    pub(crate) way: Option<Way>,
+    /// Since when the tip is at the target, s.
+    there_since_s: Option<f64>,
+    pub(crate) injected_there_ml: f64,
+}
+
+impl Reach {
+    /// A goal at a site; errors name the key of the goal that does not fit.
+    pub(crate) fn new(goal: &Goal, site: &Site<'_>) -> Result<Self> {
+        let way = match goal {
+            Goal::Place(goal) => Some(way_to(goal, site)?),
+            Goal::Packing(_) if site.has_sac => None,
+            Goal::Packing(PackingGoal { packing_density }) => {
+                let mend = "there is no sac that coils fill: give [vessel.sac] in the scene";
+                return Err(Error::parameter("goal.packing_density", packing_density, mend));
+            }
+        };
+        Ok(Self { goal: goal.clone(), way, there_since_s: None, injected_there_ml: 0.0 })
+    }
+
+    /// Refuses a record that does not say what the goal asks.
+    pub(crate) fn check(&self, record: &Record) -> Result<()> {
+        match &self.goal {
+            Goal::Packing(goal) if record.samples.iter().all(|sample| sample.packing.is_none()) => {
+                let mend = "the record does not tell what coils fill: it is of another scene, or of an earlier version; record it again";
+                Err(Error::parameter("goal.packing_density", goal.packing_density, mend))
+            }
+            Goal::Place(PlaceGoal { instrument: Some(name), .. }) => {
+                let hand = self.way.as_ref().and_then(|way| way.instrument);
+                let unknown = |sample: &Sample| {
+                    let of_hand = hand.and_then(|hand| sample.hands.get(hand));
+                    of_hand.is_none_or(|of_hand| of_hand.inserted_mm > 0.0)
+                        && sample.tip_of_mm(hand).is_none()
+                };
+                if !record.samples.iter().any(unknown) {
+                    return Ok(());
+                }
+                let mend =
+                    "the record does not tell where its tip is: it is of an earlier version; record it again";
+                Err(Error::parameter("goal.instrument", format!("{name:?}"), mend))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// From the tip to the target, mm; none while it is not in, and of a sac.
+    pub(crate) fn distance_mm(&self, sample: &Sample) -> Option<f64> {
+        let way = self.way.as_ref()?;
+        let (target_mm, _) = way.target_mm()?;
+        Some((sample.tip_of_mm(way.instrument)? - target_mm).norm())
+    }
+
+    /// When the goal is reached, if it is in this sample, which has been so since a moment.
+    pub(crate) fn reached_s(&mut self, record: &Record, sample: &Sample, so_s: f64) -> Option<f64> {
+        let goal = match &self.goal {
+            Goal::Packing(goal) => {
+                let packed = sample.packing.is_some_and(|packed| packed.density >= goal.packing_density);
+                return packed.then_some(so_s);
+            }
+            Goal::Place(goal) => goal,
+        };
+        if !self.distance_mm(sample).is_some_and(|mm| mm <= goal.tip_within_mm) {
+            (self.there_since_s, self.injected_there_ml) = (None, 0.0);
+            return None;
+        }
+        let since_s = *self.there_since_s.get_or_insert(so_s);
+        self.injected_there_ml = injected_ml(record, since_s, sample.time_s);
+        let Some(asked_ml) = goal.inject_ml else { return Some(so_s) };
+        let there = record.injections.iter().filter(|one| (since_s..=sample.time_s).contains(&one.time_s));
+        let mut sum_ml = 0.0;
+        let last = there.into_iter().find(|one| {
+            sum_ml += one.volume_ml;
+            sum_ml >= asked_ml - SAME_ML
+        });
+        last.map(|one| one.time_s.max(so_s))
+    }
+}
+
+/// The way to the place of a goal, for the tip that it names.
+fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
+    let refuse = |value: String, mend: String| Error::parameter("goal.target", value, mend);
+    let target = format!("{:?}", goal.target);
+    let Some(tree) = site.tree else {
+        return Err(refuse(target, "is a point of a centre line: give that of the vessel".to_owned()));
+    };
+    let way = match Way::to_target(tree, &goal.target, goal.tip_within_mm) {
+        Ok(Some(way)) => way,
+        Ok(None) => {
+            let mend = "is where the centre line begins: name a point farther on".to_owned();
+            return Err(refuse(target, mend));
+        }
+        Err(Error::Parameter { value, mend, .. }) => return Err(refuse(value, mend)),
+        Err(other) => return Err(other),
+    };
+    let Some(name) = &goal.instrument else { return Ok(way) };
+    let refuse = |mend: String| Error::parameter("goal.instrument", format!("{name:?}"), mend);
+    match site.instruments.iter().position(|one| one == name) {
+        Some(hand) => Ok(way.for_instrument(hand)),
+        None if site.instruments.is_empty() => Err(refuse(
+            "no instruments are told: the record is of a device alone, or of an earlier version".to_owned(),
+        )),
+        None => {
+            let nearest = nearest_name(site.instruments.iter().map(String::as_str), name);
+            let mend = format!(
+                "is no instrument of the scene: name one of {}{}",
+                site.instruments.join(", "),
+                nearest.map_or_else(String::new, |nearest| format!("; did you mean {nearest:?}?"))
+            );
+            Err(refuse(mend))
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! What of a subject cannot be judged, and why: what it asks of was not recorded, or means nothing of the procedure.
+
+use serde::Serialize;
+
+use crate::metric::{Group, Metric};
+use crate::record::Record;
+use crate::subject::Limits;
+
+const NO_BEAM: &str = "no beam was recorded: a folder of endowire run has none; record it by endowire play, or give the log of the beam as beam.csv beside steps.csv";
+
+/// A threshold or a limit that cannot be judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unjudged {
+    /// Its measure, or the key of the limit.
+    pub what: String,
+    /// Why, and how to mend it.
+    pub why: &'static str,
+}
+
+/// Why a measure has no value.
+pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
+    let of_beam = ["beam_on_s", "beam_on_idle_s", "moving_without_beam_s"].contains(&metric.name);
+    if of_beam || metric.group == Group::Radiation {
+        return if record.beam.is_none() { NO_BEAM } else { "the beam was never on" };
+    }
+    match metric.name {
+        "catheter_ahead_s" => "there is one instrument alone",
+        "packing_density" | "coil_outside_mm" => {
+            "no sac is packed: the scene has none, or it was not recorded"
+        }
+        "spectral_arc_length" | "submovement_s" | "tip_speed_mm_per_s" => "the tip did not move",
+        "path_ratio" => "the tip ends where it began",
+        "time_in_trunk_s" => "the tip did not come past the first fork on its way, or there is none",
+        _ => "no way to a target is known, or no tip was on it",
+    }
+}
+
+/// The limits that a record cannot tell of.
+pub(crate) fn limits(limits: &Limits, record: &Record) -> Vec<Unjudged> {
+    let beam = limits.beam_s.filter(|_| record.beam.is_none());
+    beam.map(|_| Unjudged { what: "limits.beam_s".to_owned(), why: NO_BEAM }).into_iter().collect()
+}

@@ -1,0 +1,277 @@
+//! Two recorded sessions, a file of `play` and a folder of `run`, against values worked out by hand. A third one is in `by_hand.rs`.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use endowire_assess::{Metric, Record, Way, assess};
+use endowire_core::Vec3;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
+use serde_json::{Value, json};
+
+/// A trunk of 100 mm along x that divides into branches of 50 mm towards +y, the left one, and −y.
+fn tree() -> CentrelineTree {
+    let node = |x: f64, y: f64, radius_mm: f64, parent| CentrelineNode {
+        position_mm: Vec3::new(x, y, 0.0),
+        radius_mm,
+        parent,
+    };
+    let nodes = vec![
+        node(0.0, 0.0, 5.0, None),
+        node(100.0, 0.0, 5.0, Some(0)),
+        node(100.0, 50.0, 3.0, Some(1)),
+        node(100.0, -50.0, 3.0, Some(1)),
+    ];
+    let target = |name: &str, row| Target { name: name.to_owned(), row };
+    CentrelineTree::new(nodes).unwrap().with_targets(vec![target("left", 2), target("right", 3)]).unwrap()
+}
+
+fn way(name: &str) -> Way {
+    Way::to_target(&tree(), name, 5.0).unwrap().unwrap()
+}
+
+fn value(metrics: &[Metric], name: &str) -> Option<f64> {
+    metrics.iter().find(|metric| metric.name == name).unwrap().value
+}
+
+/// Holds all measures but the spectral arc length against values by hand; none where there must be none.
+fn check(metrics: &[Metric], by_hand: &[(&str, Option<f64>)]) {
+    for (name, expected) in by_hand {
+        match (value(metrics, name), expected) {
+            (Some(value), Some(expected)) => {
+                assert!((value - expected).abs() < 1e-9, "{name}: {value}, by hand {expected}");
+            }
+            (value, expected) => assert_eq!(value, *expected, "{name}"),
+        }
+    }
+    assert_eq!(metrics.len(), by_hand.len() + 1, "all but the spectral arc length");
+}
+
+/// Less the arc length of the spectrum of speeds, by the sum that defines it: amplitudes of 16 times as many values as the next power of two,
+/// both axes scaled to one, to the last amplitude of 5 % of the largest.
+fn arc_length_by_sums(speeds: &[f64]) -> f64 {
+    let count = 16 * speeds.len().next_power_of_two();
+    let amplitude = |k: usize| {
+        let of = |turn: fn(f64) -> f64| -> f64 {
+            speeds
+                .iter()
+                .enumerate()
+                .map(|(n, v)| v * turn(TAU * ((k * n) % count) as f64 / count as f64))
+                .sum()
+        };
+        of(f64::cos).hypot(of(f64::sin))
+    };
+    let amplitudes: Vec<f64> = (0..=count / 2).map(amplitude).collect();
+    let largest = amplitudes.iter().copied().fold(0.0, f64::max);
+    let last = amplitudes.iter().rposition(|value| *value >= 0.05 * largest).unwrap();
+    let pieces = amplitudes[..=last].windows(2);
+    -pieces.map(|pair| (1.0 / last as f64).hypot((pair[1] - pair[0]) / largest)).sum::<f64>()
+}
+
+/// One sample of a wire and its catheter: time, tip, forces of the wall and at the tip, and of each hand advance, turn, length in, push, torque and tip.
+fn sample(time_s: f64, tip: [f64; 2], forces: [f64; 2], hands: [([f64; 5], [f64; 2]); 2]) -> Value {
+    let hand = |([advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm], [x, y]): (
+        [f64; 5],
+        [f64; 2],
+    )| {
+        json!({
+            "advance_mm": advance_mm, "rotate_rad": rotate_rad, "inserted_mm": inserted_mm, "push_force_n": push_force_n,
+            "torque_nmm": torque_nmm, "tip_mm": [x, y, 0.0],
+        })
+    };
+    json!({
+        "time_s": time_s, "tip_mm": [tip[0], tip[1], 0.0], "wall_force_n": forces[0], "tip_force_n": forces[1], "jumped": false,
+        "hands": hands.map(hand),
+    })
+}
+
+/// Six seconds into the right branch: together, a rest, the wire, the catheter past it, the wire again while the catheter is pulled back.
+fn session() -> String {
+    let beam = |time_s: f64, on: bool, primary_deg: f64| {
+        json!({
+            "time_s": time_s, "on": on, "frames_per_s": 7.5, "dose_ngy": 40.0, "field_mm2": 20_000.0, "primary_deg": primary_deg,
+            "secondary_deg": 0.0,
+        })
+    };
+    let quarter = 0.25 * TAU;
+    let samples = [
+        sample(
+            1.0,
+            [20.0, 0.0],
+            [0.05, 0.0],
+            [([20.0, quarter, 20.0, 0.04, 0.1], [20.0, 0.0]), ([10.0, 0.0, 10.0, 0.02, 0.0], [10.0, 0.0])],
+        ),
+        sample(
+            2.0,
+            [20.0, 0.0],
+            [0.05, 0.0],
+            [([0.0, 0.0, 20.0, 0.04, 0.1], [20.0, 0.0]), ([0.0, 0.0, 10.0, 0.02, 0.0], [10.0, 0.0])],
+        ),
+        sample(
+            4.0,
+            [100.0, 0.0],
+            [0.2, 0.02],
+            [([80.0, 0.0, 100.0, 0.1, 0.1], [100.0, 0.0]), ([0.0, 0.0, 10.0, -0.01, 0.0], [10.0, 0.0])],
+        ),
+        sample(
+            5.0,
+            [100.0, 0.0],
+            [0.1, 0.002],
+            [([0.0, 0.0, 100.0, 0.0, 0.1], [100.0, 0.0]), ([100.0, 0.0, 110.0, 0.3, 0.0], [100.0, 0.0])],
+        ),
+        sample(
+            6.0,
+            [100.0, -47.0],
+            [0.15, 0.15],
+            [([57.0, 0.0, 157.0, 0.2, -0.4], [100.0, -47.0]), ([-20.0, 0.0, 90.0, 0.0, 0.0], [100.0, -10.0])],
+        ),
+    ];
+    let injection = |time_s: f64, volume_ml: f64, rate_ml_per_s: f64| json!({"time_s": time_s, "volume_ml": volume_ml, "rate_ml_per_s": rate_ml_per_s});
+    json!({
+        "scene_file": "a.toml", "set": [],
+        "record": {
+            "instruments": ["wire", "catheter"],
+            "samples": samples,
+            "injections": [injection(1.5, 5.0, 2.5), injection(4.2, 3.0, 6.0)],
+            "beam": [beam(0.0, true, 0.0), beam(3.0, true, 30.0), beam(4.5, false, 30.0)],
+        },
+    })
+    .to_string()
+}
+
+#[test]
+fn a_session_of_two_instruments_is_measured_as_by_hand() {
+    let record = Record::from_session(session().as_bytes(), Path::new("a.session.json")).unwrap();
+    let metrics = assess(&record, Some(&way("right")));
+    let by_hand = [
+        ("total_s", 6.0),
+        // The second sample alone.
+        ("idle_s", 1.0),
+        ("beam_on_s", 4.5),
+        ("beam_on_idle_s", 1.0),
+        // 4.5 s × 7.5 frames a second × 40 nGy, over 200 cm².
+        ("kerma_ugy", 1.35),
+        ("kerma_area_ugycm2", 270.0),
+        ("runs", 1.0),
+        ("frames", 33.75),
+        ("field_cm2", 200.0),
+        ("c_arm_moves", 1.0),
+        ("contrast_ml", 8.0),
+        ("injections", 2.0),
+        ("largest_rate_ml_per_s", 6.0),
+        // The second injection begins in the fourth sample, with 2 mN at the tip; the first one in a sample with none.
+        ("against_wall_ml", 3.0),
+        // From 20 mm: 80 mm along the trunk, 47 mm into the branch, which is the way itself.
+        ("tip_path_mm", 127.0),
+        ("path_ratio", 1.0),
+        ("tip_speed_mm_per_s", 127.0 / 5.0),
+        // From 2 to 4 s with 40 mm/s, from 5 to 6 s with 47 mm/s.
+        ("submovements", 2.0),
+        ("submovement_s", 1.5),
+        // The catheter's hand, once.
+        ("reversals", 1.0),
+        ("turns", 0.25),
+        ("retracted_mm", 20.0),
+        ("wall_force_n", 0.2),
+        // 0.05 N for 2 s, 0.1 for 1 s, 0.15 for 1 s, 0.2 for 2 s: 5.7 s of six are in the last.
+        ("wall_force_95_n", 0.2),
+        ("tip_force_n", 0.15),
+        ("wall_impulse_ns", 0.05 + 0.05 + 0.4 + 0.1 + 0.15),
+        ("hand_force_n", 0.3),
+        ("hand_torque_nmm", 0.4),
+        ("jumps", 0.0),
+        // 110 mm over 100 mm in the fourth sample.
+        ("catheter_ahead_s", 1.0),
+        // From 4.5 s on.
+        ("moving_without_beam_s", 1.5),
+        ("wrong_branches", 0.0),
+        ("time_in_trunk_s", 6.0),
+        ("arrived", 1.0),
+        ("placement_error_mm", 3.0),
+    ];
+    let known = by_hand.iter().map(|(name, value)| (*name, Some(*value)));
+    check(&metrics, &known.chain([("packing_density", None), ("coil_outside_mm", None)]).collect::<Vec<_>>());
+    // Twenty samples a second from 1 s on.
+    let speeds = [(20, 0.0), (40, 40.0), (20, 0.0), (20, 47.0)];
+    let speeds: Vec<f64> = speeds.iter().flat_map(|(count, speed)| vec![*speed; *count]).collect();
+    let (told, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
+    assert!((told - expected).abs() < 1e-9, "{told}, by sums {expected}");
+    // The catheter's tip ends 10 mm into the branch, 40 mm before the target.
+    let metrics = assess(&record, Some(&way("right").for_instrument(1)));
+    assert_eq!((value(&metrics, "arrived"), value(&metrics, "placement_error_mm")), (Some(0.0), Some(40.0)));
+}
+
+const STEPS: &str = "\
+step,advance_mm,rotate_rad,inserted_mm,nodes,tip_x_mm,tip_y_mm,tip_z_mm,push_force_n,torque_nmm,jumped,wall_force_sum_n,wall_force_tip_n,time_s
+1,10,0,10,3,10,0,0,0.1,0.2,false,0.2,0,2
+2,-4,-3.141592653589793,6,3,6,0,0,-0.15,-0.5,true,0.4,0.1,3
+3,44,0,50,5,50,0,0,0.3,0.1,false,0.1,0.05,5
+";
+const INJECTIONS: &str = "\
+after_step,time_s,instrument,volume_ml,rate_ml_per_s,inserted_mm,tip_x_mm,tip_y_mm,tip_z_mm
+1,2.5,device,2,1,10,10,0,0
+";
+const PACKING: &str = "\
+step,coils_mm3,packing,neck_coverage,outside_mm,herniated,dome_force_n
+1,2,0.02,0.1,0,false,0
+2,2,0.02,0.1,0,false,0
+3,12,0.12,0.3,2.5,true,0.01
+";
+
+#[test]
+fn a_folder_of_a_run_is_measured_as_by_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("steps.csv", STEPS), ("injections.csv", INJECTIONS), ("packing.csv", PACKING)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let metrics = assess(&Record::read(folder.path()).unwrap(), Some(&way("left")));
+    let by_hand = [
+        ("total_s", Some(5.0)),
+        ("idle_s", Some(0.0)),
+        ("beam_on_s", None),
+        ("beam_on_idle_s", None),
+        ("kerma_ugy", None),
+        ("kerma_area_ugycm2", None),
+        ("runs", None),
+        ("frames", None),
+        ("field_cm2", None),
+        ("c_arm_moves", None),
+        ("contrast_ml", Some(2.0)),
+        ("injections", Some(1.0)),
+        ("largest_rate_ml_per_s", Some(1.0)),
+        // It begins in the second step, with 0.1 N at the tip.
+        ("against_wall_ml", Some(2.0)),
+        // 4 mm back and 44 mm on, between places 40 mm apart.
+        ("tip_path_mm", Some(48.0)),
+        ("path_ratio", Some(1.2)),
+        ("tip_speed_mm_per_s", Some(9.6)),
+        // From 2 to 5 s with 4 and 22 mm/s.
+        ("submovements", Some(1.0)),
+        ("submovement_s", Some(3.0)),
+        ("reversals", Some(2.0)),
+        ("turns", Some(0.5)),
+        ("retracted_mm", Some(4.0)),
+        ("wall_force_n", Some(0.4)),
+        // 0.1 N for 2 s, 0.2 for 2 s, 0.4 for 1 s: 4.75 s of five are in the last.
+        ("wall_force_95_n", Some(0.4)),
+        ("tip_force_n", Some(0.1)),
+        ("wall_impulse_ns", Some(0.4 + 0.4 + 0.2)),
+        ("hand_force_n", Some(0.3)),
+        ("hand_torque_nmm", Some(0.5)),
+        ("jumps", Some(1.0)),
+        ("catheter_ahead_s", None),
+        ("moving_without_beam_s", None),
+        ("wrong_branches", Some(0.0)),
+        ("time_in_trunk_s", None),
+        ("arrived", Some(0.0)),
+        // 50 mm along and 50 mm across.
+        ("placement_error_mm", Some(50.0 * 2.0f64.sqrt())),
+        ("packing_density", Some(0.12)),
+        ("coil_outside_mm", Some(2.5)),
+    ];
+    check(&metrics, &by_hand);
+    let speeds: Vec<f64> = [vec![4.0; 20], vec![22.0; 40]].concat();
+    let (told, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
+    assert!((told - expected).abs() < 1e-9, "{told}, by sums {expected}");
+}

@@ -1,0 +1,188 @@
+//! A session that was measured, with the scene in which it was recorded.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use endowire_assess::{Metric, Record, Score, Subject, Way};
+use endowire_methods::{Scene, Setting};
+
+use crate::args::AssessArgs;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::provenance::Provenance;
+use crate::output::recording::RecordedSummary;
+use crate::output::{SUMMARY, session as session_file};
+use crate::{scenes, subjects};
+
+/// What came of a session.
+pub(super) struct Attempt {
+    pub(super) session: PathBuf,
+    pub(super) recorded_unix_s: Option<u64>,
+    /// Number of its scene among the [`Places`].
+    pub(super) place: usize,
+    pub(super) target: Option<String>,
+    /// What was done; of a subject until its end.
+    pub(super) record: Record,
+    pub(super) way: Option<Way>,
+    pub(super) metrics: Vec<Metric>,
+    pub(super) score: Option<Arc<Score>>,
+}
+
+/// A scene in which sessions were recorded.
+pub(super) struct Place {
+    pub(super) path: PathBuf,
+    /// What of it was set.
+    pub(super) set: Vec<String>,
+    pub(super) scene: Scene,
+}
+
+/// Each scene once, however many sessions were recorded in it.
+pub(super) struct Places<'a> {
+    /// The scene that is given in place of those that sessions name.
+    given: Option<&'a Path>,
+    pub(super) cache: Cache,
+    all: Vec<Place>,
+}
+
+impl<'a> Places<'a> {
+    /// None yet.
+    pub(super) fn new(args: &'a AssessArgs) -> Self {
+        Self { given: args.scene.as_deref(), cache: Cache::new(&args.cache), all: vec![] }
+    }
+
+    /// That of an attempt.
+    pub(super) fn of(&self, attempt: &Attempt) -> &Place {
+        &self.all[attempt.place]
+    }
+
+    /// Number of the scene of a session, which is read if it is not known.
+    fn find(&mut self, summary: &RecordedSummary) -> Result<usize, Failure> {
+        let path = self.given.unwrap_or(&summary.scene_file);
+        let known = self.all.iter().position(|one| one.path == path && one.set == summary.set);
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let (path, scene) = scenes::of_recording(summary, self.given, &[])?;
+        Ok(self.add(Place { path, set: summary.set.clone(), scene }))
+    }
+
+    fn add(&mut self, place: Place) -> usize {
+        self.all.push(place);
+        self.all.len() - 1
+    }
+}
+
+/// What a session or a run says of its scene.
+fn read_summary(session: &Path) -> Result<RecordedSummary, Failure> {
+    if session.is_dir() {
+        RecordedSummary::read(&session.join(SUMMARY))
+    } else {
+        session_file::read_summary(session)
+    }
+}
+
+/// When a session was recorded, if it says so; a run does not.
+fn recorded_unix_s(session: &Path) -> Result<Option<u64>, Failure> {
+    if session.is_dir() { Ok(None) } else { session_file::recorded_unix_s(session) }
+}
+
+/// Measures sessions on the way to a target.
+pub(super) fn measured(
+    args: &AssessArgs,
+    files: &[PathBuf],
+    places: &mut Places<'_>,
+) -> Result<Vec<Attempt>, Failure> {
+    files.iter().map(|file| measured_one(args, file, places)).collect()
+}
+
+fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> Result<Attempt, Failure> {
+    let record = Record::read(session)?;
+    let place = places.find(&read_summary(session)?)?;
+    let Place { path, scene, .. } = &places.all[place];
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+    let tree = scene.centreline(&places.cache).map_err(in_scene)?;
+    scenes::tell_found_centreline(path, scene);
+    let target = args.target.clone().or_else(|| target(scene));
+    let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
+    let way = match (&target, last_mm) {
+        (Some(name), _) => Way::to_target(tree, name, args.within_mm).map_err(in_scene)?,
+        (None, Some(place)) => Way::to_place(tree, &place),
+        (None, None) => None,
+    };
+    let metrics = endowire_assess::assess(&record, way.as_ref());
+    Ok(Attempt {
+        session: session.to_path_buf(),
+        recorded_unix_s: recorded_unix_s(session)?,
+        place,
+        target,
+        record,
+        way,
+        metrics,
+        score: None,
+    })
+}
+
+/// Where the script goes in the end, if it says so.
+fn target(scene: &Scene) -> Option<String> {
+    scene.script.iter().rev().find_map(|line| line.until.as_ref()?.target.clone())
+}
+
+/// Scores sessions by a subject; where that comes from, and what came of them.
+pub(super) fn scored(
+    subject: &Subject,
+    files: &[PathBuf],
+    places: &mut Places<'_>,
+) -> Result<(Provenance, Vec<Attempt>), Failure> {
+    let path = subject.resolve(&subject.scene);
+    let settings = subjects::settings(subject)?;
+    let scene = scenes::read(&path, &settings)?;
+    let exam = subjects::exam(subject.clone(), &scene, &places.cache)?;
+    let provenance = Provenance::of_scene(&scene, &settings)?;
+    let place = places.add(Place { path: path.clone(), set: subject.set.clone(), scene });
+    let mut attempts = vec![];
+    for session in files {
+        check_scene(session, &read_summary(session)?, &path, &settings)?;
+        let record = Record::read(session)?;
+        exam.check(&record).map_err(|error| Failure::from(error).at(session.display()))?;
+        let score = exam.clone().score(&record);
+        attempts.push(Attempt {
+            session: session.clone(),
+            recorded_unix_s: recorded_unix_s(session)?,
+            place,
+            target: subject.goal.target().map(str::to_owned),
+            record: score.verdict.ended.map_or_else(|| record.clone(), |ended| record.before(ended.time_s)),
+            way: exam.way().cloned(),
+            metrics: score.metrics.iter().map(|one| one.metric).collect(),
+            score: Some(score),
+        });
+    }
+    Ok((provenance, attempts))
+}
+
+/// Refuses a session that was recorded in another scene than the subject's.
+fn check_scene(
+    session: &Path,
+    recorded: &RecordedSummary,
+    scene: &Path,
+    settings: &[Setting],
+) -> Result<(), Failure> {
+    let same = match (recorded.scene_file.canonicalize(), scene.canonicalize()) {
+        (Ok(recorded), Ok(scene)) => recorded == scene,
+        // A scene that has gone elsewhere cannot be told from the subject's.
+        _ => recorded.scene_file.file_name() == scene.file_name(),
+    };
+    let set: Vec<String> = settings.iter().map(ToString::to_string).collect();
+    if same && recorded.set == set {
+        return Ok(());
+    }
+    let told = |scene: &Path, set: &[String]| {
+        let set: String = set.iter().map(|setting| format!(" --set '{setting}'")).collect();
+        format!("{}{set}", scene.display())
+    };
+    Err(Failure::Input(format!(
+        "{}: was recorded in {}, and the subject is in {}: name the subject that it was recorded with",
+        session.display(),
+        told(&recorded.scene_file, &recorded.set),
+        told(scene, &set)
+    )))
+}

@@ -1,0 +1,39 @@
+//! Which sessions are meant: files, folders of runs, and folders that hold sessions.
+
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+
+/// What a folder of a run has.
+const STEPS: &str = "steps.csv";
+/// How files of sessions end.
+const ENDING: &str = ".session.json";
+
+/// The sessions in the order given; those of a folder by their names.
+pub(super) fn of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut all = vec![];
+    for path in named {
+        let within = if path.is_dir() && !path.join(STEPS).exists() { sessions_in(path)? } else { vec![] };
+        if within.is_empty() {
+            // What is none of both its reader tells.
+            all.push(path.clone());
+        }
+        all.extend(within);
+    }
+    Ok(all)
+}
+
+fn sessions_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let unreadable = |e: std::io::Error| Failure::Input(format!("{}: {e}: name a folder", folder.display()));
+    let entries = std::fs::read_dir(folder).map_err(unreadable)?;
+    let mut paths: Vec<PathBuf> =
+        entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>().map_err(unreadable)?;
+    paths.retain(|path| path.to_string_lossy().ends_with(ENDING));
+    paths.sort();
+    Ok(paths)
+}
+
+/// The file by whose bytes a session is known.
+pub(super) fn content(session: &Path) -> PathBuf {
+    if session.is_dir() { session.join(STEPS) } else { session.to_path_buf() }
+}

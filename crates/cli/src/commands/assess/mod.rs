@@ -1,0 +1,114 @@
+//! `endowire assess`: what sessions and recorded runs are scored by, and how a trainee gets on.
+
+mod attempt;
+mod course;
+mod files;
+mod page;
+mod text;
+
+use std::path::Path;
+
+use endowire_assess::{Metric, Noticed, Score, noticed};
+use endowire_report::assessed_page;
+use serde::Serialize;
+
+use crate::args::AssessArgs;
+use crate::failure::Failure;
+use crate::output::provenance::{Provenance, read_input};
+use crate::output::{answer, tell, whole};
+use crate::subjects;
+use attempt::{Attempt, Places};
+use course::{CourseOf, courses};
+
+/// The document of what was assessed.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    provenance: Provenance,
+    #[serde(flatten)]
+    told: Told<'a>,
+}
+
+/// One session, or several with their courses.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Told<'a> {
+    One(Box<Session<'a>>),
+    Several { sessions: Vec<Session<'a>>, courses: &'a [CourseOf<'a>] },
+}
+
+/// What is told of a session.
+#[derive(Serialize)]
+struct Session<'a> {
+    session: &'a Path,
+    /// Seconds since 1970 began in UTC; none where the session does not say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recorded_unix_s: Option<u64>,
+    #[serde(flatten)]
+    by: By<'a>,
+    noticed: Vec<Noticed>,
+}
+
+/// Its measures, alone or beside what a subject asks of them.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum By<'a> {
+    Subject(&'a Score),
+    Measures { scene: &'a str, target: Option<&'a str>, metrics: &'a [Metric] },
+}
+
+/// Measures each session, scores it where a subject is given, and tells the values.
+pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
+    if !(args.within_mm > 0.0 && args.within_mm.is_finite()) {
+        return Err(Failure::Input(format!("--within-mm {}: must be a length above 0", args.within_mm)));
+    }
+    let files = files::of(&args.sessions)?;
+    let mut places = Places::new(args);
+    let (provenance, mut attempts) = match &args.subject {
+        Some(which) => attempt::scored(&subjects::read(which)?, &files, &mut places)?,
+        None => {
+            let contents = files.iter().map(|file| read_input(&files::content(file)));
+            let contents = contents.collect::<Result<Vec<_>, _>>()?;
+            (Provenance::new(&contents, 0), attempt::measured(args, &files, &mut places)?)
+        }
+    };
+    course::order(&mut attempts);
+    let courses = courses(&attempts, &places);
+    let told = match attempts.as_slice() {
+        [attempt] => Told::One(Box::new(told(attempt, &places))),
+        all => Told::Several {
+            sessions: all.iter().map(|attempt| told(attempt, &places)).collect(),
+            courses: &courses,
+        },
+    };
+    if let Some(out) = &args.page {
+        write_page(out, &page::of(&attempts, &courses, &places, &provenance)?)?;
+    }
+    answer(&Document { provenance, told }, args.json, || text::of(&attempts, &courses))
+}
+
+/// What is told of an attempt.
+fn told<'a>(attempt: &'a Attempt, places: &'a Places<'_>) -> Session<'a> {
+    let by = match &attempt.score {
+        Some(score) => By::Subject(score),
+        None => By::Measures {
+            scene: &places.of(attempt).scene.name,
+            target: attempt.target.as_deref(),
+            metrics: &attempt.metrics,
+        },
+    };
+    Session {
+        session: &attempt.session,
+        recorded_unix_s: attempt.recorded_unix_s,
+        by,
+        noticed: noticed(&attempt.record, attempt.way.as_ref()),
+    }
+}
+
+fn write_page(out: &Path, document: &impl Serialize) -> Result<(), Failure> {
+    let unwritable = |e| Failure::Computation(format!("the page cannot be written as JSON: {e}"));
+    let page = assessed_page(document).map_err(unwritable)?;
+    whole::write_bytes(out, page.as_bytes()).map_err(|e| Failure::write(out, &e))?;
+    tell(format_args!("{} kB in {}", page.len().div_ceil(1000), out.display()));
+    Ok(())
+}
