@@ -84,9 +84,9 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Tells of a part what was found, and whether the device rests there.
-fn tell(report: &mut StepReport, found: &Found, effort: Effort, rests: bool) {
-    (report.slides, report.relaxations) = (found.slides, u32::from(effort == Effort::Moving));
+/// Tells of a part what was found, whether the device begins to move from a fold in it, and whether it rests there.
+fn tell(report: &mut StepReport, found: &Found, lets_go: bool, rests: bool) {
+    (report.slides, report.relaxations) = (found.slides, u32::from(lets_go));
     (report.converged, report.dissipated_mj) = (rests, found.dissipated_mj);
     (report.jump, report.jumped) = (found.jump, found.jump.is_some());
     report.imbalance = if rests { 0.0 } else { found.residual.max(found.unsettled) };
@@ -167,7 +167,7 @@ impl<const C: usize> Workspace<C> {
                         report.behind.resize(hands.len(), Command::default());
                     }
                     (report.substeps, report.angles) = (attempt, from.report.angles);
-                    tell(report, &found, effort, rests);
+                    tell(report, &found, effort == Effort::Moving && !holds_still, rests);
                     tools.work.write(report, from.report.nodes_solved);
                     return Ok(Ticked::Moved);
                 }
