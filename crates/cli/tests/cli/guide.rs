@@ -211,7 +211,7 @@ fn links(document: &str) -> Vec<String> {
 fn every_link_of_the_documents_leads_to_a_file() {
     let root = workspace();
     let mut documents = chapters();
-    for folder in [root.clone(), root.join("docs/methods"), root.join("docs/decisions")] {
+    for folder in [root.clone(), root.join("docs"), root.join("docs/methods"), root.join("docs/decisions")] {
         let entries = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path());
         documents.extend(entries.filter(|p| p.extension().is_some_and(|e| e == "md")));
     }
@@ -224,4 +224,51 @@ fn every_link_of_the_documents_leads_to_a_file() {
     }
     assert!(count > 20, "{count} links");
     assert_eq!(links("[a](b.md) and ![c](d/e.png#f), [g](#h), [i](https://j.k)"), ["b.md", "d/e.png"]);
+}
+
+/// Paths of Rust files, or of folders of them, that stand in back-ticks.
+fn paths(document: &str) -> impl Iterator<Item = &str> {
+    let quoted = document.split('`').skip(1).step_by(2);
+    quoted.filter(|text| {
+        let plain = text.chars().all(|c| c.is_ascii_alphanumeric() || "_-./".contains(c));
+        plain && (text.ends_with(".rs") || (text.contains('/') && text.ends_with('/')))
+    })
+}
+
+/// Paths of all files below a folder, without the `src` of crates, as documents shorten them.
+fn files_below(folder: &Path, found: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let path = entry.path();
+        if path.is_dir() && entry.file_name() != "target" {
+            files_below(&path, found);
+            found.push(path.to_string_lossy().replace("/src/", "/") + "/");
+        } else {
+            found.push(path.to_string_lossy().replace("/src/", "/"));
+        }
+    }
+}
+
+#[test]
+fn every_file_that_a_decision_names_is_there() {
+    let root = workspace();
+    let mut files = Vec::new();
+    for folder in ["crates", "tests", "benches", "docs"] {
+        files_below(&root.join(folder), &mut files);
+    }
+    let is_there = |path: &str| {
+        let end = format!("/{}", path.replace("/src/", "/"));
+        files.iter().any(|file| file.ends_with(&end))
+    };
+    assert!(is_there("kirchhoff/tick.rs") && is_there("cli/src/main.rs") && is_there("contact/pairs/"));
+    assert!(!is_there("kirchhoff/tock.rs") && !is_there("ick.rs"));
+    let mut documents = vec![root.join("ARCHITECTURE.md"), root.join("docs/glossary.md")];
+    documents.extend(std::fs::read_dir(root.join("docs/decisions")).unwrap().map(|e| e.unwrap().path()));
+    let mut count = 0;
+    for document in documents {
+        for path in paths(&std::fs::read_to_string(&document).unwrap()) {
+            assert!(is_there(path), "{}: {path}", document.display());
+            count += 1;
+        }
+    }
+    assert!(count > 100, "{count} paths");
 }
