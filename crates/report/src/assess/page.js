@@ -44,7 +44,7 @@ function open(index) {
   shown.attempt = index; shown.time_s = attempt.timeline.end_s;
   [...at("pick").children].forEach((button, k) => button.setAttribute("aria-pressed", String(k === index)));
   const where = attempt.target ? `${attempt.scene}, to ${attempt.target}` : attempt.scene, when = day(attempt.recorded_unix_s);
-  at("about").textContent = [data.sessions.length > 1 ? `shown: ${attempt.name}` : where, when, attempt.verdict].filter(Boolean).join(" · ");
+  at("about").textContent = [data.sessions.length > 1 ? `shown: ${attempt.name}` : where !== at("title").textContent && where, when, attempt.verdict].filter(Boolean).join(" · ");
   roadmap.open(attempt); timeline.open(attempt);
   noticed(attempt); measures(attempt); redraw();
 }
