@@ -105,6 +105,9 @@ fn replayed<'a>(
         // Where it has a time, the vessel is elsewhere after it.
         numbers.extend(step.time_s.into_iter().flat_map(f64::to_le_bytes));
         numbers.extend(step.detach.into_iter().flat_map(|instrument| (instrument as u64).to_le_bytes()));
+        // No instrument has that number.
+        let of_tick = step.solves.into_iter().flat_map(|solves| [u64::MAX, solves as u64]);
+        numbers.extend(of_tick.flat_map(u64::to_le_bytes));
         for one in &*step.moves {
             if several {
                 numbers.extend((one.instrument as u64).to_le_bytes());

@@ -209,6 +209,13 @@ fn a_wire_goes_into_the_carotid_by_keys_at_pace() {
          input to its picture, {mib:.0} MiB"
     );
     browser.wait("document.querySelector('#told').textContent.startsWith('step')");
+    // Until the device has followed its hands.
+    let step = "(async () => (await import('./screen.js')).readout.step)()";
+    while {
+        let before = browser.eval(step);
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        browser.eval(step) != before
+    } {}
     let ask = "await (await import('./simulator.js')).ask";
     let script = browser.eval(&format!("(async () => {ask}('script'))()"));
     let tip = bits(&mut browser, &format!("{ask}('positions')"));

@@ -6,7 +6,7 @@ use endowire_assess::{Exam, Record, Site, Subject};
 use endowire_core::insertion::Simulation;
 use endowire_core::vessel::NoStore;
 use endowire_methods::{Scene, Setting, scene_with};
-use endowire_play::{Input, Limits, Pictures, Session};
+use endowire_play::{Input, Limits, Pictures, Session, TICK_SOLVES};
 use endowire_viewer::{Backend, Image, ViewSpec};
 use serde_json::{Value, json};
 
@@ -25,6 +25,7 @@ pub(crate) fn session(name: &str, side_px: u32) -> (Session, Pictures) {
     let simulation = scene.simulation(&NoStore).unwrap();
     let wall = simulation.lumen().wall(&NoStore).unwrap().clone();
     let session = Session::new(simulation, view, side_px, Limits::default()).unwrap();
+    let session = session.with_ticks(TICK_SOLVES).unwrap();
     let pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
     (session, pictures)
 }
@@ -45,6 +46,7 @@ pub(crate) fn subject(name: &str, side_px: u32) -> (Exam, Session) {
     let tree = Some(scene.centreline(&NoStore).unwrap());
     let exam = Exam::new(subject, &Site { tree, ..Site::default() }).unwrap();
     let session = Session::new(simulation, view, side_px, Limits::default()).unwrap();
+    let session = session.with_ticks(TICK_SOLVES).unwrap();
     (exam.clone(), session.with_script(script).with_exam(exam))
 }
 
@@ -71,8 +73,7 @@ pub(crate) fn run(name: &str, script: &str) -> Simulation {
     let script = scene.steps(simulation.stack(), &NoStore).unwrap();
     let mut run = script.into_run();
     while let Some(step) = run.next(&simulation).unwrap() {
-        let (moves, until_s) = (step.moves.to_vec(), step.time_s);
-        simulation.step_until(&moves, until_s).unwrap();
+        step.into_owned().carry_out(&mut simulation).unwrap();
         run.carried_out();
     }
     simulation

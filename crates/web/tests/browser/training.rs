@@ -78,7 +78,7 @@ fn a_subject_is_read_done_by_hand_scored_and_saved() {
     let Some(mut browser) = Browser::open("", LAPTOP) else { return };
     browser.wait(READY);
     let offered = "document.querySelectorAll('#scenes optgroup[label^=\"Training subjects\"] option').length";
-    assert_eq!(browser.eval(offered), 9);
+    assert_eq!(browser.eval(offered), 10);
     browser.eval(
         "(() => {
             const menu = document.getElementById('scenes');
