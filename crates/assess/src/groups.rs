@@ -157,7 +157,7 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let moving_s = record.end_s() - idle_s(record);
     let (count, mean_s) = submovements(&speeds);
     let hands = || record.samples.iter().flat_map(|sample| sample.hands.iter().enumerate());
-    let most = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
+    let most = record.hand_count();
     let reversals: usize = (0..most).map(|hand| reversals(record, hand)).sum();
     let turned: f64 = hands().map(|(_, hand)| hand.rotate_rad.abs()).sum();
     let retracted: f64 = hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)).sum();

@@ -167,7 +167,7 @@ fn against_wall(record: &Record) -> Vec<Noticed> {
 
 /// The longest ways that a hand pulled back without pushing between.
 fn pulls(record: &Record) -> Vec<Noticed> {
-    let most = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
+    let most = record.hand_count();
     let mut all: Vec<(f64, Stretch, usize)> = Vec::new();
     for hand in 0..most {
         let mut now: Option<(f64, Stretch, usize)> = None;

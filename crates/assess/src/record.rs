@@ -168,6 +168,11 @@ impl Record {
         Ok(session.record)
     }
 
+    /// Hands of the sample that has most of them.
+    pub(crate) fn hand_count(&self) -> usize {
+        self.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0)
+    }
+
     fn of_folder(folder: &Path) -> Result<Self> {
         let steps: Vec<Step> = rows(&folder.join("steps.csv"))?;
         let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();

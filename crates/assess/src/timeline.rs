@@ -54,7 +54,7 @@ impl Timeline {
     pub fn of(record: &Record, way: Option<&Way>, most_pieces: usize) -> Self {
         let end_s = record.end_s();
         let pieces = ((end_s / SHORTEST_S).ceil() as usize).min(most_pieces).max(1);
-        let hands = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
+        let hands = record.hand_count();
         let mut line = Self {
             piece_s: end_s / pieces as f64,
             end_s,

@@ -2,26 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "common/fork.rs"]
+mod fork;
+
 use endowire_assess::{BeamState, Group, Hand, Injection, Record, Sample, Way, assess};
 use endowire_core::Vec3;
-use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
-
-/// A trunk of 100 mm along x that divides into branches of 50 mm towards +y and −y.
-fn tree() -> CentrelineTree {
-    let node = |x: f64, y: f64, radius_mm: f64, parent| CentrelineNode {
-        position_mm: Vec3::new(x, y, 0.0),
-        radius_mm,
-        parent,
-    };
-    let nodes = vec![
-        node(0.0, 0.0, 5.0, None),
-        node(100.0, 0.0, 5.0, Some(0)),
-        node(100.0, 50.0, 3.0, Some(1)),
-        node(100.0, -50.0, 3.0, Some(1)),
-    ];
-    let target = |name: &str, row| Target { name: name.to_owned(), row };
-    CentrelineTree::new(nodes).unwrap().with_targets(vec![target("left", 2), target("right", 3)]).unwrap()
-}
+use fork::tree;
 
 fn sample(time_s: f64, [x, y]: [f64; 2], advance_mm: f64, wall_force_n: f64) -> Sample {
     let hand = Hand { advance_mm, push_force_n: Some(-wall_force_n), ..Hand::default() };

@@ -2,7 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use endowire_assess::{BeamState, Hand, Injection, NoticedKind, Record, Sample, Way, noticed};
+#[path = "common/beam.rs"]
+mod beam;
+
+use beam::beam;
+use endowire_assess::{Hand, Injection, NoticedKind, Record, Sample, Way, noticed};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -19,18 +23,6 @@ fn way() -> Way {
     let left = Target { name: "left".to_owned(), row: 2 };
     let tree = CentrelineTree::new(nodes).unwrap().with_targets(vec![left]).unwrap();
     Way::to_target(&tree, "left", 5.0).unwrap().unwrap()
-}
-
-fn beam(time_s: f64, on: bool) -> BeamState {
-    BeamState {
-        time_s,
-        on,
-        frames_per_s: 10.0,
-        dose_ngy: 30.0,
-        field_mm2: 1e4,
-        primary_deg: 0.0,
-        secondary_deg: 0.0,
-    }
 }
 
 /// One sample a second, at the ends of these stretches of the tip, with what the wire's hand pushed.

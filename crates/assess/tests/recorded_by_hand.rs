@@ -2,30 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "common/fork.rs"]
+mod fork;
+
 use std::f64::consts::TAU;
 use std::path::Path;
 
 use endowire_assess::{Metric, Record, Way, assess};
-use endowire_core::Vec3;
-use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
+use fork::tree;
 use serde_json::{Value, json};
-
-/// A trunk of 100 mm along x that divides into branches of 50 mm towards +y, the left one, and −y.
-fn tree() -> CentrelineTree {
-    let node = |x: f64, y: f64, radius_mm: f64, parent| CentrelineNode {
-        position_mm: Vec3::new(x, y, 0.0),
-        radius_mm,
-        parent,
-    };
-    let nodes = vec![
-        node(0.0, 0.0, 5.0, None),
-        node(100.0, 0.0, 5.0, Some(0)),
-        node(100.0, 50.0, 3.0, Some(1)),
-        node(100.0, -50.0, 3.0, Some(1)),
-    ];
-    let target = |name: &str, row| Target { name: name.to_owned(), row };
-    CentrelineTree::new(nodes).unwrap().with_targets(vec![target("left", 2), target("right", 3)]).unwrap()
-}
 
 fn way(name: &str) -> Way {
     Way::to_target(&tree(), name, 5.0).unwrap().unwrap()

@@ -2,9 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "common/beam.rs"]
+mod beam;
+
 use std::path::Path;
 
-use endowire_assess::{BeamState, EndedBy, Exam, Hand, Injection, Record, Sample, Score, Site, Subject};
+use beam::beam;
+use endowire_assess::{EndedBy, Exam, Hand, Injection, Record, Sample, Score, Site, Subject};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -66,18 +70,6 @@ fn pushed(force_n: impl Fn(usize) -> f64) -> Record {
         ..Sample::default()
     };
     Record { samples: (1..=10).map(sample).collect(), ..Record::default() }
-}
-
-fn beam(time_s: f64, on: bool) -> BeamState {
-    BeamState {
-        time_s,
-        on,
-        frames_per_s: 10.0,
-        dose_ngy: 30.0,
-        field_mm2: 1e4,
-        primary_deg: 0.0,
-        secondary_deg: 0.0,
-    }
 }
 
 /// The subject on the line, with a wire in a catheter and no sac.

@@ -72,18 +72,13 @@ impl<'a> Places<'a> {
     }
 }
 
-/// What a session or a run says of its scene.
-fn read_summary(session: &Path) -> Result<RecordedSummary, Failure> {
+/// What a session or a run says of its scene, and when it was recorded, if it says so; a run does not.
+fn read_head(session: &Path) -> Result<(RecordedSummary, Option<u64>), Failure> {
     if session.is_dir() {
-        RecordedSummary::read(&session.join(SUMMARY))
+        Ok((RecordedSummary::read(&session.join(SUMMARY))?, None))
     } else {
-        session_file::read_summary(session)
+        session_file::read_head(session)
     }
-}
-
-/// When a session was recorded, if it says so; a run does not.
-fn recorded_unix_s(session: &Path) -> Result<Option<u64>, Failure> {
-    if session.is_dir() { Ok(None) } else { session_file::recorded_unix_s(session) }
 }
 
 /// Measures sessions on the way to a target.
@@ -97,7 +92,8 @@ pub(super) fn measured(
 
 fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> Result<Attempt, Failure> {
     let record = Record::read(session)?;
-    let place = places.find(&read_summary(session)?)?;
+    let (summary, recorded_unix_s) = read_head(session)?;
+    let place = places.find(&summary)?;
     let Place { path, scene, .. } = &places.all[place];
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let tree = scene.centreline(&places.cache).map_err(in_scene)?;
@@ -112,7 +108,7 @@ fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> R
     let metrics = endowire_assess::assess(&record, way.as_ref());
     Ok(Attempt {
         session: session.to_path_buf(),
-        recorded_unix_s: recorded_unix_s(session)?,
+        recorded_unix_s,
         place,
         target,
         record,
@@ -141,13 +137,14 @@ pub(super) fn scored(
     let place = places.add(Place { path: path.clone(), set: subject.set.clone(), scene });
     let mut attempts = vec![];
     for session in files {
-        check_scene(session, &read_summary(session)?, &path, &settings)?;
+        let (summary, recorded_unix_s) = read_head(session)?;
+        check_scene(session, &summary, &path, &settings)?;
         let record = Record::read(session)?;
         exam.check(&record).map_err(|error| Failure::from(error).at(session.display()))?;
         let score = exam.clone().score(&record);
         attempts.push(Attempt {
             session: session.clone(),
-            recorded_unix_s: recorded_unix_s(session)?,
+            recorded_unix_s,
             place,
             target: subject.goal.target().map(str::to_owned),
             record: score.verdict.ended.map_or_else(|| record.clone(), |ended| record.before(ended.time_s)),
