@@ -1,6 +1,6 @@
 //! What the page of assessed sessions shows.
 
-use endowire_assess::{Better, Group, Line, MetricLine, Noticed, Threshold, Timeline, noticed};
+use endowire_assess::{Better, Course, Group, Noticed, Threshold, Timeline, noticed};
 use endowire_core::Vec3;
 use endowire_report::Vessel;
 use endowire_viewer::ViewSpec;
@@ -16,24 +16,23 @@ const PIECES: (usize, usize, usize) = (30_000, 300, 1500);
 
 /// The document in the page.
 #[derive(Serialize)]
-pub(super) struct Page {
+pub(super) struct Page<'a> {
     title: String,
     source: String,
     vessels: Vec<Vessel>,
-    courses: Vec<CourseShown>,
+    courses: Vec<CourseShown<'a>>,
     sessions: Vec<Shown>,
 }
 
 /// A course with the numbers of its sessions on the page.
 #[derive(Serialize)]
-struct CourseShown {
-    scene: String,
-    target: Option<String>,
+struct CourseShown<'a> {
+    scene: &'a str,
+    target: Option<&'a str>,
     ordered_by: OrderedBy,
-    attempts: Vec<usize>,
-    score: Option<Line>,
-    passed: Option<Vec<bool>>,
-    metrics: Vec<MetricLine>,
+    attempts: &'a [usize],
+    #[serde(flatten)]
+    course: &'a Course,
 }
 
 /// A session.
@@ -77,12 +76,12 @@ struct Measure {
 }
 
 /// Gathers the page of attempts and their courses.
-pub(super) fn of(
+pub(super) fn of<'a>(
     attempts: &[Attempt],
-    courses: &[CourseOf<'_>],
+    courses: &'a [CourseOf<'_>],
     places: &Places<'_>,
     provenance: &Provenance,
-) -> Result<Page, Failure> {
+) -> Result<Page<'a>, Failure> {
     let mut known: Vec<usize> = vec![];
     let mut vessels = vec![];
     let mut sessions = vec![];
@@ -121,16 +120,9 @@ fn title(attempts: &[Attempt], places: &Places<'_>) -> String {
     scenes.join(", ")
 }
 
-fn course(of: &CourseOf<'_>) -> CourseShown {
-    CourseShown {
-        scene: of.scene.to_owned(),
-        target: of.target.map(str::to_owned),
-        ordered_by: of.ordered_by,
-        attempts: of.attempts.clone(),
-        score: of.course.score.clone(),
-        passed: of.course.passed.clone(),
-        metrics: of.course.metrics.clone(),
-    }
+fn course<'a>(of: &'a CourseOf<'_>) -> CourseShown<'a> {
+    let CourseOf { scene, target, ordered_by, attempts, course, .. } = of;
+    CourseShown { scene, target: *target, ordered_by: *ordered_by, attempts, course }
 }
 
 fn shown(attempt: &Attempt, places: &Places<'_>, vessel: usize, pieces: usize) -> Result<Shown, Failure> {
