@@ -3,6 +3,7 @@
 RAYON_NUM_THREADS=1 python crates/python/benches/speed.py                 # all but `random`
 RAYON_NUM_THREADS=1 python crates/python/benches/speed.py calls resets    # some of it
 RAYON_NUM_THREADS=1 python crates/python/benches/speed.py random --steps 1000000
+RAYON_NUM_THREADS=1 python crates/python/benches/speed.py environments pushes --solves 30    # steps of a fixed cost
 """
 
 import argparse
@@ -52,7 +53,7 @@ def random_steps(environments, steps, seed=0):
     return ended
 
 
-def environments(n, steps):
+def environments(n, steps, solves):
     """Environment steps a second, episodes' beginnings included."""
     picture = {"fluoroscopy": observations.Fluoroscopy(size_px=(128, 128))}
     for name, task, parts in (
@@ -69,14 +70,33 @@ def environments(n, steps):
         ),
         ("DualDeviceNav in the built-in arch", "DualDeviceNav", {}),
     ):
-        made = gymnasium.make_vec(f"endowire/{task}-v0", num_envs=n, **parts)
+        made = gymnasium.make_vec(f"endowire/{task}-v0", num_envs=n, solves=solves, **parts)
         made.reset(seed=0)
         ended = {}
         spent = processor_s(lambda: ended.update(random_steps(made, steps)))
         print(f"{name:42}{steps / spent:8.0f} steps/s   ({sum(ended.values())} episodes ended: {ended})")
 
 
-def resets(n, steps):
+def pushes(n, steps, solves):
+    """How long single steps take where the wire is pushed as fast as it may be, whatever comes of it, and how far it is behind the hand."""
+    made = gymnasium.make_vec(
+        "endowire/ArchVariety-v0", num_envs=1, solves=solves, vessels=arches.ArchVariety(count=None)
+    )
+    made.reset(seed=0)
+    push = np.zeros_like(made.action_space.high)
+    push[..., 0] = made.action_space.high[..., 0]
+    took_ms, behind_mm = np.empty(steps), np.empty(steps)
+    for k in range(steps):
+        began = time.perf_counter()
+        *_, info = made.step(push)
+        took_ms[k], behind_mm[k] = 1e3 * (time.perf_counter() - began), info["behind_mm"][0]
+    for name, values in (("a push, ms", took_ms), ("behind the hand, mm", behind_mm)):
+        parts = np.quantile(values, [0.5, 0.9, 0.99, 0.999, 1.0])
+        print(f"{name:42}" + "".join(f"{part:9.2f}" for part in parts) + "   (50, 90, 99, 99.9, 100 %)")
+    print(f"{'pushes a second':42}{1e3 * steps / took_ms.sum():9.0f}")
+
+
+def resets(n, steps, solves):
     """What a new arch and its simulation take."""
     variety, rng = arches.ArchVariety(count=None), np.random.default_rng(0)
     task = gymnasium.make("endowire/ArchVariety-v0").unwrapped.task
@@ -90,7 +110,7 @@ def resets(n, steps):
     print(f"{'an episode in an arch that is kept':42}{1e3 * processor_s(kept.reset, 100):8.2f} ms")
 
 
-def calls(n, steps):
+def calls(n, steps, solves):
     """What Python adds to a step."""
     made = gymnasium.make_vec("endowire/ArchVariety-v0", num_envs=n, vessels=arches.ArchVariety(count=4))
     made.reset(seed=0)
@@ -112,7 +132,7 @@ def calls(n, steps):
     print(f"{'memory of a copy that steps':42}{(resident_kib() - before) / len(copies):8.0f} KiB")
 
 
-def threads(n, steps):
+def threads(n, steps, solves):
     """Wall time of the same steps on one thread and on two; of use on an idle machine alone."""
     code = (
         "import sys, time; sys.path.insert(0, sys.argv[1]); import gymnasium, speed; from endowire.gym import arches\n"
@@ -130,7 +150,7 @@ def threads(n, steps):
     print(f"{'two threads, times as fast as one':42}{one / two:8.2f}")
 
 
-def random(n, steps):
+def random(n, steps, solves):
     """Many steps with random actions: why episodes end, and whether memory grows."""
     made = gymnasium.make_vec("endowire/ArchVariety-v0", num_envs=n, vessels=arches.ArchVariety(count=4))
     made.reset(seed=0)
@@ -145,7 +165,14 @@ def random(n, steps):
         )
 
 
-PARTS = {"environments": environments, "resets": resets, "calls": calls, "threads": threads, "random": random}
+PARTS = {
+    "environments": environments,
+    "pushes": pushes,
+    "resets": resets,
+    "calls": calls,
+    "threads": threads,
+    "random": random,
+}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
@@ -154,6 +181,7 @@ if __name__ == "__main__":
     parser.add_argument("parts", nargs="*", default=["environments", "resets", "calls", "threads"])
     parser.add_argument("--simulations", type=int, default=64)
     parser.add_argument("--steps", type=int, default=20_000)
+    parser.add_argument("--solves", type=int, help="linear solves of a step (of environments and pushes)")
     told = parser.parse_args()
     for one in told.parts:
-        PARTS[one](told.simulations, told.steps)
+        PARTS[one](told.simulations, told.steps, told.solves)

@@ -2,13 +2,13 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use endowire_core::insertion::{self, InstrumentReport};
+use endowire_core::insertion::{self, InstrumentReport, Move};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{List, Numbers, array, numbers, points};
+use crate::arrays::{List, Numbers, array, natural, numbers, points};
 use crate::error::{exception, refuse};
 use crate::forked::on_own_threads;
 use crate::report::push_force_n;
@@ -54,6 +54,30 @@ impl Batch {
                 None => Err(PyIndexError::new_err(format!("{index}: the batch has {count} simulations"))),
             }
         })
+    }
+
+    /// Has each carry out its moves; returns the failures.
+    fn carry_out<'py>(
+        &self,
+        py: Python<'py>,
+        moves: &Numbers<'_>,
+        work: impl FnOnce(
+            &mut insertion::Batch,
+            &[Vec<Move>],
+        ) -> endowire_core::Result<Vec<endowire_core::Result<()>>>
+        + Send,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
+        let moves = crate::moves::moves(moves, Some(count), hands)?;
+        let told = self.with(py, |members| on_own_threads(|| work(&mut members.batch, &moves)));
+        let told = told?.map_err(exception)?;
+        let failures = PyDict::new(py);
+        for (index, told) in told.into_iter().enumerate() {
+            if let Err(failed) = told {
+                failures.set_item(index, exception(failed).into_value(py))?;
+            }
+        }
+        Ok(failures)
     }
 
     /// A number of each report.
@@ -126,16 +150,30 @@ impl Batch {
     /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step` would have raised; empty
     /// where all went well. Those that failed are as before, and do not concern the others.
     fn step<'py>(&self, py: Python<'py>, moves: Numbers<'_>) -> PyResult<Bound<'py, PyDict>> {
-        let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
-        let moves = crate::moves::moves(&moves, Some(count), hands)?;
-        let told = self.with(py, |members| on_own_threads(|| members.batch.step_together(&moves)));
-        let told = told?.map_err(exception)?;
-        let failures = PyDict::new(py);
-        for (index, failed) in told.into_iter().enumerate().filter_map(|(k, told)| told.err().map(|e| (k, e)))
-        {
-            failures.set_item(index, exception(failed).into_value(py))?;
-        }
-        Ok(failures)
+        self.carry_out(py, &moves, |batch, moves| batch.step_together(moves))
+    }
+
+    /// As `step`, in ticks of about so many linear solves each (`Simulation.tick`): no simulation keeps the others waiting for long. What is left over
+    /// is told in `behind`, and the next tick or step goes on with it, also where a simulation is not moved.
+    fn tick<'py>(&self, py: Python<'py>, moves: Numbers<'_>, solves: i64) -> PyResult<Bound<'py, PyDict>> {
+        let solves = natural("solves", solves)?;
+        self.carry_out(py, &moves, |batch, moves| batch.tick(moves, solves))
+    }
+
+    /// What hands have done in ticks that instruments have not yet followed: advance_mm and rotate_rad of each, shape (n, n_instruments, 2); zeros where
+    /// nothing is left over.
+    #[getter]
+    fn behind<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (rows, hands, list) = self.with(py, |members| {
+            let hands = members.hands();
+            let reports = members.batch.simulations().iter().map(insertion::Simulation::report);
+            let each = reports.flat_map(|report| (0..hands).map(|hand| report.behind.get(hand).copied()));
+            let list: Vec<f64> = each
+                .flat_map(|left| left.map_or([0.0; 2], |left| [left.advance_mm, left.rotate_rad]))
+                .collect();
+            (members.starts.len(), hands, list)
+        });
+        array(py, list, [rows, hands, 2])
     }
 
     /// A copy of one of them.

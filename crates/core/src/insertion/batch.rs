@@ -51,6 +51,15 @@ impl Batch {
         self.each("moves", moves, |simulation, moves| simulation.step_together(moves).map(drop))
     }
 
+    /// As [`Batch::step_together`], in ticks of about so many linear solves each ([`Simulation::tick`]): no simulation keeps the others waiting for long. One that
+    /// has something left over goes on with it, moves or not.
+    ///
+    /// # Errors
+    /// As [`Batch::step`].
+    pub fn tick(&mut self, moves: &[Vec<Move>], solves: usize) -> Result<Vec<Result<()>>> {
+        self.each("moves", moves, |simulation, moves| simulation.tick(moves, solves, None).map(drop))
+    }
+
     /// Does something with each simulation and what is given for it.
     fn each<T: Sync>(
         &mut self,
@@ -150,6 +159,27 @@ mod tests {
         }
         let refused = batch.step_together(&[]).unwrap_err().to_string();
         assert!(refused.contains("moves = 0"), "{refused}");
+    }
+
+    #[test]
+    fn ticks_side_by_side_are_those_of_one_by_one() {
+        let mut alone = vec![simulation(); 3];
+        let mut batch = Batch::new(alone.clone());
+        let mut behind = 0;
+        for step in 0..30 {
+            let moves: Vec<Vec<Move>> =
+                (0..3).map(|k| vec![Move { instrument: 0, command: command(k, step) }]).collect();
+            batch.tick(&moves, 3).unwrap().into_iter().for_each(|told| told.unwrap());
+            for (one, moves) in alone.iter_mut().zip(&moves) {
+                behind += usize::from(!one.tick(moves, 3, None).unwrap().behind.is_empty());
+            }
+        }
+        assert!(behind > 0);
+        for (one, other) in alone.iter().zip(batch.simulations()) {
+            assert_eq!((one.shape(), one.report()), (other.shape(), other.report()));
+        }
+        let refused = batch.tick(&vec![Vec::new(); 3], 0).unwrap();
+        assert!(refused.into_iter().all(|told| told.unwrap_err().to_string().contains("solves = 0")));
     }
 
     #[test]

@@ -31,11 +31,11 @@ pub(super) const REST_RADII: f64 = 1e-3;
 /// Residual over force scale above which what has stopped is not at rest.
 pub(super) const AT_REST: f64 = 0.05;
 
-/// What the sub-steps of a command come to.
+/// What the sub-steps of a command, or the parts of a tick, come to.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sum {
-    substeps: usize,
-    relaxations: u32,
+pub(super) struct Sum {
+    pub(super) substeps: usize,
+    pub(super) relaxations: u32,
     slides: u32,
     imbalance: f64,
     dissipated_mj: f64,
@@ -45,7 +45,7 @@ struct Sum {
 
 impl Sum {
     /// Adds a part.
-    fn add(&mut self, found: &Found, effort: Effort) {
+    pub(super) fn add(&mut self, found: &Found) {
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
         if let Some(jump) = found.jump {
@@ -56,13 +56,14 @@ impl Sum {
             }
             so_far.released_mj += jump.released_mj;
         }
-        if effort == Effort::Flight {
-            self.relaxations += 1;
-            self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
-        }
     }
 
-    fn write(&self, report: &mut StepReport) {
+    /// Adds what a device that was let go from a fold lacks to an equilibrium.
+    pub(super) fn add_imbalance(&mut self, found: &Found) {
+        self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
+    }
+
+    pub(super) fn write(&self, report: &mut StepReport) {
         report.substeps = self.substeps as u32;
         (report.relaxations, report.slides) = (self.relaxations, self.slides);
         (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
@@ -168,7 +169,11 @@ impl<const C: usize> Workspace<C> {
                 // Where the device has come to rest with energy that nobody put in, it was too far from where it was.
                 Ok(found) if found.lacks && control.can_shorten(part_mm) => control.shorten(part_mm),
                 Ok(found) => {
-                    sum.add(&found, effort);
+                    sum.add(&found);
+                    if effort == Effort::Flight {
+                        sum.relaxations += 1;
+                        sum.add_imbalance(&found);
+                    }
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0

@@ -18,6 +18,16 @@ pub(super) struct Hand {
     pub(super) turn_rad: f64,
 }
 
+impl Hand {
+    /// What takes it to another place.
+    fn to(&self, target: &Self) -> Command {
+        Command {
+            advance_mm: target.inserted_mm - self.inserted_mm,
+            rotate_rad: target.turn_rad - self.turn_rad,
+        }
+    }
+}
+
 /// Sets `motions` to what takes the hands of a state to `hands`.
 pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<HandMotion>) {
     motions.clear();
@@ -75,24 +85,38 @@ impl Way {
 
     /// Sets `hands` to where they are at this part of the way, 0 to 1.
     pub(super) fn at(&self, part: f64, hands: &mut Vec<Hand>) {
-        hands.clear();
-        for ((start, target), command) in self.start.iter().zip(&self.target).zip(&self.commands) {
-            let (from, to) = (start.inserted_mm, target.inserted_mm);
-            let inserted_mm = if part == 1.0 { to } else { from + (to - from) * part };
-            hands.push(Hand { inserted_mm, turn_rad: start.turn_rad + command.rotate_rad * part });
+        if part == 1.0 {
+            hands.clone_from(&self.target);
+            return;
         }
+        hands.clear();
+        hands.extend(self.start.iter().zip(&self.target).zip(&self.commands).map(
+            |((start, target), command)| Hand {
+                inserted_mm: start.inserted_mm + (target.inserted_mm - start.inserted_mm) * part,
+                turn_rad: start.turn_rad + command.rotate_rad * part,
+            },
+        ));
     }
 
-    /// What is left of each hand's command where the hands are at `hands`; empty where nothing is.
-    pub(super) fn rest(&self, hands: &[Hand]) -> Vec<Command> {
-        if hands == self.target {
+    /// What is left of the way from `hands` on is the way now.
+    pub(super) fn go_on_from(&mut self, hands: &[Hand]) {
+        self.start.clear();
+        self.start.extend_from_slice(hands);
+        self.commands.clear();
+        self.commands.extend(hands.iter().zip(&self.target).map(|(hand, target)| hand.to(target)));
+    }
+
+    /// Whether nothing is left of it.
+    pub(super) fn is_done(&self) -> bool {
+        self.start == self.target
+    }
+
+    /// What is left of it for each hand; empty where nothing is.
+    pub(super) fn left(&self) -> Vec<Command> {
+        if self.is_done() {
             return Vec::new();
         }
-        let rest = |(target, hand): (&Hand, &Hand)| Command {
-            advance_mm: target.inserted_mm - hand.inserted_mm,
-            rotate_rad: target.turn_rad - hand.turn_rad,
-        };
-        self.target.iter().zip(hands).map(rest).collect()
+        self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)).collect()
     }
 
     /// Longest way of a hand, mm, a turn of `turn_rad` counting as one.

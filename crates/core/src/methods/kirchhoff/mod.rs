@@ -351,7 +351,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let nodes_solved = state.report.nodes_solved;
                 state.report.rest();
                 if let Some(Workspace { tools, way, .. }) = self.workspace.as_deref() {
-                    state.report.behind = way.rest(&way.start);
+                    state.report.behind = way.left();
                     tools.work.write(&mut state.report, nodes_solved);
                 }
                 Ok(())

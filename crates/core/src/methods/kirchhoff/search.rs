@@ -93,8 +93,12 @@ impl<const C: usize> Search<'_, '_, C> {
     /// From a state to the equilibrium that follows.
     pub(super) fn on(&mut self) -> NewtonReport {
         let found = self.newton();
-        if matches!(self.effort, Effort::Near | Effort::Moving) || !found.converged || self.is_settled() {
+        if self.effort == Effort::Near || !found.converged || self.is_settled() {
             return found;
+        }
+        // To follow in vain may take all solves of a tick.
+        if self.effort == Effort::Moving {
+            return self.slide(found);
         }
         self.guess.other.copy_from(self.state);
         let most = self.most;
@@ -107,7 +111,8 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         self.state.copy_from(&self.guess.other);
         self.contact.rewind_friction();
-        self.slide()
+        let found = self.newton();
+        self.slide(found)
     }
 
     /// Newton's method from the state on.
@@ -138,8 +143,7 @@ impl<const C: usize> Search<'_, '_, C> {
     }
 
     /// With the hand held still, from an equilibrium with the normal forces of another to where the device comes to rest.
-    fn slide(&mut self) -> NewtonReport {
-        let mut found = self.newton();
+    fn slide(&mut self, mut found: NewtonReport) -> NewtonReport {
         while found.converged && !self.is_settled() && self.slides < SLIDES {
             self.contact.anchor_friction(self.elements, self.state);
             found = self.newton();

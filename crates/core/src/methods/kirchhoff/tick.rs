@@ -1,16 +1,18 @@
 //! A tick of fixed cost: for those who must have an answer in time.
 //!
-//! A step ends in the equilibrium that its command leads to, however long that takes. A tick ends when its linear solves are used up. What it has begun
-//! to solve for stays with the state, which is the last equilibrium, and the next tick goes on with it; what hands do meanwhile waits, and is the
-//! next part of their way as a whole. So ticks follow the path of equilibria that steps follow, in parts as long as their solves make them. Where the path
-//! has come to a fold the device is seen on its way to where it comes to rest: as far in each tick as its solves go.
+//! A step ends in the equilibrium that its command leads to, however long that takes. A tick goes part after part of the hands' way, and ends when its
+//! linear solves are used up. What it has begun to solve for then stays with the state, which is the last equilibrium, and the next tick goes on with
+//! it; what hands do meanwhile waits. So ticks follow the path of equilibria that steps follow. Where the path has come to a fold the device is seen
+//! on its way to where it comes to rest: as far in each tick as its solves go.
+//!
+//! What would be an error after a part that went well waits too: the next tick begins with it.
 //!
 //! A vessel that moves cannot wait. There the device goes as far in each tick as its solves go, at a fold or not.
 
 use super::Environment;
 use super::blocked::refuse_wedged;
 use super::carried::carried;
-use super::command::{AT_REST, REST_RADII, WORK_RAD};
+use super::command::{AT_REST, REST_RADII, Sum, WORK_RAD};
 use super::configuration::Start;
 use super::extrapolation::Correction;
 use super::hands::{Hand, Way, lengths};
@@ -18,14 +20,14 @@ use super::search::{LONGEST, MOST_NEAR};
 use super::state::{KirchhoffState, Ticking, UnderWay};
 use super::step_control::{FOLD_MM, HELD_MM, NEARER};
 use super::substep::{Attempt, Effort, Found, Lost};
-use super::workspace::Workspace;
+use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
 use crate::methods::{Command, Move, StepReport};
 use crate::{Error, Result};
 
-/// Most parts that a tick tries: each asks all of the wall once.
-const ATTEMPTS: u32 = 3;
+/// Linear solves that a part of the way counts beside its own, as it makes a mesh and asks all of the wall once.
+const OF_A_PART: usize = 2;
 
 /// What a tick has come to.
 #[derive(Debug)]
@@ -47,6 +49,8 @@ struct Part<'a> {
     part_mm: f64,
     /// Whether hands hold still while the device moves.
     holds_still: bool,
+    /// Newton iterations for which it has moved.
+    moving: usize,
 }
 
 impl<'a> Part<'a> {
@@ -59,16 +63,21 @@ impl<'a> Part<'a> {
     ) -> Self {
         let travel_mm = way.travel_mm(WORK_RAD);
         let part = if travel_mm > longest_mm { longest_mm / travel_mm } else { 1.0 };
-        let fresh =
-            |effort: Effort| Self { effort, resumed: None, part_mm: part * travel_mm, holds_still: false };
+        let fresh = |effort: Effort| Self {
+            effort,
+            resumed: None,
+            part_mm: part * travel_mm,
+            holds_still: false,
+            moving: 0,
+        };
         match begun {
             Ticking::Solving(under_way) => {
                 hands.clone_from(&under_way.hands);
                 Self { resumed: Some(under_way), part_mm: under_way.part_mm, ..fresh(Effort::Near) }
             }
-            Ticking::Moving(1..) => {
+            Ticking::Moving(moving @ 1..) => {
                 hands.clone_from(&way.start);
-                Self { holds_still: true, ..fresh(Effort::Moving) }
+                Self { holds_still: true, moving: *moving, ..fresh(Effort::Moving) }
             }
             Ticking::Rest | Ticking::Moving(0) => {
                 way.at(part, hands);
@@ -84,12 +93,47 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Tells of a part what was found, whether the device begins to move from a fold in it, and whether it rests there.
-fn tell(report: &mut StepReport, found: &Found, lets_go: bool, rests: bool) {
-    (report.slides, report.relaxations) = (found.slides, u32::from(lets_go));
-    (report.converged, report.dissipated_mj) = (rests, found.dissipated_mj);
-    (report.jump, report.jumped) = (found.jump, found.jump.is_some());
-    report.imbalance = if rests { 0.0 } else { found.residual.max(found.unsettled) };
+/// How the parts of a tick have gone.
+struct Course {
+    /// Longest way of the hands in the next part, mm.
+    longest_mm: f64,
+    /// What they have come to.
+    sum: Sum,
+    /// Whether there is a new state, …
+    moved: bool,
+    /// … and whether the device rests there.
+    rests: bool,
+}
+
+impl Course {
+    /// Takes a part that was found in so many Newton iterations, and in which the device `lies` still or not. Returns how it goes on.
+    fn take(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) -> Ticking {
+        self.moved = true;
+        self.rests = found.balanced || (part.holds_still && lies && found.residual <= AT_REST);
+        self.sum.add(found);
+        self.sum.relaxations += u32::from(part.effort == Effort::Moving && !part.holds_still);
+        if !self.rests {
+            self.sum.add_imbalance(found);
+        }
+        if part.effort == Effort::Near && found.off < NEARER {
+            self.longest_mm = self.longest_mm.max(2.0 * part.part_mm);
+        }
+        // What does not come to rest is left where it is, and said to be in no equilibrium.
+        let goes_on = part.effort == Effort::Moving && !self.rests && part.moving + iterations <= LONGEST;
+        if goes_on { Ticking::Moving(part.moving + iterations) } else { Ticking::Rest }
+    }
+
+    /// Tells the state to which they have led of them, and of what is left of the hands' way.
+    fn write(&self, way: &Way, state: &mut KirchhoffState) {
+        state.stride.part_mm = self.longest_mm;
+        let report = &mut state.report;
+        self.sum.write(report);
+        report.converged = self.rests;
+        report.behind = way.left();
+        if matches!(state.tick, Ticking::Moving(_)) && report.behind.is_empty() {
+            report.behind.resize(way.start.len(), Command::default());
+        }
+    }
 }
 
 impl<const C: usize> Workspace<C> {
@@ -108,106 +152,125 @@ impl<const C: usize> Workspace<C> {
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
         let was = Start { mesh, state: from };
-        let (before, after) = (surroundings.displacement(0.0), surroundings.displacement(1.0));
-        let passage = before.as_ref().zip(after.as_ref()).filter(|(before, after)| before != after);
+        let [at_first, at_last] = [0.0, 1.0].map(|part| surroundings.displacement(part));
+        let passage = at_first.as_ref().zip(at_last.as_ref()).filter(|(first, last)| first != last);
         let taken = passage.filter(|_| from.rod.elements() > 0).map(|passage| {
             let mut taken = from.clone();
             carried(mesh, &from.rod, passage, &mut taken.rod);
             taken
         });
-        let here = taken.as_ref().map_or(was, |state| Start { mesh, state });
-        let [at_start, there] = [&before, &after].map(|at| environment.displaced(at.as_ref()));
-        let left = passage.map(|passage| (was, passage));
+        let there = environment.displaced(at_last.as_ref());
+        // The first part goes with the vessel, the others where it is then.
+        let mut left = passage.map(|passage| (was, passage));
+        let mut at_start = environment.displaced(at_first.as_ref());
         // What a device with friction does from a part of this length on it may do near by.
         let let_go_mm = if surroundings.properties.has_friction() { HELD_MM } else { FOLD_MM };
-        let mut longest_mm = from.stride.part_mm;
-        let (rest, fold) = (Ticking::Rest, Ticking::Moving(0));
+        let mut course =
+            Course { longest_mm: from.stride.part_mm, sum: Sum::default(), moved: false, rests: true };
+        let (rest, fold, mut moving);
+        (rest, fold) = (Ticking::Rest, Ticking::Moving(0));
         let mut begun = if passage.is_some() { &rest } else { &from.tick };
-        for attempt in 1..=ATTEMPTS {
-            let part = Part::next(begun, (way, longest_mm), passage.is_some(), hands);
+        // What is left to do, or the error that nothing more can be done for.
+        let ends = loop {
+            let parts = course.sum.substeps;
+            if parts > 0 && tools.work.solves + OF_A_PART * parts >= solves {
+                break Ok(begun.clone());
+            }
+            let here = match &taken {
+                _ if course.moved => now.start(),
+                Some(state) => Start { mesh, state },
+                None => was,
+            };
+            let part = Part::next(begun, (way, course.longest_mm), left.is_some(), hands);
+            course.sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 {
                 now.withdraw(surroundings.stack, hands);
                 tools.write_report(&there, hands, now);
-                let state = now.parts().1;
-                (state.tick, state.report.behind) = (Ticking::Rest, way.rest(hands));
-                state.report.converged = true;
-                return Ok(Ticked::Moved);
+                (course.moved, course.rests) = (true, true);
+                way.go_on_from(hands);
+                break Ok(Ticking::Rest);
             }
-            let Part { effort, resumed, part_mm, holds_still } = part;
-            let taken = tools.work;
+            let Part { effort, resumed, part_mm, .. } = part;
+            let before = tools.work;
             let most = resumed.map_or(MOST_NEAR, |under_way| MOST_NEAR - under_way.iterations);
-            let solves_left = solves.saturating_sub(taken.solves);
+            let solves_left = solves.saturating_sub(before.solves);
             let attempted = Attempt { hands, effort, most, solves: solves_left, left, resumed };
             let tried = tools.try_step(&there, here, attempted, next);
-            let iterations = (tools.work.iterations - taken.iterations).max(1);
             match tried {
-                Ok(found) if part.strays(&found) && passage.is_none() => {
-                    (longest_mm, begun) = (0.5 * part_mm, &rest);
+                Ok(found) if part.strays(&found) && left.is_none() => {
+                    (course.longest_mm, begun) = (0.5 * part_mm, &rest);
                 }
                 Ok(found) => {
-                    check_inside(
-                        surroundings.lumen.openings(),
-                        &there.wall().material(&next.state.tip_mm()),
-                        0.0,
-                    )?;
-                    std::mem::swap(now, next);
-                    let state = now.parts().1;
-                    let way_mm = here.state.rod.farthest_mm(&state.rod);
-                    let lies = way_mm <= REST_RADII * surroundings.device.min_radius_mm();
-                    let rests = found.balanced || (holds_still && lies && found.residual <= AT_REST);
-                    let so_far = if let Ticking::Moving(so_far) = begun { *so_far } else { 0 };
-                    // What does not come to rest is left where it is, and said to be in no equilibrium.
-                    let goes_on = effort == Effort::Moving && !rests && so_far + iterations <= LONGEST;
-                    state.tick = if goes_on { Ticking::Moving(so_far + iterations) } else { Ticking::Rest };
-                    let nearer = effort == Effort::Near && found.off < NEARER;
-                    state.stride.part_mm = if nearer { longest_mm.max(2.0 * part_mm) } else { longest_mm };
-                    let report = &mut state.report;
-                    report.behind = way.rest(hands);
-                    if goes_on && report.behind.is_empty() {
-                        report.behind.resize(hands.len(), Command::default());
+                    let tip_mm = there.wall().material(&next.state.tip_mm());
+                    if let Err(left) = check_inside(surroundings.lumen.openings(), &tip_mm, 0.0) {
+                        break Err(left);
                     }
-                    (report.substeps, report.angles) = (attempt, from.report.angles);
-                    tell(report, &found, effort == Effort::Moving && !holds_still, rests);
-                    tools.work.write(report, from.report.nodes_solved);
-                    return Ok(Ticked::Moved);
+                    let way_mm = here.state.rod.farthest_mm(&next.state.rod);
+                    let lies = way_mm <= REST_RADII * surroundings.device.min_radius_mm();
+                    let iterations = tools.work.since(&before);
+                    moving = course.take(&part, &found, lies, iterations);
+                    std::mem::swap(now, next);
+                    way.go_on_from(hands);
+                    (begun, left, at_start) = (&moving, None, there);
+                    if matches!(moving, Ticking::Rest) && way.is_done() {
+                        break Ok(Ticking::Rest);
+                    }
                 }
                 Err(Lost::UnderWay) => {
-                    let so_far = resumed.map_or(0, |under_way| under_way.iterations);
-                    // Beside where it has come to and what is known of the wall there it is nothing yet.
-                    let report = StepReport { angles: from.report.angles, ..StepReport::default() };
-                    let (correction, stride, tick) = (Correction::default(), from.stride, Ticking::Rest);
-                    let state = KirchhoffState { correction, stride, tick, report, ..(*next.state).clone() };
-                    let under_way = UnderWay {
-                        hands: hands.clone(),
-                        part_mm,
-                        state,
-                        neighbourhood: tools.newton.neighbourhood.clone(),
-                        iterations: (so_far + iterations).min(MOST_NEAR - 1),
-                    };
-                    // Counted once, with the state that it leads to.
-                    tools.work.nodes_solved = taken.nodes_solved;
-                    return Ok(Ticked::Rests(longest_mm, Ticking::Solving(Box::new(under_way))));
+                    let under_way = tools.under_way(&part, hands, &next.state, (from, before));
+                    break Ok(Ticking::Solving(Box::new(under_way)));
                 }
-                Err(_) if passage.is_some() => return Ok(Ticked::Overtaken),
+                Err(_) if left.is_some() => return Ok(Ticked::Overtaken),
                 // It stays where it has come to.
-                Err(_) if holds_still => return Ok(Ticked::Rests(longest_mm, Ticking::Rest)),
+                Err(_) if part.holds_still => break Ok(Ticking::Rest),
                 Err(lost) if effort == Effort::Moving && part_mm <= FOLD_MM => {
-                    let told = format!(
-                        "kirchhoff: no equilibrium beyond {:.3} mm inserted: {lost}",
-                        line_mm(lengths(&way.start))
-                    );
-                    return Err(Error::Computation(told));
+                    let inserted_mm = line_mm(lengths(&way.start));
+                    let told =
+                        format!("kirchhoff: no equilibrium beyond {inserted_mm:.3} mm inserted: {lost}");
+                    break Err(Error::Computation(told));
                 }
                 Err(_) if effort == Effort::Near && part_mm <= let_go_mm => {
-                    refuse_wedged(&at_start, was, &way.commands)?;
-                    (longest_mm, begun) = (part_mm, &fold);
+                    if let Err(wedged) = refuse_wedged(&at_start, here, &way.commands) {
+                        break Err(wedged);
+                    }
+                    (course.longest_mm, begun) = (part_mm, &fold);
                 }
-                Err(_) => (longest_mm, begun) = (0.5 * part_mm, &rest),
+                Err(_) => (course.longest_mm, begun) = (0.5 * part_mm, &rest),
             }
-            if tools.work.solves >= solves {
-                break;
-            }
+        };
+        if !course.moved {
+            return ends.map(|begun| Ticked::Rests(course.longest_mm, begun));
         }
-        Ok(Ticked::Rests(longest_mm, begun.clone()))
+        let state = now.parts().1;
+        state.tick = ends.unwrap_or_default();
+        course.write(way, state);
+        state.report.angles = from.report.angles;
+        tools.work.write(&mut state.report, from.report.nodes_solved);
+        Ok(Ticked::Moved)
+    }
+}
+
+impl<const C: usize> Tools<C> {
+    /// Notes what is begun of a part, as far as solves go, on the way `to` a state; of a tick from a state, with what it had taken before the part.
+    fn under_way(
+        &mut self,
+        part: &Part<'_>,
+        hands: &[Hand],
+        to: &KirchhoffState,
+        (from, before): (&KirchhoffState, Work),
+    ) -> UnderWay {
+        let iterations = self.work.since(&before) + part.resumed.map_or(0, |resumed| resumed.iterations);
+        // Counted once, with the state that it leads to.
+        self.work.nodes_solved = before.nodes_solved;
+        // Beside where it has come to and what is known of the wall there it is nothing yet.
+        let report = StepReport { angles: from.report.angles, ..StepReport::default() };
+        let (correction, stride, tick) = (Correction::default(), from.stride, Ticking::Rest);
+        UnderWay {
+            hands: hands.to_vec(),
+            part_mm: part.part_mm,
+            state: KirchhoffState { correction, stride, tick, report, ..to.clone() },
+            neighbourhood: self.newton.neighbourhood.clone(),
+            iterations: iterations.min(MOST_NEAR - 1),
+        }
     }
 }

@@ -70,6 +70,11 @@ impl Work {
         self.nodes_solved += if iterations > 0 { elements as u64 + 1 } else { 0 };
     }
 
+    /// Newton iterations since then; what is given up before its first one has its price as well.
+    pub(super) fn since(&self, before: &Self) -> usize {
+        (self.iterations - before.iterations).max(1)
+    }
+
     /// Tells what it took beside the nodes that were solved for before.
     pub(super) fn write(&self, report: &mut StepReport, nodes_solved: u64) {
         (report.iterations, report.solves) = (self.iterations as u32, self.solves as u32);

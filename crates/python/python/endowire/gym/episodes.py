@@ -105,11 +105,12 @@ class Episodes:
         done = moving & ~np.isnan(velocities).any(axis=(1, 2))
         self.action = np.where(done[:, None, None], velocities, self.action)
         moves = velocities * self.task.control_period_s
-        # Nothing is pushed in beyond its end or pulled out of the sheath.
-        inserted_mm = self.batch.inserted_mm
+        # Nothing is pushed in beyond its end or pulled out of the sheath, also not when the instruments have followed the hands.
+        inserted_mm = self.batch.inserted_mm + self.batch.behind[..., 0]
         moves[..., 0] = np.clip(moves[..., 0], -inserted_mm, self._lengths_mm - inserted_mm)
         moves[~moving] = 0.0
-        told = self.batch.step(moves)
+        solves = self.task.solves
+        told = self.batch.step(moves) if solves is None else self.batch.tick(moves, solves)
         # Where the way ends an instrument stays, and may be pulled back.
         self.failures = {k: failure for k, failure in told.items() if not isinstance(failure, EndOfWay)}
         self.steps += moving
@@ -161,6 +162,7 @@ class Episodes:
         told = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
         told |= {"safety": safety, "failure": failed}
         told |= {"steps": self.steps.copy(), "path_length_mm": self.path_length_mm.copy()}
+        told |= {"behind_mm": np.abs(self.batch.behind[..., 0]).max(axis=1)}
         told |= {"wall_force_n": self.force_n[:, 0].copy(), "tip_force_n": self.force_n[:, 1].copy()}
         told |= {
             "largest_wall_force_n": self.largest_force_n[:, 0].copy(),

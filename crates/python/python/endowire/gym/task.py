@@ -50,6 +50,9 @@ class Task:
     force_limit_n: float = 1.5
     #: Time between two actions, s.
     control_period_s: float = 1.0 / 7.5
+    #: Linear solves of a step, so that none takes long: what the instruments have not followed in them the next step goes on with (``info["behind_mm"]``).
+    #: None: each step goes on to the equilibrium, however long that takes.
+    solves: int | None = None
     #: Fastest push in mm/s and turn in rad/s of a hand.
     speed_limits: tuple[float, float] = (35.0, 3.14)
     #: What an action of an environment is: parts of these limits, from -1 to 1, which policies learn from as they are; or velocities, mm/s and rad/s.
@@ -72,6 +75,9 @@ class Task:
             raise InputError(f"actions = {self.actions!r}: give scaled or physical")
         if self.observed not in ("scaled", "physical"):
             raise InputError(f"observed = {self.observed!r}: give scaled or physical")
+
+        if self.solves is not None and self.solves < 1:
+            raise InputError(f"solves = {self.solves!r}: allow at least one, or give None")
 
     def limits(self) -> NDArray[np.float64]:
         """Fastest push in mm/s and turn in rad/s of each instrument, shape (n_instruments, 2)."""
