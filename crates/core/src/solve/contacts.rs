@@ -24,7 +24,7 @@ use super::external::{ContactMerit, Contacts};
 use super::line_search::LineSearch;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::StopReason;
-use super::shift::{LEAST_SHIFT, SHIFT_GROWTH, SHIFTS};
+use super::shift::{SHIFT_GROWTH, SHIFTS};
 use crate::Vec3;
 use crate::rod::scatter::{point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
@@ -90,7 +90,7 @@ impl<const C: usize> Newton<C> {
             return Ok(ContactMerit::default());
         }
         let models = problem.minimum && self.assembly.hessian;
-        let least = LEAST_SHIFT * Self::regularisation(elements);
+        let least = self.first_shift(elements);
         for _ in 0..SHIFTS {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {

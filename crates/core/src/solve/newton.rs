@@ -19,6 +19,7 @@ use super::line_search::LineSearch;
 use super::neighbourhood::Neighbourhood;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use super::residual::ResidualSize;
+use super::shift::SHIFT_DECAY;
 use super::stop::Progress;
 use crate::banded::{Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
@@ -36,6 +37,8 @@ pub struct Newton<const C: usize> {
     /// Residual rows of the first two nodes before the first was held: its reactions.
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
+    /// Shift of the last step that took one, and what is left of it since.
+    pub(super) last_shift: f64,
     pub(super) factor: Factors<C>,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
@@ -58,6 +61,7 @@ impl<const C: usize> Newton<C> {
             assembly: Assembly::new(elements),
             start_residual: [0.0; C],
             unit_shift: Shift::default(),
+            last_shift: 0.0,
             factor: Factors::new(n),
             step: vec![0.0; n],
             spare: vec![0.0; n],
@@ -150,6 +154,7 @@ impl<const C: usize> Newton<C> {
         let mut progress = Progress::default();
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
+        self.last_shift = 0.0;
         // Whether the last state was an equilibrium but for what its contacts and friction know of each other.
         let mut renewed = false;
         loop {
@@ -208,6 +213,7 @@ impl<const C: usize> Newton<C> {
                     let step = (size.relative, shift);
                     self.line_search(&mut problem, state, &mut search, step, &contacts)
                 });
+            self.last_shift = shift.max(SHIFT_DECAY * self.last_shift);
             match searched {
                 Ok(_) if state.is_folded() => return report.stopped(StopReason::Folded),
                 Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
@@ -259,7 +265,7 @@ impl<const C: usize> Newton<C> {
             *shift = 0.0;
             return Ok(Some(self.factor.inertia()));
         }
-        let (sigma, natural) = self.factor_shifted(problem, *shift)?;
+        let (sigma, natural) = self.factor_shifted(problem)?;
         *shift = sigma;
         Ok(natural)
     }

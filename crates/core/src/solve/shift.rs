@@ -11,9 +11,11 @@ use crate::rod::{Assembly, ElementData, Supports};
 /// Part of EI/L² that is always added as a uniform tension.
 pub(super) const REGULARISATION: f64 = 1e-8;
 /// Least shift, over the one that is always on.
-pub(super) const LEAST_SHIFT: f64 = 1e5;
+const LEAST_SHIFT: f64 = 1e5;
 /// A shift that does not do grows by this factor.
 pub(super) const SHIFT_GROWTH: f64 = 4.0;
+/// One is looked for from this part of the last on, which it falls to in an iteration that needs none.
+pub(super) const SHIFT_DECAY: f64 = 1.0 / 8.0;
 /// Shifts tried before a matrix is called singular.
 pub(super) const SHIFTS: usize = 60;
 
@@ -66,12 +68,11 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Factors the matrix and solves for the step under the regularisation. Where its inertia is not that of a minimum, if one is looked for, a
-    /// shift is added, from an eighth of the `last` one, and grows. Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
+    /// shift is added and grows ([`Self::first_shift`]). Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
     /// if it could be factored.
     pub(super) fn factor_shifted(
         &mut self,
         problem: &Problem<'_>,
-        last: f64,
     ) -> Result<(f64, Option<Inertia>), StopReason> {
         let regularisation = Self::regularisation(problem.elements);
         let wanted = problem.minimum.then(|| problem.multipliers());
@@ -83,7 +84,7 @@ impl<const C: usize> Newton<C> {
         if right(&found) {
             return Ok((0.0, natural));
         }
-        let mut sigma = (LEAST_SHIFT * regularisation).max(last / 8.0);
+        let mut sigma = self.first_shift(problem.elements);
         for attempt in 0..SHIFTS {
             let found = self.factor_step(regularisation + sigma);
             if right(&found) {
@@ -95,6 +96,11 @@ impl<const C: usize> Newton<C> {
             sigma *= SHIFT_GROWTH;
         }
         Err(StopReason::Singular)
+    }
+
+    /// The shift that is tried first where one is wanted.
+    pub(super) fn first_shift(&self, elements: &[ElementData]) -> f64 {
+        (LEAST_SHIFT * Self::regularisation(elements)).max(SHIFT_DECAY * self.last_shift)
     }
 
     /// Factors the assembled matrix with a shift, and sets the step that it answers.
