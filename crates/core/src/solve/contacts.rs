@@ -136,11 +136,9 @@ impl<const C: usize> Newton<C> {
     /// Finds the minimum of the model under a `shift`. Returns whether it is convex in all rounds; otherwise the system has no minimum.
     fn contacts_at_end(&mut self, problem: &mut Problem<'_>, state: &RodState, shift: f64) -> bool {
         let elements = problem.elements;
-        // Whether the last round went all its way, or was ended by its turn: with the same contacts the next one would be too.
-        let mut done = true;
         for _ in 0..ROUNDS {
-            let changed = self.change_contacts(problem, state);
-            if changed == 0 && done {
+            // With the same contacts the next round would go the same way, and this one went as far as the model falls.
+            if self.change_contacts(problem, state) == 0 {
                 break;
             }
             self.spare.copy_from_slice(&self.step);
@@ -155,7 +153,6 @@ impl<const C: usize> Newton<C> {
                 contacts.go_towards(part);
                 part
             });
-            done = part >= most;
             if part < 1.0 {
                 for (step, before) in self.step.iter_mut().zip(&self.spare) {
                     *step = before + part * (*step - before);
