@@ -25,6 +25,7 @@ mod exam;
 mod goal;
 mod groups;
 mod metric;
+mod note;
 mod noticed;
 mod reach;
 mod record;

@@ -23,9 +23,8 @@ impl Way {
     /// # Errors
     /// [`endowire_core::Error::Parameter`] for a target that is not there, or where the tree begins.
     pub fn to_target(tree: &CentrelineTree, name: &str, within_mm: f64) -> Result<Option<Self>> {
-        let row = tree.target(name)?.row;
-        let place_mm = tree.nodes()[row].position_mm;
-        Ok(Self::to_row(tree, row).map(|way| Self { target_mm: Some((place_mm, within_mm)), ..way }))
+        let place_mm = tree.nodes()[tree.target(name)?.row].position_mm;
+        Ok(Self::towards(tree, place_mm, within_mm))
     }
 
     /// The same for the tip of a hand's instrument: it is that which arrives.
@@ -42,6 +41,12 @@ impl Way {
     /// The way to a place nobody named: there is no arrival at it. None where the tree begins.
     pub fn to_place(tree: &CentrelineTree, place_mm: &Vec3) -> Option<Self> {
         Self::to_row(tree, tree.nearest_row(place_mm))
+    }
+
+    /// The way to a place, at which what is within some mm of it has arrived. None where the tree begins.
+    pub fn towards(tree: &CentrelineTree, place_mm: Vec3, within_mm: f64) -> Option<Self> {
+        let way = Self::to_place(tree, &place_mm)?;
+        Some(Self { target_mm: Some((place_mm, within_mm)), ..way })
     }
 
     fn to_row(tree: &CentrelineTree, row: usize) -> Option<Self> {

@@ -4,6 +4,7 @@ RAYON_NUM_THREADS=1 python crates/python/benches/speed.py                 # all 
 RAYON_NUM_THREADS=1 python crates/python/benches/speed.py calls resets    # some of it
 RAYON_NUM_THREADS=1 python crates/python/benches/speed.py random --steps 1000000
 RAYON_NUM_THREADS=1 python crates/python/benches/speed.py environments pushes --solves 30    # steps of a fixed cost
+RAYON_NUM_THREADS=1 python crates/python/benches/speed.py ticks --steps 20000 --solves 8
 """
 
 import argparse
@@ -96,6 +97,53 @@ def pushes(n, steps, solves):
     print(f"{'pushes a second':42}{1e3 * steps / took_ms.sum():9.0f}")
 
 
+def two_instruments(vessel, inserted_mm, **where):
+    """A bent wire in a bent catheter, so far into a vessel, with friction on the wall and on each other."""
+    bent = {"length_mm": 15.0, "rest_curvature_per_mm": [0.06, 0.0]}
+
+    def device(length_mm, keys):
+        return endowire.Instrument([{**bent, **keys}, {"length_mm": length_mm - 15.0, **keys}])
+
+    wire = device(600.0, {"radius_mm": 0.3, "bending_stiffness_nmm2": 5.0})
+    catheter = device(500.0, {"radius_mm": 0.6, "bending_stiffness_nmm2": 15.0, "inner_radius_mm": 0.35})
+    method = {"name": "kirchhoff", "element_mm": 5.0, "tolerance": 1e-4}
+    both = endowire.Simulation(
+        vessel, [wire, catheter], wall={"friction": 0.1}, method=method, friction=[0.1, 0.0], **where
+    )
+    for _ in range(100):
+        both.step([mm / 100.0 for mm in inserted_mm])
+    return both
+
+
+def ticks(n, steps, solves):
+    """Two instruments at 1 kHz in the arch and, with --surface, in another vessel: hands go to and fro and turn, with new speeds every 60 ms, and rest for 20 ms
+    before that; how long ticks take, how far hands are ahead, and how far tips at rest are from where they come to with hands held still."""
+    cases = [("arch", two_instruments(endowire.Vessel.generate("aortic_arch"), (260.0, 230.0)))]
+    if told.surface:
+        vessel = endowire.Vessel.read(told.surface)
+        cases.append((told.surface, two_instruments(vessel, (40.0, 25.0), opening=told.opening)))
+    for name, both in cases:
+        rng = np.random.default_rng(1)
+        took_ms, behind_mm, off_mm = np.empty(steps), np.zeros(steps), []
+        for k in range(steps):
+            if k % 80 == 0:
+                speeds = rng.uniform(-1.0, 1.0, (2, 2)) * [0.03, 0.004]
+            advance_mm, rotate_rad = np.zeros((2, 2)) if k % 80 >= 60 else speeds.T
+            began = time.thread_time()
+            report = both.tick(advance_mm, rotate_rad, solves=solves or 8)
+            took_ms[k] = 1e3 * (time.thread_time() - began)
+            if report.behind is not None:
+                behind_mm[k] = np.abs(report.behind[:, 0]).max()
+            if k % 80 == 79:
+                rests = both.copy()
+                rests.step([0.0, 0.0])
+                off_mm.append(np.linalg.norm(both.tips_mm - rests.tips_mm, axis=1).max())
+        print(f"{name}: {steps} ticks of {solves or 8} solves")
+        for what, values in (("a tick, ms", took_ms), ("behind the hands, mm", behind_mm), ("tips at rest off by, mm", off_mm)):
+            parts = np.quantile(values, [0.5, 0.9, 0.99, 0.999, 1.0])
+            print(f"{what:42}" + "".join(f"{part:9.3f}" for part in parts) + "   (50, 90, 99, 99.9, 100 %)")
+
+
 def resets(n, steps, solves):
     """What a new arch and its simulation take."""
     variety, rng = arches.ArchVariety(count=None), np.random.default_rng(0)
@@ -168,6 +216,7 @@ def random(n, steps, solves):
 PARTS = {
     "environments": environments,
     "pushes": pushes,
+    "ticks": ticks,
     "resets": resets,
     "calls": calls,
     "threads": threads,
@@ -181,7 +230,9 @@ if __name__ == "__main__":
     parser.add_argument("parts", nargs="*", default=["environments", "resets", "calls", "threads"])
     parser.add_argument("--simulations", type=int, default=64)
     parser.add_argument("--steps", type=int, default=20_000)
-    parser.add_argument("--solves", type=int, help="linear solves of a step (of environments and pushes)")
+    parser.add_argument("--solves", type=int, help="linear solves of a step (of environments, pushes and ticks)")
+    parser.add_argument("--surface", help="a vessel beside the arch, for ticks")
+    parser.add_argument("--opening", type=int, default=0, help="where it is entered")
     told = parser.parse_args()
     for one in told.parts:
         PARTS[one](told.simulations, told.steps, told.solves)

@@ -11,6 +11,7 @@ use pyo3::types::PyDict;
 use crate::arrays::{List, Numbers, array, natural, numbers, points};
 use crate::error::{exception, refuse};
 use crate::forked::on_own_threads;
+use crate::record::Record;
 use crate::report::push_force_n;
 use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
 use crate::start::Start;
@@ -158,6 +159,38 @@ impl Batch {
     fn tick<'py>(&self, py: Python<'py>, moves: Numbers<'_>, solves: i64) -> PyResult<Bound<'py, PyDict>> {
         let solves = natural("solves", solves)?;
         self.carry_out(py, &moves, |batch, moves| batch.tick(moves, solves))
+    }
+
+    /// Notes in records what each simulation has just done: `moves` as `step` was told, and when that ended, `times_s`, shape (n,). Where a record is
+    /// None, nothing is noted.
+    ///
+    /// Raises InputError for other numbers of records or times than of simulations, and as `Record.note`; then nothing is noted.
+    fn note(
+        &self,
+        py: Python<'_>,
+        records: List<Option<Py<Record>>>,
+        moves: Numbers<'_>,
+        times_s: Numbers<'_>,
+    ) -> PyResult<()> {
+        let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
+        let moves = crate::moves::moves(&moves, Some(count), hands)?;
+        let times_s: Vec<f64> = times_s.as_array().iter().copied().collect();
+        for (name, given) in [("records", records.0.len()), ("times_s", times_s.len())] {
+            if given != count {
+                return Err(refuse(name, given, &format!("give one for each of {count} simulations")));
+            }
+        }
+        let noted = || records.0.iter().zip(&times_s).filter_map(|(one, time_s)| Some((one.as_ref()?, time_s)));
+        noted().try_for_each(|(record, time_s)| record.get().check_time(*time_s))?;
+        self.with(py, |members| {
+            let each = members.batch.simulations().iter().zip(&moves).zip(records.0.iter().zip(&times_s));
+            for ((simulation, moves), (record, time_s)) in each {
+                if let Some(record) = record {
+                    record.get().lock().note(*time_s, moves, simulation, None);
+                }
+            }
+        });
+        Ok(())
     }
 
     /// What hands have done in ticks that instruments have not yet followed: advance_mm and rotate_rad of each, shape (n, n_instruments, 2); zeros where

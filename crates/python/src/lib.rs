@@ -16,6 +16,7 @@ mod frames;
 mod instrument;
 mod interrupt;
 mod moves;
+mod record;
 mod report;
 mod rod;
 mod scene;
@@ -42,6 +43,8 @@ mod _endowire {
     use super::frames::{Frames, Renderer};
     #[pymodule_export]
     use super::instrument::Instrument;
+    #[pymodule_export]
+    use super::record::Record;
     #[pymodule_export]
     use super::report::StepReport;
     #[pymodule_export]

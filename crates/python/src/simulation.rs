@@ -69,7 +69,7 @@ impl Simulation {
     }
 
     /// What hands do, each by its own command.
-    fn moves(
+    pub(crate) fn moves(
         &self,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,

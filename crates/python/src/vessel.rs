@@ -63,7 +63,7 @@ impl End {
 
 /// Where a way leads: the name of a target, or a place in mm.
 #[derive(FromPyObject)]
-enum Goal {
+pub(crate) enum Goal {
     Name(String),
     Place([f64; 3]),
 }

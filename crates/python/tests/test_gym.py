@@ -135,6 +135,70 @@ def test_an_action_is_a_part_of_the_limits_or_a_velocity(vessel, wire):
         Task([wire], vessels.FixedVessel(vessel), actions="metres")
 
 
+def test_steps_of_a_fixed_cost_are_behind_the_hand_and_come_to_where_it_led(vessel, wire):
+    parts = {"wall": {"friction": 0.1}, "ends": [ends.StepLimit(60)]}
+    made = [InsertionVectorEnv(Task([wire], vessels.FixedVessel(vessel), solves=n, **parts), 2) for n in (3, None)]
+    behind = []
+    for environments in made:
+        environments.reset(seed=3)
+        for k in range(50):
+            push = np.full((2, 1, 2), [0.6, 0.3] if k < 20 else [0.0, 0.0])
+            *_, info = environments.step(push)
+            behind.append(info["behind_mm"].max())
+    in_ticks, in_steps = (environments._episodes for environments in made)
+    assert max(behind[:50]) > 0.1 and behind[49] == 0.0 and max(behind[50:]) == 0.0
+    assert in_ticks.batch.inserted_mm == pytest.approx(in_steps.batch.inserted_mm, abs=1e-9)
+    assert np.linalg.norm(in_ticks.tip_mm - in_steps.tip_mm, axis=1).max() < 0.05
+    # Hands that wait have gone as far as they have: no push goes beyond the end of the wire.
+    made[0].reset(seed=3)
+    for _ in range(60):
+        *_, info = made[0].step(np.full((2, 1, 2), [1.0, 0.0]))
+        assert not info["failure"].any()
+    with pytest.raises(endowire.InputError, match="solves = 0"):
+        Task([wire], vessels.FixedVessel(vessel), solves=0)
+
+
+def test_an_episode_that_is_over_is_assessed(vessel, wire):
+    made = Task([wire], vessels.FixedVessel(vessel), assessed=True, ends=[ends.StepLimit(5)])
+    environments = InsertionVectorEnv(made, 2)
+    _, info = environments.reset(seed=1)
+    assert list(info["assessment"]) == [None, None]
+    way_mm = np.zeros(2)
+    before_mm = environments._episodes.tip_mm.copy()
+    for k in range(5):
+        *_, info = environments.step(np.full((2, 1, 2), [1.0 if k != 2 else -0.5, 0.2]))
+        way_mm += np.linalg.norm(environments._episodes.tip_mm - before_mm, axis=1)
+        before_mm = environments._episodes.tip_mm.copy()
+    for told, path_mm in zip(info["assessment"], info["path_length_mm"], strict=True):
+        told = {one["name"]: one["value"] for one in told}
+        assert told["total_s"] == pytest.approx(5 * made.control_period_s)
+        # The way of the tip begins where it is seen first.
+        assert 0.0 < told["tip_path_mm"] <= path_mm + 1e-9
+        assert told["beam_on_s"] is None and told["wrong_branches"] is not None
+    # The next episode is one of its own.
+    *_, info = environments.step(np.zeros((2, 1, 2)))
+    assert list(info["assessment"]) == [None, None]
+
+
+def test_a_record_of_ones_own_is_measured_copied_and_pickled(vessel, wire):
+    simulation, record = endowire.Simulation(vessel, wire), endowire.Record()
+    for k in range(1, 6):
+        simulation.step(4.0, 0.1)
+        record.note(simulation, 0.5 * k, 4.0, 0.1)
+    assert len(record) == 5 and len(record.copy()) == 5
+    measured = record.assess(vessel, sorted(vessel.targets)[0])
+    assert {one["name"]: one["value"] for one in measured}["total_s"] == 2.5
+    assert pickle.loads(pickle.dumps(record)).assess(vessel, sorted(vessel.targets)[0]) == measured
+    assert record.assess() != measured
+    with pytest.raises(endowire.InputError, match="time_s = 1"):
+        record.note(simulation, 1.0)
+    with pytest.raises(endowire.InputError, match="target"):
+        record.assess(target="nowhere")
+    batch = endowire.Batch([simulation, simulation])
+    with pytest.raises(endowire.InputError, match="records = 1"):
+        batch.note([record], np.zeros((2, 1, 2)), np.zeros(2))
+
+
 def test_observations_are_numbers_of_about_one_or_physical(vessel, wire):
     parts = {"tip_mm": observations.Tip(), "hands": observations.Hands(), "forces": observations.Forces()}
     made = {

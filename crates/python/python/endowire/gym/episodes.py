@@ -10,7 +10,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from .. import Batch, EndOfWay, EndowireError
+from .. import Batch, EndOfWay, EndowireError, Record
 from .centreline import Path, Ways
 from .scaling import shown
 from .task import Task
@@ -64,6 +64,8 @@ class Episodes:
         self.frame = np.zeros(n, dtype=np.int64)
         #: Last velocities within the limits, mm/s and rad/s, shape (n, n_instruments, 2); one that was no number leaves that before it.
         self.action = np.zeros((n, instruments, 2))
+        #: What is noted of each episode, where the task is assessed.
+        self.records: list[Record | None] = [None] * n
         #: What went wrong in the last step: exceptions by environment.
         self.failures: dict[int, EndowireError] = {}
         self._ways = Ways(n)
@@ -89,6 +91,7 @@ class Episodes:
             self.force_n[k] = self.largest_force_n[k] = 0.0
             self.path_length_mm[k], self._begun_s[k] = 0.0, perf_counter()
             self._over[k] = False
+            self.records[k] = Record() if self.task.assessed else None
             self.failures.pop(k, None)
         self._look()
         for k in generators:
@@ -114,6 +117,10 @@ class Episodes:
         # Where the way ends an instrument stays, and may be pulled back.
         self.failures = {k: failure for k, failure in told.items() if not isinstance(failure, EndOfWay)}
         self.steps += moving
+        if self.task.assessed:
+            moves[list(told)] = 0.0
+            noted = [record if moves_now else None for record, moves_now in zip(self.records, moving, strict=True)]
+            self.batch.note(noted, moves, self.steps * self.task.control_period_s)
         self.safe_steps += moving & (self.batch.largest_contact_force_n <= self.task.force_limit_n)
         self.frame += moving
         self.force_n = np.where(moving[:, None], self.batch.wall_forces_n, self.force_n)
@@ -173,6 +180,12 @@ class Episodes:
         # A clock's time is that of no seed: it is told of episodes that are over.
         took_s = np.where(self._over, perf_counter() - self._begun_s, 0.0)
         told |= {"safe_success": self.reached & is_safe, "wall_time_s": took_s}
+        if self.task.assessed:
+            told["assessment"] = np.full(len(self.sites), None, dtype=object)
+            for k in np.flatnonzero(self._over):
+                record, vessel = self.records[k], self.sites[k].vessel
+                if record is not None:
+                    told["assessment"][k] = record.assess(vessel, self.target_mm[k], self.task.threshold_mm)
         if self.task.stand_in:
             told["stand_in"] = np.full(len(self.sites), self.task.stand_in, dtype=object)
         return told

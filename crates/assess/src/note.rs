@@ -1,0 +1,55 @@
+//! What is noted of a simulation, step by step.
+
+use endowire_core::Vec3;
+use endowire_core::insertion::{Command, Move, Packing, Simulation};
+
+use crate::record::{Hand, Packed, Record, Sample};
+
+impl Record {
+    /// Notes a step of a simulation that ended at a time, in which hands made these moves; what coils do in the vessel's sac, if it has one.
+    /// Rests that follow each other are one sample.
+    pub fn note(&mut self, time_s: f64, moves: &[Move], simulation: &Simulation, packing: Option<Packing>) {
+        let (report, force) = (simulation.report(), simulation.wall_force());
+        let instruments = simulation.stack().instruments();
+        if self.instruments.is_empty() {
+            self.instruments = instruments.iter().map(|one| one.name.clone()).collect();
+        }
+        let rests = moves.iter().all(|one| one.command == Command::default());
+        let displacement = simulation.displacement();
+        let at_rest =
+            |tip_mm: Option<Vec3>| displacement.as_ref().zip(tip_mm).map(|(now, tip)| now.material(&tip));
+        // That of a device alone is the foremost one.
+        let tip_of = |index: usize| (instruments.len() > 1).then(|| simulation.tip_of_mm(index)).flatten();
+        let hands = report.hands().into_iter().enumerate().map(|(index, told)| {
+            let moved = moves.iter().find(|one| one.instrument == index);
+            let Command { advance_mm, rotate_rad } = moved.map(|one| one.command).unwrap_or_default();
+            let tip_mm = tip_of(index);
+            Hand {
+                advance_mm,
+                rotate_rad,
+                inserted_mm: told.inserted_mm,
+                push_force_n: told.push_force_n,
+                torque_nmm: told.torque_nmm,
+                tip_mm,
+                tip_at_rest_mm: at_rest(tip_mm),
+            }
+        });
+        let tip_mm = simulation.shape().tip_mm();
+        let sample = Sample {
+            time_s,
+            tip_mm,
+            tip_at_rest_mm: at_rest(tip_mm),
+            hands: hands.collect(),
+            wall_force_n: force.sum_n,
+            tip_force_n: force.tip_n,
+            jumped: report.jumped && !rests,
+            packing: packing.map(|Packing { density, outside_mm, .. }| Packed { density, outside_mm }),
+        };
+        match self.samples.last_mut() {
+            Some(last) if rests && Sample { time_s: last.time_s, ..sample.clone() } == *last => {
+                last.time_s = time_s;
+            }
+            _ => self.samples.push(sample),
+        }
+    }
+}

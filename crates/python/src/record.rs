@@ -1,0 +1,139 @@
+//! What hands, tips and forces did, step by step, and what that is scored by.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use endowire_assess::Way;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::document;
+use crate::error::{InputError, exception, refuse};
+use crate::interrupt::interruptible;
+use crate::simulation::Simulation;
+use crate::vessel::{Goal, Vessel};
+
+/// What was noted of a procedure, step by step: `assess` measures it as `endowire.assess` measures a recorded run.
+#[pyclass(frozen, module = "endowire", name = "Record")]
+#[derive(Default)]
+pub(crate) struct Record {
+    inner: Mutex<endowire_assess::Record>,
+}
+
+impl Record {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, endowire_assess::Record> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Record {
+    /// One in which nothing is noted yet.
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Steps that are noted; rests that follow each other are one.
+    fn __len__(&self) -> usize {
+        self.lock().samples.len()
+    }
+
+    /// Notes a step of a simulation: that it ended at `time_s` since the start, and what hands did in it, as `Simulation.step` was told. Where tips
+    /// are, forces and jumps are those of its report.
+    ///
+    /// Raises InputError for a time before that of the last step.
+    #[pyo3(signature = (simulation, time_s, advance_mm=None, rotate_rad=None))]
+    fn note(
+        &self,
+        py: Python<'_>,
+        simulation: &Simulation,
+        time_s: f64,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let moves = simulation.moves(advance_mm, rotate_rad)?;
+        self.check_time(time_s)?;
+        simulation.with(py, |simulation| self.lock().note(time_s, &moves, simulation, None));
+        Ok(())
+    }
+
+    /// The measures: a list of dictionaries, as `endowire.assess` returns it. With a `vessel`, `target` is the name of a point of its centre line
+    /// or a place in mm that was to be reached, within `within_mm` of it; without a target the way is that to where the tip ended.
+    ///
+    /// Raises InputError for a target that is not there, one without a vessel, and a vessel without a centre line.
+    #[pyo3(signature = (vessel=None, target=None, within_mm=5.0))]
+    fn assess<'py>(
+        &self,
+        py: Python<'py>,
+        vessel: Option<&Vessel>,
+        target: Option<Goal>,
+        within_mm: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if !(within_mm > 0.0 && within_mm.is_finite()) {
+            return Err(refuse("within_mm", within_mm, "must be a length above 0"));
+        }
+        let record = self.lock().clone();
+        let way = match (vessel, target) {
+            (None, None) => None,
+            (None, Some(_)) => {
+                return Err(refuse("target", "a point of a centre line", "give the vessel too"));
+            }
+            (Some(vessel), Some(Goal::Name(name))) => {
+                Way::to_target(vessel.tree(py)?, &name, within_mm).map_err(exception)?
+            }
+            (Some(vessel), Some(Goal::Place(place))) => {
+                Way::towards(vessel.tree(py)?, place.into(), within_mm)
+            }
+            (Some(vessel), None) => {
+                let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
+                let tree = vessel.tree(py)?;
+                last_mm.and_then(|place_mm| Way::to_place(tree, &place_mm))
+            }
+        };
+        let measured = interruptible(py, move || endowire_assess::assess(&record, way.as_ref()))?;
+        document::write(py, &measured)
+    }
+
+    /// A copy that goes on by itself.
+    fn copy(&self) -> Self {
+        Self { inner: Mutex::new(self.lock().clone()) }
+    }
+
+    fn __copy__(&self) -> Self {
+        self.copy()
+    }
+
+    fn __deepcopy__(&self, _memo: Bound<'_, PyAny>) -> Self {
+        self.copy()
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = serde_json::to_vec(&*slf.get().lock())
+            .map_err(|e| InputError::new_err(format!("a record: {e}")))?;
+        Ok((slf.get_type().getattr("_unpickled")?, (PyBytes::new(slf.py(), &bytes),)))
+    }
+
+    #[staticmethod]
+    fn _unpickled(data: &[u8]) -> PyResult<Self> {
+        let record = serde_json::from_slice(data)
+            .map_err(|e| InputError::new_err(format!("the bytes of a record: {e}")))?;
+        Ok(Self { inner: Mutex::new(record) })
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<endowire.Record of {} steps>", self.__len__())
+    }
+}
+
+impl Record {
+    /// Refuses a time before that of the last step.
+    pub(crate) fn check_time(&self, time_s: f64) -> PyResult<()> {
+        let last_s = self.lock().samples.last().map_or(0.0, |last| last.time_s);
+        if time_s >= last_s && time_s.is_finite() {
+            return Ok(());
+        }
+        Err(refuse("time_s", time_s, &format!("must be a time from that of the last step, {last_s} s, on")))
+    }
+}
