@@ -107,9 +107,12 @@ class Episodes:
         velocities = np.clip(velocities, -self._limits, self._limits)
         done = moving & ~np.isnan(velocities).any(axis=(1, 2))
         self.action = np.where(done[:, None, None], velocities, self.action)
-        moves = velocities * self.task.control_period_s
+        moves, behind = velocities * self.task.control_period_s, self.batch.behind
+        # Hands that are ahead by as far as they go in a step wait.
+        most = self._limits * self.task.control_period_s
+        moves = np.clip(moves, np.minimum(-most - behind, 0.0), np.maximum(most - behind, 0.0))
         # Nothing is pushed in beyond its end or pulled out of the sheath, also not when the instruments have followed the hands.
-        inserted_mm = self.batch.inserted_mm + self.batch.behind[..., 0]
+        inserted_mm = self.batch.inserted_mm + behind[..., 0]
         moves[..., 0] = np.clip(moves[..., 0], -inserted_mm, self._lengths_mm - inserted_mm)
         moves[~moving] = 0.0
         solves = self.task.solves

@@ -50,7 +50,8 @@ class Task:
     force_limit_n: float = 1.5
     #: Time between two actions, s.
     control_period_s: float = 1.0 / 7.5
-    #: Linear solves of a step, so that none takes long: what the instruments have not followed in them the next step goes on with (``info["behind_mm"]``).
+    #: Linear solves of a step, so that none takes long: what the instruments have not followed in them the next step goes on with (``info["behind_mm"]``), and hands
+    #: that are ahead by as far as they go in a step wait.
     #: None: each step goes on to the equilibrium, however long that takes.
     solves: int | None = None
     #: Fastest push in mm/s and turn in rad/s of a hand.
