@@ -169,15 +169,6 @@ impl Gpu {
         self.device.create_bind_group(&descriptor)
     }
 
-    /// Submits `encoder` and returns the bytes of `texture` after it, rows without padding.
-    pub(crate) fn read_back(
-        &self,
-        encoder: wgpu::CommandEncoder,
-        texture: &wgpu::Texture,
-    ) -> Result<Vec<u8>> {
-        pollster::block_on(self.submit(encoder, texture)?.bytes())
-    }
-
     /// Submits `encoder`; what reads `texture` after it.
     pub(crate) fn submit(
         &self,
@@ -290,7 +281,7 @@ pub(crate) mod tests {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let view = texture.create_view(&Default::default());
             drop(color_pass(&mut encoder, &view, wgpu::Color::WHITE));
-            gpu.read_back(encoder, &texture)
+            pollster::block_on(gpu.submit(encoder, &texture)?.bytes())
         };
         assert_eq!(read().unwrap(), [255; 64]);
         gpu.device.destroy();

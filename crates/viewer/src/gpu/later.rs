@@ -13,13 +13,18 @@ use crate::engine::PathEngine;
 use crate::fluoro::{Anatomy, SUBRAYS};
 use crate::gpu::context::{Gpu, Reading};
 use crate::gpu::fluoro::{GpuPaths, lengths};
+use crate::gpu::view3d::{GpuView3d, Pipelines};
+use crate::output::Image;
 use crate::scene::Setup;
+use crate::spec::CameraSpec;
+use crate::three_d::{Camera, ContactView, annotate};
 
 /// An open graphics processor for those who wait for its answers ([`Renderer::prepare_on`](crate::Renderer::prepare_on)).
 #[derive(Debug)]
 pub struct Graphics {
     gpu: Gpu,
     paths: Mutex<GpuPaths>,
+    three_d: Pipelines,
 }
 
 impl Graphics {
@@ -30,8 +35,9 @@ impl Graphics {
     pub async fn open() -> Result<Self> {
         let gpu = Gpu::request(wgpu::Features::FLOAT32_BLENDABLE, true).await.map_err(Error::Computation)?;
         let paths = Mutex::new(GpuPaths::new(&gpu));
+        let three_d = Pipelines::new(&gpu);
         gpu.check()?;
-        Ok(Self { gpu, paths })
+        Ok(Self { gpu, paths, three_d })
     }
 
     /// Graphics interface and adapter.
@@ -41,11 +47,7 @@ impl Graphics {
 
     /// What stays in the beam of a set-up.
     pub(crate) async fn anatomy(&self, setup: &Setup, c_arm: &CArm) -> Result<Anatomy> {
-        let needed = c_arm.size_px().map(|n| n * SUBRAYS).into_iter().max().unwrap_or(0);
-        if needed > self.gpu.largest_side {
-            let most = self.gpu.largest_side;
-            return Err(Error::Computation(format!("it draws at most {most} pixels a side, not {needed}")));
-        }
+        self.check_size(c_arm.size_px().map(|n| n * SUBRAYS))?;
         let mut asking = Asking { graphics: self, readings: vec![] };
         Anatomy::new(setup, c_arm, SUBRAYS, &mut asking)?;
         let mut answers = Vec::with_capacity(asking.readings.len());
@@ -53,6 +55,41 @@ impl Graphics {
             answers.push(lengths(reading).await?);
         }
         Anatomy::new(setup, c_arm, SUBRAYS, &mut Answered(answers.into_iter()))
+    }
+
+    /// What draws a set-up in 3D.
+    pub(crate) fn three_d(&self, camera: &Camera, wall: &SurfaceMesh) -> Result<Box<GpuView3d>> {
+        self.check_size(camera.size_px)?;
+        Ok(Box::new(GpuView3d::new(&self.gpu, &self.three_d, camera, wall)))
+    }
+
+    fn check_size(&self, size_px: [u32; 2]) -> Result<()> {
+        let (needed, most) = (size_px[0].max(size_px[1]), self.gpu.largest_side);
+        if needed <= most {
+            return Ok(());
+        }
+        Err(Error::Computation(format!("it draws at most {most} pixels a side, not {needed}")))
+    }
+}
+
+/// A 3D frame that is being drawn.
+#[derive(Debug)]
+pub struct Drawing {
+    pub(crate) reading: Reading,
+    pub(crate) camera: Camera,
+    pub(crate) spec: CameraSpec,
+    pub(crate) contacts: Vec<ContactView>,
+}
+
+impl Drawing {
+    /// The frame.
+    ///
+    /// # Errors
+    /// [`Error::Computation`] with what the graphics processor has reported.
+    pub async fn image(self) -> Result<Image> {
+        let mut image = GpuView3d::image(&self.camera, self.reading.bytes().await?);
+        annotate(&mut image, &self.camera, &self.spec, &self.contacts);
+        Ok(image)
     }
 }
 
