@@ -24,7 +24,7 @@ const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))} mN` : `${minus(n.toFixed(2))} N`);
 
 /** Shows a frame. */
-export function show({ readout: now, planes, three: view, backend }) {
+export function show({ readout: now, planes, three: view, backend, backend3D }) {
   readout = now;
   if (planes[0]) {
     paint(fluoro, planes[0]);
@@ -44,7 +44,7 @@ export function show({ readout: now, planes, three: view, backend }) {
   if (lab.second_deg) element("second-arm").textContent = pose(...lab.second_deg);
   element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.dose_ugy.toFixed(1)} µGy`;
   element("field").textContent = `${lab.field_mm.toFixed(0)} mm`;
-  element("backend").textContent = backend ? `pictures by ${backend}` : "";
+  element("backend").textContent = backend === backend3D ? `pictures by ${backend}` : [backend && `fluoroscopy by ${backend}`, `3D by ${backend3D}`].filter(Boolean).join(", ");
   hands(now);
   happened(now);
 }

@@ -14,11 +14,13 @@ let due = 0, frameDue = 0, frames = 0, ticks = 0, live = 0, wasLive = false;
 let shown = true;
 /** When the oldest input came in that no picture shows. */
 let inputAt = null;
-let hidden = false, waits = false, stopped = false;
+let hidden = false, waits = false, stopped = false, choosing = false;
 let counted = { at: performance.now(), ticks: 0, live: 0 };
 
 /** The graphics processor, where the browser has one. */
 let graphics = null;
+/** How long the processor took for its first 3D view, and whether the graphics processor draws the next ones: null until both were measured. */
+let firstMs = null, draws3D = null;
 
 const started = init().then(async (exports) => {
   memory = exports.memory;
@@ -57,14 +59,51 @@ function physics(until) {
   }
 }
 
+/** Has the graphics processor draw the 3D view from now on where that takes less time than the processor's first: software may imitate one. */
+async function choose(one) {
+  let lastMs = Infinity;
+  // The first has the shaders compiled.
+  for (let time = 0; time < 2 && one === session; time++) {
+    one.draw3DBy(graphics);
+    const begun = performance.now();
+    while (one === session && !one.threeD()) await new Promise((resolve) => setTimeout(resolve, 1));
+    lastMs = performance.now() - begun;
+  }
+  if (one !== session) return null;
+  // A processor that has failed has been left.
+  const isQuicker = one.backend3D() === graphics.name && lastMs < firstMs;
+  if (!isQuicker) one.draw3DHere();
+  return isQuicker;
+}
+
+/** The 3D view, if it is time for one: that of the graphics processor is drawn meanwhile, and fetched as soon as it is there. */
+function three() {
+  if (choosing || (!draws3D && frames % THREE_D_EVERY !== 0)) return null;
+  const begun = performance.now();
+  const picture = session.threeD() ?? null;
+  if (!graphics || draws3D !== null || !picture) return picture;
+  firstMs = performance.now() - begun;
+  choosing = true;
+  const done = (result) => {
+    choosing = false;
+    draws3D = result;
+  };
+  choose(session).then(done, (error) => {
+    done(false);
+    guarded(() => { throw error; });
+  });
+  return picture;
+}
+
 function draw() {
   const readout = session.readout();
-  const frame = { readout, inputAt, planes: [], three: null, backend: session.backend() };
+  const frame = { readout, inputAt, planes: [], three: null, backend: session.backend(), backend3D: session.backend3D() };
   const isLive = readout.lab.live;
   if (isLive || wasLive) frame.planes = session.fluoroSoon();
   if (isLive) live += 1;
   wasLive = isLive;
-  if (frames % THREE_D_EVERY === 0) frame.three = session.threeD() ?? null;
+  if (draws3D && frame.backend3D !== graphics.name) draws3D = false;
+  frame.three = three();
   frames += 1;
   inputAt = null;
   shown = false;
@@ -106,6 +145,7 @@ const asked = {
     session?.free();
     session = made;
     if (graphics) session.useGraphics(graphics);
+    if (draws3D) session.draw3DBy(graphics);
     due = frameDue = performance.now();
     frames = 0;
     wasLive = false;
