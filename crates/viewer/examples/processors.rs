@@ -94,7 +94,7 @@ fn rates(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<[f64; 2]> {
     Ok([still, turning])
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> std::result::Result<(), Box<dyn Error>> {
     let sides: Vec<u32> = std::env::args().skip(1).filter_map(|text| text.parse().ok()).collect();
     let sides = if sides.is_empty() { vec![128, 384, 512, 1024] } else { sides };
     let vessels = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels");
@@ -105,7 +105,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!(
         "| view | side | still: processor | graphics | turning: processor | graphics |\n|---|---|---|---|---|---|"
     );
-    let mut name = String::new();
+    let mut opened = None;
     for (view, body) in
         [(View::Fluoro, ""), (View::Fluoro, "body"), (View::Fluoro, "tomogram"), (View::ThreeD, "")]
     {
@@ -120,7 +120,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             spec.backend = Backend::Cpu;
             let processor = rates(&spec, &wall)?;
             spec.backend = Backend::Gpu;
-            name = Renderer::new(&spec, &wall)?.backend().to_owned();
+            let begun = Instant::now();
+            let name = Renderer::new(&spec, &wall)?.backend().to_owned();
+            opened.get_or_insert((name, begun.elapsed()));
             let graphics = rates(&spec, &wall)?;
             let what = if view == View::ThreeD { "3D" } else { "fluoroscopy" };
             println!(
@@ -130,6 +132,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     std::fs::remove_file(&file)?;
-    println!("{name}");
+    if let Some((name, taken)) = opened {
+        println!("graphics: {name}, opened in {taken:.0?}");
+    }
     Ok(())
 }

@@ -10,9 +10,13 @@ use endowire_core::{Error, Result};
 use futures_channel::oneshot;
 
 use crate::engine::process;
+use crate::gpu::view3d::Pipelines;
 
 /// The first failure an adapter has reported.
 type Failure = Arc<Mutex<Option<String>>>;
+
+/// The device that was opened last, for those who ask next: a driver takes a tenth of a second or more to open one.
+static OPENED: Mutex<Option<Gpu>> = Mutex::new(None);
 
 /// An open graphics device; clones share it.
 #[derive(Debug, Clone)]
@@ -21,13 +25,17 @@ pub(crate) struct Gpu {
     pub(crate) queue: wgpu::Queue,
     /// Most pixels a side that it draws.
     pub(crate) largest_side: u32,
+    /// Pipelines of fluoroscopy and of the 3D view, made with the first of each: a driver takes a while to compile them.
+    pub(crate) paths: Arc<OnceLock<wgpu::RenderPipeline>>,
+    pub(crate) three_d: Arc<OnceLock<Pipelines>>,
+    is_software: bool,
     name: String,
     failure: Failure,
 }
 
 impl Gpu {
-    /// Opens the best adapter that has `features`: discrete before integrated before others; software
-    /// adapters last, and only where `software` allows them.
+    /// The best adapter that has `features`: discrete before integrated before others; software adapters last, and only where
+    /// `software` allows them. One that is open is shared.
     ///
     /// # Errors
     /// Why there is none, as a clause.
@@ -35,10 +43,20 @@ impl Gpu {
         if cfg!(target_family = "wasm") {
             return Err("a browser's graphics answer later: give Graphics to what waits for it".into());
         }
-        pollster::block_on(Self::request(features, software))
+        check_process()?;
+        let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+        let fits = |gpu: &&Self| {
+            let has = gpu.device.features().contains(features);
+            has && (software || !gpu.is_software) && gpu.check().is_ok()
+        };
+        if let Some(gpu) = opened.as_ref().filter(fits) {
+            return Ok(gpu.clone());
+        }
+        let gpu = pollster::block_on(Self::request(features, software))?;
+        Ok(opened.insert(gpu).clone())
     }
 
-    /// The same where an answer is waited for.
+    /// Opens one where an answer is waited for.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -46,11 +64,7 @@ impl Gpu {
         features: wgpu::Features,
         software: bool,
     ) -> std::result::Result<Self, String> {
-        // Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
-        static PROCESS: OnceLock<u32> = OnceLock::new();
-        if *PROCESS.get_or_init(process) != process() {
-            return Err("graphics were in use before this process was forked".into());
-        }
+        check_process()?;
         let descriptor = wgpu::InstanceDescriptor {
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -77,6 +91,8 @@ impl Gpu {
             return Err(format!("no graphics adapter offers {features:?}"));
         };
         let info = adapter.get_info();
+        // What fluoroscopy needs, also where the 3D view alone asks: one device is for both.
+        let features = features | (adapter.features() & wgpu::Features::FLOAT32_BLENDABLE);
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("endowire"),
             required_features: features,
@@ -100,7 +116,9 @@ impl Gpu {
             wgpu::Backend::BrowserWebGpu => "WebGPU".to_owned(),
             backend => format!("{backend:?} {}", info.name),
         };
-        Ok(Self { device, queue, largest_side, name, failure })
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let (paths, three_d) = Default::default();
+        Ok(Self { device, queue, largest_side, paths, three_d, is_software, name, failure })
     }
 
     /// Graphics interface and adapter.
@@ -197,6 +215,18 @@ impl Gpu {
     }
 }
 
+/// Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
+///
+/// # Errors
+/// That this process was forked from one that has used graphics.
+fn check_process() -> std::result::Result<(), String> {
+    static PROCESS: OnceLock<u32> = OnceLock::new();
+    if *PROCESS.get_or_init(process) == process() {
+        return Ok(());
+    }
+    Err("graphics were in use before this process was forked".into())
+}
+
 /// A texture on its way back.
 #[derive(Debug)]
 pub(crate) struct Reading {
@@ -260,9 +290,9 @@ pub(crate) fn attachment<'a>(
 pub(crate) mod tests {
     use super::*;
 
-    /// An adapter. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
+    /// An adapter of its own. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
     pub(crate) fn opened() -> Option<Gpu> {
-        match Gpu::open(wgpu::Features::FLOAT32_BLENDABLE, true) {
+        match pollster::block_on(Gpu::request(wgpu::Features::FLOAT32_BLENDABLE, true)) {
             Ok(gpu) => Some(gpu),
             Err(reason) => {
                 let required = std::env::var("ENDOWIRE_REQUIRE_GPU").is_ok_and(|v| v == "1");
@@ -271,6 +301,20 @@ pub(crate) mod tests {
                 None
             }
         }
+    }
+
+    #[test]
+    fn an_open_device_is_shared_until_it_fails() {
+        if opened().is_none() {
+            return;
+        }
+        let open = || Gpu::open(wgpu::Features::empty(), true).unwrap();
+        let first = open();
+        assert!(first.device.features().contains(wgpu::Features::FLOAT32_BLENDABLE));
+        assert_eq!(open().device, first.device);
+        first.failure.lock().unwrap().replace("it was lost".into());
+        let next = open();
+        assert!(next.device != first.device && next.check().is_ok());
     }
 
     #[test]

@@ -97,17 +97,7 @@ pub(crate) struct GpuPaths {
 
 impl GpuPaths {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let draw_wall = path_pipeline(
-            gpu,
-            include_str!("wall.wgsl"),
-            &wgpu::VertexBufferLayout {
-                array_stride: size_of::<Facet>() as u64,
-                step_mode: wgpu::VertexStepMode::Instance,
-                attributes: &wgpu::vertex_attr_array![
-                    0 => Uint16x4, 1 => Sint32x4, 2 => Sint32x4, 3 => Sint32x4, 4 => Float32x3, 5 => Float32x4
-                ],
-            },
-        );
+        let draw_wall = gpu.paths.get_or_init(|| path_pipeline(gpu)).clone();
         Self { gpu: gpu.clone(), draw_wall, targets: HashMap::new() }
     }
 
@@ -156,12 +146,15 @@ fn facets(view: &CArm, mesh: &SurfaceMesh) -> Vec<Facet> {
 }
 
 /// A pipeline that adds path lengths.
-fn path_pipeline(
-    gpu: &Gpu,
-    source: &'static str,
-    layout: &wgpu::VertexBufferLayout<'_>,
-) -> wgpu::RenderPipeline {
-    let shader = gpu.shader(source);
+fn path_pipeline(gpu: &Gpu) -> wgpu::RenderPipeline {
+    let layout = wgpu::VertexBufferLayout {
+        array_stride: size_of::<Facet>() as u64,
+        step_mode: wgpu::VertexStepMode::Instance,
+        attributes: &wgpu::vertex_attr_array![
+            0 => Uint16x4, 1 => Sint32x4, 2 => Sint32x4, 3 => Sint32x4, 4 => Float32x3, 5 => Float32x4
+        ],
+    };
+    let shader = gpu.shader(include_str!("wall.wgsl"));
     let add = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
         dst_factor: wgpu::BlendFactor::One,
@@ -175,7 +168,7 @@ fn path_pipeline(
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("path lengths"),
         layout: None,
-        vertex: vertex_state(&shader, &[Some(layout.clone())]),
+        vertex: vertex_state(&shader, &[Some(layout)]),
         primitive: wgpu::PrimitiveState {
             topology: wgpu::PrimitiveTopology::TriangleStrip,
             ..Default::default()

@@ -12,7 +12,6 @@ use context::Gpu;
 use fluoro::GpuPaths;
 pub use later::{Drawing, Graphics};
 pub(crate) use view3d::GpuView3d;
-use view3d::Pipelines;
 
 /// Opens an adapter and prepares the views of `setup`; software adapters only where `software` allows them.
 ///

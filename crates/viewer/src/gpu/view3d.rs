@@ -26,7 +26,7 @@ pub(crate) struct Pipelines {
 }
 
 impl Pipelines {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    fn new(gpu: &Gpu) -> Self {
         let shader = gpu.shader(include_str!("view3d.wgsl"));
         let [device, wall, compose] =
             [Stage::Device, Stage::Wall, Stage::Compose].map(|stage| pipeline(gpu, &shader, stage));
@@ -53,7 +53,8 @@ pub(crate) struct GpuView3d {
 }
 
 impl GpuView3d {
-    pub(crate) fn new(gpu: &Gpu, pipelines: &Pipelines, camera: &Camera, wall: &SurfaceMesh) -> Self {
+    pub(crate) fn new(gpu: &Gpu, camera: &Camera, wall: &SurfaceMesh) -> Self {
+        let pipelines = gpu.three_d.get_or_init(|| Pipelines::new(gpu));
         let style = Style::new(camera);
         let uniform = gpu.buffer(bytemuck::cast_slice(&style.uniform()), wgpu::BufferUsages::UNIFORM);
         let vertices = wall_triangles(camera, wall);
