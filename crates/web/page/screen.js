@@ -21,7 +21,7 @@ const minutes = (s) => `${Math.floor(s / 60)}:${(s % 60).toFixed(1).padStart(4, 
 
 /** A minus that is one, and none before zero. */
 const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
-const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))} mN` : `${minus(n.toFixed(2))} N`);
+const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))}\u00a0mN` : `${minus(n.toFixed(2))}\u00a0N`);
 
 /** Shows a frame. */
 export function show({ readout: now, planes, three: view, backend, backend3D }) {
@@ -71,7 +71,7 @@ function hands(now) {
     name.textContent = one.name;
     const ahead = Math.abs(one.behind_mm) < 0.05 ? "" : `, hand ${minus(one.behind_mm.toFixed(1))} mm ahead`;
     place.textContent = `${one.inserted_mm.toFixed(1)} mm in${ahead}, ${minus(one.rotation_deg.toFixed(0))}°`;
-    felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))} N·mm${one.warns ? " – beyond the limit" : ""}`;
+    felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))}\u00a0N·mm${one.warns ? " – beyond the limit" : ""}`;
     button.classList.toggle("warns", one.warns);
     button.classList.toggle("chosen", now.selected === one.name && now.instruments.length > 1);
   });
