@@ -37,10 +37,8 @@ fn prepared(setup: &Setup, gpu: &Gpu) -> Result<Engines, String> {
         ));
     }
     let paths = setup.c_arm.is_some().then(|| Box::new(GpuPaths::new(gpu)) as _);
-    let three_d = setup
-        .camera
-        .as_ref()
-        .map(|camera| Box::new(GpuView3d::new(gpu, &Pipelines::new(gpu), camera, setup.wall_now())) as _);
+    let three_d =
+        setup.camera.as_ref().map(|camera| Box::new(GpuView3d::new(gpu, camera, setup.wall_now())) as _);
     let engines = Engines { paths, three_d, later: None, name: gpu.name().to_string(), process: process() };
     gpu.check().map_err(|e| format!("{}: {e}", gpu.name()))?;
     Ok(engines)
