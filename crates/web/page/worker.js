@@ -19,8 +19,8 @@ let counted = { at: performance.now(), ticks: 0, live: 0 };
 
 /** The graphics processor, where the browser has one. */
 let graphics = null;
-/** How long the processor took for its first 3D view, and whether the graphics processor draws the next ones: null until both were measured. */
-let firstMs = null, draws3D = null;
+/** How long the processor took for its first 3D view, and whether the graphics processor is quicker: null until that was measured. */
+let firstMs = null, isQuicker = null;
 
 const started = init().then(async (exports) => {
   memory = exports.memory;
@@ -59,7 +59,7 @@ function physics(until) {
   }
 }
 
-/** Has the graphics processor draw the 3D view from now on where that takes less time than the processor's first: software may imitate one. */
+/** Has the graphics processor draw from now on where its 3D view takes less time than the processor's first: software may imitate one. */
 async function choose(one) {
   let lastMs = Infinity;
   // The first has the shaders compiled.
@@ -70,23 +70,24 @@ async function choose(one) {
     lastMs = performance.now() - begun;
   }
   if (one !== session) return null;
-  // A processor that has failed has been left.
-  const isQuicker = one.backend3D() === graphics.name && lastMs < firstMs;
-  if (!isQuicker) one.draw3DHere();
-  return isQuicker;
+  // One that has failed has been left.
+  const draws = one.backend3D() === graphics.name && lastMs < firstMs;
+  if (draws) one.useGraphics(graphics);
+  else one.draw3DHere();
+  return draws;
 }
 
 /** The 3D view, if it is time for one: that of the graphics processor is drawn meanwhile, and fetched as soon as it is there. */
 function three() {
-  if (choosing || (!draws3D && frames % THREE_D_EVERY !== 0)) return null;
+  if (choosing || (!isQuicker && frames % THREE_D_EVERY !== 0)) return null;
   const begun = performance.now();
   const picture = session.threeD() ?? null;
-  if (!graphics || draws3D !== null || !picture) return picture;
+  if (!graphics || isQuicker !== null || !picture) return picture;
   firstMs = performance.now() - begun;
   choosing = true;
   const done = (result) => {
     choosing = false;
-    draws3D = result;
+    isQuicker = result;
   };
   choose(session).then(done, (error) => {
     done(false);
@@ -102,7 +103,7 @@ function draw() {
   if (isLive || wasLive) frame.planes = session.fluoroSoon();
   if (isLive) live += 1;
   wasLive = isLive;
-  if (draws3D && frame.backend3D !== graphics.name) draws3D = false;
+  if (isQuicker && frame.backend3D !== graphics.name) isQuicker = false;
   frame.three = three();
   frames += 1;
   inputAt = null;
@@ -144,8 +145,10 @@ const asked = {
     const made = new Session(files, path, side);
     session?.free();
     session = made;
-    if (graphics) session.useGraphics(graphics);
-    if (draws3D) session.draw3DBy(graphics);
+    if (isQuicker) {
+      session.useGraphics(graphics);
+      session.draw3DBy(graphics);
+    }
     due = frameDue = performance.now();
     frames = 0;
     wasLive = false;

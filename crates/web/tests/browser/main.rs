@@ -179,7 +179,9 @@ fn pictures_by_webgpu_are_those_of_the_reference() {
     assert!(most <= 2.0 && range > 100.0, "{told}");
     assert!(other > 2.0, "another place must differ: {told}");
     browser.eval("document.getElementById('lock').click()");
-    browser.wait("/^(pictures|fluoroscopy) by WebGPU/.test(document.getElementById('backend').textContent)");
+    // The page takes what is quicker for all of them, and says what that is: here software imitates a graphics processor.
+    browser
+        .wait("/^pictures by (WebGPU|CPU reference)$/.test(document.getElementById('backend').textContent)");
     let backend = browser.eval("document.getElementById('backend').textContent");
     eprintln!("the page tells {backend}");
     assert!(browser.console.is_empty(), "{:?}", browser.console);
