@@ -15,8 +15,29 @@ use crate::gpu::view3d::Pipelines;
 /// The first failure an adapter has reported.
 type Failure = Arc<Mutex<Option<String>>>;
 
-/// The device that was opened last, for those who ask next: a driver takes a tenth of a second or more to open one.
-static OPENED: Mutex<Option<Gpu>> = Mutex::new(None);
+/// Devices that are open: a driver takes a fifth of a second to open one, and each pose of a dataset asks for one.
+static OPENED: Pool = Pool(Mutex::new(Vec::new()));
+
+/// Devices, each for those who ask while no other has it: who waits for one waits for all that it was given.
+struct Pool(Mutex<Vec<Gpu>>);
+
+impl Pool {
+    /// One that nobody has and that has not failed.
+    fn free(&self, features: wgpu::Features, software: bool) -> Option<Gpu> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|gpu| gpu.check().is_ok());
+        let fits = |gpu: &&Gpu| {
+            let has = gpu.device.features().contains(features);
+            Arc::strong_count(&gpu.paths) == 1 && has && (software || !gpu.is_software)
+        };
+        all.iter().find(fits).cloned()
+    }
+
+    /// Keeps one that was opened.
+    fn keep(&self, gpu: &Gpu) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(gpu.clone());
+    }
+}
 
 /// An open graphics device; clones share it.
 #[derive(Debug, Clone)]
@@ -35,7 +56,7 @@ pub(crate) struct Gpu {
 
 impl Gpu {
     /// The best adapter that has `features`: discrete before integrated before others; software adapters last, and only where
-    /// `software` allows them. One that is open is shared.
+    /// `software` allows them. One that is open, and that nobody has any more, comes first.
     ///
     /// # Errors
     /// Why there is none, as a clause.
@@ -44,16 +65,12 @@ impl Gpu {
             return Err("a browser's graphics answer later: give Graphics to what waits for it".into());
         }
         check_process()?;
-        let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-        let fits = |gpu: &&Self| {
-            let has = gpu.device.features().contains(features);
-            has && (software || !gpu.is_software) && gpu.check().is_ok()
-        };
-        if let Some(gpu) = opened.as_ref().filter(fits) {
-            return Ok(gpu.clone());
+        if let Some(gpu) = OPENED.free(features, software) {
+            return Ok(gpu);
         }
         let gpu = pollster::block_on(Self::request(features, software))?;
-        Ok(opened.insert(gpu).clone())
+        OPENED.keep(&gpu);
+        Ok(gpu)
     }
 
     /// Opens one where an answer is waited for.
@@ -304,17 +321,21 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn an_open_device_is_shared_until_it_fails() {
-        if opened().is_none() {
-            return;
-        }
-        let open = || Gpu::open(wgpu::Features::empty(), true).unwrap();
-        let first = open();
-        assert!(first.device.features().contains(wgpu::Features::FLOAT32_BLENDABLE));
-        assert_eq!(open().device, first.device);
-        first.failure.lock().unwrap().replace("it was lost".into());
-        let next = open();
-        assert!(next.device != first.device && next.check().is_ok());
+    fn an_open_device_is_for_one_after_the_other_until_it_fails() {
+        let Some(gpu) = opened() else { return };
+        let pool = Pool(Mutex::default());
+        pool.keep(&gpu);
+        let features = wgpu::Features::FLOAT32_BLENDABLE;
+        assert!(pool.free(features, true).is_none(), "somebody has it");
+        let failure = gpu.failure.clone();
+        drop(gpu);
+        let next = pool.free(features, true).unwrap();
+        assert!(Arc::ptr_eq(&next.failure, &failure));
+        assert!(pool.free(features, true).is_none());
+        drop(next);
+        assert!(pool.free(features, true).is_some());
+        failure.lock().unwrap().replace("it was lost".into());
+        assert!(pool.free(features, true).is_none());
     }
 
     #[test]
