@@ -28,6 +28,9 @@ pub(crate) struct Engines {
     pub(crate) paths: Option<Box<dyn PathEngine>>,
     /// That of the CPU is made with the first frame.
     pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
+    /// That of a graphics processor whose answers are waited for.
+    #[cfg(feature = "gpu")]
+    pub(crate) later: Option<Box<crate::gpu::GpuView3d>>,
     /// Name for people.
     pub(crate) name: String,
     /// The process that they were made in. One that is forked from it has neither the threads nor the device of a graphics processor.
@@ -35,6 +38,15 @@ pub(crate) struct Engines {
 }
 
 impl Engines {
+    /// Has the 3D view made anew with its next frame: the wall has moved.
+    pub(crate) fn forget_wall(&mut self) {
+        self.three_d = None;
+        #[cfg(feature = "gpu")]
+        {
+            self.later = None;
+        }
+    }
+
     /// Whether this process was forked from the one that made them.
     pub(crate) fn are_forked(&self) -> bool {
         self.process != process()

@@ -56,7 +56,7 @@ pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::{device_parts, section_parts};
 pub use fluoro::FrameTime;
 #[cfg(feature = "gpu")]
-pub use gpu::Graphics;
+pub use gpu::{Drawing, Graphics};
 pub use material::Material;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,

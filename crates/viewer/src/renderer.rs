@@ -1,5 +1,7 @@
 //! From a scene to frames: chooses an engine, prepares what the wanted views need, draws.
 
+#[cfg(feature = "gpu")]
+mod later;
 mod path_lengths;
 
 use std::sync::Arc;
@@ -17,7 +19,7 @@ use crate::output::{Image, Labels};
 use crate::scene::Setup;
 use crate::spec::{Backend, CArmSpec, View, ViewSpec};
 use crate::tails::with_tails;
-use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
+use crate::three_d::{ContactView, Solids, annotate, draw_markers};
 use crate::xray::{Exposure, PathLengths};
 
 /// The frames of one moment.
@@ -170,13 +172,7 @@ impl Renderer {
             }
             let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
             if let (Some(image), Some(camera)) = (&mut three_d, &setup.camera) {
-                if setup.spec.camera.scale_bar {
-                    draw_scale_bar(image, camera);
-                }
-                if setup.spec.camera.markers {
-                    draw_markers(image, camera.right_and_up());
-                    draw_legend(image, &contacts);
-                }
+                annotate(image, camera, &setup.spec.camera, &contacts);
             }
             let fluoro = match &setup.c_arm {
                 Some(c_arm) => {
@@ -276,7 +272,7 @@ impl Renderer {
         self.setup.move_vessel(displacement);
         (self.kept, self.central, self.transmitted) = (None, None, None);
         if self.is_cpu {
-            self.engines.three_d = None;
+            self.engines.forget_wall();
         } else if self.setup.camera.is_some() {
             (self.engines, self.is_cpu) = engines(&self.setup)?;
         }
@@ -300,25 +296,6 @@ impl Renderer {
             }),
             None => Ok(()),
         }
-    }
-
-    /// The same with the rays cast by a graphics processor whose answers are waited for, as those of a browser; where it fails, by the processor.
-    /// What each frame needs is computed by the processor in any case.
-    ///
-    /// # Errors
-    /// As [`Self::render_at`].
-    #[cfg(feature = "gpu")]
-    pub async fn prepare_on(&mut self, graphics: &gpu::Graphics) -> Result<()> {
-        if let (Some(c_arm), None, None) = (&self.setup.c_arm, &self.fluoro, &self.kept) {
-            match graphics.anatomy(&self.setup, c_arm).await {
-                Ok(anatomy) => {
-                    self.kept = Some(Kept::of(c_arm, anatomy));
-                    self.engines.name = graphics.name().to_owned();
-                }
-                Err(error) => self.engines.name = format!("{} (adapter failed: {error})", cpu::NAME),
-            }
-        }
-        self.prepare()
     }
 
     /// Prepares the next frame of a detector that holds what another place has left, if there was one.

@@ -47,6 +47,8 @@ fn a_lost_adapter_hands_over_to_the_cpu_and_says_so() {
         renderer.engines = Engines {
             paths: Some(Box::new(Broken)),
             three_d: Some(Box::new(Broken)),
+            #[cfg(feature = "gpu")]
+            later: None,
             name: "adapter".into(),
             process: std::process::id(),
         };

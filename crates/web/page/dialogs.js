@@ -5,6 +5,7 @@ import * as screen from "./screen.js";
 import { ask } from "./simulator.js";
 
 const element = (id) => document.getElementById(id);
+const TOMOGRAM = /\.(nii|nii\.gz|dcm)$/i;
 const SURFACE = /\.(stl|obj|ply|vtp|vtk)$/i;
 /** Pixels a side of the picture of a surface. */
 const SIDE = 360;
@@ -149,6 +150,7 @@ async function device() {
 
 async function dropped(file) {
   if (SURFACE.test(file.name)) return takeSurface(file);
+  if (TOMOGRAM.test(file.name)) throw new Error(`${file.name}: tomograms are read by the program alone`);
   const text = await file.text();
   // A file of script lines alone is one of the scene that is open.
   if (/^\s*\[\[script\]\]/m.test(text) && !/^\s*\[(vessel|sheath)\]/m.test(text)) return openScene(current(), text);

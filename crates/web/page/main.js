@@ -80,10 +80,11 @@ const views = () => [screen.fluoro, screen.second, screen.three].filter((canvas)
 async function savePicture() {
   const pictures = views();
   const whole = document.createElement("canvas");
-  whole.width = pictures.reduce((width, one) => width + one.width, 0);
-  whole.height = Math.max(...pictures.map((one) => one.height));
+  // Of a room that has just changed there is a coarse picture.
+  const side = Math.max(...pictures.map((one) => one.height));
+  [whole.width, whole.height] = [side * pictures.length, side];
   const context = whole.getContext("2d");
-  pictures.reduce((left, one) => (context.drawImage(one, left, 0), left + one.width), 0);
+  pictures.forEach((one, number) => context.drawImage(one, number * side, 0, side, side));
   whole.toBlob((blob) => save(`${open.name}.png`, blob));
 }
 

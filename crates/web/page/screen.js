@@ -21,10 +21,10 @@ const minutes = (s) => `${Math.floor(s / 60)}:${(s % 60).toFixed(1).padStart(4, 
 
 /** A minus that is one, and none before zero. */
 const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
-const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))} mN` : `${minus(n.toFixed(2))} N`);
+const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))}\u00a0mN` : `${minus(n.toFixed(2))}\u00a0N`);
 
 /** Shows a frame. */
-export function show({ readout: now, planes, three: view, backend }) {
+export function show({ readout: now, planes, three: view, backend, backend3D }) {
   readout = now;
   if (planes[0]) {
     paint(fluoro, planes[0]);
@@ -44,7 +44,7 @@ export function show({ readout: now, planes, three: view, backend }) {
   if (lab.second_deg) element("second-arm").textContent = pose(...lab.second_deg);
   element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.dose_ugy.toFixed(1)} µGy`;
   element("field").textContent = `${lab.field_mm.toFixed(0)} mm`;
-  element("backend").textContent = backend ? `pictures by ${backend}` : "";
+  element("backend").textContent = backend === backend3D ? `pictures by ${backend}` : [backend && `fluoroscopy by ${backend}`, `3D by ${backend3D}`].filter(Boolean).join(", ");
   hands(now);
   happened(now);
 }
@@ -71,7 +71,7 @@ function hands(now) {
     name.textContent = one.name;
     const ahead = Math.abs(one.behind_mm) < 0.05 ? "" : `, hand ${minus(one.behind_mm.toFixed(1))} mm ahead`;
     place.textContent = `${one.inserted_mm.toFixed(1)} mm in${ahead}, ${minus(one.rotation_deg.toFixed(0))}°`;
-    felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))} N·mm${one.warns ? " – beyond the limit" : ""}`;
+    felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))}\u00a0N·mm${one.warns ? " – beyond the limit" : ""}`;
     button.classList.toggle("warns", one.warns);
     button.classList.toggle("chosen", now.selected === one.name && now.instruments.length > 1);
   });

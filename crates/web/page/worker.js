@@ -14,11 +14,13 @@ let due = 0, frameDue = 0, frames = 0, ticks = 0, live = 0, wasLive = false;
 let shown = true;
 /** When the oldest input came in that no picture shows. */
 let inputAt = null;
-let hidden = false, waits = false, stopped = false;
+let hidden = false, waits = false, stopped = false, choosing = false;
 let counted = { at: performance.now(), ticks: 0, live: 0 };
 
 /** The graphics processor, where the browser has one. */
 let graphics = null;
+/** How long the processor took for its first 3D view, and whether the graphics processor is quicker: null until that was measured. */
+let firstMs = null, isQuicker = null;
 
 const started = init().then(async (exports) => {
   memory = exports.memory;
@@ -57,14 +59,52 @@ function physics(until) {
   }
 }
 
+/** Has the graphics processor draw from now on where its 3D view takes less time than the processor's first: software may imitate one. */
+async function choose(one) {
+  let lastMs = Infinity;
+  // The first has the shaders compiled.
+  for (let time = 0; time < 2 && one === session; time++) {
+    one.draw3DBy(graphics);
+    const begun = performance.now();
+    while (one === session && !one.threeD()) await new Promise((resolve) => setTimeout(resolve, 1));
+    lastMs = performance.now() - begun;
+  }
+  if (one !== session) return null;
+  // One that has failed has been left.
+  const draws = one.backend3D() === graphics.name && lastMs < firstMs;
+  if (draws) one.useGraphics(graphics);
+  else one.draw3DHere();
+  return draws;
+}
+
+/** The 3D view, if it is time for one: that of the graphics processor is drawn meanwhile, and fetched as soon as it is there. */
+function three() {
+  if (choosing || (!isQuicker && frames % THREE_D_EVERY !== 0)) return null;
+  const begun = performance.now();
+  const picture = session.threeD() ?? null;
+  if (!graphics || isQuicker !== null || !picture) return picture;
+  firstMs = performance.now() - begun;
+  choosing = true;
+  const done = (result) => {
+    choosing = false;
+    isQuicker = result;
+  };
+  choose(session).then(done, (error) => {
+    done(false);
+    guarded(() => { throw error; });
+  });
+  return picture;
+}
+
 function draw() {
   const readout = session.readout();
-  const frame = { readout, inputAt, planes: [], three: null, backend: session.backend() };
+  const frame = { readout, inputAt, planes: [], three: null, backend: session.backend(), backend3D: session.backend3D() };
   const isLive = readout.lab.live;
   if (isLive || wasLive) frame.planes = session.fluoroSoon();
   if (isLive) live += 1;
   wasLive = isLive;
-  if (frames % THREE_D_EVERY === 0) frame.three = session.threeD() ?? null;
+  if (isQuicker && frame.backend3D !== graphics.name) isQuicker = false;
+  frame.three = three();
   frames += 1;
   inputAt = null;
   shown = false;
@@ -105,7 +145,10 @@ const asked = {
     const made = new Session(files, path, side);
     session?.free();
     session = made;
-    if (graphics) session.useGraphics(graphics);
+    if (isQuicker) {
+      session.useGraphics(graphics);
+      session.draw3DBy(graphics);
+    }
     due = frameDue = performance.now();
     frames = 0;
     wasLive = false;

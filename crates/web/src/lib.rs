@@ -12,6 +12,7 @@ mod played;
 mod session;
 mod subject;
 mod surface;
+mod three_d;
 
 use std::path::Path;
 use std::sync::Arc;

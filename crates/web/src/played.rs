@@ -1,23 +1,25 @@
 //! A session with its pictures and keys, from files in memory.
 
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use endowire_assess::{Exam, SessionFile, Site};
 use endowire_core::file::{Files, InMemory};
 use endowire_core::insertion::Script;
 use endowire_core::methods::MethodChoice;
-use endowire_core::vessel::{CentrelineTree, NoStore};
+use endowire_core::vessel::{CentrelineTree, NoStore, Wall};
 use endowire_core::{Error, Result};
 use endowire_methods::Setting;
 use endowire_play::{
     Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, TICK_SOLVES, script_head,
 };
 use endowire_report::{Frame, Recorder, Run, Series, Vessel, events};
-use endowire_viewer::{Backend, Image, PixelFormat, ViewSpec};
+use endowire_viewer::{Backend, Graphics, Image, PixelFormat, Pushed, ViewSpec};
 use serde_json::{Value, json};
 
 use crate::opened::Opened;
+use crate::three_d::ThreeD;
 
 /// A session as a page shows it.
 #[derive(Debug)]
@@ -35,8 +37,10 @@ pub(crate) struct Played {
     /// Steps that it has.
     noted: usize,
     pictures: Pictures,
-    /// What was seen of the room and the line when the 3D view was drawn last.
-    drawn_3d: Option<(usize, Option<[f64; 3]>, u64)>,
+    three_d: ThreeD,
+    /// What pictures are made of, for a graphics processor.
+    pushed: Pushed,
+    wall: Wall,
 }
 
 /// The file whose script takes the place of any other, where there is one.
@@ -74,7 +78,9 @@ impl Played {
             let site = Site { tree, instruments: &names, has_sac: scene.vessel.sac.is_some() };
             session = session.with_exam(Exam::new(subject, &site)?);
         }
-        let pictures = Pictures::new(&scene, &session.snapshot(), wall)?;
+        let first = session.snapshot();
+        let pushed = Pushed::new(&scene, first.lab.fluoro())?;
+        let pictures = Pictures::new(&scene, &first, wall.clone())?;
         let provenance = json!({
             "scene": scene.name, "method": scene.method.name(), "seed": scene.seed, "version": env!("CARGO_PKG_VERSION"),
         });
@@ -88,7 +94,9 @@ impl Played {
             recorder: Recorder::default(),
             noted: 0,
             pictures,
-            drawn_3d: None,
+            three_d: ThreeD::new(),
+            pushed,
+            wall,
         })
     }
 
@@ -225,19 +233,27 @@ impl Played {
         self.pictures.sharpened(done)
     }
 
-    /// The 3D view, where it is another than the last time.
+    /// The 3D view, where it is another than the last time; one that a graphics processor draws comes with a later call.
     ///
     /// # Errors
     /// As [`Pictures::three_d`].
     pub(crate) fn three_d(&mut self) -> Result<Option<Image>> {
-        let snapshot = self.session.snapshot();
-        let seen = Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]));
-        if self.drawn_3d == seen {
-            return Ok(None);
-        }
-        let image = self.pictures.three_d(&snapshot)?;
-        self.drawn_3d = seen;
-        Ok(Some(image))
+        self.three_d.next(&self.session.snapshot(), &mut self.pictures)
+    }
+
+    /// Has the 3D view drawn by a graphics processor from now on.
+    pub(crate) fn three_d_by(&mut self, graphics: Rc<Graphics>) {
+        self.three_d.draw_by(graphics, self.pushed.clone(), self.wall.clone());
+    }
+
+    /// Has the 3D view drawn by the processor from now on.
+    pub(crate) fn three_d_here(&mut self) {
+        self.three_d.draw_here();
+    }
+
+    /// What draws the 3D view, for people.
+    pub(crate) fn three_d_backend(&self) -> String {
+        self.three_d.backend()
     }
 
     /// What draws the fluoroscopic picture, for people; nothing before the first.

@@ -180,7 +180,19 @@ impl Session {
         Ok(())
     }
 
-    /// The 3D view; nothing where it is the one before.
+    /// Has the 3D view drawn by a graphics processor from now on; where it fails, the processor takes over.
+    #[wasm_bindgen(js_name = draw3DBy)]
+    pub fn draw_3d_by(&mut self, graphics: &Graphics) {
+        self.played.three_d_by(graphics.shared());
+    }
+
+    /// Has the 3D view drawn by the processor from now on, as it is at first.
+    #[wasm_bindgen(js_name = draw3DHere)]
+    pub fn draw_3d_here(&mut self) {
+        self.played.three_d_here();
+    }
+
+    /// The 3D view; nothing where it is the one before. By a graphics processor it comes with a later call.
     ///
     /// # Errors
     /// What cannot be drawn, by key.
@@ -192,7 +204,13 @@ impl Session {
         }
     }
 
-    /// What draws the pictures, for people.
+    /// What draws the 3D view, for people.
+    #[wasm_bindgen(js_name = backend3D)]
+    pub fn backend_3d(&self) -> String {
+        self.played.three_d_backend()
+    }
+
+    /// What draws the fluoroscopic pictures, for people.
     pub fn backend(&self) -> Option<String> {
         self.played.backend().map(str::to_owned)
     }

@@ -15,7 +15,11 @@ pub(crate) use coverage::Coverage;
 pub(crate) use devices::layers_in_beam;
 pub(crate) use fluoro::CpuPaths;
 pub(crate) use lumen::covered_by_half;
+#[cfg(feature = "gpu")]
+pub(crate) use raster::GRID;
 pub(crate) use raster::ScreenTriangle;
+#[cfg(feature = "gpu")]
+pub(crate) use wall::seen;
 pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
 use endowire_core::vessel::SurfaceMesh;
@@ -30,7 +34,14 @@ pub(crate) const NAME: &str = "CPU reference";
 /// Prepares the fluoroscopic view where it is wanted; the 3D view is made with the first frame ([`three_d`]).
 pub(crate) fn engines(fluoro: bool) -> Engines {
     let paths = fluoro.then(|| Box::new(CpuPaths) as _);
-    Engines { paths, three_d: None, name: NAME.into(), process: process() }
+    Engines {
+        paths,
+        three_d: None,
+        #[cfg(feature = "gpu")]
+        later: None,
+        name: NAME.into(),
+        process: process(),
+    }
 }
 
 /// The 3D view with the picture of the wall.

@@ -13,7 +13,7 @@
 //!   exactly zero, or further from it than rounding reaches.
 
 /// Corners are rounded to multiples of its inverse.
-const GRID: f64 = (1 << 20) as f64;
+pub(crate) const GRID: f64 = (1 << 20) as f64;
 
 /// A triangle in pixel coordinates, columns rightwards and rows downwards.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +47,13 @@ impl ScreenTriangle {
         self.area2
     }
 
+    /// Columns and rows of a picture whose centres it may cover.
+    #[inline]
+    pub(crate) fn frame(&self, [width, height]: [u32; 2]) -> [std::ops::Range<usize>; 2] {
+        let [a, b, c] = self.corners;
+        [pixel_range([a[0], b[0], c[0]], width), pixel_range([a[1], b[1], c[1]], height)]
+    }
+
     /// Calls `visit(x, y, weights)` for every pixel of a `size` picture whose centre is covered. The weights
     /// belong to the corners and are not negative; their sum, which is not zero, is left to those who need it.
     pub(crate) fn scan(&self, size: [u32; 2], visit: impl FnMut(usize, usize, [f64; 3])) {
@@ -62,8 +69,7 @@ impl ScreenTriangle {
     ) {
         // Loops are inlined where maps of arrays are not: most triangles of a body cover a centre or none.
         let [a, b, c] = self.corners;
-        let xs = pixel_range([a[0], b[0], c[0]], width);
-        let ys = pixel_range([a[1], b[1], c[1]], rows.end);
+        let [xs, ys] = self.frame([width, rows.end]);
         let ys = ys.start.max(rows.start as usize)..ys.end;
         if xs.is_empty() || ys.is_empty() {
             return;

@@ -21,7 +21,7 @@ use crate::cpu::raster::{ScreenTriangle, on_grid};
 const BAND_ROWS: u32 = 32;
 
 /// Pixel, as triangles have it, and inverse depth of each vertex.
-pub(super) fn seen(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<([f64; 2], f64)> {
+pub(crate) fn seen(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<([f64; 2], f64)> {
     let vertex = |v: &Vec3| {
         let beam = c_arm.in_beam(v);
         (on_grid(c_arm.pixel_of(&beam)), 1.0 / (c_arm.sod_mm() + beam.z))

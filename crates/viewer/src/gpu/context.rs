@@ -10,9 +10,34 @@ use endowire_core::{Error, Result};
 use futures_channel::oneshot;
 
 use crate::engine::process;
+use crate::gpu::view3d::Pipelines;
 
 /// The first failure an adapter has reported.
 type Failure = Arc<Mutex<Option<String>>>;
+
+/// Devices that are open: a driver takes a fifth of a second to open one, and each pose of a dataset asks for one.
+static OPENED: Pool = Pool(Mutex::new(Vec::new()));
+
+/// Devices, each for those who ask while no other has it: who waits for one waits for all that it was given.
+struct Pool(Mutex<Vec<Gpu>>);
+
+impl Pool {
+    /// One that nobody has and that has not failed.
+    fn free(&self, features: wgpu::Features, software: bool) -> Option<Gpu> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|gpu| gpu.check().is_ok());
+        let fits = |gpu: &&Gpu| {
+            let has = gpu.device.features().contains(features);
+            Arc::strong_count(&gpu.paths) == 1 && has && (software || !gpu.is_software)
+        };
+        all.iter().find(fits).cloned()
+    }
+
+    /// Keeps one that was opened.
+    fn keep(&self, gpu: &Gpu) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(gpu.clone());
+    }
+}
 
 /// An open graphics device; clones share it.
 #[derive(Debug, Clone)]
@@ -21,13 +46,17 @@ pub(crate) struct Gpu {
     pub(crate) queue: wgpu::Queue,
     /// Most pixels a side that it draws.
     pub(crate) largest_side: u32,
+    /// Pipelines of fluoroscopy and of the 3D view, made with the first of each: a driver takes a while to compile them.
+    pub(crate) paths: Arc<OnceLock<wgpu::RenderPipeline>>,
+    pub(crate) three_d: Arc<OnceLock<Pipelines>>,
+    is_software: bool,
     name: String,
     failure: Failure,
 }
 
 impl Gpu {
-    /// Opens the best adapter that has `features`: discrete before integrated before others; software
-    /// adapters last, and only where `software` allows them.
+    /// The best adapter that has `features`: discrete before integrated before others; software adapters last, and only where
+    /// `software` allows them. One that is open, and that nobody has any more, comes first.
     ///
     /// # Errors
     /// Why there is none, as a clause.
@@ -35,10 +64,16 @@ impl Gpu {
         if cfg!(target_family = "wasm") {
             return Err("a browser's graphics answer later: give Graphics to what waits for it".into());
         }
-        pollster::block_on(Self::request(features, software))
+        check_process()?;
+        if let Some(gpu) = OPENED.free(features, software) {
+            return Ok(gpu);
+        }
+        let gpu = pollster::block_on(Self::request(features, software))?;
+        OPENED.keep(&gpu);
+        Ok(gpu)
     }
 
-    /// The same where an answer is waited for.
+    /// Opens one where an answer is waited for.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -46,11 +81,7 @@ impl Gpu {
         features: wgpu::Features,
         software: bool,
     ) -> std::result::Result<Self, String> {
-        // Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
-        static PROCESS: OnceLock<u32> = OnceLock::new();
-        if *PROCESS.get_or_init(process) != process() {
-            return Err("graphics were in use before this process was forked".into());
-        }
+        check_process()?;
         let descriptor = wgpu::InstanceDescriptor {
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -77,6 +108,8 @@ impl Gpu {
             return Err(format!("no graphics adapter offers {features:?}"));
         };
         let info = adapter.get_info();
+        // What fluoroscopy needs, also where the 3D view alone asks: one device is for both.
+        let features = features | (adapter.features() & wgpu::Features::FLOAT32_BLENDABLE);
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("endowire"),
             required_features: features,
@@ -100,7 +133,9 @@ impl Gpu {
             wgpu::Backend::BrowserWebGpu => "WebGPU".to_owned(),
             backend => format!("{backend:?} {}", info.name),
         };
-        Ok(Self { device, queue, largest_side, name, failure })
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let (paths, three_d) = Default::default();
+        Ok(Self { device, queue, largest_side, paths, three_d, is_software, name, failure })
     }
 
     /// Graphics interface and adapter.
@@ -169,15 +204,6 @@ impl Gpu {
         self.device.create_bind_group(&descriptor)
     }
 
-    /// Submits `encoder` and returns the bytes of `texture` after it, rows without padding.
-    pub(crate) fn read_back(
-        &self,
-        encoder: wgpu::CommandEncoder,
-        texture: &wgpu::Texture,
-    ) -> Result<Vec<u8>> {
-        pollster::block_on(self.submit(encoder, texture)?.bytes())
-    }
-
     /// Submits `encoder`; what reads `texture` after it.
     pub(crate) fn submit(
         &self,
@@ -204,6 +230,18 @@ impl Gpu {
         self.check()?;
         Ok(Reading { gpu: self.clone(), buffer, row: row as usize, padded: padded as usize })
     }
+}
+
+/// Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
+///
+/// # Errors
+/// That this process was forked from one that has used graphics.
+fn check_process() -> std::result::Result<(), String> {
+    static PROCESS: OnceLock<u32> = OnceLock::new();
+    if *PROCESS.get_or_init(process) == process() {
+        return Ok(());
+    }
+    Err("graphics were in use before this process was forked".into())
 }
 
 /// A texture on its way back.
@@ -269,9 +307,9 @@ pub(crate) fn attachment<'a>(
 pub(crate) mod tests {
     use super::*;
 
-    /// An adapter. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
+    /// An adapter of its own. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
     pub(crate) fn opened() -> Option<Gpu> {
-        match Gpu::open(wgpu::Features::FLOAT32_BLENDABLE, true) {
+        match pollster::block_on(Gpu::request(wgpu::Features::FLOAT32_BLENDABLE, true)) {
             Ok(gpu) => Some(gpu),
             Err(reason) => {
                 let required = std::env::var("ENDOWIRE_REQUIRE_GPU").is_ok_and(|v| v == "1");
@@ -283,6 +321,24 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn an_open_device_is_for_one_after_the_other_until_it_fails() {
+        let Some(gpu) = opened() else { return };
+        let pool = Pool(Mutex::default());
+        pool.keep(&gpu);
+        let features = wgpu::Features::FLOAT32_BLENDABLE;
+        assert!(pool.free(features, true).is_none(), "somebody has it");
+        let failure = gpu.failure.clone();
+        drop(gpu);
+        let next = pool.free(features, true).unwrap();
+        assert!(Arc::ptr_eq(&next.failure, &failure));
+        assert!(pool.free(features, true).is_none());
+        drop(next);
+        assert!(pool.free(features, true).is_some());
+        failure.lock().unwrap().replace("it was lost".into());
+        assert!(pool.free(features, true).is_none());
+    }
+
+    #[test]
     fn a_destroyed_device_gives_an_error_and_no_panic() {
         let Some(gpu) = opened() else { return };
         let read = || {
@@ -290,7 +346,7 @@ pub(crate) mod tests {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let view = texture.create_view(&Default::default());
             drop(color_pass(&mut encoder, &view, wgpu::Color::WHITE));
-            gpu.read_back(encoder, &texture)
+            pollster::block_on(gpu.submit(encoder, &texture)?.bytes())
         };
         assert_eq!(read().unwrap(), [255; 64]);
         gpu.device.destroy();

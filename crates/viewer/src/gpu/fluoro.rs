@@ -3,34 +3,69 @@
 //! Faces are added into a float target, minus their distance along the ray where they face the source and
 //! plus where they do not; what remains is the length inside (see `cpu/wall.rs`). Distances are taken from
 //! the plane through the isocentre across the beam: being constant along a ray, the shift cancels in the sum,
-//! and f32 keeps its digits for millimetres rather than for the 750 mm before them. Each pixel intersects its
-//! own ray with the triangle's plane, so the rasteriser's rounding of corners to 1/256 pixel moves
-//! silhouettes only. All depths are given as the middle of the clip range: no plane can cut the mesh.
+//! and f32 keeps its digits for millimetres rather than for the 750 mm before them.
+//!
+//! **Which pixels a triangle covers is the shader's to say**, by the rules of `cpu/raster.rs` on the same corners. An adapter's own rasteriser
+//! rounds corners to 1/256 of a pixel or less finely, which moves silhouettes: a ray then meets a rib or does not. So the adapter draws
+//! rectangles of whole pixels, and each of their pixels asks the edge functions: in f32 where that tells their sign, else in integers, exactly.
 //!
 //! Devices are few pixels, and cast by the processor (`cpu/cells.rs`).
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use bytemuck::{Pod, Zeroable};
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
+use rayon::prelude::*;
 
 use crate::c_arm::CArm;
+use crate::cpu::{GRID, ScreenTriangle, seen};
 use crate::engine::PathEngine;
 use crate::gpu::context::{Gpu, Reading, color_pass};
 
 const PATH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
+/// Corners farther from the picture's than this are drawn there, pixels: products of the shader's integers fit.
+const FARTHEST_PX: f64 = 32768.0;
 
-/// A corner of the wall, with what its triangle's pixels need.
+/// A triangle as its pixels need it, its corners from left to right, and those above each other downwards.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-struct WallVertex {
-    /// In beam coordinates from the isocentre.
-    position: [f32; 3],
-    /// Unit normal and its product with a point of the plane.
-    plane: [f32; 4],
-    /// Least and greatest depth of the triangle.
-    range: [f32; 2],
+struct Facet {
+    /// First column and row that it may cover, and those behind the last.
+    frame: [u16; 4],
+    /// Column and row of each corner, and what is left of them in parts of the grid.
+    corners: [[i32; 4]; 3],
+    /// Inverse depth of each corner from the source.
+    inverse: [f32; 3],
+    /// Depth of each corner from the isocentre, negative where rays enter; then the turn of the ordered corners.
+    depths: [f32; 4],
+}
+
+impl Facet {
+    /// None where it covers no pixel.
+    fn new(corners: [([f64; 2], f64); 3], view: &CArm) -> Option<Self> {
+        let triangle = ScreenTriangle::on_grid(corners.map(|(pixel, _)| pixel))?;
+        let [xs, ys] = triangle.frame(view.size_px());
+        if xs.is_empty() || ys.is_empty() {
+            return None;
+        }
+        let sign = -triangle.area2().signum();
+        let mut ordered = corners;
+        ordered.sort_by(|(a, _), (b, _)| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+        let turn = ScreenTriangle::on_grid(ordered.map(|(pixel, _)| pixel))?.area2().signum();
+        let [a, b, c] = ordered.map(|(_, inverse)| (sign * (1.0 / inverse - view.sod_mm())) as f32);
+        Some(Self {
+            frame: [xs.start, ys.start, xs.end, ys.end].map(|n| n as u16),
+            corners: ordered.map(|(pixel, _)| {
+                let [x, y] = pixel.map(|at| at.clamp(-FARTHEST_PX, FARTHEST_PX));
+                let part = |at: f64| ((at - at.floor()) * GRID) as i32;
+                [x.floor() as i32, y.floor() as i32, part(x), part(y)]
+            }),
+            inverse: ordered.map(|(_, inverse)| inverse as f32),
+            depths: [a, b, c, turn as f32],
+        })
+    }
 }
 
 /// The shader's view of a C-arm.
@@ -39,7 +74,7 @@ struct WallVertex {
 struct ViewUniform {
     half_size: [f32; 2],
     focal_px: f32,
-    sod_mm: f32,
+    unused: f32,
 }
 
 impl ViewUniform {
@@ -47,7 +82,7 @@ impl ViewUniform {
         Self {
             half_size: c_arm.size_px().map(|n| n as f32 / 2.0),
             focal_px: c_arm.focal_px() as f32,
-            sod_mm: c_arm.sod_mm() as f32,
+            unused: 0.0,
         }
     }
 }
@@ -62,35 +97,30 @@ pub(crate) struct GpuPaths {
 
 impl GpuPaths {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let draw_wall = path_pipeline(
-            gpu,
-            include_str!("wall.wgsl"),
-            &wgpu::VertexBufferLayout {
-                array_stride: size_of::<WallVertex>() as u64,
-                step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x4, 2 => Float32x2],
-            },
-        );
+        let draw_wall = gpu.paths.get_or_init(|| path_pipeline(gpu)).clone();
         Self { gpu: gpu.clone(), draw_wall, targets: HashMap::new() }
     }
 
     /// Draws a mesh into a target of the size of `view`; what reads the lengths in it.
     pub(crate) fn submit(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Reading> {
-        let vertices = wall_vertices(view, mesh);
+        let facets = facets(view, mesh);
         let (gpu, pipeline) = (&self.gpu, &self.draw_wall);
         let target =
             self.targets.entry(view.size_px()).or_insert_with_key(|size| gpu.target(*size, PATH_FORMAT, 1));
         let uniform = gpu.buffer(bytemuck::bytes_of(&ViewUniform::new(view)), wgpu::BufferUsages::UNIFORM);
         let group = gpu.bind(pipeline, &[uniform.as_entire_binding()]);
-        let buffer = gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX);
+        let buffer = (!facets.is_empty())
+            .then(|| gpu.buffer(bytemuck::cast_slice(&facets), wgpu::BufferUsages::VERTEX));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
             let texture = target.create_view(&Default::default());
             let mut pass = color_pass(&mut encoder, &texture, wgpu::Color::TRANSPARENT);
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.set_vertex_buffer(0, buffer.slice(..));
-            pass.draw(0..vertices.len() as u32, 0..1);
+            if let Some(buffer) = &buffer {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                pass.set_vertex_buffer(0, buffer.slice(..));
+                pass.draw(0..4, 0..facets.len() as u32);
+            }
         }
         gpu.submit(encoder, target)
     }
@@ -108,32 +138,23 @@ impl PathEngine for GpuPaths {
     }
 }
 
-fn wall_vertices(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<WallVertex> {
-    let mut vertices = Vec::with_capacity(3 * wall.triangles.len());
-    for i in 0..wall.triangles.len() {
-        let corners = wall.corners(i).map(|v| c_arm.in_beam(&v));
-        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-        let normal = normal.try_normalize(0.0).unwrap_or_default();
-        let offset = normal.dot(&corners[0]);
-        let depths = corners.map(|c| c.z as f32);
-        let range =
-            [depths.into_iter().fold(f32::MAX, f32::min), depths.into_iter().fold(f32::MIN, f32::max)];
-        vertices.extend(corners.map(|c| WallVertex {
-            position: [c.x, c.y, c.z].map(|x| x as f32),
-            plane: [normal.x, normal.y, normal.z, offset].map(|x| x as f32),
-            range,
-        }));
-    }
-    vertices
+/// The triangles of a mesh that cover a pixel, in its order.
+fn facets(view: &CArm, mesh: &SurfaceMesh) -> Vec<Facet> {
+    let seen = seen(view, mesh);
+    let facet = |corners: &[u32; 3]| Facet::new(corners.map(|corner| seen[corner as usize]), view);
+    mesh.triangles.par_iter().filter_map(facet).collect()
 }
 
 /// A pipeline that adds path lengths.
-fn path_pipeline(
-    gpu: &Gpu,
-    source: &'static str,
-    layout: &wgpu::VertexBufferLayout<'_>,
-) -> wgpu::RenderPipeline {
-    let shader = gpu.shader(source);
+fn path_pipeline(gpu: &Gpu) -> wgpu::RenderPipeline {
+    let layout = wgpu::VertexBufferLayout {
+        array_stride: size_of::<Facet>() as u64,
+        step_mode: wgpu::VertexStepMode::Instance,
+        attributes: &wgpu::vertex_attr_array![
+            0 => Uint16x4, 1 => Sint32x4, 2 => Sint32x4, 3 => Sint32x4, 4 => Float32x3, 5 => Float32x4
+        ],
+    };
+    let shader = gpu.shader(include_str!("wall.wgsl"));
     let add = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
         dst_factor: wgpu::BlendFactor::One,
@@ -147,10 +168,11 @@ fn path_pipeline(
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("path lengths"),
         layout: None,
-        vertex: vertex_state(&shader, &[Some(layout.clone())]),
-        // Outward triangles turn clockwise on the screen where they face the source: the picture is seen from
-        // the detector.
-        primitive: wgpu::PrimitiveState { front_face: wgpu::FrontFace::Cw, ..Default::default() },
+        vertex: vertex_state(&shader, &[Some(layout)]),
+        primitive: wgpu::PrimitiveState {
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
+            ..Default::default()
+        },
         depth_stencil: None,
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(fragment_state(&shader, &[Some(target)])),

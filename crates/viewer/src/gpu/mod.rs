@@ -10,8 +10,8 @@ use crate::fluoro::SUBRAYS;
 use crate::scene::Setup;
 use context::Gpu;
 use fluoro::GpuPaths;
-pub use later::Graphics;
-use view3d::GpuView3d;
+pub use later::{Drawing, Graphics};
+pub(crate) use view3d::GpuView3d;
 
 /// Opens an adapter and prepares the views of `setup`; software adapters only where `software` allows them.
 ///
@@ -39,7 +39,7 @@ fn prepared(setup: &Setup, gpu: &Gpu) -> Result<Engines, String> {
     let paths = setup.c_arm.is_some().then(|| Box::new(GpuPaths::new(gpu)) as _);
     let three_d =
         setup.camera.as_ref().map(|camera| Box::new(GpuView3d::new(gpu, camera, setup.wall_now())) as _);
-    let engines = Engines { paths, three_d, name: gpu.name().to_string(), process: process() };
+    let engines = Engines { paths, three_d, later: None, name: gpu.name().to_string(), process: process() };
     gpu.check().map_err(|e| format!("{}: {e}", gpu.name()))?;
     Ok(engines)
 }

@@ -4,7 +4,7 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::engine::ThreeDEngine;
-use crate::gpu::context::{Gpu, attachment, color_pass};
+use crate::gpu::context::{Gpu, Reading, attachment, color_pass};
 use crate::output::{Image, PixelFormat};
 use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
@@ -17,18 +17,33 @@ const SUM: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// Product of what fragments let through.
 const THROUGH: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 
+/// What draws any wall from anywhere.
+#[derive(Debug, Clone)]
+pub(crate) struct Pipelines {
+    device: wgpu::RenderPipeline,
+    wall: wgpu::RenderPipeline,
+    compose: wgpu::RenderPipeline,
+}
+
+impl Pipelines {
+    fn new(gpu: &Gpu) -> Self {
+        let shader = gpu.shader(include_str!("view3d.wgsl"));
+        let [device, wall, compose] =
+            [Stage::Device, Stage::Wall, Stage::Compose].map(|stage| pipeline(gpu, &shader, stage));
+        Self { device, wall, compose }
+    }
+}
+
 /// Pipelines, wall and targets of the 3D view.
 #[derive(Debug)]
 pub(crate) struct GpuView3d {
     gpu: Gpu,
+    pipelines: Pipelines,
     camera: Camera,
     background: wgpu::Color,
     wall: wgpu::Buffer,
-    draw_device: wgpu::RenderPipeline,
     device_group: wgpu::BindGroup,
-    draw_wall: wgpu::RenderPipeline,
     wall_group: wgpu::BindGroup,
-    compose: wgpu::RenderPipeline,
     compose_group: wgpu::BindGroup,
     /// Multisampled colour, depth, sum and product.
     sampled: [wgpu::TextureView; 4],
@@ -39,6 +54,7 @@ pub(crate) struct GpuView3d {
 
 impl GpuView3d {
     pub(crate) fn new(gpu: &Gpu, camera: &Camera, wall: &SurfaceMesh) -> Self {
+        let pipelines = gpu.three_d.get_or_init(|| Pipelines::new(gpu));
         let style = Style::new(camera);
         let uniform = gpu.buffer(bytemuck::cast_slice(&style.uniform()), wgpu::BufferUsages::UNIFORM);
         let vertices = wall_triangles(camera, wall);
@@ -47,16 +63,11 @@ impl GpuView3d {
             |format, samples| gpu.target(camera.size_px, format, samples).create_view(&Default::default());
         let sampled = [COLOUR, DEPTH, SUM, THROUGH].map(|format| view(format, SAMPLES));
         let resolved = [COLOUR, SUM, THROUGH].map(|format| view(format, 1));
-
-        let shader = gpu.shader(include_str!("view3d.wgsl"));
-        let draw_device = pipeline(gpu, &shader, Stage::Device);
-        let draw_wall = pipeline(gpu, &shader, Stage::Wall);
-        let compose = pipeline(gpu, &shader, Stage::Compose);
-        let device_group = gpu.bind(&draw_device, &[uniform.as_entire_binding()]);
-        let wall_group = gpu.bind(&draw_wall, &[uniform.as_entire_binding()]);
+        let device_group = gpu.bind(&pipelines.device, &[uniform.as_entire_binding()]);
+        let wall_group = gpu.bind(&pipelines.wall, &[uniform.as_entire_binding()]);
         let compose_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &compose.get_bind_group_layout(0),
+            layout: &pipelines.compose.get_bind_group_layout(0),
             entries: &[1, 2, 3].map(|binding| wgpu::BindGroupEntry {
                 binding,
                 resource: wgpu::BindingResource::TextureView(&resolved[binding as usize - 1]),
@@ -65,81 +76,90 @@ impl GpuView3d {
         let [r, g, b] = style.background().to_array().map(f64::from);
         Self {
             gpu: gpu.clone(),
+            pipelines: pipelines.clone(),
             camera: camera.clone(),
             background: wgpu::Color { r, g, b, a: 1.0 },
             wall,
-            draw_device,
             device_group,
-            draw_wall,
             wall_group,
-            compose,
             compose_group,
             sampled,
             resolved,
             picture: gpu.target(camera.size_px, COLOUR, 1),
         }
     }
+
+    /// Draws a frame; what reads it.
+    pub(crate) fn submit(&self, solids: &Solids) -> Result<Reading> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.draw_devices(&mut encoder, &solid_triangles(&self.camera, solids));
+        self.draw_wall(&mut encoder);
+        let target = self.picture.create_view(&Default::default());
+        let mut pass = color_pass(&mut encoder, &target, wgpu::Color::BLACK);
+        pass.set_pipeline(&self.pipelines.compose);
+        pass.set_bind_group(0, &self.compose_group, &[]);
+        pass.draw(0..3, 0..1);
+        drop(pass);
+        self.gpu.submit(encoder, &self.picture)
+    }
+
+    fn draw_devices(&self, encoder: &mut wgpu::CommandEncoder, vertices: &[Vertex]) {
+        let [colour, depth, ..] = &self.sampled;
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("devices"),
+            color_attachments: &[Some(attachment(colour, Some(&self.resolved[0]), self.background))],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(1.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        if !vertices.is_empty() {
+            let buffer = self.gpu.buffer(bytemuck::cast_slice(vertices), wgpu::BufferUsages::VERTEX);
+            pass.set_pipeline(&self.pipelines.device);
+            pass.set_bind_group(0, &self.device_group, &[]);
+            pass.set_vertex_buffer(0, buffer.slice(..));
+            pass.draw(0..vertices.len() as u32, 0..1);
+        }
+    }
+
+    fn draw_wall(&self, encoder: &mut wgpu::CommandEncoder) {
+        let [_, depth, sum, through] = &self.sampled;
+        let [_, resolved_sum, resolved_through] = &self.resolved;
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("wall"),
+            color_attachments: &[
+                Some(attachment(sum, Some(resolved_sum), wgpu::Color::TRANSPARENT)),
+                Some(attachment(through, Some(resolved_through), wgpu::Color::WHITE)),
+            ],
+            // Without operations the depth buffer is read, not written.
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: depth,
+                depth_ops: None,
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipelines.wall);
+        pass.set_bind_group(0, &self.wall_group, &[]);
+        pass.set_vertex_buffer(0, self.wall.slice(..));
+        pass.draw(0..(self.wall.size() / size_of::<Vertex>() as u64) as u32, 0..1);
+    }
+
+    /// The picture that was read.
+    pub(crate) fn image(camera: &Camera, data: Vec<u8>) -> Image {
+        Image::new(camera.size_px[0], camera.size_px[1], PixelFormat::Rgba8, data)
+    }
 }
 
 impl ThreeDEngine for GpuView3d {
     fn frame(&mut self, solids: &Solids) -> Result<Image> {
-        let Self { gpu, camera, .. } = self;
-        let vertices = solid_triangles(camera, solids);
-        let buffer = (!vertices.is_empty())
-            .then(|| gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX));
-        let [colour, depth, sum, through] = &self.sampled;
-        let [resolved_colour, resolved_sum, resolved_through] = &self.resolved;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("devices"),
-                color_attachments: &[Some(attachment(colour, Some(resolved_colour), self.background))],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: depth,
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(1.0),
-                        store: wgpu::StoreOp::Store,
-                    }),
-                    stencil_ops: None,
-                }),
-                ..Default::default()
-            });
-            if let Some(buffer) = &buffer {
-                pass.set_pipeline(&self.draw_device);
-                pass.set_bind_group(0, &self.device_group, &[]);
-                pass.set_vertex_buffer(0, buffer.slice(..));
-                pass.draw(0..vertices.len() as u32, 0..1);
-            }
-        }
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("wall"),
-                color_attachments: &[
-                    Some(attachment(sum, Some(resolved_sum), wgpu::Color::TRANSPARENT)),
-                    Some(attachment(through, Some(resolved_through), wgpu::Color::WHITE)),
-                ],
-                // Without operations the depth buffer is read, not written.
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: depth,
-                    depth_ops: None,
-                    stencil_ops: None,
-                }),
-                ..Default::default()
-            });
-            pass.set_pipeline(&self.draw_wall);
-            pass.set_bind_group(0, &self.wall_group, &[]);
-            pass.set_vertex_buffer(0, self.wall.slice(..));
-            pass.draw(0..(self.wall.size() / size_of::<Vertex>() as u64) as u32, 0..1);
-        }
-        {
-            let target = self.picture.create_view(&Default::default());
-            let mut pass = color_pass(&mut encoder, &target, wgpu::Color::BLACK);
-            pass.set_pipeline(&self.compose);
-            pass.set_bind_group(0, &self.compose_group, &[]);
-            pass.draw(0..3, 0..1);
-        }
-        let data = gpu.read_back(encoder, &self.picture)?;
-        Ok(Image::new(camera.size_px[0], camera.size_px[1], PixelFormat::Rgba8, data))
+        let data = pollster::block_on(self.submit(solids)?.bytes())?;
+        Ok(Self::image(&self.camera, data))
     }
 }
 

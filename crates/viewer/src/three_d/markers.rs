@@ -1,9 +1,11 @@
-//! Letters that tell directions, and a legend of forces.
+//! Letters that tell directions, a legend of forces, and all that is written on a 3D frame.
 
 use endowire_core::Vec3;
 
 use crate::output::{Image, PixelFormat};
-use crate::three_d::scale_bar::INK;
+use crate::spec::CameraSpec;
+use crate::three_d::Camera;
+use crate::three_d::scale_bar::{self, INK};
 use crate::three_d::solids::{ARROW_PX, ContactView, FORCE};
 use crate::three_d::text::{ROWS, columns, text};
 
@@ -39,8 +41,19 @@ pub(crate) fn draw(image: &mut Image, [right, up]: [Vec3; 2]) {
     }
 }
 
+/// Writes on a 3D frame what its camera is asked for: scale, directions, and the strongest of these contacts.
+pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, contacts: &[ContactView]) {
+    if spec.scale_bar {
+        scale_bar::draw(image, camera);
+    }
+    if spec.markers {
+        draw(image, camera.right_and_up());
+        legend(image, contacts);
+    }
+}
+
 /// An arrow as long as that of the strongest force, with its strength.
-pub(crate) fn legend(image: &mut Image, contacts: &[ContactView]) {
+fn legend(image: &mut Image, contacts: &[ContactView]) {
     let strongest = contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max);
     if strongest == 0.0 {
         return;

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod chromium;
+mod hands;
 mod native;
 mod training;
 
@@ -17,6 +18,9 @@ use serde_json::{Value, json};
 
 const LAPTOP: [u32; 2] = [1280, 800];
 const PHONE: [u32; 2] = [390, 844];
+/// What gives a headless browser an adapter for WebGPU.
+const WEBGPU: [&str; 2] = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
+
 /// Has tests run one after another: they measure, and each is a browser.
 fn alone() -> MutexGuard<'static, ()> {
     static MACHINE: Mutex<()> = Mutex::new(());
@@ -135,8 +139,7 @@ fn pictures_are_those_of_the_program() {
 #[test]
 fn pictures_by_webgpu_are_those_of_the_reference() {
     let _alone = alone();
-    let webgpu = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
-    let Some(mut browser) = Browser::with(&webgpu, "", LAPTOP) else { return };
+    let Some(mut browser) = Browser::with(&WEBGPU, "", LAPTOP) else { return };
     module(&mut browser, "arch_carotid.toml", 192);
     if browser.eval("navigator.gpu?.requestAdapter().then((adapter) => adapter !== null)") != true {
         eprintln!("skipped: this browser has no adapter for WebGPU");
@@ -161,18 +164,26 @@ fn pictures_by_webgpu_are_those_of_the_reference() {
             const still = (text) => text.replace('[view.xray]', '[view.detector]\\nnoise = false\\n[view.xray]');
             const graphics = await Graphics.open();
             const grey = ({ data }) => data.filter((_, k) => k % 4 === 0);
-            const [first, second] = [await sharp(opened(still), null), await sharp(opened(still), graphics)].map(grey);
-            const apart = first.map((value, k) => Math.abs(value - second[k]));
+            const turned = opened(still);
+            turned.apply({ do: 'turn_c_arm', lao_deg: 1 });
+            const [first, second, other] =
+                [await sharp(opened(still), null), await sharp(opened(still), graphics), await sharp(turned, graphics)].map(grey);
+            const apart = (picture) => Math.max(...first.map((value, k) => Math.abs(value - picture[k])));
             const range = Math.max(...first) - Math.min(...first);
-            return [graphics.name, Math.max(...apart), apart.filter((one) => one > 2).length / apart.length, range];
+            return [graphics.name, apart(second), range, apart(other)];
         })()",
     );
     assert_eq!(told[0], "WebGPU");
-    // The rasteriser rounds corners of triangles, which moves silhouettes: a ray in a thousand meets a rib or does not.
-    let [most, beyond, range] = [1, 2, 3].map(|k| told[k].as_f64().unwrap());
-    assert!(most <= 16.0 && beyond < 1e-3 && range > 100.0, "{told}");
+    let [most, range, other] = [1, 2, 3].map(|k| told[k].as_f64().unwrap());
+    eprintln!("fluoroscopy by WebGPU: at most {most} of 255 apart at any pixel");
+    assert!(most <= 2.0 && range > 100.0, "{told}");
+    assert!(other > 2.0, "another place must differ: {told}");
     browser.eval("document.getElementById('lock').click()");
-    browser.wait("document.getElementById('backend').textContent === 'pictures by WebGPU'");
+    // The page takes what is quicker for all of them, and says what that is: here software imitates a graphics processor.
+    browser
+        .wait("/^pictures by (WebGPU|CPU reference)$/.test(document.getElementById('backend').textContent)");
+    let backend = browser.eval("document.getElementById('backend').textContent");
+    eprintln!("the page tells {backend}");
     assert!(browser.console.is_empty(), "{:?}", browser.console);
 }
 

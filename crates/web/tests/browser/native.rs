@@ -113,6 +113,43 @@ impl Dice {
         }
     }
 
+    /// A key of sessions, pressed or let go.
+    pub(crate) fn key(&mut self) -> (&'static str, bool) {
+        const KEYS: [&str; 30] = [
+            "ArrowUp",
+            "ArrowUp",
+            "ArrowUp",
+            "ArrowDown",
+            "ArrowLeft",
+            "ArrowRight",
+            "Space",
+            "KeyC",
+            "KeyV",
+            "KeyB",
+            "Enter",
+            "KeyJ",
+            "KeyL",
+            "KeyO",
+            "KeyK",
+            "Equal",
+            "Minus",
+            "KeyQ",
+            "KeyE",
+            "KeyI",
+            "KeyP",
+            "KeyD",
+            "Backspace",
+            "Digit1",
+            "Digit2",
+            "Tab",
+            "KeyW",
+            "KeyA",
+            "KeyS",
+            "KeyX",
+        ];
+        (self.one(&KEYS), self.below(2) == 0)
+    }
+
     /// Anything, valid or not, as a page could send it.
     pub(crate) fn wild(&mut self) -> Value {
         let number = self.one(&[0.0, -1.0, 0.2, 7.5, 400.0, -1e308, 1e-308]);

@@ -1,0 +1,126 @@
+//! The 3D view of a session: drawn by the processor at once, or by a graphics processor meanwhile.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use endowire_core::vessel::Wall;
+use endowire_core::{Error, Result};
+use endowire_play::{Pictures, Snapshot};
+use endowire_viewer::{Drawing, Graphics, Image, Pushed, Renderer};
+
+/// What was seen when a frame was drawn: the step, the tip, and the room.
+type Seen = (usize, Option<[f64; 3]>, u64);
+
+/// Draws the 3D view where it is another than the last time.
+#[derive(Debug)]
+pub(crate) struct ThreeD {
+    seen: Option<Seen>,
+    graphics: Option<OnGraphics>,
+    /// Why a graphics processor that drew it does so no more.
+    failure: Option<String>,
+}
+
+/// The view on a graphics processor.
+#[derive(Debug)]
+struct OnGraphics {
+    graphics: Rc<Graphics>,
+    pushed: Pushed,
+    wall: Wall,
+    /// With the room that it is for.
+    renderer: Option<(u64, Renderer)>,
+    answer: Rc<RefCell<Option<Result<Image>>>>,
+    /// Whether a frame is being drawn.
+    waits: bool,
+}
+
+impl ThreeD {
+    pub(crate) fn new() -> Self {
+        Self { seen: None, graphics: None, failure: None }
+    }
+
+    /// Has a graphics processor draw it from now on; `pushed` and `wall` are the session's.
+    pub(crate) fn draw_by(&mut self, graphics: Rc<Graphics>, pushed: Pushed, wall: Wall) {
+        let answer = Rc::default();
+        self.graphics = Some(OnGraphics { graphics, pushed, wall, renderer: None, answer, waits: false });
+        self.seen = None;
+    }
+
+    /// Has the processor draw it from now on.
+    pub(crate) fn draw_here(&mut self) {
+        (self.graphics, self.seen) = (None, None);
+    }
+
+    /// What draws it, for people.
+    pub(crate) fn backend(&self) -> String {
+        match (&self.graphics, &self.failure) {
+            (Some(on), _) => on.graphics.name().to_owned(),
+            (None, Some(failure)) => format!("CPU reference (adapter failed: {failure})"),
+            (None, None) => "CPU reference".to_owned(),
+        }
+    }
+
+    /// The next frame: of a graphics processor that which was asked for last time, once it is there.
+    pub(crate) fn next(&mut self, snapshot: &Snapshot, pictures: &mut Pictures) -> Result<Option<Image>> {
+        let seen = Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]));
+        if let Some(on) = &mut self.graphics {
+            match on.next(snapshot, self.seen != seen) {
+                Ok((image, asked)) => {
+                    if asked {
+                        self.seen = seen;
+                    }
+                    return Ok(image);
+                }
+                Err(Error::Computation(failure)) => {
+                    self.failure = Some(failure);
+                    self.draw_here();
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if self.seen == seen {
+            return Ok(None);
+        }
+        let image = pictures.three_d(snapshot)?;
+        self.seen = seen;
+        Ok(Some(image))
+    }
+}
+
+impl OnGraphics {
+    /// The frame that has arrived, and whether another was asked for.
+    fn next(&mut self, snapshot: &Snapshot, is_new: bool) -> Result<(Option<Image>, bool)> {
+        let arrived = self.answer.take();
+        self.waits &= arrived.is_none();
+        let image = arrived.transpose()?;
+        let asks = is_new && !self.waits;
+        if asks {
+            let drawing = self.begun(snapshot)?;
+            let answer = self.answer.clone();
+            self.waits = true;
+            wasm_bindgen_futures::spawn_local(async move {
+                let image = drawing.image().await;
+                answer.replace(Some(image));
+            });
+        }
+        Ok((image, asks))
+    }
+
+    fn begun(&mut self, snapshot: &Snapshot) -> Result<Drawing> {
+        let (revision, spec) = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
+        self.pushed.leave(&snapshot.coils)?;
+        let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
+        let renderer = match &mut self.renderer {
+            Some((drawn, renderer)) => {
+                if *drawn != revision {
+                    renderer.change(spec)?;
+                    *drawn = revision;
+                }
+                renderer
+            }
+            none => &mut none.insert((revision, Renderer::of_wall(spec, &self.wall)?)).1,
+        };
+        renderer.move_vessel(snapshot.displacement.as_ref())?;
+        renderer.show_contacts(&snapshot.contacts);
+        renderer.three_d_on(&self.graphics, &views)
+    }
+}
