@@ -180,7 +180,8 @@ impl Batch {
                 return Err(refuse(name, given, &format!("give one for each of {count} simulations")));
             }
         }
-        let noted = || records.0.iter().zip(&times_s).filter_map(|(one, time_s)| Some((one.as_ref()?, time_s)));
+        let noted =
+            || records.0.iter().zip(&times_s).filter_map(|(one, time_s)| Some((one.as_ref()?, time_s)));
         noted().try_for_each(|(record, time_s)| record.get().check_time(*time_s))?;
         self.with(py, |members| {
             let each = members.batch.simulations().iter().zip(&moves).zip(records.0.iter().zip(&times_s));

@@ -107,9 +107,7 @@ impl Record {
         self.copy()
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let bytes = serde_json::to_vec(&*slf.get().lock())
             .map_err(|e| InputError::new_err(format!("a record: {e}")))?;
         Ok((slf.get_type().getattr("_unpickled")?, (PyBytes::new(slf.py(), &bytes),)))
