@@ -20,9 +20,7 @@ struct Task {
 
 impl Task {
     fn new(centreline: Option<PathBuf>, target: Option<String>, within_mm: f64) -> PyResult<Self> {
-        if !(within_mm > 0.0 && within_mm.is_finite()) {
-            return Err(refuse("within_mm", within_mm, "must be a length above 0"));
-        }
+        check_within(within_mm)?;
         if let (None, Some(target)) = (&centreline, &target) {
             let mend = "is a point of a centre line: give centreline too";
             return Err(refuse("target", format!("{target:?}"), mend));
@@ -42,6 +40,14 @@ impl Task {
         };
         Ok(endowire_assess::assess(&record, way.as_ref()))
     }
+}
+
+/// Refuses a distance at which nothing can have arrived.
+pub(crate) fn check_within(within_mm: f64) -> PyResult<()> {
+    if within_mm > 0.0 && within_mm.is_finite() {
+        return Ok(());
+    }
+    Err(refuse("within_mm", within_mm, "must be a length above 0"))
 }
 
 /// Scores a record by a subject.

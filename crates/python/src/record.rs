@@ -6,6 +6,7 @@ use endowire_assess::Way;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::assess::check_within;
 use crate::document;
 use crate::error::{InputError, exception, refuse};
 use crate::interrupt::interruptible;
@@ -69,9 +70,7 @@ impl Record {
         target: Option<Goal>,
         within_mm: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        if !(within_mm > 0.0 && within_mm.is_finite()) {
-            return Err(refuse("within_mm", within_mm, "must be a length above 0"));
-        }
+        check_within(within_mm)?;
         let record = self.lock().clone();
         let way = match (vessel, target) {
             (None, None) => None,

@@ -5,28 +5,15 @@
 mod common;
 
 use std::f64::consts::TAU;
-use std::path::{Path, PathBuf};
 
 use common::*;
 use endowire_core::Vec3;
-use endowire_core::vessel::{SurfaceMesh, Wall};
-use endowire_viewer::{
-    Backend, DeviceView, FrameTime, InjectionSpec, Material, Mode, Renderer, TorsoSpec, View, ViewSpec,
-};
+use endowire_viewer::{Backend, DeviceView, FrameTime, Material, Mode, Renderer, TorsoSpec, View, ViewSpec};
 
 /// Grey levels that any pixel may be apart.
 const LEVELS: u8 = 2;
 /// What any ray's length may be apart, mm.
 const LENGTH_MM: f32 = 1e-3;
-
-fn assets() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels")
-}
-
-fn wall(vessel: &str) -> SurfaceMesh {
-    let surface = SurfaceMesh::read(&assets().join(format!("{vessel}.stl")), 1.0).unwrap();
-    Wall::from_surface(&surface).unwrap().closed_mesh()
-}
 
 fn view(side_px: u32, pose: &str) -> ViewSpec {
     let mut view = ViewSpec {
@@ -41,21 +28,6 @@ fn view(side_px: u32, pose: &str) -> ViewSpec {
 
 fn with_body(mut view: ViewSpec) -> ViewSpec {
     view.patient.torso = Some(TorsoSpec::default());
-    view
-}
-
-/// Contrast medium that comes in at an end of the vessel.
-fn with_injection(mut view: ViewSpec, vessel: &str, inlet_mm: [f64; 3], mode: Mode) -> ViewSpec {
-    view.xray.mode = mode;
-    view.flow.tree = Some(assets().join(format!("{vessel}.csv")));
-    view.flow.inlet_mm = Some(inlet_mm);
-    view.injection = vec![InjectionSpec {
-        start_s: 0.0,
-        duration_s: 1.5,
-        rate_ml_per_s: 20.0,
-        at_mm: None,
-        at_tip: false,
-    }];
     view
 }
 

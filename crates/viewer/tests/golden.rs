@@ -12,24 +12,14 @@ use std::path::{Path, PathBuf};
 
 use common::*;
 use endowire_core::Vec3;
-use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_viewer::{
-    Backend, ContactView, DevicePart, DeviceView, ExposureSpec, FrameTime, Image, InjectionSpec, Material,
-    Mode, Renderer, TorsoSpec, View, ViewSpec,
+    Backend, ContactView, DevicePart, DeviceView, ExposureSpec, FrameTime, Image, Material, Mode, Renderer,
+    TorsoSpec, View, ViewSpec,
 };
 
 /// Grey levels that mathematical libraries may differ by, and the share of pixels that may differ by more.
 const LEVELS: u8 = 2;
 const SHARE: f64 = 2e-3;
-
-fn assets() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels")
-}
-
-fn arch() -> SurfaceMesh {
-    let surface = SurfaceMesh::read(&assets().join("aortic_arch.stl"), 1.0).unwrap();
-    Wall::from_surface(&surface).unwrap().closed_mesh()
-}
 
 fn view(mode: Mode) -> ViewSpec {
     let mut view = ViewSpec {
@@ -40,17 +30,7 @@ fn view(mode: Mode) -> ViewSpec {
     };
     view.c_arm.pose = Some("LAO 40".parse().unwrap());
     view.patient.torso = Some(TorsoSpec::default());
-    view.xray.mode = mode;
-    view.flow.tree = Some(assets().join("aortic_arch.csv"));
-    view.flow.inlet_mm = Some([-38.4, -54.8, 136.0]);
-    view.injection = vec![InjectionSpec {
-        start_s: 0.0,
-        duration_s: 1.5,
-        rate_ml_per_s: 20.0,
-        at_mm: None,
-        at_tip: false,
-    }];
-    view
+    with_injection(view, "aortic_arch", [-38.4, -54.8, 136.0], mode)
 }
 
 fn catheter() -> DeviceView {
@@ -124,7 +104,7 @@ fn frames_are_the_stored_ones_and_a_wire_a_millimetre_aside_is_not() {
     for (name, mode) in
         [("fluoro", Mode::Fluoro), ("cine", Mode::Cine), ("dsa", Mode::Dsa), ("roadmap", Mode::Roadmap)]
     {
-        let [fluoro, three_d] = draw(Renderer::new(&view(mode), &arch()).unwrap(), catheter());
+        let [fluoro, three_d] = draw(Renderer::new(&view(mode), &wall("aortic_arch")).unwrap(), catheter());
         pictures.push((format!("{name}.png"), fluoro));
         if mode == Mode::Fluoro {
             pictures.push(("three_d.png".to_owned(), three_d));
@@ -136,7 +116,7 @@ fn frames_are_the_stored_ones_and_a_wire_a_millimetre_aside_is_not() {
         assert!(share <= SHARE, "{name}: {share} of the bytes differ");
     }
     // The twin.
-    let [image, _] = draw(Renderer::new(&view(Mode::Fluoro), &arch()).unwrap(), moved(1.0));
+    let [image, _] = draw(Renderer::new(&view(Mode::Fluoro), &wall("aortic_arch")).unwrap(), moved(1.0));
     assert!(differing(image.data(), pictures[0].1.data()) > SHARE, "the comparison must be able to fail");
 }
 
@@ -155,7 +135,7 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
         let mut near = view(Mode::Fluoro);
         near.injection.clear();
         (near.c_arm.field_mm, near.c_arm.isocentre_mm) = (Some(110.0), Some([1.0, 2.0, 150.0]));
-        Renderer::new(&near, &arch()).unwrap()
+        Renderer::new(&near, &wall("aortic_arch")).unwrap()
     };
     // A wire that goes 6 mm aside from frame to frame: where it was fades.
     let mut held = near();
@@ -175,10 +155,10 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
     let mut thick = view(Mode::Fluoro);
     thick.patient.torso = Some(TorsoSpec { width_mm: 460.0, depth_mm: 330.0, ..TorsoSpec::default() });
     (thick.xray.pulse_ms, thick.exposure) = (8.0, (!twin).then(ExposureSpec::default));
-    add("exposure", frame(&mut Renderer::new(&thick, &arch()).unwrap(), 0.0, 3));
+    add("exposure", frame(&mut Renderer::new(&thick, &wall("aortic_arch")).unwrap(), 0.0, 3));
 
     // The fourth frame of a turn of 10° each, with what the detector holds of the third.
-    let mut turning = Renderer::new(&view(Mode::Fluoro), &arch()).unwrap();
+    let mut turning = Renderer::new(&view(Mode::Fluoro), &wall("aortic_arch")).unwrap();
     let start = turning.spec().c_arm.clone();
     let mut shown = None;
     for k in 0..4 {
@@ -230,12 +210,12 @@ impl Tolerance {
 
 #[test]
 fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_is_not() {
-    let Some(renderer) = on_gpu(&view(Mode::Fluoro), &arch()) else { return };
+    let Some(renderer) = on_gpu(&view(Mode::Fluoro), &wall("aortic_arch")) else { return };
     assert!(!renderer.backend().contains("CPU reference"), "{}", renderer.backend());
     let name = renderer.backend().to_owned();
     let [fluoro, three_d] = draw(renderer, catheter());
     let of_mode = |mode, device| {
-        let [image, _] = draw(on_gpu(&view(mode), &arch()).unwrap(), device);
+        let [image, _] = draw(on_gpu(&view(mode), &wall("aortic_arch")).unwrap(), device);
         image
     };
     const OTHERS: [Mode; 3] = [Mode::Dsa, Mode::Cine, Mode::Roadmap];
@@ -257,7 +237,7 @@ fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_i
         assert!(differ, "{file} a column aside: {said}");
     }
     // Another: a wire a millimetre aside, half a pixel.
-    let Some(renderer) = on_gpu(&view(Mode::Fluoro), &arch()) else { return };
+    let Some(renderer) = on_gpu(&view(Mode::Fluoro), &wall("aortic_arch")) else { return };
     let [fluoro, three_d] = draw(renderer, moved(1.0));
     // A subtraction has the wire in its mask too, and shows nothing of it.
     let others = OTHERS.map(|mode| (mode != Mode::Dsa).then(|| of_mode(mode, moved(1.0))));

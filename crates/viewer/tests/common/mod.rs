@@ -1,13 +1,16 @@
 //! Shapes with known path lengths, and comparisons.
 
 #![allow(dead_code, unreachable_pub, reason = "each test program uses its own part of this module")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_viewer::{
-    Backend, CArmSpec, DetectorSpec, DevicePoint, DeviceView, Renderer, View, ViewSpec, XRaySpec,
+    Backend, CArmSpec, DetectorSpec, DevicePoint, DeviceView, InjectionSpec, Mode, Renderer, View, ViewSpec,
+    XRaySpec,
 };
 
 /// A surface of revolution about z through the given (radius, height) profile from the bottom pole to the top
@@ -141,4 +144,30 @@ pub fn mean_difference(a: &[f32], b: &[f32]) -> f64 {
 pub fn pixel_centre(index: usize, width: u32) -> [f64; 2] {
     let width = width as usize;
     [(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]
+}
+
+/// The folder of the vessels that come with the project.
+pub fn assets() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels")
+}
+
+/// The surface of one of them, closed.
+pub fn wall(vessel: &str) -> SurfaceMesh {
+    let surface = SurfaceMesh::read(&assets().join(format!("{vessel}.stl")), 1.0).unwrap();
+    Wall::from_surface(&surface).unwrap().closed_mesh()
+}
+
+/// Contrast medium that comes in at an end of the vessel.
+pub fn with_injection(mut view: ViewSpec, vessel: &str, inlet_mm: [f64; 3], mode: Mode) -> ViewSpec {
+    view.xray.mode = mode;
+    view.flow.tree = Some(assets().join(format!("{vessel}.csv")));
+    view.flow.inlet_mm = Some(inlet_mm);
+    view.injection = vec![InjectionSpec {
+        start_s: 0.0,
+        duration_s: 1.5,
+        rate_ml_per_s: 20.0,
+        at_mm: None,
+        at_tip: false,
+    }];
+    view
 }

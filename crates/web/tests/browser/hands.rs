@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::chromium::Browser;
 use crate::native::Dice;
-use crate::{LAPTOP, PHONE, READY, WEBGPU, alone, drop_file, module, native};
+use crate::{LAPTOP, PHONE, READY, alone, drop_file, native, with_webgpu};
 
 /// Millimetres that the first instrument is in.
 const INSERTED: &str =
@@ -112,12 +112,7 @@ fn script_and_table_that_are_saved_tell_what_hands_did() {
 #[test]
 fn a_graphics_processor_that_is_lost_leaves_pictures_to_the_processor_which_is_said() {
     let _alone = alone();
-    let Some(mut browser) = Browser::with(&WEBGPU, "", LAPTOP) else { return };
-    module(&mut browser, "curved_tube_exact.toml", 128);
-    if browser.eval("navigator.gpu?.requestAdapter().then((adapter) => adapter !== null)") != true {
-        eprintln!("skipped: this browser has no adapter for WebGPU");
-        return;
-    }
+    let Some(mut browser) = with_webgpu("curved_tube_exact.toml", 128) else { return };
     let told = browser.eval(
         "(async () => {
             const { Graphics } = await import('./pkg/endowire.js');

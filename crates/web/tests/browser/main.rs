@@ -36,6 +36,17 @@ fn module(browser: &mut Browser, scene: &str, side_px: u32) {
     module_of(browser, &format!("scenes/{scene}"), side_px);
 }
 
+/// The module with a scene in a browser that has WebGPU; none, and a word, where there is no such browser.
+fn with_webgpu(scene: &str, side_px: u32) -> Option<Browser> {
+    let mut browser = Browser::with(&WEBGPU, "", LAPTOP)?;
+    module(&mut browser, scene, side_px);
+    if browser.eval("navigator.gpu?.requestAdapter().then((adapter) => adapter !== null)") != true {
+        eprintln!("skipped: this browser has no adapter for WebGPU");
+        return None;
+    }
+    Some(browser)
+}
+
 /// The same of a scene or a subject by its path.
 fn module_of(browser: &mut Browser, path: &str, side_px: u32) {
     browser.wait(READY);
@@ -139,12 +150,7 @@ fn pictures_are_those_of_the_program() {
 #[test]
 fn pictures_by_webgpu_are_those_of_the_reference() {
     let _alone = alone();
-    let Some(mut browser) = Browser::with(&WEBGPU, "", LAPTOP) else { return };
-    module(&mut browser, "arch_carotid.toml", 192);
-    if browser.eval("navigator.gpu?.requestAdapter().then((adapter) => adapter !== null)") != true {
-        eprintln!("skipped: this browser has no adapter for WebGPU");
-        return;
-    }
+    let Some(mut browser) = with_webgpu("arch_carotid.toml", 192) else { return };
     let told = browser.eval(
         "(async () => {
             const { Graphics } = await import('./pkg/endowire.js');
