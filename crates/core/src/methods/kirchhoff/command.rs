@@ -160,11 +160,9 @@ impl<const C: usize> Workspace<C> {
             let left = passage.map(|passage| (was, passage));
             let most = control.budget();
             let attempt = Attempt { hands, effort, most, solves: usize::MAX, left, resumed: None };
-            let iterations = tools.work.iterations;
+            let before = tools.work;
             let tried = tools.try_step(&there, here, attempt, next);
-            let iterations = tools.work.iterations - iterations;
-            // What is given up before its first iteration has its price as well.
-            control.took(iterations.max(1));
+            control.took(tools.work.since(&before));
             match tried {
                 // Where the device has come to rest with energy that nobody put in, it was too far from where it was.
                 Ok(found) if found.lacks && control.can_shorten(part_mm) => control.shorten(part_mm),
