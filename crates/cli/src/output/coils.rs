@@ -1,34 +1,39 @@
-//! Coils that a script has left behind: coils.csv, beside steps.csv. Each row is a point of a coil's centre line, from the end that was detached to its
-//! tip.
+//! Coils that a script has left behind: coils.csv, beside steps.csv. Each row is a point of a coil's centre line after a step, from the end that was detached to
+//! its tip. A coil has rows of the step that detached it, and of every one after which it is another micrometre from where its last rows have it.
 
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
 use endowire_core::device::Stack;
-use endowire_core::insertion::DetachedCoil;
+use endowire_core::insertion::{DetachedCoil, Simulation};
 use endowire_core::shape::Shape;
 use serde::{Deserialize, Serialize};
 
 use super::rows;
+use super::step_table::StepTable;
 use crate::failure::Failure;
 
 /// The table; there is none where nothing was detached.
 pub(crate) const COILS: &str = "coils.csv";
+/// A coil that has moved by less lies where it was, mm.
+const MOVED_MM: f64 = 1e-3;
 
-/// A coil, and when it was detached.
+/// Where a coil lies from a step on.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Left {
-    /// Number of the step that detached it.
-    pub(crate) step: usize,
-    pub(crate) coil: DetachedCoil,
+    step: usize,
+    /// Which of the coils that were detached it is.
+    number: usize,
+    coil: DetachedCoil,
 }
 
 /// One line of the table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Row {
+    step: usize,
     coil: usize,
     instrument: String,
-    step: usize,
     from_tip_mm: f64,
     x_mm: f64,
     y_mm: f64,
@@ -38,45 +43,121 @@ struct Row {
     tangent_z: f64,
 }
 
-/// Writes the table of a recording.
-pub(crate) fn write(folder: &Path, left: &[Left], stack: &Stack) -> Result<(), Failure> {
-    let rows = left.iter().enumerate().flat_map(|(number, Left { step, coil })| {
-        let Shape { positions_mm, tangents, from_tip_mm } = &coil.shape;
-        let points = positions_mm.iter().zip(tangents).zip(from_tip_mm);
-        points.map(move |((x, t), from_tip_mm)| Row {
-            coil: number,
-            instrument: stack.instruments()[coil.instrument].name.clone(),
-            step: *step,
-            from_tip_mm: *from_tip_mm,
-            x_mm: x.x,
-            y_mm: x.y,
-            z_mm: x.z,
-            tangent_x: t.x,
-            tangent_y: t.y,
-            tangent_z: t.z,
-        })
-    });
-    rows::write(&folder.join(COILS), &rows.collect::<Vec<_>>())
+/// Writes the table of a run.
+pub(crate) struct CoilTable {
+    path: PathBuf,
+    /// None before the first coil.
+    table: Option<StepTable>,
+    /// As the last rows have them.
+    told: Vec<DetachedCoil>,
+}
+
+impl CoilTable {
+    /// The table of a recording in `folder` that begins.
+    pub(crate) fn new(folder: &Path) -> Self {
+        Self { path: folder.join(COILS), table: None, told: Vec::new() }
+    }
+
+    /// The table of a recording that goes on after step `steps`: rows of later ones are dropped.
+    pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> Result<Self, Failure> {
+        let new = Self::new(folder);
+        if !new.path.exists() {
+            return Ok(new);
+        }
+        let told = after(&read(folder, stack)?, steps);
+        let table = StepTable::go_on(&new.path, steps).map_err(|e| Failure::write(&new.path, &e))?;
+        Ok(Self { table: Some(table), told, ..new })
+    }
+
+    /// Adds the rows of a step.
+    pub(crate) fn push(&mut self, step: usize, simulation: &Simulation) -> io::Result<()> {
+        let mut moved = false;
+        for (number, coil) in simulation.coils().iter().enumerate() {
+            if self.told.get(number).is_some_and(|was| moved_mm(coil, was) <= MOVED_MM) {
+                continue;
+            }
+            let table = match &mut self.table {
+                Some(table) => table,
+                none => none.insert(StepTable::new(&self.path)?),
+            };
+            let instrument = &simulation.stack().instruments()[coil.instrument].name;
+            rows_of(step, number, instrument, &coil.shape).try_for_each(|row| table.push(row))?;
+            match self.told.get_mut(number) {
+                Some(told) => told.clone_from(coil),
+                None => self.told.push(coil.clone()),
+            }
+            moved = true;
+        }
+        match &mut self.table {
+            Some(table) if moved => table.flush(),
+            _ => Ok(()),
+        }
+    }
+
+    /// The coils as the last rows have them.
+    pub(crate) fn told(&self) -> &[DetachedCoil] {
+        &self.told
+    }
+
+    /// Waits until all rows are on the disk itself.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.table.as_ref().map_or(Ok(()), StepTable::sync)
+    }
+}
+
+/// The farthest that a node of a coil is from where it was, mm.
+fn moved_mm(coil: &DetachedCoil, was: &DetachedCoil) -> f64 {
+    let nodes = coil.shape.positions_mm.iter().zip(&was.shape.positions_mm);
+    nodes.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+/// The rows of a coil.
+fn rows_of<'a>(
+    step: usize,
+    coil: usize,
+    instrument: &'a str,
+    Shape { positions_mm, tangents, from_tip_mm }: &'a Shape,
+) -> impl Iterator<Item = Row> + 'a {
+    let points = positions_mm.iter().zip(tangents).zip(from_tip_mm);
+    points.map(move |((x, t), from_tip_mm)| Row {
+        step,
+        coil,
+        instrument: instrument.to_owned(),
+        from_tip_mm: *from_tip_mm,
+        x_mm: x.x,
+        y_mm: x.y,
+        z_mm: x.z,
+        tangent_x: t.x,
+        tangent_y: t.y,
+        tangent_z: t.z,
+    })
 }
 
 /// What was left behind in a recorded run of these instruments.
 pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Vec<Left>, Failure> {
     let path = folder.join(COILS);
     let rows: Vec<Row> = rows::read(&path)?;
-    let each = rows.chunk_by(|a, b| a.coil == b.coil).map(|rows| {
-        let instrument = stack.find(&rows[0].instrument);
-        let instrument = instrument.map_err(|e| rows::refused(&path, &e.to_string()))?;
+    let each = rows.chunk_by(|a, b| (a.step, a.coil) == (b.step, b.coil)).map(|rows| {
+        let Row { step, coil: number, ref instrument, .. } = rows[0];
+        let instrument = stack.find(instrument).map_err(|e| rows::refused(&path, &e.to_string()))?;
         let shape = Shape {
             positions_mm: rows.iter().map(|row| Vec3::new(row.x_mm, row.y_mm, row.z_mm)).collect(),
             tangents: rows.iter().map(|row| Vec3::new(row.tangent_x, row.tangent_y, row.tangent_z)).collect(),
             from_tip_mm: rows.iter().map(|row| row.from_tip_mm).collect(),
         };
-        Ok(Left { step: rows[0].step, coil: DetachedCoil { instrument, shape } })
+        Ok(Left { step, number, coil: DetachedCoil { instrument, shape } })
     });
     each.collect()
 }
 
-/// The coils that lie there after a step.
+/// The coils as they lie after a step.
 pub(crate) fn after(left: &[Left], step: usize) -> Vec<DetachedCoil> {
-    left.iter().filter(|left| left.step <= step).map(|left| left.coil.clone()).collect()
+    let mut coils: Vec<DetachedCoil> = Vec::new();
+    for Left { number, coil, .. } in left.iter().filter(|left| left.step <= step) {
+        match coils.get_mut(*number) {
+            Some(known) => known.clone_from(coil),
+            None => coils.push(coil.clone()),
+        }
+    }
+    coils
 }

@@ -183,7 +183,7 @@ impl FrameWriter {
             let displacement = motion.at(time_s);
             self.planes.iter_mut().try_for_each(|plane| plane.move_vessel(Some(&displacement)))?;
         }
-        self.pushed.leave(&recorder.coils(step))?;
+        self.pushed.leave(recorder.coils())?;
         let views = self.pushed.views(shape, inserted_mm);
         let moment = FrameTime { frame: step as u64, time_s };
         let before = self.before.as_ref();

@@ -13,7 +13,7 @@ use endowire_sweep::RunOutcome;
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
-use super::coils::{self, Left};
+use super::coils::CoilTable;
 use super::folder::{self, Claim};
 use super::frames::PlaneTold;
 use super::instruments::InstrumentTable;
@@ -109,8 +109,7 @@ pub(crate) struct Recorder {
     packing: Option<PackingTable>,
     arrays: ShapeArrays,
     steps: usize,
-    /// Coils that were left behind so far.
-    left: Vec<Left>,
+    coils: CoilTable,
     /// Frames written so far, relative to the folder.
     pub(crate) frames: Vec<String>,
     checkpoint: Option<Instant>,
@@ -134,7 +133,7 @@ impl Recorder {
             packing: None,
             arrays,
             steps: 0,
-            left: Vec::new(),
+            coils: CoilTable::new(folder),
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -186,9 +185,7 @@ impl Recorder {
             Ok((table, InstrumentTable::go_on(folder, at.stack(), steps)?, arrays))
         };
         let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
-        let mut left = coils::read(folder, at.stack())?;
-        left.retain(|left| left.step <= steps);
-        coils::write(folder, &left, at.stack())?;
+        let coils = CoilTable::go_on(folder, at.stack(), steps)?;
         let table = csv::WriterBuilder::new().has_headers(kept.bytes == 0).from_writer(table);
         let recorder = Self {
             folder: folder.to_path_buf(),
@@ -197,7 +194,7 @@ impl Recorder {
             packing: None,
             arrays,
             steps,
-            left,
+            coils,
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -265,18 +262,13 @@ impl Recorder {
             if let Some(packing) = &mut self.packing {
                 packing.push(row.step, simulation)?;
             }
+            self.coils.push(row.step, simulation)?;
             self.table.serialize(row)?;
             self.table.flush()
         };
         let pushed = self.arrays.push(shape, report, write_row);
         pushed.map_err(|error| Failure::write(&self.folder, &error))?;
         self.steps += 1;
-        let begun = simulation.coils().iter().skip(self.left.len());
-        let begun: Vec<Left> = begun.map(|coil| Left { step: self.steps, coil: coil.clone() }).collect();
-        if !begun.is_empty() {
-            self.left.extend(begun);
-            coils::write(&self.folder, &self.left, simulation.stack())?;
-        }
         Ok(())
     }
 
@@ -285,9 +277,9 @@ impl Recorder {
         self.packing.as_ref().map(PackingTable::told)
     }
 
-    /// Coils that lay there after a step.
-    pub(crate) fn coils(&self, step: usize) -> Vec<DetachedCoil> {
-        coils::after(&self.left, step)
+    /// Coils that were left behind, as they lie after the last step.
+    pub(crate) fn coils(&self) -> &[DetachedCoil] {
+        self.coils.told()
     }
 
     /// Now and then, writes the summary as it is: what a run that is killed leaves.
@@ -307,6 +299,7 @@ impl Recorder {
         let instruments = || self.instruments.as_ref().map_or(Ok(()), InstrumentTable::sync);
         let packing = || self.packing.as_ref().map_or(Ok(()), PackingTable::sync);
         let synced = self.arrays.sync().and_then(|()| instruments()).and_then(|()| packing());
+        let synced = synced.and_then(|()| self.coils.sync());
         let synced = synced.and_then(|()| self.table.get_ref().sync_data());
         synced.map_err(|e| Failure::write(&self.folder, &e))
     }

@@ -23,10 +23,12 @@ fn write_some(path: &Path, rows: &[impl Serialize]) -> io::Result<()> {
 
 /// The rows of a table; none where there is none.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
-    let text = match std::fs::read(path) {
+    let mut text = match std::fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(vec![]),
         read => read.map_err(|e| refused(path, &e.to_string()))?,
     };
+    // A run may have been killed within a row.
+    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
     let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
     rows.collect::<Result<_, _>>().map_err(|e: csv::Error| refused(path, &e.to_string()))
 }

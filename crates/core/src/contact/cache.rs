@@ -3,6 +3,8 @@
 //! What is known at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step takes it over, slides it with the device and
 //! goes on from there in its own memory ([`ContactCache`]), so that a step that fails has changed nothing.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
@@ -125,6 +127,16 @@ impl KnownPoints {
         self.points.clear();
     }
 
+    /// What some of the points know.
+    pub(crate) fn part(&self, points: Range<usize>) -> Self {
+        Self { points: self.points.get(points).unwrap_or_default().to_vec() }
+    }
+
+    /// Leaves the first points. Keeps the memory.
+    pub(crate) fn truncate(&mut self, points: usize) {
+        self.points.truncate(points);
+    }
+
     /// Keeps what the last points know, whose distances from the tip are others by so much, mm.
     pub(crate) fn keep_last(&mut self, points: usize, farther_mm: f64) {
         self.points.drain(..self.points.len().saturating_sub(points));
@@ -233,6 +245,12 @@ impl ContactCache {
             self.points.push(slid.unwrap_or(NOTHING));
         }
         self.readings.clear();
+        self.readings.resize(self.points.len(), TakenReading::NONE);
+    }
+
+    /// Goes on with the points of another rod, which lie where they were.
+    pub(crate) fn go_on(&mut self, known: &KnownPoints) {
+        self.points.extend_from_slice(&known.points);
         self.readings.resize(self.points.len(), TakenReading::NONE);
     }
 

@@ -31,6 +31,7 @@ mod follow;
 mod moving;
 
 pub use between::{Between, InnerFriction, Place};
+pub(in crate::contact) use follow::Renewal;
 pub use follow::SETTLED;
 
 use nalgebra::Matrix3;
@@ -46,11 +47,15 @@ use crate::vessel::Displacement;
 /// regularisation gives away.
 const STICK: f64 = 1e-3;
 /// In every slide while the hand holds still it shrinks to this part, …
-const STICK_AT_REST: f64 = 0.3;
+pub(in crate::contact) const STICK_AT_REST: f64 = 0.3;
 /// … but to no less than this part of what it was in the step: a spring that holds a point within less is stiffer than any wall.
 const LEAST_AT_REST: f64 = 0.01;
 /// Least slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
+/// Friction at a point is worth another round of the contacts of a step where its force is off by more than this part of the largest that it can be; …
+pub(in crate::contact) const CHANGED: f64 = 0.05;
+/// … and a round has it as it is where it is off by more than this: left as it was, steps were uphill by what it was off.
+pub(in crate::contact) const RENEWED: f64 = 5e-3;
 /// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
 /// one that was felt where they come to lie, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
@@ -72,6 +77,25 @@ struct Slider {
     begun: (Vec3, f64),
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
+}
+
+impl Slider {
+    /// A point that has come by `advance_mm` along its own curve, on which nothing presses yet.
+    fn at(point: &ContactPoint, elements: &[ElementData], state: &RodState, advance_mm: f64) -> Self {
+        let e = point.element;
+        let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
+        let slope = Point::at(point.xi, 0.0).derivatives(state.chords[e], t0, t1).0;
+        let along = slope / slope.norm();
+        Self {
+            from_mm: point.position(elements, state) - along * advance_mm,
+            from_rad: point.angle(state),
+            along,
+            normal: Vec3::zeros(),
+            force_n: 0.0,
+            begun: (Vec3::zeros(), 0.0),
+            seen: (Vec3::zeros(), 0.0),
+        }
+    }
 }
 
 /// What presses at a contact point in an equilibrium.
@@ -176,28 +200,13 @@ impl Friction {
         let line_mm = |length: fn(&HandMotion) -> f64| hands.iter().map(length).fold(0.0, f64::max);
         let advance = line_mm(|hand| hand.to_mm) - line_mm(|hand| hand.from_mm);
         let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
-        // An instrument that rests sticks within as much as the others move.
-        let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius * hand.turn_rad.abs());
-        let way = ways.fold(0.0, f64::max);
-        self.stick_within(STICK * if way > 0.0 { way } else { radius });
+        [self.stick_mm, self.least_stick_mm] = stick_mm(hands, radius);
         let (old_points, old) = before;
         let count = old_points.len().min(old.len());
         let near_tip = TIP_RADII * radius + advance.abs();
         let mut k = 0;
         for (index, point) in points.iter().enumerate() {
-            let e = point.element;
-            let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-            let slope = Point::at(point.xi, 0.0).derivatives(state.chords[e], t0, t1).0;
-            let along = slope / slope.norm();
-            let mut slider = Slider {
-                from_mm: point.position(elements, state) - along * hands[point.instrument].advance_mm(),
-                from_rad: point.angle(state),
-                along,
-                normal: Vec3::zeros(),
-                force_n: 0.0,
-                begun: (Vec3::zeros(), 0.0),
-                seen: (Vec3::zeros(), 0.0),
-            };
+            let mut slider = Slider::at(point, elements, state, hands[point.instrument].advance_mm());
             let same = |old: &ContactPoint| old.instrument == point.instrument;
             if point.from_tip_mm < near_tip && old_points.get(index).is_none_or(same) {
                 if index < count {
@@ -223,6 +232,27 @@ impl Friction {
         }
     }
 
+    /// Goes on with the points of a rod that no hand moves, where these forces pressed.
+    pub(crate) fn go_on(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        points: &[ContactPoint],
+        forces: &[NormalForce],
+    ) {
+        if !self.acts() {
+            return;
+        }
+        // Where no hand has anything in, none says how much is little.
+        if let ([], Some(first)) = (&self.sliders[..], points.first()) {
+            self.stick_within(STICK * first.potential.radius_mm);
+        }
+        self.sliders.extend(points.iter().zip(forces).map(|(point, NormalForce { normal, force_n })| {
+            let (normal, force_n) = (*normal, *force_n);
+            Slider { normal, force_n, begun: (normal, force_n), ..Slider::at(point, elements, state, 0.0) }
+        }));
+    }
+
     /// The wall has moved since the step began, and its material points have taken along what slip is counted from: see [`moving`].
     pub(crate) fn carry(&mut self, (before, after): (&Displacement, &Displacement), hands: &[HandMotion]) {
         let mut farthest_mm = 0.0f64;
@@ -239,8 +269,7 @@ impl Friction {
 
     /// Sets the ε of a step.
     fn stick_within(&mut self, stick_mm: f64) {
-        self.stick_mm = stick_mm.max(LEAST_STICK_MM);
-        self.least_stick_mm = (LEAST_AT_REST * stick_mm).max(LEAST_STICK_MM);
+        [self.stick_mm, self.least_stick_mm] = sticking_mm(stick_mm);
     }
 
     /// Keeps the normal forces that a step has ended with.
@@ -251,7 +280,7 @@ impl Friction {
 
     /// Force of friction on a point over its `slip`, N/mm.
     pub(crate) fn resistance(&self, index: usize, slip: &Vec3) -> f64 {
-        self.largest_n(index) * rates(slip.norm(), self.stick_mm).0
+        resistance(self.largest_n(index), slip, self.stick_mm)
     }
 
     /// Slip vector of a point and the direction its surface takes when it spins.
@@ -359,12 +388,8 @@ impl Friction {
         let slider = self.sliders.get(index).filter(|_| self.holds(index))?;
         let force = self.coefficient * slider.force_n;
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
-        let y = slip.norm();
-        let (over, second) = rates(y, self.stick_mm);
-        let gradient = slip * (force * over);
-        let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
         let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();
-        let hessian = (plane * over + unit * unit.transpose() * (second - over)) * force;
+        let (gradient, hessian) = force_of_slip(force, &plane, &slip, self.stick_mm);
         let mixed = hessian * spin;
         Some(FrictionDerivatives {
             gradient,
@@ -376,8 +401,39 @@ impl Friction {
     }
 }
 
+/// The ε of a step of these hands and a device of that radius, and what it does not shrink below while they hold still, mm. An instrument that rests sticks
+/// within as much as the others move.
+pub(crate) fn stick_mm(hands: &[HandMotion], radius_mm: f64) -> [f64; 2] {
+    let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius_mm * hand.turn_rad.abs());
+    let way_mm = ways.fold(0.0, f64::max);
+    sticking_mm(STICK * if way_mm > 0.0 { way_mm } else { radius_mm })
+}
+
+fn sticking_mm(stick_mm: f64) -> [f64; 2] {
+    [stick_mm, LEAST_AT_REST * stick_mm].map(|mm| mm.max(LEAST_STICK_MM))
+}
+
+/// Gradient of μ N φ in a slip in a plane, N, and its derivative, N/mm.
+pub(in crate::contact) fn force_of_slip(
+    largest_n: f64,
+    plane: &Matrix3<f64>,
+    slip_mm: &Vec3,
+    stick_mm: f64,
+) -> (Vec3, Matrix3<f64>) {
+    let y = slip_mm.norm();
+    let (over, second) = rates(y, stick_mm);
+    let unit = if y > 0.0 { slip_mm / y } else { Vec3::zeros() };
+    let hessian = (plane * over + unit * unit.transpose() * (second - over)) * largest_n;
+    (slip_mm * (largest_n * over), hessian)
+}
+
+/// Force of friction over its slip, N/mm.
+pub(in crate::contact) fn resistance(largest_n: f64, slip_mm: &Vec3, stick_mm: f64) -> f64 {
+    largest_n * rates(slip_mm.norm(), stick_mm).0
+}
+
 /// φ(y) with its ε, `e`.
-fn phi(y: f64, e: f64) -> f64 {
+pub(in crate::contact) fn phi(y: f64, e: f64) -> f64 {
     if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
 }
 

@@ -43,6 +43,11 @@ const SUNK: f64 = 0.3;
 /// Roundings of a coordinate by which a distance is off.
 const ROUNDING: f64 = 4.0;
 
+/// What a device of this bending stiffness, N·mm², carries when it is bent to a radius of 100 mm, N.
+pub(crate) fn least_force_n(bending_nmm2: f64) -> f64 {
+    bending_nmm2 / (LEAST_BEND_MM * LEAST_BEND_MM)
+}
+
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
     surface: MovedWall<'a>,
@@ -156,7 +161,7 @@ impl<'a> WallContact<'a> {
         }
     }
 
-    /// A device bent to a radius of 100 mm carries this.
+    /// See [`least_force_n`].
     fn least_force_n(&self) -> f64 {
         self.least_moment_nmm / LEAST_BEND_MM
     }

@@ -237,9 +237,16 @@ impl Stack {
     /// Outer radius of the outermost instrument at a place so far from the tip of the line, mm, with these lengths inserted.
     pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
         let line_mm = line_mm(inserted_mm.iter().copied());
-        let own = |inserted: f64| from_tip_mm - (line_mm - inserted);
-        let there = self.devices().zip(inserted_mm).rev().find(|(_, inserted)| own(**inserted) >= 0.0);
-        there.map_or(0.0, |(device, inserted)| device.section_at(own(*inserted)).radius_mm)
+        self.felt_instrument(inserted_mm, from_tip_mm).map_or(0.0, |index| {
+            let own_mm = from_tip_mm - (line_mm - inserted_mm[index]);
+            self.instruments[index].device.section_at(own_mm).radius_mm
+        })
+    }
+
+    /// The outermost instrument there; none where none reaches so far.
+    pub(crate) fn felt_instrument(&self, inserted_mm: &[f64], from_tip_mm: f64) -> Option<usize> {
+        let line_mm = line_mm(inserted_mm.iter().copied());
+        inserted_mm.iter().rposition(|inserted| from_tip_mm - (line_mm - inserted) >= 0.0)
     }
 
     /// Checks that instruments with these lengths inserted can be in together: each in the lumen of the next, with its tail out of that

@@ -136,15 +136,20 @@ impl<const C: usize> Assembly<C> {
         }
         for (e, data) in elements.iter().enumerate() {
             for set in (0..Layout::<C>::ANGLES).filter(|set| !data.materials[*set].is_present()) {
-                for row in [l.bubble(e, set), l.angle(e + 1, set)] {
-                    self.matrix.add(row, row, 1.0);
+                self.matrix.add(l.bubble(e, set), l.bubble(e, set), 1.0);
+                // The instrument may be in the rod that begins behind a gap.
+                let begins = data.is_break()
+                    && elements.get(e + 1).is_some_and(|next| next.materials[set].is_present());
+                if !begins {
+                    self.matrix.add(l.angle(e + 1, set), l.angle(e + 1, set), 1.0);
                 }
             }
         }
     }
 
     /// Sets `shift` to ∫|δr′|² (and ∫δθ²) of a rod of which the rows in `held` are held: the stiffness of a uniform unit tension,
-    /// which is what cures the negative curvature of compression, the commonest kind.
+    /// which is what cures the negative curvature of compression, the commonest kind. Over a gap between two rods it acts as well, so that one which
+    /// nothing holds is held by it.
     pub fn unit_shift(elements: &[ElementData], held: &[Option<usize>], shift: &mut Shift) {
         let l = Layout::<C>;
         shift.reset(Layout::<C>::dimension(elements.len()));
@@ -198,13 +203,26 @@ impl<const C: usize, const HESSIAN: bool> WithSimd for AddElements<'_, C, HESSIA
             }
             system::<S, C, HESSIAN>(&batch, Lanes::gather(simd, |lane| gammas[lane]), &mut all);
             for lane in 0..count {
-                to.add_lane::<S, HESSIAN>(first + lane, lane, gammas[lane], &all);
+                if elements[first + lane].is_break() {
+                    to.add_break::<HESSIAN>(first + lane);
+                } else {
+                    to.add_lane::<S, HESSIAN>(first + lane, lane, gammas[lane], &all);
+                }
             }
         }
     }
 }
 
 impl<const C: usize> Assembly<C> {
+    /// Adds nothing where one rod ends and the next begins: the axial force that is not there is held.
+    #[inline(always)]
+    fn add_break<const HESSIAN: bool>(&mut self, e: usize) {
+        if HESSIAN {
+            let at = Layout::<C>::BLOCK * e;
+            self.matrix.lay_blocks(at, |i, j| f64::from(u8::from(i == j && i == C - 1)));
+        }
+    }
+
     /// Adds element `e`, which is in this lane of all.
     #[inline(always)]
     fn add_lane<S: Simd, const HESSIAN: bool>(

@@ -19,8 +19,8 @@ pub const PLACES: usize = 8;
 pub struct Couple {
     /// The element of the first point.
     pub first: usize,
-    /// That of the second; none where it stays where it is, and only the derivatives in the first count.
-    pub second: Option<usize>,
+    /// That of the second.
+    pub second: usize,
     /// First derivatives.
     pub gradient: [Vec3; PLACES],
     /// Those under which tangents turn: the first derivatives, or where forces are unknowns of their own, what these are.
@@ -35,9 +35,8 @@ type Way = (usize, usize, Vec3);
 impl<const C: usize> Assembly<C> {
     /// Adds the energy of two points.
     pub(super) fn add_coupled(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple) {
-        let (ways, count) = ways::<C>(elements, state, couple);
-        let ways = &ways[..count];
-        for (row, place, way) in ways {
+        let ways = ways::<C>(elements, state, couple);
+        for (row, place, way) in &ways {
             self.residual[*row] += way.dot(&couple.gradient[*place]);
         }
         if !self.hessian {
@@ -72,21 +71,29 @@ impl<const C: usize> Assembly<C> {
 }
 
 impl Couple {
-    /// The points that move, by number, and their elements.
+    /// No energy, of a point on each of two elements.
+    pub fn none([first, second]: [usize; 2]) -> Self {
+        Self {
+            first,
+            second,
+            gradient: [Vec3::zeros(); PLACES],
+            carried: [Vec3::zeros(); PLACES],
+            hessian: [[Matrix3::zeros(); PLACES]; PLACES],
+        }
+    }
+
+    /// The points by number, and their elements.
     fn sides(&self) -> impl Iterator<Item = (usize, usize)> {
-        [Some(self.first), self.second].into_iter().flatten().enumerate()
+        [self.first, self.second].into_iter().enumerate()
     }
 }
 
-/// The unknowns of the elements that move, and their number.
-fn ways<const C: usize>(elements: &[ElementData], state: &RodState, couple: &Couple) -> ([Way; 20], usize) {
+/// The unknowns of both elements.
+fn ways<const C: usize>(elements: &[ElementData], state: &RodState, couple: &Couple) -> [Way; 20] {
     let l = Layout::<C>;
     let mut ways = [(0, 0, Vec3::zeros()); 20];
-    let mut count = 0;
-    let mut put = |way: Way| {
-        ways[count] = way;
-        count += 1;
-    };
+    let mut free = ways.iter_mut();
+    let mut put = |way: Way| free.next().into_iter().for_each(|to| *to = way);
     for (side, e) in couple.sides() {
         let h = elements[e].length;
         for (end, node) in [e, e + 1].into_iter().enumerate() {
@@ -99,5 +106,5 @@ fn ways<const C: usize>(elements: &[ElementData], state: &RodState, couple: &Cou
             put((l.tangent(node) + 1, place + 1, frame.v * h));
         }
     }
-    (ways, count)
+    ways
 }

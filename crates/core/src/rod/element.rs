@@ -51,6 +51,16 @@ impl ElementData {
     pub(crate) const EMPTY: Self =
         Self { length: 0.0, bending: [0.0; 3], flexibility: 0.0, materials: [Material::NONE; MAX_ANGLES] };
 
+    /// The gap between the end of one rod and the begin of the next, where several are solved for together: nothing is there, and what is on one side does
+    /// not feel the other. Its length only says what its chord is counted in.
+    pub(crate) const BREAK: Self = Self { length: 1.0, ..Self::EMPTY };
+
+    /// Whether it is the gap between two rods.
+    #[inline(always)]
+    pub(crate) fn is_break(&self) -> bool {
+        self.bending == [0.0; 3]
+    }
+
     /// An inextensible element of one instrument.
     pub fn of(length: f64, material: Material) -> Self {
         let mut data = Self { length, bending: material.bending, ..Self::EMPTY };

@@ -60,7 +60,7 @@ impl<const C: usize> WithSimd for Stored<'_, C> {
             let Energy { bend, twist, axial } = energy::<S, C>(&batch);
             let energies = [bend, twist, axial];
             let [bend, twist, axial] = [0, 1, 2].map(|k| bytemuck::cast_slice(&energies[k..k + 1]));
-            for lane in 0..count {
+            for lane in (0..count).filter(|lane| !self.elements[first + lane].is_break()) {
                 sum += Energy::<f64> { bend: bend[lane], twist: twist[lane], axial: axial[lane] }.total();
             }
         }

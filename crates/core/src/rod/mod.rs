@@ -37,6 +37,7 @@ pub mod layout;
 pub mod points;
 pub mod quadrature;
 pub(crate) mod scatter;
+mod several;
 mod share;
 pub mod state;
 pub mod stencils;

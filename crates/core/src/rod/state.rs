@@ -63,10 +63,10 @@ impl RodState {
         self.chords.len()
     }
 
-    /// Positions from the first node and the chords.
+    /// Positions of the nodes of these elements, the first of all, from the first node and the chords.
     pub fn place(&mut self, elements: &[ElementData]) {
-        for e in 0..self.chords.len() {
-            self.positions[e + 1] = self.positions[e] + self.chords[e] * elements[e].length;
+        for (e, data) in elements.iter().enumerate() {
+            self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;
         }
     }
 
@@ -148,17 +148,6 @@ impl RodState {
         self.frames[i].turned(self.angle(i, 0))
     }
 
-    /// Leaves the first node alone. Keeps the memory.
-    pub fn clear(&mut self) {
-        self.angles.truncate(self.sets());
-        self.frames.truncate(1);
-        self.positions.truncate(1);
-        self.chords.clear();
-        for list in [&mut self.tensions, &mut self.bubbles, &mut self.reference_twists] {
-            list.clear();
-        }
-    }
-
     /// Takes memory for `elements` elements, so that a rod may grow to them without allocating.
     pub(crate) fn reserve(&mut self, elements: usize) {
         let more = |len: usize| (elements + 1).saturating_sub(len);
@@ -206,6 +195,12 @@ impl RodState {
         }
         self.positions[0] = base.positions[0] + position_step(d, l.position(0)) * alpha;
         for (e, data) in elements.iter().enumerate() {
+            if data.is_break() {
+                let step = position_step(d, l.position(e + 1)) * alpha;
+                self.positions[e + 1] = base.positions[e + 1] + step;
+                self.chords[e] = (self.positions[e + 1] - self.positions[e]) / data.length;
+                continue;
+            }
             let (before, rate) = mid_rate::<C>(elements, base, d, e);
             let size = before.norm();
             let m = before / size;
@@ -247,9 +242,10 @@ impl RodState {
 
     /// Whether an element bends by more than 120° from end to end: the curve that is drawn of it is shorter than it by a fiftieth then, and
     /// by a tenth at 180°, where its twist is not defined any more.
-    pub fn is_folded(&self) -> bool {
+    pub fn is_folded(&self, elements: &[ElementData]) -> bool {
         const COSINE: f64 = -0.5;
-        self.frames.windows(2).any(|ends| ends[0].t.dot(&ends[1].t) < COSINE)
+        let mut each = self.frames.windows(2).zip(elements).filter(|(_, data)| !data.is_break());
+        each.any(|(ends, _)| ends[0].t.dot(&ends[1].t) < COSINE)
     }
 
     /// The largest rotation a step holds, at nodes and in the middle of elements, and the largest change of angle.
@@ -263,7 +259,7 @@ impl RodState {
                 twist = twist.max(d[l.angle(i, set)].abs());
             }
         }
-        for e in 0..elements.len() {
+        for e in (0..elements.len()).filter(|e| !elements[*e].is_break()) {
             let (mid, rate) = mid_rate::<C>(elements, base, d, e);
             let (size, along) = (mid.norm_squared(), mid.dot(&rate));
             square = square.max((rate.norm_squared() - along * along / size) / size);

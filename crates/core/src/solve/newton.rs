@@ -146,7 +146,7 @@ impl<const C: usize> Newton<C> {
     fn iterate(&mut self, mut problem: Problem<'_>, state: &mut RodState) -> NewtonReport {
         let (elements, options, minimum) = (problem.elements, problem.options, problem.minimum);
         let supports = &*problem.supports;
-        let mut report = NewtonReport::of(elements.len() + supports.conditions());
+        let mut report = NewtonReport::of(problem.multipliers());
         self.trial.copy_from(state);
         self.other.copy_from(state);
         self.steps.clear();
@@ -215,7 +215,7 @@ impl<const C: usize> Newton<C> {
                 });
             self.last_shift = shift.max(SHIFT_DECAY * self.last_shift);
             match searched {
-                Ok(_) if state.is_folded() => return report.stopped(StopReason::Folded),
+                Ok(_) if state.is_folded(elements) => return report.stopped(StopReason::Folded),
                 Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
                 Ok(turn) => progress.has_turned(turn),
                 Err(StopReason::NoDescent) => {
@@ -327,6 +327,6 @@ impl Problem<'_> {
 
     /// Negative pivots of a minimum: one for each multiplier.
     pub(super) fn multipliers(&self) -> usize {
-        self.elements.len() + self.supports.conditions()
+        self.elements.iter().filter(|data| !data.is_break()).count() + self.supports.conditions()
     }
 }

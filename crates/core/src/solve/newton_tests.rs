@@ -117,11 +117,71 @@ fn a_force_that_is_not_a_number_is_named() {
 #[test]
 fn an_element_that_would_fold_is_told_and_shorter_ones_bend() {
     let back = || Tip(Vec3::new(-40.0, 1.0, 0.0));
+    let is_folded = |state: &RodState| state.is_folded(&vec![ElementData::plain(1.0, 1.0); state.elements()]);
     let (state, r) = cantilever(1, &mut back());
     assert_eq!(r.reason, super::StopReason::Folded);
-    assert!(!r.converged && state.is_folded());
+    assert!(!r.converged && is_folded(&state));
     let (state, r) = cantilever(32, &mut back());
-    assert!(r.converged && r.stable && !state.is_folded(), "{}", r.reason);
+    assert!(r.converged && r.stable && !is_folded(&state), "{}", r.reason);
     // From its clamped end to its tip it has turned round.
     assert!(state.frames[0].t.dot(&state.frames[32].t) < -0.9);
+}
+
+/// A force at a node, and a spring at each of some nodes to where it was.
+struct Held {
+    force: (usize, Vec3),
+    springs: Vec<(usize, Vec3)>,
+}
+impl External for Held {
+    fn value(&mut self, _: &[ElementData], state: &RodState) -> f64 {
+        let held = self.springs.iter().map(|(i, was)| 0.5 * (state.positions[*i] - was).norm_squared());
+        held.sum::<f64>() - self.force.1.dot(&state.positions[self.force.0])
+    }
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        into.add_value(self.value(elements, state));
+        into.add_node(self.force.0, &-self.force.1, &nalgebra::Matrix3::zeros());
+        for (i, was) in &self.springs {
+            into.add_node(*i, &(state.positions[*i] - was), &nalgebra::Matrix3::identity());
+        }
+    }
+}
+
+#[test]
+fn rods_behind_a_gap_are_solved_for_together_and_do_not_feel_each_other() {
+    const N: usize = 8;
+    let elements = vec![ElementData::plain(1.0 / N as f64, 1.0); N];
+    let frame = |along: Vec3| Frame::new(along, None);
+    let clamped = RodState::straight(&elements, Vec3::zeros(), frame(Vec3::x()));
+    let free = RodState::straight(&elements, Vec3::new(1.0, 0.2, 0.0), frame(-Vec3::x()));
+    let bent = (N, Vec3::new(0.0, -2.0, 0.5));
+    // All that acts on it is its weight at one end and springs: it sinks by their ratio in the mean, and turns and bends.
+    let sinks = (0, Vec3::new(0.1, 0.3, -0.2));
+    let springs = |first: usize| (0..=N).map(|i| (first + i, free.positions[i])).collect::<Vec<_>>();
+    let solve =
+        |elements: &[ElementData], mut state: RodState, outside: &mut dyn External, start_free: bool| {
+            let mut supports =
+                Supports { start_free, start_tangent: true, start_angle: true, ..Supports::default() };
+            let mut newton = Newton::<PLAIN>::new(elements.len());
+            let options = NewtonOptions { tolerance: 1e-11, ..NewtonOptions::default() };
+            let report = newton.solve(elements, &mut supports, outside, &mut state, &options);
+            assert!(report.converged && report.stable, "{}", report.reason);
+            state
+        };
+    let one = solve(&elements, clamped.clone(), &mut Held { force: bent, springs: Vec::new() }, false);
+    let other = solve(&elements, free.clone(), &mut Held { force: sinks, springs: springs(0) }, true);
+    let mean = other.positions.iter().zip(&free.positions).map(|(x, was)| x - was).sum::<Vec3>();
+    assert!((mean - sinks.1).norm() < 1e-9, "{mean}");
+    let mut both = clamped;
+    both.join(&free);
+    let all = [&elements[..], &[ElementData::BREAK], &elements[..]].concat();
+    let first = N + 1;
+    let (mut on_one, mut on_other) = (
+        Held { force: bent, springs: Vec::new() },
+        Held { force: (first + sinks.0, sinks.1), springs: springs(first) },
+    );
+    let mut outside = super::Together(vec![&mut on_one, &mut on_other]);
+    let both = solve(&all, both, &mut outside, false);
+    for (nodes, alone) in [(0..first, one), (first..2 * first, other)] {
+        assert!(both.part(nodes).farthest_mm(&alone) < 1e-9);
+    }
 }

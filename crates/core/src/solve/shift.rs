@@ -61,9 +61,10 @@ impl<const C: usize> Newton<C> {
 
     /// The shift that is always on.
     pub(crate) fn regularisation(elements: &[ElementData]) -> f64 {
-        let length: f64 = elements.iter().map(|e| e.length).sum();
+        let rods = || elements.iter().filter(|data| !data.is_break());
+        let length: f64 = rods().map(|e| e.length).sum();
         // EI averaged as springs in series: the stiffness the whole rod shows.
-        let soft: f64 = elements.iter().map(|e| e.length / e.bending[1]).sum();
+        let soft: f64 = rods().map(|e| e.length / e.bending[1]).sum();
         REGULARISATION / (length * soft)
     }
 

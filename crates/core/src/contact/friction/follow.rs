@@ -11,7 +11,7 @@ pub const SETTLED: f64 = 1e-4;
 
 /// Whether normal forces are renewed at the next base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Renewal {
+pub(in crate::contact) enum Renewal {
     /// They are, for the first time: whether they settle shows from the second base on.
     #[default]
     Begins,
@@ -23,13 +23,38 @@ pub(super) enum Renewal {
     Held,
 }
 
+impl Renewal {
+    /// Whether they are renewed.
+    pub(in crate::contact) fn follows(self) -> bool {
+        matches!(self, Self::Begins | Self::Follows)
+    }
+
+    /// How it goes on from a base at which they were steady or not.
+    pub(in crate::contact) fn after(self, steady: bool) -> Self {
+        match self {
+            Self::Begins => Self::Follows,
+            Self::Follows if steady => Self::Settled,
+            same => same,
+        }
+    }
+
+    /// Whether an equilibrium at which they are what presses, or not, is one; otherwise they follow again.
+    pub(in crate::contact) fn settles(&mut self, settled: bool) -> bool {
+        if *self == Self::Held || settled {
+            return true;
+        }
+        *self = Self::Follows;
+        false
+    }
+}
+
 impl Friction {
     /// Takes the forces of contacts as normal forces, unless they are settled or held, and looks at what presses at the base: the numbers of
     /// the points that are active, ascending, each with a normal, its force, and that with which it presses, N. `least_n` is a force not
     /// worth settling.
     pub fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
         let mut active = active.peekable();
-        let follows = matches!(self.renewal, Renewal::Begins | Renewal::Follows);
+        let follows = self.renewal.follows();
         let (mut change_n, mut sum_n) = (0.0, least_n);
         for (index, slider) in self.sliders.iter_mut().enumerate() {
             let (normal, [force_n, presses_n]) = active
@@ -43,20 +68,13 @@ impl Friction {
             }
         }
         let steady = change_n < SETTLED * sum_n && self.unsettled(least_n) < SETTLED;
-        self.renewal = match self.renewal {
-            Renewal::Begins => Renewal::Follows,
-            Renewal::Follows if steady => Renewal::Settled,
-            same => same,
-        };
+        self.renewal = self.renewal.after(steady);
     }
 
     /// Whether normal forces at an equilibrium are what presses there, or are held; otherwise they follow again.
     pub fn settles(&mut self, least_n: f64) -> bool {
-        if self.renewal == Renewal::Held || self.unsettled(least_n) < SETTLED {
-            return true;
-        }
-        self.renewal = Renewal::Follows;
-        false
+        let settled = self.unsettled(least_n) < SETTLED;
+        self.renewal.settles(settled)
     }
 
     /// Part by which normal forces differ from what pressed at the last base.
@@ -80,7 +98,7 @@ impl Friction {
     }
 
     /// Normal forces are those that a solution has come to, one for each point, and follow from there.
-    pub fn resume(&mut self, forces: &[NormalForce]) {
+    pub fn resume<'a>(&mut self, forces: impl IntoIterator<Item = &'a NormalForce>) {
         self.release();
         self.sliders.iter_mut().zip(forces).for_each(|(s, f)| (s.normal, s.force_n) = (f.normal, f.force_n));
     }

@@ -67,9 +67,9 @@ fn is_open(state: &RodState) -> bool {
 }
 
 impl SelfContact {
-    /// Whether there is nothing but a rod that cannot touch itself.
-    fn is_alone_and_open(&self, state: &RodState) -> bool {
-        self.others.is_empty() && is_open(state)
+    /// Whether there is one rod alone, which cannot touch itself.
+    fn is_alone_and_open(&self, elements: &[ElementData], state: &RodState) -> bool {
+        is_open(state) && !elements.iter().any(ElementData::is_break)
     }
 
     /// Whether nothing is near, at the base and at a state, and no step between them leads by anything.
@@ -77,7 +77,8 @@ impl SelfContact {
         let most_mm = FREE * 2.0 * self.largest_radius_mm;
         self.pairs.is_empty()
             && self.clear.as_ref().is_some_and(|clear| {
-                (clear.nodes.is_empty() && is_open(state)) || clear.holds(elements, state, most_mm)
+                (clear.nodes.is_empty() && self.is_alone_and_open(elements, state))
+                    || clear.holds(elements, state, most_mm)
             })
     }
 
@@ -86,7 +87,7 @@ impl SelfContact {
         if self.closed {
             return false;
         }
-        if self.is_alone_and_open(state) {
+        if self.is_alone_and_open(elements, state) {
             self.clear = Some(Clear::default());
             return true;
         }
@@ -112,25 +113,28 @@ impl SelfContact {
         state: &RodState,
         advance_mm: f64,
     ) -> bool {
-        if advance_mm <= 0.0 || self.skins.is_empty() || self.is_alone_and_open(state) {
+        if advance_mm <= 0.0 || self.skins.is_empty() || self.is_alone_and_open(elements, state) {
             return false;
         }
+        // The tip is that of the first rod.
+        let Some(last) = elements.iter().take_while(|data| !data.is_break()).count().checked_sub(1) else {
+            return false;
+        };
         self.is_placed = false;
-        self.tree.place(&super::Curve { elements, state, others: &self.others, closed: false });
-        let tip = state.positions[elements.len()];
-        let from = tip - state.frames[elements.len()].t * advance_mm;
-        let tip_mm = self.skins[elements.len() - 1].radius_mm;
-        let reach_mm = |e: usize| 0.5 * (self.skin(e).radius_mm + tip_mm);
+        self.tree.place(&super::Curve { elements, state, closed: false });
+        let tip = state.positions[last + 1];
+        let from = tip - state.frames[last + 1].t * advance_mm;
+        let reach_mm = |e: usize| 0.5 * (self.skins[e].radius_mm + self.skins[last].radius_mm);
         self.tree.is_near_segment((&from, &tip), advance_mm + self.apart_mm(), reach_mm)
     }
 
     /// Whether the way from one state to another leads through the rod itself.
     pub(crate) fn crosses(&mut self, elements: &[ElementData], from: &RodState, to: &RodState) -> bool {
-        if self.skins.is_empty() || (self.is_alone_and_open(from) && is_open(to)) {
+        if self.skins.is_empty() || (self.is_alone_and_open(elements, from) && is_open(to)) {
             return false;
         }
         self.is_placed = false;
-        let curve = |state| super::Curve { elements, state, others: &self.others, closed: self.closed };
+        let curve = |state| super::Curve { elements, state, closed: self.closed };
         self.tree.place(&curve(from));
         self.tree.move_to(&curve(to));
         self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0

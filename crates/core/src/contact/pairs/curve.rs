@@ -1,9 +1,9 @@
 //! The centre line as a curve: places on it, and its derivatives there.
 //!
 //! On an element of length h it is the cubic of [`hermite`], in the parameter s = h ξ. Neighbouring elements share place and tangent, so that it
-//! is continuously differentiable in s, from one end to the other. Elements of other rods ([`Still`]) come after those of the rod itself.
+//! is continuously differentiable in s, from one end of a rod to the other. Where several rods are solved for together there are gaps between them, which are no
+//! elements of either.
 
-use super::Skin;
 use crate::Vec3;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
@@ -25,24 +25,11 @@ pub(super) struct Jet {
     pub(super) second: Vec3,
 }
 
-/// An element of another rod, which stays where it is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Still {
-    /// Places and tangents of its nodes.
-    pub(crate) nodes: [(Vec3, Vec3); 2],
-    pub(crate) length_mm: f64,
-    pub(crate) skin: Skin,
-    /// Number of its rod, and arc length from the begin of that, mm.
-    pub(crate) rod: usize,
-    pub(crate) begin_mm: f64,
-}
-
-/// The centre line of a rod, and those of the others.
+/// The centre lines of all rods.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Curve<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) state: &'a RodState,
-    pub(super) others: &'a [Still],
     /// Whether the rod's end is its start.
     pub(super) closed: bool,
 }
@@ -57,48 +44,38 @@ impl Curve<'_> {
         Jet { at: x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * h, first, second: second / h }
     }
 
-    /// Number of all elements.
-    pub(super) fn len(&self) -> usize {
-        self.elements.len() + self.others.len()
-    }
-
-    /// The element, if it is one of another rod.
-    pub(super) fn other(&self, e: usize) -> Option<&Still> {
-        e.checked_sub(self.elements.len()).map(|k| &self.others[k])
+    /// Whether there is a gap between two rods in the place of an element.
+    pub(super) fn is_break(&self, e: usize) -> bool {
+        self.elements[e].is_break()
     }
 
     /// Length of an element, mm.
     pub(super) fn length_mm(&self, e: usize) -> f64 {
-        self.other(e).map_or_else(|| self.elements[e].length, |still| still.length_mm)
+        self.elements[e].length
     }
 
     /// Places and tangents of the nodes of an element.
     fn nodes(&self, e: usize) -> [(Vec3, Vec3); 2] {
         // Asked for a million times a step: arrays of closures cost twice as much.
         let (x, frames) = (&self.state.positions, &self.state.frames);
-        match self.other(e) {
-            None => [(x[e], frames[e].t), (x[e + 1], frames[e + 1].t)],
-            Some(still) => still.nodes,
-        }
+        [(x[e], frames[e].t), (x[e + 1], frames[e + 1].t)]
     }
 
     /// The element before one on its rod.
     pub(super) fn before(&self, e: usize) -> Option<usize> {
-        match self.other(e) {
-            Some(still) => (still.begin_mm > 0.0).then(|| e - 1),
-            None if e == 0 => self.closed.then(|| self.elements.len() - 1),
-            None => Some(e - 1),
+        if e == 0 {
+            return self.closed.then(|| self.elements.len() - 1);
         }
+        (!self.is_break(e - 1)).then_some(e - 1)
     }
 
     /// The element after one on its rod.
     pub(super) fn after(&self, e: usize) -> Option<usize> {
         let next = e + 1;
-        match self.other(e) {
-            Some(still) => (next < self.len() && self.other(next)?.rod == still.rod).then_some(next),
-            None if next == self.elements.len() => self.closed.then_some(0),
-            None => Some(next),
+        if next == self.elements.len() {
+            return self.closed.then_some(0);
         }
+        (!self.is_break(next)).then_some(next)
     }
 
     /// The place so far along the centre line from another, or the end on the way there.

@@ -17,8 +17,8 @@ const ROUNDING: f64 = 4.0;
 pub struct Touching {
     /// Arc lengths of the two points from the first node of their rod, mm.
     pub arcs_mm: [f64; 2],
-    /// Number of the other rod on which the second point is; none where it is on the rod itself.
-    pub other: Option<usize>,
+    /// Numbers of the rods on which they are: 0 of the device, and from 1 on of the coils that were detached, in their order.
+    pub rods: [usize; 2],
     /// Where they are, mm.
     pub positions_mm: [Vec3; 2],
     /// From the second to the first, unit length.
@@ -32,11 +32,11 @@ pub struct Touching {
 /// Element and ξ.
 pub(crate) type RodPlace = (usize, f64);
 
-/// Two places of a rod, or of it and another one, that press on each other, as its elements have them.
+/// Two places that press on each other, as elements have them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pressing {
-    /// Element and ξ of both; none of the second on another rod.
-    pub(crate) places: (RodPlace, Option<RodPlace>),
+    /// Element and ξ of both.
+    pub(crate) places: [RodPlace; 2],
     /// Force on the first; on the second it is the opposite, N.
     pub(crate) force_n: Vec3,
     /// Element of the site that feels it, by the length of which it counts, …
@@ -50,11 +50,8 @@ impl SelfContact {
     pub(crate) fn pressing(&self) -> impl Iterator<Item = Pressing> + '_ {
         let pressed = self.pairs.iter().filter(|pair| pair.depth_mm() > 0.0);
         pressed.map(|pair| Pressing {
-            places: {
-                let [a, b] = pair.gap.at.map(|place| (place.element, place.xi));
-                (a, (!pair.of_other).then_some(b))
-            },
-            force_n: pair.gap.direction() * (pair.spring_n_per_mm * pair.depth_mm()),
+            places: pair.gap.at.map(|place| (place.element, place.xi)),
+            force_n: pair.gap.direction() * (pair.spring_n_per_mm * pair.depth_mm()) + self.friction_n(pair),
             site: self.sites[pair.site].place.element,
             energy_mj: 0.5 * pair.spring_n_per_mm * pair.depth_mm().powi(2),
         })
@@ -64,14 +61,20 @@ impl SelfContact {
     pub(super) fn press(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         let mut rounding_n: f64 = 0.0;
         let curve = self.curve(elements, state);
-        for pair in self.pairs.iter().filter(|pair| pair.at_base) {
-            let depth_mm = pair.depth_mm();
-            into.add_value(0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2));
-            let farthest_mm =
-                pair.gap.at.map(|place| curve.jet(place).at.amax()).into_iter().fold(0.0, f64::max);
-            rounding_n = rounding_n.max(ROUNDING * f64::EPSILON * pair.spring_n_per_mm * farthest_mm);
-            let force_n = pair.spring_n_per_mm * depth_mm;
-            let couple = pair.couple(&curve, -force_n, pair.force_n, pair.spring_n_per_mm);
+        for pair in self.pairs.iter().filter(|pair| pair.at_base || pair.rubs()) {
+            let mut couple = Couple::none(pair.gap.at.map(|place| place.element));
+            if pair.at_base {
+                let depth_mm = pair.depth_mm();
+                into.add_value(0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2));
+                let farthest_mm =
+                    pair.gap.at.map(|place| curve.jet(place).at.amax()).into_iter().fold(0.0, f64::max);
+                rounding_n = rounding_n.max(ROUNDING * f64::EPSILON * pair.spring_n_per_mm * farthest_mm);
+                let force_n = pair.spring_n_per_mm * depth_mm;
+                couple = pair.couple(&curve, -force_n, pair.force_n, pair.spring_n_per_mm);
+            }
+            if pair.rubs() {
+                into.add_value(self.add_friction(pair, &mut couple));
+            }
             into.add_couple(elements, state, &couple);
         }
         self.rounding_n = rounding_n;
@@ -98,7 +101,7 @@ impl SelfContact {
             }
             merit(pair.spring_n_per_mm, pair.penalty_n_per_mm, force_n, depth_mm).0
         };
-        self.pairs.iter().map(of).sum()
+        self.pairs.iter().map(|pair| of(pair) + self.friction_mj(pair, &curve)).sum()
     }
 
     /// See [`Contacts::merit`](crate::solve::Contacts::merit).
@@ -155,13 +158,15 @@ impl SelfContact {
     /// Where the rod presses on itself at the base: at the last state of a solution.
     pub fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         let curve = self.curve(elements, state);
-        let arc_mm = |place: Place| match curve.other(place.element) {
-            Some(still) => still.begin_mm + place.xi * still.length_mm,
-            None => self.tree.arc(place.element, place.xi),
+        let gaps: Vec<usize> = (0..elements.len()).filter(|e| curve.is_break(*e)).collect();
+        let rod = |place: Place| gaps.partition_point(|gap| *gap < place.element);
+        let arc_mm = |place: Place| {
+            let first = rod(place).checked_sub(1).map_or(0, |k| gaps[k] + 1);
+            self.tree.arc(place.element, place.xi) - self.tree.arc(first, 0.0)
         };
         let of = |pair: &Pair| Touching {
             arcs_mm: pair.gap.at.map(arc_mm),
-            other: curve.other(pair.gap.at[1].element).map(|still| still.rod),
+            rods: pair.gap.at.map(rod),
             positions_mm: pair.gap.at.map(|place| curve.jet(place).at),
             normal: pair.gap.between / pair.gap.between.norm(),
             force_n: pair.spring_n_per_mm * pair.depth_mm() * pair.gap.direction().norm(),
@@ -183,7 +188,7 @@ impl Pair {
         }
         Couple {
             first: self.gap.at[0].element,
-            second: (!self.of_other).then_some(self.gap.at[1].element),
+            second: self.gap.at[1].element,
             gradient: of.gradient.map(|g| g * first),
             carried: of.gradient.map(|g| g * -force_n),
             hessian: of.hessian,

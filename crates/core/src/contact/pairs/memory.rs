@@ -1,9 +1,8 @@
 //! Which pairs there are at a base, and what is kept of those before.
 
-use std::sync::Arc;
-
 use super::curve::{Curve, Place};
 use super::gap::Gap;
+use super::rubbing::Rub;
 use super::{KNOWN, LOOKED_AT, Pair, SelfContact};
 use crate::contact::force::PENALTY;
 use crate::rod::{ElementData, RodState};
@@ -17,6 +16,7 @@ impl SelfContact {
     /// Has a state be the base, and finds the pairs there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.aimed = false;
+        self.slips_known = false;
         self.checked.1 = f64::NAN;
         self.base.copy_from(state);
         self.is_placed = false;
@@ -24,8 +24,7 @@ impl SelfContact {
             self.pairs.clear();
             return;
         }
-        let others = Arc::clone(&self.others);
-        let curve = Curve { elements, state, others: &others, closed: self.closed };
+        let curve = self.curve(elements, state);
         self.place_tree(elements);
         self.counters.searches += 1;
         let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
@@ -38,9 +37,7 @@ impl SelfContact {
         self.pairs.clear();
         for (a, b) in &near {
             self.find_between(&curve, *a, *b, reach_mm);
-            if curve.other(*b).is_none() {
-                self.find_between(&curve, *b, *a, reach_mm);
-            }
+            self.find_between(&curve, *b, *a, reach_mm);
         }
         self.near = near;
         self.pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
@@ -65,7 +62,7 @@ impl SelfContact {
             if (x - curve.jet(Place { element: b, xi }).at).norm() > reach_mm {
                 continue;
             }
-            let touch_mm = self.skin(a).radius_mm + self.skin(b).radius_mm;
+            let touch_mm = self.skins[a].radius_mm + self.skins[b].radius_mm;
             let place = self.sites[site].place;
             let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, touch_mm);
             if gap.distance < KNOWN * touch_mm {
@@ -78,14 +75,13 @@ impl SelfContact {
     fn pair(&self, curve: &Curve<'_>, site: usize, gap: Gap, touch_mm: f64) -> Option<Pair> {
         let [a, b] = gap.at.map(|place| place.element);
         let [here_mm, arc_mm] = gap.at.map(|place| self.tree.arc(place.element, place.xi));
-        let of_other = curve.other(b).is_some();
-        if !of_other && (a.abs_diff(b) < 2 || self.tree.between(here_mm, arc_mm) < self.apart_mm()) {
+        if a.abs_diff(b) < 2 || self.tree.between(here_mm, arc_mm) < self.apart_mm() {
             return None;
         }
-        let [one, other] = [a, b].map(|e| self.skin(e));
+        let [one, other] = [a, b].map(|e| self.skins[e]);
         let softer = 2.0 / (1.0 / one.modulus_n_per_mm2 + 1.0 / other.modulus_n_per_mm2);
-        // Of two stretches of the rod each has sites that feel the other.
-        let weight_mm = if of_other { 1.0 } else { 0.5 } * self.sites[site].weight_mm;
+        // Of two stretches each has sites that feel the other.
+        let weight_mm = 0.5 * self.sites[site].weight_mm;
         let element = &curve.elements[a];
         Some(Pair {
             site,
@@ -94,7 +90,6 @@ impl SelfContact {
             spring_n_per_mm: weight_mm * softer,
             penalty_n_per_mm: weight_mm * element.bending[1] * PENALTY / element.length.powi(4),
             arc_mm,
-            of_other,
             force_n: 0.0,
             at_base: false,
             presses: false,
@@ -103,6 +98,7 @@ impl SelfContact {
             end_mm: 0.0,
             carried_n: 0.0,
             aim_n: 0.0,
+            rub: Rub::default(),
         })
     }
 
@@ -115,6 +111,7 @@ impl SelfContact {
                 same.min_by(|p, q| (p.arc_mm - pair.arc_mm).abs().total_cmp(&(q.arc_mm - pair.arc_mm).abs()));
             let kept = nearest.filter(|old| (old.arc_mm - pair.arc_mm).abs() < SAME * pair.touch_mm);
             pair.force_n = kept.map_or(0.0, |old| old.force_n);
+            pair.rub = kept.map_or_else(Rub::default, |old| old.rub);
             pair.at_base = pair.force_n + pair.penalty_n_per_mm * pair.depth_mm() > 0.0;
             pair.presses = pair.at_base;
             if !pair.at_base {
@@ -126,8 +123,7 @@ impl SelfContact {
     /// Has the hierarchy be that of the base.
     pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
         if !std::mem::replace(&mut self.is_placed, true) {
-            let (state, others) = (&self.base, &*self.others);
-            self.tree.place(&Curve { elements, state, others, closed: self.closed });
+            self.tree.place(&Curve { elements, state: &self.base, closed: self.closed });
         }
     }
 
@@ -138,7 +134,7 @@ impl SelfContact {
             return *part;
         }
         self.place_tree(elements);
-        self.tree.move_to(&Curve { elements, state: to, others: &self.others, closed: self.closed });
+        self.tree.move_to(&Curve { elements, state: to, closed: self.closed });
         let part = self.tree.safe_part(self.apart_mm());
         self.checked.0.copy_from(to);
         self.checked.1 = part;

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! the wall's law ([`super::potential`]), where the half stands since each of two stretches has sites that feel the other. Stretches are other ones where they are
-//! at least half a turn of the least radius apart along the rod: a rod cannot be bent to a smaller one than its own. Other rods, which stay where they
-//! are, are touched as loops are; they have no sites, so that wᵢ counts whole there.
+//! at least half a turn of the least radius apart along the rod: a rod cannot be bent to a smaller one than its own. Stretches of other rods, where several are solved
+//! for together, are other ones too.
 //!
 //! Forces of pairs are unknowns of their own, as those of the wall are: derived in [`super::wall`] (`wall/forces.rs`), with G in the place of d,
 //!
@@ -27,21 +27,23 @@ mod forces;
 mod gap;
 mod memory;
 mod model;
+mod rubbing;
+#[cfg(test)]
+mod rubbing_tests;
 #[cfg(test)]
 mod tests;
 mod tree;
-
-use std::sync::Arc;
 
 use crate::Vec3;
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
 
-pub(crate) use curve::Still;
 use curve::{Curve, Place};
 pub use forces::Touching;
 pub(crate) use forces::{Pressing, RodPlace};
 use gap::Gap;
+pub(crate) use rubbing::Rubs;
+use rubbing::{Rub, Rubbing};
 use tree::Tree;
 
 /// Most distance of sites, in radii.
@@ -68,6 +70,9 @@ impl Skin {
     /// Modulus of the contact of a rod without one of its own, over EI/r⁴. A solid round wire has E = 4/π EI/r⁴, and two of them in contact give
     /// way by about what their own material says; ten times as hard they are rigid: a plectoneme under T r²/EI = 10⁻³ sinks in by 10⁻⁴ of its radius.
     pub const RIGID: f64 = 10.0;
+
+    /// That of a gap between two rods.
+    pub(crate) const NONE: Self = Self { radius_mm: 0.0, modulus_n_per_mm2: 0.0 };
 
     /// That of a rod of this radius, mm, and bending stiffness, N·mm², as hard as a rod can tell.
     pub fn rigid(radius_mm: f64, bending_nmm2: f64) -> Self {
@@ -96,8 +101,6 @@ struct Pair {
     penalty_n_per_mm: f64,
     /// Arc length of the nearest point of the stretch, mm.
     arc_mm: f64,
-    /// Whether the stretch is one of another rod.
-    of_other: bool,
     /// Force of its own, N.
     force_n: f64,
     /// Whether it presses in the system at the base, …
@@ -114,6 +117,7 @@ struct Pair {
     carried_n: f64,
     /// f⁺: the force that the step leads to, N.
     aim_n: f64,
+    rub: Rub,
 }
 
 impl Pair {
@@ -138,8 +142,6 @@ pub struct PairCounters {
 #[derive(Debug, Clone, Default)]
 pub struct SelfContact {
     skins: Vec<Skin>,
-    /// The other rods.
-    others: Arc<[Still]>,
     sites: Vec<Site>,
     /// First site of each element, and one past the last.
     first_sites: Vec<usize>,
@@ -162,6 +164,9 @@ pub struct SelfContact {
     clear: Option<clear::Clear>,
     /// The trial that was found safe last, and the part of its way that is.
     checked: (RodState, f64),
+    rubbing: Rubbing,
+    /// Whether friction at the base is known in a step.
+    slips_known: bool,
     rounding_n: f64,
     counters: PairCounters,
 }
@@ -183,7 +188,8 @@ impl SelfContact {
         first_sites.clear();
         first_sites.push(0);
         for (e, (element, skin)) in elements.iter().zip(&*known).enumerate() {
-            let count = (element.length / (SPACING_RADII * skin.radius_mm)).ceil().max(1.0);
+            let spaces = (element.length / (SPACING_RADII * skin.radius_mm)).ceil().max(1.0);
+            let count = if element.is_break() { 0.0 } else { spaces };
             let site = |k: usize| Site {
                 place: Place { element: e, xi: (k as f64 + 0.5) / count },
                 weight_mm: element.length / count,
@@ -205,19 +211,8 @@ impl SelfContact {
         Self { closed: true, ..self }
     }
 
-    /// Has these rods be the others.
-    pub(crate) fn beside(&mut self, others: &Arc<[Still]>) {
-        self.others = Arc::clone(others);
-        self.clear = None;
-    }
-
-    fn curve<'a>(&'a self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
-        Curve { elements, state, others: &self.others, closed: self.closed }
-    }
-
-    /// The surface of an element.
-    fn skin(&self, e: usize) -> Skin {
-        e.checked_sub(self.skins.len()).map_or_else(|| self.skins[e], |k| self.others[k].skin)
+    fn curve<'a>(&self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
+        Curve { elements, state, closed: self.closed }
     }
 
     /// What was asked so far.
@@ -234,6 +229,7 @@ impl SelfContact {
 impl External for SelfContact {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         self.look_at_base(elements, state);
+        self.rub_with_pairs(elements, state);
         self.press(elements, state, into);
     }
 
@@ -263,6 +259,7 @@ impl External for SelfContact {
 impl Contacts for SelfContact {
     fn foresee(&mut self, _elements: &[ElementData], _base: &RodState, moved: &Moved<'_>) {
         self.foresee_pairs(moved);
+        self.foresee_slipping(moved);
     }
 
     fn press_or_let_go(
@@ -272,23 +269,25 @@ impl Contacts for SelfContact {
         moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
-        self.press_or_let_go_pairs(elements, base, moved, into)
+        self.press_or_let_go_pairs(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
     }
 
     fn look_towards(&mut self, moved: &Moved<'_>) {
         for pair in &mut self.pairs {
             pair.end_mm = pair.change(moved);
         }
+        self.look_towards_slips(moved);
     }
 
     fn slope_towards(&mut self, part: f64) -> f64 {
-        self.pairs.iter().map(|pair| pair.slope_towards(part)).sum()
+        self.pairs.iter().map(|pair| pair.slope_towards(part)).sum::<f64>() + self.slipping_slope(part)
     }
 
     fn go_towards(&mut self, part: f64) {
         for pair in &mut self.pairs {
             pair.carried_n += part * (pair.linear_n(pair.end_mm) - pair.carried_n);
         }
+        self.carry_slipping(part);
     }
 
     fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
@@ -302,6 +301,6 @@ impl Contacts for SelfContact {
     }
 
     fn settled(&mut self, tolerance: f64) -> bool {
-        self.let_go_of_pulling(tolerance)
+        self.let_go_of_pulling(tolerance) && self.friction_settles()
     }
 }

@@ -1,9 +1,8 @@
 //! The model of a step: gaps to first order, and springs where they close. See `wall/model.rs`, of which this is the other one.
 
-use std::sync::Arc;
-
-use super::curve::{Curve, Place};
+use super::curve::Curve;
 use super::{Pair, SelfContact};
+use crate::Vec3;
 use crate::contact::point::FOLLOW;
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::Moved;
@@ -14,10 +13,13 @@ impl Pair {
         if !self.foreseen {
             return 0.0;
         }
-        let way = |place: Place| moved((place.element, place.xi, 0)).0;
-        let [a, b] = self.gap.at;
-        let away = if self.of_other { way(a) } else { way(a) - way(b) };
-        self.gap.direction().dot(&away)
+        self.gap.direction().dot(&self.way(moved))
+    }
+
+    /// By how much a step moves its places apart, mm.
+    pub(super) fn way(&self, moved: &Moved<'_>) -> Vec3 {
+        let [a, b] = self.gap.at.map(|place| moved((place.element, place.xi, 0)).0);
+        a - b
     }
 
     /// Force of its spring in the system after a step that changes its gap so much, N.
@@ -52,8 +54,7 @@ impl SelfContact {
         moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
-        let others = Arc::clone(&self.others);
-        let curve = Curve { elements, state: base, others: &others, closed: self.closed };
+        let curve = Curve { elements, state: base, closed: self.closed };
         let mut changed = 0;
         for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
             pair.change_mm = pair.change(moved);

@@ -43,14 +43,23 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
     elements: &[ElementData],
     state: &RodState,
     radius: f64,
+    friction: f64,
 ) {
     let mut touching = contact(elements, radius);
+    // Slips are of the size of ε, so that some stick and some do not.
+    let mut begun = state.clone();
+    for (i, x) in begun.positions.iter_mut().enumerate() {
+        *x += Vec3::new((0.7 * i as f64).sin(), (1.1 * i as f64).cos(), 0.3) * 0.01;
+    }
+    let rubs = Rubs { coefficient: friction, stick_mm: [0.02, 0.001], least_n: 0.0 };
+    touching.begin_friction(&begun, elements.iter().map(|_| 0.005), rubs);
     let mut assembly = Assembly::<C>::new(elements.len());
     touching.look_at_base(elements, state);
     // Under the forces that the energy itself exerts.
     for pair in &mut touching.pairs {
         pair.force_n = if pair.at_base { pair.spring_n_per_mm * pair.depth_mm() } else { 0.0 };
     }
+    touching.rub_with_pairs(elements, state);
     touching.press(elements, state, &mut assembly);
     assert!(touching.pairs.iter().filter(|pair| pair.at_base).count() > 3);
     assert!(!assembly.couplings.is_empty());
@@ -91,10 +100,14 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
 #[test]
 fn derivatives_are_those_of_the_energy_along_lines_and_at_crossings() {
     let (elements, state) = along(coil(0.5, 0.19), 13.0, 40);
-    derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1);
-    derivatives_are_those_of_the_energy::<TWISTED>(&elements, &state, 0.1);
+    for friction in [0.0, 0.4] {
+        derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1, friction);
+        derivatives_are_those_of_the_energy::<TWISTED>(&elements, &state, 0.1, friction);
+    }
     let (elements, state) = along(loop_over(0.09), 5.0, 30);
-    derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1);
+    for friction in [0.0, 0.4] {
+        derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1, friction);
+    }
 }
 
 #[test]

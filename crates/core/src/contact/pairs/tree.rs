@@ -48,14 +48,14 @@ pub(super) struct Tree {
     motions: Vec<Controls>,
     /// Of each half: places and motions. The children of `i` are 2i + 1 and 2i + 2.
     boxes: Vec<[Extent; 2]>,
-    /// Arc lengths at the ends of each element; those of other rods follow far behind the rod's own.
+    /// Arc lengths at the ends of each element; a rod follows far behind the one before it.
     arcs: Vec<[f64; 2]>,
-    /// Elements of the rod itself, which come first. Others are looked at against these alone.
-    own: usize,
+    /// Whether there is none, but a gap between two rods.
+    breaks: Vec<bool>,
     closed: bool,
 }
 
-/// Arc length between the end of the rod and the others, mm: more than any reach.
+/// Arc length between the end of a rod and the begin of the next, mm: more than any reach.
 const APART_MM: f64 = 1e3;
 
 /// A stretch of elements, and the number of its box.
@@ -67,22 +67,22 @@ fn halves((at, range): &Stretch) -> [Stretch; 2] {
 }
 
 impl Tree {
-    /// That of a rod where it is, without a motion.
+    /// That of rods where they are, without a motion.
     pub(super) fn place(&mut self, curve: &Curve<'_>) {
-        let n = curve.len();
-        self.own = curve.elements.len();
+        let n = curve.elements.len();
         self.closed = curve.closed;
         self.controls.clear();
         self.controls.extend((0..n).map(|e| curve.controls(e)));
         self.motions.clear();
         self.motions.resize(n, [Vec3::zeros(); 4]);
         self.arcs.clear();
+        self.breaks.clear();
         let mut end = 0.0;
         for e in 0..n {
-            let begin =
-                end + if curve.other(e).is_some() && curve.before(e).is_none() { APART_MM } else { 0.0 };
-            end = begin + curve.length_mm(e);
+            let begin = end;
+            end += if curve.is_break(e) { APART_MM } else { curve.length_mm(e) };
             self.arcs.push([begin, end]);
+            self.breaks.push(curve.is_break(e));
         }
         self.boxes.clear();
         self.boxes.resize(2 * n.next_power_of_two() * 2, [Extent::EMPTY; 2]);
@@ -101,7 +101,8 @@ impl Tree {
     fn enclose(&mut self, stretch: &Stretch) -> [Extent; 2] {
         let found = if stretch.1.len() <= 1 {
             let e = stretch.1.start;
-            let of = |list: &[Controls]| list.get(e).map_or(Extent::EMPTY, Extent::of);
+            let is_one = self.breaks.get(e).is_some_and(|is_break| !is_break);
+            let of = |list: &[Controls]| if is_one { Extent::of(&list[e]) } else { Extent::EMPTY };
             [of(&self.controls), of(&self.motions)]
         } else {
             let [a, b] = halves(stretch).map(|half| self.enclose(&half));
@@ -119,21 +120,18 @@ impl Tree {
 
     /// Whether two elements, the first before the second, are so far apart along the rod that they can touch.
     fn may_touch(&self, a: usize, b: usize, apart: f64) -> bool {
-        if b >= self.own {
-            return a < self.own;
-        }
         let around = self.arcs[a][0] + self.length() - self.arcs[b][1];
         a + 1 < b
             && self.arcs[b][0] - self.arcs[a][1] >= apart
-            && !(self.closed && (a + self.own == b + 1 || around < apart))
+            && !(self.closed && (a + self.arcs.len() == b + 1 || around < apart))
     }
 
-    /// Length of the rod itself.
+    /// Length of all that there is.
     fn length(&self) -> f64 {
-        self.own.checked_sub(1).map_or(0.0, |last| self.arcs[last][1])
+        self.arcs.last().map_or(0.0, |last| last[1])
     }
 
-    /// Arc length between two places of the rod itself, the shorter way round of a closed one.
+    /// Arc length between two places, the shorter way round of a closed rod.
     pub(super) fn between(&self, a: f64, b: f64) -> f64 {
         let apart = (a - b).abs();
         if self.closed { apart.min(self.length() - apart) } else { apart }
@@ -151,17 +149,19 @@ impl Tree {
         self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
     }
 
-    /// Whether an element at least `behind` from the rod's end, or one of another rod, comes nearer to a segment than its `reach`.
+    /// Whether an element, but for those of the first rod that are less than `behind` from its end, comes nearer to a segment than its `reach`.
     pub(super) fn is_near_segment(
         &self,
         (from, to): (&Vec3, &Vec3),
         behind: f64,
         reach: impl Fn(usize) -> f64,
     ) -> bool {
-        let (n, length) = (self.controls.len(), self.length());
+        let first = self.breaks.iter().position(|is_break| *is_break).unwrap_or(self.breaks.len());
+        let length = first.checked_sub(1).map_or(0.0, |last| self.arcs[last][1]);
         let segment = [*from, from + (to - from) / 3.0, to - (to - from) / 3.0, *to];
-        let others = (0..n).filter(|e| *e >= self.own || length - self.arcs[*e][1] >= behind);
-        others.into_iter().any(|e| is_near(&self.controls[e], &segment, reach(e), SPLITS))
+        let mut others = (0..self.breaks.len())
+            .filter(|e| !self.breaks[*e] && (*e > first || length - self.arcs[*e][1] >= behind));
+        others.any(|e| is_near(&self.controls[e], &segment, reach(e), SPLITS))
     }
 
     /// Part, at most all, of the motion in which no two points of elements at least `apart` along the rod come nearer to each other by more than half
@@ -190,14 +190,12 @@ impl Tree {
         is_near: &dyn Fn(&Stretch, &Stretch) -> bool,
         leaf: &mut dyn FnMut(usize, usize),
     ) {
-        if stretch.1.len() <= 1 || stretch.1.start >= self.own {
+        if stretch.1.len() <= 1 {
             return;
         }
         let [a, b] = halves(stretch);
         self.visit_within(&a, is_near, leaf);
-        // What is not of the rod itself stays where it is.
-        let is_near_rod = |a: &Stretch, b: &Stretch| a.1.start < self.own && is_near(a, b);
-        visit_between(&a, &b, &is_near_rod, leaf);
+        visit_between(&a, &b, is_near, leaf);
         self.visit_within(&b, is_near, leaf);
     }
 }

@@ -160,7 +160,7 @@ impl WallContact<'_> {
     }
 
     /// The room that each node of a device has at a state, mm: how far it can move without coming near a wall, as far as is known of the
-    /// points on the element before it, or their radius where that is more. The first node has that of the second.
+    /// points on the element before it, or their radius where that is more.
     pub fn rooms(&self, elements: &[ElementData], state: &RodState, room_mm: &mut Vec<f64>) {
         room_mm.clear();
         room_mm.resize(elements.len() + 1, f64::INFINITY);
@@ -172,7 +172,11 @@ impl WallContact<'_> {
             let radius_mm = self.points[span.points.start].potential.radius_mm;
             room_mm[e + 1] = clearance_mm.max(radius_mm);
         }
+        // The first node of a rod has that of its second.
         room_mm[0] = room_mm[1];
+        for e in (0..elements.len()).filter(|e| elements[*e].is_break()) {
+            room_mm[e + 1] = room_mm[e + 2];
+        }
     }
 
     /// Has a state be the base, and looks at the points that may touch there.

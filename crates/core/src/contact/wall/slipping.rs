@@ -15,15 +15,10 @@ use nalgebra::Matrix3;
 
 use super::WallContact;
 use crate::Vec3;
-use crate::contact::friction::FrictionDerivatives;
+use crate::contact::friction::{CHANGED, FrictionDerivatives, RENEWED};
 use crate::contact::point::ContactPoint;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
-
-/// Friction at a point is worth another round where its force is off by more than this part of the largest that it can be; …
-const CHANGED: f64 = 0.05;
-/// … and a round has it as it is where it is off by more than this: left as it was, steps were uphill by what it was off.
-const RENEWED: f64 = 5e-3;
 
 /// How far a step moves a point, mm, and turns it, rad.
 pub(super) type Motion = (Vec3, f64);

@@ -191,6 +191,16 @@ pub(super) fn element(
     data
 }
 
+/// An element of an instrument by itself between two distances from its tip, with its set of angles if it has one.
+pub(super) fn alone(device: &Device, set: Option<usize>, (near, far): (f64, f64)) -> ElementData {
+    let part = between(device, near, far);
+    let mut data = ElementData { length: near - far, bending: part.bending, ..ElementData::EMPTY };
+    if let Some(set) = set {
+        data.materials[set] = part;
+    }
+    data
+}
+
 /// What lies between two distances from the tip of a device, of each section the part that is there.
 fn between(device: &Device, near: f64, far: f64) -> Material {
     let h = near - far;

@@ -1,6 +1,8 @@
 //! One command: in one sub-step where that will do, in several where it will not, and to where the device comes to rest as it can where
 //! the way is lost.
 
+use std::sync::Arc;
+
 use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::carried;
@@ -12,7 +14,7 @@ use super::substep::{Attempt, Effort, Found};
 use super::workspace::{Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
-use crate::methods::{Jump, Move, StepReport};
+use crate::methods::{Jump, Move, StepReport, Surroundings};
 use crate::{Error, Result};
 
 /// Most sub-steps that one command may be cut into.
@@ -85,7 +87,11 @@ impl<const C: usize> Workspace<C> {
         let Self { tools, now, next, most: (elements, points), way, .. } = self;
         now.own(*elements, *points);
         next.own(*elements, *points);
-        tools.touch(&from.coils, environment.surroundings.stack, [&mut *now, &mut *next]);
+        // Where nothing is solved for they stay where they are.
+        now.parts().1.coils = Arc::clone(&from.coils);
+        let Surroundings { stack, properties, .. } = environment.surroundings;
+        let fineness = environment.options.fineness();
+        tools.joined.renew(&from.coils, stack, fineness, properties.modulus_n_per_mm2);
         tools.work = Work::default();
         let surroundings = &environment.surroundings;
         way.begin(surroundings.stack, &from.report, moves);
@@ -118,11 +124,15 @@ impl<const C: usize> Workspace<C> {
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD);
         let work = (WORK * travel.max(1.0)) as usize;
-        // Where no hand moves the vessel does, or time goes by.
+        // Where no hand moves the vessel does, time goes by, or something was set free.
+        let set_free = travel == 0.0 && !surroundings.moves();
         let travel = if travel > 0.0 { travel } else { 1.0 };
-        let has_friction = surroundings.properties.has_friction();
+        let has_friction = environment.has_friction();
         let mut control =
             StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.stride, has_friction);
+        if set_free {
+            control = control.set_free();
+        }
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
@@ -152,7 +162,7 @@ impl<const C: usize> Workspace<C> {
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
             let there = environment.displaced(then.as_ref());
             sum.substeps += 1;
-            if line_mm(lengths(hands)) == 0.0 {
+            if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 now.withdraw(surroundings.stack, hands);
                 tools.write_report(&there, hands, now);
                 break;

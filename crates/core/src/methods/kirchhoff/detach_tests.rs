@@ -51,7 +51,7 @@ fn advance(simulation: &mut Simulation, instruments: &[usize], mm: f64) -> crate
     Ok(())
 }
 
-/// Least distance of the coil from what is in, mm.
+/// Least distance of a coil from what is in, mm.
 fn clearance_mm(simulation: &Simulation, coil: &DetachedCoil) -> f64 {
     let (coil, line) = (axis(&coil.shape), axis(simulation.shape()));
     let each = coil.iter().flat_map(|a| line.iter().map(move |b| (a - b).norm()));
@@ -59,7 +59,7 @@ fn clearance_mm(simulation: &Simulation, coil: &DetachedCoil) -> f64 {
 }
 
 #[test]
-fn a_coil_that_is_detached_stays_and_the_next_one_does_not_pass_it() {
+fn a_coil_that_is_detached_yields_to_the_next_one_which_does_not_pass_it() {
     for friction in [0.0, 0.1] {
         let mut simulation = two_coils(friction, true);
         advance(&mut simulation, &[0], OUT_MM).unwrap();
@@ -74,13 +74,19 @@ fn a_coil_that_is_detached_stays_and_the_next_one_does_not_pass_it() {
         let (mut least_mm, mut touched) = (f64::INFINITY, false);
         for step in 0..40 {
             simulation.step_together(&[Move { instrument: 1, command: Command::advance(0.5) }]).unwrap();
-            let clearance_mm = clearance_mm(&simulation, &coil);
+            let clearance_mm = clearance_mm(&simulation, &simulation.coils()[0]);
             assert!(clearance_mm > 1.95 * RADIUS_MM, "{friction}, step {step}: {clearance_mm}");
             least_mm = least_mm.min(clearance_mm);
-            touched |= simulation.touching().iter().any(|touch| touch.other == Some(0));
+            touched |= simulation.touching().iter().any(|touch| touch.rods == [0, 1]);
         }
         assert!(touched && least_mm < 2.01 * RADIUS_MM, "they do not touch: {least_mm}");
-        assert_eq!(simulation.coils(), [coil]);
+        // It has been pushed aside, and is as long as it was.
+        let now = &simulation.coils()[0];
+        let farthest_mm = farthest_mm(now, &coil);
+        assert!(farthest_mm > 0.1 * RADIUS_MM, "{farthest_mm}");
+        let length_mm =
+            |coil: &DetachedCoil| axis(&coil.shape).windows(2).map(|p| (p[1] - p[0]).norm()).sum::<f64>();
+        assert!((length_mm(now) - length_mm(&coil)).abs() < 1e-3 * COIL_MM, "{} mm", length_mm(now));
         // A state knows it.
         let saved = serde_json::to_string(&simulation.state()).unwrap();
         let mut again = two_coils(friction, true);
@@ -90,7 +96,67 @@ fn a_coil_that_is_detached_stays_and_the_next_one_does_not_pass_it() {
             of.step_together(&[Move { instrument: 1, command: Command::advance(-0.5) }]).unwrap().clone()
         };
         assert_eq!(step(&mut again), step(&mut simulation));
+        assert_eq!(again.coils(), simulation.coils());
     }
+}
+
+/// How far a node of a coil is from where it was, mm.
+fn farthest_mm(coil: &DetachedCoil, was: &DetachedCoil) -> f64 {
+    let nodes = coil.shape.positions_mm.iter().zip(&was.shape.positions_mm);
+    nodes.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn what_presses_on_a_coil_is_what_holds_it() {
+    let mut simulation = two_coils(0.0, true);
+    advance(&mut simulation, &[0], OUT_MM).unwrap();
+    simulation.detach(0).unwrap();
+    for _ in 0..20 {
+        simulation.step_together(&[Move { instrument: 1, command: Command::advance(0.5) }]).unwrap();
+    }
+    // Time goes by, until the resistance to its motion is gone.
+    for _ in 0..10 {
+        let nudge = |mm: f64| [Move { instrument: 1, command: Command::advance(mm) }];
+        simulation.step_together(&nudge(1e-6)).unwrap();
+        simulation.step_together(&nudge(-1e-6)).unwrap();
+    }
+    let (mut on_coil_n, mut sizes_n) = (Vec3::zeros(), 0.0);
+    for touch in simulation.touching() {
+        for (rod, sign) in touch.rods.into_iter().zip([1.0, -1.0]) {
+            if rod == 1 {
+                on_coil_n += touch.normal * (sign * touch.force_n);
+                sizes_n += touch.force_n;
+            }
+        }
+    }
+    let axis = axis(&simulation.coils()[0].shape);
+    let is_on_coil = |at: &Vec3| axis.iter().any(|x| (x - at).norm() < 0.05);
+    for contact in &simulation.report().contacts {
+        if is_on_coil(&contact.position_mm) {
+            on_coil_n += contact.normal * contact.force_n;
+            sizes_n += contact.force_n;
+        }
+    }
+    assert!(sizes_n > 0.0 && on_coil_n.norm() < 1e-3 * sizes_n, "{on_coil_n:?} of {sizes_n} N");
+}
+
+#[test]
+fn a_catheter_that_is_pushed_into_a_coil_shoves_it_along() {
+    let mut simulation = two_coils(0.1, true);
+    advance(&mut simulation, &[0], OUT_MM).unwrap();
+    simulation.detach(0).unwrap();
+    let was = simulation.coils()[0].clone();
+    advance(&mut simulation, &[CATHETER], 4.0).unwrap();
+    let now = simulation.coils()[0].clone();
+    assert!(farthest_mm(&now, &was) > 0.5, "{}", farthest_mm(&now, &was));
+    assert!(clearance_mm(&simulation, &now) > 1.9 * RADIUS_MM);
+    // And all is taken out: the coil stays, and no hand feels it.
+    while simulation.report().lengths_mm()[CATHETER] > 0.0 {
+        simulation.step_together(&[Move { instrument: CATHETER, command: Command::advance(-0.5) }]).unwrap();
+    }
+    assert!(simulation.shape().len() == 1 && simulation.report().converged);
+    assert!(simulation.report().push_force_n == 0.0 && simulation.report().energy.bend > 0.0);
+    assert!(farthest_mm(&simulation.coils()[0], &now) < 3.0);
 }
 
 #[test]

@@ -107,11 +107,11 @@ impl Correction {
         (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
-    /// Remembers the way from the slid device to the equilibrium that was found.
+    /// Remembers the way from the slid device to the equilibrium that was found; behind the slid one others may follow.
     pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
-        let n = slid.elements();
+        let n = found.elements();
         let mut twist: f64 = found.reference_twists.iter().sum();
         for e in (0..n).rev() {
             let (f, i) = (&slid.frames[e], e + 1);
@@ -163,9 +163,9 @@ impl Correction {
         }
     }
 
-    /// Changes the slid device in `state` by `factor` times what was learnt.
+    /// Changes the slid device, whose elements are the first in `state`, by `factor` times what was learnt.
     pub(super) fn apply(&self, factor: f64, elements: &[ElementData], state: &mut RodState) {
-        let n = state.elements();
+        let n = elements.len();
         let first = n - n.min(self.departures.len());
         // Each middle before the tangents on either side change.
         let mut t = state.frames[first].t;

@@ -40,14 +40,15 @@ impl Guess {
     ) -> bool {
         self.slid.copy_from(state);
         let elements = &mesh.elements;
+        let line = &elements[..mesh.line()];
         let correction = &start.state.correction;
         if let Some(factor) = correction.repeats(&self.motions) {
             // Nodes of a device alone are the same marks in every step.
             if mesh.inserted_mm.is_empty() {
-                correction.apply(factor, elements, state);
+                correction.apply(factor, line, state);
             } else {
                 correction.transfer(start.mesh, mesh, &mut self.learnt);
-                self.learnt.apply(factor, elements, state);
+                self.learnt.apply(factor, line, state);
             }
             let mut crosses =
                 || loops.as_deref_mut().is_some_and(|loops| loops.crosses(elements, &self.slid, state));

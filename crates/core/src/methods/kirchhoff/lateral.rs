@@ -107,8 +107,8 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
     let last = mesh.nearest_node(line_mm - reach_mm);
     // Beyond the others it is alone, with the axial force of the line.
     let mut beyond = NodeForce::default();
-    let parts = parts::<C>(stack, mesh, rod, (mesh.elements.len().min(first + 1), instrument));
-    if comes_out(mesh, instrument).is_some() && first < mesh.elements.len() {
+    let parts = parts::<C>(stack, mesh, rod, (mesh.line().min(first + 1), instrument));
+    if comes_out(mesh, instrument).is_some() && first < mesh.line() {
         let [near, _, pull, _] = parts[first];
         let wall = wall_force(line, (first, instrument));
         beyond = near.plus(&pull, rod.tensions[first]).plus(&wall, -1.0);

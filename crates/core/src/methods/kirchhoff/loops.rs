@@ -1,8 +1,9 @@
 //! Loops of the device that touch each other.
 
 use super::mesh::Mesh;
-use crate::contact::Skin;
+use crate::contact::{HandMotion, Skin};
 use crate::device::{Device, Stack};
+use crate::rod::ElementData;
 
 /// The surface of each element of what is in: as thick as its outermost instrument in the middle, and as hard as a rod can tell.
 pub(super) fn skins<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item = Skin> + 'a {
@@ -13,11 +14,20 @@ pub(super) fn skins<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item 
     })
 }
 
-/// That of a device by itself.
-pub(super) fn skins_alone<'a>(mesh: &'a Mesh, device: &'a Device) -> impl Iterator<Item = Skin> + 'a {
-    middles(mesh)
-        .zip(&mesh.elements)
-        .map(|(middle_mm, element)| Skin::rigid(device.section_at(middle_mm).radius_mm, element.bending[1]))
+/// That of an element of a device by itself, in the middle of which is this distance from its tip, mm.
+pub(super) fn skin(device: &Device, middle_mm: f64, element: &ElementData) -> Skin {
+    Skin::rigid(device.section_at(middle_mm).radius_mm, element.bending[1])
+}
+
+/// By how much the outermost instrument in each element has advanced along the line, mm; coils, of which elements follow, have not.
+pub(super) fn advances_mm<'a>(
+    mesh: &'a Mesh,
+    stack: &'a Stack,
+    motions: &'a [HandMotion],
+) -> impl Iterator<Item = f64> + 'a {
+    let outermost = |middle_mm: f64| stack.felt_instrument(&mesh.inserted_mm, middle_mm).unwrap_or(0);
+    let on_line = middles(mesh).map(move |middle_mm| motions[outermost(middle_mm)].advance_mm());
+    on_line.chain(std::iter::repeat(0.0)).take(mesh.elements.len())
 }
 
 /// How far the middles of elements are from the tip, mm.

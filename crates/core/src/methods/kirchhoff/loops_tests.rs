@@ -242,3 +242,37 @@ fn hands_of_several_instruments_feel_what_loops_do() {
     let (twin, least_mm) = run(false);
     assert!(twin.touching().is_empty() && least_mm < RADIUS_MM, "{least_mm}");
 }
+
+#[test]
+fn loops_that_rub_on_each_other_take_work() {
+    let run = |self_friction: f64| {
+        let (made, device, sheath) = parts(4.0);
+        let builder = Simulation::builder(made.wall, device, sheath).properties(properties());
+        let options = KirchhoffOptions { self_friction, ..method(true) };
+        let mut simulation = builder.method(&options).build().unwrap();
+        let (mut work_mj, mut dissipated_mj) = (0.0, 0.0);
+        for step in 0..110 {
+            let before_n = simulation.report().push_force_n;
+            let report = simulation.step(Command::advance(0.5)).unwrap();
+            assert!(report.converged, "step {step}: {}", report.imbalance);
+            work_mj += 0.25 * (before_n + report.push_force_n);
+            dissipated_mj += report.dissipated_mj;
+        }
+        (work_mj, dissipated_mj)
+    };
+    let (smooth, rough) = (run(0.0), run(0.3));
+    assert!(smooth.1 == 0.0 && rough.1 > 0.0 && rough.0 > smooth.0, "{smooth:?} {rough:?}");
+}
+
+#[test]
+fn friction_of_loops_that_nothing_feels_is_refused() {
+    let (made, device, sheath) = parts(4.0);
+    let refused = |self_friction: f64, self_contact: bool| {
+        let options = KirchhoffOptions { self_friction, ..method(self_contact) };
+        let builder = Simulation::builder(made.wall.clone(), device.clone(), sheath);
+        builder.method(&options).build().err().map(|error| error.to_string())
+    };
+    assert!(refused(0.2, false).unwrap().contains("self_contact = true"));
+    assert!(refused(-0.1, true).unwrap().contains("method.self_friction"));
+    assert_eq!(refused(0.2, true), None);
+}

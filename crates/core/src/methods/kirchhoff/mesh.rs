@@ -135,6 +135,11 @@ impl Mesh {
         self.inserted_mm.clear();
     }
 
+    /// Number of elements of the line; those of coils follow where they are solved for together.
+    pub(super) fn line(&self) -> usize {
+        self.from_tip_mm.len() - 1
+    }
+
     /// The node nearest to a place so far from the tip, mm.
     pub(super) fn nearest_node(&self, from_tip_mm: f64) -> usize {
         let off = |i: &usize| (self.from_tip_mm[*i] - from_tip_mm).abs();

@@ -34,6 +34,7 @@ mod hands;
 mod inner_friction;
 #[cfg(test)]
 mod inner_friction_tests;
+mod joined;
 mod lateral;
 mod loops;
 #[cfg(test)]
@@ -76,6 +77,7 @@ use crate::vessel::{Displacement, WallStore};
 use crate::{Error, Result};
 use coaxial::Nodes;
 use hands::{Hand, lengths};
+use joined::{FreeCoil, Joined, join};
 use lateral::Line;
 use state::{Belongs, Ticking};
 use tick::Ticked;
@@ -132,8 +134,10 @@ pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
     surface: Arc<ContactSurface>,
     state: Arc<KirchhoffState>,
-    /// That of the state, for those who ask.
+    /// That of the state, for those who ask, …
     shape: Shape,
+    /// … and the coils that were detached.
+    coils: Vec<DetachedCoil>,
     counters: Counters,
     /// Made when the first command comes.
     workspace: Option<Box<Workspace<C>>>,
@@ -165,6 +169,11 @@ impl<'a> Environment<'a> {
         'a: 'b,
     {
         Environment { displacement, ..*self }
+    }
+
+    /// Whether anything rubs: on the wall, or loops on each other.
+    fn has_friction(&self) -> bool {
+        self.surroundings.properties.has_friction() || self.options.self_friction > 0.0
     }
 
     /// The wall where it is.
@@ -212,6 +221,11 @@ impl<const C: usize> Kirchhoff<C> {
                 "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
             return Err(Error::parameter("method.self_contact", true, mend));
         }
+        crate::contact::check_friction("method.self_friction", options.self_friction)?;
+        if options.self_friction > 0.0 && !options.self_contact {
+            let mend = "nothing touches itself that could rub: set method.self_contact = true as well";
+            return Err(Error::parameter("method.self_friction", options.self_friction, mend));
+        }
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
@@ -224,6 +238,7 @@ impl<const C: usize> Kirchhoff<C> {
             surface: Arc::new(surface),
             state: Arc::new(state),
             shape: Shape::default(),
+            coils: Vec::new(),
             counters: Counters::default(),
             workspace: None,
         };
@@ -285,6 +300,7 @@ impl<const C: usize> Kirchhoff<C> {
             stack: surroundings.stack,
             surface: &self.surface,
             sheath: surroundings.sheath,
+            fineness: self.options.fineness(),
             elements: mesh.elements.len(),
             points: mesh.points.len(),
             sets: Layout::<C>::ANGLES,
@@ -294,7 +310,7 @@ impl<const C: usize> Kirchhoff<C> {
         Ok(mesh)
     }
 
-    /// The centre line of the state, with nodes at these arc lengths from the tip.
+    /// The centre lines of the state, that of the device with nodes at these arc lengths from the tip.
     fn write_shape(&mut self, from_tip_mm: &[f64]) {
         let rod = &self.state.rod;
         self.shape.positions_mm.clone_from(&rod.positions);
@@ -302,6 +318,8 @@ impl<const C: usize> Kirchhoff<C> {
         self.shape.tangents.extend(rod.frames.iter().map(|f| f.t));
         self.shape.from_tip_mm.clear();
         self.shape.from_tip_mm.extend_from_slice(from_tip_mm);
+        self.coils.clear();
+        self.coils.extend(self.state.coils.iter().map(FreeCoil::told));
     }
 }
 
@@ -313,6 +331,7 @@ impl<const C: usize> Clone for Kirchhoff<C> {
             surface: Arc::clone(&self.surface),
             state: Arc::clone(&self.state),
             shape: self.shape.clone(),
+            coils: self.coils.clone(),
             counters: self.counters,
             workspace: None,
         }
@@ -377,7 +396,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn coils(&self) -> &[DetachedCoil] {
-        &self.state.coils
+        &self.coils
     }
 
     fn shape(&self) -> &Shape {
@@ -413,9 +432,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
-        let mut loops = SelfContact::new(&mesh.elements, loops::skins(&mesh, surroundings.stack).collect());
-        loops.beside(&DetachedCoil::elements(&self.state.coils, surroundings.stack).into());
-        loops.touching_at(&mesh.elements, &self.state.rod)
+        let mut joined = Joined::default();
+        let Surroundings { stack, properties, .. } = surroundings;
+        joined.renew(&self.state.coils, stack, self.options.fineness(), properties.modulus_n_per_mm2);
+        joined.add_to(&mut mesh);
+        let mut rod = self.state.rod.clone();
+        join(&mut rod, &self.state.coils);
+        let skins = loops::skins(&mesh, stack).chain(joined.skins()).collect();
+        SelfContact::new(&mesh.elements, skins).touching_at(&mesh.elements, &rod)
     }
 
     fn state(&self) -> State {

@@ -32,6 +32,7 @@ struct Written {
     max_iterations: Option<usize>,
     contact_spacing_radii: Option<f64>,
     self_contact: Option<bool>,
+    self_friction: Option<f64>,
 }
 
 impl From<Written> for KirchhoffOptions {
@@ -43,6 +44,7 @@ impl From<Written> for KirchhoffOptions {
             max_iterations: written.max_iterations.unwrap_or(of.max_iterations),
             contact_spacing_radii: written.contact_spacing_radii.unwrap_or(of.contact_spacing_radii),
             self_contact: written.self_contact.unwrap_or(of.self_contact),
+            self_friction: written.self_friction.unwrap_or(of.self_friction),
         }
     }
 }
@@ -63,6 +65,8 @@ pub struct KirchhoffOptions {
     /// Whether loops of the device touch each other. Off: most vessels are too narrow for a device to come back to itself in them, and
     /// where it cannot, nothing is gained by looking; on wherever a loop has room.
     pub self_contact: bool,
+    /// Coefficient of friction where loops, and coils that were detached, touch each other; platinum on platinum in blood has about 0.2.
+    pub self_friction: f64,
 }
 
 impl KirchhoffOptions {
@@ -73,7 +77,14 @@ impl KirchhoffOptions {
             Accuracy::Balanced => (4.0, 1.0, 1e-5),
             Accuracy::Fine => (2.0, 0.5, 1e-9),
         };
-        Self { element_mm, contact_spacing_radii, tolerance, max_iterations: 500, self_contact: false }
+        Self {
+            element_mm,
+            contact_spacing_radii,
+            tolerance,
+            max_iterations: 500,
+            self_contact: false,
+            self_friction: 0.0,
+        }
     }
 
     /// How finely it meshes.

@@ -34,13 +34,9 @@ impl<const C: usize> Tools<C> {
         let tip = environment.wall().material(&tip);
         report.left_through =
             left_through(surroundings.lumen.openings(), &tip).map(|(opening, _)| opening.index);
-        if mesh.elements.is_empty() {
+        if mesh.elements.is_empty() && self.joined.is_empty() {
             report.energy = Energy::default();
-            (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
-            if surroundings.stack.is_several() {
-                write_instruments::<C>(environment, hands, None, Acting::default(), at);
-            }
-            return 0.0;
+            return self.write_withdrawn(environment, hands, at);
         }
         let stored = self.newton.assembly.energy;
         report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
@@ -54,6 +50,9 @@ impl<const C: usize> Tools<C> {
         }
         let drag = surroundings.flow.map(|_| &self.drag);
         report.drag_n = drag.map_or_else(Vec3::zeros, Drag::total_n);
+        if mesh.elements.is_empty() {
+            return self.write_withdrawn(environment, hands, at);
+        }
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
             let between = self.friction.between.places();
@@ -61,7 +60,9 @@ impl<const C: usize> Tools<C> {
                 true => self.loops.pressing().collect(),
                 false => Vec::new(),
             };
-            let acting = Acting { wall: &self.touches, between, loops: &loops, drag };
+            // Those of coils come last.
+            let on_line = self.touches.partition_point(|(point, _)| *point < mesh.points.len());
+            let acting = Acting { wall: &self.touches[..on_line], between, loops: &loops, drag };
             write_instruments::<C>(environment, hands, Some(&clamp), acting, at);
             self.rub(at);
             let taken_mj = self.rub_in_valves(surroundings.stack, at);
@@ -76,6 +77,16 @@ impl<const C: usize> Tools<C> {
             report.tip_rotation_rad += rod.twist();
         }
         self.rub_in_sheath(surroundings, &clamp, at)
+    }
+
+    /// The same where nothing is inserted: hands feel nothing.
+    fn write_withdrawn(&self, environment: &Environment<'_>, hands: &[Hand], at: &mut Configuration) -> f64 {
+        let report = &mut at.parts().1.report;
+        (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
+        if environment.surroundings.stack.is_several() {
+            write_instruments::<C>(environment, hands, None, Acting::default(), at);
+        }
+        0.0
     }
 
     /// What a hand feels of friction in the sheath, that of the outermost instrument in it, is added to the report; returns the energy that

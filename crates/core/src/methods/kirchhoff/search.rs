@@ -18,7 +18,7 @@
 
 use super::guess::Guess;
 use super::substep::Effort;
-use crate::contact::{SETTLED, WallContact};
+use crate::contact::{SETTLED, SelfContact, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
@@ -43,13 +43,15 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) newton: &'a mut Newton<C>,
     pub(super) guess: &'a mut Guess,
     pub(super) contact: &'a mut WallContact<'b>,
-    /// What acts beside the wall: loops, if they touch.
-    pub(super) beside: Vec<&'a mut dyn External>,
+    /// What its loops and coils do to each other, if they touch.
+    pub(super) loops: Option<&'a mut SelfContact>,
+    /// What acts beside them.
+    pub(super) beside: Option<&'a mut dyn External>,
     pub(super) supports: &'a mut Supports,
     pub(super) elements: &'a [ElementData],
     /// The prediction, and then what was found.
     pub(super) state: &'a mut RodState,
-    /// Whether there is friction on the wall.
+    /// Whether there is friction.
     pub(super) has_friction: bool,
     /// Residual over force scale of an equilibrium.
     pub(super) tolerance: f64,
@@ -74,6 +76,7 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         if self.effort != Effort::Near {
             self.contact.hold_friction();
+            self.with_loops(SelfContact::hold_friction);
         }
         self.on()
     }
@@ -104,6 +107,7 @@ impl<const C: usize> Search<'_, '_, C> {
         let most = self.most;
         self.most = most.min(self.iterations + FOLLOWING);
         self.contact.release_friction();
+        self.with_loops(SelfContact::release_friction);
         let found = self.newton();
         self.most = most;
         if found.converged {
@@ -111,6 +115,7 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         self.state.copy_from(&self.guess.other);
         self.contact.rewind_friction();
+        self.with_loops(SelfContact::rewind_friction);
         let found = self.newton();
         self.slide(found)
     }
@@ -125,11 +130,12 @@ impl<const C: usize> Search<'_, '_, C> {
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);
-        let found = if self.beside.is_empty() {
+        let found = if self.loops.is_none() && self.beside.is_none() {
             self.newton.solve(elements, supports, self.contact, self.state, &options)
         } else {
             let mut outside: Vec<&mut dyn External> = vec![&mut *self.contact];
-            outside.extend(self.beside.iter_mut().map(|other| &mut **other as &mut dyn External));
+            outside.extend(self.loops.as_deref_mut().map(|loops| loops as &mut dyn External));
+            outside.extend(self.beside.as_deref_mut().map(|beside| beside as &mut dyn External));
             self.newton.solve(elements, supports, &mut Together(outside), self.state, &options)
         };
         self.iterations += found.iterations;
@@ -137,15 +143,29 @@ impl<const C: usize> Search<'_, '_, C> {
         found
     }
 
+    /// Has loops do something, if they touch.
+    fn with_loops(&mut self, what: impl FnMut(&mut SelfContact)) {
+        self.loops.as_deref_mut().into_iter().for_each(what);
+    }
+
+    /// Part by which the normal forces of friction differ from what presses in what was found.
+    pub(super) fn unsettled(&self) -> f64 {
+        if !self.has_friction {
+            return 0.0;
+        }
+        self.contact.unsettled().max(self.loops.as_deref().map_or(0.0, SelfContact::unsettled))
+    }
+
     /// Whether friction knows the normal forces of what was found.
     fn is_settled(&self) -> bool {
-        !self.has_friction || self.contact.unsettled() < SETTLED
+        self.unsettled() < SETTLED
     }
 
     /// With the hand held still, from an equilibrium with the normal forces of another to where the device comes to rest.
     fn slide(&mut self, mut found: NewtonReport) -> NewtonReport {
         while found.converged && !self.is_settled() && self.slides < SLIDES {
             self.contact.anchor_friction(self.elements, self.state);
+            self.with_loops(SelfContact::anchor_friction);
             found = self.newton();
             self.slides += 1;
         }

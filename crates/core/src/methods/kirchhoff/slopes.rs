@@ -233,8 +233,12 @@ impl Beside {
                 place_mm(&self.mesh.elements, &self.rod, place)
                     - place_mm(&at.mesh.elements, &at.state.rod, place)
             };
-            let (a, b) = (moved_mm(pair.places.0), pair.places.1.map_or_else(Vec3::zeros, moved_mm));
-            let widened = self.mesh.elements[pair.site].length / at.mesh.elements[pair.site].length - 1.0;
+            // Coils are no part of it.
+            let on_line = |e: usize| e < at.mesh.elements.len();
+            let [a, b] =
+                pair.places.map(|place| if on_line(place.0) { moved_mm(place) } else { Vec3::zeros() });
+            let longer = |e: usize| self.mesh.elements[e].length / at.mesh.elements[e].length - 1.0;
+            let widened = if on_line(pair.site) { longer(pair.site) } else { 0.0 };
             widened * pair.energy_mj - pair.force_n.dot(&(a - b))
         });
         each.sum()

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::extrapolation::Correction;
 use super::hands::Hand;
+use super::joined::Coils;
+use super::mesh::Fineness;
 use super::step_control::Stride;
 use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce};
 use crate::device::Stack;
-use crate::methods::detached::{Coils, DetachedCoil};
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
 use crate::solve::Neighbourhood;
@@ -68,6 +69,7 @@ pub(super) struct Belongs<'a> {
     pub(super) stack: &'a Stack,
     pub(super) surface: &'a ContactSurface,
     pub(super) sheath: &'a Sheath,
+    pub(super) fineness: Fineness,
     /// Elements and contact points of the inserted length.
     pub(super) elements: usize,
     pub(super) points: usize,
@@ -126,7 +128,7 @@ impl KirchhoffState {
 
     /// Nothing is inserted any more: what is left are the angles of the tails.
     pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
-        self.rod.clear();
+        self.rod.truncate(1);
         self.turn_tails(stack, hands);
         self.forces.clear();
         self.inner_friction.clear();
@@ -159,10 +161,9 @@ impl KirchhoffState {
         }
         let r = &self.rod;
         let sets = belongs.sets.max(1);
-        let nodes = [r.frames.len(), r.angles.len() / sets, r.positions.len()];
-        let each = [r.tensions.len(), r.bubbles.len() / sets, r.reference_twists.len()];
-        if nodes != [n + 1; 3] || each != [n; 3] {
-            return Err(other("rod", format!("{nodes:?} {each:?}"), "its lists have different lengths"));
+        if !r.fits(n, sets) {
+            let mend = format!("its lists are not those of {n} elements");
+            return Err(other("rod", r.positions.len(), mend));
         }
         if self.report.angles != (belongs.sets > 0) {
             let mend = "it has material angles where this simulation has none, or none where it has: another device or friction";
@@ -188,7 +189,10 @@ impl KirchhoffState {
             );
             return Err(other("known", self.known.len(), mend));
         }
-        self.coils.iter().try_for_each(|coil| DetachedCoil::check(coil, belongs.stack))?;
+        let felt = (belongs.fineness, belongs.surface.pieces());
+        self.coils
+            .iter()
+            .try_for_each(|coil| coil.check(belongs.stack, felt, (sets, belongs.inner_friction)))?;
         let part_mm = self.stride.part_mm;
         if !(part_mm.is_finite() && part_mm > 0.0) {
             return Err(other("stride.part_mm", part_mm, "a way that is longer than 0"));
@@ -208,12 +212,9 @@ impl KirchhoffState {
             );
             return Err(other("sheath", show(&r.positions[0]), mend));
         }
-        let vectors =
-            r.positions.iter().chain(&r.chords).chain(r.frames.iter().flat_map(|f| [&f.t, &f.u, &f.v]));
-        let numbers = [&r.tensions, &r.angles, &r.bubbles, &r.reference_twists].into_iter().flatten();
-        let inner_friction =
-            self.inner_friction.iter().flat_map(|rub| [&rub.along, &rub.around, &rub.pressure_n_per_mm]);
-        if !vectors.flat_map(|v| v.iter()).chain(numbers).chain(inner_friction).all(|x| x.is_finite()) {
+        let mut inner_friction =
+            self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
+        if !(r.is_finite() && inner_friction.all(f64::is_finite)) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
         }
         Ok(())

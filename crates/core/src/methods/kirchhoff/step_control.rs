@@ -46,6 +46,11 @@ impl StepControl {
         Self { budget, stride, has_friction, flight_mm: None }
     }
 
+    /// The same, of what was set free and no hand moves: it goes to where it comes to rest at once.
+    pub(super) fn set_free(self) -> Self {
+        Self { flight_mm: Some(f64::INFINITY), ..self }
+    }
+
     /// How the next command begins.
     pub(super) fn stride(&self) -> Stride {
         self.stride

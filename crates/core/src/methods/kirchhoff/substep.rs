@@ -1,17 +1,20 @@
 //! One sub-step: a guess of where the device will be, and Newton's method from there.
 
+use std::sync::Arc;
+
 use super::balance::Balance;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
-use super::loops::skins;
+use super::joined::{Resistance, join};
+use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::{KirchhoffState, UnderWay};
 use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
-use crate::contact::{SETTLED, WallContact};
+use crate::contact::{HandMotion, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
@@ -111,7 +114,8 @@ pub(super) struct Attempt<'a> {
 }
 
 impl<const C: usize> Tools<C> {
-    /// Slides the device at `start` to where the hands are, on the mesh of what is in then, with its friction and what is known of the wall.
+    /// Slides the device at `start` to where the hands are, on the mesh of what is in then, with its friction and what is known of the wall;
+    /// coils stay where they are.
     fn transport_to(
         &mut self,
         environment: &Environment<'_>,
@@ -124,7 +128,10 @@ impl<const C: usize> Tools<C> {
         let stack = environment.surroundings.stack;
         let transport_from = |start: Start<'_>, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
-            if stack.is_several() {
+            if mesh.elements.is_empty() {
+                rod.copy_from(from.1);
+                rod.truncate(1);
+            } else if stack.is_several() {
                 transport_together(from, mesh, stack.sets(), rod);
             } else {
                 transport(from, mesh, rod);
@@ -148,21 +155,37 @@ impl<const C: usize> Tools<C> {
         let pressed = resumed.map_or(start, |resumed| Start { mesh, state: &resumed.state });
         inner_friction::begin(stack, pressed, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
+        let on_line = mesh.points.len();
+        self.joined.add_to(mesh);
+        join(&mut after.rod, &start.state.coils);
         self.newton.resize(mesh.elements.len());
-        if let Some(resumed) = resumed {
-            self.friction.resume(&resumed.state.forces);
-            self.cache.resume(&resumed.state.known);
+        let mut first = on_line;
+        for coil in start.state.coils.iter() {
+            let points = &mesh.points[first..first + coil.known.len()];
+            self.friction.go_on(&mesh.elements, &after.rod, points, &coil.forces);
+            first += points.len();
+        }
+        if let Some(UnderWay { state, .. }) = resumed {
+            self.friction.resume(state.forces.iter().chain(state.coils.iter().flat_map(|coil| &coil.forces)));
+            self.cache.resume(&state.known);
+            state.coils.iter().for_each(|coil| self.cache.go_on(&coil.known));
         } else {
             let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
-            self.cache.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+            let points = &mesh.points[..on_line];
+            self.cache.begin(&start.state.known, &start.mesh.points, points, advance_mm);
+            start.state.coils.iter().for_each(|coil| self.cache.go_on(&coil.known));
         }
     }
 
-    /// Gives the state what the next sub-step starts with.
-    fn keep(&self, mesh: &Mesh, after: &mut KirchhoffState) {
+    /// Gives the state what the next sub-step starts with, and takes the coils off the line.
+    fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
-        inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
         self.cache.keep(&mut after.known);
+        after.coils = Arc::clone(&start.state.coils);
+        if !self.joined.is_empty() {
+            after.coils = Arc::new(self.joined.take_off(mesh, after));
+        }
+        inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
     }
 
     /// One part from `start`: slides and solves on `next`, which is worth nothing if that fails.
@@ -185,13 +208,18 @@ impl<const C: usize> Tools<C> {
         let mut loops = options.self_contact.then_some(&mut self.loops);
         let mut in_its_own_way = false;
         if let Some(loops) = &mut loops {
-            loops.renew(&mesh.elements, skins(mesh, surroundings.stack));
+            loops.renew(&mesh.elements, skins(mesh, surroundings.stack).chain(self.joined.skins()));
             let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+            let friction = self_friction(environment, mesh, &self.guess.motions);
+            let advances_mm = advances_mm(mesh, surroundings.stack, &self.guess.motions);
+            loops.begin_friction(rod, advances_mm, friction);
             in_its_own_way = loops.blocks_its_tip(&mesh.elements, rod, advance_mm);
         }
         let near = matches!(effort, Effort::Near | Effort::Held);
         if let Some(resumed) = resumed {
-            self.guess.resume(&resumed.state.rod, rod);
+            let mut under_way = resumed.state.rod.clone();
+            join(&mut under_way, &resumed.state.coils);
+            self.guess.resume(&under_way, rod);
             self.newton.neighbourhood.clone_from(&resumed.neighbourhood);
         } else {
             let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), (start, &*mesh, &mut *rod));
@@ -205,15 +233,19 @@ impl<const C: usize> Tools<C> {
         }
         self.newton.neighbourhood.bounds = near;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+        let coils = !self.joined.is_empty();
+        let mut free = coils.then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1));
+        let free = free.as_mut().map(|free| free as &mut dyn External);
         let mut search = Search {
             newton: &mut self.newton,
             guess: &mut self.guess,
             contact: &mut contact,
-            beside: loops.map(|loops| loops as &mut dyn External).into_iter().collect(),
+            loops,
+            beside: free,
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,
-            has_friction: surroundings.properties.has_friction(),
+            has_friction: environment.has_friction(),
             tolerance: options.tolerance,
             effort,
             most: most.min(options.max_iterations),
@@ -225,10 +257,9 @@ impl<const C: usize> Tools<C> {
         let found = search.run();
         let found = search.dragged(found, surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
+        let unsettled = search.unsettled().max(lagging);
         let (taken, slides) = ((search.iterations, search.solves), search.slides);
         let off = self.newton.neighbourhood.off(rod);
-        let unsettled = if surroundings.properties.has_friction() { contact.unsettled() } else { 0.0 };
-        let unsettled = unsettled.max(lagging);
         // What has come to rest is in equilibrium as exactly as friction is with the wall elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let used_up = found.reason == StopReason::MaxIterations && taken.1 >= attempt.solves;
@@ -248,16 +279,21 @@ impl<const C: usize> Tools<C> {
         self.work.add(taken, mesh.elements.len());
         if let Some(wrong) = wrong {
             if wrong == Lost::UnderWay {
-                self.keep(mesh, after);
+                self.keep(start, mesh, after);
             }
             return Err(wrong);
         }
         let (least_mj, most_mj) = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
-        let elsewhere_mj = self.friction.between.taken_mj(rod) + self.write_report(environment, hands, next);
+        let farthest_mm = self.newton.neighbourhood.farthest(rod);
+        let (least_loops_mj, most_loops_mj) = self.loops.dissipated_mj();
+        let (least_mj, most_mj) = (least_mj + least_loops_mj, most_mj + most_loops_mj);
+        let between_mj = self.friction.between.taken_mj(rod);
+        self.keep(start, mesh, after);
+        let elsewhere_mj = between_mj + self.write_report(environment, hands, next);
         let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
-        let (mesh, after) = next.parts();
+        let after = next.parts().1;
         let reports = (&start.state.report, &after.report);
-        let flow_mj = aside_mj + self.drag.size_n() * farthest_mm(reports);
+        let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
         let balance = Balance::new(surroundings.stack, reports, by_wall, rubbed_mj);
         let lacks = balance.lacks();
@@ -266,16 +302,24 @@ impl<const C: usize> Tools<C> {
         }
         let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
         let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
-        let farthest = || self.newton.neighbourhood.farthest(&after.rod);
-        let jump = jumps.then(|| Jump { released_mj, position_mm: farthest() });
+        let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
-        self.keep(mesh, after);
         Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
     }
 }
 
+/// How loops and coils rub on each other in a part.
+fn self_friction(environment: &Environment<'_>, mesh: &Mesh, motions: &[HandMotion]) -> Rubs {
+    let radius_mm = mesh.points.first().map_or(0.0, |point| point.potential.radius_mm);
+    Rubs {
+        coefficient: environment.options.self_friction,
+        stick_mm: stick_mm(motions, radius_mm),
+        least_n: least_force_n(environment.surroundings.stack.softest_nmm2()),
+    }
+}
+
 /// The farthest way of a hand, mm.
-fn farthest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
+fn longest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
     let way = |index: usize| (after.hand(index).inserted_mm - before.hand(index).inserted_mm).abs();
     (0..after.instruments.len().max(1)).map(way).fold(0.0, f64::max)
 }

@@ -164,7 +164,7 @@ impl<const C: usize> Workspace<C> {
         let mut left = passage.map(|passage| (was, passage));
         let mut at_start = environment.displaced(at_first.as_ref());
         // What a device with friction does from a part of this length on it may do near by.
-        let let_go_mm = if surroundings.properties.has_friction() { HELD_MM } else { FOLD_MM };
+        let let_go_mm = if environment.has_friction() { HELD_MM } else { FOLD_MM };
         let mut course =
             Course { longest_mm: from.stride.part_mm, sum: Sum::default(), moved: false, rests: true };
         let (rest, fold, mut moving);
@@ -183,7 +183,7 @@ impl<const C: usize> Workspace<C> {
             };
             let part = Part::next(begun, (way, course.longest_mm), left.is_some(), hands);
             course.sum.substeps += 1;
-            if line_mm(lengths(hands)) == 0.0 {
+            if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 now.withdraw(surroundings.stack, hands);
                 tools.write_report(&there, hands, now);
                 (course.moved, course.rests) = (true, true);

@@ -1,17 +1,14 @@
 //! What a step works with. None of it reaches the next step: it can be dropped and made anew at any moment.
 
-use std::sync::Arc;
-
 use super::configuration::{Configuration, largest};
 use super::guess::Guess;
 use super::hands::{Hand, Way};
+use super::joined::Joined;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact, Touch};
-use crate::device::Stack;
 use crate::methods::StepReport;
-use crate::methods::detached::{Coils, DetachedCoil};
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -41,8 +38,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) drag: Drag,
     /// What its loops do to each other; nothing is known of them where they do not touch.
     pub(super) loops: SelfContact,
-    /// Coils that these touch.
-    pub(super) coils: Coils,
+    /// Coils that were detached, which are solved for together with the line.
+    pub(super) joined: Joined,
     /// Points that press in the equilibrium found last, and what happens there.
     pub(super) touches: Vec<(usize, Touch)>,
     /// What the sub-steps of the command took.
@@ -82,19 +79,6 @@ impl Work {
     }
 }
 
-impl<const C: usize> Tools<C> {
-    /// Has loops touch the coils that were detached, which lie there in what a command leads to.
-    pub(super) fn touch(&mut self, coils: &Coils, stack: &Stack, to: [&mut Configuration; 2]) {
-        for configuration in to {
-            configuration.parts().1.coils = Arc::clone(coils);
-        }
-        if !Arc::ptr_eq(&self.coils, coils) {
-            self.coils = Arc::clone(coils);
-            self.loops.beside(&DetachedCoil::elements(coils, stack).into());
-        }
-    }
-}
-
 impl<const C: usize> Workspace<C> {
     /// Memory for the whole device, so that steps take none.
     pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
@@ -108,7 +92,7 @@ impl<const C: usize> Workspace<C> {
             cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
             loops: SelfContact::default(),
-            coils: Coils::default(),
+            joined: Joined::default(),
             touches: Vec::new(),
             work: Work::default(),
             counters: Counters::default(),

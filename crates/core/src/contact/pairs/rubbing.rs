@@ -1,0 +1,355 @@
+//! Friction where rods touch themselves and each other, as an incremental potential like that of the wall ([`crate::contact::friction`]).
+//!
+//! In a part of a command the two places of a pair, material points of the base, slip on each other by
+//!
+//! ```text
+//! u = P [(A − a) − (B − b)],    P = I − n nᵀ,    a = Ā − Δ t̄
+//! ```
+//!
+//! where Ā and t̄ are place and direction of the first after its device has slid by the advance Δ of its hand along its own curve, and b is the same of the second. With μ, and
+//! the φ of the wall, friction takes Σ μ N φ(|u|). N and n are those of the base, and follow from base to base until they are settled.
+//!
+//! Surfaces that turn about their own axis do not rub: a wire is spun freely in its loops.
+
+use nalgebra::Matrix3;
+
+use super::curve::Curve;
+use super::{Pair, SelfContact};
+use crate::Vec3;
+use crate::contact::friction::{CHANGED, RENEWED};
+use crate::contact::friction::{Renewal, STICK_AT_REST, force_of_slip, phi, resistance};
+use crate::rod::{Couple, ElementData, RodState, Stencils};
+use crate::solve::Moved;
+
+/// Friction of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Rub {
+    /// n, from the second place to the first, and N.
+    normal: Vec3,
+    force_n: f64,
+    /// The same as they are at the base.
+    seen: (Vec3, f64),
+    /// a − b, mm.
+    from_mm: Vec3,
+    /// What it had slipped where slip began anew, mm.
+    kept_mm: Vec3,
+    /// Slip at the base, mm, …
+    slip_mm: Vec3,
+    /// … and by how much the step moves the two apart, mm.
+    way_mm: Vec3,
+    /// Force of friction at the end of the step where it is linear: in the system, without a motion, N; its derivative there, N/mm.
+    at_rest_n: Vec3,
+    stiffness: Matrix3<f64>,
+    /// What the stiffness of the rods is in balance with, N.
+    carried_n: Vec3,
+    /// By how much a round moves the two apart, mm, and what is carried then, N.
+    end_mm: Vec3,
+    end_n: Vec3,
+}
+
+/// Friction of all pairs in a part of a command.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rubbing {
+    /// μ.
+    coefficient: f64,
+    /// ε, mm, and what it does not shrink below while hands hold still.
+    stick_mm: f64,
+    least_stick_mm: f64,
+    /// A force not worth settling, N.
+    least_n: f64,
+    renewal: Renewal,
+    /// Where rods were when the part began, after devices have slid along their own curves, …
+    begun: RodState,
+    /// … and by how much each element has, mm.
+    advances_mm: Vec<f64>,
+    /// Energy that was taken before slip began anew, mJ.
+    taken_mj: f64,
+}
+
+/// How a part of a command begins for friction.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rubs {
+    /// μ, …
+    pub(crate) coefficient: f64,
+    /// … the slip below which places stick, and the least one while hands hold still, mm, …
+    pub(crate) stick_mm: [f64; 2],
+    /// … and a force not worth settling, N.
+    pub(crate) least_n: f64,
+}
+
+impl Rub {
+    fn plane(&self) -> Matrix3<f64> {
+        Matrix3::identity() - self.normal * self.normal.transpose()
+    }
+
+    fn along(&self, way_mm: &Vec3) -> Vec3 {
+        way_mm - self.normal * self.normal.dot(way_mm)
+    }
+
+    /// Force in the system at the end of a step, N.
+    fn linear_n(&self, way_mm: &Vec3) -> Vec3 {
+        self.at_rest_n + self.stiffness * way_mm
+    }
+}
+
+impl Pair {
+    pub(super) fn rubs(&self) -> bool {
+        self.rub.force_n > 0.0
+    }
+
+    /// A − B, mm, of the material points that are its places.
+    fn apart_mm(&self, curve: &Curve<'_>) -> Vec3 {
+        let [a, b] = self.gap.at.map(|place| curve.jet(place).at);
+        a - b
+    }
+
+    /// Adds a force of friction as a gradient, and its derivative, to what the pair does.
+    fn add_friction(&self, to: &mut Couple, force_n: &Vec3, stiffness: &Matrix3<f64>, carried: f64) {
+        let c = self.gap.weights();
+        for k in 0..c.len() {
+            to.gradient[k] += force_n * c[k];
+            to.carried[k] += force_n * (carried * c[k]);
+            for l in k..c.len() {
+                to.hessian[k][l] += stiffness * (c[k] * c[l]);
+            }
+        }
+    }
+}
+
+impl SelfContact {
+    /// Begins a part of a command: rods are at a state after devices have slid along their own curves, those of each element by so much, mm.
+    pub(crate) fn begin_friction(
+        &mut self,
+        state: &RodState,
+        advances_mm: impl Iterator<Item = f64>,
+        Rubs { coefficient, stick_mm: [stick_mm, least_stick_mm], least_n }: Rubs,
+    ) {
+        let rubbing = &mut self.rubbing;
+        (rubbing.coefficient, rubbing.least_n, rubbing.taken_mj) = (coefficient, least_n, 0.0);
+        (rubbing.stick_mm, rubbing.least_stick_mm) = (stick_mm, least_stick_mm);
+        if coefficient == 0.0 {
+            return;
+        }
+        rubbing.renewal = Renewal::Begins;
+        rubbing.begun.copy_from(state);
+        rubbing.advances_mm.clear();
+        rubbing.advances_mm.extend(advances_mm);
+    }
+
+    /// Whether there is any.
+    fn rubs(&self) -> bool {
+        self.rubbing.coefficient > 0.0
+    }
+
+    /// Has friction be of what presses at the base, unless it is settled or held.
+    pub(super) fn rub_with_pairs(&mut self, elements: &[ElementData], state: &RodState) {
+        if !self.rubs() {
+            return;
+        }
+        let Rubbing { begun, advances_mm, renewal, least_n, .. } = &self.rubbing;
+        let follows = renewal.follows();
+        let (now, was) = (
+            Curve { elements, state, closed: self.closed },
+            Curve { elements, state: begun, closed: self.closed },
+        );
+        let (mut change_n, mut sum_n) = (0.0, *least_n);
+        for pair in &mut self.pairs {
+            let size = pair.gap.direction().norm();
+            let (presses_n, force_n) = (
+                pair.spring_n_per_mm * pair.depth_mm().max(0.0) * size,
+                if pair.at_base { pair.force_n * size } else { 0.0 },
+            );
+            let normal = pair.gap.direction() / size;
+            let [a, b] = pair.gap.at.map(|place| {
+                let jet = was.jet(place);
+                jet.at - jet.first * (advances_mm[place.element] / jet.first.norm())
+            });
+            let apart_mm = pair.apart_mm(&now);
+            let rub = &mut pair.rub;
+            rub.seen = (normal, presses_n);
+            if follows {
+                change_n += (rub.normal * rub.force_n - normal * force_n).norm();
+                sum_n += force_n;
+                (rub.normal, rub.force_n) = (normal, force_n);
+            }
+            rub.from_mm = a - b - rub.kept_mm;
+            rub.slip_mm = rub.along(&(apart_mm - rub.from_mm));
+        }
+        let steady = change_n < crate::contact::SETTLED * sum_n && self.unsettled() < crate::contact::SETTLED;
+        self.rubbing.renewal = self.rubbing.renewal.after(steady);
+    }
+
+    /// Whether normal forces at an equilibrium are what presses there, or are held; otherwise they follow again.
+    pub(super) fn friction_settles(&mut self) -> bool {
+        let settled = self.unsettled() < crate::contact::SETTLED;
+        !self.rubs() || self.rubbing.renewal.settles(settled)
+    }
+
+    /// Part by which normal forces of friction differ from what pressed at the last base.
+    pub(crate) fn unsettled(&self) -> f64 {
+        if !self.rubs() {
+            return 0.0;
+        }
+        let (mut change_n, mut sum_n) = (0.0, self.rubbing.least_n);
+        for Pair { rub, .. } in &self.pairs {
+            change_n += (rub.normal * rub.force_n - rub.seen.0 * rub.seen.1).norm();
+            sum_n += rub.seen.1;
+        }
+        change_n / sum_n
+    }
+
+    /// Normal forces are renewed no more.
+    pub(crate) fn hold_friction(&mut self) {
+        self.rubbing.renewal = Renewal::Held;
+    }
+
+    /// Normal forces follow from here on.
+    pub(crate) fn release_friction(&mut self) {
+        self.rubbing.renewal = Renewal::Begins;
+    }
+
+    /// Normal forces are those with which the part began, none, and are held.
+    pub(crate) fn rewind_friction(&mut self) {
+        self.hold_friction();
+        self.pairs.iter_mut().for_each(|pair| pair.rub.force_n = 0.0);
+    }
+
+    /// Slip begins anew at the base, with the normal forces seen there, which are held: see [`Friction::anchor`](crate::contact::Friction::anchor).
+    pub(crate) fn anchor_friction(&mut self) {
+        if !self.rubs() {
+            return;
+        }
+        self.hold_friction();
+        let rubbing = &mut self.rubbing;
+        let stick_mm = (rubbing.stick_mm * STICK_AT_REST).max(rubbing.least_stick_mm);
+        for Pair { rub, .. } in &mut self.pairs {
+            let slip_mm = rub.slip_mm.norm();
+            let way_mm = phi(slip_mm, rubbing.stick_mm) - phi(0.0, rubbing.stick_mm);
+            rubbing.taken_mj += rubbing.coefficient * rub.force_n * way_mm;
+            rub.kept_mm = rub.slip_mm * (stick_mm / slip_mm.max(rubbing.stick_mm));
+            if rub.seen.1 > 0.0 {
+                rub.normal = rub.seen.0;
+            }
+            rub.force_n = rub.seen.1;
+            let way_mm = phi(rub.kept_mm.norm(), stick_mm) - phi(0.0, stick_mm);
+            rubbing.taken_mj -= rubbing.coefficient * rub.force_n * way_mm;
+        }
+        rubbing.stick_mm = stick_mm;
+        rubbing.begun.copy_from(&self.base);
+        rubbing.advances_mm.fill(0.0);
+    }
+
+    /// The least and the most that friction has taken in the part, mJ: with no normal forces, as at its beginning, and with those of its end.
+    pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
+        let Rubbing { coefficient, stick_mm, taken_mj, .. } = self.rubbing;
+        let each = self.pairs.iter().filter(|pair| pair.rubs()).map(|Pair { rub, .. }| {
+            coefficient * rub.force_n * (phi(rub.slip_mm.norm(), stick_mm) - phi(0.0, stick_mm))
+        });
+        let most_mj = taken_mj + each.sum::<f64>();
+        (if taken_mj == 0.0 { 0.0 } else { most_mj }, most_mj)
+    }
+
+    /// Force of friction on the first place of a pair at the base, N.
+    pub(super) fn friction_n(&self, pair: &Pair) -> Vec3 {
+        if !pair.rubs() {
+            return Vec3::zeros();
+        }
+        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        -pair.rub.slip_mm * resistance(coefficient * pair.rub.force_n, &pair.rub.slip_mm, stick_mm)
+    }
+
+    /// Adds friction at the base to what a pair does, and returns what it takes, mJ.
+    pub(super) fn add_friction(&self, pair: &Pair, to: &mut Couple) -> f64 {
+        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let largest_n = coefficient * pair.rub.force_n;
+        let (force_n, stiffness) = force_of_slip(largest_n, &pair.rub.plane(), &pair.rub.slip_mm, stick_mm);
+        pair.add_friction(to, &force_n, &stiffness, 1.0);
+        largest_n * phi(pair.rub.slip_mm.norm(), stick_mm)
+    }
+
+    /// What friction takes from a pair on the way to a state, mJ.
+    pub(super) fn friction_mj(&self, pair: &Pair, curve: &Curve<'_>) -> f64 {
+        if !pair.rubs() {
+            return 0.0;
+        }
+        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let slip_mm = pair.rub.along(&(pair.apart_mm(curve) - pair.rub.from_mm));
+        coefficient * pair.rub.force_n * phi(slip_mm.norm(), stick_mm)
+    }
+
+    /// Takes note of the friction in a step from the base that answers the system as it is: see [`crate::contact::wall`] (`wall/slipping.rs`), of which this is the other one.
+    pub(super) fn foresee_slipping(&mut self, moved: &Moved<'_>) {
+        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let begins = !std::mem::replace(&mut self.slips_known, true);
+        for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
+            let way_mm = pair.way(moved);
+            let rub = &mut pair.rub;
+            if begins {
+                (rub.at_rest_n, rub.stiffness) =
+                    force_of_slip(coefficient * rub.force_n, &rub.plane(), &rub.slip_mm, stick_mm);
+            }
+            rub.way_mm = way_mm;
+            rub.carried_n = rub.linear_n(&rub.way_mm);
+        }
+    }
+
+    /// Has friction be that at the end of the step; returns at how many pairs that changes it.
+    pub(super) fn slip_on(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let mut changed = 0;
+        for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
+            let way_mm = pair.way(moved);
+            let largest_n = coefficient * pair.rub.force_n;
+            let rub = &mut pair.rub;
+            rub.way_mm = way_mm;
+            let slip_mm = rub.slip_mm + rub.along(&way_mm);
+            let (force_n, stiffness) = force_of_slip(largest_n, &rub.plane(), &slip_mm, stick_mm);
+            let off_n = (force_n - rub.linear_n(&way_mm)).norm();
+            changed += usize::from(off_n > CHANGED * largest_n);
+            if off_n > RENEWED * largest_n {
+                let at_rest_n = force_n - stiffness * way_mm;
+                let (more_n, stiffer) = (at_rest_n - rub.at_rest_n, stiffness - rub.stiffness);
+                (rub.at_rest_n, rub.stiffness) = (at_rest_n, stiffness);
+                let mut couple = Couple::none(pair.gap.at.map(|place| place.element));
+                // Linear: tangents turn under no force.
+                pair.add_friction(&mut couple, &more_n, &stiffer, 0.0);
+                into.add_couple(elements, base, &couple);
+            }
+        }
+        changed
+    }
+
+    /// What a round does to pairs with friction.
+    pub(super) fn look_towards_slips(&mut self, moved: &Moved<'_>) {
+        for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
+            let end_mm = pair.way(moved);
+            pair.rub.end_n = pair.rub.linear_n(&end_mm);
+            pair.rub.end_mm = end_mm;
+        }
+    }
+
+    /// Slope of what friction takes at a `part` of a round, less what is carried there.
+    pub(super) fn slipping_slope(&self, part: f64) -> f64 {
+        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let each = self.pairs.iter().filter(|pair| pair.rubs()).map(|Pair { rub, .. }| {
+            let way_mm = rub.end_mm - rub.way_mm;
+            let slip_mm = rub.slip_mm + rub.along(&(rub.way_mm + way_mm * part));
+            let against = resistance(coefficient * rub.force_n, &slip_mm, stick_mm) * slip_mm.dot(&way_mm);
+            against - (rub.carried_n + (rub.end_n - rub.carried_n) * part).dot(&way_mm)
+        });
+        each.sum()
+    }
+
+    /// What the stiffness of rods is in balance with after that part of the round.
+    pub(super) fn carry_slipping(&mut self, part: f64) {
+        for Pair { rub, .. } in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
+            rub.carried_n += (rub.end_n - rub.carried_n) * part;
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Coulomb's law where two rods cross.
+
+use nalgebra::Matrix3;
+
+use super::*;
+use crate::rod::{Frame, PLAIN, Supports};
+use crate::solve::{Newton, NewtonOptions, Together};
+
+/// A force at a node, and springs that hold others where they are.
+struct Held {
+    force: (usize, Vec3),
+    springs: Vec<(usize, Vec3)>,
+    stiffness: f64,
+}
+
+impl Held {
+    /// By what the springs are pulled.
+    fn pulls(&self, state: &RodState) -> Vec3 {
+        self.springs.iter().map(|(i, was)| (state.positions[*i] - was) * self.stiffness).sum()
+    }
+}
+
+impl External for Held {
+    fn value(&mut self, _: &[ElementData], state: &RodState) -> f64 {
+        let off = self.springs.iter().map(|(i, was)| (state.positions[*i] - was).norm_squared());
+        0.5 * self.stiffness * off.sum::<f64>() - self.force.1.dot(&state.positions[self.force.0])
+    }
+
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        into.add_value(self.value(elements, state));
+        into.add_node(self.force.0, &-self.force.1, &Matrix3::zeros());
+        for (i, was) in &self.springs {
+            let stiffness = Matrix3::from_diagonal_element(self.stiffness);
+            into.add_node(*i, &((state.positions[*i] - was) * self.stiffness), &stiffness);
+        }
+    }
+}
+
+const N: usize = 12;
+const RADIUS: f64 = 0.02;
+
+/// A cantilever along x that is pressed down on a rod along y, which springs hold, and pulled along that. Returns the force between them on that rod: down, and along it.
+fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
+    let elements = vec![ElementData::plain(1.0 / N as f64, 1.0); N];
+    let frame = |along: Vec3| Frame::new(along, None);
+    let mut rods = RodState::straight(&elements, Vec3::zeros(), frame(Vec3::x()));
+    let below = RodState::straight(&elements, Vec3::new(0.77, -0.513, -2.0 * RADIUS), frame(Vec3::y()));
+    rods.join(&below);
+    // Stiff, so that it does not lean where it is pressed.
+    let stiff = vec![ElementData::plain(1.0 / N as f64, 100.0); N];
+    let all = [&elements[..], &[ElementData::BREAK], &stiff[..]].concat();
+    let springs = (0..=N).map(|i| (N + 1 + i, below.positions[i])).collect();
+    let mut held = Held { force: (N, Vec3::new(0.0, along, -down)), springs, stiffness: 2000.0 };
+    let skin = |data: &ElementData| if data.is_break() { Skin::NONE } else { Skin::rigid(RADIUS, 1.0) };
+    let mut loops = SelfContact::new(&all, all.iter().map(skin).collect());
+    let rubs = Rubs { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
+    loops.begin_friction(&rods, all.iter().map(|_| 0.0), rubs);
+    let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+    let options = NewtonOptions { tolerance: 1e-9, ..NewtonOptions::default() };
+    let mut outside = Together(vec![&mut loops, &mut held]);
+    let report =
+        Newton::<PLAIN>::new(all.len()).solve(&all, &mut supports, &mut outside, &mut rods, &options);
+    assert!(report.converged && report.stable, "{coefficient}, {along}: {}", report.reason);
+    assert!(loops.unsettled() < 1e-3, "{}", loops.unsettled());
+    let pulls = held.pulls(&rods);
+    (-pulls.z, pulls.y)
+}
+
+#[test]
+fn rods_that_cross_slip_at_coulombs_force_and_stick_below_it() {
+    let (smooth_n, none_n) = pressed_across(0.0, 0.1, 0.05);
+    assert!(smooth_n > 0.05 && none_n.abs() < 5e-3 * smooth_n, "{smooth_n} {none_n}");
+    for coefficient in [0.1, 0.3] {
+        let (down, along) = pressed_across(coefficient, 0.1, 0.1);
+        // Across it no force acts but friction, along the surfaces that touch; the upper rod leans by the way.
+        assert!((along / (coefficient * down) - 1.0).abs() < 0.02, "{coefficient}: {along} of {down}");
+        let (down, along) = pressed_across(coefficient, 0.1, 0.002);
+        assert!(along > 0.0 && along < 0.5 * coefficient * down, "{coefficient}: {along} of {down}");
+    }
+}
