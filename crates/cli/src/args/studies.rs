@@ -105,6 +105,9 @@ pub(crate) struct CoilArgs {
     /// Coefficient of friction of the wall
     #[arg(long, default_value_t = 0.1, value_name = "MU", allow_negative_numbers = true)]
     pub(crate) friction: f64,
+    /// Coefficient of friction of coils on themselves and on each other
+    #[arg(long, default_value_t = 0.2, value_name = "MU", allow_negative_numbers = true)]
+    pub(crate) self_friction: f64,
     /// Folder for coil.csv, .json, .svg and .png
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

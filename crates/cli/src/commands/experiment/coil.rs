@@ -130,6 +130,7 @@ fn check(args: &CoilArgs) -> Result<(), Failure> {
     within("--step-mm", args.step_mm, (0.05, 5.0))?;
     within("--element-mm", args.element_mm, (0.1, 2.0))?;
     within("--friction", args.friction, (0.0, 2.0))?;
+    within("--self-friction", args.self_friction, (0.0, 2.0))?;
     if args.coils.is_empty() || args.coils.len() > MOST_COILS {
         return Err(Failure::Input(format!("--coils: give 1 to {MOST_COILS}")));
     }
@@ -230,6 +231,7 @@ fn begin(args: &CoilArgs) -> Result<(Simulation, Sac), Failure> {
         element_mm: args.element_mm,
         tolerance: 1e-6,
         self_contact: true,
+        self_friction: args.self_friction,
         ..KirchhoffOptions::default()
     };
     let properties = WallProperties {
