@@ -1,7 +1,7 @@
 //! Reference cases with exact or independently computed answers: what `endowire verify` runs.
 //!
 //! Each case is data and a function; nothing here knows what the solver returns. Beside the cases stand the [`stress`] table of
-//! rods, that of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]) and of any size ([`sequences`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
+//! rods, that of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]) and of any size ([`sequences`]), random deployments of coils ([`deployments`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
 //! that [crosses](crossing) its wall.
 
 mod capstan;
@@ -12,6 +12,7 @@ mod coaxial;
 mod contact;
 pub mod crossing;
 mod cylinder;
+pub mod deployments;
 mod ends;
 mod flow_drag;
 mod insertion;

@@ -84,16 +84,18 @@ impl std::fmt::Display for SequenceRow {
     }
 }
 
-/// Random numbers of a seed.
-struct Random(u64, u64);
+/// Random numbers of a seed, by how many there were.
+pub(crate) struct Random(pub(crate) u64, pub(crate) u64);
 
 impl Random {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    /// A number between two.
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         self.1 += 1;
         low + (high - low) * unit(splitmix64(self.0, self.1))
     }
 
-    fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
+    /// One of a list.
+    pub(crate) fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.between(0.0, list.len() as f64) as usize]
     }
 }

@@ -5,6 +5,7 @@
 mod arrival;
 mod catalogue;
 mod damaged_files;
+mod deployments;
 mod hard_scenes;
 mod instruments;
 mod passages;

@@ -5,6 +5,7 @@
 //! cargo run --release -p endowire-benches --bin hard -- lines [NAME]         # what each of them takes, for `benches/ablation.sh`
 //! cargo run --release -p endowire-benches --bin hard -- turned [SCENE]       # 480 insertions of four scenes against steps of 0.25 mm
 //! cargo run --release -p endowire-benches --bin hard -- sequences [SEEDS]    # random commands, each against its parts of 1 mm
+//! cargo run --release -p endowire-benches --bin hard -- deployments [SEEDS]  # two coils out of a catheter and detached, by random commands
 //! ```
 //!
 //! Ends with 1 where one ends elsewhere in silence.
@@ -17,15 +18,20 @@ mod turned;
 use std::process::ExitCode;
 
 use endowire_core::{Error, Result};
-use endowire_verify::sequences::{SEQUENCES, SequenceRow, run};
+use endowire_verify::{deployments, sequences};
 
-/// Sequences in which something is wrong.
-fn sequences(count: u64) -> Result<usize> {
-    println!("{}", SequenceRow::HEAD);
+/// Rows of so many seeds in which something is wrong.
+fn seeded<R: std::fmt::Display>(
+    count: u64,
+    head: &str,
+    run: impl Fn(u64) -> Result<R>,
+    passes: impl Fn(&R) -> bool,
+) -> Result<usize> {
+    println!("{head}");
     let mut wrong = 0;
     for seed in 0..count {
         let row = run(seed)?;
-        wrong += usize::from(!row.pass);
+        wrong += usize::from(!passes(&row));
         println!("{row}");
     }
     Ok(wrong)
@@ -33,8 +39,13 @@ fn sequences(count: u64) -> Result<usize> {
 
 fn main() -> Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mend = "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]` or `sequences [SEEDS]`";
+    let mend =
+        "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]`, `sequences [SEEDS]` or `deployments [SEEDS]`";
     let second = arguments.get(1).map(String::as_str);
+    let seeds = |all: u64| {
+        let count = second.map_or(Ok(all), str::parse);
+        count.map_err(|_| Error::parameter("SEEDS", second.unwrap_or_default(), mend))
+    };
     let wrong = match arguments.first().map(String::as_str) {
         Some("cases") => cases::cases(second)?,
         Some("lines") => {
@@ -43,8 +54,12 @@ fn main() -> Result<ExitCode> {
         }
         Some("turned") => turned::turned(second)?,
         Some("sequences") => {
-            let seeds = second.map_or(Ok(SEQUENCES), str::parse);
-            sequences(seeds.map_err(|_| Error::parameter("SEEDS", &arguments[1], mend))?)?
+            let head = sequences::SequenceRow::HEAD;
+            seeded(seeds(sequences::SEQUENCES)?, head, sequences::run, |row| row.pass)?
+        }
+        Some("deployments") => {
+            let head = deployments::DeploymentRow::HEAD;
+            seeded(seeds(deployments::DEPLOYMENTS)?, head, deployments::run, |row| row.pass)?
         }
         other => return Err(Error::parameter("study", other.unwrap_or("none"), mend)),
     };

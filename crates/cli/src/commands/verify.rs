@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use endowire_core::Result;
+use endowire_verify::deployments::{self, DEPLOYMENTS, DeploymentRow};
 use endowire_verify::insertion_stress::{InsertionRow, InsertionStress};
 use endowire_verify::instrument_stress::{self, InstrumentRow, InstrumentStress};
 use endowire_verify::sequences::{self, SEQUENCES, SequenceRow};
@@ -31,6 +32,8 @@ struct Document {
     instrument_stress: Option<Vec<Instruments>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sequences: Option<Vec<SequenceRow>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    deployments: Option<Vec<DeploymentRow>>,
 }
 
 /// Random commands on several instruments, and the time they took.
@@ -59,7 +62,9 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
     let combinations = insertion.as_ref().map_or_else(Vec::new, InsertionStress::cases);
     let together = if args.stress { instrument_stress::cases() } else { Vec::new() };
     let seeds = if args.stress { 0..SEQUENCES } else { 0..0 };
-    let count = FAMILIES.len() + stressed.len() + combinations.len() + together.len() + seeds.end as usize;
+    let deployed = if args.stress { DEPLOYMENTS } else { 0 };
+    let count = FAMILIES.len() + stressed.len() + combinations.len() + together.len();
+    let count = count + (seeds.end + deployed) as usize;
     let bar = progress::bar(count, "case");
     let mut cases = Vec::new();
     for family in FAMILIES {
@@ -99,6 +104,13 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
         row
     });
     let random: Vec<SequenceRow> = random.into_iter().collect::<Result<_>>()?;
+    bar.set_message("random deployments");
+    let deployments = in_parallel(deployed as usize, None, |seed| {
+        let row = deployments::run(seed as u64);
+        bar.inc(1);
+        row
+    });
+    let deployments: Vec<DeploymentRow> = deployments.into_iter().collect::<Result<_>>()?;
     bar.finish_and_clear();
 
     let passed = cases.iter().filter(|row| row.pass).count();
@@ -111,6 +123,7 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
         insertion_stress: insertions,
         instrument_stress: args.stress.then_some(instruments),
         sequences: args.stress.then_some(random),
+        deployments: args.stress.then_some(deployments),
     };
     if args.json {
         print_json(&document)?;
@@ -120,7 +133,8 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
     let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count()
         + document.insertion_stress.iter().flatten().filter(|row| !row.pass).count()
         + document.instrument_stress.iter().flatten().filter(|one| !one.row.pass).count()
-        + document.sequences.iter().flatten().filter(|row| !row.pass).count();
+        + document.sequences.iter().flatten().filter(|row| !row.pass).count()
+        + document.deployments.iter().flatten().filter(|row| !row.pass).count();
     if document.failed > 0 || unexplained > 0 {
         return Err(Failure::Computation(format!(
             "{} of {} reference rows and {unexplained} stressed cases fail",
@@ -164,6 +178,11 @@ fn print_cases(document: &Document) {
     if let Some(rows) = &document.sequences {
         println!();
         println!("{}", SequenceRow::HEAD);
+        rows.iter().for_each(|row| println!("{row}"));
+    }
+    if let Some(rows) = &document.deployments {
+        println!();
+        println!("{}", DeploymentRow::HEAD);
         rows.iter().for_each(|row| println!("{row}"));
     }
 }

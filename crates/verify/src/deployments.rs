@@ -1,0 +1,280 @@
+//! Random deployments of coils: two coils are pushed, pulled and turned out of a catheter that moves as well, and detached. What `endowire verify --stress` runs beside
+//! random commands.
+//!
+//! The check is independent of the simulation: it has the centre lines that are told alone. No two pieces of what is out are nearer to each other than their surfaces allow, whether
+//! they are of one coil, of two, or of what is in; none is behind the wall, and none is longer or shorter than it was.
+
+use endowire_core::device::{Device, Instrument, Section, Stack};
+use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::shape::Shape;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
+use endowire_core::{Error, Result, Vec3};
+use serde::Serialize;
+
+use crate::crossing::{CrossingTest, curve_in};
+use crate::sequences::Random;
+
+/// Deployments of the whole stress.
+pub const DEPLOYMENTS: u64 = 300;
+/// Commands of a deployment.
+const COMMANDS: usize = 80;
+/// Instruments of the stack: two coils, and the catheter.
+const CATHETER: usize = 2;
+/// Chords of an element: its curve is met within a thousandth of a radius.
+const CHORDS: usize = 12;
+/// Axes nearer to each other than this part of the distance at which surfaces touch are too deep in each other, …
+const DEEP: f64 = 0.97;
+/// … and nearer than this they have crossed.
+const CROSSED: f64 = 0.5;
+/// Largest part of a length by which a coil may be longer or shorter.
+const STRETCHED: f64 = 2e-3;
+
+/// What became of a deployment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeploymentRow {
+    /// Its number.
+    pub seed: u64,
+    /// Sac, coils and friction.
+    pub what: String,
+    /// Commands carried out.
+    pub commands: usize,
+    /// Newton iterations of them.
+    pub iterations: u64,
+    /// Commands in which something jumped.
+    pub jumps: usize,
+    /// Commands that ended without an equilibrium, and said so.
+    pub unconverged: usize,
+    /// Commands that were refused, with a reason, and lost nothing.
+    pub refused: usize,
+    /// Coils that were detached.
+    pub detached: usize,
+    /// Least distance of two axes, over that at which their surfaces touch.
+    pub least_distance: f64,
+    /// States in which axes have crossed, …
+    pub crossed: usize,
+    /// … in which one is behind the wall, …
+    pub behind: usize,
+    /// … and in which one is longer or shorter.
+    pub stretched: usize,
+    /// The first thing that went wrong.
+    pub first: String,
+    /// Whether nothing did.
+    pub pass: bool,
+}
+
+impl DeploymentRow {
+    /// The heads of what a row shows.
+    pub const HEAD: &str =
+        "seed  cmds  iter. jumps  unb refused out least crossed behind length  what, and what was first";
+}
+
+impl std::fmt::Display for DeploymentRow {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { seed, commands, iterations, jumps, unconverged, refused, detached, .. } = self;
+        let Self { least_distance, crossed, behind, stretched, what, first, .. } = self;
+        write!(
+            f,
+            "{seed:>4} {commands:>5} {iterations:>6} {jumps:>5} {unconverged:>4} {refused:>7} {detached:>3} {least_distance:>5.3} {crossed:>7} \
+             {behind:>6} {stretched:>6}  {what} {first}"
+        )
+    }
+}
+
+/// A catheter whose tip stands in a sac, and two coils in it.
+struct Scene {
+    simulation: Simulation,
+    wall: Wall,
+    radius_mm: f64,
+    what: String,
+}
+
+impl Scene {
+    fn new(random: &mut Random) -> Result<Self> {
+        let sac_mm = random.between(1.5, 4.0);
+        let node = |i: usize| CentrelineNode {
+            position_mm: Vec3::z() * (3.0 * sac_mm * i as f64),
+            radius_mm: sac_mm,
+            parent: i.checked_sub(1),
+        };
+        let tree = CentrelineTree::new((0..4).map(node).collect())?;
+        let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.3 * sac_mm))?;
+        let radius_mm = random.between(0.12, 0.2);
+        let stiffness_nmm2 = 10f64.powf(random.between(-2.7, -1.7));
+        let coil = |random: &mut Random| -> Result<Device> {
+            let length_mm = random.between(8.0, 25.0);
+            let curl = 1.0 / random.between(0.5 * sac_mm, 1.2 * sac_mm);
+            let wound = Section {
+                rest_curvature_per_mm: [curl, random.between(0.0, 0.3) * curl],
+                torsional_stiffness_nmm2: Some(0.8 * stiffness_nmm2),
+                ..Section::straight(length_mm, radius_mm, stiffness_nmm2)
+            };
+            Device::new(vec![wound, Section::straight(100.0, radius_mm, 0.3)])?.with_coil(length_mm)
+        };
+        let coils = [coil(random)?, coil(random)?];
+        let catheter = Section {
+            inner_radius_mm: Some(radius_mm + 0.03),
+            ..Section::straight(60.0, radius_mm + 0.12, random.between(0.3, 2.0))
+        };
+        let one = |name: &str, device: Device| Instrument { name: name.to_owned(), device, may_lead: true };
+        let [first, second] = coils;
+        let stack = Stack::new(vec![
+            one("first", first),
+            one("second", second),
+            one("catheter", Device::new(vec![catheter])?),
+        ])?;
+        let friction = random.one_of(&[0.0, 0.1, 0.3]);
+        let modulus_n_per_mm2 = random.one_of(&[1.0, 100.0]);
+        let self_friction = random.one_of(&[0.0, 0.2, 0.4]);
+        let element_mm = random.one_of(&[0.5, 0.75]);
+        let options =
+            KirchhoffOptions { element_mm, self_contact: true, self_friction, ..KirchhoffOptions::default() };
+        let position_mm = Vec3::new(-0.6 * sac_mm, 0.0, 4.5 * sac_mm);
+        let direction = Vec3::new(1.0, random.between(-0.4, 0.4), random.between(-0.4, 0.4));
+        let sheath = Sheath::new(position_mm, direction)?;
+        let properties = WallProperties { modulus_n_per_mm2, friction, ..WallProperties::default() };
+        let mut simulation = Simulation::builder(made.wall.clone(), stack, sheath)
+            .properties(properties)
+            .method(&options)
+            .build()?;
+        // In the catheter a coil touches nothing.
+        simulation.step_together(&[advance(CATHETER, 0.3 * sac_mm), advance(0, 0.3 * sac_mm)])?;
+        let what = format!(
+            "sac {sac_mm:.1} mm, coils {radius_mm:.2} mm of {stiffness_nmm2:.4} N·mm², wall {modulus_n_per_mm2}, μ {friction} and {self_friction}, \
+             elements {element_mm}"
+        );
+        Ok(Self { simulation, wall: made.wall, radius_mm, what })
+    }
+}
+
+fn advance(instrument: usize, mm: f64) -> Move {
+    Move { instrument, command: Command::advance(mm) }
+}
+
+/// What is out of a coil, or of all that is in: points of its axis in order, and the length of device that they stand for, mm.
+fn axes(simulation: &Simulation) -> Vec<(Vec<Vec3>, f64)> {
+    let of = |shape: &Shape| {
+        let length_mm = shape.from_tip_mm.first().copied().unwrap_or(0.0);
+        (curve_in(shape, CHORDS), length_mm)
+    };
+    let mut all = vec![of(simulation.shape())];
+    all.extend(simulation.coils().iter().map(|coil| of(&coil.shape)));
+    all
+}
+
+fn length_mm(axis: &[Vec3]) -> f64 {
+    axis.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+}
+
+/// Least distance of two points of axes, but for those of one axis that are less than a turn of the radius apart along it, mm.
+fn least_distance_mm(axes: &[(Vec<Vec3>, f64)], radius_mm: f64) -> f64 {
+    let apart_mm = std::f64::consts::TAU * radius_mm;
+    let mut least = f64::INFINITY;
+    for (k, (one, _)) in axes.iter().enumerate() {
+        let mut arc_mm = vec![0.0; one.len()];
+        for i in 1..one.len() {
+            arc_mm[i] = arc_mm[i - 1] + (one[i] - one[i - 1]).norm();
+        }
+        for (i, a) in one.iter().enumerate() {
+            let own = one.iter().zip(&arc_mm).skip(i + 1).filter(|(_, mm)| *mm - arc_mm[i] > apart_mm);
+            let others = axes[k + 1..].iter().flat_map(|(other, _)| other);
+            let each = own.map(|(b, _)| b).chain(others).map(|b| (a - b).norm_squared());
+            least = each.fold(least, f64::min);
+        }
+    }
+    least.sqrt()
+}
+
+/// A random command: mostly the coil that is next is pushed on.
+fn command(random: &mut Random, coil: usize) -> Move {
+    let advance_mm = random.one_of(&[0.3, 0.5, 1.0, 1.0, 2.0, 3.0]);
+    match random.between(0.0, 1.0) {
+        kind if kind < 0.1 => advance(coil, -2.0 * advance_mm),
+        kind if kind < 0.2 => {
+            let command = Command { advance_mm: 0.0, rotate_rad: random.between(-1.0, 1.0) };
+            Move { instrument: coil, command }
+        }
+        kind if kind < 0.25 => advance(CATHETER, random.between(-0.3, 0.3)),
+        _ => advance(coil, advance_mm),
+    }
+}
+
+/// Runs a deployment.
+///
+/// # Errors
+/// None that a seed is to blame for.
+pub fn run(seed: u64) -> Result<DeploymentRow> {
+    let mut random = Random(seed, 1 << 32);
+    let Scene { mut simulation, wall, radius_mm, what } = Scene::new(&mut random)?;
+    let crossing = CrossingTest::new(wall.mesh());
+    let mut row = DeploymentRow {
+        seed,
+        what,
+        commands: 0,
+        iterations: 0,
+        jumps: 0,
+        unconverged: 0,
+        refused: 0,
+        detached: 0,
+        least_distance: f64::INFINITY,
+        crossed: 0,
+        behind: 0,
+        stretched: 0,
+        first: String::new(),
+        pass: true,
+    };
+    for number in 0..COMMANDS {
+        let coil = row.detached.min(1);
+        let inserted_mm = simulation.report().lengths_mm();
+        let out_mm = inserted_mm[coil] - inserted_mm[CATHETER];
+        let coil_mm = simulation.stack().instruments()[coil].device.coil_mm();
+        let done = if row.detached < 2 && out_mm > coil_mm + 3.0 * radius_mm {
+            simulation.detach(coil).cloned()
+        } else if row.detached < 2 {
+            simulation.step_together(&[command(&mut random, coil)]).cloned()
+        } else {
+            let mm = random.between(-1.0, 1.0);
+            simulation.step_together(&[advance(CATHETER, mm)]).cloned()
+        };
+        let report = match done {
+            Ok(report) => report,
+            Err(error) => {
+                row.refused += 1;
+                let explained = matches!(error, Error::End(_)) || error.is_input();
+                if !explained && row.first.is_empty() {
+                    row.first = format!("command {number}: {error}");
+                }
+                continue;
+            }
+        };
+        row.commands += 1;
+        row.detached = simulation.coils().len();
+        row.iterations += u64::from(report.iterations);
+        row.jumps += usize::from(report.jumped);
+        row.unconverged += usize::from(!report.converged);
+        let axes = axes(&simulation);
+        let distance = least_distance_mm(&axes, radius_mm) / (2.0 * radius_mm);
+        row.least_distance = row.least_distance.min(distance);
+        let mut wrong = |count: &mut usize, is_wrong: bool, what: String| {
+            *count += usize::from(is_wrong);
+            if is_wrong && row.first.is_empty() {
+                row.first = format!("command {number}: {what}");
+            }
+        };
+        wrong(
+            &mut row.crossed,
+            distance < CROSSED,
+            format!("axes are {distance:.3} distances of touch apart"),
+        );
+        let behind = axes.iter().skip(1).any(|(axis, _)| crossing.crosses(axis))
+            || crossing.is_crossed_by(&simulation);
+        wrong(&mut row.behind, behind, "an axis passes through the wall".to_owned());
+        for (axis, told_mm) in &axes {
+            let length_mm = length_mm(axis);
+            let stretched = report.converged && (length_mm - told_mm).abs() > STRETCHED * told_mm;
+            wrong(&mut row.stretched, stretched, format!("{length_mm:.3} mm of {told_mm:.3}"));
+        }
+    }
+    row.pass = row.crossed + row.behind + row.stretched == 0 && row.least_distance > DEEP;
+    Ok(row)
+}
