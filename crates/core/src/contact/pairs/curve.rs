@@ -78,8 +78,8 @@ impl Curve<'_> {
         (!self.is_break(next)).then_some(next)
     }
 
-    /// The place so far along the centre line from another, or the end on the way there.
-    pub(super) fn walk(&self, from: Place, by: f64) -> Place {
+    /// The place so far along the centre line from another, or the end on the way there; and how far that is.
+    pub(super) fn walk(&self, from: Place, by: f64) -> (Place, f64) {
         let Place { mut element, xi } = from;
         let mut s = xi * self.length_mm(element) + by;
         while s < 0.0
@@ -94,7 +94,8 @@ impl Curve<'_> {
             s -= self.length_mm(element);
             element = after;
         }
-        Place { element, xi: (s / self.length_mm(element)).clamp(0.0, 1.0) }
+        let inside = s.clamp(0.0, self.length_mm(element));
+        (Place { element, xi: (s / self.length_mm(element)).clamp(0.0, 1.0) }, by + (inside - s))
     }
 
     /// Whether a place is the end of the rod in this direction, 1 or −1.

@@ -102,9 +102,9 @@ impl Gap {
     /// That of a site from the stretch about a place, as near as a descent from a slide and that place leads. `touch` is the distance at which surfaces touch.
     pub(super) fn find(curve: &Curve<'_>, site: Place, slide: f64, to: Place, touch: f64) -> Self {
         let window = WINDOW * touch;
-        let at = |slide: f64| curve.walk(site, slide);
-        let mut slide = slide.clamp(-window, window);
-        let mut places = [at(slide), to];
+        let at = |slide: f64| curve.walk(site, slide.clamp(-window, window));
+        let (first, mut slide) = at(slide);
+        let mut places = [first, to];
         let mut free = [true; 2];
         let mut jets = places.map(|place| curve.jet(place));
         let mut now = value(&jets[0], &jets[1], slide);
@@ -126,8 +126,8 @@ impl Gap {
             }
             let mut part = 1.0;
             loop {
-                let there = (slide + part * step[0]).clamp(-window, window);
-                let next = [at(there), curve.walk(places[1], part * step[1])];
+                let (first, there) = at(slide + part * step[0]);
+                let next = [first, curve.walk(places[1], part * step[1]).0];
                 let reached = next.map(|place| curve.jet(place));
                 let then = value(&reached[0], &reached[1], there);
                 if then.phi <= now.phi || part < 1e-3 || size <= SHORT * touch {

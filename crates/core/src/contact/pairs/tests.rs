@@ -124,3 +124,20 @@ fn a_crossing_is_felt_the_same_wherever_sites_lie() {
     let mean = all.iter().sum::<f64>() / all.len() as f64;
     assert!(mean > 0.0 && all.iter().all(|f| (f / mean - 1.0).abs() < 0.005), "{all:?}");
 }
+
+#[test]
+fn ends_that_meet_head_on_are_felt_as_near_as_they_are() {
+    // A ring that is open by so much, whose ends lie in front of each other, and one whose ends are aside of each other.
+    for (apart, aside) in [(0.19, 0.0), (0.15, 0.5), (0.0, 0.9), (0.12, 0.7)] {
+        let radius = 1.5;
+        let turn = std::f64::consts::TAU - apart / radius;
+        let ring = move |a: f64| Vec3::new(radius * a.cos(), radius * a.sin(), 0.19 * aside * a / turn);
+        let (elements, state) = along(ring, turn, 20);
+        let mut touching = contact(&elements, 0.1);
+        let ends = (state.positions[20] - state.positions[0]).norm();
+        touching.look_at_base(&elements, &state);
+        // Those of the sites next to the ends.
+        let deepest = touching.pairs.iter().map(Pair::depth_mm).fold(0.0, f64::max);
+        assert!((deepest - (0.2 - ends)).abs() < 5e-4, "{apart} {aside}: {deepest} of {}", 0.2 - ends);
+    }
+}
