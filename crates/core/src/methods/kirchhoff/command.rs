@@ -73,6 +73,15 @@ impl Sum {
     }
 }
 
+/// How a command from a state begins whose hands go so far, mm.
+fn control(environment: &Environment<'_>, from: &KirchhoffState, travel_mm: f64) -> StepControl {
+    let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
+    let work = (WORK * travel_mm.max(1.0)) as usize;
+    let control = StepControl::new(work.min(most), from.stride, environment.has_friction());
+    let set_free = travel_mm == 0.0 && !environment.surroundings.moves();
+    if set_free { control.set_free() } else { control }
+}
+
 impl<const C: usize> Workspace<C> {
     /// Begins with moves, and what ticks have left over, from the state `from`.
     ///
@@ -121,18 +130,10 @@ impl<const C: usize> Workspace<C> {
         let mut displaced = displacement(0.0);
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         let (mut sum, mut balanced) = (Sum::default(), true);
-        let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD);
-        let work = (WORK * travel.max(1.0)) as usize;
+        let mut control = control(environment, from, travel);
         // Where no hand moves the vessel does, time goes by, or something was set free.
-        let set_free = travel == 0.0 && !surroundings.moves();
         let travel = if travel > 0.0 { travel } else { 1.0 };
-        let has_friction = environment.has_friction();
-        let mut control =
-            StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.stride, has_friction);
-        if set_free {
-            control = control.set_free();
-        }
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;

@@ -14,7 +14,7 @@ use super::state::{KirchhoffState, UnderWay};
 use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
-use crate::contact::{HandMotion, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{Rubs, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
@@ -177,6 +177,26 @@ impl<const C: usize> Tools<C> {
         }
     }
 
+    /// Begins a part for loops and coils, with its friction; returns whether the tip would be pushed through one.
+    fn begin_loops(
+        &mut self,
+        environment: &Environment<'_>,
+        start: Start<'_>,
+        (mesh, rod): (&Mesh, &RodState),
+    ) -> bool {
+        let (stack, motions) = (environment.surroundings.stack, &self.guess.motions);
+        let radius_mm = mesh.points.first().map_or(0.0, |point| point.potential.radius_mm);
+        let friction = Rubs {
+            coefficient: environment.options.self_friction,
+            stick_mm: stick_mm(motions, radius_mm),
+            least_n: least_force_n(stack.softest_nmm2()),
+        };
+        self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
+        self.loops.begin_friction(rod, advances_mm(mesh, stack, motions), friction);
+        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+        self.loops.blocks_its_tip(&mesh.elements, rod, advance_mm)
+    }
+
     /// Gives the state what the next sub-step starts with, and takes the coils off the line.
     fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
@@ -201,20 +221,12 @@ impl<const C: usize> Tools<C> {
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
+        let in_its_own_way = options.self_contact && self.begin_loops(environment, start, (mesh, rod));
         let softest_nmm2 = surroundings.stack.softest_nmm2();
         let (cache, friction) = (&mut self.cache, &mut self.friction);
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
         let mut loops = options.self_contact.then_some(&mut self.loops);
-        let mut in_its_own_way = false;
-        if let Some(loops) = &mut loops {
-            loops.renew(&mesh.elements, skins(mesh, surroundings.stack).chain(self.joined.skins()));
-            let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
-            let friction = self_friction(environment, mesh, &self.guess.motions);
-            let advances_mm = advances_mm(mesh, surroundings.stack, &self.guess.motions);
-            loops.begin_friction(rod, advances_mm, friction);
-            in_its_own_way = loops.blocks_its_tip(&mesh.elements, rod, advance_mm);
-        }
         let near = matches!(effort, Effort::Near | Effort::Held);
         if let Some(resumed) = resumed {
             let mut under_way = resumed.state.rod.clone();
@@ -305,16 +317,6 @@ impl<const C: usize> Tools<C> {
         let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
         Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
-    }
-}
-
-/// How loops and coils rub on each other in a part.
-fn self_friction(environment: &Environment<'_>, mesh: &Mesh, motions: &[HandMotion]) -> Rubs {
-    let radius_mm = mesh.points.first().map_or(0.0, |point| point.potential.radius_mm);
-    Rubs {
-        coefficient: environment.options.self_friction,
-        stick_mm: stick_mm(motions, radius_mm),
-        least_n: least_force_n(environment.surroundings.stack.softest_nmm2()),
     }
 }
 
