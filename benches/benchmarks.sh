@@ -58,6 +58,8 @@ measure loop experiment loop
 
 processor=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -1)
 origin="Written by \`benches/benchmarks.sh\` on $(date -u +%Y-%m-%d) from commit $commit, on ${processor:-an unknown processor}, $(nproc) cores, $(uname -s), $(rustc --version | cut -d' ' -f1,2)."
+# What benches/ablation.sh has written stays.
+parts=$(sed -n '/^## What each part brings/,$p' "$target/BENCHMARKS.md" 2>/dev/null || true)
 block() {
   printf '## %s\n```sh\n' "$1"; cat "$out/$2.cmd"; printf '```\n```text\n'; cat "$out/$2.txt"; printf '```\n\n'
 }
@@ -69,6 +71,8 @@ block() {
   block "Table 2 of Li et al. 2011" deformation
   block "Navigation" navigation
   block "The loop" loop
+  printf '%s' "${parts:+$parts
+}"
 } > "$target/BENCHMARKS.md"
 
 # The rows of a method, as a table: what lies behind the comment in each page is written anew. The note is the last column and may hold
