@@ -6,7 +6,7 @@
 //! V = Σ ½ c wᵢ |xᵢ − x̄ᵢ|²,    c = RESISTANCE · EI / mm⁴
 //! ```
 //!
-//! from where it was when the part of the command began: it is as slow there as in honey, and as no part goes on from where another began, it holds nothing.
+//! from where it was when the part of the command began. It makes the solution unique, and holds nothing for long: the next part begins where this one has ended.
 
 use std::sync::Arc;
 
@@ -184,7 +184,7 @@ impl Joined {
         mesh.points.extend(self.points.iter().map(moved));
     }
 
-    /// Takes the coils off a mesh, and off a rod in which their lines are; returns them where they lie there, with what presses and what is known.
+    /// Takes the coils off a mesh and off the rod on it; returns them where they lie there, with what presses and what is known.
     pub(super) fn take_off(&self, mesh: &mut Mesh, after: &mut KirchhoffState) -> Vec<FreeCoil> {
         let line = mesh.elements.len() - self.elements.len();
         let mut points = mesh.points.len() - self.points.len();
