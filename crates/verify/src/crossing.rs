@@ -168,6 +168,11 @@ impl CrossingTest {
     }
 }
 
+/// Length of the chords between points, mm.
+pub(crate) fn chords_mm(points: &[Vec3]) -> f64 {
+    points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+}
+
 /// Points along the device's curve: the cubics through positions and tangents of the nodes.
 pub fn curve(shape: &Shape) -> Vec<Vec3> {
     curve_in(shape, CHORDS)

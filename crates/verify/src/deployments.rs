@@ -12,7 +12,7 @@ use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resol
 use endowire_core::{Error, Result, Vec3};
 use serde::Serialize;
 
-use crate::crossing::{CrossingTest, curve_in};
+use crate::crossing::{CrossingTest, chords_mm, curve_in};
 use crate::sequences::Random;
 
 /// Deployments of the whole stress.
@@ -31,7 +31,7 @@ const CROSSED: f64 = 0.5;
 const STRETCHED: f64 = 2e-3;
 
 /// What became of a deployment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct DeploymentRow {
     /// Its number.
     pub seed: u64,
@@ -164,10 +164,6 @@ fn axes(simulation: &Simulation) -> Vec<(Vec<Vec3>, f64)> {
     all
 }
 
-fn length_mm(axis: &[Vec3]) -> f64 {
-    axis.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
-}
-
 /// Least distance of two points of axes, but for those of one axis that are less than a turn of the radius apart along it, mm, and the numbers of the axes.
 fn nearest(axes: &[(Vec<Vec3>, f64)], radius_mm: f64) -> (f64, [usize; 2]) {
     let apart_mm = std::f64::consts::TAU * radius_mm;
@@ -214,23 +210,7 @@ pub fn run(seed: u64) -> Result<DeploymentRow> {
     let mut random = Random(seed, 1 << 32);
     let Scene { mut simulation, wall, radius_mm, what } = Scene::new(&mut random)?;
     let crossing = CrossingTest::new(wall.mesh());
-    let mut row = DeploymentRow {
-        seed,
-        what,
-        commands: 0,
-        iterations: 0,
-        jumps: 0,
-        unconverged: 0,
-        refused: 0,
-        detached: 0,
-        least_distance: f64::INFINITY,
-        deep: 0,
-        crossed: 0,
-        behind: 0,
-        stretched: 0,
-        first: String::new(),
-        pass: true,
-    };
+    let mut row = DeploymentRow { seed, what, least_distance: f64::INFINITY, ..DeploymentRow::default() };
     for number in 0..COMMANDS {
         let coil = row.detached.min(1);
         let inserted_mm = simulation.report().lengths_mm();
@@ -277,7 +257,7 @@ pub fn run(seed: u64) -> Result<DeploymentRow> {
             || crossing.is_crossed_by(&simulation);
         wrong(&mut row.behind, behind, "an axis passes through the wall".to_owned());
         for (axis, told_mm) in &axes {
-            let length_mm = length_mm(axis);
+            let length_mm = chords_mm(axis);
             let stretched = report.converged && (length_mm - told_mm).abs() > STRETCHED * told_mm;
             wrong(&mut row.stretched, stretched, format!("{length_mm:.3} mm of {told_mm:.3}"));
         }

@@ -8,12 +8,11 @@ use endowire_core::device::{Device, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::random::{splitmix64, unit};
-use endowire_core::shape::Shape;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use endowire_core::{Error, Result};
 use serde::Serialize;
 
-use crate::crossing::{CrossingTest, curve_in};
+use crate::crossing::{CrossingTest, chords_mm, curve_in};
 
 /// Sequences of the whole stress.
 pub const SEQUENCES: u64 = 300;
@@ -199,11 +198,6 @@ fn go(simulation: &mut Simulation, moves: &[Move], parts: usize) -> Done {
     done
 }
 
-/// Length of a device, mm: of cubic curves between its nodes, as chords.
-fn length_mm(shape: &Shape) -> f64 {
-    curve_in(shape, CHORDS).windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
-}
-
 /// Runs a sequence.
 ///
 /// # Errors
@@ -266,7 +260,7 @@ pub fn run(seed: u64) -> Result<SequenceRow> {
         }
         row.commands += 1;
         let [energy_mj, of_parts_mj] = [&one, &many].map(|s| s.report().energy.total());
-        let (inserted_mm, length_mm) = (one.report().inserted_mm, length_mm(one.shape()));
+        let (inserted_mm, length_mm) = (one.report().inserted_mm, chords_mm(&curve_in(one.shape(), CHORDS)));
         let accepted = !by_one.unconverged;
         if accepted && energy_mj > MORE * of_parts_mj + MORE_MJ {
             wrong(&mut row.stored_more, format!("{energy_mj:.4} mJ, and its parts {of_parts_mj:.4}"));

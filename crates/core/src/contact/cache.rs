@@ -256,9 +256,9 @@ impl ContactCache {
 
     /// Goes on with what was kept of the same points.
     pub fn resume(&mut self, known: &KnownPoints) {
-        self.points.clone_from(&known.points);
+        self.points.clear();
         self.readings.clear();
-        self.readings.resize(self.points.len(), TakenReading::NONE);
+        self.go_on(known);
     }
 
     /// Keeps what is known at the end of a step.

@@ -346,8 +346,7 @@ impl Friction {
             }
             let x = point.position(elements, state);
             let slip_mm = self.slip(index, &x, point.angle(state), point.potential.radius_mm).0.norm();
-            // What sticks takes nothing.
-            let way_mm = phi(slip_mm, self.stick_mm) - phi(0.0, self.stick_mm);
+            let way_mm = rubbed_mm(slip_mm, self.stick_mm);
             for (sum_mj, force_n) in sums_mj.iter_mut().zip(forces_n) {
                 *sum_mj += self.coefficient * force_n.max(0.0) * way_mm;
             }
@@ -430,6 +429,11 @@ pub(in crate::contact) fn force_of_slip(
 /// Force of friction over its slip, N/mm.
 pub(in crate::contact) fn resistance(largest_n: f64, slip_mm: &Vec3, stick_mm: f64) -> f64 {
     largest_n * rates(slip_mm.norm(), stick_mm).0
+}
+
+/// The way on which friction takes energy in a slip, mm: what sticks takes nothing.
+pub(in crate::contact) fn rubbed_mm(slip_mm: f64, stick_mm: f64) -> f64 {
+    phi(slip_mm, stick_mm) - phi(0.0, stick_mm)
 }
 
 /// φ(y) with its ε, `e`.

@@ -92,8 +92,11 @@ impl Couple {
 fn ways<const C: usize>(elements: &[ElementData], state: &RodState, couple: &Couple) -> [Way; 20] {
     let l = Layout::<C>;
     let mut ways = [(0, 0, Vec3::zeros()); 20];
-    let mut free = ways.iter_mut();
-    let mut put = |way: Way| free.next().into_iter().for_each(|to| *to = way);
+    let mut count = 0;
+    let mut put = |way: Way| {
+        ways[count] = way;
+        count += 1;
+    };
     for (side, e) in couple.sides() {
         let h = elements[e].length;
         for (end, node) in [e, e + 1].into_iter().enumerate() {

@@ -27,4 +27,4 @@ pub use residual::ResidualSize;
 pub use together::Together;
 
 #[cfg(test)]
-mod newton_tests;
+pub(crate) mod newton_tests;

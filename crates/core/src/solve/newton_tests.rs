@@ -128,20 +128,28 @@ fn an_element_that_would_fold_is_told_and_shorter_ones_bend() {
 }
 
 /// A force at a node, and a spring at each of some nodes to where it was.
-struct Held {
-    force: (usize, Vec3),
-    springs: Vec<(usize, Vec3)>,
+pub(crate) struct Held {
+    pub(crate) force: (usize, Vec3),
+    pub(crate) springs: Vec<(usize, Vec3)>,
+    pub(crate) stiffness: f64,
+}
+impl Held {
+    /// By what the springs are pulled.
+    pub(crate) fn pulls(&self, state: &RodState) -> Vec3 {
+        self.springs.iter().map(|(i, was)| (state.positions[*i] - was) * self.stiffness).sum()
+    }
 }
 impl External for Held {
     fn value(&mut self, _: &[ElementData], state: &RodState) -> f64 {
-        let held = self.springs.iter().map(|(i, was)| 0.5 * (state.positions[*i] - was).norm_squared());
-        held.sum::<f64>() - self.force.1.dot(&state.positions[self.force.0])
+        let off = self.springs.iter().map(|(i, was)| (state.positions[*i] - was).norm_squared());
+        0.5 * self.stiffness * off.sum::<f64>() - self.force.1.dot(&state.positions[self.force.0])
     }
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         into.add_value(self.value(elements, state));
         into.add_node(self.force.0, &-self.force.1, &nalgebra::Matrix3::zeros());
+        let stiffness = nalgebra::Matrix3::from_diagonal_element(self.stiffness);
         for (i, was) in &self.springs {
-            into.add_node(*i, &(state.positions[*i] - was), &nalgebra::Matrix3::identity());
+            into.add_node(*i, &((state.positions[*i] - was) * self.stiffness), &stiffness);
         }
     }
 }
@@ -167,8 +175,14 @@ fn rods_behind_a_gap_are_solved_for_together_and_do_not_feel_each_other() {
             assert!(report.converged && report.stable, "{}", report.reason);
             state
         };
-    let one = solve(&elements, clamped.clone(), &mut Held { force: bent, springs: Vec::new() }, false);
-    let other = solve(&elements, free.clone(), &mut Held { force: sinks, springs: springs(0) }, true);
+    let one = solve(
+        &elements,
+        clamped.clone(),
+        &mut Held { force: bent, springs: Vec::new(), stiffness: 1.0 },
+        false,
+    );
+    let other =
+        solve(&elements, free.clone(), &mut Held { force: sinks, springs: springs(0), stiffness: 1.0 }, true);
     let mean = other.positions.iter().zip(&free.positions).map(|(x, was)| x - was).sum::<Vec3>();
     assert!((mean - sinks.1).norm() < 1e-9, "{mean}");
     let mut both = clamped;
@@ -176,8 +190,8 @@ fn rods_behind_a_gap_are_solved_for_together_and_do_not_feel_each_other() {
     let all = [&elements[..], &[ElementData::BREAK], &elements[..]].concat();
     let first = N + 1;
     let (mut on_one, mut on_other) = (
-        Held { force: bent, springs: Vec::new() },
-        Held { force: (first + sinks.0, sinks.1), springs: springs(first) },
+        Held { force: bent, springs: Vec::new(), stiffness: 1.0 },
+        Held { force: (first + sinks.0, sinks.1), springs: springs(first), stiffness: 1.0 },
     );
     let mut outside = super::Together(vec![&mut on_one, &mut on_other]);
     let both = solve(&all, both, &mut outside, false);

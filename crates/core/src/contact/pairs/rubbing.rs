@@ -16,8 +16,10 @@ use nalgebra::Matrix3;
 use super::curve::Curve;
 use super::{Pair, SelfContact};
 use crate::Vec3;
-use crate::contact::friction::{CHANGED, RENEWED};
-use crate::contact::friction::{Renewal, STICK_AT_REST, force_of_slip, phi, resistance};
+use crate::contact::SETTLED;
+use crate::contact::friction::{
+    CHANGED, RENEWED, Renewal, STICK_AT_REST, force_of_slip, phi, resistance, rubbed_mm,
+};
 use crate::rod::{Couple, ElementData, RodState, Stencils};
 use crate::solve::Moved;
 
@@ -175,13 +177,13 @@ impl SelfContact {
             rub.from_mm = a - b - rub.kept_mm;
             rub.slip_mm = rub.along(&(apart_mm - rub.from_mm));
         }
-        let steady = change_n < crate::contact::SETTLED * sum_n && self.unsettled() < crate::contact::SETTLED;
+        let steady = change_n < SETTLED * sum_n && self.unsettled() < SETTLED;
         self.rubbing.renewal = self.rubbing.renewal.after(steady);
     }
 
     /// Whether normal forces at an equilibrium are what presses there, or are held; otherwise they follow again.
     pub(super) fn friction_settles(&mut self) -> bool {
-        let settled = self.unsettled() < crate::contact::SETTLED;
+        let settled = self.unsettled() < SETTLED;
         !self.rubs() || self.rubbing.renewal.settles(settled)
     }
 
@@ -224,14 +226,14 @@ impl SelfContact {
         let stick_mm = (rubbing.stick_mm * STICK_AT_REST).max(rubbing.least_stick_mm);
         for Pair { rub, .. } in &mut self.pairs {
             let slip_mm = rub.slip_mm.norm();
-            let way_mm = phi(slip_mm, rubbing.stick_mm) - phi(0.0, rubbing.stick_mm);
+            let way_mm = rubbed_mm(slip_mm, rubbing.stick_mm);
             rubbing.taken_mj += rubbing.coefficient * rub.force_n * way_mm;
             rub.kept_mm = rub.slip_mm * (stick_mm / slip_mm.max(rubbing.stick_mm));
             if rub.seen.1 > 0.0 {
                 rub.normal = rub.seen.0;
             }
             rub.force_n = rub.seen.1;
-            let way_mm = phi(rub.kept_mm.norm(), stick_mm) - phi(0.0, stick_mm);
+            let way_mm = rubbed_mm(rub.kept_mm.norm(), stick_mm);
             rubbing.taken_mj -= rubbing.coefficient * rub.force_n * way_mm;
         }
         rubbing.stick_mm = stick_mm;
@@ -242,9 +244,11 @@ impl SelfContact {
     /// The least and the most that friction has taken in the part, mJ: with no normal forces, as at its beginning, and with those of its end.
     pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
         let Rubbing { coefficient, stick_mm, taken_mj, .. } = self.rubbing;
-        let each = self.pairs.iter().filter(|pair| pair.rubs()).map(|Pair { rub, .. }| {
-            coefficient * rub.force_n * (phi(rub.slip_mm.norm(), stick_mm) - phi(0.0, stick_mm))
-        });
+        let each = self
+            .pairs
+            .iter()
+            .filter(|pair| pair.rubs())
+            .map(|Pair { rub, .. }| coefficient * rub.force_n * rubbed_mm(rub.slip_mm.norm(), stick_mm));
         let most_mj = taken_mj + each.sum::<f64>();
         (if taken_mj == 0.0 { 0.0 } else { most_mj }, most_mj)
     }

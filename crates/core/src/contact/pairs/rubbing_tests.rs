@@ -1,40 +1,9 @@
 //! Coulomb's law where two rods cross.
 
-use nalgebra::Matrix3;
-
 use super::*;
 use crate::rod::{Frame, PLAIN, Supports};
+use crate::solve::newton_tests::Held;
 use crate::solve::{Newton, NewtonOptions, Together};
-
-/// A force at a node, and springs that hold others where they are.
-struct Held {
-    force: (usize, Vec3),
-    springs: Vec<(usize, Vec3)>,
-    stiffness: f64,
-}
-
-impl Held {
-    /// By what the springs are pulled.
-    fn pulls(&self, state: &RodState) -> Vec3 {
-        self.springs.iter().map(|(i, was)| (state.positions[*i] - was) * self.stiffness).sum()
-    }
-}
-
-impl External for Held {
-    fn value(&mut self, _: &[ElementData], state: &RodState) -> f64 {
-        let off = self.springs.iter().map(|(i, was)| (state.positions[*i] - was).norm_squared());
-        0.5 * self.stiffness * off.sum::<f64>() - self.force.1.dot(&state.positions[self.force.0])
-    }
-
-    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        into.add_value(self.value(elements, state));
-        into.add_node(self.force.0, &-self.force.1, &Matrix3::zeros());
-        for (i, was) in &self.springs {
-            let stiffness = Matrix3::from_diagonal_element(self.stiffness);
-            into.add_node(*i, &((state.positions[*i] - was) * self.stiffness), &stiffness);
-        }
-    }
-}
 
 const N: usize = 12;
 const RADIUS: f64 = 0.02;

@@ -127,11 +127,7 @@ impl Nodes {
             let set = stack.sets()[index].unwrap_or(0);
             for point in &alone.points {
                 let from_tip_mm = line - inserted + point.from_tip_mm;
-                while e > 0 && from_tip_mm >= mesh.from_tip_mm[e] {
-                    e -= 1;
-                }
-                let xi = 1.0 - (from_tip_mm - mesh.from_tip_mm[e + 1]) / mesh.elements[e].length;
-                let (element, xi) = (e, xi.clamp(0.0, 1.0));
+                let (element, xi) = mesh.place(from_tip_mm, &mut e);
                 let surface = ContactPoint { element, xi, instrument: index, set, from_tip_mm, ..*point };
                 mesh.points.push(surface);
             }

@@ -83,15 +83,13 @@ impl FreeCoil {
         mesh.elements = ends.map(|ends| alone(device, set, ends)).collect();
         mesh.from_tip_mm.clone_from(&self.from_tip_mm);
         let mut e = mesh.elements.len() - 1;
-        for point in &mut mesh.points {
-            while e > 0 && point.from_tip_mm >= mesh.from_tip_mm[e] {
-                e -= 1;
-            }
-            let xi = 1.0 - (point.from_tip_mm - mesh.from_tip_mm[e + 1]) / mesh.elements[e].length;
+        let mut points = std::mem::take(&mut mesh.points);
+        for point in &mut points {
+            let (element, xi) = mesh.place(point.from_tip_mm, &mut e);
             let (instrument, set) = (self.instrument, set.unwrap_or(0));
-            *point = ContactPoint { element: e, xi: xi.clamp(0.0, 1.0), instrument, set, ..*point };
+            *point = ContactPoint { element, xi, instrument, set, ..*point };
         }
-        mesh
+        Mesh { points, ..mesh }
     }
 
     /// Checks that a coil that is restored may be one of these instruments: what is read from a file may be anything.
@@ -184,15 +182,20 @@ impl Joined {
         mesh.points.extend(self.points.iter().map(moved));
     }
 
-    /// Takes the coils off a mesh and off the rod on it; returns them where they lie there, with what presses and what is known.
-    pub(super) fn take_off(&self, mesh: &mut Mesh, after: &mut KirchhoffState) -> Vec<FreeCoil> {
+    /// Takes coils that were somewhere off a mesh and off the rod on it; returns them where they lie there, with what presses and what is known.
+    pub(super) fn take_off(
+        &self,
+        were: &[FreeCoil],
+        mesh: &mut Mesh,
+        after: &mut KirchhoffState,
+    ) -> Vec<FreeCoil> {
         let line = mesh.elements.len() - self.elements.len();
         let mut points = mesh.points.len() - self.points.len();
         mesh.elements.truncate(line);
         mesh.points.truncate(points);
         let first = points;
         let mut node = line + 1;
-        let coils = after.coils.iter().zip(&self.counts).map(|(coil, count)| {
+        let coils = were.iter().zip(&self.counts).map(|(coil, count)| {
             let nodes = node..node + coil.from_tip_mm.len();
             let felt = points..points + count;
             (node, points) = (nodes.end, felt.end);

@@ -140,6 +140,15 @@ impl Mesh {
         self.from_tip_mm.len() - 1
     }
 
+    /// Element and ξ of a place so far from the tip, mm. `e` is where to start looking: calls go from the tip to the sheath.
+    pub(super) fn place(&self, from_tip_mm: f64, e: &mut usize) -> (usize, f64) {
+        while *e > 0 && from_tip_mm >= self.from_tip_mm[*e] {
+            *e -= 1;
+        }
+        let xi = 1.0 - (from_tip_mm - self.from_tip_mm[*e + 1]) / self.elements[*e].length;
+        (*e, xi.clamp(0.0, 1.0))
+    }
+
     /// The node nearest to a place so far from the tip, mm.
     pub(super) fn nearest_node(&self, from_tip_mm: f64) -> usize {
         let off = |i: &usize| (self.from_tip_mm[*i] - from_tip_mm).abs();

@@ -201,10 +201,11 @@ impl<const C: usize> Tools<C> {
     fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
         self.cache.keep(&mut after.known);
-        after.coils = Arc::clone(&start.state.coils);
-        if !self.joined.is_empty() {
-            after.coils = Arc::new(self.joined.take_off(mesh, after));
-        }
+        let coils = &start.state.coils;
+        after.coils = match self.joined.is_empty() {
+            true => Arc::clone(coils),
+            false => Arc::new(self.joined.take_off(coils, mesh, after)),
+        };
         inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
     }
 
