@@ -4,6 +4,8 @@
     python crates/python/examples/learn_arch.py evaluate out/learn       # what has been learnt, and what does not learn, on unseen arches
     python crates/python/examples/learn_arch.py plot out/learn           # the curve
 
+Of several folders, `out/learn-1 out/learn-2 …`, each is learnt in its turn from a seed of its own, and `evaluate` and `plot` tell of all of them.
+
 What is learnt: SAC, whose memory begins with episodes of a hand of the library that follows the centre line and with random ones. The policy sees a
 roadmap of the way ahead from the tip, and its last action; nothing of the wall. It learns on a hundred arches that are kept, with rewards of its own;
 evaluation is the task's own in all but what is observed, each episode in a new arch.
@@ -24,8 +26,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from endowire.gym import arches, ends, evaluation, observations, policies, rewards, tasks
 from endowire.gym.sb3 import Learned, SB3VecEnv
 
-#: Arches that are learnt on come from this seed, those of evaluation from the seeds of their episodes.
-LEARNING_SEED = 1
+#: Episodes of evaluation, each in the arch of its seed; arches that are learnt on come from the seed of learning.
 EVALUATED = range(900_000, 901_000)
 ENVIRONMENTS = 16
 #: Steps of each environment with which the memory begins: of the hand, and random ones.
@@ -51,13 +52,13 @@ EVALUATION = (
 CURVE, EVERY = ("steps", "processor_s", "reached", "return"), 1024
 
 
-def learning_task():
+def learning_task(seed):
     """Arches that are kept, five times the reward for the way against that at its end, and an end where steps take seconds."""
     left = ends.LeftVessel()
     # It leads nowhere: the learner shall not guess what would come after it.
     left.terminates = True
     return tasks.arch_variety(
-        vessels=arches.ArchVariety(count=100, seed=LEARNING_SEED),
+        vessels=arches.ArchVariety(count=100, seed=seed),
         observations=SEEN,
         rewards=[rewards.Reached(2.0), rewards.EachStep(-0.01), rewards.Approach(0.01)],
         ends=[ends.TargetReached(), left, ends.Laborious(), ends.StepLimit(250)],
@@ -123,12 +124,14 @@ def save(out, model, normalize):
         (out / f"new_{name}").replace(out / name)
 
 
-def train(out, minutes):
+def train(out, minutes, seed):
     out.mkdir(parents=True, exist_ok=True)
-    environments = SB3VecEnv(learning_task(), ENVIRONMENTS, seed=LEARNING_SEED)
+    environments = SB3VecEnv(learning_task(seed), ENVIRONMENTS, seed=seed)
     if (out / "model.zip").exists():
         normalize = VecNormalize.load(out / "normalize.pkl", environments)
         model = SAC.load(out / "model.zip", env=normalize, device="cpu")
+        if model.seed != seed:
+            raise SystemExit(f"{out} is learnt from seed {model.seed}, not {seed}: take another folder or seed")
         model.load_replay_buffer(out / "memory.pkl")
         with (out / "curve.csv").open() as file:
             before_s = float(list(csv.reader(file))[-1][1])
@@ -145,9 +148,9 @@ def train(out, minutes):
             "gradient_steps": ENVIRONMENTS // 2,
             "policy_kwargs": {"net_arch": [128, 128]},
         }
-        model = SAC("MultiInputPolicy", normalize, **settings, seed=LEARNING_SEED, device="cpu")
+        model = SAC("MultiInputPolicy", normalize, **settings, seed=seed, device="cpu")
         for name, steps in FIRST.items():
-            remember(model, normalize, known_policy(out, name, LEARNING_SEED), steps)
+            remember(model, normalize, known_policy(out, name, seed), steps)
         print(
             f"remembers {sum(FIRST.values()) * ENVIRONMENTS} steps, {time.process_time():.0f} s", flush=True
         )
@@ -182,9 +185,10 @@ def known_policy(out, name, seed):
 
 
 def evaluate(out, episodes, names, most_s):
-    """A row for each episode; those that are there already are not run again."""
+    """A row for each episode; those that are there already are not run again. Returns how many have arrived of each policy."""
     file = out / "evaluation.csv"
     rows = list(csv.DictReader(file.open())) if file.exists() else []
+    arrived = {}
     with file.open("a", newline="") as appended:
         writer = csv.DictWriter(appended, EVALUATION)
         if not rows:
@@ -199,7 +203,8 @@ def evaluate(out, episodes, names, most_s):
                 rows.append({**told, "processor_s": round(time.process_time() - began, 2)})
                 writer.writerow(rows[-1])
                 appended.flush()
-            tell(name, [row for row in rows if row["policy"] == name])
+            arrived[name] = tell(name, [row for row in rows if row["policy"] == name])
+    return arrived
 
 
 def tell(name, rows):
@@ -214,22 +219,21 @@ def tell(name, rows):
         f"median of those that arrived {steps:.0f} steps; out of time {lost}; {spent:.1f} s an episode",
         flush=True,
     )
+    return len(reached)
 
 
-def plot(out, picture):
+def plot(folders, picture):
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    with (out / "curve.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    minutes = [float(row["processor_s"]) / 60.0 for row in rows]
     figure, axes = pyplot.subplots(figsize=(6.4, 3.2), dpi=100)
-    points = [
-        (m, 100.0 * float(row["reached"])) for m, row in zip(minutes, rows, strict=True) if row["reached"]
-    ]
-    axes.plot(*zip(*points, strict=True))
+    for out in folders:
+        with (out / "curve.csv").open() as file:
+            rows = [row for row in csv.DictReader(file) if row["reached"]]
+        minutes = [float(row["processor_s"]) / 60.0 for row in rows]
+        axes.plot(minutes, [100.0 * float(row["reached"]) for row in rows])
     axes.set(xlabel="processor time, min", ylabel="of the last 100 episodes arrived, %", ylim=(0, 100))
     figure.tight_layout()
     figure.savefig(picture)
@@ -240,7 +244,8 @@ def main():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("what", choices=["train", "evaluate", "plot"])
-    parser.add_argument("out", type=Path)
+    parser.add_argument("out", type=Path, nargs="+", help="a folder for each seed")
+    parser.add_argument("--seed", type=int, default=1, help="of the first folder; each one more takes the next")
     parser.add_argument("--minutes", type=float, default=45.0, help="processor time of training in all")
     parser.add_argument("--episodes", type=int, default=60)
     parser.add_argument(
@@ -251,11 +256,19 @@ def main():
     told = parser.parse_args()
     torch.set_num_threads(1)
     if told.what == "train":
-        train(told.out, told.minutes)
+        for k, out in enumerate(told.out):
+            train(out, told.minutes, told.seed + k)
     elif told.what == "evaluate":
-        evaluate(told.out, told.episodes, told.policies, told.most_s)
+        # What does not learn is the same for all seeds.
+        arrived = [
+            evaluate(out, told.episodes, ["learnt"] if k else told.policies, told.most_s)
+            for k, out in enumerate(told.out)
+        ]
+        if len(arrived) > 1:
+            learnt = [of.get("learnt", 0) for of in arrived]
+            print(f"learnt, of {told.episodes}: {learnt}, mean {np.mean(learnt):.1f}")
     else:
-        plot(told.out, told.picture or told.out / "curve.png")
+        plot(told.out, told.picture or told.out[0] / "curve.png")
 
 
 if __name__ == "__main__":

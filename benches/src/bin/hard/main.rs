@@ -15,6 +15,7 @@ mod cases;
 mod course;
 mod turned;
 
+use std::ops::Range;
 use std::process::ExitCode;
 
 use endowire_core::{Error, Result};
@@ -22,17 +23,24 @@ use endowire_verify::{deployments, sequences};
 
 /// Rows of so many seeds in which something is wrong.
 fn seeded<R: std::fmt::Display>(
-    count: u64,
+    seeds: Range<u64>,
     head: &str,
     run: impl Fn(u64) -> Result<R>,
     passes: impl Fn(&R) -> bool,
 ) -> Result<usize> {
     println!("{head}");
     let mut wrong = 0;
-    for seed in 0..count {
-        let row = run(seed)?;
-        wrong += usize::from(!passes(&row));
-        println!("{row}");
+    for seed in seeds {
+        match run(seed) {
+            Ok(row) => {
+                wrong += usize::from(!passes(&row));
+                println!("{row}");
+            }
+            Err(error) => {
+                wrong += 1;
+                println!("{seed:>4} {error}");
+            }
+        }
     }
     Ok(wrong)
 }
@@ -43,8 +51,12 @@ fn main() -> Result<ExitCode> {
         "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]`, `sequences [SEEDS]` or `deployments [SEEDS]`";
     let second = arguments.get(1).map(String::as_str);
     let seeds = |all: u64| {
-        let count = second.map_or(Ok(all), str::parse);
-        count.map_err(|_| Error::parameter("SEEDS", second.unwrap_or_default(), mend))
+        let Some(told) = second else { return Ok(0..all) };
+        let (first, end) = told.split_once("..").unwrap_or(("0", told));
+        match (first.parse(), end.parse()) {
+            (Ok(first), Ok(end)) => Ok(first..end),
+            _ => Err(Error::parameter("SEEDS", told, "say how many, or from which up to which: 100..200")),
+        }
     };
     let wrong = match arguments.first().map(String::as_str) {
         Some("cases") => cases::cases(second)?,

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import EndowireError
 
+__version__: str
+
 @final
 class Vessel:
     @staticmethod
