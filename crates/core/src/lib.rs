@@ -17,6 +17,7 @@ pub mod control;
 pub(crate) mod coupled;
 pub mod device;
 pub mod error;
+pub mod field;
 pub mod file;
 pub mod flow;
 pub mod input;

@@ -171,7 +171,7 @@ impl Insertion {
         let mut load = WallLoad::new(&self.wall, surroundings, from_tip_mm);
         let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
         let bend = chain.bending_energy_mj(posture);
-        report.energy = Energy { bend, twist: 0.0, wall };
+        report.energy = Energy { bend, wall, ..Energy::default() };
         report.max_penetration_mm = report.contacts.iter().map(|c| c.penetration_mm).fold(0.0, f64::max);
         report.push_force_n = 0.0;
         if chain.segments() > 0 {

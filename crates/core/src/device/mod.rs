@@ -127,7 +127,7 @@ pub struct Device {
 }
 
 /// Longest device accepted, mm. Ten metres: three times the longest exchange wire made; more is a unit mistake.
-const LENGTH_LIMIT_MM: f64 = 10_000.0;
+pub(crate) const LENGTH_LIMIT_MM: f64 = 10_000.0;
 /// Thickest device accepted, mm. A 30 F sheath has radius 5 mm; more than 50 mm is a unit mistake.
 const RADIUS_LIMIT_MM: f64 = 50.0;
 /// Thinnest device accepted, mm: a molecule. Contact points begin at the tip closer than a radius, and their number grows with its

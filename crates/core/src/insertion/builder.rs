@@ -95,7 +95,8 @@ impl<'a> SimulationBuilder<'a> {
             return Err(Error::parameter("method.name", method.name(), mend));
         }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;
-        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0 })
+        let (fields, fields_before) = (Arc::new([]), Arc::new([]));
+        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before })
     }
 }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::{Counters, Touching, WallProperties};
 use crate::device::{Device, LENGTH_SLACK_MM, Stack, line_mm};
+use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
 use crate::methods::{
@@ -22,7 +23,14 @@ pub struct Simulation {
     pub(super) method: Box<dyn Method>,
     /// Time since the start, s.
     pub(super) time_s: f64,
+    /// Fields in which the device is, …
+    pub(super) fields: Fields,
+    /// … and those in which it was when it last came to rest.
+    pub(super) fields_before: Fields,
 }
+
+/// Fields that clones share.
+type Fields = Arc<[Arc<dyn Field>]>;
 
 /// What a simulation never changes.
 pub(super) struct Environment {
@@ -35,18 +43,33 @@ pub(super) struct Environment {
 }
 
 impl Environment {
-    /// In a step from one time to another, s.
+    /// In a step from one time to another, s, outside of fields.
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
         let Self { lumen, properties, sheath, stack, motion, flow } = self;
         let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
-        Surroundings { lumen, properties, sheath, device, stack, motion, flow, time_s }
+        Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields: [&[], &[]], time_s }
     }
 }
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        Self { scene: Arc::clone(&self.scene), method: self.method.boxed_clone(), time_s: self.time_s }
+        Self {
+            scene: Arc::clone(&self.scene),
+            method: self.method.boxed_clone(),
+            time_s: self.time_s,
+            fields: Arc::clone(&self.fields),
+            fields_before: Arc::clone(&self.fields_before),
+        }
     }
+}
+
+/// What surrounds the device in a step until a time. The method is not part of it: it works in these surroundings.
+fn surroundings<'a>(
+    scene: &'a Environment,
+    [before, after]: [&'a Fields; 2],
+    time_s: [f64; 2],
+) -> Surroundings<'a> {
+    Surroundings { fields: [before, after], ..scene.surroundings(time_s) }
 }
 
 impl Simulation {
@@ -84,7 +107,8 @@ impl Simulation {
     pub fn step_until(&mut self, moves: &[Move], time_s: Option<f64>) -> Result<&StepReport> {
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
-        let surroundings = self.scene.surroundings([self.time_s, time_s]);
+        let surroundings =
+            surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s, time_s]);
         if self.scene.stack.is_several() {
             self.method.step_together(&surroundings, moves)?;
         } else {
@@ -92,6 +116,7 @@ impl Simulation {
             self.method.step(&surroundings, command)?;
         }
         self.time_s = time_s;
+        self.fields_before = Arc::clone(&self.fields);
         Ok(self.method.report())
     }
 
@@ -110,8 +135,13 @@ impl Simulation {
         }
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
-        self.method.tick(&self.scene.surroundings([self.time_s, time_s]), moves, solves)?;
+        let surroundings =
+            surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s, time_s]);
+        self.method.tick(&surroundings, moves, solves)?;
         self.time_s = time_s;
+        if !self.method.report().is_under_way() {
+            self.fields_before = Arc::clone(&self.fields);
+        }
         Ok(self.method.report())
     }
 
@@ -137,8 +167,26 @@ impl Simulation {
             let mend = format!("there are {instruments}, the innermost is 0");
             return Err(Error::parameter("detach", instrument, mend));
         }
-        self.method.detach(&self.scene.surroundings([self.time_s; 2]), instrument)?;
+        let surroundings = surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s; 2]);
+        self.method.detach(&surroundings, instrument)?;
+        self.fields_before = Arc::clone(&self.fields);
         Ok(self.method.report())
+    }
+
+    /// Puts the device into these fields, in place of those in which it was: it goes over into them with the next step or tick, along equilibria
+    /// as far as there are some, and a step without a motion will do. What lies in the sheath and coils that were detached do not feel them; a [`State`] has none, so that a
+    /// simulation that is restored is in the fields that it has.
+    ///
+    /// # Errors
+    /// A method that takes none.
+    pub fn set_fields(&mut self, fields: impl IntoIterator<Item = Arc<dyn Field>>) -> Result<()> {
+        let fields: Fields = fields.into_iter().collect();
+        if !fields.is_empty() && !self.method.takes_fields() {
+            let mend = "this method knows no fields: use kirchhoff";
+            return Err(Error::parameter("fields", fields.len(), mend));
+        }
+        self.fields = fields;
+        Ok(())
     }
 
     /// Coils that were detached, in their order.
@@ -201,6 +249,7 @@ impl Simulation {
         }
         self.method.restore(&self.scene.surroundings([self.time_s; 2]), state)?;
         self.time_s = state.time_s();
+        self.fields_before = Arc::clone(&self.fields);
         Ok(())
     }
 

@@ -15,11 +15,13 @@ pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
 
 use std::fmt::Debug;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, Touching, WallProperties};
 use crate::device::{Device, Stack};
+use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::shape::Shape;
 use crate::vessel::{Displacement, Lumen, VesselMotion, WallStore};
@@ -43,15 +45,30 @@ pub struct Surroundings<'a> {
     pub motion: Option<&'a VesselMotion>,
     /// What flows through the vessel and drags at the device; nothing where it is left out.
     pub flow: Option<&'a BloodFlow>,
+    /// The fields in which the device is before and after the step.
+    pub fields: [&'a [Arc<dyn Field>]; 2],
     /// Time before and after the step, s.
     pub time_s: [f64; 2],
 }
 
-impl Surroundings<'_> {
+impl<'a> Surroundings<'a> {
     /// Whether the vessel moves in the step.
     pub fn moves(&self) -> bool {
         let [before, after] = self.time_s;
         before != after && self.motion.is_some_and(VesselMotion::changes)
+    }
+
+    /// Whether the device is in other fields after the step.
+    pub fn fields_change(&self) -> bool {
+        let [before, after] = self.fields;
+        before.len() != after.len() || before.iter().zip(after).any(|(a, b)| !Arc::ptr_eq(a, b))
+    }
+
+    /// The fields in which the device is after this part of the step, 0 to 1, with their weights: those before go over into those after evenly.
+    pub fn fields_at(&self, part: f64) -> impl Iterator<Item = (&'a dyn Field, f64)> + use<'a> {
+        let weights = if self.fields_change() { [1.0 - part, part] } else { [0.0, 1.0] };
+        let each = self.fields.into_iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
+        each.flat_map(|(fields, weight)| fields.iter().map(move |field| (&**field, weight)))
     }
 
     /// Where the vessel is after this part of the step, 0 to 1; none where it never moves.
@@ -119,6 +136,11 @@ pub trait Method: Send {
     /// Coils that were detached, in their order.
     fn coils(&self) -> &[DetachedCoil] {
         &[]
+    }
+
+    /// Whether it knows of fields ([`Surroundings::fields`]).
+    fn takes_fields(&self) -> bool {
+        false
     }
 
     /// The inserted centre line.

@@ -16,12 +16,15 @@ pub struct Energy {
     pub twist: f64,
     /// Deformation of the vessel wall, and of the device's surface where its loops touch each other.
     pub wall: f64,
+    /// In a [`Field`](crate::field::Field); 0 without one.
+    #[serde(default)]
+    pub field: f64,
 }
 
 impl Energy {
     /// Sum of all terms, mJ.
     pub fn total(&self) -> f64 {
-        self.bend + self.twist + self.wall
+        self.bend + self.twist + self.wall + self.field
     }
 }
 

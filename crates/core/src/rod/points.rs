@@ -8,9 +8,10 @@ use nalgebra::Matrix3;
 use super::assembly::Assembly;
 use super::element::ElementData;
 use super::layout::Layout;
-use super::quadrature::hermite;
+use super::quadrature::{Point, hermite};
 use super::state::RodState;
 use crate::Vec3;
+use crate::field::EnergyDensity;
 
 /// Gradients and Hessians of energies of points of one element.
 #[derive(Debug, Clone, Copy, Default)]
@@ -50,6 +51,26 @@ impl PointSum {
             let part = hessian * c[i];
             for j in i..4 {
                 self.stiffness[i][j] += part * c[j];
+            }
+        }
+    }
+
+    /// Adds a part of the energy of a point at ξ of an element of this length that depends on its tangent as well ([`crate::field`]).
+    pub fn add_directed(&mut self, (xi, length): (f64, f64), weight: f64, density: &EnergyDensity) {
+        self.felt = true;
+        let c = hermite(xi);
+        let [chord, along, ahead] = Point::at(xi, 0.0).y;
+        let d = [-chord, along, chord, ahead].map(|part| part / length);
+        let EnergyDensity { by_positions, by_position_and_tangent: mixed, by_tangents, .. } = density;
+        let turned = mixed.transpose();
+        for i in 0..4 {
+            self.forces[i] += (density.by_position * c[i] + density.by_tangent * d[i]) * weight;
+            for j in i..4 {
+                self.stiffness[i][j] += (by_positions * (c[i] * c[j])
+                    + mixed * (c[i] * d[j])
+                    + turned * (d[i] * c[j])
+                    + by_tangents * (d[i] * d[j]))
+                    * weight;
             }
         }
     }

@@ -1,5 +1,7 @@
 //! From a case to a mesh, supports and loads, and from Newton's result to a solution.
 
+use std::sync::Arc;
+
 use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
 use super::guess;
 use super::loads::Loads;
@@ -7,6 +9,7 @@ use super::mesh::{self, ASSUMED_GJ_RATIO};
 use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
 use super::stack::Stack;
 use crate::contact::{SelfContact, Skin, Touching};
+use crate::field::{Field, FieldLoad};
 use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 use crate::{Error, Result, Vec3};
@@ -159,7 +162,13 @@ impl StaticProblem {
 
     /// Solves from the initial shape and returns the state itself.
     pub fn solve_state(&self) -> Result<Solved> {
-        let solved = by_angles!(self.angles, self.run());
+        self.solve_in(&[])
+    }
+
+    /// The same in fields, whose units of length and energy are those of the case. They act in full in all load steps, and are no part of the energies of the
+    /// solution.
+    pub fn solve_in(&self, fields: &[Arc<dyn Field>]) -> Result<Solved> {
+        let solved = by_angles!(self.angles, self.run(fields));
         let energy = &solved.energy;
         if self.angles > 0
             && !self.gj_given
@@ -185,7 +194,7 @@ impl StaticProblem {
         let state = &solved.state;
         let mut newton = Newton::<C>::new(self.elements.len());
         let (mut loads, mut touching) = (self.loads.clone(), self.touching.clone());
-        let mut outside = outside(&mut loads, &mut touching);
+        let mut outside = outside(&mut loads, &mut touching, None);
         newton.assemble(&self.elements, &solved.supports, &mut outside, state);
         let Some((_, step)) = newton.full_step(&self.elements, &solved.supports) else { return f64::NAN };
         let mut next = state.clone();
@@ -194,7 +203,23 @@ impl StaticProblem {
         (0..state.elements()).map(|e| (bend(&next, e) - bend(state, e)).abs()).sum()
     }
 
-    fn run<const C: usize>(&self) -> Solved {
+    /// What fields do to the rod; none where there are none.
+    fn field_load<'a>(&self, fields: &'a [Arc<dyn Field>]) -> Option<FieldLoad<'a>> {
+        if fields.is_empty() {
+            return None;
+        }
+        let towards_tip = self.elements.iter().rev().scan(0.0, |sum, element| {
+            *sum += element.length;
+            Some(*sum)
+        });
+        let mut from_tip: Vec<f64> = std::iter::once(0.0).chain(towards_tip).collect();
+        from_tip.reverse();
+        let inserted: Vec<f64> =
+            self.stack.iter().flat_map(Stack::instruments).map(|(one, _)| one.inserted).collect();
+        Some(FieldLoad::new(fields.iter().map(|field| (&**field, 1.0)), &from_tip, &inserted))
+    }
+
+    fn run<const C: usize>(&self, fields: &[Arc<dyn Field>]) -> Solved {
         let mut newton = Newton::<C>::new(self.elements.len());
         let mut state = self.initial.clone();
         let mut supports = self.supports.clone();
@@ -213,12 +238,13 @@ impl StaticProblem {
             supports.begin(&state);
         }
         let (mut loads, mut touching) = (self.loads.clone(), self.touching.clone());
+        let mut field = self.field_load(fields);
         let mut iterations = 0;
         let mut monotone = true;
         let mut last = None;
         for step in 1..=self.load_steps {
             loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
-            let mut outside = outside(&mut loads, &mut touching);
+            let mut outside = outside(&mut loads, &mut touching, field.as_mut());
             let report = newton.solve(&self.elements, &mut supports, &mut outside, &mut state, &self.options);
             drop(outside);
             iterations += report.iterations;
@@ -231,7 +257,7 @@ impl StaticProblem {
             }
         }
         let mut report = last.unwrap_or_else(|| {
-            let mut outside = outside(&mut loads, &mut touching);
+            let mut outside = outside(&mut loads, &mut touching, field.as_mut());
             newton.solve(&self.elements, &mut supports, &mut outside, &mut state, &self.options)
         });
         report.iterations = iterations;
@@ -348,9 +374,14 @@ impl StaticProblem {
 }
 
 /// Loads, and what loops of the rod do to each other, as one.
-fn outside<'a>(loads: &'a mut Loads, touching: &'a mut Option<SelfContact>) -> Together<'a> {
+fn outside<'a>(
+    loads: &'a mut Loads,
+    touching: &'a mut Option<SelfContact>,
+    field: Option<&'a mut FieldLoad<'_>>,
+) -> Together<'a> {
     let touching = touching.as_mut().map(|touching| touching as &mut dyn External);
-    Together(std::iter::once(loads as &mut dyn External).chain(touching).collect())
+    let field = field.map(|field| field as &mut dyn External);
+    Together(std::iter::once(loads as &mut dyn External).chain(touching).chain(field).collect())
 }
 
 /// The loads of a case on the nodes at these arc lengths.

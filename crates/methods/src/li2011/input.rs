@@ -238,7 +238,7 @@ impl Input {
         let misfit_n = stiffness_n_per_mm * self.misfit_mm;
         report.imbalance = if misfit_n > 0.0 { misfit_n / largest_n.max(misfit_n) } else { 0.0 };
         let bend = self.chain.bending_energy_mj(&self.tangents);
-        report.energy = Energy { bend, twist: 0.0, wall: wall_mj };
+        report.energy = Energy { bend, wall: wall_mj, ..Energy::default() };
         report.push_force_n = match (self.tangents.first(), self.chain.lengths_mm.first()) {
             (Some(t1), Some(h1)) => {
                 let bending = t1 - sheath.direction;

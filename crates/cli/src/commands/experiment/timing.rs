@@ -106,6 +106,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         stack: &stack,
         motion: None,
         flow: None,
+        fields: [&[], &[]],
         time_s: [0.0; 2],
     };
 

@@ -121,6 +121,7 @@ mod tests {
             stack: &stack,
             motion: None,
             flow: None,
+            fields: [&[], &[]],
             time_s: [0.0; 2],
         };
         let options = KirchhoffOptions::default();

@@ -113,9 +113,14 @@ impl WallWork {
         Self { least_mj: was.0.min(is.0), most_mj: was.1.max(is.1) }
     }
 
+    /// The same, and something else that does between these.
+    pub(super) fn with(self, [one, other]: [f64; 2]) -> Self {
+        Self { least_mj: self.least_mj + one.min(other), most_mj: self.most_mj + one.max(other) }
+    }
+
     /// The same, and blood that does so much at the most, or has it done against it.
     pub(super) fn with_flow(self, most_mj: f64) -> Self {
-        Self { least_mj: self.least_mj - most_mj, most_mj: self.most_mj + most_mj }
+        self.with([-most_mj, most_mj])
     }
 }
 

@@ -78,7 +78,8 @@ fn control(environment: &Environment<'_>, from: &KirchhoffState, travel_mm: f64)
     let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
     let work = (WORK * travel_mm.max(1.0)) as usize;
     let control = StepControl::new(work.min(most), from.stride, environment.has_friction());
-    let set_free = travel_mm == 0.0 && !environment.surroundings.moves();
+    let surroundings = &environment.surroundings;
+    let set_free = travel_mm == 0.0 && !surroundings.moves() && !surroundings.fields_change();
     if set_free { control.set_free() } else { control }
 }
 
@@ -132,7 +133,7 @@ impl<const C: usize> Workspace<C> {
         let (mut sum, mut balanced) = (Sum::default(), true);
         let travel = way.travel_mm(WORK_RAD);
         let mut control = control(environment, from, travel);
-        // Where no hand moves the vessel does, time goes by, or something was set free.
+        // Where no hand moves the vessel or a field does, time goes by, or something was set free.
         let travel = if travel > 0.0 { travel } else { 1.0 };
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
@@ -161,7 +162,7 @@ impl<const C: usize> Workspace<C> {
                 taken
             });
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
-            let there = environment.displaced(then.as_ref());
+            let there = environment.displaced(then.as_ref()).with_fields_at(to);
             sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 now.withdraw(surroundings.stack, hands);

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::state::Ticking;
 use crate::contact::HandMotion;
 use crate::device::Stack;
 use crate::methods::{Command, Move, StepReport};
@@ -111,9 +112,9 @@ impl Way {
         self.start == self.target
     }
 
-    /// What is left of it for each hand; empty where nothing is.
-    pub(super) fn left(&self) -> Vec<Command> {
-        if self.is_done() {
+    /// What is left of it for each hand; empty where nothing is, and the device is at rest. Hands may rest while it is not.
+    pub(super) fn left(&self, ticking: &Ticking) -> Vec<Command> {
+        if self.is_done() && matches!(ticking, Ticking::Rest) {
             return Vec::new();
         }
         self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)).collect()

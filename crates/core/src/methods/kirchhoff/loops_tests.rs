@@ -107,6 +107,7 @@ fn nothing_is_built_where_nothing_can_touch() {
         stack: &stack,
         motion: None,
         flow: None,
+        fields: [&[], &[]],
         time_s: [0.0; 2],
     };
     let searches = |to_mm: f64| {

@@ -69,9 +69,10 @@ use std::sync::Arc;
 
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
+use crate::field::FieldLoad;
 use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
-use crate::rod::{Layout, PLAIN, TWISTED};
+use crate::rod::{Layout, PLAIN, RodState, TWISTED};
 use crate::shape::Shape;
 use crate::vessel::{Displacement, WallStore};
 use crate::{Error, Result};
@@ -151,6 +152,8 @@ struct Environment<'a> {
     options: &'a KirchhoffOptions,
     /// Where the vessel is; none where it never moves.
     displacement: Option<&'a Displacement>,
+    /// How far the step has gone into the fields after it, 0 to 1.
+    fields_part: f64,
 }
 
 impl<'a> Environment<'a> {
@@ -160,7 +163,7 @@ impl<'a> Environment<'a> {
         surface: &'a ContactSurface,
         options: &'a KirchhoffOptions,
     ) -> Self {
-        Self { surroundings: *surroundings, surface, options, displacement: None }
+        Self { surroundings: *surroundings, surface, options, displacement: None, fields_part: 1.0 }
     }
 
     /// The same where the vessel is displaced.
@@ -169,6 +172,23 @@ impl<'a> Environment<'a> {
         'a: 'b,
     {
         Environment { displacement, ..*self }
+    }
+
+    /// The same after this part of the way into the fields after the step.
+    fn with_fields_at(self, fields_part: f64) -> Self {
+        Self { fields_part, ..self }
+    }
+
+    /// What fields do to a line; none where there are none.
+    fn field_load(&self, mesh: &Mesh) -> Option<FieldLoad<'a>> {
+        let mut fields = self.surroundings.fields_at(self.fields_part).peekable();
+        fields.peek()?;
+        Some(FieldLoad::new(fields, &mesh.from_tip_mm, &mesh.inserted_mm))
+    }
+
+    /// Energy of a line in the fields, mJ.
+    fn field_mj(&self, mesh: &Mesh, rod: &RodState) -> f64 {
+        self.field_load(mesh).map_or(0.0, |load| load.energy_mj(&mesh.elements, rod))
     }
 
     /// Whether anything rubs: on the wall, or loops on each other.
@@ -249,7 +269,10 @@ impl<const C: usize> Kirchhoff<C> {
     /// Whether nothing is left to do: hands and vessel rest, and so does the device; its report then says so.
     fn rests(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
         let still = moves.iter().all(|one| one.command == Command::default());
-        let rests = still && !surroundings.moves() && self.state.report.behind.is_empty();
+        let rests = still
+            && !surroundings.moves()
+            && !surroundings.fields_change()
+            && self.state.report.behind.is_empty();
         if rests {
             Arc::make_mut(&mut self.state).report.rest();
         }
@@ -370,7 +393,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let nodes_solved = state.report.nodes_solved;
                 state.report.rest();
                 if let Some(Workspace { tools, way, .. }) = self.workspace.as_deref() {
-                    state.report.behind = way.left();
+                    state.report.behind = way.left(&state.tick);
                     tools.work.write(&mut state.report, nodes_solved);
                 }
                 Ok(())
@@ -397,6 +420,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn coils(&self) -> &[DetachedCoil] {
         &self.coils
+    }
+
+    fn takes_fields(&self) -> bool {
+        true
     }
 
     fn shape(&self) -> &Shape {

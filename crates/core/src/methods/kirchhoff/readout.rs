@@ -39,7 +39,8 @@ impl<const C: usize> Tools<C> {
             return self.write_withdrawn(environment, hands, at);
         }
         let stored = self.newton.assembly.energy;
-        report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
+        let field = environment.field_mj(mesh, rod);
+        report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0, field };
         for (_, touch) in &self.touches {
             report.energy.wall += touch.energy_mj;
             report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);

@@ -46,7 +46,7 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     /// What its loops and coils do to each other, if they touch.
     pub(super) loops: Option<&'a mut SelfContact>,
     /// What acts beside them.
-    pub(super) beside: Option<&'a mut dyn External>,
+    pub(super) beside: Vec<&'a mut dyn External>,
     pub(super) supports: &'a mut Supports,
     pub(super) elements: &'a [ElementData],
     /// The prediction, and then what was found.
@@ -130,12 +130,12 @@ impl<const C: usize> Search<'_, '_, C> {
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);
-        let found = if self.loops.is_none() && self.beside.is_none() {
+        let found = if self.loops.is_none() && self.beside.is_empty() {
             self.newton.solve(elements, supports, self.contact, self.state, &options)
         } else {
             let mut outside: Vec<&mut dyn External> = vec![&mut *self.contact];
             outside.extend(self.loops.as_deref_mut().map(|loops| loops as &mut dyn External));
-            outside.extend(self.beside.as_deref_mut().map(|beside| beside as &mut dyn External));
+            outside.extend(self.beside.iter_mut().map(|beside| &mut **beside as &mut dyn External));
             self.newton.solve(elements, supports, &mut Together(outside), self.state, &options)
         };
         self.iterations += found.iterations;

@@ -110,6 +110,7 @@ fn push_force<const C: usize>(
         (one, other) => one.or(other)?,
     };
     let loops = (on.pressing_mj(acting.loops, at) - back.pressing_mj(acting.loops, at)) / (2.0 * step);
+    let field = (on.field_mj(environment) - back.field_mj(environment)) / (2.0 * step);
     let turned = (on.turning_against(turning, at) - back.turning_against(turning, at)) / (2.0 * step);
     let dragged = acting.drag.map_or(0.0, |drag| {
         // Where a point comes or goes on one side, the other side's is taken.
@@ -124,7 +125,7 @@ fn push_force<const C: usize>(
     });
     let straightened_n =
         together.iter().map(|index| stack.instruments()[*index].device.section_at(own).straightening_n());
-    Some(stored + wall + loops + turned - dragged - straightened_n.sum::<f64>())
+    Some(stored + wall + loops + field + turned - dragged - straightened_n.sum::<f64>())
 }
 
 /// Step of the differences, mm.
@@ -210,6 +211,11 @@ impl Beside {
             element_energy::<C>(here, &state).total() - element_energy::<C>(there, &state).total()
         });
         more.sum()
+    }
+
+    /// Energy in the fields, mJ.
+    fn field_mj(&self, environment: &Environment<'_>) -> f64 {
+        environment.field_mj(&self.mesh, &self.rod)
     }
 
     /// Work against the couples of friction between instruments on the way here, on which what lies at a node turns with its twist, mJ.

@@ -248,13 +248,15 @@ impl<const C: usize> Tools<C> {
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let coils = !self.joined.is_empty();
         let mut free = coils.then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1));
+        let mut fields = environment.field_load(&*mesh);
         let free = free.as_mut().map(|free| free as &mut dyn External);
+        let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
         let mut search = Search {
             newton: &mut self.newton,
             guess: &mut self.guess,
             contact: &mut contact,
             loops,
-            beside: free,
+            beside: free.into_iter().chain(fields).collect(),
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,
@@ -304,11 +306,12 @@ impl<const C: usize> Tools<C> {
         self.keep(start, mesh, after);
         let elsewhere_mj = between_mj + self.write_report(environment, hands, next);
         let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
+        let by_fields = work_of_fields(environment, start, next.start());
         let after = next.parts().1;
         let reports = (&start.state.report, &after.report);
         let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
-        let balance = Balance::new(surroundings.stack, reports, by_wall, rubbed_mj);
+        let balance = Balance::new(surroundings.stack, reports, by_wall.with(by_fields), rubbed_mj);
         let lacks = balance.lacks();
         if near && lacks {
             return Err(Lost::Unbalanced);
@@ -319,6 +322,16 @@ impl<const C: usize> Tools<C> {
         self.guess.teach(&after.rod, &mut after.correction);
         Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
     }
+}
+
+/// Work of fields that change, mJ: by what they add to the energy of the device where it was, and of the device where it is now.
+fn work_of_fields(environment: &Environment<'_>, was: Start<'_>, is: Start<'_>) -> [f64; 2] {
+    let at_first = environment.field_mj(was.mesh, &was.state.rod) - was.state.report.energy.field;
+    if !environment.surroundings.fields_change() {
+        return [at_first; 2];
+    }
+    let before = environment.with_fields_at(0.0);
+    [at_first, is.state.report.energy.field - before.field_mj(is.mesh, &is.state.rod)]
 }
 
 /// The farthest way of a hand, mm.

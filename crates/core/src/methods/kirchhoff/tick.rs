@@ -23,7 +23,7 @@ use super::substep::{Attempt, Effort, Found, Lost};
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
-use crate::methods::{Command, Move, StepReport};
+use crate::methods::{Move, StepReport};
 use crate::{Error, Result};
 
 /// Linear solves that a part of the way counts beside its own, as it makes a mesh and asks all of the wall once.
@@ -129,10 +129,7 @@ impl Course {
         let report = &mut state.report;
         self.sum.write(report);
         report.converged = self.rests;
-        report.behind = way.left();
-        if matches!(state.tick, Ticking::Moving(_)) && report.behind.is_empty() {
-            report.behind.resize(way.start.len(), Command::default());
-        }
+        report.behind = way.left(&state.tick);
     }
 }
 
