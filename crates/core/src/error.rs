@@ -43,6 +43,9 @@ pub enum Error {
     /// A computation did not reach its result.
     #[error("{0}")]
     Computation(String),
+    /// It was to be stopped ([`Simulation::stop_when`](crate::insertion::Simulation::stop_when)); nothing has changed.
+    #[error("stopped before an equilibrium was found")]
+    Stopped,
     /// The device can go no farther: not a failure, but where the way ends.
     #[error("{0}")]
     End(PhysicalEnd),
@@ -117,7 +120,7 @@ impl Error {
 
     /// Whether the input is at fault (as opposed to a computation that failed on good input).
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Computation(_) | Self::End(_))
+        !matches!(self, Self::Computation(_) | Self::Stopped | Self::End(_))
     }
 }
 

@@ -62,7 +62,7 @@ pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,
 };
 pub use pulse::Seen;
-pub use pushed::Pushed;
+pub use pushed::{Pushed, ShownDevice};
 pub use renderer::{Frames, Renderer};
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, ExposureSpec, FlowSpec, InjectionSpec, Mode,

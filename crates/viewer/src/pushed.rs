@@ -7,6 +7,7 @@ use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_core::{Error, Result, Vec3};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::device::{DevicePart, DeviceView, bore_too_wide};
@@ -126,6 +127,17 @@ impl Pushed {
         self.views_of(&behind.collect::<Vec<_>>(), inserted_mm)
     }
 
+    /// What [`Self::views`] shows, in their order.
+    pub fn shown(&self, inserted_mm: &[f64]) -> Vec<ShownDevice> {
+        let shown = |instrument: usize, detached: bool| {
+            let name = self.stack.instruments()[instrument].name.clone();
+            ShownDevice { instrument, name, detached }
+        };
+        let is_in = inserted_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0);
+        let left = self.coils.iter().map(|coil| shown(coil.instrument, true));
+        is_in.map(|(instrument, _)| shown(instrument, false)).chain(left).collect()
+    }
+
     /// Views of all that is in, on lines of their own.
     pub(crate) fn views_of(&self, shapes: &[Shape], inserted_mm: &[f64]) -> Vec<DeviceView> {
         let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
@@ -139,6 +151,17 @@ impl Pushed {
         });
         each.zip(shapes).map(view).chain(left).collect()
     }
+}
+
+/// Which device a view shows: numbers of views change as instruments come in and coils are detached.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ShownDevice {
+    /// Number of the instrument, the innermost is 0.
+    pub instrument: usize,
+    /// Its name; empty of a device alone.
+    pub name: String,
+    /// Whether it is its coil, which was detached.
+    pub detached: bool,
 }
 
 /// Refuses a table of the view that is as wide inside as its device is outside: it was written for another.

@@ -183,6 +183,11 @@ impl Device {
         self.coil_mm
     }
 
+    /// Whether the coil ends so far from the tip, to rounding.
+    pub(crate) fn is_coil_end(&self, from_tip_mm: f64) -> bool {
+        self.coil_mm > 0.0 && (from_tip_mm - self.coil_mm).abs() < 1e-9 * self.length_mm
+    }
+
     /// Volume of the coil, the circle of its outer radius along its length, mm³; 0 of devices that are no coils.
     pub fn coil_mm3(&self) -> f64 {
         let mut left_mm = self.coil_mm;

@@ -194,6 +194,16 @@ impl Stack {
         self.instruments.len() > 1
     }
 
+    /// How far an instrument must be in for its coil to be out of all others where these lengths are in, mm: its end comes free of what it lay in where it
+    /// no longer touches that.
+    pub(crate) fn out_mm(&self, instrument: usize, inserted_mm: &[f64]) -> f64 {
+        let device = &self.instruments[instrument].device;
+        let end_mm = device.section_at(device.coil_mm()).radius_mm;
+        let outside = self.devices().zip(inserted_mm).skip(instrument + 1).filter(|(_, mm)| **mm > 0.0);
+        let free_mm = outside.map(|(outer, mm)| mm + outer.section_at(0.0).radius_mm + end_mm);
+        device.coil_mm() + free_mm.fold(0.0, f64::max)
+    }
+
     /// The devices, the innermost first.
     pub fn devices(&self) -> impl DoubleEndedIterator<Item = &Device> + ExactSizeIterator {
         self.instruments.iter().map(|instrument| &instrument.device)

@@ -23,6 +23,7 @@
 
 mod load;
 mod magnet;
+mod spec;
 #[cfg(test)]
 mod tests;
 mod weight;
@@ -36,6 +37,7 @@ use crate::{Error, Result, Vec3};
 
 pub use load::FieldLoad;
 pub use magnet::Magnet;
+pub use spec::FieldSpec;
 pub use weight::Weight;
 
 /// A material point of a device in a field.

@@ -96,7 +96,7 @@ impl<'a> SimulationBuilder<'a> {
         }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;
         let (fields, fields_before) = (Arc::new([]), Arc::new([]));
-        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before })
+        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before, stop: None })
     }
 }
 

@@ -8,7 +8,8 @@ use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
 use crate::methods::{
-    Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings, WallForce,
+    Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Stop, Surroundings,
+    WallForce,
 };
 use crate::shape::Shape;
 use crate::vessel::{Displacement, Lumen, VesselMotion};
@@ -27,6 +28,8 @@ pub struct Simulation {
     pub(super) fields: Fields,
     /// … and those in which it was when it last came to rest.
     pub(super) fields_before: Fields,
+    /// Says whether a step is to be stopped.
+    pub(super) stop: Option<Arc<Stop>>,
 }
 
 /// Fields that clones share.
@@ -47,7 +50,8 @@ impl Environment {
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
         let Self { lumen, properties, sheath, stack, motion, flow } = self;
         let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
-        Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields: [&[], &[]], time_s }
+        let fields = [&[][..]; 2];
+        Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields, stop: None, time_s }
     }
 }
 
@@ -59,17 +63,20 @@ impl Clone for Simulation {
             time_s: self.time_s,
             fields: Arc::clone(&self.fields),
             fields_before: Arc::clone(&self.fields_before),
+            stop: self.stop.clone(),
         }
     }
 }
 
-/// What surrounds the device in a step until a time. The method is not part of it: it works in these surroundings.
-fn surroundings<'a>(
-    scene: &'a Environment,
-    [before, after]: [&'a Fields; 2],
-    time_s: [f64; 2],
-) -> Surroundings<'a> {
-    Surroundings { fields: [before, after], ..scene.surroundings(time_s) }
+/// What surrounds the device in a step of a simulation until a time; apart from its method, which works in these surroundings.
+macro_rules! surroundings {
+    ($simulation:expr, $time_s:expr) => {
+        Surroundings {
+            fields: [&$simulation.fields_before, &$simulation.fields],
+            stop: $simulation.stop.as_deref(),
+            ..$simulation.scene.surroundings([$simulation.time_s, $time_s])
+        }
+    };
 }
 
 impl Simulation {
@@ -107,8 +114,7 @@ impl Simulation {
     pub fn step_until(&mut self, moves: &[Move], time_s: Option<f64>) -> Result<&StepReport> {
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
-        let surroundings =
-            surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s, time_s]);
+        let surroundings = surroundings!(self, time_s);
         if self.scene.stack.is_several() {
             self.method.step_together(&surroundings, moves)?;
         } else {
@@ -135,8 +141,7 @@ impl Simulation {
         }
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
-        let surroundings =
-            surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s, time_s]);
+        let surroundings = surroundings!(self, time_s);
         self.method.tick(&surroundings, moves, solves)?;
         self.time_s = time_s;
         if !self.method.report().is_under_way() {
@@ -162,15 +167,24 @@ impl Simulation {
     /// An instrument that is not there, is no coil, is detached already or not out yet ([`Error::Parameter`]); a coil, or what is left in the vessel,
     /// that does not come to rest ([`Error::Computation`]).
     pub fn detach(&mut self, instrument: usize) -> Result<&StepReport> {
+        self.check_detach(instrument)?;
+        let surroundings = surroundings!(self, self.time_s);
+        self.method.detach(&surroundings, instrument)?;
+        self.fields_before = Arc::clone(&self.fields);
+        Ok(self.method.report())
+    }
+
+    /// Says whether the coil of an instrument can be left behind where it is.
+    ///
+    /// # Errors
+    /// As [`Simulation::detach`], but for what it comes to.
+    pub fn check_detach(&self, instrument: usize) -> Result<()> {
         let instruments = self.scene.stack.instruments().len();
         if instrument >= instruments {
             let mend = format!("there are {instruments}, the innermost is 0");
             return Err(Error::parameter("detach", instrument, mend));
         }
-        let surroundings = surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s; 2]);
-        self.method.detach(&surroundings, instrument)?;
-        self.fields_before = Arc::clone(&self.fields);
-        Ok(self.method.report())
+        self.method.check_detach(&surroundings!(self, self.time_s), instrument)
     }
 
     /// Puts the device into these fields, in place of those in which it was: it goes over into them with the next step or tick, along equilibria
@@ -178,15 +192,27 @@ impl Simulation {
     /// simulation that is restored is in the fields that it has.
     ///
     /// # Errors
-    /// A method that takes none.
+    /// A method that takes none, and a field that acts on no instrument that is there.
     pub fn set_fields(&mut self, fields: impl IntoIterator<Item = Arc<dyn Field>>) -> Result<()> {
         let fields: Fields = fields.into_iter().collect();
         if !fields.is_empty() && !self.method.takes_fields() {
             let mend = "this method knows no fields: use kirchhoff";
             return Err(Error::parameter("fields", fields.len(), mend));
         }
+        let instruments = self.scene.stack.instruments().len();
+        let acts = |field: &Arc<dyn Field>| (0..instruments).any(|index| !field.acts_on(index).is_empty());
+        if let Some(index) = fields.iter().position(|field| !acts(field)) {
+            let mend = format!("acts on none of the {instruments} instruments: the innermost is 0");
+            return Err(Error::parameter(format!("field[{index}]"), format!("{:?}", fields[index]), mend));
+        }
         self.fields = fields;
         Ok(())
+    }
+
+    /// Has steps that take long, of this simulation and its clones to come, end with [`Error::Stopped`] as soon as `stop` says so; it is asked between the parts of a step,
+    /// and not in steps of one part.
+    pub fn stop_when(&mut self, stop: impl Fn() -> bool + Send + Sync + 'static) {
+        self.stop = Some(Arc::new(stop));
     }
 
     /// Coils that were detached, in their order.

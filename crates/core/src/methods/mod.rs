@@ -47,15 +47,28 @@ pub struct Surroundings<'a> {
     pub flow: Option<&'a BloodFlow>,
     /// The fields in which the device is before and after the step.
     pub fields: [&'a [Arc<dyn Field>]; 2],
+    /// Says whether a step that takes long is to end without a result; it is asked between parts of the step.
+    pub stop: Option<&'a Stop>,
     /// Time before and after the step, s.
     pub time_s: [f64; 2],
 }
+
+/// Says whether something that takes long is to end; any thread may ask it.
+pub type Stop = dyn Fn() -> bool + Send + Sync;
 
 impl<'a> Surroundings<'a> {
     /// Whether the vessel moves in the step.
     pub fn moves(&self) -> bool {
         let [before, after] = self.time_s;
         before != after && self.motion.is_some_and(VesselMotion::changes)
+    }
+
+    /// Ends what takes long where it is to be stopped.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn check_stop(&self) -> Result<()> {
+        if self.stop.is_some_and(|stop| stop()) { Err(Error::Stopped) } else { Ok(()) }
     }
 
     /// Whether the device is in other fields after the step.
@@ -130,6 +143,14 @@ pub trait Method: Send {
     /// An instrument that is no coil, is detached already or is not out yet (input); a coil, or what is left, that does not come to rest
     /// (computation).
     fn detach(&mut self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
+    }
+
+    /// Says whether that can be done as things are; asked of methods that know coils.
+    ///
+    /// # Errors
+    /// As [`Method::detach`], but for what it comes to.
+    fn check_detach(&self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
         Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
     }
 

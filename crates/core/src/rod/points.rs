@@ -111,7 +111,7 @@ impl<const C: usize> Assembly<C> {
             }
         }
         for a in 0..2 {
-            let (near, across) = (s[0][1] * d0[a], s[1][2] * d0[a]);
+            let (near, across) = (s[0][1] * d0[a], s[1][2].tr_mul(&d0[a]));
             let (far, along) = (s[0][3] * d1[a], s[2][3] * d1[a]);
             for b in 0..3 {
                 rows[x0 + b][t0 + a] = near[b];
@@ -119,7 +119,7 @@ impl<const C: usize> Assembly<C> {
                 rows[x0 + b][t1 + a] = far[b];
                 rows[x1 + b][t1 + a] = along[b];
             }
-            let (own, other, last) = (s[1][1] * d0[a], s[1][3] * d0[a], s[3][3] * d1[a]);
+            let (own, other, last) = (s[1][1] * d0[a], s[1][3].tr_mul(&d0[a]), s[3][3] * d1[a]);
             for b in 0..2 {
                 rows[t0 + a][t1 + b] = other.dot(&d1[b]);
                 if b >= a {

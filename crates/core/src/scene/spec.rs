@@ -9,6 +9,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use super::method_table;
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
 use crate::device::{Device, DeviceFile, FileTable, Instrument, Stack, line_mm};
+use crate::field::FieldSpec;
 use crate::file::{FileSystem, Files};
 use crate::input::{from_toml_of, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
@@ -44,6 +45,9 @@ pub struct SceneOf<M> {
     /// How its equilibrium is found.
     #[serde(default, deserialize_with = "method_table::read")]
     pub method: M,
+    /// Fields that the device is in from the start.
+    #[serde(default)]
+    pub field: Vec<FieldSpec>,
     /// What the hand does.
     #[serde(default)]
     pub script: Vec<ScriptLine>,
@@ -86,7 +90,7 @@ const START_MM: f64 = 1.0;
 fn in_table(table: &str, error: Error) -> Error {
     match error {
         Error::Parameter { name, value, mend } => {
-            let name = match name.strip_prefix("device.") {
+            let name = match ["device.", "magnet.", "weight."].iter().find_map(|own| name.strip_prefix(own)) {
                 Some(key) => format!("{table}.{key}"),
                 None => format!("{table}.{name}"),
             };
@@ -492,6 +496,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let stack = self.stack()?;
         let inserted_mm = self.inserted_mm(&stack)?;
         let mut simulation = self.built(lumen, stack, sheath, store)?;
+        let fields =
+            self.field.iter().enumerate().map(|(index, spec)| {
+                spec.field().map_err(|error| in_table(&format!("field[{index}]"), error))
+            });
+        simulation.set_fields(fields.collect::<Result<Vec<_>>>()?)?;
         push_in(&mut simulation, &inserted_mm)?;
         Ok(simulation)
     }

@@ -79,6 +79,7 @@ fn device_label(
     let tip = points.last().map(|p| p.position_mm);
     let tip_px = tip.and_then(|tip| seen(c_arm, &tip));
     Ok(DeviceLabel {
+        shown: None,
         centre_line_px,
         depth_mm: places.iter().map(|p| c_arm.depth_mm(p)).collect(),
         centre_line_mm: places.into_iter().map(Into::into).collect(),

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{Image, Mask};
 use crate::material::Material;
+use crate::pushed::ShownDevice;
 use crate::xray::Exposure;
 
 /// Labels of one fluoroscopic frame. Pixel coordinates are those of [`crate::CArm::project`], lengths are in mm in patient axes.
@@ -30,6 +31,9 @@ pub struct Labels {
 /// One device in a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceLabel {
+    /// Which device it is, where the renderer's caller knows.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub shown: Option<ShownDevice>,
     /// The projected centre line, the tip last: what of it is between source and detector.
     pub centre_line_px: Vec<[f64; 2]>,
     /// The same points in space.

@@ -154,9 +154,9 @@ impl Bounds {
         if std::mem::replace(&mut self.detached[instrument], true) {
             return refused("is detached already: push the next coil".into());
         }
-        let (high_mm, coil_mm) = (self.high.now_mm[instrument], one.device.coil_mm());
-        if high_mm < coil_mm {
-            return refused(format!("{high_mm} of {coil_mm} mm of the coil are in: advance it before"));
+        let left_mm = stack.out_mm(instrument, &self.low.now_mm) - self.high.now_mm[instrument];
+        if left_mm > LENGTH_SLACK_MM {
+            return refused(format!("is not out by then: advance it by {left_mm:.3} mm more before"));
         }
         for lengths in [&mut self.low, &mut self.high] {
             lengths.before_mm.clone_from(&lengths.now_mm);

@@ -469,7 +469,7 @@ fn a_coil_is_detached_by_a_line_of_its_own_and_the_next_one_follows() {
     for (lines, expected) in [
         (&[by("framing", 26.0), detach("framing"), detach("framing")][..], "script[2].detach = \"framing\""),
         (&[by("framing", 26.0), detach("framing"), by("framing", 1.0)], "script[2].instrument = \"framing\""),
-        (&[by("framing", 10.0), detach("framing")], "10 of 20 mm of the coil are in"),
+        (&[by("framing", 10.0), detach("framing")], "is not out by then: advance it by 15.400 mm more"),
         (&[detach("catheter")], "is no coil"),
         (&[by("framing", 26.0), by("filling", 1.0)], "has no lumen"),
         (&[ScriptLine { detach: true, ..by("framing", 26.0) }], "stands alone"),

@@ -82,4 +82,10 @@ impl Balance {
         let (least_mj, most_mj) = self.rubbed_mj;
         if jumps { (0.0, lost_mj.max(0.0)) } else { (lost_mj.clamp(least_mj, most_mj), 0.0) }
     }
+
+    /// What is stored or was lost in this way without having been put in: what stops on its way may be higher than it began, and the rest of the way
+    /// gives that back.
+    pub(super) fn borrowed_mj(&self, (dissipated_mj, released_mj): (f64, f64)) -> f64 {
+        (dissipated_mj + released_mj - (self.mean_mj - self.stored_mj)).max(0.0)
+    }
 }

@@ -122,6 +122,7 @@ mod tests {
             motion: None,
             flow: None,
             fields: [&[], &[]],
+            stop: None,
             time_s: [0.0; 2],
         };
         let options = KirchhoffOptions::default();

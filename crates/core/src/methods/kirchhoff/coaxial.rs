@@ -39,6 +39,13 @@ impl Nodes {
         let line = line_mm(inserted_mm.iter().copied());
         let near = NEAR * element_mm;
         let mut breaks: Vec<(f64, Anchor)> = Vec::new();
+        // What is too near to another one goes; ends of coils, where they are detached, stay.
+        for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
+            let at = line - inserted + device.coil_mm();
+            if device.coil_mm() > 0.0 && at > near && at < line - near {
+                breaks.push((at, Anchor::Break(index, device.coil_mm())));
+            }
+        }
         for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
             let begins = std::iter::once(0.0).chain(section_ends(device, element_mm));
             for begin in begins.take_while(|begin| begin < inserted) {

@@ -41,6 +41,7 @@ pub(super) struct Sum {
     slides: u32,
     imbalance: f64,
     dissipated_mj: f64,
+    borrowed_mj: f64,
     jump: Option<Jump>,
     largest_mj: f64,
 }
@@ -48,8 +49,10 @@ pub(super) struct Sum {
 impl Sum {
     /// Adds a part.
     pub(super) fn add(&mut self, found: &Found) {
+        self.imbalance = 0.0;
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
+        self.borrowed_mj += found.borrowed_mj;
         if let Some(jump) = found.jump {
             let so_far = self.jump.get_or_insert(Jump { released_mj: 0.0, ..jump });
             // The place is that of the largest.
@@ -60,16 +63,18 @@ impl Sum {
         }
     }
 
-    /// Adds what a device that was let go from a fold lacks to an equilibrium.
-    pub(super) fn add_imbalance(&mut self, found: &Found) {
-        self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
+    /// Notes what a device that was let go from a fold lacks to an equilibrium.
+    pub(super) fn note_imbalance(&mut self, found: &Found) {
+        self.imbalance = found.residual.max(found.unsettled);
     }
 
     pub(super) fn write(&self, report: &mut StepReport) {
         report.substeps = self.substeps as u32;
         (report.relaxations, report.slides) = (self.relaxations, self.slides);
         (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
-        (report.jump, report.jumped) = (self.jump, self.jump.is_some());
+        let released =
+            |jump: Jump| Jump { released_mj: (jump.released_mj - self.borrowed_mj).max(0.0), ..jump };
+        (report.jump, report.jumped) = (self.jump.map(released), self.jump.is_some());
     }
 }
 
@@ -143,6 +148,10 @@ impl<const C: usize> Workspace<C> {
         while done < 1.0 || (!balanced && again > 0) {
             // What has come to rest without an equilibrium at the end of its way goes on from there.
             again -= usize::from(done >= 1.0);
+            // A step of one part is not asked: it takes milliseconds.
+            if sum.substeps > 0 {
+                surroundings.check_stop()?;
+            }
             let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
             let (effort, part_mm) = control.next(rest * travel);
@@ -182,7 +191,7 @@ impl<const C: usize> Workspace<C> {
                     sum.add(&found);
                     if effort == Effort::Flight {
                         sum.relaxations += 1;
-                        sum.add_imbalance(&found);
+                        sum.note_imbalance(&found);
                     }
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
                     // any more the device is at rest all the same.

@@ -13,15 +13,12 @@ use super::state::KirchhoffState;
 use super::transport::transport_together;
 use super::workspace::Workspace;
 use super::{Environment, meshed};
-use crate::device::line_mm;
+use crate::device::{LENGTH_SLACK_MM, line_mm};
 use crate::methods::InstrumentReport;
 use crate::{Error, Result};
 
-/// A coil that is in a catheter by less than this, mm, is out of it.
-const OUT_MM: f64 = 1e-6;
-
-/// Refuses a coil that cannot be detached.
-fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize) -> Result<f64> {
+/// Refuses a coil that cannot be detached; returns the length of one that can, mm.
+pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize) -> Result<f64> {
     let stack = environment.surroundings.stack;
     let refused = |mend: String| {
         let name = stack.instruments().get(instrument).map_or_else(String::new, |one| one.name.clone());
@@ -40,14 +37,8 @@ fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize
         return refused("what follows would pass through it: set method.self_contact = true".into());
     }
     let inserted_mm = from.report.lengths_mm();
-    // Its end comes free of what it lay in where it no longer touches that.
-    let device = &stack.instruments()[instrument].device;
-    let outside = stack.devices().zip(&inserted_mm).skip(instrument + 1).filter(|(_, mm)| **mm > 0.0);
-    let free_mm = outside
-        .map(|(outer, mm)| mm + outer.section_at(0.0).radius_mm + device.section_at(coil_mm).radius_mm)
-        .fold(0.0, f64::max);
-    let left_mm = coil_mm + free_mm - inserted_mm[instrument];
-    if left_mm > OUT_MM {
+    let left_mm = stack.out_mm(instrument, &inserted_mm) - inserted_mm[instrument];
+    if left_mm > LENGTH_SLACK_MM {
         return refused(format!("is not out yet: advance it by {left_mm:.3} mm"));
     }
     Ok(coil_mm)

@@ -108,6 +108,7 @@ fn nothing_is_built_where_nothing_can_touch() {
         motion: None,
         flow: None,
         fields: [&[], &[]],
+        stop: None,
         time_s: [0.0; 2],
     };
     let searches = |to_mm: f64| {

@@ -65,8 +65,8 @@ struct Stretch {
     curvature_per_mm: f64,
 }
 
-/// The stretches of a device from its tip on, none shorter than half an element but the last: tapers of many short sections need no node
-/// for each.
+/// The stretches of a device from its tip on, none shorter than half an element but the last and that at the end of a coil: tapers of many short sections
+/// need no node for each, and a coil is detached at a node.
 fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> {
     let mut left = device.sections().iter();
     let (mut begin, mut end) = (0.0, 0.0);
@@ -76,7 +76,7 @@ fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> 
             end += section.length_mm;
             let [u, v] = section.rest_curvature_per_mm;
             curvature_per_mm = curvature_per_mm.max(libm::hypot(u, v));
-            if end - begin >= 0.5 * element_mm {
+            if end - begin >= 0.5 * element_mm || device.is_coil_end(end) {
                 break;
             }
         }

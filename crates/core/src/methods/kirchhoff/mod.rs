@@ -418,6 +418,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
         })
     }
 
+    fn check_detach(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        detach::check(&environment, &self.state, instrument).map(drop)
+    }
+
     fn coils(&self) -> &[DetachedCoil] {
         &self.coils
     }

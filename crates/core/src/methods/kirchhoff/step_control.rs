@@ -136,6 +136,7 @@ mod tests {
         Found {
             slides: 0,
             dissipated_mj: 0.0,
+            borrowed_mj: 0.0,
             residual: 0.0,
             unsettled: 0.0,
             balanced: true,

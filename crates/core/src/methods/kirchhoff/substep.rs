@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::balance::Balance;
 use super::carried::{Passage, WallWork};
+use super::command::AT_REST;
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
 use super::joined::{Resistance, join};
@@ -38,6 +39,8 @@ pub(super) struct Found {
     pub(super) slides: u32,
     /// Energy that friction took, mJ.
     pub(super) dissipated_mj: f64,
+    /// Energy that came from nowhere on a way to rest: less is set free on the rest of it, mJ.
+    pub(super) borrowed_mj: f64,
     /// Residual over force scale.
     pub(super) residual: f64,
     /// Part by which the normal forces that friction follows differ from those of the wall.
@@ -305,6 +308,9 @@ impl<const C: usize> Tools<C> {
         let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
         let elsewhere_mj = between_mj + self.write_report(environment, hands, next);
+        if found.residual > AT_REST {
+            hold_hands(&start.state.report, &mut next.parts().1.report);
+        }
         let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
         let by_fields = work_of_fields(environment, start, next.start());
         let after = next.parts().1;
@@ -317,10 +323,21 @@ impl<const C: usize> Tools<C> {
             return Err(Lost::Unbalanced);
         }
         let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
-        let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
+        let lost_mj = balance.lost_mj(jumps);
+        let (dissipated_mj, released_mj) = lost_mj;
+        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(lost_mj) };
         let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
-        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
+        let residual = found.residual;
+        Ok(Found { slides, dissipated_mj, borrowed_mj, residual, unsettled, balanced, lacks, off, jump })
+    }
+}
+
+/// What is not at rest presses on the hands with forces that no motion leads to, and they would count as work: those before stand.
+fn hold_hands(before: &StepReport, after: &mut StepReport) {
+    (after.push_force_n, after.torque_nmm) = (before.push_force_n, before.torque_nmm);
+    for (was, is) in before.instruments.iter().zip(&mut after.instruments) {
+        (is.push_force_n, is.torque_nmm) = (was.push_force_n, was.torque_nmm);
     }
 }
 

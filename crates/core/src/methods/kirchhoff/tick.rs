@@ -113,7 +113,7 @@ impl Course {
         self.sum.add(found);
         self.sum.relaxations += u32::from(part.effort == Effort::Moving && !part.holds_still);
         if !self.rests {
-            self.sum.add_imbalance(found);
+            self.sum.note_imbalance(found);
         }
         if part.effort == Effort::Near && found.off < NEARER {
             self.longest_mm = self.longest_mm.max(2.0 * part.part_mm);
