@@ -39,7 +39,7 @@ fn derivatives_are_those_of_the_value() {
     }
 }
 
-/// Of the tube, at a height over the wall that may be negative.
+/// A position in the tube, at a height over the wall that may be negative.
 fn from_inside(wall: &(SmoothWall, WallQuery), i: i32, height_mm: f64) -> (Vec3, Distance) {
     let angle = 2.399 * f64::from(i);
     let on = |r: f64| Vec3::new(r * angle.cos(), r * angle.sin(), 30.0 + 0.1 * f64::from(i));
@@ -107,7 +107,7 @@ fn error(wall: &(SmoothWall, WallQuery), height: f64) -> f64 {
 fn a_tube_is_met_far_better_than_by_its_triangles() {
     let (coarse, fine) = (error(&tube(1.0), 0.1), error(&tube(0.5), 0.1));
     assert!(coarse / fine > 8.0, "{coarse:e} {fine:e}");
-    // The flat triangles stand off by edge²/8R.
+    // The flat triangles deviate by edge²/8R.
     assert!(fine < 0.5 * 0.5 / (8.0 * 4.0) / 60.0, "{fine:e}");
 }
 
