@@ -1,7 +1,7 @@
-//! A coil is left behind.
+//! Detachment of a coil.
 //!
-//! What was the first part of the line becomes a rod of its own, without a hand ([`super::joined`]). The pusher is taken out, and what is left comes to rest as
-//! after any command.
+//! The front part of the line becomes a rod of its own, without a hand ([`super::joined`]). The pusher is withdrawn,
+//! and the rest of the line comes to rest as after any command.
 
 use std::sync::Arc;
 
@@ -17,10 +17,10 @@ use crate::device::line_mm;
 use crate::methods::InstrumentReport;
 use crate::{Error, Result};
 
-/// A coil that is in a catheter by less than this, mm, is out of it.
+/// A coil that is in a catheter by less than this, mm, counts as out of it.
 const OUT_MM: f64 = 1e-6;
 
-/// Refuses a coil that cannot be detached.
+/// Rejects a coil that cannot be detached.
 fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize) -> Result<f64> {
     let stack = environment.surroundings.stack;
     let refused = |mend: String| {
@@ -40,7 +40,7 @@ fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize
         return refused("what follows would pass through it: set method.self_contact = true".into());
     }
     let inserted_mm = from.report.lengths_mm();
-    // Its end comes free of what it lay in where it no longer touches that.
+    // Its end is free of the surrounding instrument once they no longer touch.
     let device = &stack.instruments()[instrument].device;
     let outside = stack.devices().zip(&inserted_mm).skip(instrument + 1).filter(|(_, mm)| **mm > 0.0);
     let free_mm = outside
@@ -54,7 +54,7 @@ fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Detaches the coil of an instrument from the state `from`, and leaves the new state in `now`.
+    /// Detaches the coil of an instrument from the state `from`; the new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::detach`](crate::methods::Method::detach).
@@ -69,7 +69,7 @@ impl<const C: usize> Workspace<C> {
         let mut hands = Vec::new();
         read(&from.report, &mut hands);
         hands[instrument] = Hand::default();
-        // What is left, where it lies before it comes to rest.
+        // The remaining line, before it comes to rest.
         let mut left = Configuration { mesh: Mesh::default(), state: Arc::new(from.clone()) };
         meshed(environment, &hands, &mut left.mesh);
         let (mesh, state) = left.parts();
@@ -87,7 +87,8 @@ impl<const C: usize> Workspace<C> {
         } else {
             transport_together((&self.mesh, &from.rod), mesh, stack.sets(), &mut state.rod);
             state.turn_tails(stack, &hands);
-            // Nothing pushes at its end any more: a straight catheter stores too little for that to be found by going downhill.
+            // The axial force of the coil is gone: in a straight catheter its energy is too small for descent to find
+            // that.
             state.rod.tensions.fill(0.0);
         }
         let coil = FreeCoil::from_line(&self.mesh, from, (instrument, self.mesh.nearest_node(coil_mm)));
@@ -96,7 +97,7 @@ impl<const C: usize> Workspace<C> {
         let was = std::mem::replace(&mut self.mesh, mesh);
         let done = self.carry_out(environment, &state, &[]);
         self.mesh = was;
-        // What is set free stays in the coil.
+        // The released energy stays in the coil.
         let report = &mut self.now.parts().1.report;
         (report.jump, report.jumped) = (None, false);
         done
