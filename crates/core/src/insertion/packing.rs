@@ -89,7 +89,7 @@ impl Packing {
             for (i, j) in (-half..=half).flat_map(|i| (-half..=half).map(move |j| (i, j))) {
                 let up_mm = (k as f64 + 0.5) * step_mm;
                 let at = sac.neck_mm + sac.normal * up_mm + (u * f64::from(i) + v * f64::from(j)) * step_mm;
-                // No larger ball fits above the neck, and the search skips points too close to coils.
+                // Skip points where no larger ball fits above the neck or between the coils.
                 let mut room_mm = up_mm.min(sac.height_mm);
                 for piece in &coils {
                     room_mm = room_mm.min((piece.at_mm - at).norm() - piece.radius_mm);
