@@ -235,7 +235,7 @@ mod tests {
             ["dome", "left posterior cerebral", "right posterior cerebral"].map(share)
         };
         assert_eq!(shares(&vessel), [0.2, 0.5, 0.5]);
-        // An open end would allow other positions.
+        // With an open end its share would be lost.
         let open = vessel.with_closed_ends(vec![]).unwrap();
         assert!((shares(&open).iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
