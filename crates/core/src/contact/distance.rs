@@ -107,15 +107,15 @@ const FACING: f64 = 0.3;
 /// A vertex that reaches a point.
 pub(super) struct Reaching {
     pub(super) vertex: u32,
-    /// wᵢ, …
+    /// wᵢ.
     pub(super) weight: f64,
-    /// … ∇wᵢ, …
+    /// ∇wᵢ.
     pub(super) gradient: Vec3,
-    /// … and ∇∇wᵢ.
+    /// ∇∇wᵢ.
     pub(super) hessian: Matrix3<f64>,
-    /// aᵢ, …
+    /// aᵢ.
     support: f64,
-    /// … and ∇aᵢ.
+    /// ∇aᵢ.
     support_gradient: Vec3,
 }
 

@@ -40,13 +40,13 @@ pub(super) struct ReferenceTwist<S: Simd> {
     hg: Matrix<S>,
     /// −DG.
     value: Lanes<S>,
-    /// Gradients of −DG in y …
+    /// Gradient of −DG in y.
     pub(super) along_y: Vector<S>,
-    /// … and z.
+    /// Gradient of −DG in z.
     pub(super) along_z: Vector<S>,
-    /// Its second derivatives: y, y, …
+    /// Its second derivatives in y, y.
     yy: Matrix<S>,
-    /// … y (rows), z (columns).
+    /// Its second derivatives in y (rows), z (columns).
     yz: Matrix<S>,
 }
 

@@ -52,7 +52,7 @@ fn from_inside(wall: &(SmoothWall, WallQuery), i: i32, height_mm: f64) -> (Vec3,
 fn behind_the_surface_the_distance_goes_on_as_in_front() {
     let wall = tube(1.0);
     for i in 0..200 {
-        // Across the surface, …
+        // Across the surface.
         let (x, front) = from_inside(&wall, i, 0.0);
         let n = front.normal();
         let x = x - n * front.value_mm;
@@ -63,7 +63,7 @@ fn behind_the_surface_the_distance_goes_on_as_in_front() {
         assert!(front.value_mm > 0.0 && back.value_mm < 0.0);
         assert!((front.value_mm - back.value_mm - 2e-6).abs() < 1e-8, "{front:?} {back:?}");
         assert!((front.gradient - back.gradient).norm() < 1e-5);
-        // … and deep behind it.
+        // Deep behind it.
         for height in [-0.3, -2.0, -20.0] {
             let (x, here) = from_inside(&wall, i, height);
             assert!((here.value_mm - height).abs() < 2e-3 * (1.0 - height), "{height}: {here:?}");

@@ -73,7 +73,7 @@ pub(super) struct Rubbing {
 /// Parameters of friction in a part of a command.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rubs {
-    /// μ, …
+    /// Coefficient of friction μ.
     pub(crate) coefficient: f64,
     /// Slip below which points stick, and its lower bound while hands hold still, mm.
     pub(crate) stick_mm: [f64; 2],

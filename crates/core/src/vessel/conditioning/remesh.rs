@@ -13,9 +13,9 @@ use crate::vessel::topology::NONE;
 
 /// Edges longer than this fraction of the target are split.
 const LONG: f64 = 4.0 / 3.0;
-/// Edges shorter than these fractions of the target are collapsed, the shortest first,
+/// Edges shorter than these fractions of the target are collapsed, the shortest first.
 const SHORT: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// unless an edge longer than this fraction would result.
+/// Longest edge, as a fraction of the target, that may result from a collapse.
 const TOO_LONG: f64 = 1.4;
 /// Where a spike is cut off, edges shorter than this fraction of the target are collapsed.
 const TOGETHER: f64 = 0.5;

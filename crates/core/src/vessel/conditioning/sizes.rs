@@ -32,17 +32,17 @@ const LONGEST_MM: f64 = 2.0;
 /// of flow dividers stood 0.2 to 0.5 mm into the lumen, with kinks at which no equilibrium exists; with 0.4 edges are
 /// so short that facets of coarse meshes are no longer faired.
 const TURN: f64 = 0.5;
-/// Shortest edge relative to the limit: the sharpest kink needs no shorter ones;
+/// Shortest edge relative to the limit: the sharpest kink needs no shorter ones.
 const FLOOR: f64 = 0.6;
-/// and relative to the local radius: the smooth wall rounds a kink over one or two edges by itself, and kinks of a
+/// Shortest edge relative to the local radius: the smooth wall rounds a kink over one or two edges by itself, and kinks of a
 /// coarse mesh are long;
 const FLOOR_PER_RADIUS: f64 = 1.0 / 3.5;
-/// but in wide vessels this, mm: crests there are as sharp as in narrow ones, and must be accurate to about the
+/// Upper bound of this shortest edge in wide vessels, mm: crests there are as sharp as in narrow ones, and must be accurate to about the
 /// thickness of a wire.
 const FLOOR_MM: f64 = 0.4;
-/// Factor by which edges are shortened where the surfaces are farther apart than the limit,
+/// Factor by which edges are shortened where the surfaces are farther apart than the limit.
 const SHORTER: f64 = 0.65;
-/// down to this fraction of the local radius.
+/// Smallest edge after shortening, as a fraction of the local radius.
 const SHORTEST: f64 = 1.0 / 5.0;
 /// Upper bound of the limit relative to the local radius.
 const LIMIT_PER_RADIUS: f64 = 0.05;

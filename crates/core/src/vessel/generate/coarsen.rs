@@ -19,7 +19,7 @@ use crate::{Vec3, parallel};
 
 /// Number of rounds of collapsing, flipping and smoothing. Later rounds find almost nothing to collapse.
 const ROUNDS: usize = 6;
-/// Edges shorter than this fraction of the target are collapsed, unless one longer than that of the next constant
+/// Edges shorter than this fraction of the target are collapsed, unless one longer than `LONG` times the target
 /// results (Botsch and Kobbelt: 4/5, 4/3).
 const SHORT: f64 = 0.8;
 /// Fraction of the target used if the grid has the target resolution: one round then removes only the short edges of

@@ -32,7 +32,7 @@ struct Knot {
     /// Third derivative up to the next knot, 1/mm².
     third: Vec3,
     radius: f64,
-    /// Slope of the radius, …
+    /// Slope of the radius.
     slope: f64,
     /// Coefficients of the square and the cube of the distance in the radius.
     flare: [f64; 2],
