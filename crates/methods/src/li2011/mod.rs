@@ -17,10 +17,9 @@
 //! linear system per input:
 //!
 //! 1. "Translate each node by disp": every node moves by disp along the wire's own curve, like a sliding wire
-//! (`slide`).
+//!    (`slide`).
 //! 2. t(s) = x′(s) is a unit vector: one row t̂·t = 1 and one multiplier per node, t̂ the slid tangent; tangents are
-//! divided by their length
-//!    after the solve, and x = B t ([`chain`]).
+//!    divided by their length after the solve, and x = B t ([`chain`]).
 //! 3. A contact knows the curvature of the lumen across the device (`wall`).
 //!
 //! `tangents = "unit"` is 1 and 2, `contact = "smooth"` is 3. `tangents = "free"` with `contact = "triangle"` is the paper as printed.
@@ -29,12 +28,10 @@
 //! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall, and there is no contact between
 //!   nodes.
 //! - **One linear solve per input**: a collision during an input is detected at the next. The remaining error of an
-//!   input is measured and reported
-//!   (`input`), and with unit tangents inputs that have not converged are halved ([`stepper`]).
+//!   input is measured and reported (`input`), and with unit tangents inputs that have not converged are halved ([`stepper`]).
 //! - No twist, no rest curvature, no friction.
-//! - With free tangents, lengths are not preserved: a cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects 10
-//!   %, 35 %, 133 %, 311 % too far, on any
-//! mesh.
+//! - With free tangents, lengths are not preserved: a cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects
+//!   10 %, 35 %, 133 %, 311 % too far, on any mesh.
 //!
 //! # Misprints
 //! Eq. 4 and 6 drop the ½ of eq. 2: it is kept here. Eq. 5's first weight must read (sᵢ − s)/(sᵢ − sᵢ₋₁) for the

@@ -35,7 +35,7 @@ const TURN: f64 = 0.5;
 /// Shortest edge relative to the limit: the sharpest kink needs no shorter ones.
 const FLOOR: f64 = 0.6;
 /// Shortest edge relative to the local radius: the smooth wall rounds a kink over one or two edges by itself, and kinks of a
-/// coarse mesh are long;
+/// coarse mesh are long.
 const FLOOR_PER_RADIUS: f64 = 1.0 / 3.5;
 /// Upper bound of this shortest edge in wide vessels, mm: crests there are as sharp as in narrow ones, and must be accurate to about the
 /// thickness of a wire.

@@ -12,8 +12,8 @@ const SPACING_RADII: f64 = 0.25;
 const ROUNDS: usize = 2;
 /// Smoothing passes per round.
 const PASSES: usize = 6;
-/// Final smoothing passes, and their steps: Taubin, "A signal processing approach to fair surface design", SIGGRAPH
-/// 1995. The second step reverses the shrinkage of the first.
+/// Final smoothing passes, and their steps; the second reverses the shrinkage of the first: Taubin, "A signal
+/// processing approach to fair surface design", SIGGRAPH 1995.
 const FAIRING: (usize, [f64; 2]) = (12, [0.5, -0.53]);
 /// A point is smoothed only if its sphere keeps this fraction of its radius.
 const LEAST_LEFT: f64 = 0.97;
