@@ -19,9 +19,9 @@ use crate::crossing::{CrossingTest, chords_mm, curve_in};
 pub const SEQUENCES: u64 = 300;
 /// Number of commands per sequence.
 const COMMANDS: usize = 60;
-/// Ratio of energies to the small steps' above which the equilibrium is another one,
+/// Ratio of the energy to that of the small steps above which the equilibrium is another one.
 const MORE: f64 = 1.5;
-/// if the excess is also above this, mJ.
+/// Smallest excess of energy, mJ, for which that ratio counts.
 const MORE_MJ: f64 = 1e-3;
 /// Largest difference of a device's length from what is inserted, as a fraction.
 const STRETCHED: f64 = 1e-3;
