@@ -8,7 +8,7 @@
 //! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
 //! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`].
 
-// The same bits on every machine.
+// Results are bit-identical on every machine: functions whose rounding depends on the platform are disallowed.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod banded;

@@ -1,9 +1,9 @@
-//! Scene in, frames out: a 3D view and a simulated fluoroscopic view, without a window.
+//! Renders a scene into frames: a 3D view and a simulated fluoroscopic view, without a window.
 //!
-//! A [`ViewSpec`] says which frames are wanted, a [`Renderer`] prepares them for a vessel wall and draws
-//! devices in it. Frames come from a graphics processor through wgpu where there is one, and otherwise from
-//! plain Rust, which is also the exact reference for path lengths. Without the feature `gpu` (on by default) there is
-//! plain Rust alone. Units: millimetre, degree and keV where a name says so.
+//! A [`ViewSpec`] specifies the frames, a [`Renderer`] prepares them for a vessel wall and draws devices in it.
+//! Frames come from a graphics processor through wgpu if there is one, and otherwise from plain Rust, which is also
+//! the exact reference for path lengths. Without the feature `gpu` (on by default) only plain Rust is used. Units:
+//! millimetre, degree and keV as named.
 //!
 //! ```
 //! use endowire_core::{Vec3, vessel::SurfaceMesh};

@@ -16,11 +16,11 @@ use crate::field::EnergyDensity;
 /// Gradients and Hessians of energies of points of one element.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PointSum {
-    /// In x₀, h t₀, x₁ and h t₁.
+    /// Gradients in x₀, h t₀, x₁ and h t₁.
     forces: [Vec3; 4],
-    /// In pairs of them, i ≤ j; the rest is zero.
+    /// Hessians in pairs of these, i ≤ j; the other entries are zero.
     stiffness: [[Matrix3<f64>; 4]; 4],
-    /// Whether there is anything.
+    /// Whether anything has been added.
     felt: bool,
 }
 
@@ -30,7 +30,7 @@ impl PointSum {
         !self.felt
     }
 
-    /// Energy of gradients that do not change, from where all is at the device's first node: Σ gᵢ·(xᵢ − x₀).
+    /// Energy of constant gradients, zero where all points are at the device's first node: Σ gᵢ·(xᵢ − x₀).
     pub fn along(&self, state: &RodState, element: &ElementData, e: usize) -> f64 {
         let start = state.positions[0];
         let [x0, x1] = [e, e + 1].map(|node| state.positions[node] - start);
@@ -39,7 +39,7 @@ impl PointSum {
         f0.dot(&x0) + g0.dot(&t0) + f1.dot(&x1) + g1.dot(&t1)
     }
 
-    /// Adds an energy of the point at ξ, whose gradient and, if wanted, Hessian in that point's position are given.
+    /// Adds an energy of the point at ξ from its gradient and, if wanted, Hessian in the position of that point.
     pub fn add(&mut self, xi: f64, gradient: &Vec3, hessian: Option<&Matrix3<f64>>) {
         self.felt = true;
         let c = hermite(xi);
@@ -77,7 +77,7 @@ impl PointSum {
 }
 
 impl<const C: usize> Assembly<C> {
-    /// Adds energies of points of element `e`.
+    /// Adds the summed energies of points of element `e`.
     pub(super) fn add_gathered(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
         let l = Layout::<C>;
         let h = element.length;

@@ -1,7 +1,7 @@
-//! A coil is left behind.
+//! Detachment of a coil.
 //!
-//! What was the first part of the line becomes a rod of its own, without a hand ([`super::joined`]). The pusher is taken out, and what is left comes to rest as
-//! after any command.
+//! The front part of the line becomes a rod of its own, without a hand ([`super::joined`]). The pusher is withdrawn,
+//! and the rest of the line comes to rest as after any command.
 
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instru
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Detaches the coil of an instrument from the state `from`, and leaves the new state in `now`.
+    /// Detaches the coil of an instrument from the state `from`; the new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::detach`](crate::methods::Method::detach).
@@ -60,7 +60,7 @@ impl<const C: usize> Workspace<C> {
         let mut hands = Vec::new();
         read(&from.report, &mut hands);
         hands[instrument] = Hand::default();
-        // What is left, where it lies before it comes to rest.
+        // The remaining line, before it comes to rest.
         let mut left = Configuration { mesh: Mesh::default(), state: Arc::new(from.clone()) };
         meshed(environment, &hands, &mut left.mesh);
         let (mesh, state) = left.parts();
@@ -78,7 +78,8 @@ impl<const C: usize> Workspace<C> {
         } else {
             transport_together((&self.mesh, &from.rod), mesh, stack.sets(), &mut state.rod);
             state.turn_tails(stack, &hands);
-            // Nothing pushes at its end any more: a straight catheter stores too little for that to be found by going downhill.
+            // The axial force of the coil is gone: in a straight catheter its energy is too small for descent to find
+            // that.
             state.rod.tensions.fill(0.0);
         }
         let coil = FreeCoil::from_line(&self.mesh, from, (instrument, self.mesh.nearest_node(coil_mm)));
@@ -87,7 +88,7 @@ impl<const C: usize> Workspace<C> {
         let was = std::mem::replace(&mut self.mesh, mesh);
         let done = self.carry_out(environment, &state, &[]);
         self.mesh = was;
-        // What is set free stays in the coil.
+        // The released energy stays in the coil.
         let report = &mut self.now.parts().1.report;
         (report.jump, report.jumped) = (None, false);
         done
