@@ -180,10 +180,10 @@ impl Simulation {
         Ok(self.method.report())
     }
 
-    /// Says whether the coil of an instrument can be left behind where it is.
+    /// Checks whether the coil of an instrument can be detached where it is.
     ///
     /// # Errors
-    /// As [`Simulation::detach`], but for what it comes to.
+    /// As [`Simulation::detach`], except [`Error::Computation`].
     pub fn check_detach(&self, instrument: usize) -> Result<()> {
         let instruments = self.scene.stack.instruments().len();
         if instrument >= instruments {
@@ -193,12 +193,12 @@ impl Simulation {
         self.method.check_detach(&surroundings!(self, self.time_s), instrument)
     }
 
-    /// Puts the device into these fields, in place of those in which it was: it goes over into them with the next step or tick, along equilibria
-    /// as far as there are some, and a step without a motion will do. What lies in the sheath and coils that were detached do not feel them; a [`State`] has none, so that a
-    /// simulation that is restored is in the fields that it has.
+    /// Replaces the fields in which the device lies. The next step or tick follows the equilibrium from the old fields to the new ones; a command
+    /// without motion is enough. The length inside the sheath and detached coils do not feel fields. A [`State`] contains none: a restored simulation
+    /// keeps its own.
     ///
     /// # Errors
-    /// A method that takes none, and a field that acts on no instrument that is there.
+    /// A method that supports no fields; a field that acts on none of the instruments.
     pub fn set_fields(&mut self, fields: impl IntoIterator<Item = Arc<dyn Field>>) -> Result<()> {
         let fields: Fields = fields.into_iter().collect();
         if !fields.is_empty() && !self.method.takes_fields() {
@@ -215,8 +215,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Has steps that take long, of this simulation and its clones to come, end with [`Error::Stopped`] as soon as `stop` says so; it is asked between the parts of a step,
-    /// and not in steps of one part.
+    /// Ends long steps of this simulation and its later clones with [`Error::Stopped`] once `stop` returns true. It is called between the sub-steps of a
+    /// command, and not in commands of a single sub-step.
     pub fn stop_when(&mut self, stop: impl Fn() -> bool + Send + Sync + 'static) {
         self.stop = Some(Arc::new(stop));
     }

@@ -46,13 +46,13 @@ pub struct Surroundings<'a> {
     pub flow: Option<&'a BloodFlow>,
     /// The fields in which the device is before and after the step.
     pub fields: [&'a [Arc<dyn Field>]; 2],
-    /// Says whether a step that takes long is to end without a result; it is asked between parts of the step.
+    /// Returns true once a long step is to end without a result; called between sub-steps.
     pub stop: Option<&'a Stop>,
     /// Time before and after the step, s.
     pub time_s: [f64; 2],
 }
 
-/// Says whether something that takes long is to end; any thread may ask it.
+/// Returns true once a long computation is to end; called from any thread.
 pub type Stop = dyn Fn() -> bool + Send + Sync;
 
 impl<'a> Surroundings<'a> {
@@ -62,7 +62,7 @@ impl<'a> Surroundings<'a> {
         before != after && self.motion.is_some_and(VesselMotion::changes)
     }
 
-    /// Ends what takes long where it is to be stopped.
+    /// Ends a step that is to be stopped.
     ///
     /// # Errors
     /// [`Error::Stopped`].
@@ -146,10 +146,10 @@ pub trait Method: Send {
         Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
     }
 
-    /// Says whether that can be done as things are; asked of methods that know coils.
+    /// Checks whether [`Method::detach`] is possible in the current state.
     ///
     /// # Errors
-    /// As [`Method::detach`], but for what it comes to.
+    /// As [`Method::detach`], except [`Error::Computation`].
     fn check_detach(&self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
         Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
     }
@@ -159,7 +159,7 @@ pub trait Method: Send {
         &[]
     }
 
-    /// Whether it knows of fields ([`Surroundings::fields`]).
+    /// Whether it supports fields ([`Surroundings::fields`]).
     fn takes_fields(&self) -> bool {
         false
     }

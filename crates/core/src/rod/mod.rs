@@ -5,7 +5,7 @@
 //! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
 //! the element. The Lagrangian is
 //!
-//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending (`bending`)
+//!   ½∫EI |r′×r″|²/|r′|⁵ ds · ∫|r′| ds / h                      bending (`bending`)
 //!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature (`torsion`)
 //!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist (`torsion`)
 //!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
