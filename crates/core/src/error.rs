@@ -1,4 +1,4 @@
-//! What can go wrong, said so that the reader knows which input to change.
+//! Errors, worded so that the reader knows which input to change.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use crate::Vec3;
 /// Shorthand for results of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Every error of the core names the thing at fault, its value where there is one, and how to mend it.
+/// Every error of the core names the input at fault, its value if there is one, and how to correct it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -16,15 +16,15 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A file was read, but its content is not usable.
+    /// A file was read, but its content is unusable.
     #[error("{}: {reason}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong and where, with a hint to mend it.
+        /// What is wrong, where, and how to correct it.
         reason: String,
     },
     /// A value is out of its range or contradicts another.
@@ -34,15 +34,18 @@ pub enum Error {
         name: String,
         /// The value given.
         value: String,
-        /// What would be right.
+        /// What would be valid.
         mend: String,
     },
-    /// A surface mesh cannot serve as a vessel wall.
+    /// A surface mesh is unsuitable as a vessel wall.
     #[error("mesh: {0}")]
     Mesh(String),
     /// A computation did not reach its result.
     #[error("{0}")]
     Computation(String),
+    /// It was to be stopped ([`Simulation::stop_when`](crate::insertion::Simulation::stop_when)); nothing has changed.
+    #[error("stopped before an equilibrium was found")]
+    Stopped,
     /// The device can go no farther: not a failure, but where the way ends.
     #[error("{0}")]
     End(PhysicalEnd),
@@ -51,20 +54,20 @@ pub enum Error {
 /// Why a device can go no farther.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PhysicalEnd {
-    /// The tip has left the vessel, and is farther beyond the opening than anything is known.
+    /// The tip has left the vessel and is too far beyond the opening, where the anatomy is unknown.
     Left {
         /// Number of the opening.
         opening: usize,
-        /// How far the tip is beyond its plane, mm.
+        /// Distance of the tip beyond its plane, mm.
         beyond_mm: f64,
-        /// How far it may be, mm.
+        /// Largest distance allowed, mm.
         limit_mm: f64,
     },
     /// The vessel is narrower than the device.
     Blocked {
         /// Where, mm.
         position_mm: Vec3,
-        /// Half of the room there, mm.
+        /// Half of the width there, mm.
         lumen_radius_mm: f64,
         /// Radius of the device there, mm.
         device_radius_mm: f64,
@@ -89,7 +92,7 @@ impl std::fmt::Display for PhysicalEnd {
     }
 }
 
-/// Numbers of no more characters stand as they are.
+/// Numbers of at most this many characters are printed unchanged.
 const SHORT: usize = 6;
 
 impl Error {
@@ -99,7 +102,7 @@ impl Error {
         value: impl std::fmt::Display,
         mend: impl Into<String>,
     ) -> Self {
-        // A number of three hundred digits hides what is wrong with it.
+        // Hundreds of digits would hide what is wrong with a number.
         let text = value.to_string();
         let value = if text.len() > SHORT { text.parse().map_or(text, number) } else { text };
         Self::Parameter { name: name.to_string(), value, mend: mend.into() }
@@ -115,13 +118,13 @@ impl Error {
         Self::Content { path: path.to_path_buf(), reason: reason.into() }
     }
 
-    /// Whether the input is at fault (as opposed to a computation that failed on good input).
+    /// Whether the input is at fault (in contrast to a computation that failed on valid input).
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Computation(_) | Self::End(_))
+        !matches!(self, Self::Computation(_) | Self::Stopped | Self::End(_))
     }
 }
 
-/// A number for people: with an exponent where digits would only be zeros.
+/// Formats a number for messages, with an exponent instead of many zeros.
 pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-4..1e9).contains(&value.abs()) {
         value.to_string()
@@ -130,13 +133,13 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// The name most like one that is not there; none where there are no names.
+/// The known name most similar to an unknown one; `None` if there are no names.
 pub fn nearest_name<'a>(known: impl Iterator<Item = &'a str>, wrong: &str) -> Option<&'a str> {
     let alike = |name: &str| strsim::jaro_winkler(name, wrong);
     known.max_by(|a, b| alike(a).total_cmp(&alike(b)))
 }
 
-/// A vector for people.
+/// Formats a vector for messages.
 pub(crate) fn vector(v: &Vec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }

@@ -1,4 +1,4 @@
-//! Input files: regular ones of bounded size, or what a program without a file system has at hand.
+//! Input files: regular files of bounded size, or data in memory for programs without a file system.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -8,16 +8,16 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 
-/// Where the files are that a scene names.
+/// Access to the files that a scene names.
 pub trait Files: Debug + Send + Sync {
     /// The bytes of a file.
     ///
     /// # Errors
-    /// [`Error::File`] for what cannot be read, [`Error::Content`] for what has more than `limit` bytes.
+    /// [`Error::File`] if the file cannot be read, [`Error::Content`] if it has more than `limit` bytes.
     fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>>;
 }
 
-/// Those of the file system.
+/// Files of the file system.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FileSystem;
 
@@ -27,7 +27,7 @@ impl Files for FileSystem {
     }
 }
 
-/// Those that are in memory, by their paths as scenes resolve them: what a web page has fetched.
+/// Files in memory, by their paths as scenes resolve them: for example, fetched by a web page.
 #[derive(Debug, Clone, Default)]
 pub struct InMemory(pub BTreeMap<PathBuf, Vec<u8>>);
 
@@ -49,10 +49,11 @@ fn check_size(path: &Path, bytes: u64, limit: u64) -> Result<()> {
     Ok(())
 }
 
-/// The bytes of a regular file. Devices and pipes are refused, which could be endless or never answer.
+/// The bytes of a regular file. Devices and pipes are refused, because they may be endless or block.
 ///
 /// # Errors
-/// [`Error::File`] for what cannot be read, [`Error::Content`] for what is no regular file or has more than `limit` bytes.
+/// [`Error::File`] if it cannot be read, [`Error::Content`] if it is not a regular file or has more than `limit`
+/// bytes.
 pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let failed = |e| Error::file(path, e);
     let kind = std::fs::metadata(path).map_err(failed)?;
@@ -61,7 +62,7 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
         return Err(Error::content(path, format!("is {what}: give a regular file")));
     }
     let mut bytes = Vec::new();
-    // A file may grow while it is read, and some that call themselves regular tell no length.
+    // A file may grow while it is read, and some that claim to be regular report no length.
     File::open(path)
         .map_err(failed)?
         .take(limit.saturating_add(1))

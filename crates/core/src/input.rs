@@ -1,4 +1,4 @@
-//! Input files: TOML into types, with errors that name file, line and key, and the nearest right key.
+//! Input files: TOML into types, with errors that name file, line and key, and the most similar valid key.
 
 mod whole;
 
@@ -13,19 +13,19 @@ use crate::{Error, Result};
 /// Largest input file in bytes: scenes and cases are kilobytes.
 const SIZE_LIMIT: u64 = 16 << 20;
 
-/// Similarity (Jaro–Winkler, 0…1) from which a known key is offered for an unknown one.
+/// Similarity (Jaro–Winkler, 0…1) from which a known key is suggested for an unknown one.
 const SIMILAR: f64 = 0.75;
 
 /// Reads a TOML file into `T`, and returns its text too.
 ///
 /// # Errors
-/// A file that cannot be read, is no TOML, or does not fit `T`, lists longer than they may be included; unknown keys come with the nearest
-/// known one.
+/// A file that cannot be read, is not TOML, or does not match `T`, including lists that are too long; for unknown
+/// keys the most similar known one is suggested.
 pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     from_toml_of(&FileSystem, path)
 }
 
-/// The same of a file that is among `files`.
+/// As [`from_toml`], for a file of `files`.
 ///
 /// # Errors
 /// As [`from_toml`].
@@ -35,10 +35,10 @@ pub fn from_toml_of<T: DeserializeOwned>(files: &dyn Files, path: &Path) -> Resu
     Ok((parse_toml(&text, path)?, text))
 }
 
-/// Reads TOML text into `T`; `name` is what errors call it.
+/// Reads TOML text into `T`; `name` is its name in errors.
 ///
 /// # Errors
-/// As [`from_toml`], less those of the file.
+/// As [`from_toml`], except those of the file.
 pub fn parse_toml<T: DeserializeOwned>(text: &str, name: &Path) -> Result<T> {
     read(text).map_err(|e| {
         let fits = |text: &str| read::<T>(text).is_ok();
@@ -50,11 +50,11 @@ fn read<T: DeserializeOwned>(text: &str) -> std::result::Result<T, toml::de::Err
     T::deserialize(Whole(toml::Deserializer::parse(text)?))
 }
 
-/// Most lines of a table that are tried one by one.
+/// Largest number of lines of a table that are tried one by one.
 const LINES_TRIED: usize = 64;
 
-/// Line and key at fault in the table with its header on line `header`, for messages that know the table alone: the line
-/// without which all fits.
+/// Line and key at fault in the table whose header is on line `header`, for errors that locate only the table: the
+/// line whose removal makes the table valid.
 fn culprit(text: &str, header: usize, fits: impl Fn(&str) -> bool) -> Option<String> {
     let lines: Vec<&str> = text.lines().collect();
     let table =
@@ -70,13 +70,13 @@ fn culprit(text: &str, header: usize, fits: impl Fn(&str) -> bool) -> Option<Str
     None
 }
 
-/// One line: where, what, and the nearest right key.
+/// One line: location, error, and the most similar valid key.
 fn explain(error: &toml::de::Error, text: &str, fits: impl Fn(&str) -> bool) -> String {
     let message = error.message().trim().replace('\n', " ");
     let place = error.span().map_or(String::new(), |span| {
         let at = span.start.min(text.len());
         let line = text[..at].matches('\n').count() + 1;
-        // The key whose value begins here, if one does.
+        // The key whose value begins here, if any.
         let before = text[..at].rsplit('\n').next().unwrap_or_default();
         match before.split_once('=') {
             Some((key, _)) => format!("line {line}: {}: ", key.trim()),
@@ -87,8 +87,8 @@ fn explain(error: &toml::de::Error, text: &str, fits: impl Fn(&str) -> bool) -> 
     format!("{place}{message}{hint}")
 }
 
-/// The nearest of the names that serde knows, for its message on one that it does not: "unknown field `a`, expected one of `b`, `c`". Empty
-/// for other messages, and where none is near.
+/// The most similar of the names in serde's message for an unknown one: "unknown field `a`, expected one of `b`,
+/// `c`". Empty for other messages, and if none is similar.
 pub fn nearest(message: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     match quoted.split_first() {
@@ -117,7 +117,7 @@ mod tests {
         _method: Tagged,
     }
 
-    /// Tagged enums are read twice, and the second reader knows no places.
+    /// Tagged enums are deserialised twice, and the second time without locations.
     #[derive(Debug, serde::Deserialize)]
     #[serde(tag = "name")]
     enum Tagged {

@@ -2,13 +2,46 @@
 //!
 //! Units everywhere: millimetre, newton, second, radian; energy in N·mm = mJ.
 //!
-//! A scene file becomes a [`scene::Scene`], that builds an [`insertion::Simulation`], which is stepped by
-//! [`insertion::Command`]s and always has its [`shape::Shape`] and an [`insertion::StepReport`].
+//! A vessel, instruments that enter it through a sheath, and a method make a [`Simulation`]. It is moved by [`Command`]s, and after each of them it has
+//! a [`Shape`] and a [`StepReport`]:
 //!
-//! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
-//! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`].
+//! ```
+//! use endowire_core::{Command, Device, GeneratedWall, Resolution, Sheath, Simulation, WallProperties, anatomy};
+//!
+//! // A vessel: a built-in anatomy, a surface (`SurfaceMesh::read`, `Wall::from_surface`) or a centre line (`SweptVessel`).
+//! let tree = anatomy::tree("curved_tube").expect("a built-in anatomy");
+//! let vessel = GeneratedWall::new(&tree, Resolution::EdgeMm(1.5))?;
+//! let sheath = Sheath::at_opening(&vessel.wall, vessel.inlet, 1.0)?;
+//! // An instrument: length mm, radius mm, bending stiffness N·mm². Several of them make a `Stack`.
+//! let wire = Device::uniform(400.0, 0.45, 10.0)?;
+//! let wall = WallProperties { friction: 0.05, ..WallProperties::default() };
+//! let mut simulation = Simulation::builder(vessel.wall, wire, sheath).properties(wall).build()?;
+//! for _ in 0..40 {
+//!     simulation.step(Command { advance_mm: 4.0, rotate_rad: 0.02 })?;
+//! }
+//! let report = simulation.report();
+//! assert!(report.converged && report.push_force_n > 0.0 && !report.contacts.is_empty());
+//! let tip_mm = simulation.shape().tip_mm().expect("the wire is in");
+//! // `endowire_viewer::Renderer` draws the shape in 3D and in fluoroscopy.
+//! # assert!(tip_mm.norm() > 100.0);
+//! # Ok::<(), endowire_core::Error>(())
+//! ```
+//!
+//! A scene file contains all of this: [`Scene::read`] and [`Scene::simulation`](scene::SceneOf::simulation).
+//!
+//! The names at this level are those that a simulation needs. The modules are for extensions:
+//!
+//! | module | for whom |
+//! |---|---|
+//! | [`control`] | hands that steer: your own [`Controller`](control::Controller) |
+//! | [`field`] | magnets, weight and your own energies |
+//! | [`methods`] | your own method behind [`Method`](methods::Method) |
+//! | [`device`], [`vessel`], [`flow`], [`scene`] | devices from data sheets; surfaces, their checks and repair; blood; scene files |
+//! | [`statics`] | static problems of rods without a vessel |
+//! | [`rod`], [`solve`], [`contact`], [`banded`] | elements, Newton's method, walls and loops: your own solver |
+//! | [`insertion`] | scripts, batches and tallies of insertions |
 
-// The same bits on every machine.
+// Results are bit-identical on every machine: functions whose rounding depends on the platform are disallowed.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod banded;
@@ -34,8 +67,18 @@ pub mod solve;
 pub mod statics;
 pub mod vessel;
 
+pub use device::{Device, DeviceFile, Instrument, Section, Stack};
 pub use error::{Error, PhysicalEnd, Result};
+pub use field::{Field, Magnet, Weight};
+pub use flow::BloodFlow;
+pub use insertion::{Batch, Command, Contact, Move, Sheath, Simulation, State, StepReport, WallProperties};
+pub use methods::kirchhoff::{Accuracy, KirchhoffOptions};
 pub use nalgebra;
+pub use scene::Scene;
+pub use shape::Shape;
+pub use vessel::{
+    CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution, SurfaceMesh, SweptVessel, VesselMotion, Wall, anatomy,
+};
 
 /// A point or direction in space, millimetres or unit length as its name says.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -1,11 +1,11 @@
-//! Work on all cores whose result does not depend on how many there are.
+//! Work on all cores; the result does not depend on their number.
 
 use std::ops::Range;
 use std::thread;
 
-/// Most threads: memory feeds no more.
+/// Largest number of threads: more would be limited by memory bandwidth.
 const THREADS: usize = 8;
-/// Least items a thread: starting one costs as much as some hundred of them.
+/// Smallest number of items per thread: starting a thread costs as much as some hundred of them.
 const LEAST: usize = 512;
 
 /// `work` on consecutive parts of `0..count`, in order.

@@ -1,7 +1,7 @@
 //! Products of vectors and matrices of three, written out.
 //!
-//! The library's own go through loops over columns that the compiler calls in place of unrolling them, where functions are as large as those of
-//! an element. Sums are taken in the library's order, so the bits are the same.
+//! In functions as large as those of an element, the compiler does not inline nalgebra's loops over columns. Sums are
+//! taken in the library's order, so the bits are the same.
 
 use nalgebra::Matrix3;
 

@@ -1,9 +1,9 @@
-//! Random numbers by place: whatever the order and the number of threads, the same.
+//! Counter-based random numbers: independent of the order of calls and the number of threads.
 //!
-//! SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) is a counter and a function that mixes its bits, so the n-th word of a seed needs none
-//! of those before it.
+//! SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) is a counter and a function that mixes its bits, so the n-th word
+//! of a seed does not need the words before it.
 
-/// What the counter goes on by.
+/// Increment of the counter.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The `index`-th word of the generator with this seed.
@@ -14,7 +14,7 @@ pub const fn splitmix64(seed: u64, index: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The number from 0 to 1, without 1, that a word stands for.
+/// Converts a word to a number in [0, 1).
 pub fn unit(word: u64) -> f64 {
     const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
     (word >> 11) as f64 * UNIT
@@ -26,7 +26,7 @@ mod tests {
 
     #[test]
     fn words_are_the_published_ones_and_numbers_even() {
-        // The first outputs of the authors' generator from the seed 0.
+        // The first outputs of the authors' generator for the seed 0.
         assert_eq!([0, 1].map(|k| splitmix64(0, k)), [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4]);
         assert_eq!((unit(0), unit(1 << 63)), (0.0, 0.5));
         assert!(unit(u64::MAX) < 1.0);

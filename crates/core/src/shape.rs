@@ -1,4 +1,4 @@
-//! The centre line of an inserted device, as methods produce it and recorders and viewers read it.
+//! The centre line of an inserted device: output of methods, input of recorders and viewers.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub struct Shape {
     pub tangents: Vec<Vec3>,
     /// Device arc length at each node, measured **from the tip** in millimetres: the last entry is 0.
     ///
-    /// From the tip, because that names a point of the device whatever length is inserted.
+    /// An arc length from the tip names the same point of the device whatever length is inserted.
     pub from_tip_mm: Vec<f64>,
 }
 
@@ -29,18 +29,18 @@ impl Shape {
         self.positions_mm.is_empty()
     }
 
-    /// Takes memory for up to `nodes` nodes.
+    /// Allocates for up to `nodes` nodes.
     pub(crate) fn reserve(&mut self, nodes: usize) {
         self.positions_mm.reserve(nodes.saturating_sub(self.positions_mm.len()));
         self.tangents.reserve(nodes.saturating_sub(self.tangents.len()));
         self.from_tip_mm.reserve(nodes.saturating_sub(self.from_tip_mm.len()));
     }
 
-    /// The point of the centre line at an arc length from the tip, mm: on the cubic curve through positions and tangents of the nodes
-    /// around it. Beyond either end it is that end; `None` where there is no node.
+    /// The point of the centre line at an arc length from the tip, mm: on the cubic through positions and tangents of
+    /// the adjacent nodes. Beyond either end, that end; `None` if there is no node.
     pub fn position_at(&self, from_tip_mm: f64) -> Option<Vec3> {
         let tip = self.tip_mm()?;
-        // Lengths fall along the nodes: those before `after` are farther from the tip.
+        // Lengths from the tip decrease along the nodes: those before `after` are farther from the tip.
         let after = self.from_tip_mm.partition_point(|s| *s > from_tip_mm);
         if after == 0 {
             return self.positions_mm.first().copied();
@@ -53,7 +53,8 @@ impl Shape {
         Some(x[before] * w0 + x[after] * w1 + (t[before] * s0 + t[after] * s1) * h)
     }
 
-    /// The part up to the node nearest to a place so far from the tip, mm: that of an instrument which ends there.
+    /// The part from the sheath to the node nearest to this arc length from the tip, mm: that of an instrument which
+    /// ends there.
     pub fn behind(&self, from_tip_mm: f64) -> Self {
         let off = |place: usize| (self.from_tip_mm[place] - from_tip_mm).abs();
         let Some(last) = (0..self.len()).min_by(|a, b| off(*a).total_cmp(&off(*b))) else {

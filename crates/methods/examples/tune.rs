@@ -1,5 +1,6 @@
-//! Searches the parameters that the papers leave open: least time to equilibrium, on the cantilever of the reference cases and
-//! on an insertion into the curved tube. Prints, for every method and task, the best sets of a grid and the defaults among them.
+//! Searches for the parameters that the papers leave open: shortest time to equilibrium, on the cantilever of the
+//! reference cases and on an insertion into the curved tube. Prints, for every method and task, the best sets of a
+//! grid, with the defaults.
 //!
 //! `cargo run --profile dist -p endowire-methods --example tune [METHOD …]`
 
@@ -14,15 +15,15 @@ use endowire_methods::{
     BeamFem, DiscreteRod, Inserted, InsertionOptions, MassSpring, RigidLinks, RodModel, cantilever,
 };
 
-/// Longest time of one set, s; a worse one is out.
+/// Time limit of one set, s; slower ones are discarded.
 const LIMIT: Duration = Duration::from_secs(4);
-/// How many of the best are shown.
+/// Number of best sets shown.
 const SHOWN: usize = 4;
 
-/// Models keep nothing from one run to the next.
+/// Models keep no state between runs.
 type Model = Arc<dyn RodModel>;
 
-/// A set of parameters under its description.
+/// A set of parameters and its description.
 struct Candidate {
     method: &'static str,
     text: String,
@@ -63,7 +64,7 @@ fn candidates() -> Vec<Candidate> {
     list
 }
 
-/// Time and error of the cantilever under PL²/EI = 10 with 32 elements.
+/// Time and error of the cantilever at PL²/EI = 10 with 32 elements.
 fn bend(model: &dyn RodModel) -> Option<(f64, f64)> {
     const N: usize = 32;
     let clock = Instant::now();
@@ -73,7 +74,7 @@ fn bend(model: &dyn RodModel) -> Option<(f64, f64)> {
     solution.converged.then(|| (time_s, (solution.nodes[N] - tip).norm()))
 }
 
-/// Time of 160 mm into the curved tube on elements of 5 mm, and steps that did not converge.
+/// Time for 160 mm into the curved tube on elements of 5 mm, and number of steps that did not converge.
 fn insert(model: &Model, made: &GeneratedWall, sheath: Sheath, wire: &Device) -> Option<(f64, f64)> {
     let (wall, properties) = (made.wall.clone(), WallProperties::default());
     let options = InsertionOptions { element_mm: 5.0, ..InsertionOptions::default() };

@@ -2,22 +2,24 @@
 //! interventional radiology simulation*, MICCAI 2005; Lenoir, Cotin, Duriez and Neumann, *Interactive physically-based simulation of
 //! catheter and guidewire*, Computers & Graphics 30, 2006.
 //!
-//! A device is a string of straight beam elements (Przemieniecki 1968), six degrees of freedom a node. Each element is linear in
-//! a frame that moves with it; in every increment the stiffness is assembled at the configuration of the last one and
+//! A device is a chain of straight beam elements (Przemieniecki 1968), six degrees of freedom per node. Each element
+//! is linear in a co-moving frame; in every increment the stiffness is assembled at the configuration of the last one
+//! and
 //!
 //! ```text
 //! K(U) ΔU = f − f_int(U),    U ← U + ΔU
 //! ```
 //!
-//! is solved once for the block tridiagonal K (6×6 blocks, O(n)). What is out of balance is carried to the next increment. Loads
-//! that are known beforehand are applied in equal increments; increments without new load follow until balance.
+//! is solved once for the block tridiagonal K (6×6 blocks, O(n)). The imbalance is carried over to the next
+//! increment. Loads known in advance are applied in equal increments; increments without new load follow until
+//! balance.
 //!
-//! # What it cannot do
-//! The element's stiffness knows nothing of the force in it. Where tension stiffens the device more than its bending
-//! resists, ΔU overshoots and the increments diverge, however small: on the cantilever of the reference cases beyond PL²/EI of
-//! about 2.5, which is reported as no equilibrium. [`BeamFem::damped`] adds what the papers do not have, a viscous force on
-//! the nodes for the duration of an increment, as later dynamic codes with the same element have; it settles then, and is
-//! compared beside the published method as `beam-fem-damped`. The elements stretch (EA = ratio·EI/h²).
+//! # Limitations
+//! The element's stiffness does not depend on its axial force. Where tension stiffens the device more than bending,
+//! ΔU overshoots and the increments diverge, however small: on the cantilever of the reference cases beyond PL²/EI of
+//! about 2.5, which is reported as no equilibrium. [`BeamFem::damped`] adds, unlike the papers, a viscous force on
+//! the nodes over an increment, as later dynamic codes with the same element do; then it settles, and is compared
+//! with the published method as `beam-fem-damped`. The elements stretch (EA = ratio·EI/h²).
 
 use endowire_core::Vec3;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector};
@@ -30,20 +32,20 @@ type Six = SVector<f64, 6>;
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeamFem {
-    /// Increments of a load that is known beforehand.
+    /// Number of increments of a load known in advance.
     pub increments: usize,
-    /// Axial stiffness over bending stiffness, EA h²/EI.
+    /// Ratio of axial to bending stiffness, EA h²/EI.
     pub axial_ratio: f64,
     /// Viscous damping of the nodes over the time of one increment, in units of EI/L⁴ per length.
     pub damping: f64,
-    /// Largest turn of a node in one increment, rad.
+    /// Largest rotation of a node in one increment, rad.
     pub largest_turn_rad: f64,
-    /// Most increments in all.
+    /// Largest number of increments in all.
     pub max_iterations: usize,
 }
 
 impl Default for BeamFem {
-    /// As the papers have it: without damping.
+    /// As published: without damping.
     fn default() -> Self {
         Self {
             increments: 1,
@@ -56,7 +58,7 @@ impl Default for BeamFem {
 }
 
 impl BeamFem {
-    /// With viscous damping, which the papers do not have. See the [module docs](self).
+    /// With viscous damping, unlike the papers. See the [module docs](self).
     pub fn damped() -> Self {
         Self { damping: 80.0, ..Self::default() }
     }
@@ -88,7 +90,7 @@ impl RodModel for BeamFem {
                 let rhs = &mut system.residual[i - 1];
                 for a in 0..3 {
                     rhs[a] += share * push.force_n[a];
-                    // A moment is a force at the lever of a segment.
+                    // A moment is a force times the length of a segment.
                     out_of_balance =
                         out_of_balance.max(rhs[a].abs()).max(rhs[a + 3].abs() / chain.lengths_mm[i - 1]);
                 }
@@ -131,7 +133,7 @@ pub(crate) fn smallest_rotation(a: &Vec3, b: &Vec3) -> Rotation3<f64> {
     Rotation3::from_matrix_unchecked(Matrix3::identity() + w + w * w / (1.0 + cosine))
 }
 
-/// The rotation vector of a rotation by less than π, also of one that rounding has taken off the orthogonal matrices.
+/// The rotation vector of a rotation by less than π, also if rounding has made it slightly non-orthogonal.
 fn rotation_vector(rotation: &Rotation3<f64>) -> Vec3 {
     let m = rotation.matrix();
     let axis = Vec3::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5;
@@ -142,7 +144,7 @@ fn rotation_vector(rotation: &Rotation3<f64>) -> Vec3 {
 /// The block tridiagonal system of the nodes after the clamp.
 struct System {
     diagonal: Vec<Block>,
-    /// Rows of a node, columns of the next.
+    /// Rows of a node, columns of the next one.
     above: Vec<Block>,
     residual: Vec<Six>,
 }
@@ -174,14 +176,15 @@ impl System {
         }
     }
 
-    /// Solves in place; the residual becomes the change. False if the matrix is not positive definite.
+    /// Solves in place; the residual is replaced by the increment. Returns false if the matrix is not positive
+    /// definite.
     fn solve(&mut self) -> bool {
         let n = self.diagonal.len();
         for i in 0..n {
             let Some(factor) = self.diagonal[i].cholesky() else { return false };
             factor.solve_mut(&mut self.residual[i]);
             if i + 1 < n {
-                // above becomes D⁻¹ U.
+                // Becomes D⁻¹ U.
                 let upper = self.above[i];
                 factor.solve_mut(&mut self.above[i]);
                 self.diagonal[i + 1] -= upper.transpose() * self.above[i];
@@ -205,7 +208,7 @@ struct Element {
     torsion: f64,
     axial: f64,
     tension: f64,
-    /// Rotations of the two ends from their rest, in the frame.
+    /// Rotations of the two ends from their rest shape, in the frame.
     turns: [Vec3; 2],
 }
 
@@ -259,7 +262,7 @@ impl Element {
         let (h, k) = (self.length, self.bending);
         let (s, c) = (12.0 * k / (h * h * h), 6.0 * k / (h * h));
         let xx = self.rotate(&Vec3::new(self.axial / h, s, s));
-        // Deflection y goes with rotation z, deflection z with rotation −y.
+        // Deflection y is coupled to rotation z, deflection z to rotation −y.
         let coupling = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, c, 0.0, -c, 0.0);
         let xr = self.frame * coupling * self.frame.transpose();
         let near = self.rotate(&Vec3::new(self.torsion / h, 4.0 * k / h, 4.0 * k / h));

@@ -1,4 +1,4 @@
-//! A clamped, straight chain under a dead tip force: the case in which every method can be checked exactly.
+//! A clamped, straight chain under a dead tip force: a case with an exact solution for every method.
 
 use endowire_core::{Error, Result, Vec3};
 
@@ -9,17 +9,17 @@ use crate::{Chain, RodModel, TipForce};
 pub struct CantileverSolution {
     /// Node positions, clamp first.
     pub nodes: Vec<Vec3>,
-    /// Iterations as the method counts them.
+    /// Number of iterations, as counted by the method.
     pub iterations: usize,
-    /// Whether it came to equilibrium.
+    /// Whether it reached equilibrium.
     pub converged: bool,
 }
 
-/// Relaxes a straight rod of unit length and bending stiffness, clamped at the origin along x, under a dead tip force in one
-/// go from the unloaded shape. `tolerance` is as in [`RodModel::relax`].
+/// Relaxes a straight rod of unit length and bending stiffness, clamped at the origin along x, under a dead tip force
+/// applied at once to the unloaded shape. `tolerance` is as in [`RodModel::relax`].
 ///
 /// # Errors
-/// No segments, or a relaxation that diverged.
+/// Zero segments, or a relaxation that diverged.
 pub fn cantilever(
     model: &dyn RodModel,
     segments: usize,

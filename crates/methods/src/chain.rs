@@ -1,16 +1,16 @@
-//! A device as a chain of nodes, and what acts on them.
+//! A device as a chain of nodes, and the loads on it.
 
 use endowire_core::Vec3;
 use nalgebra::Rotation3;
 
-/// The segments of a clamped chain. Node 0 is the clamp, segment i (from 0) lies between nodes i and i + 1.
+/// The segments of a clamped chain. Node 0 is the clamp, segment i (from 0) is between nodes i and i + 1.
 #[derive(Debug, Clone, Default)]
 pub struct Chain {
     /// Position of the clamp, mm.
     pub start_mm: Vec3,
     /// Direction of the clamp, unit length.
     pub direction: Vec3,
-    /// Turn of the clamp about its direction, rad.
+    /// Rotation of the clamp about its direction, rad.
     pub turn_rad: f64,
     /// Lengths of the segments, mm.
     pub lengths_mm: Vec<f64>,
@@ -45,8 +45,8 @@ impl Chain {
         self.lengths_mm.iter().sum()
     }
 
-    /// Stiffness, N·mm/rad, of the joint at node `i`: half a segment on either side bends in series. Before the clamp there
-    /// is nothing that bends, so that its joint stands for half a segment; a chain is then of second order.
+    /// Stiffness, N·mm/rad, of the joint at node `i`: half a segment on either side, in series. Before the clamp
+    /// nothing bends, so its joint represents half a segment; this makes a chain second-order accurate.
     pub(crate) fn joint_stiffness(&self, i: usize) -> f64 {
         1.0 / (self.half_flexibility(i)
             + i.checked_sub(1).map_or(0.0, |before| self.half_flexibility(before)))
@@ -56,7 +56,7 @@ impl Chain {
         0.5 * self.lengths_mm[segment] / self.bending_nmm2[segment]
     }
 
-    /// The force unit EI/L², N, of tolerances; of the stiffest segment.
+    /// The force unit EI/L², N, of tolerances, for the stiffest segment.
     pub(crate) fn force_unit(&self) -> f64 {
         self.bending_nmm2.iter().fold(0.0, |a: f64, b| a.max(*b)) / self.length_mm().powi(2)
     }
@@ -73,10 +73,10 @@ impl Chain {
         posture
     }
 
-    /// The clamp's triad, turned: tangent, first and second material direction as columns.
+    /// The clamp's triad, rotated: tangent, first and second material direction as columns.
     pub(crate) fn clamp_frame(&self) -> Rotation3<f64> {
         let t = self.direction;
-        // As core's rods have it: the axis farthest from the tangent, y for a tangent along x.
+        // As in the core's rods: the axis farthest from the tangent, y for a tangent along x.
         let axis = if t.y.abs() <= t.x.abs().max(t.z.abs()) { Vec3::y() } else { Vec3::z() };
         let d1 = (axis - t * axis.dot(&t)).normalize();
         let d2 = t.cross(&d1);
@@ -98,12 +98,12 @@ impl Chain {
     }
 }
 
-/// Where the nodes of a chain are.
+/// Configuration of a chain.
 #[derive(Debug, Clone, Default)]
 pub struct Posture {
     /// Node positions, clamp first, mm.
     pub positions_mm: Vec<Vec3>,
-    /// Triads of the nodes (tangent, two material directions), for methods that carry them.
+    /// Triads of the nodes (tangent, two material directions), for methods that use them.
     pub frames: Vec<Rotation3<f64>>,
 }
 
@@ -119,7 +119,7 @@ impl Posture {
     }
 }
 
-/// A force on a node, and how it changes as the node moves: dF = −k n (n·dx).
+/// A force on a node, and its dependence on the node's position: dF = −k n (n·dx).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Push {
     /// Force, N.
@@ -130,12 +130,12 @@ pub struct Push {
     pub stiffness_n_per_mm: f64,
 }
 
-/// What acts on the nodes of a chain.
+/// Loads on the nodes of a chain.
 pub trait NodalLoad {
-    /// What acts on `node` (1 to the number of segments) at `x`.
+    /// The load on `node` (1 to the number of segments) at `x`.
     fn on(&mut self, node: usize, x: &Vec3) -> Push;
 
-    /// How far a node may move, mm, before what this said of it is worth nothing.
+    /// Distance that a node may move, mm, before its load has to be evaluated anew.
     fn trusted_mm(&self) -> f64 {
         f64::INFINITY
     }

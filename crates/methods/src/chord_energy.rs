@@ -4,21 +4,21 @@
 //! Computer Aided Surgery 9, 2004, and *Modeling friction, intrinsic curvature, and rotation of guide wires for simulation of
 //! minimally invasive vascular interventions*, IEEE Transactions on Biomedical Engineering 54, 2007.
 //!
-//! A wire is joints connected by straight segments λᵢ = l dᵢ of fixed length. With the wall's energy to second order,
-//! the total energy as a function of one segment, all others kept, is
+//! A wire is a chain of joints connected by straight segments λᵢ = l dᵢ of fixed length. With the wall's energy to
+//! second order, the total energy as a function of one segment, with all others fixed, is
 //!
 //! ```text
 //! E(dᵢ) = −kᵢ dᵢ·(dᵢ₋₁ + bᵢ) − kᵢ₊₁ dᵢ·(dᵢ₊₁ − bᵢ₊₁) − l F·dᵢ + ½ l² (δdᵢ)ᵀ S δdᵢ
 //! ```
 //!
-//! (k = EI/l; b the intrinsic bend of a joint; F and S force and stiffness of the wall on all that lies beyond, which
-//! moves with dᵢ), whose minimum on |dᵢ| = 1 is written down: the direction of a vector. Segments are adapted in turn from the
-//! tip to the sheath, again and again, until none moves: that is the semi-analytic relaxation.
+//! (k = EI/l; b the intrinsic bend of a joint; F and S force and stiffness of the wall on everything beyond, which
+//! moves with dᵢ), whose minimum on |dᵢ| = 1 is known in closed form: the direction of a vector. Segments are updated
+//! in turn from the tip to the sheath, repeatedly, until none moves: this is the semi-analytic relaxation.
 //!
-//! # What it cannot do
-//! The wire does not twist: the tail's turn reaches the tip at once (the papers take the torsion constant as
-//! infinite), so there is no torque to feel and no whip. The number of rounds grows with the square of the number of segments. The
-//! papers' friction is left out: no scene of the comparison has any.
+//! # Limitations
+//! The wire does not twist: the tail's rotation reaches the tip at once (the papers assume an infinite torsion
+//! constant), so there is no torque and no whip. The number of sweeps is quadratic in the number of segments. The
+//! papers' friction is omitted: no scene of the comparison has any.
 
 use endowire_core::Vec3;
 use nalgebra::Matrix3;
@@ -29,7 +29,7 @@ use crate::{Chain, NodalLoad, Outcome, Posture, Push, RodModel};
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChordEnergy {
-    /// Most rounds.
+    /// Largest number of sweeps.
     pub max_iterations: usize,
 }
 
@@ -71,7 +71,7 @@ impl RodModel for ChordEnergy {
     }
 }
 
-/// Adapts every segment once, tip first. Returns the largest torque that was on one, N·mm.
+/// Updates every segment once, tip first. Returns the largest torque on a segment, N·mm.
 fn round(chain: &Chain, joints: &[f64], bends: &[Vec3], pushes: &[Push], links: &mut [Vec3]) -> f64 {
     let n = links.len();
     let (mut force, mut yielding) = (Vec3::zeros(), Matrix3::zeros());
@@ -82,7 +82,7 @@ fn round(chain: &Chain, joints: &[f64], bends: &[Vec3], pushes: &[Push], links: 
         let before = if i == 0 { chain.direction } else { links[i - 1] };
         let mut pull = (before + bends[i]) * joints[i] + force * l;
         if i + 1 < n {
-            // The next joint's bend turns with this segment, hence the cosine.
+            // The next joint's bend rotates with this segment, hence the cosine.
             pull += (links[i + 1] - bends[i + 1] * links[i + 1].dot(&d)) * joints[i + 1];
         }
         largest = largest.max((pull - d * pull.dot(&d)).norm());
@@ -90,27 +90,27 @@ fn round(chain: &Chain, joints: &[f64], bends: &[Vec3], pushes: &[Push], links: 
             pull.normalize()
         } else {
             yielding += push.normal * push.normal.transpose() * push.stiffness_n_per_mm;
-            // The wall's second-order term about where the segment is; across it, the sphere adds pull·d.
+            // The wall's second-order term about the segment's position; across it, the sphere adds pull·d.
             let along = pull.dot(&d).max(joints[i]);
             let across = Matrix3::identity() - d * d.transpose();
             let matrix = Matrix3::identity() * along + across * yielding * across * (l * l);
             let turn = matrix.lu().solve(&(across * pull)).unwrap_or_else(Vec3::zeros);
             (d + turn).normalize()
         };
-        // Everything beyond has moved along: its forces with it.
+        // Everything beyond has moved too, and changes the forces.
         force -= yielding * (moved - d) * l;
         links[i] = moved;
     }
     largest
 }
 
-/// Intrinsic bend of every joint: the rest curvature in the clamp's triad, carried along the wire without twist.
+/// Intrinsic bend of every joint: the rest curvature in the clamp's triad, transported along the wire without twist.
 fn intrinsic_bends(chain: &Chain, links: &[Vec3], bends: &mut [Vec3]) {
     let frame = chain.clamp_frame();
     let mut u: Vec3 = frame.matrix().column(1).into();
     let mut before = chain.direction;
     for i in 0..links.len() {
-        // Half of the bend comes from the segment on either side; before the clamp there is none.
+        // Half of the bend is due to the segment on either side; before the clamp there is none.
         let mut angle = [0.0; 2];
         for segment in [Some(i), i.checked_sub(1)].into_iter().flatten() {
             for (a, curvature) in angle.iter_mut().zip(chain.rest_curvature_per_mm[segment]) {

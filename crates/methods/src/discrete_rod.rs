@@ -8,22 +8,23 @@
 //! κb = 2 e×f / (|e||f| + e·f),    E = ½ k |κb|²,    k = EI/l̄
 //! ```
 //!
-//! (l̄ half of the two edges at the vertex), integrated by symplectic Euler; after each time step, fast manifold projection
-//! (Goldenthal, Harmon, Fattal, Bercovier and Grinspun, *Efficient simulation of inextensible cloth*, SIGGRAPH 2007) restores the
-//! lengths of the edges: a tridiagonal system for the multipliers, a few times. As the papers have it, the centre line is
-//! dynamic and the material frame quasistatic.
+//! (l̄ half of the two edges at the vertex), integrated by symplectic Euler; after each time step, fast manifold
+//! projection (Goldenthal, Harmon, Fattal, Bercovier and Grinspun, *Efficient simulation of inextensible cloth*,
+//! SIGGRAPH 2007) restores the lengths of the edges: a few tridiagonal systems for the multipliers. As in the papers,
+//! the centre line is dynamic and the material frame quasistatic.
 //!
 //! Twist of an isotropic rod that is straight at rest is uniform and leaves the rod at once through its free tip, so
-//! this special case needs no material frames, and no others are asked for in the comparison. Masses and damping are chosen as
-//! in [`mass_spring`](crate::mass_spring).
+//! this special case, the only one needed in the comparison, needs no material frames. Masses and damping are chosen
+//! as in [`mass_spring`](crate::mass_spring).
 //!
-//! The papers do not tell how a stiff wall and the projection go together. Here the wall's stiffness is implicit at its node, and the
-//! projection moves nodes as that step does. With the nodes' masses alone in the projection, as it was first, the rod never came to
-//! rest where it touched: 1 of the 15 sets of the search for parameters settled in the tube instead of 11.
+//! The papers do not describe how a stiff wall and the projection are combined. Here the wall's stiffness is implicit
+//! at its node, and the projection moves nodes consistently with that step. With the nodes' masses alone in the
+//! projection, as first tried, the rod never came to rest in contact: 1 of the 15 sets of the search for parameters
+//! settled in the tube instead of 11.
 //!
-//! # What it cannot do
-//! Isotropic rods that are straight at rest alone: shaped tips are refused. The number of time steps grows with the square of the
-//! number of nodes.
+//! # Limitations
+//! Only isotropic rods that are straight at rest: shaped tips are rejected. The number of time steps is quadratic in
+//! the number of nodes.
 
 use endowire_core::device::Device;
 use endowire_core::{Result, Vec3};
@@ -34,13 +35,13 @@ use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, refuse_shape};
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiscreteRod {
-    /// Damping over that which is critical for the slowest mode.
+    /// Damping relative to the critical damping of the slowest mode.
     pub damping: f64,
-    /// Time step over the largest stable one.
+    /// Time step relative to the largest stable one.
     pub time_step: f64,
-    /// Relative error of an edge's length with which a round of projection is the last.
+    /// Relative error of an edge's length at which projection stops.
     pub length_tolerance: f64,
-    /// Most time steps.
+    /// Largest number of time steps.
     pub max_iterations: usize,
 }
 
@@ -50,7 +51,7 @@ impl Default for DiscreteRod {
     }
 }
 
-/// Most rounds of one projection.
+/// Largest number of iterations of one projection.
 const PROJECTIONS: usize = 10;
 
 impl RodModel for DiscreteRod {
@@ -83,7 +84,7 @@ impl RodModel for DiscreteRod {
                 posture.positions_mm[i] += run.mobility(i).of(&run.impulse(i)) * run.dt;
             }
             projection.restore(run, &mut posture.positions_mm);
-            // In equilibrium nothing is left of a step: the change of velocity is the force that the edges do not hold.
+            // In equilibrium the velocity does not change: its change is the force not balanced by the edges.
             let mut out_of_balance: f64 = 0.0;
             for i in 1..=n {
                 let new = (posture.positions_mm[i] - before[i]) / run.dt;
@@ -121,17 +122,17 @@ fn bending(chain: &Chain, joints: &[f64], posture: &Posture, force: &mut [Vec3])
     }
 }
 
-/// Fast projection onto edges of given length: one tridiagonal system a round.
+/// Fast projection onto edges of given length: one tridiagonal system per iteration.
 ///
-/// Nodes give way as they do in the time step that is projected ([`Integration::mobility`]). With their masses alone, the push of a wall,
-/// which the time step takes implicitly, and the pull of the edges would be weighed differently, and the rod would never come to rest
-/// where it touches.
+/// Mobilities of nodes are those of the time step that is projected ([`Integration::mobility`]). With their masses
+/// alone, the force of a wall, implicit in the time step, and the tension of edges would be weighted differently, and
+/// the rod would never come to rest in contact.
 struct Projection {
     squares: Vec<f64>,
     tolerance: f64,
     mobility: Vec<Mobility>,
     edges: Vec<Vec3>,
-    /// What each edge's pull does to its near and its far node.
+    /// Effect of each edge's tension on its near and its far node.
     moves: Vec<[Vec3; 2]>,
     diagonal: Vec<f64>,
     above: Vec<f64>,
@@ -194,7 +195,7 @@ impl Projection {
                     x[i + node] -= way * self.multipliers[i];
                 }
             }
-            // At least one round a step: convergence is quadratic, so the lengths settle with the rod.
+            // At least one iteration per step: convergence is quadratic, so the lengths settle with the rod.
             if largest <= 2.0 * self.tolerance {
                 return;
             }

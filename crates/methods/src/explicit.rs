@@ -1,8 +1,8 @@
-//! Explicit integration towards equilibrium: what [`mass_spring`](crate::mass_spring) and
-//! [`discrete_rod`](crate::discrete_rod) share.
+//! Explicit integration towards equilibrium, shared by [`mass_spring`](crate::mass_spring) and
+//! [`discrete_rod`](crate::discrete_rod).
 //!
-//! Masses are free in a search for equilibrium: each is set in proportion to the stiffness at its node, with which one time step
-//! suits all. The drag is that which is critical for the slowest mode of a cantilever, times a factor.
+//! Masses can be chosen freely in a search for equilibrium: each is proportional to the stiffness at its node, so
+//! that one time step suits all. The drag is the critical one of the slowest mode of a cantilever, times a factor.
 
 use endowire_core::Vec3;
 
@@ -10,10 +10,10 @@ use crate::{Chain, NodalLoad, Outcome, Posture, Push};
 
 /// Lowest frequency of a cantilever, squared: ω² = 12.36 EI/(ρ L⁴).
 const SLOWEST: f64 = 12.362;
-/// Time steps between two looks at what is out of balance.
+/// Number of time steps between two convergence tests.
 const CHECK_EVERY: usize = 20;
 
-/// An integration under way. Node 0 is the clamp.
+/// A running integration. Node 0 is the clamp.
 pub(crate) struct Integration {
     pub(crate) masses: Vec<f64>,
     /// Time step.
@@ -23,22 +23,22 @@ pub(crate) struct Integration {
     pub(crate) velocity: Vec<Vec3>,
     /// Force on the nodes.
     pub(crate) force: Vec<Vec3>,
-    /// What the loads are on the nodes.
+    /// Loads on the nodes.
     pub(crate) pushes: Vec<Push>,
-    /// Force that may be out of balance at a node, N.
+    /// Allowed imbalance at a node, N.
     allowed: f64,
 }
 
 impl Integration {
-    /// At rest. `axial_ratio` is EA h²/EI of axial springs, `time_step` is over the largest stable one, `damping` over the
-    /// critical one, `tolerance` as in [`RodModel::relax`](crate::RodModel::relax).
+    /// Starts at rest. `axial_ratio` is EA h²/EI of axial springs, `time_step` is relative to the largest stable one,
+    /// `damping` to the critical one, `tolerance` as in [`RodModel::relax`](crate::RodModel::relax).
     pub(crate) fn new(chain: &Chain, axial_ratio: f64, time_step: f64, damping: f64, tolerance: f64) -> Self {
         let n = chain.segments();
         let masses = node_stiffness(chain, axial_ratio);
         let drag = 2.0 * damping * slowest_frequency(chain, &masses);
         Self {
             masses,
-            // Masses equal to stiffnesses: no frequency is above 1, so that steps up to 2 are stable.
+            // Masses equal stiffnesses: no frequency is above 1, so steps up to 2 are stable.
             dt: 2.0 * time_step,
             drag,
             velocity: vec![Vec3::zeros(); n + 1],
@@ -48,7 +48,7 @@ impl Integration {
         }
     }
 
-    /// Forces become the loads at the present positions.
+    /// Sets the forces to the loads at the current positions.
     pub(crate) fn load(&mut self, load: &mut dyn NodalLoad, posture: &Posture) {
         for i in 1..self.masses.len() {
             self.pushes[i] = load.on(i, &posture.positions_mm[i]);
@@ -56,7 +56,7 @@ impl Integration {
         }
     }
 
-    /// How node `i` gives way to an impulse in one time step.
+    /// Mobility of node `i` in one time step.
     pub(crate) fn mobility(&self, i: usize) -> Mobility {
         let inertia = self.masses[i] * (1.0 + self.drag * self.dt);
         let held = self.dt * self.dt * self.pushes[i].stiffness_n_per_mm;
@@ -67,12 +67,12 @@ impl Integration {
         }
     }
 
-    /// Impulse on node `i` in one time step, its momentum included.
+    /// Impulse on node `i` in one time step, including its momentum.
     pub(crate) fn impulse(&self, i: usize) -> Vec3 {
         self.velocity[i] * self.masses[i] + self.force[i] * self.dt
     }
 
-    /// Steps until nothing is out of balance. `step` takes one time step and returns the largest force that is out of balance.
+    /// Steps until balanced. `step` takes one time step and returns the largest imbalance.
     pub(crate) fn run(&mut self, most: usize, mut step: impl FnMut(&mut Self) -> f64) -> Outcome {
         for iterations in 1..=most {
             let out_of_balance = step(self);
@@ -87,8 +87,8 @@ impl Integration {
     }
 }
 
-/// The inverse of a node's inertia in one time step: mass, drag, and the stiffness of a push, which is implicit at its own node, so
-/// that it does not limit the time step. (m(1 + cΔt) + Δt² k n nᵀ) v⁺ = m v + Δt f.
+/// The inverse of a node's effective inertia in one time step: mass, drag, and the stiffness of its load, which is
+/// implicit so that it does not limit the time step. (m(1 + cΔt) + Δt² k n nᵀ) v⁺ = m v + Δt f.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Mobility {
     free: f64,
@@ -103,7 +103,7 @@ impl Mobility {
     }
 }
 
-/// A bound on the stiffness that a node sees: the sum of the magnitudes of its row.
+/// An upper bound of the stiffness at a node: the sum of the magnitudes of its row.
 fn node_stiffness(chain: &Chain, axial_ratio: f64) -> Vec<f64> {
     let n = chain.segments();
     let mut rows = vec![0.0; n + 1];

@@ -1,4 +1,4 @@
-//! Any of the methods as an insertion: core's trait `Method`.
+//! Any of the methods as an insertion: implements the core's trait `Method`.
 
 use std::sync::Arc;
 
@@ -16,12 +16,12 @@ use crate::beam_fem::smallest_rotation;
 use crate::wall_load::WallLoad;
 use crate::{Chain, Outcome, Posture, RodModel};
 
-/// How a device is cut up and how well its equilibria are met.
+/// Discretisation and tolerance of an insertion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InsertionOptions {
     /// Length of a segment, mm.
     pub element_mm: f64,
-    /// Force that may be out of balance in all, in units of EI/L².
+    /// Total force that may be out of balance, in units of EI/L².
     pub tolerance: f64,
 }
 
@@ -31,7 +31,7 @@ impl Default for InsertionOptions {
     }
 }
 
-/// A model and how it is inserted: what a simulation starts with.
+/// A model with its insertion options: the choice from which a simulation starts.
 #[derive(Debug, Clone)]
 pub struct Inserted {
     model: Arc<dyn RodModel>,
@@ -39,7 +39,7 @@ pub struct Inserted {
 }
 
 impl Inserted {
-    /// That of a model with parameters of its own.
+    /// A model with given parameters.
     pub fn new(model: Arc<dyn RodModel>, options: InsertionOptions) -> Self {
         Self { model, options }
     }
@@ -55,14 +55,14 @@ impl MethodChoice for Inserted {
     }
 }
 
-/// Most segments.
+/// Largest number of segments.
 const SEGMENT_LIMIT: f64 = 100_000.0;
-/// Retracting to within this of the sheath, mm, is retracting to it.
+/// Retracting to within this distance of the sheath, mm, counts as retracting completely.
 const ZERO_LENGTH_MM: f64 = 1e-9;
-/// A command is cut into parts of this many radii at most: a tip that is pushed on straight meets the wall by its surface.
+/// Largest part of a command, in radii: a tip that is pushed straight ahead must touch the wall with its surface.
 const PART_RADII: f64 = 2.0;
 
-/// A method under way in a vessel. Nodes are marks on the device, as in core's methods.
+/// A running insertion. Nodes are marks on the device, as in the core's methods.
 #[derive(Clone)]
 pub struct Insertion {
     model: Arc<dyn RodModel>,
@@ -73,7 +73,7 @@ pub struct Insertion {
     report: StepReport,
 }
 
-/// How far an insertion has come. The chain follows from the arc lengths and the turn.
+/// Progress of an insertion. The chain follows from the arc lengths and the rotation.
 #[derive(Clone)]
 struct Progress {
     chain: Chain,
@@ -82,10 +82,10 @@ struct Progress {
 }
 
 impl Insertion {
-    /// The method with nothing inserted; the even mesh of the wall comes from `store`.
+    /// The method with nothing inserted; the uniform mesh of the wall comes from `store`.
     ///
     /// # Errors
-    /// A device that the method refuses, or options out of range.
+    /// A device that the method rejects, or options out of range.
     pub fn new(
         model: Arc<dyn RodModel>,
         options: InsertionOptions,
@@ -199,7 +199,7 @@ impl Progress {
         }
     }
 
-    /// The new nodes on the present curve, which goes straight on beyond its tip.
+    /// The new nodes on the current curve, which continues straight beyond its tip.
     fn slid(&self, from_tip_mm: &[f64]) -> Posture {
         let inserted = from_tip_mm[0];
         let tangents = tangents(&self.chain, &self.posture);
@@ -213,7 +213,7 @@ impl Progress {
             posture.positions_mm.push(x);
             directions.push(t);
         }
-        // The triads of the same marks on the device, turned to their new directions.
+        // The triads of the same marks on the device, rotated to their new directions.
         let known = self.posture.frames.len();
         let clamp = self.chain.clamp_frame();
         for (i, direction) in directions.iter().enumerate() {
@@ -228,7 +228,8 @@ impl Progress {
         posture
     }
 
-    /// Position and direction at an arc length from the sheath: cubic between nodes. Calls go from the sheath to the tip.
+    /// Position and direction at an arc length from the sheath: cubic between nodes. Calls go from the sheath to the
+    /// tip.
     fn on_curve(&self, tangents: &[Vec3], from_sheath_mm: f64, element: &mut usize) -> (Vec3, Vec3) {
         let x = &self.posture.positions_mm;
         let last = x.len() - 1;
@@ -334,8 +335,8 @@ impl Method for Insertion {
     }
 }
 
-/// Unit tangents at the nodes: the clamp's, the mean of the chords on either side, and at the tip the last chord turned on by as
-/// much as it is from the mean at its other end.
+/// Unit tangents at the nodes: the clamp's, the mean of the adjacent chords, and at the tip the last chord rotated by
+/// its angle to the mean at its other end.
 fn tangents(chain: &Chain, posture: &Posture) -> Vec<Vec3> {
     let n = posture.positions_mm.len() - 1;
     let mut tangents = vec![chain.direction];

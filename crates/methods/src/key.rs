@@ -1,4 +1,4 @@
-//! Keys of a scene file, and giving them values.
+//! Keys of a scene file, and setting their values.
 
 use std::fmt;
 
@@ -8,11 +8,11 @@ use toml::{Table, Value};
 
 /// Keys of a scene file that are lists of tables, for hints.
 const LISTS: [&str; 6] = ["script", "instrument", "section", "part", "motion", "injection"];
-/// Keys of a device file that a table of the scene may have itself.
+/// Keys of a device file that may also be in a table of the scene.
 const OF_DEVICES: [&str; 5] = ["kind", "length_mm", "length_cm", "section", "part"];
 
-/// A key of a scene file as it is written in a sweep: names with dots between them, and the number of one of several tables in brackets, as
-/// in `device.section[0].radius_mm`.
+/// A key of a scene file in a sweep's notation: names separated by dots, and the index of one of several tables in
+/// brackets, as in `device.section[0].radius_mm`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
     text: String,
@@ -26,10 +26,10 @@ enum Part {
 }
 
 impl Key {
-    /// Reads a key.
+    /// Parses a key.
     ///
     /// # Errors
-    /// Text that is no key ([`Error::Parameter`]).
+    /// [`Error::Parameter`] for text that is not a key.
     pub fn parse(text: &str) -> Result<Self> {
         let parts: Option<Vec<Vec<Part>>> = text.split('.').map(part).collect();
         match parts {
@@ -42,7 +42,7 @@ impl Key {
         }
     }
 
-    /// The first name: that of a table or key of the scene itself.
+    /// Its first name: that of a table or key of the scene.
     pub fn begins(&self) -> &str {
         match self.parts.first() {
             Some(Part::Name(name)) => name,
@@ -50,12 +50,12 @@ impl Key {
         }
     }
 
-    /// Whether what it names is the other, or holds it: giving it a value takes that of the other away.
+    /// Whether it names the other key or its ancestor: setting it replaces the other's value.
     pub fn holds(&self, other: &Self) -> bool {
         other.parts.starts_with(&self.parts)
     }
 
-    /// Whether it may lie in a device file.
+    /// Whether it may be in a device file.
     pub fn is_of_device(&self) -> bool {
         let of = |key: &Part| matches!(key, Part::Name(key) if OF_DEVICES.contains(&key.as_str()));
         match self.parts.as_slice() {
@@ -65,7 +65,7 @@ impl Key {
         }
     }
 
-    /// The table of `scene` for the device or instrument that the key is of, where it may lie in a device file.
+    /// The table of `scene` for the device or instrument of the key, if it may be in a device file.
     pub(crate) fn device_table<'a>(&self, scene: &'a mut Value) -> Option<&'a mut Table> {
         let table = scene.get_mut(self.begins()).filter(|_| self.is_of_device())?;
         match self.parts.get(1) {
@@ -74,10 +74,10 @@ impl Key {
         }
     }
 
-    /// Gives the key of `scene` a value; tables on the way that are not there are made.
+    /// Sets the key of `scene` to a value; missing tables are created.
     ///
     /// # Errors
-    /// A way through what is no table, or to one of several that is not there ([`Error::Parameter`]).
+    /// [`Error::Parameter`] for a path through something that is not a table, or to a nonexistent one of several.
     pub fn set(&self, scene: &mut Value, value: Value) -> Result<()> {
         let mut place = scene;
         let mut last = "";
@@ -114,7 +114,7 @@ impl Key {
     }
 }
 
-/// The name of one part of a key, and the numbers behind it.
+/// The name of one part of a key, and the indices after it.
 fn part(text: &str) -> Option<Vec<Part>> {
     let (name, numbers) = text.find('[').map_or((text, ""), |at| text.split_at(at));
     let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');

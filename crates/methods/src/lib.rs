@@ -1,6 +1,8 @@
-//! The methods by name, and the field's for catheters and guidewires beside the core's own, each as its paper has it.
+//! A registry of all methods, and published methods for catheters and guidewires, each as in its paper, for
+//! comparison with the core's own.
 //!
-//! [`AnyMethod`] is what `[method]` of a scene may say, and [`Scene`] a scene file that is read so; [`scene_with`] gives its keys other values.
+//! [`AnyMethod`] is any `[method]` of a scene, and [`Scene`] a scene file with it; [`scene_with`] overrides values of
+//! its keys.
 //!
 //! | name | module | paper |
 //! |---|---|---|
@@ -12,13 +14,15 @@
 //! | `chord-energy` | [`chord_energy`] | Konings et al. 2003; Alderliesten, Konings, Niessen 2004, 2007 |
 //! | `discrete-rod` | [`discrete_rod`] | Bergou et al. 2008; Tang et al. 2010 |
 //!
-//! The last six are a [`RodModel`]: it relaxes a [`Chain`] of nodes under nodal loads, with the numerics of its paper. The same
-//! relaxation serves a static [`cantilever`](fn@cantilever) and, as [`Insertion`], core's trait `Method`. What is no part of
-//! any paper is shared: the discretisation of the device, the wall's energy per length (so that all methods have the same
-//! limit under refinement), and the slide along the own curve that starts each step.
+//! The last six are [`RodModel`]s: each relaxes a [`Chain`] of nodes under nodal loads, with the numerics of its
+//! paper. The same relaxation is used for a static [`cantilever`](fn@cantilever) and, as [`Insertion`], for the
+//! core's trait `Method`. What is not part of any paper is shared: the discretisation of the device, the wall's
+//! energy per length (so that all methods have the same limit under refinement), and the slide along the device's own
+//! curve at the start of each step.
 //!
-//! Papers leave parameters open (time steps, damping, stiffness of springs). The defaults are those with which a method
-//! reaches a given error soonest; `cargo run --profile dist -p endowire-methods --example tune` repeats the search.
+//! Papers leave parameters open (time steps, damping, stiffness of springs). The defaults are those with which a
+//! method reaches a given error fastest; `cargo run --profile dist -p endowire-methods --example tune` repeats the
+//! search.
 
 pub mod beam_fem;
 pub mod cantilever;
@@ -54,31 +58,31 @@ use std::fmt::Debug;
 use endowire_core::device::Device;
 use endowire_core::{Error, Result};
 
-/// How a relaxation ended.
+/// Outcome of a relaxation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Outcome {
-    /// Iterations: time steps, sweeps or linear solves, as the method has it.
+    /// Number of iterations: time steps, sweeps or linear solves, depending on the method.
     pub iterations: usize,
-    /// Whether what is out of balance fell below the tolerance.
+    /// Whether the imbalance fell below the tolerance.
     pub converged: bool,
 }
 
-/// A discrete rod with the solution procedure of its paper.
+/// A discrete rod with the solver of its paper.
 pub trait RodModel: Debug + Send + Sync {
     /// The name used in tables and scenes.
     fn name(&self) -> &'static str;
 
-    /// Refuses a device that the method cannot represent; one that can represent all refuses none.
+    /// Rejects a device that the method cannot represent; by default none.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming what the method does not have.
+    /// [`Error::Parameter`] naming the unsupported feature.
     fn check(&self, _device: &Device) -> Result<()> {
         Ok(())
     }
 
     /// Moves `posture` to equilibrium under `load`.
     ///
-    /// `tolerance` is the force that may be out of balance in all, in units of EI/L² (L the chain's length): for a
+    /// `tolerance` is the total force that may be out of balance, in units of EI/L² (L the chain's length): for a
     /// smooth error it is about the error of the tip in units of L.
     fn relax(
         &self,
@@ -89,7 +93,7 @@ pub trait RodModel: Debug + Send + Sync {
     ) -> Outcome;
 }
 
-/// The refusal of a device with a shape of its own by a method that has none.
+/// Rejects a device with a rest shape, for a method that supports none.
 fn refuse_shape(name: &str, device: &Device, reason: &str) -> Result<()> {
     match device.sections().iter().position(|s| s.rest_curvature_per_mm != [0.0; 2]) {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! Segments of fixed length: what [`rigid_links`](crate::rigid_links) and [`chord_energy`](crate::chord_energy) share.
+//! Segments of fixed length, shared by [`rigid_links`](crate::rigid_links) and [`chord_energy`](crate::chord_energy).
 
 use endowire_core::Vec3;
 
@@ -8,9 +8,9 @@ use crate::{Chain, NodalLoad, Posture, Push};
 pub(crate) struct Links {
     /// Unit vectors, the first after the clamp.
     pub(crate) directions: Vec<Vec3>,
-    /// What the loads are on the ends of the segments.
+    /// Loads on the ends of the segments.
     pub(crate) pushes: Vec<Push>,
-    /// Torque that may be out of balance on a segment, N·mm.
+    /// Allowed imbalance of torque on a segment, N·mm.
     pub(crate) allowed: f64,
 }
 
@@ -25,7 +25,7 @@ impl Links {
         }
     }
 
-    /// Puts the nodes where the directions have them, and asks for the loads there.
+    /// Computes the nodes from the directions, and their loads.
     pub(crate) fn place(&mut self, chain: &Chain, load: &mut dyn NodalLoad, posture: &mut Posture) {
         let mut x = chain.start_mm;
         for (i, d) in self.directions.iter().enumerate() {

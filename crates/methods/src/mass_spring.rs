@@ -1,20 +1,20 @@
 //! Mass–spring: Wang, Duratti, Samur, Spaelter and Bleuler, *A computer-based real-time simulation of interventional
 //! radiology*, IEEE EMBC 2007.
 //!
-//! Point masses joined by springs along the device and by springs that straighten each pair of neighbours:
+//! Point masses joined by axial springs and by springs that straighten each pair of neighbours:
 //!
 //! ```text
 //! E = Σ ½ (EA/h) (|eᵢ| − hᵢ)² + Σ ½ kᵢ |eᵢ/hᵢ − eᵢ₋₁/hᵢ₋₁|²,    k = EI/h
 //! v ← v + Δt (f/m − c v),    x ← x + Δt v        (semi-implicit Euler; drag and wall stiffness implicit)
 //! ```
 //!
-//! Length is kept by stiff springs, EA = ratio·EI/h², so it is met as the segments get shorter. Masses are free in a search for
-//! equilibrium: each is set in proportion to the stiffness at its node, with which one time step suits all, and the drag c to
-//! that which is critical for the slowest mode of a cantilever, times a factor.
+//! Length is maintained by stiff springs, EA = ratio·EI/h², so it converges as the segments get shorter. Masses can
+//! be chosen freely in a search for equilibrium: each is proportional to the stiffness at its node, so that one time
+//! step suits all, and the drag c is the critical one of the slowest mode of a cantilever, times a factor.
 //!
-//! # What it cannot do
-//! No twist and no shaped tips. The number of time steps grows with the square of the number of nodes: the fastest wave decides
-//! the time step, the slowest mode the time.
+//! # Limitations
+//! No twist and no shaped tips. The number of time steps is quadratic in the number of nodes: the fastest wave
+//! determines the time step, the slowest mode the duration.
 
 use endowire_core::device::Device;
 use endowire_core::{Result, Vec3};
@@ -25,13 +25,13 @@ use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, refuse_shape};
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MassSpring {
-    /// Axial stiffness over bending stiffness, EA h²/EI.
+    /// Ratio of axial to bending stiffness, EA h²/EI.
     pub axial_ratio: f64,
-    /// Damping over that which is critical for the slowest mode.
+    /// Damping relative to the critical damping of the slowest mode.
     pub damping: f64,
-    /// Time step over the largest stable one.
+    /// Time step relative to the largest stable one.
     pub time_step: f64,
-    /// Most time steps.
+    /// Largest number of time steps.
     pub max_iterations: usize,
 }
 

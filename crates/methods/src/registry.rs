@@ -1,4 +1,4 @@
-//! All methods by name, with their options: what `[method]` of a scene may say.
+//! All methods by name, with their options: the possible `[method]` tables of a scene.
 
 use endowire_core::insertion::Surroundings;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
@@ -15,10 +15,10 @@ use crate::options::{
 };
 use crate::{BeamFem, ChordEnergy, DiscreteRod, MassSpring, RigidLinks, RodModel};
 
-/// A scene whose `[method]` may be any method.
+/// A scene with any method as `[method]`.
 pub type Scene = endowire_core::scene::SceneOf<AnyMethod>;
 
-/// Names of all methods, ours first.
+/// Names of all methods, this project's first.
 pub const NAMES: [&str; 9] = [
     "kirchhoff",
     "li2011-dense",
@@ -31,7 +31,7 @@ pub const NAMES: [&str; 9] = [
     "discrete-rod",
 ];
 
-/// Names of the methods that are a [`RodModel`]: all but `kirchhoff` and the two of the paper.
+/// Names of the methods that are a [`RodModel`]: all except `kirchhoff` and the two of Li et al. 2011.
 pub const MODEL_NAMES: &[&str] = NAMES.split_at(3).1;
 
 /// A method with its options.
@@ -56,7 +56,7 @@ pub enum AnyMethod {
     /// Cotin et al. 2005.
     #[serde(rename = "beam-fem")]
     BeamFem(BeamFemOptions),
-    /// The same with damping, which the paper does not have.
+    /// The same with damping, unlike the paper.
     #[serde(rename = "beam-fem-damped")]
     BeamFemDamped(BeamFemDampedOptions),
     /// Konings et al. 2003.
@@ -74,17 +74,17 @@ impl Default for AnyMethod {
 }
 
 impl AnyMethod {
-    /// The method of that name with the default of every option.
+    /// The method of this name with default options.
     ///
     /// # Errors
-    /// A name that is none of [`NAMES`].
+    /// A name that is not in [`NAMES`].
     pub fn named(name: &str) -> Result<Self> {
         let table = [("name", name)].into_iter();
         Self::deserialize(MapDeserializer::<_, NotKnown>::new(table))
             .map_err(|_| Error::parameter("method", name, format!("the methods are {}", NAMES.join(", "))))
     }
 
-    /// The same method on elements of another length.
+    /// The same method with another element length.
     #[must_use]
     pub fn with_element_mm(mut self, element_mm: f64) -> Self {
         *match &mut self {
@@ -138,8 +138,8 @@ impl MethodChoice for AnyMethod {
     }
 }
 
-/// The model of that name with the parameters that serve one static solve from the unloaded shape best, as found by the example
-/// `tune`: there the motion is as long as the device. None for the methods that are no [`RodModel`].
+/// The model of this name with the best parameters for one static solve from the unloaded shape, as found by the
+/// example `tune`: there the motion is as long as the device. `None` for methods that are not a [`RodModel`].
 pub fn static_model(name: &str) -> Option<Box<dyn RodModel>> {
     Some(match name {
         "rigid-links" => Box::new(RigidLinks::default()),

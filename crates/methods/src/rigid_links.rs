@@ -1,30 +1,32 @@
 //! Rigid links: Dawson, Cotin, Meglan, Shaffer and Ferrell, *Designing a computer-based simulator for interventional
 //! cardiology training*, Catheterization and Cardiovascular Interventions 51, 2000.
 //!
-//! A device is a chain of rigid links on spherical joints. A joint between links of directions dᵢ₋₁ and dᵢ has a torsional
-//! spring, ½ kθ² with k = EI/l, and a damper; contact, injection and user forces act on the nodes. The generalised
-//! coordinates are the directions of the links alone, so length is exact and a force on a node turns every link before it:
+//! A device is a chain of rigid links on spherical joints. A joint between links of directions dᵢ₋₁ and dᵢ has a
+//! torsional spring, ½ kθ² with k = EI/l, and a damper; contact, injection and user forces act on the nodes. The
+//! generalised coordinates are the directions of the links alone, so length is exact and a force on a node acts on
+//! every link before it:
 //!
 //! ```text
 //! δxⱼ = Σ_{i ≤ j} lᵢ δdᵢ,    M v̇ = τ − C v,    τᵢ = lᵢ Σ_{j ≥ i} fⱼ + spring torques
 //! (M + Δt C + Δt² K) v⁺ = M v + Δt τ,    d ← d + Δt v⁺
 //! ```
 //!
-//! Springs of joints and contacts are implicit (K), loads are not. Mass and dampers are free in a search for equilibrium; they are given in the
-//! units of the device (its length, EI, and EI/L⁴ for the mass per length).
+//! Springs of joints and contacts are implicit (K), loads are not. Mass and dampers can be chosen freely in a search
+//! for equilibrium; they are given in the units of the device (its length, EI, and EI/L⁴ for the mass per length).
 //!
-//! M and the contacts couple every link with every other, and yet a step takes O(n), as the recursions for chains of bodies do (Featherstone,
-//! *The calculation of robot dynamics using articulated-body inertias*, Int. J. Robotics Research 2, 1983). With the velocity xⱼ of node j beside those of the links,
-//! xⱼ = xⱼ₋₁ + lⱼ vⱼ, the step is the minimum of
+//! M and the contacts couple every link with every other, and yet a step takes O(n), like the recursions for chains
+//! of bodies (Featherstone, *The calculation of robot dynamics using articulated-body inertias*, Int. J. Robotics
+//! Research 2, 1983). With the velocity xⱼ of node j in addition to those of the links, xⱼ = xⱼ₋₁ + lⱼ vⱼ, the step
+//! is the minimum of
 //!
 //! ```text
 //! Σⱼ ½ xⱼᵀ (mⱼ + Δt² kⱼ nⱼnⱼᵀ) xⱼ + ½ Kⱼ vⱼ² − κⱼ vⱼ·vⱼ₋₁ − rⱼ·vⱼ
 //! ```
 //!
-//! and what all beyond a link adds to it is a quadratic function of its velocity and that of its node: a recursion from the tip with
-//! blocks of five, and back.
+//! and the contribution of everything beyond a link is a quadratic function of its velocity and that of its node: a
+//! recursion from the tip with blocks of five, and back.
 //!
-//! # What it cannot do
+//! # Limitations
 //! Links do not twist: no torque, and no shaped tips.
 
 use endowire_core::device::Device;
@@ -39,11 +41,11 @@ use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, refuse_shape};
 pub struct RigidLinks {
     /// Time step in units of √(ρL⁴/EI).
     pub time_step: f64,
-    /// Joint dampers over joint springs, in the same unit.
+    /// Ratio of joint dampers to joint springs, in the same unit.
     pub damping: f64,
-    /// Largest turn of a link in one time step, rad.
+    /// Largest rotation of a link in one time step, rad.
     pub largest_turn_rad: f64,
-    /// Most time steps.
+    /// Largest number of time steps.
     pub max_iterations: usize,
 }
 
@@ -90,7 +92,8 @@ impl RodModel for RigidLinks {
 }
 
 impl RigidLinks {
-    /// One time step. False if the matrix is not positive definite, which only numbers that are not finite can do.
+    /// One time step. Returns false if the matrix is not positive definite, which happens only with numbers that are
+    /// not finite.
     fn step(
         &self,
         chain: &Chain,
@@ -122,12 +125,13 @@ struct Body {
     torque: Vector2<f64>,
     /// Mass at its far node.
     mass: f64,
-    /// Stiffness of its joints, N·mm: its own, and with that of the next one.
+    /// Stiffness of its joints, N·mm: of its own, and including the next one.
     joint: f64,
     joints: f64,
 }
 
-/// Where the motion beyond a link has its least cost: its velocity v is `by_node` x + `by_link` v′ + `alone`, of the node and the link before it.
+/// The optimal velocity of a link: v is `by_node` x + `by_link` v′ + `alone`, with the velocities of the node and the
+/// link before it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Answer {
     by_node: Matrix2x3<f64>,
@@ -135,7 +139,8 @@ struct Answer {
     alone: Vector2<f64>,
 }
 
-/// What all beyond a link adds to the cost: ½ of a quadratic form of its node's velocity x and its own v, and a linear one.
+/// Contribution of everything beyond a link to the cost: ½ of a quadratic form of its node's velocity x and its own
+/// v, and a linear one.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cost {
     xx: Matrix3<f64>,
@@ -165,7 +170,7 @@ impl System {
     fn assemble(&mut self, chain: &Chain, Links { directions: links, pushes, .. }: &Links) {
         let n = links.len();
         let density = chain.force_unit() / chain.length_mm().powi(2);
-        // Force on everything beyond a link: it moves all of that.
+        // Force on everything beyond a link, which the link moves.
         let mut force = Vec3::zeros();
         for i in (0..n).rev() {
             let (d, l) = (links[i], chain.lengths_mm[i]);
@@ -185,8 +190,8 @@ impl System {
         }
     }
 
-    /// Replaces the velocities of links by those after a time step with that damping. Returns the fastest, or none where the matrix is not
-    /// positive definite.
+    /// Replaces the velocities of links by those after a time step with this damping. Returns the largest, or `None`
+    /// if the matrix is not positive definite.
     fn solve(
         &mut self,
         chain: &Chain,
@@ -211,7 +216,7 @@ impl System {
             let node = cost.xx
                 + Matrix3::identity() * mass
                 + push.normal * push.normal.transpose() * (dt * dt * push.stiffness_n_per_mm);
-            // Of x = x′ + l v the cost in v is ½ vᵀ own v + v·(by_node x′ + by_link v′ − alone).
+            // With x = x′ + l v the cost in v is ½ vᵀ own v + v·(by_node x′ + by_link v′ − alone).
             let turn = cost.vx * across * l;
             let own = across.tr_mul(&(node * across)) * (l * l)
                 + Matrix2::identity() * (joints * implicit)
@@ -261,7 +266,7 @@ mod tests {
     use crate::Push;
     use nalgebra::{DMatrix, DVector};
 
-    /// The recursion against the matrix that it never forms.
+    /// The recursion compared with the matrix that it never forms.
     #[test]
     fn a_step_of_the_recursion_is_that_of_the_dense_matrix() {
         let n = 7;
@@ -324,7 +329,7 @@ mod tests {
             let off = system.bodies[i].across.tr_mul(v) - expected.rows(2 * i, 2);
             assert!(off.norm() < 1e-12 * expected.norm(), "{i}: {off:?}");
         }
-        // What it began with is something else.
+        // Counter-check: the initial velocities differ.
         let moved = velocity.iter().zip(&start).map(|(v, s)| (v - s).norm()).fold(0.0, f64::max);
         assert!(moved > 0.1 * expected.norm(), "{moved}");
     }

@@ -1,4 +1,4 @@
-//! Keys of a scene that are given other values than its file has: by a sweep, or on a command line.
+//! Overrides values of a scene's keys, for a sweep or the command line.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,8 @@ use toml::{Table, Value};
 use crate::Scene;
 use crate::key::Key;
 
-/// A key of a scene and its value, `KEY=VALUE`. The key is one as in a sweep, the value one as in the scene file; text needs no quotes.
+/// A key of a scene and its value, `KEY=VALUE`. The key is as in a sweep, the value as in the scene file; text needs
+/// no quotes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
     /// The key.
@@ -31,7 +32,7 @@ impl FromStr for Setting {
             return Err(Error::parameter("set", format!("{text:?}"), mend));
         };
         let (key, value) = (Key::parse(key.trim())?, value.trim());
-        // What is no value of TOML is text: names of methods and files.
+        // What is not a TOML value is text: names of methods and files.
         let document = toml::from_str::<Table>(&format!("value = {value}"));
         let document = document.ok().filter(|document| document.len() == 1);
         let read = document.and_then(|mut document| document.remove("value"));
@@ -45,18 +46,19 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Reads a scene with these values of its keys, one after the other; parts of a device file come last, as the file may be one of the values.
-/// `check` looks at what the core leaves to others.
+/// Reads a scene with these values of its keys, set one after the other; keys of a device file come last, since the
+/// file itself may be set. `check` checks what the core leaves to others.
 ///
-/// The scene's text is that of all that is set: it has another hash than the file, and that of a run of a sweep which sets the same.
+/// The scene's text includes all values set: its hash differs from the file's, and equals that of a sweep's run with
+/// the same values.
 ///
 /// # Errors
-/// Those of the file; a key that the scene does not know, with the nearest right one, and a value that its key does not take.
+/// Those of the file; a key unknown to the scene, with the most similar valid one, and an invalid value.
 pub fn scene_with(path: &Path, settings: &[Setting], check: impl Fn(&Scene) -> Result<()>) -> Result<Scene> {
     scene_with_of(Arc::new(FileSystem), path, settings, check)
 }
 
-/// The same of a scene that is among `files`, where those that it names are too.
+/// As [`scene_with`], for a scene in `files`, with the files that it names.
 ///
 /// # Errors
 /// As [`scene_with`].
@@ -85,7 +87,7 @@ pub fn scene_with_of(
     tables.scene()
 }
 
-/// The tables of a scene file, whose keys are given other values.
+/// The tables of a scene file, to override values of keys.
 #[derive(Debug, Clone)]
 pub struct SceneTables {
     path: PathBuf,
@@ -94,22 +96,22 @@ pub struct SceneTables {
 }
 
 impl SceneTables {
-    /// Those of the text of the scene file `path`, which is among `files`.
+    /// The tables of the text of the scene file `path`, which is in `files`.
     ///
     /// # Errors
-    /// [`Error::Content`] for what is no TOML.
+    /// [`Error::Content`] if it is not TOML.
     pub fn of_file(text: &str, path: &Path, files: Arc<dyn Files>) -> Result<Self> {
         let tables =
             toml::from_str(text).map_err(|error| Error::content(path, error.message().to_owned()))?;
         Ok(Self { path: path.to_owned(), files, tables })
     }
 
-    /// The scene file: paths start from its folder.
+    /// The path of the scene file; paths are relative to its folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Gives a key a value. Where it is one of a device file, what that says stands in the scene from then on.
+    /// Sets a key to a value. If the key belongs to a device file, its contents are copied into the scene.
     ///
     /// # Errors
     /// As [`Key::set`], and those of the device file.
@@ -120,15 +122,15 @@ impl SceneTables {
         key.set(&mut self.tables, value.clone())
     }
 
-    /// Themselves, to change what no key alone says.
+    /// The tables, for changes beyond single keys.
     pub fn tables_mut(&mut self) -> &mut Value {
         &mut self.tables
     }
 
-    /// Whether the scene takes this value, and `check` the scene.
+    /// Checks that the scene accepts this value, and `check` the scene.
     ///
     /// # Errors
-    /// [`Error::Parameter`] with key and value where it does not.
+    /// [`Error::Parameter`] with key and value if not.
     pub fn check(&self, key: &Key, value: &Value, check: impl Fn(&Scene) -> Result<()>) -> Result<()> {
         let mut tried = self.clone();
         tried.set(key, value)?;
@@ -138,7 +140,7 @@ impl SceneTables {
         })
     }
 
-    /// The scene that they say.
+    /// The scene of these tables.
     ///
     /// # Errors
     /// As [`Scene::from_toml`].
@@ -146,28 +148,28 @@ impl SceneTables {
         Ok(Scene::from_toml(&self.text()?, &self.path)?.with_files(self.files.clone()))
     }
 
-    /// The text of a scene file that says them.
+    /// The text of a scene file with these tables.
     ///
     /// # Errors
-    /// [`Error::Content`] for what TOML cannot say.
+    /// [`Error::Content`] for what TOML cannot represent.
     pub fn text(&self) -> Result<String> {
         toml::to_string(&self.tables).map_err(|error| Error::content(&self.path, error.to_string()))
     }
 }
 
-/// Takes what the device file says into the table of the scene `path` that names it.
+/// Copies the contents of the device file into the table of the scene `path` that names it.
 fn open_device(path: &Path, files: &dyn Files, table: &mut Table) -> Result<()> {
     let Some(Value::String(file)) = table.get("file") else { return Ok(()) };
     let file = path.parent().unwrap_or(Path::new("")).join(file);
     let (mut device, _): (Table, String) = from_toml_of(files, &file)?;
-    // A table of an instrument has a name of its own.
+    // An instrument's table has its own name.
     device.remove("name");
     table.remove("file");
     table.extend(device);
     Ok(())
 }
 
-/// The reason without the number of a line that nobody has written.
+/// The reason without the line number, which refers to generated text.
 fn without_line(reason: &str) -> &str {
     let rest = reason.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
     rest.filter(|(number, _)| number.parse::<usize>().is_ok()).map_or(reason, |(_, rest)| rest)
@@ -194,7 +196,7 @@ mod tests {
         std::fs::write(folder.path().join("other.toml"), WIRE.replace("450.0", "250.0")).unwrap();
         let settings: Vec<Setting> = settings.iter().map(|text| setting(text)).collect();
         let scene = scene_with(&path, &settings, |_| Ok(()))?;
-        // The device is read while its file is there.
+        // The device is read while its file exists.
         scene.stack().map(|_| scene)
     }
 
@@ -236,7 +238,7 @@ mod tests {
         let stiffer = device(&["device.part[0].bending_stiffness_nmm2=7"]);
         assert_eq!(stiffer.sections()[0].bending_stiffness_nmm2, 7.0);
         assert_eq!(stiffer.sections()[1..], device(&[]).sections()[1..]);
-        // Whatever their order.
+        // In any order.
         let both = ["device.part[0].length_mm=60", "device.file=other.toml"];
         assert_eq!(device(&both).length_mm(), 310.0);
         assert_eq!(device(&[both[1], both[0]]), device(&both));
@@ -252,7 +254,7 @@ mod tests {
             ("device.part[2].length_mm=1", "the scene has 2 in that list"),
             ("device.prt[0].length_mm=1", "did you mean `part[0]`?"),
             ("device.part[0].lenth_mm=1", "did you mean `length_mm`?"),
-            // Only where the device is made: another key gives the same.
+            // Only where the device is made: another key has the same effect.
             (
                 "device.part[0].radius_mm=0.4",
                 "device.part \"tip\".outer_diameter_mm = 0.9: radius_mm is given too",

@@ -1,7 +1,7 @@
-//! The wall's push on the nodes of a chain: ½ k p² per length, p the depth of the surface beyond the wall.
+//! Contact forces of the wall on the nodes of a chain: ½ k p² per length, p the penetration of the surface.
 //!
-//! The wall is the scene's, not a method's: all methods feel core's smooth distance and its extensions beyond openings, the
-//! same that `kirchhoff` feels, and so have the same limit.
+//! The wall is that of the scene, not of a method: all methods use the core's smooth distance and its extensions
+//! beyond openings, like `kirchhoff`, and so have the same limit.
 
 use endowire_core::Vec3;
 use endowire_core::contact::ContactSurface;
@@ -9,12 +9,12 @@ use endowire_core::insertion::{Contact, Surroundings};
 
 use crate::{NodalLoad, Push};
 
-/// How far beyond its radius a node looks for the wall, mm: what it sees it need not ask for again.
+/// Distance beyond its radius over which a node seeks the wall, mm; results within it are reused.
 const LOOK_MM: f64 = 3.0;
-/// A node near the wall looks for its nearest piece again when it has moved by this part of its radius.
+/// Motion of a node near the wall, as a fraction of its radius, after which its nearest piece is sought again.
 const LOOK_AGAIN: f64 = 0.5;
 
-/// What a node knows of the wall.
+/// Cached result of a node.
 #[derive(Debug, Clone, Copy, Default)]
 struct Known {
     asked_at: Vec3,
@@ -28,7 +28,7 @@ pub(crate) struct WallLoad<'a> {
     wall: &'a ContactSurface,
     known: Vec<Known>,
     radii: Vec<f64>,
-    /// Stiffness of the wall for the length of device that a node stands for, N/mm; the tip's cap included.
+    /// Stiffness of the wall for the length of device that a node represents, N/mm; including the tip's cap.
     stiffness: Vec<f64>,
 }
 
@@ -51,12 +51,12 @@ impl<'a> WallLoad<'a> {
         Self { wall, known: vec![Known::default(); n + 1], radii, stiffness }
     }
 
-    /// Depth of the surface beyond the wall at `x`, the wall's normal and its piece.
+    /// Penetration of the surface at `x`, the wall's normal and its piece.
     fn depth(&mut self, node: usize, x: &Vec3) -> Option<(f64, Vec3, u32)> {
         let radius = self.radii[node];
         let known = &mut self.known[node];
         let moved = (x - known.asked_at).norm();
-        // Clear of the wall by more than it has moved, or so little moved that the same piece will do.
+        // Clear of the wall by more than its motion, or moved so little that the same piece can be used.
         let clear = known.near.map_or(LOOK_MM, |(_, distance)| distance - 2.0 * radius);
         if !known.fresh || moved > clear.max(LOOK_AGAIN * radius) {
             let near = self.wall.nearest_piece(x, radius + LOOK_MM);

@@ -1,4 +1,4 @@
-//! Every method against a case that it must get right, and its order of convergence.
+//! Every method on a case with an exact solution, and its order of convergence.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! The state of an insertion by any method is all that its next step depends on.
+//! The state of an insertion by any method determines its next step.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -3,7 +3,7 @@
 mod exam;
 
 use endowire_assess::Exam;
-use endowire_core::insertion::{DetachedCoil, InstrumentReport, Packing, Script, Simulation};
+use endowire_core::insertion::{Command, DetachedCoil, InstrumentReport, Packing, Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, NoStore, Sac};
 use endowire_core::{Error, PhysicalEnd, Result, Vec3};
@@ -250,6 +250,12 @@ impl Session {
     fn detach(&mut self, instrument: usize) -> Result<()> {
         self.take_over();
         self.stop();
+        // What is refused changes nothing: it is looked at where the device will be once it has followed.
+        let mut followed = self.simulation.clone();
+        if followed.report().is_under_way() {
+            followed.step(Command::default())?;
+        }
+        followed.check_detach(instrument)?;
         self.catch_up()?;
         self.advance(Done { detach: Some(instrument), ..Self::resting() }, true)
     }

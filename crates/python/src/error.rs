@@ -1,7 +1,8 @@
 //! Errors as exceptions, in the same words. The classes are Python's own: `endowire/errors.py`.
 
 use endowire_core::Error;
-use pyo3::PyErr;
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
 
 pyo3::import_exception!(endowire.errors, InputError);
 pyo3::import_exception!(endowire.errors, ComputationError);
@@ -12,6 +13,8 @@ pub(crate) fn exception(error: Error) -> PyErr {
     let text = error.to_string();
     match error {
         Error::End(_) => EndOfWay::new_err(text),
+        // What the handler of the signal has raised.
+        Error::Stopped => Python::attach(PyErr::take).unwrap_or_else(|| PyKeyboardInterrupt::new_err(())),
         error if error.is_input() => InputError::new_err(text),
         _ => ComputationError::new_err(text),
     }

@@ -91,6 +91,12 @@ impl StepReport {
         self.report.energy.wall
     }
 
+    /// Energy in fields, mJ; 0 without any.
+    #[getter]
+    fn field_energy_mj(&self) -> f64 {
+        self.report.energy.field
+    }
+
     /// Deepest penetration of the wall, mm; 0 without contact.
     #[getter]
     fn max_penetration_mm(&self) -> f64 {

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use endowire_core::Vec3;
 use endowire_core::device::line_mm;
+use endowire_core::field::FieldSpec;
 use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce};
 use endowire_viewer::DeviceView;
 use numpy::{PyArray1, PyArray2};
@@ -20,8 +21,8 @@ use crate::start::{Arguments, Start};
 use crate::state::State;
 use crate::vessel::Vessel;
 
-/// What a simulation has come from, and where it is.
-type Pickled = (Py<Start>, State);
+/// What a simulation has come from, where it is, and the fields that it was put into, as JSON.
+type Pickled = (Py<Start>, State, Option<String>);
 
 /// An instrument, or several.
 #[derive(FromPyObject)]
@@ -39,18 +40,21 @@ pub(crate) struct Simulation {
     inner: Mutex<insertion::Simulation>,
     /// Counted here, since the interpreter may be let go of where it is copied.
     start: Arc<Py<Start>>,
+    /// The fields that it was put into; none where it has those that it began with.
+    fields: Mutex<Option<Vec<FieldSpec>>>,
 }
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        Self::new(self.lock().clone(), self.start())
+        let simulation = self.lock().clone();
+        Self { inner: Mutex::new(simulation), start: self.start(), fields: Mutex::new(self.fields()) }
     }
 }
 
 impl Simulation {
     /// A simulation that has come from `start`.
     pub(crate) fn new(simulation: insertion::Simulation, start: Arc<Py<Start>>) -> Self {
-        Self { inner: Mutex::new(simulation), start }
+        Self { inner: Mutex::new(simulation), start, fields: Mutex::new(None) }
     }
 
     /// A simulation at its start.
@@ -84,6 +88,18 @@ impl Simulation {
     /// The simulation, alone. Never wait for it with the interpreter held: whoever has it may step for long.
     fn lock(&self) -> MutexGuard<'_, insertion::Simulation> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn fields(&self) -> Option<Vec<FieldSpec>> {
+        self.fields.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Puts it into fields, and remembers which.
+    fn put_into(&self, py: Python<'_>, specs: Vec<FieldSpec>) -> PyResult<()> {
+        let fields = specs.iter().map(FieldSpec::field).collect::<Result<Vec<_>, _>>().map_err(exception)?;
+        self.with(py, |simulation| simulation.set_fields(fields)).map_err(exception)?;
+        *self.fields.lock().unwrap_or_else(PoisonError::into_inner) = Some(specs);
+        Ok(())
     }
 
     /// Does something with the simulation, without the interpreter.
@@ -227,9 +243,19 @@ impl Simulation {
     /// rest; then everything is as before.
     #[pyo3(signature = (instrument=0))]
     fn detach(&self, py: Python<'_>, instrument: i64) -> PyResult<StepReport> {
-        let place = usize::try_from(instrument).unwrap_or(usize::MAX);
+        let place = natural("instrument", instrument)?;
         let done = self.with(py, |simulation| simulation.detach(place).cloned());
         done.map(StepReport::new).map_err(exception)
+    }
+
+    /// Puts the instruments into these fields, in place of those in which they were; they go over into them with the next step or tick. Each is a dictionary
+    /// with the keys of `[[field]]` of a scene: `{"kind": "magnet", "instrument": 0, "start_mm": 0.0, "end_mm": 4.0, "moment_am2": 4e-3, "field_t":
+    /// [0.05, 0.0, 0.0]}`, a magnet along the axis between two distances from the tip in a uniform magnetic field, or `{"kind": "weight", "instrument": 0,
+    /// "force_n_per_mm": [0.0, 0.0, -1e-5]}`.
+    ///
+    /// Raises InputError for values out of range, and for an instrument that is not there; then nothing has changed.
+    fn set_fields(&self, py: Python<'_>, fields: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.put_into(py, document::read("fields", fields)?)
     }
 
     /// Coils that were detached, in their order: a list of pairs of an instrument and the points of its coil, from the end that was detached to
@@ -383,15 +409,21 @@ impl Simulation {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
         let (py, simulation) = (slf.py(), slf.get());
-        let parts = (simulation.start.clone_ref(py), simulation.state(py));
+        let fields = simulation.fields().map(|fields| serde_json::to_string(&fields)).transpose();
+        let fields = fields.map_err(|e| refuse("fields", e, "cannot be written"))?;
+        let parts = (simulation.start.clone_ref(py), simulation.state(py), fields);
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
 
     #[staticmethod]
-    fn _unpickled(start: Py<Start>, state: &State) -> PyResult<Self> {
-        let mut simulation = start.get().simulation();
-        simulation.restore(&state.state).map_err(exception)?;
-        Ok(Self::new(simulation, Arc::new(start)))
+    fn _unpickled(py: Python<'_>, start: Py<Start>, state: &State, fields: Option<&str>) -> PyResult<Self> {
+        let unpickled = Self::new(start.get().simulation(), Arc::new(start));
+        if let Some(fields) = fields {
+            let fields = serde_json::from_str(fields).map_err(|e| refuse("fields", e, "cannot be read"))?;
+            unpickled.put_into(py, fields)?;
+        }
+        unpickled.restore(py, state)?;
+        Ok(unpickled)
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {

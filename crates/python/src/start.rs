@@ -75,9 +75,14 @@ impl Start {
         Ok(Self { instruments, simulation: Mutex::new(simulation), made_of })
     }
 
-    /// The simulation.
+    /// The simulation, whose long steps end with Ctrl-C.
     pub(crate) fn simulation(&self) -> insertion::Simulation {
-        self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        let mut simulation = self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        // What the handler raises is kept for the one who hears of the end of the step.
+        simulation.stop_when(|| {
+            Python::attach(|py| py.check_signals().map_err(|raised| raised.restore(py)).is_err())
+        });
+        simulation
     }
 }
 

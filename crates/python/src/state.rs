@@ -14,7 +14,7 @@ use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
 /// The first bytes of a saved state, which is sealed, and those of every version.
-const FORMAT: &[u8] = b"endowire.State 7\n";
+const FORMAT: &[u8] = b"endowire.State 8\n";
 const ANY_FORMAT: &[u8] = b"endowire.State ";
 
 /// Whether a file has been written by `State.save`, of whatever version, or is empty, so that nothing of it can be lost.

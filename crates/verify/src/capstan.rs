@@ -8,12 +8,12 @@ use endowire_core::rod::Frame;
 use endowire_core::{Result, Vec3};
 use std::f64::consts::PI;
 
-/// Straight parts and radius of the bend, radius and play of the wire, mm.
+/// Lengths of the straight parts, radius of the bend, radius and clearance of the wire, mm.
 pub(super) const STRAIGHT: f64 = 20.0;
 pub(super) const BEND: f64 = 30.0;
 pub(super) const RADIUS: f64 = 0.45;
 pub(super) const PLAY: f64 = 0.5;
-/// EI, N·mm², and pull at the far end, N: a wire that bends where it meets the wall within a millimetre.
+/// EI, N·mm², and pull at the far end, N: the wire conforms to the wall within a millimetre of touching it.
 const BENDING: f64 = 10.0;
 const PULL: f64 = 10.0;
 /// Foundation modulus, N/mm²: rigid.
@@ -21,12 +21,13 @@ const MODULUS: f64 = 1e3;
 /// Length by which the wire is drawn, mm.
 const DRAWN: f64 = 0.01;
 
-/// A rigid wall of this friction.
+/// A practically rigid wall with this friction.
 pub(super) fn rigid(friction: f64) -> WallProperties {
     WallProperties { modulus_n_per_mm2: MODULUS, friction, ..WallProperties::default() }
 }
 
-/// Ratio of the force at the clamp to that at the far end of a wire that is drawn out of the bend, and the angle between them.
+/// Ratio of the force at the clamp to that at the far end for a wire drawn out of the bend, and the angle between
+/// them.
 pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f64)> {
     let tube = Tube {
         begin_mm: 1.0,
@@ -50,12 +51,13 @@ pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f
     let mut rod = TestRod::on_wall(&wall, properties, &setup, Vec3::zeros(), along)?;
     rod.tolerance = 1e-8;
     rod.loads.forces = vec![(rod.elements().len(), Vec3::x() * -PULL)];
-    // First at rest without friction, then drawn.
+    // First in equilibrium without friction, then drawn.
     rod.solve()?;
     rod.slide(properties.largest_friction(), -DRAWN)?;
     let clamp = rod.clamp();
     let force = clamp.force.norm();
-    // The wire is pulled one way at the clamp and the same way at the tip: it has turned by 180° less the angle between.
+    // The wire is pulled in the same direction at the clamp and at the tip: it has turned by 180° less the angle
+    // between.
     let angle = PI - (clamp.force / force).dot(&-Vec3::x()).clamp(-1.0, 1.0).acos();
     Ok((force / PULL, angle))
 }

@@ -1,4 +1,4 @@
-//! D5 and D7: a wire that is pulled and pushed through a catheter which rubs on it, or whose valve does.
+//! D5 and D7: a wire that is pulled and pushed through a catheter with friction, or with a valve.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -16,7 +16,7 @@ const WIRE_RADIUS_MM: f64 = 0.2;
 const WIRE_NMM2: f64 = 20.0;
 const CATHETER_NMM2: f64 = 60.0;
 
-/// A wire with this rest curvature comes out of a straight catheter by 3 mm.
+/// A wire with this rest curvature, which protrudes by 3 mm from a straight catheter.
 fn bent(curvature_per_mm: f64, friction: f64) -> Result<Simulation> {
     bent_within(curvature_per_mm, friction, 0.0)
 }
@@ -42,8 +42,9 @@ fn bent_within(curvature_per_mm: f64, friction: f64, valve_n: f64) -> Result<Sim
     Ok(simulation)
 }
 
-/// Both make an arc of κ = κ₁EI₁/(EI₁ + EI₂), here of 90°. Where the wire comes out it is pulled by ½EI₁(κ₁² − κ²) whatever rubs, and at the
-/// sheath by e^{μφ} times that while it is pulled back, by e^{−μφ} times that while it is pushed.
+/// Together they form an arc of κ = κ₁EI₁/(EI₁ + EI₂), here of 90°. Where the wire comes out it is pulled by ½EI₁(κ₁²
+/// − κ²) for any friction, and at the sheath by e^{μφ} times that while it is pulled back, by e^{−μφ} times that
+/// while it is pushed.
 pub(super) fn capstan() -> Result<Vec<Row>> {
     let curvature = FRAC_PI_2 / LENGTH_MM;
     let rest = curvature * (WIRE_NMM2 + CATHETER_NMM2) / WIRE_NMM2;
@@ -64,8 +65,9 @@ pub(super) fn capstan() -> Result<Vec<Row>> {
 /// Force of the valve, N.
 const VALVE_N: f64 = 0.3;
 
-/// A straight wire in a straight catheter feels its valve alone: F₀ against its way, and of a motion that turns as well the parts of F₀ along
-/// and around the wire. The catheter's hand feels the opposite, and nobody anything where both go together.
+/// On a straight wire in a straight catheter only the valve acts: with F₀ against its motion, and in a combined
+/// motion with the components of F₀ along and around the wire. The catheter's hand feels the reaction, and neither
+/// hand feels anything if both move together.
 pub(super) fn valve() -> Result<Vec<Row>> {
     const NAME: &str = "D7 valve of 0.3 N, straight wire";
     let mut plain = bent(0.0, 0.0)?;

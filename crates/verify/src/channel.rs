@@ -6,13 +6,13 @@ use endowire_core::rod::Frame;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 
-/// Stiffness of the plates at a node, over that of a rod of the element's length.
+/// Stiffness of the plates at a node, relative to that of a rod of the element's length.
 const PLATES: f64 = 1e3;
 
 /// A straight rod along x from the origin, clamped there, in a channel whose walls are the planes y = floor and y = ceiling.
 ///
-/// Two rigid plates without play hold the nodes in the plane z = 0: flat walls alone leave a buckled rod free to turn about
-/// its axis and escape. In the plane they do nothing.
+/// Two rigid plates without clearance hold the nodes in the plane z = 0: between flat walls alone a buckled rod could
+/// turn about its axis and escape. In the plane they have no effect.
 pub(super) fn channel(setup: &Setup, heights: [f64; 2]) -> Result<TestRod> {
     with_regions(setup, heights, 0.25 * setup.length, Vec::new())
 }
@@ -25,13 +25,13 @@ pub(super) fn with_regions(
     region: Vec<WallRegion>,
 ) -> Result<TestRod> {
     let (length, radius) = (setup.length, setup.radius);
-    // So far away that no edge of the box is felt: each of three steps (the edge is drawn in, vertices reach there, points
-    // feel these vertices) reaches at most a diagonal and a half of a cell.
+    // So far away that the box's edges have no effect: each of three steps (the edge is moved in, vertices reach it,
+    // points reach these vertices) extends over at most a diagonal and a half of a cell.
     let aside = cell * (6.0 * (radius / cell).max(1.0)).ceil();
     let low = Vec3::new(-aside, floor, -aside);
     let high = Vec3::new(length + aside, ceiling, aside);
     let wall = Wall::from_surface(&SurfaceMesh::cuboid(low, high, cell))?;
-    // Planes need no other mesh, and the box's edges are not to be rounded.
+    // Planes need no other mesh, and the box's edges must not be rounded.
     let properties = WallProperties {
         modulus_n_per_mm2: setup.modulus,
         deviation_mm: 0.0,

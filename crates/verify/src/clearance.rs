@@ -1,16 +1,18 @@
-//! D8: what play between instruments is worth, which the shared line has none of.
+//! D8: the effect of clearance between instruments, which the shared line neglects.
 //!
-//! A wire and a catheter are two beams of small deflections w₁ and w₂ here, held together at the sheath and kept within the clearance δ of each
-//! other where both are, |w₁ − w₂| ≤ δ; the wire goes on by itself beyond the catheter's tip. Their difference u = w₁ − w₂ lies on one side of the
-//! lumen, and over a last length ℓ it crosses to the other. Where the two would differ in curvature by Δκ at the tip if they were free of each other,
-//! u″ rises evenly to that from 0 where u leaves its side, so that
+//! Here a wire and a catheter are two beams with small deflections w₁ and w₂, held together at the sheath and kept
+//! within the clearance δ of each other where both are, |w₁ − w₂| ≤ δ; the wire continues beyond the catheter's tip.
+//! Their difference u = w₁ − w₂ lies on one side of the lumen, and over a last length ℓ it crosses to the other. If
+//! their free curvatures at the tip differ by Δκ, u″ increases linearly to that from 0 where u leaves its side, so
+//! that
 //!
 //! ```text
 //! 2δ = Δκ ℓ²/6,    u′ = Δκ ℓ/2 = √(3 δ Δκ)
 //! ```
 //!
-//! at the tip, of which the stiffer instrument takes the smaller part. A rest curvature κ⁰ of the wire gives Δκ = κ⁰, a force F across the wire at
-//! a beyond the tip Δκ = F a/EI₁. On a line that is bent itself they are the deflections from that, as far as ℓ is short against its radius.
+//! at the tip, of which the stiffer instrument takes the smaller part. A rest curvature κ⁰ of the wire gives Δκ = κ⁰,
+//! a force F across the wire at a beyond the tip Δκ = F a/EI₁. On a bent line these are deflections from the line, if
+//! ℓ is small compared with its radius.
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
@@ -30,24 +32,24 @@ const CURVATURE_PER_MM: f64 = 0.04;
 const FORCE_N: f64 = 0.05;
 /// Clearances, mm.
 const CLEARANCES_MM: [f64; 2] = [0.05, 0.2];
-/// Stiffness of the lumen at a node, N/mm: it gives way by nanometres.
+/// Stiffness of the lumen at a node, N/mm: it yields by nanometres.
 const LUMEN_N_PER_MM: f64 = 1e6;
-/// Most changes of the nodes that touch.
+/// Largest number of changes of the active set.
 const ROUNDS: usize = 200;
-/// What moves by less has come to its end, mm.
+/// Motion below which the iteration has converged, mm.
 const SETTLED_MM: f64 = 1e-6;
 
-/// Direction of the wire against the catheter at the catheter's tip, rad, and where the wire's tip is, mm.
+/// Direction of the wire relative to the catheter at the catheter's tip, rad, and position of the wire's tip, mm.
 struct Deflection {
     tilt_rad: f64,
     tip_mm: f64,
 }
 
-/// Two beams within a clearance of each other: cubic elements, and a primal-dual active set of the nodes that touch either side.
+/// Two beams within a clearance of each other: cubic elements, and a primal-dual active set of the nodes in contact.
 fn deflect(clearance_mm: f64, curvature_per_mm: f64, force_n: f64) -> Result<Deflection> {
     let both = (LENGTH_MM / ELEMENT_MM).round() as usize;
     let wire = both + (BEYOND_MM / ELEMENT_MM).round() as usize;
-    // Deflection and slope of each node but the first, of the wire and then of the catheter.
+    // Deflection and slope of each node except the first, of the wire and then of the catheter.
     let (of_wire, of_catheter) = (|i: usize| 2 * (i - 1), |i: usize| 2 * (wire + i - 1));
     let count = 2 * (wire + both);
     let (mut stiffness, mut load) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
@@ -88,7 +90,7 @@ fn deflect(clearance_mm: f64, curvature_per_mm: f64, force_n: f64) -> Result<Def
     add(wire, &of_wire, WIRE_NMM2, curvature_per_mm);
     add(both, &of_catheter, CATHETER_NMM2, 0.0);
     load[of_wire(wire)] += force_n;
-    // Side that each node touches: 1, −1, or 0; without play all touch both.
+    // Side that each node touches: 1, −1, or 0; without clearance all touch both.
     let tied = clearance_mm == 0.0;
     let mut sides = vec![f64::from(u8::from(tied)); both + 1];
     let mut before = DVector::<f64>::zeros(count);
@@ -104,7 +106,7 @@ fn deflect(clearance_mm: f64, curvature_per_mm: f64, force_n: f64) -> Result<Def
         }
         let Some(factor) = matrix.cholesky() else { break };
         let w = factor.solve(&right);
-        // Where both lie on each other nothing presses, and which nodes of those touch is rounding.
+        // Where both lie on each other without force, rounding decides which nodes are active.
         if tied || (&w - &before).amax() < SETTLED_MM {
             let tilt_rad = w[of_wire(both) + 1] - w[of_catheter(both) + 1];
             return Ok(Deflection { tilt_rad, tip_mm: w[of_wire(wire)] });
@@ -118,7 +120,8 @@ fn deflect(clearance_mm: f64, curvature_per_mm: f64, force_n: f64) -> Result<Def
     Err(Error::Computation(format!("clearance {clearance_mm} mm: the nodes that touch do not settle")))
 }
 
-/// The tilt at the catheter's tip against √(3 δ Δκ), and by how much the wire's tip is elsewhere than without play.
+/// The tilt at the catheter's tip compared with √(3 δ Δκ), and the displacement of the wire's tip from that without
+/// clearance.
 pub(super) fn clearance() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     let arm = FORCE_N * BEYOND_MM / WIRE_NMM2;

@@ -1,4 +1,4 @@
-//! Part D: several instruments on one centre line.
+//! Part D: several coaxial instruments on one centre line.
 
 use nalgebra::Matrix3;
 
@@ -58,7 +58,7 @@ pub(super) fn stiffness_adds() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Two pre-curved instruments of length 1, of which the first is turned.
+/// Two pre-curved instruments of length 1, of which the first is rotated.
 struct Pair {
     problem: StaticProblem,
     iterations: usize,
@@ -67,7 +67,7 @@ struct Pair {
 impl Pair {
     const BENDING: [f64; 2] = [1.0, 2.0];
     const CURVATURES: [f64; 2] = [1.2, 0.8];
-    /// GJ of the second over that of the first.
+    /// Ratio of GJ of the second to that of the first.
     const TORSION: f64 = 1.5;
 
     /// λ² = κ₁κ₂ EI₁EI₂/(EI₁ + EI₂) (1/GJ₁ + 1/GJ₂).
@@ -86,7 +86,8 @@ impl Pair {
         Ok(Self { problem, iterations: 0 })
     }
 
-    /// Turns the first to an angle against the second, in degrees, from where they are; returns that of the tips.
+    /// Rotates the first to an angle against the second, in degrees, from the current state; returns that of the
+    /// tips.
     fn turn_to(&mut self, hand: f64) -> Result<f64> {
         let before = self.problem.initial.clone();
         self.problem.initial.angles[0] = hand.to_radians();
@@ -123,9 +124,9 @@ impl Pair {
         Err(Error::Computation(format!("D2: no hand angle found for tips at {tip}°")))
     }
 
-    /// Angle of the hand at which the tips snap round, and their angle just before, by bisection.
+    /// Angle of the hand at which the tips snap through, and their angle just before, by bisection.
     fn snap(&mut self) -> Result<[f64; 2]> {
-        /// Tips that are farther round than this have snapped, degrees.
+        /// Tip angle beyond which they have snapped through, degrees.
         const ROUND: f64 = 130.0;
         let (mut low, mut tip, mut step) = (0.0, 0.0, 5.0);
         while step > 1e-7 && low < 360.0 {
@@ -142,7 +143,7 @@ impl Pair {
     }
 }
 
-/// D2: two pre-curved instruments turned against each other.
+/// D2: two pre-curved instruments rotated against each other.
 pub(super) fn pair() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (lambda, hands) in [(0.8, [39.589933027, 108.272382565]), (1.5, [67.324275333, 151.898367219])] {
@@ -155,18 +156,18 @@ pub(super) fn pair() -> Result<Vec<Row>> {
     }
     let [hand, tip] = Pair::new(2.5)?.snap()?;
     rows.push(Row::relative("D2 λ=2.5", "hand where it snaps", hand, 228.975789690, 1e-3));
-    // The tip runs ahead of the hand there without bound: it is known to the root of what the hand is.
+    // The tip angle changes infinitely fast with the hand's there: its error is the square root of the hand's.
     rows.push(Row::relative("D2 λ=2.5", "tip where it snaps", tip, 92.41541, 1e-3));
     rows.push(rigid_torsion()?);
     Ok(rows)
 }
 
-/// Rigid in torsion, they bend to an arc of the mean of their curvatures, weighed by stiffness.
+/// If torsionally rigid, they bend to an arc with the stiffness-weighted mean of their curvatures.
 fn rigid_torsion() -> Result<Row> {
     let mut pair = Pair::with_torsion(1e4)?;
     pair.turn_to(90.0)?;
     let ([a, b], [p, q]) = (Pair::BENDING, Pair::CURVATURES);
-    // The first is turned from y to z.
+    // The first is rotated from y to z.
     let curvature = Vec3::new(0.0, b * q, a * p) / (a + b);
     let k = curvature.norm();
     let expected = Vec3::x() * (k.sin() / k) + curvature * ((1.0 - k.cos()) / (k * k));
@@ -204,7 +205,7 @@ pub(super) fn curved_in_straight() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// A close-fitting channel along a circle of this radius about (0, radius, 0), ½ k d² per length.
+/// A close-fitting channel along a circle of this radius about (0, radius, 0), with ½ k d² per length.
 struct Channel {
     radius: f64,
     stiffness: f64,
@@ -224,7 +225,7 @@ impl Channel {
         (0.5 * self.stiffness * (off * off + x.z * x.z), gradient, hessian)
     }
 
-    /// Goes through its quadrature points: element, ξ, weight, and what is there.
+    /// Iterates over its quadrature points: element, ξ, weight, and energy there.
     fn points(
         &self,
         elements: &[ElementData],

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 const HEIGHT: f64 = 0.05;
 /// Radius of the rod of C2; only the difference of distance and radius counts.
 const RADIUS: f64 = 0.02;
-/// Foundation modulus of C2 over EI/L⁴ that is as good as rigid.
+/// Foundation modulus of C2 over EI/L⁴, large enough to be practically rigid.
 const RIGID: f64 = 1e10;
 
 /// One equilibrium of C2.
@@ -25,12 +25,12 @@ struct Squeezed {
     middle_moment: f64,
 }
 
-/// C2: a clamped-clamped rod of length and stiffness 1 under an axial load between walls. It is symmetric, so this is its first
-/// half: clamped at one end, guided at the other, which stands for the middle.
+/// C2: a clamped-clamped rod of length and stiffness 1 under an axial load between walls. By symmetry this is its
+/// first half: clamped at one end, guided at the other, which is the middle.
 struct Elastica(TestRod);
 
 impl Elastica {
-    /// `elements` to the whole length.
+    /// `elements` on the whole length.
     fn new(elements: usize, modulus: f64) -> Result<Self> {
         let (half, wall) = (elements / 2, HEIGHT + RADIUS);
         let setup = Setup { length: 0.5, bending: 1.0, radius: RADIUS, elements: half, modulus };
@@ -44,7 +44,7 @@ impl Elastica {
         Ok(Self(channel))
     }
 
-    /// The equilibrium under `load`, from the last one.
+    /// The equilibrium under `load`, starting from the last one.
     fn at(&mut self, load: f64) -> Result<Squeezed> {
         let Self(channel) = self;
         let half = channel.elements().len();
@@ -87,8 +87,8 @@ impl Elastica {
         Ok((high, rod.at(high)?.shortening))
     }
 
-    /// Load at which contact spreads from a point to a line: where the bending moment in the middle vanishes, by the parabola
-    /// through three loads below it. (From there on the flat part soon buckles off the wall.)
+    /// Load at which point contact becomes line contact: where the bending moment in the middle vanishes, by the
+    /// parabola through three loads below it. (From there on the flat part soon buckles off the wall.)
     fn line_contact(elements: usize) -> Result<f64> {
         let mut rod = Self::new(elements, RIGID)?;
         let loads = [140.0, 145.0, 150.0, 155.0];
@@ -145,7 +145,8 @@ pub(super) fn elastica() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// A row that passes if every error is at most `ratio` times the one before: computed and expected are the last and the first.
+/// A row that passes if every error is at most `ratio` times the one before: computed and expected are the last and
+/// the first.
 pub(super) fn falling(name: &str, quantity: &str, errors: &[f64], ratio: f64) -> Row {
     let worst = errors.windows(2).map(|pair| pair[1] / pair[0]).fold(0.0, f64::max);
     let (first, last) = (errors[0], errors[errors.len() - 1]);
@@ -156,10 +157,10 @@ pub(super) fn falling(name: &str, quantity: &str, errors: &[f64], ratio: f64) ->
 const BENDING: f64 = 10.0;
 const WIRE_RADIUS: f64 = 0.45;
 const MODULUS: f64 = 1.0;
-/// Depth to which the rod of C6 is pressed into the floor beforehand, mm: so the floor also holds it where it would lift off.
+/// Initial penetration of the rod of C6 into the floor, mm: so the floor also holds it where it would lift off.
 const PRESSED: f64 = 0.02;
 
-/// C6: a rod pressed into a soft floor by its weight, `elements` of them in `length` mm.
+/// C6: a rod pressed into a soft floor by its weight, with `elements` in `length` mm.
 fn pressed(elements: usize, length: f64) -> Result<TestRod> {
     let setup = Setup { length, bending: BENDING, radius: WIRE_RADIUS, elements, modulus: MODULUS };
     let mut channel = channel(&setup, [PRESSED - WIRE_RADIUS, 10.0])?;
@@ -167,7 +168,7 @@ fn pressed(elements: usize, length: f64) -> Result<TestRod> {
     Ok(channel)
 }
 
-/// How deep a force presses the middle of the rod into the floor, mm.
+/// Depth by which a force presses the middle of the rod into the floor, mm.
 fn sunk(elements: usize, force: f64) -> Result<f64> {
     let mut channel = pressed(elements, 60.0)?;
     channel.loads.forces = vec![(elements / 2, Vec3::y() * -force)];

@@ -1,11 +1,13 @@
-//! Whether a device passes through a triangle of a surface, and whether it has sunk in there as deep as its step says.
+//! Whether a device passes through a triangle of a surface, and whether its report of the penetration there is
+//! correct.
 //!
-//! An independent check: it shares no code with the queries of the simulation, and takes the triangles as they are given, before
-//! any repair.
+//! An independent check: it shares no code with the queries of the simulation, and uses the triangles as given,
+//! before any repair.
 //!
-//! A soft wall gives way, and the axis of a device may lie behind it. Where the axis meets a triangle, the device has sunk in by its
-//! radius r; where it is D behind, by r + D. A depth changes by no more than the way along the device, so that a contact that is a
-//! away must tell at least r + D − a ([`CrossingTest::missing_mm`]). A device that has come through the wall tells less.
+//! A soft wall yields, and the axis of a device may be behind it. Where the axis meets a triangle, the penetration is
+//! its radius r; where it is D behind, r + D. A depth changes by at most the distance along the device, so a contact
+//! at a distance a must report at least r + D − a ([`CrossingTest::missing_mm`]). A device that has come through the
+//! wall reports less.
 
 use std::collections::BTreeMap;
 
@@ -14,24 +16,26 @@ use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{NoStore, SurfaceMesh, Wall};
 
-/// Chords per element: with 4 of them, a curve of radius 10 mm in an element of 5 mm is met within 0.02 mm.
+/// Number of chords per element: with 4, the error for a curve of radius 10 mm in an element of 5 mm is within 0.02
+/// mm.
 const CHORDS: usize = 4;
 
-/// Least size of a grid's cell, mm.
+/// Smallest size of a grid's cell, mm.
 const LEAST_CELL_MM: f64 = 0.5;
-/// Most cells along the longest edge of a triangle: one huge triangle among small ones must not fill millions of cells.
+/// Largest number of cells along the longest edge of a triangle: one huge triangle among small ones must not fill
+/// millions of cells.
 const MOST_CELLS_ALONG: f64 = 32.0;
 
-/// Half of the distance between the places at which a device feels the wall, in radii, is at most this.
+/// Upper bound of half the distance between contact points, in radii.
 const APART_RADII: f64 = 1.5;
-/// Beyond an opening's plane and within so many of its radii of its axis there is no wall to be behind.
+/// Distance from an opening's axis, in its radii, within which there is no wall beyond the opening's plane.
 const BESIDE_RADII: f64 = 2.0;
-/// A device farther behind the triangles is told to be as far as this, mm.
+/// Larger depths behind the triangles are reported as this, mm.
 const FARTHEST_MM: f64 = 20.0;
 
-/// How far the wall that is felt may be from the triangles, mm, …
+/// Largest distance of the felt wall from the triangles, mm.
 const FELT_MM: f64 = 0.1;
-/// … and in edges: a smooth wall that turns by a radian along an edge is an eighth of it away from its middle.
+/// The same in edges: a smooth wall that turns by a radian along an edge is an eighth of it away from its middle.
 const FELT_EDGES: f64 = 0.125;
 
 /// The triangles of a mesh in the cells of a grid, for testing lines against them.
@@ -74,27 +78,27 @@ impl CrossingTest {
             .flat_map(move |x| (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| [x, y, z])))
     }
 
-    /// Where the straight way from one point to another first passes through a triangle, as a part of the way.
+    /// Where the straight path from one point to another first passes through a triangle, as a fraction of the path.
     fn first_met(&self, from: Vec3, to: Vec3) -> Option<f64> {
         let cells = self.cells_of(&from.inf(&to), &from.sup(&to));
         let near = cells.flat_map(|cell| self.cells.get(&cell).into_iter().flatten());
         near.filter_map(|&i| passes(&self.triangles[i as usize], from, to)).min_by(f64::total_cmp)
     }
 
-    /// Whether any piece of the line through `points` passes through a triangle.
+    /// Whether any segment of the line through `points` passes through a triangle.
     pub fn crosses(&self, points: &[Vec3]) -> bool {
         points.windows(2).any(|ends| self.first_met(ends[0], ends[1]).is_some())
     }
 
-    /// How much less deep than it is, mm, the device says to have sunk in where it passes through a triangle and beyond; `None` where
-    /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in. `wall`, made of these triangles, tells inside
-    /// from outside.
+    /// By how much the penetration reported by the device is too small, mm, where it passes through a triangle and
+    /// beyond; `None` if it passes through none. If the device was pressed in, this is at most the distance between
+    /// the felt wall and the triangles. `wall`, made of these triangles, distinguishes inside from outside.
     pub fn missing_mm(&self, wall: &Wall, simulation: &Simulation) -> Option<f64> {
         let (shape, stack) = (simulation.shape(), simulation.stack());
         let inserted_mm = simulation.report().lengths_mm();
         let contacts = &simulation.report().contacts;
         let points = curve(shape);
-        // A tip goes out through an opening, and so does a bow whose tip is still within.
+        // A tip leaves through an opening, and so does a bow whose tip is still inside.
         let is_out = |x: &Vec3| {
             wall.openings().iter().any(|opening| {
                 let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
@@ -102,13 +106,13 @@ impl CrossingTest {
             })
         };
         let missing = |x: &Vec3, behind_mm: f64, (piece, part): (usize, f64)| {
-            // An instrument may end at the element's first node: the radius is that of the place itself.
+            // An instrument may end at the element's first node, so the radius is that at the position itself.
             let (e, within) = (piece / CHORDS, ((piece % CHORDS) as f64 + part) / CHORDS as f64);
             let (near, far) = (shape.from_tip_mm[e], shape.from_tip_mm[e + 1]);
             let radius_mm = stack.felt_radius_mm(&inserted_mm, near + (far - near) * within);
             let near = contacts.iter().map(|c| ((c.position_mm - x).norm(), c.penetration_mm));
             let next = near.min_by(|a, b| a.0.total_cmp(&b.0));
-            // Next to a place without a contact the device does not press at all.
+            // Next to a position without contact the device does not press at all.
             let told =
                 next.filter(|(away, _)| *away < APART_RADII * radius_mm).map(|(away, depth)| away + depth);
             radius_mm + behind_mm - told.unwrap_or(0.0)
@@ -134,7 +138,7 @@ impl CrossingTest {
         most
     }
 
-    /// Whether the device of a simulation is behind the triangles without having sunk in there as deep as it is.
+    /// Whether the device of a simulation is behind the triangles by more than its reported penetration.
     pub fn is_crossed_by(&self, simulation: &Simulation) -> bool {
         let felt_mm = FELT_MM.max(FELT_EDGES * self.edge_mm);
         // The triangles are those of its wall, so it has one.
@@ -178,7 +182,7 @@ pub fn curve(shape: &Shape) -> Vec<Vec3> {
     curve_in(shape, CHORDS)
 }
 
-/// The same with so many chords an element.
+/// The same with this number of chords per element.
 pub(crate) fn curve_in(shape: &Shape, chords: usize) -> Vec<Vec3> {
     let (x, t, s) = (&shape.positions_mm, &shape.tangents, &shape.from_tip_mm);
     let mut points: Vec<Vec3> = x.first().copied().into_iter().collect();
@@ -196,8 +200,8 @@ pub(crate) fn curve_in(shape: &Shape, chords: usize) -> Vec<Vec3> {
     points
 }
 
-/// Where the way passes through a triangle, as a part of it: Möller and Trumbore, *Fast, minimum storage ray/triangle intersection*,
-/// 1997.
+/// Where the path passes through a triangle, as a fraction of it: Möller and Trumbore, *Fast, minimum storage
+/// ray/triangle intersection*, 1997.
 fn passes([a, b, c]: &[Vec3; 3], from: Vec3, to: Vec3) -> Option<f64> {
     let (way, e, f) = (to - from, b - a, c - a);
     let p = way.cross(&f);
@@ -254,7 +258,7 @@ mod tests {
         let z = |x: f64, z: f64| Vec3::new(x, 0.0, z);
         assert!(test.crosses(&[z(0.0, 50.0), z(9.0, 50.0)]));
         assert!(!test.crosses(&[z(0.0, 10.0), z(0.0, 50.0)]));
-        // Both ends inside, only the curve between them leaves.
+        // Both ends are inside; only the curve between them leaves.
         let t = Vec3::new(1.0, 0.0, 0.2).normalize();
         let back = Vec3::new(-t.x, 0.0, t.z);
         let shape = |t: Vec3, back: Vec3| Shape {

@@ -1,5 +1,5 @@
-//! C1: a rod in a cylinder that leaves its axis a play r: its helix under thrust, the loads at which it leaves the bottom of
-//! a horizontal cylinder, and friction along the helix. In units of EI and r.
+//! C1: a rod in a cylinder with a clearance r: its helix under thrust, the loads at which it leaves the bottom of a
+//! horizontal cylinder, and friction along the helix. In units of EI and r.
 
 use super::Row;
 use super::contact::falling;
@@ -9,10 +9,11 @@ use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
 
-/// Radius of the rod over the play; only the difference of distance and radius counts.
+/// Radius of the rod relative to the clearance; only the difference of distance and radius matters.
 const RADIUS: f64 = 0.3;
 
-/// The cylinder of play 1 about x, from −1 to `length` + 1: rings of `around` vertices, twice as far apart as these.
+/// The cylinder of clearance 1 about x, from −1 to `length` + 1: rings of `around` vertices, twice as far apart as
+/// these.
 fn cylinder(length: f64, around: u32) -> Result<Wall> {
     let radius = 1.0 + RADIUS;
     let apart = 2.0 * TAU * radius / f64::from(around);
@@ -21,7 +22,7 @@ fn cylinder(length: f64, around: u32) -> Result<Wall> {
     for i in 0..=rings {
         let x = (length + 2.0) * f64::from(i) / f64::from(rings) - 1.0;
         for k in 0..around {
-            // Every other ring is turned by half an edge.
+            // Every other ring is rotated by half an edge.
             let angle = TAU * (f64::from(k) + 0.5 * f64::from(i % 2)) / f64::from(around);
             mesh.vertices_mm.push(Vec3::new(x, -radius * angle.cos(), radius * angle.sin()));
         }
@@ -37,32 +38,33 @@ fn cylinder(length: f64, around: u32) -> Result<Wall> {
     Wall::from_surface(&mesh)
 }
 
-/// A place `turn` radians around the cylinder from its bottom, and the direction of a helix there.
+/// A position `turn` radians around the cylinder from its bottom, and the direction of a helix there.
 fn on_helix(turn: f64, angle: f64) -> (Vec3, Vec3) {
     let (sin, cos) = turn.sin_cos();
     (Vec3::new(0.0, -cos, sin), Vec3::new(angle.cos(), angle.sin() * sin, angle.sin() * cos))
 }
 
-/// How fine a helix is computed.
+/// Resolution of a helix.
 #[derive(Debug, Clone, Copy)]
 struct Fineness {
-    /// Elements to a turn.
+    /// Elements per turn.
     elements: usize,
     /// Vertices around the cylinder.
     around: u32,
-    /// How often the depth to which the helix presses itself into the wall goes into the play.
+    /// Ratio of the clearance to the depth to which the helix presses itself into the wall.
     hardness: f64,
 }
 
-/// A rod wound into `turns` turns of about `angle` by the thrust that belongs to it: clamped at its start along the helix,
-/// otherwise free, so no moment about the cylinder's axis acts. What the ends disturb decays by a factor of 10⁴ in a turn.
+/// A rod wound into `turns` turns of about `angle` by the corresponding thrust: clamped at its start along the helix,
+/// otherwise free, so no moment about the cylinder's axis acts. The influence of the ends decays by a factor of 10⁴
+/// per turn.
 struct Helix {
     rod: TestRod,
     turns: usize,
     per_turn: usize,
 }
 
-/// What is measured in a turn.
+/// Measurements in a turn.
 struct Turn {
     /// Mean sin²α.
     sine2: f64,
@@ -97,7 +99,7 @@ impl Helix {
         Ok(Self { rod, turns, per_turn })
     }
 
-    /// Arc lengths where turn `k` begins and ends, just before the nodes there.
+    /// Arc lengths where turn `k` starts and ends, just before the nodes there.
     fn range(&self, k: usize) -> [f64; 2] {
         let h = self.rod.elements()[0].length;
         [k, k + 1].map(|k| h * ((self.per_turn * k) as f64 - 1e-6))
@@ -125,7 +127,7 @@ impl Helix {
         }
     }
 
-    /// Thrust in the rod where turn `k` begins.
+    /// Thrust in the rod at the start of turn `k`.
     fn thrust_at(&mut self, k: usize) -> f64 {
         let [end, _] = self.range(k);
         let touches = self.rod.touches();
@@ -166,10 +168,10 @@ pub(super) fn helix() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Foundation modulus of the cylinder under the rod that lies in it.
+/// Foundation modulus of the cylinder under the rod lying in it.
 const FLOOR: f64 = 1e3;
 
-/// Load at which a rod of weight 1 per length that lies at the bottom of the cylinder, pinned at both ends, begins to snake.
+/// Load at which a rod of weight 1 per length at the bottom of the cylinder, pinned at both ends, starts to snake.
 fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
     let elements = (8.0 * length / PI) as usize;
     let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus: FLOOR };
@@ -185,11 +187,13 @@ fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
     Ok(rod.buckling_load(8.0))
 }
 
-/// F/√(EI w/r) of a helix without weight, for the weight w that would lift its energy to that of the straight rod at the bottom.
+/// F/√(EI w/r) of a helix without weight, for the weight w that would raise its energy to that of the straight rod at
+/// the bottom.
 ///
-/// Chen, Lin and Cheatham (1990) compare the straight rod with a uniform helix of the best pitch under the same load, of energy
-/// ½ EI r² q⁴ − ½ F r² q² + w r per length: nothing at F = 2√2 √(EI w/r). It is no limit of stability, and weight makes the
-/// helix uneven: minimised over its shape too, the energy vanishes 1.34 % earlier, at 2.79043 √(EI w/r).
+/// Chen, Lin and Cheatham (1990) compare the straight rod with a uniform helix of the best pitch under the same load,
+/// of energy ½ EI r² q⁴ − ½ F r² q² + w r per length: zero at F = 2√2 √(EI w/r). This is not a stability limit, and
+/// weight makes the helix non-uniform: minimised over its shape too, the energy vanishes 1.34 % earlier, at 2.79043
+/// √(EI w/r).
 fn winding(angle: f64) -> Result<f64> {
     let mut helix = Helix::new(Fineness { elements: 32, around: 48, hardness: 1e3 }, angle, 3)?;
     let load = helix.rod.clamp().force.x;
@@ -221,12 +225,12 @@ pub(super) fn weight() -> Result<Vec<Row>> {
 
 /// A rod that is pushed through its helix.
 ///
-/// Where friction acts along the axis alone, thrust and helix belong together as without it, and F_in = F_out/(1 − x) with
-/// x = μ r L F_out/(4EI). A rod that slides along its own curve is rubbed along that curve, which turns it about the axis as
-/// well; then the whole helix keeps the pitch of its far end, presses with r F_out (2F − F_out)/(4EI) where the thrust is F,
-/// and F_in = ½ F_out (1 + e^{2x}): the same but for x³/3. Both hold for small α.
+/// If friction acts along the axis alone, thrust and helix are related as without it, and F_in = F_out/(1 − x) with
+/// x = μ r L F_out/(4EI). On a rod that slides along its own curve friction acts along that curve, which also rotates
+/// it about the axis; then the whole helix keeps the pitch of its far end, presses with r F_out (2F − F_out)/(4EI)
+/// where the thrust is F, and F_in = ½ F_out (1 + e^{2x}): the same up to x³/3. Both hold for small α.
 struct Pushed {
-    /// Thrust where five turns begin and where they end, and that at the end of the rod.
+    /// Thrust at the start and end of five turns, and at the end of the rod.
     thrust: [f64; 3],
     /// μ r L/(4EI) of these turns.
     friction: f64,
@@ -241,13 +245,13 @@ impl Pushed {
         Ok(Self { thrust, friction: 0.25 * friction * length })
     }
 
-    /// The ratio of the thrusts, and what it is with friction along the axis.
+    /// The ratio of the thrusts, and its value for friction along the axis.
     fn along_axis(&self) -> [f64; 2] {
         let [before, behind, _] = self.thrust;
         [before / behind, 1.0 / (1.0 - self.friction * behind)]
     }
 
-    /// The ratio of F − ½F_out, and what it is with friction along the curve.
+    /// The ratio of F − ½F_out, and its value for friction along the curve.
     fn along_curve(&self) -> [f64; 2] {
         let [before, behind, out] = self.thrust;
         [(before - 0.5 * out) / (behind - 0.5 * out), (2.0 * self.friction * out).exp()]

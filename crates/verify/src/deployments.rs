@@ -1,8 +1,9 @@
-//! Random deployments of coils: two coils are pushed, pulled and turned out of a catheter that moves as well, and detached. What `endowire verify --stress` runs beside
-//! random commands.
+//! Random deployments of coils: two coils are pushed, pulled and rotated out of a catheter that moves too, and
+//! detached. Run by `endowire verify --stress` in addition to random commands.
 //!
-//! The check is independent of the simulation: it has the centre lines that are told alone. No two pieces of what is out are nearer to each other than their surfaces allow, whether
-//! they are of one coil, of two, or of what is in; none is behind the wall, and none is longer or shorter than it was.
+//! The check is independent of the simulation: it uses only the reported centre lines. No two pieces outside the
+//! catheter may be nearer to each other than their surfaces allow, whether of one coil, of two, or of an inserted
+//! device; none may be behind the wall, and none may change its length.
 
 use endowire_core::device::{Device, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
@@ -15,22 +16,22 @@ use serde::Serialize;
 use crate::crossing::{CrossingTest, chords_mm, curve_in};
 use crate::sequences::Random;
 
-/// Deployments of the whole stress.
+/// Number of deployments of the whole stress test.
 pub const DEPLOYMENTS: u64 = 300;
-/// Commands of a deployment.
+/// Number of commands per deployment.
 const COMMANDS: usize = 80;
 /// Instruments of the stack: two coils, and the catheter.
 const CATHETER: usize = 2;
-/// Chords of an element: its curve is met within a thousandth of a radius.
+/// Number of chords per element: its curve is met within a thousandth of a radius.
 const CHORDS: usize = 12;
-/// Axes nearer to each other than this part of the distance at which surfaces touch are too deep in each other, …
+/// Distance of axes, relative to the touching distance, below which the penetration is too deep.
 const DEEP: f64 = 0.97;
-/// … and nearer than this they have crossed.
+/// Distance below which they have crossed.
 const CROSSED: f64 = 0.5;
-/// Largest part of a length by which a coil may be longer or shorter.
+/// Largest relative change of a coil's length.
 const STRETCHED: f64 = 2e-3;
 
-/// What became of a deployment.
+/// Result of a deployment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct DeploymentRow {
     /// Its number.
@@ -41,32 +42,32 @@ pub struct DeploymentRow {
     pub commands: usize,
     /// Newton iterations of them.
     pub iterations: u64,
-    /// Commands in which something jumped.
+    /// Commands with a jump.
     pub jumps: usize,
-    /// Commands that ended without an equilibrium, and said so.
+    /// Commands that ended without an equilibrium, and reported it.
     pub unconverged: usize,
-    /// Commands that were refused, with a reason, and lost nothing.
+    /// Commands that were rejected, with a reason, without side effects.
     pub refused: usize,
-    /// Coils that were detached.
+    /// Coils detached.
     pub detached: usize,
-    /// Least distance of two axes, over that at which their surfaces touch.
+    /// Smallest distance of two axes, relative to that at which their surfaces touch.
     pub least_distance: f64,
-    /// States in which surfaces are too deep in each other, …
+    /// States with too deep penetration.
     pub deep: usize,
-    /// … in which axes have crossed, …
+    /// States in which axes have crossed.
     pub crossed: usize,
-    /// … in which one is behind the wall, …
+    /// States in which one is behind the wall.
     pub behind: usize,
-    /// … and in which one is longer or shorter.
+    /// States in which the length of one has changed.
     pub stretched: usize,
-    /// The first thing that went wrong.
+    /// The first error.
     pub first: String,
-    /// Whether nothing did.
+    /// Whether there was no error.
     pub pass: bool,
 }
 
 impl DeploymentRow {
-    /// The heads of what a row shows.
+    /// Column heads of a row.
     pub const HEAD: &str =
         "seed  cmds  iter. jumps  unb refused out least deep crossed behind length  what, and what was first";
 }
@@ -83,7 +84,7 @@ impl std::fmt::Display for DeploymentRow {
     }
 }
 
-/// A catheter whose tip stands in a sac, and two coils in it.
+/// A catheter whose tip is in a sac, and two coils in it.
 struct Scene {
     simulation: Simulation,
     wall: Wall,
@@ -153,7 +154,8 @@ fn advance(instrument: usize, mm: f64) -> Move {
     Move { instrument, command: Command::advance(mm) }
 }
 
-/// What is out of a coil, or of all that is in: points of its axis in order, and the length of device that they stand for, mm.
+/// The part of a coil, or of the inserted devices, that is out: points of its axis in order, and the corresponding
+/// length of device, mm.
 fn axes(simulation: &Simulation) -> Vec<(Vec<Vec3>, f64)> {
     let of = |shape: &Shape| {
         let length_mm = shape.from_tip_mm.first().copied().unwrap_or(0.0);
@@ -164,7 +166,8 @@ fn axes(simulation: &Simulation) -> Vec<(Vec<Vec3>, f64)> {
     all
 }
 
-/// Least distance of two points of axes, but for those of one axis that are less than a turn of the radius apart along it, mm, and the numbers of the axes.
+/// Smallest distance of two points of axes, except those of one axis less than a turn of the radius apart along it,
+/// mm, and the indices of the axes.
 fn nearest(axes: &[(Vec<Vec3>, f64)], radius_mm: f64) -> (f64, [usize; 2]) {
     let apart_mm = std::f64::consts::TAU * radius_mm;
     let mut least = (f64::INFINITY, [0; 2]);
@@ -188,7 +191,7 @@ fn nearest(axes: &[(Vec<Vec3>, f64)], radius_mm: f64) -> (f64, [usize; 2]) {
     (least.0.sqrt(), least.1)
 }
 
-/// A random command: mostly the coil that is next is pushed on.
+/// A random command: mostly pushes the next coil.
 fn command(random: &mut Random, coil: usize) -> Move {
     let advance_mm = random.one_of(&[0.3, 0.5, 1.0, 1.0, 2.0, 3.0]);
     match random.between(0.0, 1.0) {
@@ -205,7 +208,7 @@ fn command(random: &mut Random, coil: usize) -> Move {
 /// Runs a deployment.
 ///
 /// # Errors
-/// None that a seed is to blame for.
+/// None that depends on the seed.
 pub fn run(seed: u64) -> Result<DeploymentRow> {
     let mut random = Random(seed, 1 << 32);
     let Scene { mut simulation, wall, radius_mm, what } = Scene::new(&mut random)?;

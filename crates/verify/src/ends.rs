@@ -1,4 +1,4 @@
-//! D6: a wire is pushed on in a catheter, and its end and the nodes that go with it slide along the line.
+//! D6: a wire is pushed on in a catheter, and its end slides along the line with its nodes.
 
 use super::Row;
 use endowire_core::device::{Device, Instrument, Section, Stack};
@@ -8,17 +8,17 @@ use endowire_core::{Error, Result, Vec3};
 
 pub(super) const WIRE: usize = 0;
 pub(super) const CATHETER: usize = 1;
-/// Advance of a step, mm, and steps: the wire goes through twenty elements of 2 mm.
+/// Advance per step, mm, and number of steps: the wire passes through twenty elements of 2 mm.
 const STEP_MM: f64 = 0.1;
 const STEPS: usize = 400;
-/// Forces are compared with differences of the energy after every so many steps: marks change at whole millimetres, to which an odd number
-/// of steps does not come, …
+/// Number of steps between comparisons of forces with differences of the energy: marks change at whole millimetres,
+/// which an odd number of steps avoids.
 const COMPARED: usize = 8;
-/// … and over steps of so much, mm.
+/// Step of these differences, mm.
 const DIFFERENCE_MM: f64 = 0.01;
-/// Least part of the way that what a force accounts for is looked at, mm.
+/// Shortest part of the motion over which the unexplained energy is examined, mm.
 const LEAST_MM: f64 = 1e-4;
-/// A jump of the energy over its total.
+/// A jump of the energy, relative to its total.
 const JUMP: f64 = 1e-6;
 
 /// A wire with a hook of this length and curvature in a bent catheter.
@@ -54,8 +54,8 @@ pub(super) fn force(simulation: &Simulation, instrument: usize) -> f64 {
     simulation.report().instruments[instrument].push_force_n.unwrap_or(f64::NAN)
 }
 
-/// Largest change of the energy on the wire's way that its force does not account for, mJ. Where that is more than `bar_mj` the way is
-/// cut: what is smooth becomes less by squares, and a jump stays.
+/// Largest change of the energy along the wire's motion that its force does not explain, mJ. If that exceeds `bar_mj`
+/// the motion is subdivided: smooth parts decrease quadratically, a jump remains.
 fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> Result<f64> {
     let start = simulation.clone();
     let (before, pushed) = (energy(simulation), force(simulation, WIRE));
@@ -70,7 +70,7 @@ fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> Result<
     Ok(first.max(unaccounted(simulation, 0.5 * way_mm, bar_mj)?))
 }
 
-/// Slope of the energy with respect to an instrument's insertion, by its differences, N.
+/// Slope of the energy in an instrument's insertion, by finite differences, N.
 fn slope(simulation: &Simulation, instrument: usize) -> Result<f64> {
     let at = |k: i32| {
         let mut moved = simulation.clone();
@@ -82,14 +82,14 @@ fn slope(simulation: &Simulation, instrument: usize) -> Result<f64> {
     Ok((8.0 * near - far) / (12.0 * DIFFERENCE_MM))
 }
 
-/// A way of the wire: where its hook leaves the catheter the force jumps, and it comes by no such place.
+/// A motion of the wire that avoids the place where its hook leaves the catheter and the force jumps.
 struct Way {
     place: &'static str,
     wall: GeneratedWall,
     depth_mm: f64,
     /// Length and curvature of the wire's hook, mm and 1/mm.
     hook: (f64, f64),
-    /// Length of the catheter that is in, and by how much the wire's is more, mm.
+    /// Inserted length of the catheter, and by how much the wire's exceeds it, mm.
     inserted_mm: f64,
     ahead_mm: f64,
 }

@@ -1,4 +1,5 @@
-//! C9: Poiseuille flow in a straight tube drags at a wire: along its axis, which the hand holds against, and across it, which bends it.
+//! C9: drag of Poiseuille flow in a straight tube on a wire: along its axis, which the hand balances, and across it,
+//! which bends it.
 
 use std::f64::consts::PI;
 
@@ -34,8 +35,9 @@ fn wire(stiffness_nmm2: f64, start: Vec3, direction: Vec3) -> Result<Simulation>
         .build()
 }
 
-/// Along the axis a length is dragged by ½πG((R² − a²)/ln(R/a) − 2a²), G = 8μQ/πR⁴ (Bird, Stewart and Lightfoot, *Transport Phenomena*,
-/// section 2.4). Across a diameter a thin thread, a ≪ R, is dragged by twice 2πμu/ln((R² − e²)/aR) with u = G(R² − e²)/4μ, and bends as a beam.
+/// Along the axis the drag per length is ½πG((R² − a²)/ln(R/a) − 2a²), G = 8μQ/πR⁴ (Bird, Stewart and Lightfoot,
+/// *Transport Phenomena*, section 2.4). Across a diameter the drag on a thin thread, a ≪ R, is twice 2πμu/ln((R² −
+/// e²)/aR) with u = G(R² − e²)/4μ, and it bends like a beam.
 pub(super) fn drag() -> Result<Vec<Row>> {
     let gradient = 8.0 * VISCOSITY_MPA_S * 1e-9 * INFLOW_ML_PER_S * 1e3 / (PI * TUBE_MM.powi(4));
     let mut along = wire(20.0, Vec3::z() * 5.0, Vec3::z())?;

@@ -1,4 +1,5 @@
-//! Part C by pushing: the wire in a bend, the frictionless sleeve, the soft-walled tube, and one that is pressed in deeply.
+//! Part C by pushing: the wire in a bend, the frictionless sleeve, the soft-walled tube, and one with deep
+//! penetration.
 
 use super::contact::falling;
 use super::{Row, at_end, unit_rod};
@@ -73,7 +74,7 @@ pub(super) fn push(simulation: &mut Simulation, length_mm: f64, steps: usize) ->
     Ok(())
 }
 
-/// Slope of the energy with the inserted length, over 2 `step_mm`. Leaves the device where it was.
+/// Slope of the energy in the inserted length, over 2 `step_mm`. The device does not move.
 fn slope_of_energy(simulation: &mut Simulation, step_mm: f64) -> Result<f64> {
     let before = simulation.step(Command::retract(step_mm))?.energy.total();
     let after = simulation.step(Command::advance(2.0 * step_mm))?.energy.total();
@@ -84,7 +85,7 @@ fn slope_of_energy(simulation: &mut Simulation, step_mm: f64) -> Result<f64> {
 /// Radius of the bend of C3 in mm; EI is its square, so that forces in N are those of the list.
 const BEND: f64 = 30.0;
 
-/// What C3 compares, in units of EI and R.
+/// Quantities compared in C3, in units of EI and R.
 struct InBend {
     wall_force: f64,
     root_moment: f64,
@@ -94,7 +95,7 @@ struct InBend {
     slope: f64,
 }
 
-/// C3: a wire pushed 0.8 R into a circular bend that leaves its axis a play of 0.1 R.
+/// C3: a wire pushed 0.8 R into a circular bend with a clearance of 0.1 R.
 fn in_bend(fine: Fineness, friction: f64) -> Result<InBend> {
     const WIRE_RADIUS: f64 = 0.45;
     let radius_mm = 0.1 * BEND + WIRE_RADIUS;
@@ -180,7 +181,7 @@ pub(super) fn sleeve() -> Result<Vec<Row>> {
     ])
 }
 
-/// What C5 gives at one fineness: triangles of the wall, position of the tip, report, and slope of the energy.
+/// Results of C5 at one resolution: triangles of the wall, position of the tip, report, and slope of the energy.
 struct InSoftTube {
     triangles: usize,
     tip: Vec3,
@@ -193,11 +194,11 @@ struct InSoftTube {
 const SOFT_TIP: Vec3 = Vec3::new(39.74440707407, 4.11600170316, 0.0);
 /// Bending energy there, mJ.
 const SOFT_BENDING: f64 = 3.992828408e-3;
-/// Wall energy, mJ, of which the line holds 4.175e-8 beside the tip's cap. The two-point solution of the list, with a residual of
-/// 10⁻⁷ and contact over the last 0.0103 mm alone, gives it as 5.51e-6.
+/// Wall energy, mJ, of which 4.175e-8 are due to the line outside the tip's cap. The two-point solution of the list,
+/// with a residual of 10⁻⁷ and contact over the last 0.0103 mm alone, gives 5.51e-6.
 const SOFT_WALL: f64 = 5.493707955e-6;
 
-/// C5: a wire in a soft-walled tube, 40 mm inserted.
+/// C5: a wire inserted by 40 mm in a soft-walled tube.
 fn in_soft_tube(fine: Fineness) -> Result<InSoftTube> {
     let tube = Tube {
         begin_mm: 0.0,
@@ -245,14 +246,14 @@ pub(super) fn soft_tube() -> Result<Vec<Row>> {
     let bend = |found: &InSoftTube| (found.report.energy.bend / SOFT_BENDING - 1.0).abs();
     let errors = [&coarse, &middle, &found].map(bend);
     rows.push(falling("C5 h = 1 mm", "error of bending, 1.2 … 0.3 mm", &errors, 0.5));
-    // Shorter elements than 10 mm change less than the wall's mesh does.
+    // Shorter elements than 10 mm matter less than the wall's mesh.
     let tip = |element_mm: f64| -> Result<f64> { Ok((at(element_mm, 0.3)?.tip - found.tip).norm()) };
     let errors = [tip(20.0)?, tip(10.0)?, tip(5.0)?];
     rows.push(falling("C5 edges 0.3 mm", "tip, h = 20, 10, 5 against 1", &errors, 0.5));
     Ok(rows)
 }
 
-/// What C8 compares at one length: where the tip is (mm), how deep it is in the wall (mm), and energies (mJ).
+/// Quantities compared in C8 at one length: position of the tip (mm), its penetration (mm), and energies (mJ).
 struct InYieldingTube {
     tip: Vec3,
     deepest: f64,
@@ -260,8 +261,9 @@ struct InYieldingTube {
     wall: f64,
 }
 
-/// C8 with 30 and with 50 mm of wire inserted, by the two-point boundary value problem of the inextensible elastica on the foundation ½ k p²
-/// with the tip's cap: at 50 mm twice the wire's radius deep. Energies are listed for the second.
+/// C8 with 30 and with 50 mm of wire inserted, by the two-point boundary value problem of the inextensible elastica
+/// on the foundation ½ k p² with the tip's cap: at 50 mm the penetration is twice the wire's radius. Energies are
+/// listed for the second.
 const YIELDING: [InYieldingTube; 2] = [
     InYieldingTube {
         tip: Vec3::new(29.674645, 4.016187, 0.0),
@@ -272,7 +274,7 @@ const YIELDING: [InYieldingTube; 2] = [
     InYieldingTube { tip: Vec3::new(39.9816, 24.5033, 0.0), deepest: 0.986, bend: 0.5061, wall: 0.0331 },
 ];
 
-/// C8: a stiff wire in a quarter turn whose wall gives way by twice the wire's radius, 30 and 50 mm inserted.
+/// C8: a stiff wire in a quarter turn whose wall yields by twice the wire's radius, inserted by 30 and 50 mm.
 fn in_yielding_tube(fine: Fineness) -> Result<[InYieldingTube; 2]> {
     let tube = Tube {
         begin_mm: 0.0,
@@ -283,7 +285,7 @@ fn in_yielding_tube(fine: Fineness) -> Result<[InYieldingTube; 2]> {
         radius_mm: 2.5,
     };
     let wire = Device::uniform(100.0, 0.5, 40.0)?;
-    // A chord of 0.5 mm is off the axis by 1.3 µm, one of 1 mm by 5: more than the mesh is.
+    // A chord of 0.5 mm is off the axis by 1.3 µm, one of 1 mm by 5: more than the error of the mesh.
     let mut simulation = at_origin(tube.wall(0.5, fine.edge_mm)?, wire, fine, 0.0)?;
     let mut after = |length_mm: f64| -> Result<InYieldingTube> {
         push(&mut simulation, length_mm, (0.5 * length_mm) as usize)?;
@@ -301,7 +303,7 @@ fn in_yielding_tube(fine: Fineness) -> Result<[InYieldingTube; 2]> {
 pub(super) fn yielding_tube() -> Result<Vec<Row>> {
     let at = |mm: f64| in_yielding_tube(Fineness { element_mm: mm, edge_mm: mm, modulus_n_per_mm2: 0.05 });
     let off = |found: &InYieldingTube, listed: &InYieldingTube| (found.tip - listed.tip).norm();
-    // At 0.5 mm the tip of 30 mm lies 2.3 µm out of the plane, which nothing but the wall's roundness holds it to.
+    // At 0.5 mm the tip of 30 mm is 2.3 µm out of the plane, in which only the wall's curvature holds it.
     let found = at(0.25)?;
     let mut rows = Vec::new();
     for ((found, listed), length) in found.iter().zip(&YIELDING).zip([30, 50]) {

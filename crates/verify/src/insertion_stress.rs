@@ -1,8 +1,9 @@
-//! Numerical stress of an insertion: what `endowire verify --stress` runs beside the stress of the rod alone.
+//! Numerical stress test of an insertion: run by `endowire verify --stress` in addition to the stress test of the rod
+//! alone.
 //!
-//! A wire is pushed around a bend, far beyond the ordinary in every direction at once: walls from jelly to steel, wires from
-//! thread to rod, coarse and fine elements, small and large increments, with and without friction. Every combination must
-//! converge at every step, or stop with a reason that names what is the matter.
+//! A wire is pushed around a bend, with parameters far beyond the usual in every direction at once: walls from jelly
+//! to steel, wires from thread to rod, coarse and fine elements, small and large increments, with and without
+//! friction. Every combination must converge at every step, or stop with a reason that names the problem.
 
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
@@ -21,14 +22,14 @@ const ELEMENTS: [f64; 3] = [0.2, 2.0, 10.0];
 const INCREMENTS: [f64; 3] = [0.01, 1.0, 20.0];
 /// Coefficients of friction.
 const FRICTIONS: [f64; 3] = [0.0, 0.1, 0.5];
-/// Steps of the increment that is tried, …
+/// Number of steps of the tested increment.
 const STEPS: usize = 5;
-/// … and the largest way they may take, mm.
+/// Their largest total length, mm.
 const MOST_MM: f64 = 40.0;
-/// Steps of 2 mm in which the wire is first brought to the wall, and bent by it.
+/// Number of steps of 2 mm that first bring the wire to the wall, and bend it.
 const APPROACH: usize = 12;
 
-/// One combination and what became of it.
+/// One combination of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct InsertionCase {
     /// Wall modulus, N/mm².
@@ -43,7 +44,7 @@ pub struct InsertionCase {
     pub friction: f64,
 }
 
-/// What became of a combination.
+/// Result of a combination.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InsertionRow {
     /// The combination.
@@ -55,20 +56,20 @@ pub struct InsertionRow {
     pub iterations: u32,
     /// Newton iterations of the worst step.
     pub most_iterations: u32,
-    /// Most sub-steps of a step.
+    /// Largest number of sub-steps of a step.
     pub most_substeps: u32,
-    /// Deepest penetration, mm.
+    /// Largest penetration, mm.
     pub max_penetration_mm: f64,
     /// `converged`, or the reason why a step stopped.
     pub outcome: String,
     /// Whether every step converged.
     pub converged: bool,
-    /// Whether every step converged or the last one stopped with a reason, and left a state from which the device can be
-    /// pulled back.
+    /// Whether every step converged, or the last one stopped with a reason and left a state from which the device can
+    /// be pulled back.
     pub pass: bool,
 }
 
-/// The vessel of the table: 10 mm straight, a quarter circle of radius 20 mm, 40 mm straight; bore 3 mm.
+/// The vessel of the table: 10 mm straight, a quarter circle of radius 20 mm, 40 mm straight; inner diameter 3 mm.
 #[derive(Debug)]
 pub struct InsertionStress {
     /// Its wall.
@@ -182,7 +183,7 @@ impl InsertionStress {
     }
 }
 
-/// The reason of a failed step without its numbers: after the last colon but for what is in brackets.
+/// The reason of a failed step without its numbers: after the last colon, without brackets.
 fn reason(message: &str) -> String {
     let end = message.find(" (").unwrap_or(message.len());
     let text = &message[..end];

@@ -1,8 +1,9 @@
-//! Random commands on three instruments that lie in one another: what `endowire verify --stress` runs beside the stress of insertions.
+//! Random commands on three coaxial instruments: run by `endowire verify --stress` in addition to the stress test of
+//! insertions.
 //!
-//! A wire in a microcatheter in a catheter are advanced, pulled back and turned, alone and together, by tenths of a millimetre and by
-//! centimetres, and the wire is exchanged for a stiff one. Whatever the command, it ends in an equilibrium inside the vessel, or is refused
-//! with a reason, and then leaves the state as it was, byte for byte.
+//! A wire in a microcatheter in a catheter are advanced, pulled back and rotated, alone and together, by tenths of a
+//! millimetre and by centimetres, and the wire is exchanged for a stiff one. Every command ends in an equilibrium
+//! inside the vessel, or is rejected with a reason and leaves the state unchanged, byte for byte.
 
 use std::f64::consts::PI;
 
@@ -16,17 +17,17 @@ use serde::Serialize;
 use crate::crossing::CrossingTest;
 use crate::noise::Noise;
 
-/// Commands after which a case begins anew, with other random numbers.
+/// Number of commands after which a case restarts with other random numbers.
 pub const COURSE: usize = 1_000;
-/// The instruments are brought in together in steps of this, mm.
+/// Step in which the instruments are first inserted together, mm.
 const APPROACH_MM: f64 = 2.0;
-/// How far the wire and the microcatheter are ahead of the catheter then, mm.
+/// Initial distances of the wire and the microcatheter ahead of the catheter, mm.
 const AHEAD_MM: [f64; 2] = [25.0, 10.0];
-/// Longest advance of a command, mm, of small, ordinary and large ones, …
+/// Longest advance, mm, of small, ordinary and large commands.
 const ADVANCES_MM: [f64; 3] = [0.1, 1.5, 8.0];
-/// … and longest turn, rad.
+/// Largest rotations, rad.
 const TURNS_RAD: [f64; 3] = [0.05, 0.3, PI];
-/// Hands push more than they pull, by this part of the longest advance.
+/// Bias of the hands towards pushing, as a fraction of the longest advance.
 const DRIFT: f64 = 0.13;
 /// Steps of an exchange, mm.
 const EXCHANGE_MM: f64 = 8.0;
@@ -34,19 +35,19 @@ const EXCHANGE_MM: f64 = 8.0;
 const FRICTION: f64 = 0.15;
 const VALVE_N: f64 = 0.2;
 
-/// What rubs.
+/// Where friction acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rubbing {
-    /// Nothing.
+    /// Nowhere.
     Nothing,
-    /// Instruments in each other, and in the sheath.
+    /// Between instruments, and in the sheath.
     Within,
-    /// Those, and the wall. Three instruments: there is no stiff wire.
+    /// Also on the wall. Three instruments: there is no stiff wire.
     Everywhere,
 }
 
-/// A vessel, its mesh, and what rubs.
+/// A vessel, its mesh, and the friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct InstrumentCase {
     /// A built-in anatomy.
@@ -55,37 +56,37 @@ pub struct InstrumentCase {
     pub edge_mm: f64,
     /// Element length, mm.
     pub element_mm: f64,
-    /// What rubs.
+    /// Where friction acts.
     pub rubbing: Rubbing,
-    /// How far in the catheter is at the start, mm.
+    /// Initial inserted length of the catheter, mm.
     pub start_mm: f64,
 }
 
-/// What became of random commands.
+/// Result of random commands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InstrumentRow {
-    /// Where.
+    /// The case.
     #[serde(flatten)]
     pub case: InstrumentCase,
-    /// Commands that were carried out, and those that were refused.
+    /// Numbers of commands carried out and rejected.
     pub commands: usize,
     /// See [`InstrumentRow::commands`].
     pub refused: usize,
-    /// Commands after which there was no equilibrium, …
+    /// Commands without an equilibrium.
     pub unconverged: usize,
-    /// … or the line had passed through the wall.
+    /// Commands after which the line had passed through the wall.
     pub crossed: usize,
-    /// Commands that were refused without a reason in the command or the vessel.
+    /// Commands rejected without a reason in the command or the vessel.
     pub unexplained: usize,
-    /// Refused commands that left another state.
+    /// Rejected commands that changed the state.
     pub changed: usize,
     /// Newton iterations of the worst command.
     pub most_iterations: u32,
-    /// Most sub-steps of a command.
+    /// Largest number of sub-steps of a command.
     pub most_substeps: u32,
-    /// The first thing that went wrong: course, number of the command, and what.
+    /// The first error: course, number of the command, and description.
     pub first: String,
-    /// Whether nothing went wrong.
+    /// Whether there was no error.
     pub pass: bool,
 }
 
@@ -110,8 +111,8 @@ pub fn cases() -> Vec<InstrumentCase> {
     ]
 }
 
-/// A hooked wire, a stiff one to exchange it for, a straight microcatheter and a bent catheter. Where the wall rubs every instrument is
-/// twisted, of which there can be three: no stiff wire.
+/// A hooked wire, a stiff one for exchange, a straight microcatheter and a bent catheter. With friction on the wall
+/// every instrument is twisted, which limits their number to three: no stiff wire.
 fn stack(rubbing: Rubbing) -> Result<Stack> {
     let one = |name: &str, sections: Vec<Section>| {
         Ok(Instrument { name: name.to_owned(), device: Device::new(sections)?, may_lead: true })
@@ -143,17 +144,17 @@ fn stack(rubbing: Rubbing) -> Result<Stack> {
 
 /// Three instruments in a vessel, the thinner farther in.
 pub struct InstrumentStress {
-    /// Where they are at the start.
+    /// Their initial state.
     pub start: Simulation,
     /// The vessel's triangles.
     pub crossing: CrossingTest,
 }
 
 impl InstrumentStress {
-    /// Brings them in.
+    /// Inserts them.
     ///
     /// # Errors
-    /// A vessel that is not built in, and what stops them on the way.
+    /// An unknown vessel, and errors during insertion.
     pub fn new(case: &InstrumentCase) -> Result<Self> {
         let Some(tree) = anatomy::tree(case.vessel) else {
             return Err(Error::parameter("vessel", case.vessel, "is not built in"));
@@ -185,7 +186,7 @@ impl InstrumentStress {
         Ok(Self { start, crossing })
     }
 
-    /// Carries out so many random commands, those of each [`COURSE`] from the start.
+    /// Carries out this many random commands, each [`COURSE`] from the initial state.
     pub fn run(case: &InstrumentCase, commands: usize) -> InstrumentRow {
         let mut row = InstrumentRow::new(case);
         let stress = match Self::new(case) {
@@ -202,7 +203,7 @@ impl InstrumentStress {
         row
     }
 
-    /// A course of commands, counted in `row`. What went wrong does not end it: the next command must be carried out all the same.
+    /// A course of commands, counted in `row`. An error does not end it: the next command must succeed all the same.
     fn course(&self, seed: u64, count: usize, row: &mut InstrumentRow) {
         let mut simulation = self.start.clone();
         let mut hands = RandomHands::new(seed);
@@ -267,13 +268,13 @@ impl InstrumentRow {
     }
 }
 
-/// A state as it is saved.
+/// The bytes of a saved state.
 pub fn bytes(simulation: &Simulation) -> Vec<u8> {
-    // Writing into memory does not fail; were it to, no two states would be distinguished, which the tests would not miss.
+    // Writing into memory does not fail; if it did, all states would be equal, which the tests would detect.
     postcard::to_allocvec(&simulation.state()).unwrap_or_default()
 }
 
-/// A wire that is exchanged for another, which goes in as far as the first was.
+/// A wire exchanged for another, which is inserted as far as the first was.
 #[derive(Debug, Clone, Copy)]
 struct Exchange {
     out: usize,
@@ -281,7 +282,8 @@ struct Exchange {
     to_mm: f64,
 }
 
-/// Hands that push on the whole, one or several at a time, often repeat themselves, and now and then exchange the wire.
+/// Random hands with a bias towards pushing, one or several at a time, which often repeat themselves, and sometimes
+/// exchange the wire.
 #[derive(Debug, Clone)]
 pub struct RandomHands {
     noise: Noise,
@@ -290,17 +292,17 @@ pub struct RandomHands {
 }
 
 impl RandomHands {
-    /// Hands of their own for every seed.
+    /// Different hands for every seed.
     pub fn new(seed: u64) -> Self {
         Self { noise: Noise::new(seed), last: Vec::new(), exchange: None }
     }
 
-    /// What was said last was refused: it is not repeated.
+    /// The last moves were rejected: they are not repeated.
     pub fn refused(&mut self) {
         (self.last, self.exchange) = (Vec::new(), None);
     }
 
-    /// What they do next.
+    /// The next moves.
     pub fn next(&mut self, simulation: &Simulation) -> Vec<Move> {
         let lengths_mm = simulation.report().lengths_mm();
         if let Some(step) = self.exchange.and_then(|exchange| exchange.next(&lengths_mm)) {
@@ -310,7 +312,7 @@ impl RandomHands {
         if !self.last.is_empty() && self.noise.happens(0.5) {
             return self.last.clone();
         }
-        // Two wires, one of them in, and two catheters; or one wire.
+        // Two wires, one of them inserted, and two catheters; or one wire.
         let count = lengths_mm.len();
         let wire = usize::from(count > 3 && lengths_mm[1] > 0.0);
         if count > 3 && lengths_mm[wire] > 0.0 && self.noise.happens(0.005) {
@@ -344,7 +346,7 @@ impl RandomHands {
 }
 
 impl Exchange {
-    /// The next step; none where it is done.
+    /// The next step; `None` when complete.
     fn next(&self, lengths_mm: &[f64]) -> Option<Move> {
         let (out_mm, rest_mm) = (lengths_mm[self.out], self.to_mm - lengths_mm[self.into]);
         if out_mm > 0.0 {

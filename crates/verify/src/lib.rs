@@ -1,8 +1,9 @@
-//! Reference cases with exact or independently computed answers: what `endowire verify` runs.
+//! Reference cases with exact or independently computed solutions, run by `endowire verify`.
 //!
-//! Each case is data and a function; nothing here knows what the solver returns. Beside the cases stand the [`stress`] table of
-//! rods, that of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]) and of any size ([`sequences`]), random deployments of coils ([`deployments`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
-//! that [crosses](crossing) its wall.
+//! Each case is data and a function, independent of the solver's results. Further modules are the [`stress`] tests of
+//! rods and of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]) and
+//! of any size ([`sequences`]), random deployments of coils ([`deployments`]), insertions into the [`surfaces`] of a
+//! folder, and the exact test for a device that [crosses](crossing) its wall.
 
 mod capstan;
 mod capstan_within;
@@ -40,23 +41,23 @@ use serde::Serialize;
 /// One compared number.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Case, as `A1 a=10, 16 elements`.
+    /// Case, for example `A1 a=10, 16 elements`.
     pub name: String,
-    /// What is compared.
+    /// The quantity compared.
     pub quantity: String,
     /// Computed value.
     pub computed: f64,
     /// Reference.
     pub expected: f64,
-    /// Error, as the quantity says.
+    /// Error, as defined by the quantity.
     pub error: f64,
     /// Largest error allowed.
     pub bound: f64,
     /// Whether the error is within the bound.
     pub pass: bool,
-    /// Newton iterations, where one solve gave the number.
+    /// Newton iterations, if the number is from a single solve.
     pub iterations: Option<usize>,
-    /// Observed order of convergence, where several meshes were run.
+    /// Observed order of convergence, if several meshes were used.
     pub order: Option<f64>,
 }
 
@@ -67,7 +68,8 @@ impl Row {
         Self::with_error(name, quantity, computed, expected, error, bound)
     }
 
-    /// A point with its distance from the reference over `scale`; the numbers shown are the distances from the origin.
+    /// A point with its distance from the reference relative to `scale`; the numbers shown are the distances from the
+    /// origin.
     pub fn point(
         name: &str,
         quantity: &str,
@@ -125,9 +127,9 @@ impl Row {
 /// A family of reference cases.
 #[derive(Debug, Clone, Copy)]
 pub struct Family {
-    /// Its number in the reference list.
+    /// Its identifier in the reference list.
     pub id: &'static str,
-    /// What it is and who computed it first.
+    /// Its description, and who computed it first.
     pub title: &'static str,
     run: fn() -> Result<Vec<Row>>,
 }
@@ -304,7 +306,7 @@ pub fn at_end(kind: LoadKind, value: [f64; 3]) -> Load {
 }
 
 /// Observed order of convergence: between the finest two meshes, halved from `elements`, on which the error is above
-/// `digits`, what the reference and the computation are good for.
+/// `digits`, the accuracy of reference and computation.
 pub(crate) fn observed_order(
     elements: usize,
     digits: f64,

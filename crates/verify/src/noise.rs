@@ -1,11 +1,11 @@
-//! Random numbers that are the same in every run.
+//! Reproducible random numbers.
 
-/// Equally distributed numbers from −1 to 1: the multiplier and increment of Knuth's MMIX.
+/// Uniformly distributed numbers from −1 to 1: the multiplier and increment of Knuth's MMIX.
 #[derive(Debug, Clone)]
 pub struct Noise(pub u64);
 
 impl Noise {
-    /// A sequence of its own for every small seed: neighbouring states of the generator begin alike.
+    /// A different sequence for every small seed: neighbouring states of the generator start similarly.
     pub fn new(seed: u64) -> Self {
         let mut noise = Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d);
         for _ in 0..4 {
@@ -26,7 +26,7 @@ impl Noise {
         ((0.5 * (self.next() + 1.0) * count as f64) as usize).min(count.saturating_sub(1))
     }
 
-    /// Whether something of this probability happens.
+    /// Whether an event of this probability happens.
     pub fn happens(&mut self, probability: f64) -> bool {
         0.5 * (self.next() + 1.0) < probability
     }

@@ -26,10 +26,10 @@ fn critical_load(case: &StaticCase, expected: f64) -> Result<f64> {
     StaticProblem::new(case)?.critical(Parameter::Loads, 0.5 * expected, 1.4 * expected, 1e-10)
 }
 
-/// Errors below this are those of the reference's last digits and of rounding, not of the mesh.
+/// Errors below this are due to the reference's last digits and rounding, not the mesh.
 pub(super) const DIGITS: f64 = 1e-10;
 
-/// The same for critical loads, which bisection and the shift that is always on leave uncertain.
+/// The same for critical loads, whose uncertainty is due to bisection and regularisation.
 pub(super) const CRITICAL_DIGITS: f64 = 1e-7;
 
 /// A1: (a, tip angle, deflection, shortening), elements and bound of the tip error.
@@ -52,7 +52,7 @@ pub(super) fn cantilever() -> Result<Vec<Row>> {
         let s = case(n).solve()?.checked()?;
         let order = observed_order(n, DIGITS, |n| tip_error(&case(n), tip))?;
         rows.push(Row::point(&name, "tip", s.tip, tip, 1.0, bound).iterations(s.iterations).order(order));
-        // The angle is a derivative: allow it ten times the error of the position.
+        // The angle is a derivative: allow ten times the error of the position.
         rows.push(Row::relative(&name, "tip angle", s.tip_angle, angle, 10.0 * bound));
         if a == 10.0 {
             let limit = if n == 16 { 15.0 } else { 20.0 };
@@ -60,7 +60,7 @@ pub(super) fn cantilever() -> Result<Vec<Row>> {
             rows.push(Row::with_error(&name, "iterations, one step", count, limit, count, limit));
         }
     }
-    // The bound is on how far the order falls short of 4.
+    // The bound is on the shortfall of the order from 4.
     let (w, u) = (0.810609024880, 0.554995597754);
     let error = |n| tip_error(&tip_load(n, [0.0, -10.0, 0.0]), [1.0 - u, -w, 0.0]);
     let found = 0.5 * (error(8)? / error(32)?).log2();
@@ -96,7 +96,7 @@ const POST_BUCKLED: [[f64; 4]; 2] = [
 pub(super) fn column() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for [angle, p, x, y] in POST_BUCKLED {
-        // The column may leave to any side.
+        // The column may buckle to any side.
         let tip = |n: usize| -> Result<_> {
             let s = tip_load(n, [-p, 0.0, 0.0]).solve()?.checked()?;
             Ok(([s.tip[0], s.tip[1].hypot(s.tip[2]), 0.0], s))

@@ -1,7 +1,7 @@
-//! A5: what the method of Li et al. 2011 must give on the cantilever of A1, errors of the model included.
+//! A5: expected results of the method of Li et al. 2011 on the cantilever of A1, including the error of its model.
 //!
-//! Minimising ½∫|t′|² − a y(1) with t(0) = (1, 0) gives t_y = a(s − s²/2) exactly, so w = a/3, and the rod that should
-//! keep its length grows to ∫√(1 + t_y²) ds.
+//! Minimising ½∫|t′|² − a y(1) with t(0) = (1, 0) gives t_y = a(s − s²/2) exactly, so w = a/3, and the length, which
+//! should be constant, grows to ∫√(1 + t_y²) ds.
 
 use super::{Row, at_end, observed_order, unit_rod};
 use endowire_core::statics::LoadKind;

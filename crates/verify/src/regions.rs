@@ -1,4 +1,4 @@
-//! C7: walls that are not the same everywhere.
+//! C7: walls with regions.
 //!
 //! A long rod under a load q per length on a floor of modulus k₁ left and k₂ right of x = 0 sinks by q/kᵢ far from there. With
 //! λᵢ = (kᵢ/4EI)^¼ and r = λ₂/λ₁ the beam equation EI p⁗ + k p = q has, where p and three derivatives are continuous,
@@ -7,7 +7,7 @@
 //! p(0) = q/k₂ + (q/k₁ − q/k₂) / (1 + r²),    p′(0) = −2 λ₂ (q/k₁ − q/k₂) r / ((1 + r) (1 + r²))
 //! ```
 //!
-//! (Hetényi, *Beams on elastic foundation*, 1946). A rope drawn over a bend that is rough only within an angle φ
+//! (Hetényi, *Beams on elastic foundation*, 1946). A rope drawn over a bend with friction only within an angle φ
 //! needs e^{μφ} times the force.
 
 use super::Row;
@@ -25,18 +25,18 @@ const HALF: f64 = 60.0;
 const MODULI: [f64; 2] = [1.0, 10.0];
 /// Depth far on the left, mm.
 const DEEP: f64 = 0.02;
-/// Elements of the rod; the middle of them is at the edge.
+/// Number of elements of the rod; the edge of the region is at the middle.
 const ELEMENTS: usize = 240;
 
-/// A rod on a floor of two moduli: depths at a quarter, the middle and three quarters, and slope in the middle.
+/// A rod on a floor with two moduli: depths at a quarter, the middle and three quarters, and slope in the middle.
 struct OnTwo {
     depths: [f64; 3],
     slope: f64,
 }
 
-/// The modulus changes over `transition_mm`, on triangles with sides as long.
+/// The modulus changes over `transition_mm`, on triangles with sides of that length.
 fn on_two(moduli: [f64; 2], transition_mm: f64) -> Result<OnTwo> {
-    // A ball so large that its side is flat here.
+    // A ball so large that its surface is flat here.
     let radius_mm = 1e5;
     let right = WallRegion {
         centre_mm: [HALF + radius_mm, 0.0, 0.0],
@@ -72,7 +72,7 @@ fn two_moduli() -> Result<Vec<Row>> {
     let [coarse, middle, fine] = found;
     let (coarse, middle, fine) = (coarse?, middle?, fine?);
     let error = |found: &OnTwo| (found.depths[1] / (right + rise) - 1.0).abs();
-    // The transition moves the edge by a part of its width.
+    // The transition shifts the edge by a fraction of its width.
     let at_edge = |of: &dyn Fn(&OnTwo) -> f64| 2.0 * of(&fine) - of(&middle);
     let (name, bound) = ("C7 two moduli, h = 0.5 mm", 1e-2);
     Ok(vec![
@@ -84,8 +84,8 @@ fn two_moduli() -> Result<Vec<Row>> {
     ])
 }
 
-/// The wall of the capstan with friction `outside`, but `inside` in a ball of `radius_mm` about the middle of the bend, and the
-/// angle of the bend within it.
+/// The wall of the capstan with friction `outside`, but `inside` in a ball of `radius_mm` about the middle of the
+/// bend, and the angle of the bend within it.
 fn rough_part(outside: f64, inside: f64, radius_mm: f64) -> (WallProperties, f64) {
     // The wire lies on the inner side of the bend.
     let inner = BEND - RADIUS - PLAY;

@@ -1,4 +1,4 @@
-//! E2, E3, E6: rods that touch themselves and each other.
+//! E2, E3, E6: self-contact of rods and contact between rods.
 
 use super::Row;
 use endowire_core::statics::{
@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 type Point = [f64; 3];
 
-/// A rod of length 1 and EI 1 that begins along a curve.
+/// A rod of length 1 and EI 1 with a curve as initial shape.
 fn case(elements: usize, surface: Option<Surface>, gj: Option<f64>, points: Vec<Point>) -> StaticCase {
     let tangent = (Vec3::from(points[1]) - Vec3::from(points[0])).into();
     let section = Section { gj, ..super::section(1.0, 1.0) };
@@ -25,7 +25,7 @@ fn case(elements: usize, surface: Option<Surface>, gj: Option<f64>, points: Vec<
     }
 }
 
-/// A closed rod that is knotted as a trefoil; without a `radius` it passes through itself.
+/// A closed rod knotted as a trefoil; without a `radius` it passes through itself.
 fn knotted(elements: usize, radius: Option<f64>) -> Result<StaticSolution> {
     let at = |i: i32| {
         let a = TAU * f64::from(i) / 600.0;
@@ -39,8 +39,9 @@ fn knotted(elements: usize, radius: Option<f64>) -> Result<StaticSolution> {
     case.solve()?.checked()
 }
 
-/// Of all shapes in which a thin elastic rod without twist can be a trefoil, that of least energy is a circle run through twice: E L/B = 8π²
-/// (Gerlach, Reiter, von der Mosel, *The elastic trefoil is the doubly covered circle*, Arch. Ration. Mech. Anal. 225 (2017)).
+/// Of all shapes of a thin elastic rod without twist that are a trefoil, the one of least energy is a doubly covered
+/// circle: E L/B = 8π² (Gerlach, Reiter, von der Mosel, *The elastic trefoil is the doubly covered circle*, Arch.
+/// Ration. Mech. Anal. 225 (2017)).
 pub(super) fn trefoil() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (radius, bound) in [(5e-3, 0.01), (1e-3, 0.001)] {
@@ -52,14 +53,14 @@ pub(super) fn trefoil() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// How far surfaces are in each other, over the radius: a hundredth at most.
+/// Penetration of surfaces, relative to the radius: a hundredth at most.
 fn deepest(name: &str, found: &StaticSolution, radius: f64) -> Row {
     let deepest = found.touching.iter().map(|touch| touch.penetration).fold(0.0, f64::max) / radius;
     Row::with_error(name, "penetration over radius", deepest, 0.0, deepest, 0.011)
 }
 
-/// What a long plectoneme under a tension T is like, all in units of B and R: helix angle, moment, force per length, and shortening for each turn
-/// that is added at the same moment.
+/// Properties of a long plectoneme under a tension T, in units of B and R: helix angle, moment, force per length, and
+/// shortening per turn added at constant moment.
 struct Plectoneme {
     angle: f64,
     moment: f64,
@@ -86,7 +87,7 @@ impl Plectoneme {
     }
 }
 
-/// Length over radius.
+/// Ratio of length to radius.
 const SLENDERNESS: f64 = 400.0;
 /// T R²/B.
 const TENSION: f64 = 5e-2;
@@ -116,7 +117,7 @@ fn wound(turns: f64, radius: f64, angle: f64) -> Vec<Point> {
     points
 }
 
-/// What a twisted rod under tension that is wound about itself comes to.
+/// Results for a twisted rod under tension that is wound about itself.
 struct Found {
     moment: f64,
     pressure: f64,
@@ -159,7 +160,7 @@ fn twisted(elements: usize, further_turns: f64, modulus: f64) -> Result<Found> {
     })
 }
 
-/// Twist that a change of moment leaves in the rod is no turn of the plectoneme.
+/// Twist stored in the rod by a change of moment is not a turn of the plectoneme.
 fn shortening(before: &Found, after: &Found, turns: f64) -> f64 {
     let kept = (after.moment - before.moment) * SLENDERNESS * SLENDERNESS / (GJ * SLENDERNESS);
     (before.tip - after.tip) * TAU / (TAU * turns - kept)
@@ -184,7 +185,8 @@ pub(super) fn plectoneme() -> Result<Vec<Row>> {
 /// Radius of rods that cross.
 const CROSSING: f64 = 0.005;
 
-/// Two cantilevers across each other, the tip of the upper one under a load; a soft thread in a wide arc joins their tips, so that both are one rod.
+/// Two cantilevers across each other, the tip of the upper one under a load; a soft thread in a wide arc joins their
+/// tips, so that both are one rod.
 fn across(load: f64) -> Result<StaticSolution> {
     const THREAD: f64 = 1e-8;
     let arc = |k: i32| {
@@ -196,7 +198,7 @@ fn across(load: f64) -> Result<StaticSolution> {
     points.extend((0..=200).map(arc));
     points.push([0.0, -0.5, -CROSSING]);
     let length: f64 = points.windows(2).map(|pair| (Vec3::from(pair[1]) - Vec3::from(pair[0])).norm()).sum();
-    // As hard as the rods, not as the thread.
+    // As stiff as the rods, not as the thread.
     let surface = Surface { radius: CROSSING, modulus: Some(100.0 / CROSSING.powi(4)) };
     let mut case = case(80, Some(surface), None, points);
     let sections = [(1.0, 1.0), (length - 1.0, THREAD), (length, 1.0)];
@@ -209,7 +211,8 @@ fn across(load: f64) -> Result<StaticSolution> {
     case.solve()?.checked()
 }
 
-/// Cantilevers of length 1 that cross in their middles, a = ½ from their clamps: w = P a²(3 − a)/6 − F a³/3 of the upper one is F a³/3 of the lower one.
+/// Cantilevers of length 1 that cross in their middles, a = ½ from their clamps: w = P a²(3 − a)/6 − F a³/3 of the
+/// upper one equals F a³/3 of the lower one.
 pub(super) fn crossing() -> Result<Vec<Row>> {
     let load = 0.05;
     let found = across(load)?;
@@ -230,7 +233,7 @@ mod tests {
     #[test]
     fn a_rod_that_passes_through_itself_is_no_knot() {
         let found = knotted(96, None).unwrap();
-        // A circle run through once.
+        // A simply covered circle.
         assert!((found.energy.total / (2.0 * PI * PI) - 1.0).abs() < 0.01, "{}", found.energy.total);
     }
 

@@ -1,8 +1,9 @@
-//! Random commands of up to 40 mm in random vessels, each against the same motion in parts of a millimetre: what `endowire verify --stress`
-//! runs beside the stress of insertions.
+//! Random commands of up to 40 mm in random vessels, each compared with the same motion in fractions of a millimetre:
+//! run by `endowire verify --stress` in addition to the stress test of insertions.
 //!
-//! Whatever the hand does at once, the device ends where it would if it were done bit by bit: no state is accepted with much more energy than
-//! that of the parts, none is beyond the wall by more than it says, none is longer or shorter than what is inserted.
+//! However much the hand does at once, the device must end where it would in small steps: no state may have much more
+//! energy than that of the small steps, none may be beyond the wall by more than reported, none may differ in length
+//! from what is inserted.
 
 use endowire_core::device::{Device, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
@@ -14,24 +15,25 @@ use serde::Serialize;
 
 use crate::crossing::{CrossingTest, chords_mm, curve_in};
 
-/// Sequences of the whole stress.
+/// Number of sequences of the whole stress test.
 pub const SEQUENCES: u64 = 300;
-/// Commands of a sequence.
+/// Number of commands per sequence.
 const COMMANDS: usize = 60;
-/// More energy than this many times that of the parts, and …
+/// Ratio of the energy to that of the small steps above which the equilibrium is another one.
 const MORE: f64 = 1.5;
-/// … this, mJ, beyond that, is another equilibrium.
+/// Smallest excess of energy, mJ, for which that ratio counts.
 const MORE_MJ: f64 = 1e-3;
-/// Largest part of what is inserted by which a device may be longer or shorter.
+/// Largest difference of a device's length from what is inserted, as a fraction.
 const STRETCHED: f64 = 1e-3;
-/// How far apart tips may be, mm: without friction and with it, which leaves a device anywhere within its cones.
+/// Largest distance of tips, mm: without friction, and with it, which lets a device rest anywhere within its cones.
 pub const APART_MM: [f64; 2] = [0.05, 0.5];
-/// Chords of an element whose lengths are summed: of one that turns by a radian they are 4·10⁻⁵ shorter.
+/// Number of chords of an element whose lengths are summed: for one that turns by a radian they are 4·10⁻⁵ shorter.
 const CHORDS: usize = 32;
-/// A device deeper behind the triangles than it says by this, mm, has gone through them: more than the wall that is felt is off.
+/// Excess of the depth behind the triangles over the reported one, mm, above which a device has gone through them:
+/// more than the error of the felt wall.
 const CROSSED_MM: f64 = 0.3;
 
-/// What became of a sequence.
+/// Result of a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceRow {
     /// Its number.
@@ -40,34 +42,35 @@ pub struct SequenceRow {
     pub what: String,
     /// Commands carried out.
     pub commands: usize,
-    /// Newton iterations of them, …
+    /// Newton iterations of the commands.
     pub iterations: u64,
-    /// … and of their parts.
+    /// Newton iterations of the small steps.
     pub iterations_of_parts: u64,
-    /// Parts in which the device moved to where it came to rest.
+    /// Sub-steps with relaxation to where the device came to rest.
     pub flights: u64,
-    /// Commands that ended without an equilibrium, and said so.
+    /// Commands that ended without an equilibrium, and reported it.
     pub unconverged: usize,
-    /// Accepted states of more than 1.5 times the energy of the parts, …
+    /// Accepted states of more than 1.5 times the energy of the small steps.
     pub stored_more: usize,
-    /// … of numbers that are not finite, …
+    /// States with numbers that are not finite.
     pub not_finite: usize,
-    /// … of another length than what is inserted, …
+    /// States of a length other than the inserted one.
     pub stretched: usize,
-    /// … and beyond the wall by more than they say.
+    /// States beyond the wall by more than reported.
     pub crossed: usize,
-    /// Commands that failed though their parts did not, or the other way round.
+    /// Commands that failed though their small steps did not, or vice versa.
     pub failed: usize,
-    /// Commands that end elsewhere than their parts without a jump in both. Where friction holds a device loosely, parts tell what they can.
+    /// Commands that end elsewhere than their small steps without a jump in both. Where friction holds a device
+    /// loosely, this is only informative.
     pub apart: usize,
-    /// The first thing that went wrong.
+    /// The first error.
     pub first: String,
-    /// Whether nothing did.
+    /// Whether there was no error.
     pub pass: bool,
 }
 
 impl SequenceRow {
-    /// The heads of what a row shows.
+    /// Column heads of a row.
     pub const HEAD: &str = "seed  cmds  iter.  parts' fly  unb  energy nan length crossed failed apart  what, and what was first";
 }
 
@@ -83,7 +86,7 @@ impl std::fmt::Display for SequenceRow {
     }
 }
 
-/// Random numbers of a seed, by how many there were.
+/// Random numbers of a seed, and how many have been drawn.
 pub(crate) struct Random(pub(crate) u64, pub(crate) u64);
 
 impl Random {
@@ -93,13 +96,13 @@ impl Random {
         low + (high - low) * unit(splitmix64(self.0, self.1))
     }
 
-    /// One of a list.
+    /// A random element of a list.
     pub(crate) fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.between(0.0, list.len() as f64) as usize]
     }
 }
 
-/// A random wire, now and then in a catheter, in a random anatomy.
+/// A random wire, sometimes in a catheter, in a random anatomy.
 struct Scene {
     start: Simulation,
     wall: Wall,
@@ -158,7 +161,7 @@ fn within_catheter(wire: Device, radius_mm: f64, random: &mut Random) -> Result<
     Stack::new(vec![instrument("wire", wire), instrument("catheter", catheter)])
 }
 
-/// What a motion came to.
+/// The result of a motion.
 #[derive(Default)]
 struct Done {
     iterations: u64,
@@ -168,7 +171,7 @@ struct Done {
     failed: Option<Error>,
 }
 
-/// One of so many equal parts of moves.
+/// One of this many equal parts of moves.
 pub fn part_of(moves: &[Move], parts: usize) -> Vec<Move> {
     let share = |Command { advance_mm, rotate_rad }| Command {
         advance_mm: advance_mm / parts as f64,
@@ -201,7 +204,7 @@ fn go(simulation: &mut Simulation, moves: &[Move], parts: usize) -> Done {
 /// Runs a sequence.
 ///
 /// # Errors
-/// None that a seed is to blame for.
+/// None that depends on the seed.
 pub fn run(seed: u64) -> Result<SequenceRow> {
     let mut random = Random(seed, 0);
     let scene = Scene::new(&mut random)?;
@@ -249,7 +252,7 @@ pub fn run(seed: u64) -> Result<SequenceRow> {
         };
         match (&by_one.failed, &by_many.failed) {
             (None, None) => {}
-            // What ends in the vessel may be met by parts that have come less far.
+            // Something that ends the command in the vessel may not be reached by the small steps.
             (Some(error), _) | (None, Some(error)) => {
                 let explained = |error: &Error| matches!(error, Error::End(_)) || error.is_input();
                 if !explained(error) {

@@ -12,8 +12,8 @@ pub(super) fn bend() -> Result<Vec<Row>> {
     for (p, tip) in
         [(300.0, [22.24503474, 58.77968539, 40.18828384]), (600.0, [15.68507816, 47.15129440, 53.46859844])]
     {
-        // R = 100, E = 1e7, G = 5e6, unit square: EI = E/12; J = 1/6 is the one of the list. Clamped along y at the origin,
-        // bending to +x.
+        // R = 100, E = 1e7, G = 5e6, unit square: EI = E/12; J = 1/6 is that of the list. Clamped along y at the
+        // origin, bending to +x.
         let case = |n: usize| {
             let mut case = unit_rod(n);
             case.rod.length = 100.0 * FRAC_PI_4;
@@ -73,7 +73,7 @@ pub(super) fn twisted_rod() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The dead end moments at which a hinged rod under tension gives way.
+/// The dead end moments at which a hinged rod under tension buckles.
 fn hinged_moment(elements: usize, tension: f64, expected: f64) -> Result<f64> {
     let mut case = unit_rod(elements);
     case.rod.section[0].gj = Some(1.0);
@@ -81,7 +81,7 @@ fn hinged_moment(elements: usize, tension: f64, expected: f64) -> Result<f64> {
     case.end.kind = EndKind::Pinned;
     case.end.position = Some([1.0, 0.0, 0.0]);
     case.end.slide = Some([1.0, 0.0, 0.0]);
-    // Moments per unit of the factor; the tension must not grow with it.
+    // Moments per unit of the factor; the tension must not be scaled with it.
     let mut start = at_end(LoadKind::Moment, [-1.0, 0.0, 0.0]);
     start.at = Some(0.0);
     case.load = vec![start, at_end(LoadKind::Moment, [1.0, 0.0, 0.0])];
@@ -111,7 +111,8 @@ pub(super) fn ring() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Love's localised solution as a first guess: tangents of a rod of length L under tension T with m = M/√(BT), B = 1.
+/// Love's localised solution as an initial shape: tangents of a rod of length L under tension T with m = M/√(BT), B =
+/// 1.
 fn love(elements: usize, length: f64, tension: f64, m: f64) -> Vec<Vec3> {
     let a = (1.0 - 0.25 * m * m).sqrt();
     (0..=elements)

@@ -1,4 +1,4 @@
-//! Numerical stress: what `endowire verify --stress` runs. Every case must converge, or say what failed.
+//! Numerical stress tests, run by `endowire verify --stress`. Every case must converge, or report what failed.
 
 use super::{at_end, section, unit_rod};
 use endowire_core::rod::{Frame, RodState};
@@ -6,14 +6,14 @@ use endowire_core::statics::{LoadKind, StaticCase, StaticProblem};
 use endowire_core::{Error, Result, Vec3};
 use serde::Serialize;
 
-/// A shape that one more Newton step would bend by less than this (radians) has settled, whatever the size of its residual:
-/// rows of elements 10,000 times shorter than the rod round at 10⁻⁷ of its forces and cannot get smaller.
+/// Change of bend by one more Newton step, rad, below which a shape has settled, whatever its residual: rows of
+/// elements 10,000 times shorter than the rod have a rounding error of 10⁻⁷ of its forces.
 const SETTLED: f64 = 1e-8;
 
 /// One stressed case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StressRow {
-    /// What is stressed and by how much.
+    /// Description of the case.
     pub name: String,
     /// Whether it converged.
     pub converged: bool,
@@ -23,18 +23,18 @@ pub struct StressRow {
     pub iterations: usize,
     /// Relative residual.
     pub residual: f64,
-    /// How much one more Newton step would change the bend, in radians: what the residual is worth.
+    /// Change of bend by one more Newton step, rad: the significance of the residual.
     pub next_bend: f64,
-    /// Whether the merit fell at every step.
+    /// Whether the merit decreased at every step.
     pub monotone: bool,
     /// Why it stopped.
     pub stop: String,
-    /// Whether it converged to a minimum, downhill all the way, and one more step would not matter.
+    /// Whether it converged to a minimum, with decreasing merit, and one more step would not matter.
     pub pass: bool,
 }
 
 impl StressRow {
-    /// What became of it, in a few words.
+    /// The result in a few words.
     pub fn outcome(&self) -> String {
         match self {
             Self { pass: true, .. } => self.stop.clone(),
@@ -45,7 +45,7 @@ impl StressRow {
         }
     }
 
-    /// A case that could not even be set up.
+    /// A case that could not be set up.
     fn refused(name: &str, error: &Error) -> Self {
         Self {
             name: name.to_owned(),
@@ -64,7 +64,7 @@ impl StressRow {
 /// A case to be run.
 #[derive(Debug)]
 pub struct StressCase {
-    /// What is stressed and by how much.
+    /// Description of the case.
     pub name: String,
     problem: Result<StaticProblem>,
 }
@@ -126,7 +126,7 @@ pub fn cases() -> Vec<StressCase> {
         rows.push(StressCase::new(format!("EI jumps from {first:.0e} to {second:.0e}, 64 elements"), &c));
     }
     {
-        // Elements of 0.01 mm beside elements of 50 mm: short sections force them.
+        // Elements of 0.01 mm beside elements of 50 mm, forced by short sections.
         let mut c = case(14, 500.2, 100.0, 5.0);
         let mut sections = vec![section(250.0, 100.0)];
         for k in 1..=10 {

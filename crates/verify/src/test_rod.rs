@@ -1,4 +1,4 @@
-//! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
+//! A rod in equilibrium with walls and loads, without an insertion: the test bench of the contact cases.
 
 use endowire_core::contact::Touch;
 use endowire_core::contact::{ContactCache, ContactSurface, Friction, HandMotion, WallContact};
@@ -12,7 +12,7 @@ use endowire_core::vessel::{NoStore, Wall};
 use endowire_core::{Error, Result, Vec3};
 use nalgebra::Matrix3;
 
-/// What lies on the bench.
+/// Parameters of the bench.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Setup {
     /// Length of the rod.
@@ -35,15 +35,15 @@ pub(super) struct TestRod {
     cache: ContactCache,
     friction: Friction,
     newton: Newton<PLAIN>,
-    /// Stiffness at a node of two plates without play along the plane z = 0, between which the rod lies.
+    /// Stiffness at a node of two plates without clearance along the plane z = 0, between which the rod lies.
     pub(super) plates: f64,
-    /// Residual over force scale at which a state is an equilibrium.
+    /// Residual, relative to the force scale, at which a state is an equilibrium.
     pub(super) tolerance: f64,
     /// Loads on the nodes.
     pub(super) loads: Loads,
-    /// What holds the ends.
+    /// Supports of the ends.
     pub(super) supports: Supports,
-    /// Where the rod is.
+    /// State of the rod.
     pub(super) state: RodState,
 }
 
@@ -87,7 +87,7 @@ impl External for Outside<'_> {
 }
 
 impl TestRod {
-    /// A rod in the shape that `tangents` gives to its nodes, by their arc length, from `start` on.
+    /// A rod from `start` on with the node tangents given by `tangents` as a function of arc length.
     pub(super) fn new(
         wall: &Wall,
         setup: &Setup,
@@ -98,7 +98,7 @@ impl TestRod {
         Self::on_wall(wall, &properties, setup, start, tangents)
     }
 
-    /// The same where parts of the wall have properties of their own.
+    /// The same with regions of the wall.
     pub(super) fn on_wall(
         wall: &Wall,
         properties: &WallProperties,
@@ -132,7 +132,7 @@ impl TestRod {
         &self.mesh.elements
     }
 
-    /// Runs `job` with Newton's method and everything outside the rod.
+    /// Runs `job` with Newton's method and all external energies.
     fn with<T>(
         &mut self,
         job: impl FnOnce(&mut Newton<PLAIN>, &[ElementData], &mut Supports, &mut Outside<'_>, &mut RodState) -> T,
@@ -155,8 +155,8 @@ impl TestRod {
         })
     }
 
-    /// The rod has slid along its own curve by `advance` to where it lies, and goes on to where friction and loads are in
-    /// equilibrium.
+    /// The rod has slid along its own curve by `advance` to its current position, and moves on to equilibrium with
+    /// friction and loads.
     pub(super) fn slide(&mut self, coefficient: f64, advance: f64) -> Result<()> {
         let length = self.setup.length;
         let hands = [HandMotion { from_mm: length, to_mm: length + advance, turn_rad: 0.0 }];
@@ -166,7 +166,7 @@ impl TestRod {
         self.solve()
     }
 
-    /// Whether the state as it is, taken for an equilibrium, is a minimum.
+    /// Whether the current state, assumed to be an equilibrium, is a minimum.
     fn is_stable(&mut self) -> bool {
         self.with(|newton, elements, supports, outside, state| {
             newton.assemble(elements, supports, outside, state);
@@ -175,7 +175,8 @@ impl TestRod {
         })
     }
 
-    /// The axial load up to `most` at which the rod as it lies, straight and so an equilibrium under every load, is no minimum any more.
+    /// The axial load up to `most` at which the current rod, straight and so an equilibrium under every load, is no
+    /// longer a minimum.
     pub(super) fn buckling_load(&mut self, most: f64) -> f64 {
         let (mut low, mut high) = (0.0, most);
         for _ in 0..40 {
@@ -186,12 +187,12 @@ impl TestRod {
         low
     }
 
-    /// What the clamp at the start exerts, at the state solved last.
+    /// Reaction of the clamp at the start, at the state solved last.
     pub(super) fn clamp(&self) -> Clamp {
         Clamp::new::<PLAIN>(&self.newton.start_residual, &self.state)
     }
 
-    /// What presses on the wall, and at which arc length from the start.
+    /// Contacts with the wall, with their arc lengths from the start.
     pub(super) fn touches(&mut self) -> Vec<(f64, Touch)> {
         let (length, points) = (self.setup.length, self.mesh.points.clone());
         self.with(|_, elements, _, outside, state| {

@@ -1,4 +1,4 @@
-//! D9: a wire that is turned, and pushed, in a bent catheter which rubs on it.
+//! D9: a wire that is rotated, and pushed, in a bent catheter with friction.
 
 use super::Row;
 use super::ends::{CATHETER, WIRE, force, free_space, push};
@@ -17,7 +17,8 @@ const WIRE_NMM2: f64 = 200.0;
 const CATHETER_NMM2: f64 = 600.0;
 const ELEMENT_MM: f64 = 0.5;
 
-/// A straight wire of this torsional stiffness, N·mm², comes by 2 mm out of a catheter that is curved everywhere and does not twist.
+/// A straight wire of this torsional stiffness, N·mm², which protrudes by 2 mm from a catheter that is curved
+/// everywhere and does not twist.
 fn bent(torsion_nmm2: f64, friction: f64) -> Result<Simulation> {
     let one = |name: &str, section: Section| -> Result<Instrument> {
         let device = Device::new(vec![section])?;
@@ -50,11 +51,12 @@ fn go(simulation: &mut Simulation, advance_mm: f64, rotate_rad: f64) -> Result<(
     simulation.step_together(&[Move { instrument: WIRE, command }]).map(|_| ())
 }
 
-/// The wire presses with n = ½EI₁κ³ a length, as N₁ + ½EI₁κ² = 0 where nothing holds it along the line, and dM/ds = −μ r n where it turns. A turn θ of its
-/// hand is felt as far as ℓ = √(2GJθ/μrn): M = μ r n ℓ, and beyond that it sticks. All of it turns once θ is μ r n L²/2GJ, by which its tip lags.
+/// The wire presses with n = ½EI₁κ³ per length, as N₁ + ½EI₁κ² = 0 if nothing holds it along the line, and dM/ds = −μ
+/// r n where it rotates. A rotation θ of its hand extends to ℓ = √(2GJθ/μrn): M = μ r n ℓ, and beyond that it sticks.
+/// All of it rotates once θ is μ r n L²/2GJ, by which its tip lags.
 ///
-/// Pushed by Δ and turned by θ in each step it slips by (Δ, r θ): the force that pushes it along the line builds up by e^{μφ cos α} with
-/// tan α = r θ/Δ, and the torque is r tan α times what that adds.
+/// Pushed by Δ and rotated by θ in each step it slips by (Δ, r θ): the force along the line grows by e^{μφ cos α}
+/// with tan α = r θ/Δ, and the torque is r tan α times the increase.
 pub(super) fn turned() -> Result<Vec<Row>> {
     const SOFT_NMM2: f64 = 0.5;
     const STIFF_NMM2: f64 = 100.0;

@@ -1,4 +1,4 @@
-//! B5: the whip of a pre-curved wire that is turned in a curved tube.
+//! B5: the whip of a pre-curved wire rotated in a curved tube.
 
 use super::Row;
 use super::contact::falling;
@@ -15,7 +15,7 @@ const STIFFNESS: f64 = 10.0;
 /// Radius of the wire's section, mm.
 const WIRE_RADIUS: f64 = 0.1;
 
-/// A wire as long as the tube's bend of `lambda` radians, with `play_mm` about it.
+/// A wire as long as the tube's bend of `lambda` radians, with a clearance `play_mm`.
 fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     let length_mm = lambda * BEND;
     let radius_mm = WIRE_RADIUS + play_mm;
@@ -36,7 +36,7 @@ fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     Ok(simulation)
 }
 
-/// Turns the hand to `hand` degrees in steps of at most `step`; the number of jumps on the way.
+/// Rotates the hand to `hand` degrees in steps of at most `step`; returns the number of jumps on the way.
 fn turn_to(simulation: &mut Simulation, hand: f64, step: f64) -> Result<usize> {
     let way = hand.to_radians() - simulation.report().rotation_rad;
     let count = (way.abs() / step.to_radians()).ceil().max(1.0);
@@ -47,7 +47,7 @@ fn turn_to(simulation: &mut Simulation, hand: f64, step: f64) -> Result<usize> {
     Ok(jumps)
 }
 
-/// Angle of the hand, in degrees, at which the tip has turned by `tip` degrees, by the secant method.
+/// Angle of the hand, in degrees, at which the tip has rotated by `tip` degrees, by the secant method.
 fn hand_for(simulation: &mut Simulation, tip: f64) -> Result<f64> {
     let (mut hand, mut slope) = (tip, 1.0);
     let mut last = None;
@@ -66,9 +66,10 @@ fn hand_for(simulation: &mut Simulation, tip: f64) -> Result<f64> {
     Err(Error::Computation(format!("B5: no hand angle found for a tip at {tip}°")))
 }
 
-/// Angle of the hand at which the tip jumps with λ = 2, in degrees, and jumps up to there.
+/// Angle of the hand at which the tip jumps with λ = 2, in degrees, and number of jumps up to there.
 ///
-/// Before it jumps the tip runs ahead of the hand, and the hand's angle over the tip's is a parabola with its top at the jump.
+/// Before the jump the tip overtakes the hand, and the hand's angle as a function of the tip's is a parabola with its
+/// maximum at the jump.
 fn jump(play_mm: f64) -> Result<(f64, usize)> {
     let mut simulation = in_tube(2.0, play_mm)?;
     let mut hand = 190.0;
@@ -89,8 +90,8 @@ fn jump(play_mm: f64) -> Result<(f64, usize)> {
     Err(Error::Computation("B5: no jump up to 205°".to_owned()))
 }
 
-/// What a value comes to without play, from those at some play and half of it: near the ends the wire straightens over a length
-/// √(2 play/Δκ), so errors go with the root of the play.
+/// Extrapolation to zero clearance from the values at a clearance and at half of it: near the ends the wire
+/// straightens over a length √(2 play/Δκ), so errors are proportional to the square root of the clearance.
 fn without_play(with: f64, with_half: f64) -> f64 {
     (SQRT_2 * with_half - with) / (SQRT_2 - 1.0)
 }
@@ -152,7 +153,7 @@ mod tests {
 
     #[test]
     fn another_tube_turns_otherwise() {
-        // λ 5 % longer: the hand goes 1 % farther, and a jump comes elsewhere.
+        // λ 5 % longer: the hand goes 1 % farther, and the jump is elsewhere.
         let mut simulation = in_tube(1.05, 0.2).unwrap();
         let longer = hand_for(&mut simulation, 90.0).unwrap();
         let hand = hand_for(&mut in_tube(1.0, 0.2).unwrap(), 90.0).unwrap();

@@ -1,4 +1,4 @@
-//! What a device file says of radiopacity, as parts to draw.
+//! Radiopacity from a device file, as parts to draw.
 
 use endowire_core::device::{Device, DeviceFile, Part, Section};
 use endowire_core::{Error, Result};
@@ -6,15 +6,16 @@ use endowire_core::{Error, Result};
 use crate::device::DevicePart;
 use crate::material::Material;
 
-/// The parts to draw of a device: walls of tubes and wires, and the coats upon them. None for a solid device that names no material.
+/// The parts of a device to draw: walls of tubes and wires, and the coats on them. Empty for a solid device without
+/// materials.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a material that is not known, with the part that names it and the nearest name.
+/// [`Error::Parameter`] for an unknown material, with the part that names it and the most similar name.
 pub fn device_parts(file: &DeviceFile) -> Result<Vec<DevicePart>> {
     Ok(named_parts(file)?.into_iter().map(|(part, _)| part).collect())
 }
 
-/// The names of these parts in the file; none where the materials of one are not known.
+/// The names of these parts in the file; empty if materials are unknown.
 pub(crate) fn device_part_names(file: &DeviceFile) -> Vec<String> {
     named_parts(file).unwrap_or_default().into_iter().map(|(_, name)| name).collect()
 }
@@ -43,7 +44,7 @@ fn named_parts(file: &DeviceFile) -> Result<Vec<(DevicePart, String)>> {
     Ok(named)
 }
 
-/// The sections of a device without a file, as tubes to draw; none where all are solid.
+/// The sections of a device without a file, as tubes to draw; empty if all are solid.
 pub fn section_parts(device: &Device) -> Vec<DevicePart> {
     if device.sections().iter().all(|section| section.inner_radius_mm.is_none()) {
         return Vec::new();
@@ -59,7 +60,7 @@ pub fn section_parts(device: &Device) -> Vec<DevicePart> {
     device.sections().iter().map(part).collect()
 }
 
-/// Adds a stretch of a layer; where it only goes on, the layer grows.
+/// Adds a stretch of a layer, or extends the layer if it continues.
 fn push(drawn: &mut Vec<DevicePart>, layer: DevicePart) {
     let alike = |before: &&mut DevicePart| {
         DevicePart { from_tip_mm: None, ..**before } == DevicePart { from_tip_mm: None, ..layer }
@@ -70,7 +71,7 @@ fn push(drawn: &mut Vec<DevicePart>, layer: DevicePart) {
     }
 }
 
-/// Materials of a part, from the inside.
+/// Materials of a part, from the inside outwards.
 struct Layers {
     wall: Option<Material>,
     coat: Option<(Material, f64)>,
@@ -94,7 +95,7 @@ impl Layers {
         Ok(Self { wall, coat })
     }
 
-    /// The layers of a section that lies between two arc lengths from the tip, the outermost last.
+    /// The layers of a section between two arc lengths from the tip, the outermost last.
     fn across(&self, section: &Section, from_tip_mm: [f64; 2]) -> impl Iterator<Item = DevicePart> {
         let from_tip_mm = Some(from_tip_mm);
         let inner_radius_mm = section.inner_radius_mm.unwrap_or(0.0);

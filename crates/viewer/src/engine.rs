@@ -1,4 +1,4 @@
-//! What processors differ in: the two tasks that a graphics processor, or plain Rust, carries out.
+//! The processor-dependent tasks, carried out by a graphics processor or plain Rust.
 
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
@@ -7,7 +7,7 @@ use crate::c_arm::CArm;
 use crate::output::Image;
 use crate::three_d::Solids;
 
-/// Computes lengths of rays inside things: the one task that processors differ in.
+/// Computes lengths of rays inside objects.
 pub(crate) trait PathEngine: Send + Sync {
     /// Length inside a closed mesh of the central ray of each pixel of `view`, row by row.
     fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>>;
@@ -18,7 +18,7 @@ pub(crate) trait ThreeDEngine: Send + Sync {
     fn frame(&mut self, solids: &Solids) -> Result<Image>;
 }
 
-/// Number of this process. A web page is one that is never forked.
+/// Identifier of this process. A web page is never forked and has a fixed one.
 pub(crate) fn process() -> u32 {
     if cfg!(target_family = "wasm") { 0 } else { std::process::id() }
 }
@@ -26,19 +26,20 @@ pub(crate) fn process() -> u32 {
 /// The engines of the wanted views, all on the same processor.
 pub(crate) struct Engines {
     pub(crate) paths: Option<Box<dyn PathEngine>>,
-    /// That of the CPU is made with the first frame.
+    /// On the CPU it is created with the first frame.
     pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
-    /// That of a graphics processor whose answers are waited for.
+    /// A graphics processor with asynchronous results.
     #[cfg(feature = "gpu")]
     pub(crate) later: Option<Box<crate::gpu::GpuView3d>>,
-    /// Name for people.
+    /// Name for display.
     pub(crate) name: String,
-    /// The process that they were made in. One that is forked from it has neither the threads nor the device of a graphics processor.
+    /// The process that created them. A process forked from it has neither the threads nor the device of a graphics
+    /// processor.
     pub(crate) process: u32,
 }
 
 impl Engines {
-    /// Has the 3D view made anew with its next frame: the wall has moved.
+    /// Recreates the 3D view with its next frame, because the wall has moved.
     pub(crate) fn forget_wall(&mut self) {
         self.three_d = None;
         #[cfg(feature = "gpu")]
@@ -47,7 +48,7 @@ impl Engines {
         }
     }
 
-    /// Whether this process was forked from the one that made them.
+    /// Whether this process was forked from the one that created them.
     pub(crate) fn are_forked(&self) -> bool {
         self.process != process()
     }
@@ -55,7 +56,7 @@ impl Engines {
 
 impl Drop for Engines {
     fn drop(&mut self) {
-        // A driver would wait for its threads, which are not there.
+        // A driver would wait for its threads, which do not exist here.
         if self.are_forked() {
             std::mem::forget((self.paths.take(), self.three_d.take()));
         }

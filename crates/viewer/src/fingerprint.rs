@@ -1,4 +1,4 @@
-//! Numbers made from content: the same content, the same number, on every machine.
+//! Content hashes: equal content has the same hash on every machine.
 
 /// 128-bit FNV-1a.
 pub(crate) fn fingerprint(bytes: impl Iterator<Item = u8>) -> u128 {

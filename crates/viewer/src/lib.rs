@@ -1,9 +1,9 @@
-//! Scene in, frames out: a 3D view and a simulated fluoroscopic view, without a window.
+//! Renders a scene into frames: a 3D view and a simulated fluoroscopic view, without a window.
 //!
-//! A [`ViewSpec`] says which frames are wanted, a [`Renderer`] prepares them for a vessel wall and draws
-//! devices in it. Frames come from a graphics processor through wgpu where there is one, and otherwise from
-//! plain Rust, which is also the exact reference for path lengths. Without the feature `gpu` (on by default) there is
-//! plain Rust alone. Units: millimetre, degree and keV where a name says so.
+//! A [`ViewSpec`] specifies the frames, a [`Renderer`] prepares them for a vessel wall and draws devices in it.
+//! Frames come from a graphics processor through wgpu if there is one, and otherwise from plain Rust, which is also
+//! the exact reference for path lengths. Without the feature `gpu` (on by default) only plain Rust is used. Units:
+//! millimetre, degree and keV as named.
 //!
 //! ```
 //! use endowire_core::{Vec3, vessel::SurfaceMesh};
@@ -62,7 +62,7 @@ pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,
 };
 pub use pulse::Seen;
-pub use pushed::Pushed;
+pub use pushed::{Pushed, ShownDevice};
 pub use renderer::{Frames, Renderer};
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, ExposureSpec, FlowSpec, InjectionSpec, Mode,

@@ -1,9 +1,9 @@
-//! What a build without the feature `gpu` has in place of wgpu.
+//! Substitute for wgpu in a build without the feature `gpu`.
 
 use crate::engine::Engines;
 use crate::scene::Setup;
 
-/// No adapter ever fits.
+/// No adapter is ever available.
 ///
 /// # Errors
 /// That there is none, as a clause.

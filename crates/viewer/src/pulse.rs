@@ -1,19 +1,21 @@
-//! A pulse of X-rays while devices move.
+//! X-ray pulses while devices move.
 //!
-//! A pulse of length τ ends at the moment of its frame. The detector adds up energy as it comes, so behind the line integral p(t) of a ray its signal is
+//! A pulse of length τ ends at the time of its frame. The detector accumulates energy, so behind the line integral
+//! p(t) of a ray its signal is
 //!
 //! ```text
 //! (1/τ) ∫ S(p(t)) dt,    the mean of signals
 //! ```
 //!
-//! and not the signal of the mean line integral: S falls as e^{−p} does, which is convex, so a thin dark shadow that sweeps over a pixel takes less from it
-//! than its mean thickness would (Jensen), by ½ var p of the signal in the lowest order. The integral is the midpoint rule over K equal parts, and K is such
-//! that no point of a device moves by more than half a pixel of the picture from one to the next, as far apart as the rays of a pixel are; at most 32.
+//! and not the signal of the mean line integral: S decreases like e^{−p}, which is convex, so a thin dark shadow that
+//! sweeps over a pixel reduces it by less than its mean thickness would (Jensen), by ½ var p of the signal to lowest
+//! order. The integral is computed by the midpoint rule over K equal parts, with K such that no point of a device
+//! moves by more than half a pixel from one to the next, the distance of rays within a pixel; at most 32.
 //!
-//! **Motion.** Between two recorded moments each point of a device goes straight and evenly. Points are counted from the tip of their instrument, so they are
-//! the same at both: x(s, w) = (1 − w) x₀(s) + w x₁(s). What is still, or
-//! again, in the sheath at one of them lies there along the tangent of its mouth. At a time before the
-//! first moment devices are as they were then. Contrast medium rests within a pulse.
+//! **Motion.** Between two recorded moments each point of a device moves in a straight line at constant speed. Points
+//! are identified by their arc length from the tip of their instrument, which is the same at both: x(s, w) = (1 − w)
+//! x₀(s) + w x₁(s). Points inside the sheath at one of them are on the tangent of its mouth. Before the first moment
+//! devices are as at that moment. Contrast medium does not move within a pulse.
 
 use endowire_core::Vec3;
 use endowire_core::device::line_mm;
@@ -24,27 +26,28 @@ use crate::device::DeviceView;
 use crate::pushed::Pushed;
 use crate::renderer::Renderer;
 
-/// Most parts of a pulse.
+/// Largest number of parts of a pulse.
 const MOST_PARTS: f64 = 32.0;
-/// Parts for each pixel of way.
+/// Number of parts per pixel of motion.
 const PARTS_PER_PX: f64 = 2.0;
-/// Half of the length over which a tangent is told, mm.
+/// Half of the length over which a tangent is computed, mm.
 const TANGENT_MM: f64 = 1e-3;
 
-/// What is in at a moment.
+/// The inserted devices at a moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
     /// The centre line.
     pub shape: &'a Shape,
-    /// Length in of each instrument.
+    /// Inserted length of each instrument.
     pub inserted_mm: &'a [f64],
     /// The moment.
     pub time_s: f64,
 }
 
 impl Pushed {
-    /// Devices at even times of the pulse that ends `now`, as a renderer's next frame is to show them; `before` is what was recorded last. Empty where
-    /// nothing is to be distinguished: without pulses (`xray.pulse_ms`), without a moment before, or where nothing moves.
+    /// Devices at equally spaced times of the pulse that ends `now`, for a renderer's next frame; `before` is the
+    /// last record. Empty if no motion can be resolved: without pulses (`xray.pulse_ms`), without an earlier moment,
+    /// or if nothing moves.
     pub fn pulse(
         &self,
         before: Option<Seen<'_>>,
@@ -57,7 +60,7 @@ impl Pushed {
         if !(pulse_s > 0.0 && step_s > 0.0) {
             return vec![];
         }
-        // Part of the step that the pulse takes.
+        // Fraction of the step covered by the pulse.
         let share = (pulse_s / step_s).min(1.0);
         let ways = self.ways(before, now);
         let way_px = ways.iter().map(|way| way.px(arm)).fold(0.0, f64::max) * share;
@@ -73,7 +76,7 @@ impl Pushed {
         (0..parts as usize).rev().map(instant).collect()
     }
 
-    /// The way of each instrument that is in, from what was before to now.
+    /// The motion of each inserted instrument from before to now.
     fn ways(&self, before: Seen<'_>, now: Seen<'_>) -> Vec<Way> {
         let [line, line_before] = [now, before].map(|seen| line_mm(seen.inserted_mm.iter().copied()));
         let lengths = now.inserted_mm.iter().zip(before.inserted_mm).filter(|(mm, _)| **mm > 0.0);
@@ -90,7 +93,7 @@ impl Pushed {
     }
 }
 
-/// Where the points of an instrument were, and where they are: those that are in at either moment.
+/// Positions of an instrument's points before and now: those inserted at either moment.
 struct Way {
     from: Vec<(Vec3, Vec3)>,
     to: Vec<(Vec3, Vec3)>,
@@ -100,7 +103,7 @@ struct Way {
 impl Way {
     fn new(before: &Shape, now: &Shape) -> Self {
         let in_now = now.from_tip_mm.first().copied().unwrap_or(0.0);
-        // What has been withdrawn since.
+        // The part withdrawn since.
         let gone = before.from_tip_mm.iter().filter(|s| **s > in_now);
         let from_tip_mm: Vec<f64> = gone.chain(&now.from_tip_mm).copied().collect();
         let places = |shape: &Shape, other: &Shape| {
@@ -110,7 +113,7 @@ impl Way {
         Self { from: places(before, now), to: places(now, before), from_tip_mm }
     }
 
-    /// The longest way of a point on the detector, pixels.
+    /// The largest motion of a point on the detector, pixels.
     fn px(&self, arm: &CArm) -> f64 {
         let ways = self.from.iter().zip(&self.to).map(|((from, _), (to, _))| {
             let [a, b] = [arm.project(from), arm.project(to)];
@@ -128,7 +131,8 @@ impl Way {
     }
 }
 
-/// Place and tangent of a point so far from the tip; one that is not in yet lies behind on the line of the first tangent.
+/// Position and tangent of a point at this distance from the tip; one not yet inserted lies on the line of the first
+/// tangent, behind it.
 fn place(shape: &Shape, from_tip_mm: f64) -> Option<(Vec3, Vec3)> {
     let (first, start, tangent) =
         (*shape.from_tip_mm.first()?, *shape.positions_mm.first()?, *shape.tangents.first()?);
@@ -144,7 +148,7 @@ fn place(shape: &Shape, from_tip_mm: f64) -> Option<(Vec3, Vec3)> {
 mod tests {
     use super::*;
 
-    /// An arc of a circle of radius 30 mm that begins at the origin along z, so much of it.
+    /// An arc of this length of a circle of radius 30 mm that starts at the origin along z.
     fn arc(length_mm: f64) -> Shape {
         let angles = (0..=10).map(|k| f64::from(k) / 10.0 * length_mm / 30.0);
         Shape {
@@ -159,7 +163,7 @@ mod tests {
 
     #[test]
     fn points_of_a_device_that_is_pushed_along_its_arc_go_along_it() {
-        // A point goes 2 mm along the arc: half of its way is the middle of a chord, 2²/8·30 mm beside it.
+        // A point moves 2 mm along the arc: half-way it is at the middle of a chord, 2²/8·30 mm beside the arc.
         let way = Way::new(&arc(20.0), &arc(22.0));
         let (half, expected) = (way.at(0.5), arc(21.0));
         let tip = half.positions_mm[10];
@@ -173,7 +177,7 @@ mod tests {
             assert!((half.positions_mm[k] - on).norm() < 0.02, "{k}: {} {on}", half.positions_mm[k]);
             assert!((half.tangents[k].norm() - 1.0).abs() < 1e-3);
         }
-        // At the ends it is what was recorded; the twin: half of the way is neither.
+        // At the ends it equals the records; counter-check: half-way it equals neither.
         let off = |a: &Shape, b: &Shape| {
             a.positions_mm.iter().zip(&b.positions_mm).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
         };
@@ -186,12 +190,12 @@ mod tests {
     fn what_is_withdrawn_is_still_in_before_its_end() {
         let way = Way::new(&arc(22.0), &arc(20.0));
         let half = way.at(0.5);
-        // 21 mm are in, and what is behind the mouth lies on its line.
+        // 21 mm are inserted, and points behind the mouth are on its line.
         let mouth = half.position_at(21.0).unwrap();
         assert!(mouth.norm() < 0.02, "{mouth}");
         assert!(half.positions_mm.iter().zip(&half.from_tip_mm).all(|(x, s)| *s <= 21.0 || x.z < 0.01));
         assert!(half.from_tip_mm.windows(2).all(|pair| pair[1] < pair[0]));
-        // The twin: without them a millimetre at the mouth would be missing.
+        // Counter-check: without them a millimetre at the mouth would be missing.
         let first = half.from_tip_mm.iter().position(|s| *s <= 20.0).unwrap();
         assert!(half.positions_mm[first].norm() > 0.9);
     }

@@ -1,4 +1,4 @@
-//! What is pushed, as the viewer sees it: the device, or each of several instruments.
+//! The inserted device, or several instruments, as seen by the viewer.
 
 use endowire_core::device::{Device, Kind, Stack, line_mm};
 use endowire_core::insertion::DetachedCoil;
@@ -7,32 +7,34 @@ use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_core::{Error, Result, Vec3};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::device::{DevicePart, DeviceView, bore_too_wide};
 use crate::device_file::{device_part_names, device_parts, section_parts};
 use crate::spec::ViewSpec;
 
-/// Instruments of a scene and what they are made of.
+/// Instruments of a scene and their materials.
 #[derive(Debug, Clone)]
 pub struct Pushed {
     stack: Stack,
-    /// Parts to draw of each.
+    /// Parts of each to draw.
     parts: Vec<Vec<DevicePart>>,
-    /// What each is, where its file says so.
+    /// The kind of each, if its file gives it.
     kinds: Vec<Option<Kind>>,
-    /// The names of their parts, where files say so.
+    /// The names of their parts, if files give them.
     part_names: Vec<Vec<String>>,
-    /// Coils that were left behind.
+    /// Detached coils.
     coils: Vec<DetachedCoil>,
 }
 
 impl Pushed {
-    /// Those of a scene. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
+    /// The instruments of a scene. The parts of a single device come from the `[view]` table if given there, all
+    /// others from device files.
     ///
     /// # Errors
-    /// As [`SceneOf::stack`]; materials of a device file that are not known; a `[view]` table that describes one device where there are several,
-    /// or another one; an injection through a tip where nothing has a lumen.
+    /// As [`SceneOf::stack`]; unknown materials in a device file; a `[view]` table that describes one device where
+    /// there are several, or a different one; an injection through a tip if no instrument has a lumen.
     pub fn new<M: MethodChoice + DeserializeOwned + Default>(
         scene: &SceneOf<M>,
         spec: &ViewSpec,
@@ -66,10 +68,10 @@ impl Pushed {
         Ok(pushed)
     }
 
-    /// Has views show these coils, which were detached from instruments of the stack, after all that is in.
+    /// Makes views show these coils, detached from instruments of the stack, after all inserted instruments.
     ///
     /// # Errors
-    /// A coil of an instrument that is not there.
+    /// A coil of a nonexistent instrument.
     pub fn leave(&mut self, coils: &[DetachedCoil]) -> Result<()> {
         let count = self.stack.instruments().len();
         if let Some(other) = coils.iter().find(|coil| coil.instrument >= count) {
@@ -80,14 +82,14 @@ impl Pushed {
         Ok(())
     }
 
-    /// Whether medium can come through an instrument.
+    /// Whether medium can flow through an instrument.
     pub fn has_lumen(&self, instrument: usize) -> bool {
         let sections = self.stack.instruments()[instrument].device.sections();
         sections.iter().any(|section| section.inner_radius_mm.is_some())
             || self.parts[instrument].iter().any(|part| part.inner_radius_mm > 0.0)
     }
 
-    /// Whether an instrument is a wire: its file says so, or it has no lumen.
+    /// Whether an instrument is a wire: according to its file, or because it has no lumen.
     pub fn is_wire(&self, instrument: usize) -> bool {
         match self.kinds[instrument] {
             Some(kind) => matches!(kind, Kind::Guidewire | Kind::Microwire),
@@ -95,18 +97,18 @@ impl Pushed {
         }
     }
 
-    /// Whether an instrument is a coil on its pusher: its file says so.
+    /// Whether an instrument is a coil on its pusher, according to its file.
     pub fn is_coil(&self, instrument: usize) -> bool {
         self.kinds[instrument] == Some(Kind::Coil)
     }
 
-    /// What the file of an instrument calls a part that is drawn, by its number.
+    /// The name in an instrument's file of a drawn part, by its index.
     pub fn part_name(&self, instrument: usize, part: usize) -> Option<&str> {
         self.part_names[instrument].get(part).map(String::as_str)
     }
 
-    /// The tip of the innermost instrument with a lumen that is in on this line, where these lengths are, mm; in the vessel at rest, where that is
-    /// displaced.
+    /// The tip of the innermost inserted instrument with a lumen on this line, for these lengths, mm; transformed to
+    /// the vessel at rest if it is displaced.
     pub fn tip_at_rest_mm(
         &self,
         shape: &Shape,
@@ -119,11 +121,22 @@ impl Pushed {
         Some(displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm)))
     }
 
-    /// Views of all that is in on this line, where these lengths are.
+    /// Views of all inserted instruments on this line, for these lengths.
     pub fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
         let line_mm = line_mm(inserted_mm.iter().copied());
         let behind = inserted_mm.iter().filter(|mm| **mm > 0.0).map(|mm| shape.behind(line_mm - mm));
         self.views_of(&behind.collect::<Vec<_>>(), inserted_mm)
+    }
+
+    /// What [`Self::views`] shows, in their order.
+    pub fn shown(&self, inserted_mm: &[f64]) -> Vec<ShownDevice> {
+        let shown = |instrument: usize, detached: bool| {
+            let name = self.stack.instruments()[instrument].name.clone();
+            ShownDevice { instrument, name, detached }
+        };
+        let is_in = inserted_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0);
+        let left = self.coils.iter().map(|coil| shown(coil.instrument, true));
+        is_in.map(|(instrument, _)| shown(instrument, false)).chain(left).collect()
     }
 
     /// Views of all that is in, on lines of their own.
@@ -139,6 +152,17 @@ impl Pushed {
         });
         each.zip(shapes).map(view).chain(left).collect()
     }
+}
+
+/// Which device a view shows: numbers of views change as instruments come in and coils are detached.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ShownDevice {
+    /// Number of the instrument, the innermost is 0.
+    pub instrument: usize,
+    /// Its name; empty of a device alone.
+    pub name: String,
+    /// Whether it is its coil, which was detached.
+    pub detached: bool,
 }
 
 /// Refuses a table of the view that is as wide inside as its device is outside: it was written for another.

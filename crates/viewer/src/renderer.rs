@@ -1,4 +1,4 @@
-//! From a scene to frames: chooses an engine, prepares what the wanted views need, draws.
+//! From a scene to frames: chooses an engine, prepares the wanted views, draws.
 
 #[cfg(feature = "gpu")]
 mod later;
@@ -35,13 +35,13 @@ pub struct Frames {
 pub struct Renderer {
     setup: Setup,
     engines: Engines,
-    /// Made with the first frame.
+    /// Created with the first frame.
     fluoro: Option<(Fluoroscope, Sequence)>,
-    /// What is left of the view before.
+    /// Reusable data of the previous view.
     kept: Option<Kept>,
-    /// Lengths of the central rays, with the first that are asked for.
+    /// Lengths of the central rays, computed when first needed.
     central: Option<Anatomy>,
-    /// The last path lengths with what they transmit.
+    /// The last path lengths and their transmission.
     transmitted: Option<(PathLengths, Vec<f32>)>,
     contacts: Vec<ContactView>,
     is_cpu: bool,
@@ -55,22 +55,23 @@ impl std::fmt::Debug for Renderer {
 }
 
 impl Renderer {
-    /// Prepares the views that `spec` asks for, and nothing else; what stays from frame to frame is computed with the first. The fluoroscopic view needs a **closed**
-    /// wall with outward triangles (cap the openings); the 3D view shows any.
+    /// Prepares the views of `spec`; data constant between frames are computed with the first one. The fluoroscopic
+    /// view needs a **closed** wall with outward triangles (cap the openings); the 3D view shows any.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a bad `spec`, a vessel that is not between source and detector, files that are not there, or
-    /// `backend = gpu` without a fitting adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or
-    /// inside out; [`Error::Content`] for a centre line or a tomogram that cannot be used.
+    /// [`Error::Parameter`] for an invalid `spec`, a vessel that is not between source and detector, missing files,
+    /// or `backend = gpu` without a suitable adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently
+    /// or inside out; [`Error::Content`] for an unusable centre line or tomogram.
     pub fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         Self::of_setup(Setup::new(spec, wall)?)
     }
 
-    /// The same for a wall with openings: the 3D view shows them closed, and in the beam vessels taper off there, as if they went on
-    /// into branches too fine to be seen. Contrast medium flows along the centre line that is found in the wall where `spec` has none.
+    /// As [`Self::new`], for a wall with openings: the 3D view shows them closed, and in the beam vessels taper off
+    /// there, as if they continued into invisibly fine branches. Contrast medium flows along a centre line computed
+    /// from the wall if `spec` has none.
     ///
     /// # Errors
-    /// As [`Self::new`], and a wall in which no centre line is found where one is needed.
+    /// As [`Self::new`], and a wall from which no centre line can be computed if one is needed.
     pub fn of_wall(spec: &ViewSpec, wall: &Wall) -> Result<Self> {
         let mut spec = spec.clone();
         if spec.wants(View::Fluoro) && !spec.injection.is_empty() {
@@ -95,36 +96,38 @@ impl Renderer {
         })
     }
 
-    /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Says why where a
-    /// graphics processor was wanted and is not used, and changes where a lost adapter made the CPU take over.
+    /// Name of the engine for display: "CPU reference", or the graphics interface and adapter. Includes the reason if
+    /// a wanted graphics processor is not used, and changes if the CPU takes over after an adapter was lost.
     pub fn backend(&self) -> &str {
         &self.engines.name
     }
 
-    /// The C-arm of the fluoroscopic view, if that is wanted: projects points exactly as the frames do.
+    /// The C-arm of the fluoroscopic view, if wanted: projects points exactly like the frames.
     pub fn c_arm(&self) -> Option<&CArm> {
         self.setup.c_arm.as_ref()
     }
 
-    /// Where a point is in the 3D view, pixels from the left and from the top; `None` without that view, and for points behind the camera.
+    /// Position of a point in the 3D view, pixels from the left and from the top; `None` without that view, and for
+    /// points behind the camera.
     pub fn three_d_pixel(&self, point_mm: &Vec3) -> Option<[f64; 2]> {
         let camera = self.setup.camera.as_ref()?;
         let view = camera.in_view(point_mm);
         (view[2] < 0.0).then(|| camera.pixel_of(view, 1))
     }
 
-    /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; `None` without a tomogram, or fluoroscopy.
+    /// Fraction of the vessel's surface contained in the tomogram of its patient, 0 to 1; `None` without a tomogram,
+    /// or fluoroscopy.
     pub fn vessel_held(&self) -> Option<f64> {
         self.setup.patient.vessel_held()
     }
 
-    /// What the renderer was made for.
+    /// The specification of the renderer.
     pub fn spec(&self) -> &ViewSpec {
         &self.setup.spec
     }
 
-    /// Draws the wanted views as the next frame at its time by `frames_per_s`. Fluoroscopy leaves out what of a device is not
-    /// between source and detector.
+    /// Draws the wanted views as the next frame at its time according to `frames_per_s`. Fluoroscopy omits parts of a
+    /// device that are not between source and detector.
     ///
     /// # Errors
     /// As [`Self::render_at`].
@@ -134,18 +137,20 @@ impl Renderer {
         self.render_at(devices, moment)
     }
 
-    /// Draws the wanted views of a moment: its number seeds the noise, its time tells where contrast medium is.
+    /// Draws the wanted views of a moment: its number seeds the noise, its time determines the contrast medium.
     ///
-    /// In subtraction modes the first frame also takes the mask: the scene and the devices as they are then, before any injection.
+    /// In subtraction modes the first frame also takes the mask: the scene and the devices at that time, before any
+    /// injection.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a device with values that are not finite, a time that is not, or a roadmap without an injection.
+    /// [`Error::Parameter`] for a device with values that are not finite, a time that is not finite, or a roadmap
+    /// without an injection.
     pub fn render_at(&mut self, devices: &[DeviceView], moment: FrameTime) -> Result<Frames> {
         self.render_pulse(devices, &[], moment)
     }
 
-    /// The same with devices that move while the beam is on: fluoroscopy is the mean of what the detector gets at the instants of `pulse`
-    /// ([`crate::Pushed::pulse`]), or as `devices` are if there are none; the 3D view shows `devices`.
+    /// As [`Self::render_at`], with devices that move during exposure: fluoroscopy is the mean over the instants of
+    /// `pulse` ([`crate::Pushed::pulse`]), or of `devices` if there are none; the 3D view shows `devices`.
     ///
     /// # Errors
     /// As [`Self::render_at`].
@@ -193,11 +198,13 @@ impl Renderer {
         Ok(frames)
     }
 
-    /// Turns the C-arm in a run: the next frame is of another place, in a subtraction against a mask that is taken there with it, or by
-    /// [`Self::take_mask`], as one of a run that came the same way. Body and flow stay, and so does what the detector holds of the last frame.
+    /// Turns the C-arm within a run: the next frame is from another position, with subtraction of a mask taken there
+    /// with it, or by [`Self::take_mask`], as in a run with the same motion. Body and flow are kept, and so is the
+    /// detector's memory of the last frame.
     ///
     /// # Errors
-    /// As [`Self::new`] for the place, and [`Error::Parameter`] where the fluoroscopic view was not asked for. The C-arm then stays where it was.
+    /// As [`Self::new`] for the position, and [`Error::Parameter`] without the fluoroscopic view. Then the C-arm does
+    /// not move.
     pub fn turn_c_arm(&mut self, place: &CArmSpec) -> Result<()> {
         let spec = ViewSpec { c_arm: place.clone(), ..self.setup.spec.clone() };
         self.c_arm().ok_or_else(no_fluoro)?;
@@ -205,7 +212,7 @@ impl Renderer {
         self.go_on_from(stored)
     }
 
-    /// A renderer of another view of the same vessel, with what both have in common.
+    /// A renderer of another view of the same vessel, sharing common data.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -213,9 +220,9 @@ impl Renderer {
         Self::of_setup(self.setup.beside(spec)?.of_own_run())
     }
 
-    /// Tells where the tip of the innermost instrument with a lumen is at a moment that is not drawn, in the vessel at rest: medium that is injected
-    /// `at_tip` goes where the tip is meanwhile. Frames tell it themselves; between moments its way is straight. Where the tip was said to
-    /// be elsewhere at that moment, what was said of it and of later ones is forgotten.
+    /// Reports the tip position of the innermost instrument with a lumen at a moment that is not drawn, in the vessel
+    /// at rest: medium injected `at_tip` follows the tip. Frames report it themselves; between moments its path is
+    /// straight. If another position was reported for that moment, this and later reports are discarded.
     ///
     /// # Errors
     /// [`Error::Parameter`] for values that are not finite.
@@ -231,22 +238,22 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws another view of the same vessel from now on, as a renderer that is new, and keeps what both have in common: where the C-arm stands in the same
-    /// place, the lengths of its rays.
+    /// Draws another view of the same vessel from now on, like a new renderer, but keeps common data: if the C-arm
+    /// has the same position, the lengths of its rays.
     ///
     /// # Errors
-    /// As [`Self::new`]. The view then stays what it was.
+    /// As [`Self::new`]. Then the view is unchanged.
     pub fn change(&mut self, spec: &ViewSpec) -> Result<()> {
         self.show(spec).map(drop)
     }
 
-    /// The same; what the detector and the masks of the view before remember.
+    /// As [`Self::change`]; returns the memory of the detector and the masks of the previous view.
     fn show(&mut self, spec: &ViewSpec) -> Result<Option<Sequence>> {
         let setup = self.setup.beside(spec)?;
         let before = &self.setup.spec;
         let same =
             before.views == spec.views && before.size_px == spec.size_px && before.backend == spec.backend;
-        // The camera stands where it sees the beam.
+        // The camera is at a position where it sees the beam.
         let camera = !spec.wants(View::ThreeD) || (before.camera == spec.camera && !spec.camera.c_arm);
         let engines = if same && camera { None } else { Some(engines(&setup)?) };
         let (scope, sequence) = self.fluoro.take().unzip();
@@ -260,8 +267,8 @@ impl Renderer {
         Ok(sequence)
     }
 
-    /// Moves the vessel from where it is at rest, or back there. The C-arm stands, the camera looks and the beam is as before, and masks that
-    /// were taken stay: a subtraction shows by how much the vessel is elsewhere.
+    /// Displaces the vessel, or returns it to rest. C-arm, camera and beam are unchanged, and masks are kept: a
+    /// subtraction shows the displacement.
     ///
     /// # Errors
     /// As [`Self::render_at`].
@@ -285,7 +292,7 @@ impl Renderer {
         })
     }
 
-    /// Computes what stays from frame to frame now, and not with the first one.
+    /// Computes data constant between frames now instead of with the first frame.
     ///
     /// # Errors
     /// As [`Self::render_at`].
@@ -298,7 +305,7 @@ impl Renderer {
         }
     }
 
-    /// Prepares the next frame of a detector that holds what another place has left, if there was one.
+    /// Prepares the next frame of a detector with the memory of another position, if any.
     fn go_on_from(&mut self, stored: Option<Afterglow>) -> Result<()> {
         let Some(stored) = stored else { return Ok(()) };
         self.with_fallback(|setup, engines, fluoro, kept| {
@@ -313,10 +320,10 @@ impl Renderer {
         self.contacts.extend_from_slice(contacts);
     }
 
-    /// Takes the mask of a subtraction anew: the scene with `devices` as they are, before any injection.
+    /// Retakes the mask of a subtraction: the scene with the current `devices`, before any injection.
     ///
     /// # Errors
-    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    /// As [`Self::render_at`], and [`Error::Parameter`] without the fluoroscopic view.
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
         let devices = [RefinedDevice::all(devices)?];
         self.with_fallback(|setup, engines, fluoro, kept| {
@@ -325,21 +332,22 @@ impl Renderer {
         })
     }
 
-    /// How fluoroscopy is exposed; `None` before its first frame.
+    /// The exposure of fluoroscopy; `None` before its first frame.
     pub fn exposure(&self) -> Option<Exposure> {
         self.fluoro.as_ref().map(|(scope, _)| scope.exposure)
     }
 
-    /// The last image hold: the last frames as one, the newest weighing most. `None` before the first frame.
+    /// The last image hold: a weighted mean of the last frames, the newest weighing most. `None` before the first
+    /// frame.
     pub fn last_image_hold(&self) -> Option<Image> {
         let (scope, sequence) = self.fluoro.as_ref()?;
         sequence.hold(scope)
     }
 
-    /// What a fluoroscopic frame of these devices shows, with the contacts at the given places.
+    /// Labels of a fluoroscopic frame of these devices, with contacts at the given positions.
     ///
     /// # Errors
-    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    /// As [`Self::render_at`], and [`Error::Parameter`] without the fluoroscopic view.
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
         let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
@@ -349,7 +357,7 @@ impl Renderer {
         labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)
     }
 
-    /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.
+    /// Runs `job`; if an adapter fails in it, switches to the CPU and runs it again.
     fn with_fallback<T>(
         &mut self,
         job: impl Fn(&Setup, &mut Engines, &mut Option<(Fluoroscope, Sequence)>, Option<&Kept>) -> Result<T>,
@@ -366,7 +374,7 @@ impl Renderer {
         }
     }
 
-    /// Goes on with the CPU.
+    /// Switches to the CPU.
     fn hand_over(&mut self, reason: &str) {
         let mut engines = cpu::engines(self.setup.c_arm.is_some());
         engines.name = format!("{} ({} failed: {reason})", engines.name, self.engines.name);
@@ -375,7 +383,7 @@ impl Renderer {
     }
 }
 
-/// What casts and draws for a set-up, and whether that is the CPU.
+/// The engines for a set-up, and whether they are the CPU's.
 fn engines(setup: &Setup) -> Result<(Engines, bool)> {
     let nothing = setup.c_arm.is_none() && setup.camera.is_none();
     let mut refused = None;
@@ -395,7 +403,7 @@ fn engines(setup: &Setup) -> Result<(Engines, bool)> {
     Ok((engines, is_cpu))
 }
 
-/// The fluoroscopic view, made where it is not yet, and what casts its rays.
+/// The fluoroscopic view, created if needed, and the engine for its rays.
 fn prepared<'a>(
     setup: &Setup,
     engines: &'a mut Engines,

@@ -1,4 +1,4 @@
-//! What a renderer does when an adapter fails.
+//! Renderer with failing adapters.
 
 use super::*;
 use crate::engine::ThreeDEngine;
@@ -59,11 +59,11 @@ fn a_lost_adapter_hands_over_to_the_cpu_and_says_so() {
     assert_eq!(renderer.render(&wire).unwrap(), first);
     assert_eq!(renderer.backend(), "CPU reference (adapter failed: the device was lost)");
     assert_eq!(renderer.path_lengths(&wire).unwrap(), whole.path_lengths(&wire).unwrap());
-    // What another process has made, this one being forked from it, is not asked at all.
+    // Engines created by the parent of a forked process are not used at all.
     let mut renderer = Renderer { is_cpu: false, ..broken() };
     renderer.engines.process += 1;
     assert_eq!(renderer.render(&wire).unwrap(), first);
     assert_eq!(renderer.backend(), "CPU reference (adapter failed: it does not outlive a fork)");
-    // The twin: without anything to fall back on, the failure is reported.
+    // Counter-check: without a fallback, the failure is reported.
     assert!(broken().render(&wire).is_err());
 }

@@ -1,4 +1,4 @@
-//! What all engines draw: the wall, the patient, and the resolved set-up of each wanted view.
+//! Input of all engines: the wall, the patient, and the resolved set-up of each wanted view.
 
 use std::sync::Arc;
 
@@ -12,36 +12,37 @@ use crate::patient::Patient;
 use crate::spec::{View, ViewSpec};
 use crate::three_d::Camera;
 
-/// All that an engine needs, and no more than the wanted views need.
+/// Data for an engine, only those that the wanted views need.
 #[derive(Debug)]
 pub(crate) struct Setup {
     pub(crate) spec: ViewSpec,
     pub(crate) wall: Arc<SurfaceMesh>,
-    /// The surface of what blood fills, as the beam meets it.
+    /// The surface of the blood-filled lumen in the beam.
     pub(crate) filled: Arc<SurfaceMesh>,
     pub(crate) patient: Arc<Patient>,
-    /// Where the vessel has moved to, if it has; the C-arm stands, and the camera looks, where it is at rest.
+    /// The displaced vessel, if displaced; C-arm and camera refer to the vessel at rest.
     pub(crate) moved: Option<Arc<Moved>>,
-    /// What carries contrast medium, where any is injected.
+    /// The flow that transports contrast medium, if any is injected.
     pub(crate) flow: Option<Arc<Flow>>,
-    /// Whether the wall is closed, so that lengths inside it are known; else blood counts as the tissue around it.
+    /// Whether the wall is closed, so that lengths inside it are defined; otherwise blood counts as surrounding
+    /// tissue.
     pub(crate) lumen: bool,
     pub(crate) c_arm: Option<CArm>,
     pub(crate) camera: Option<Camera>,
 }
 
-/// A vessel that has moved.
+/// A displaced vessel.
 #[derive(Debug)]
 pub(crate) struct Moved {
     pub(crate) displacement: Displacement,
     wall: Arc<SurfaceMesh>,
     filled: Arc<SurfaceMesh>,
-    /// The air of a generated body: diaphragm, borders of the heart and bowel go with what moves the vessel.
+    /// The air of a generated body: diaphragm, borders of the heart and bowel move with the vessel.
     air: Option<SurfaceMesh>,
 }
 
 impl Setup {
-    /// Moves the vessel, and the air of a generated body, from where they are at rest, or back there.
+    /// Displaces the vessel, and the air of a generated body, or returns them to rest.
     pub(crate) fn move_vessel(&mut self, displacement: Option<&Displacement>) {
         let moved = |mesh: &SurfaceMesh, displacement: &Displacement| SurfaceMesh {
             vertices_mm: mesh.vertices_mm.iter().map(|v| displacement.place(v)).collect(),
@@ -58,22 +59,22 @@ impl Setup {
         });
     }
 
-    /// Where the vessel has moved to.
+    /// The displacement of the vessel.
     pub(crate) fn displacement(&self) -> Option<&Displacement> {
         self.moved.as_ref().map(|moved| &moved.displacement)
     }
 
-    /// The wall where it is.
+    /// The wall at its displacement.
     pub(crate) fn wall_now(&self) -> &SurfaceMesh {
         self.moved.as_ref().map_or(&self.wall, |moved| &moved.wall)
     }
 
-    /// What blood fills where it is.
+    /// The blood-filled lumen at its displacement.
     pub(crate) fn filled_now(&self) -> &SurfaceMesh {
         self.moved.as_ref().map_or(&self.filled, |moved| &moved.filled)
     }
 
-    /// The air of a generated body where it is.
+    /// The air of a generated body at its displacement.
     pub(crate) fn air_now(&self) -> Option<&SurfaceMesh> {
         match &self.moved {
             Some(moved) => moved.air.as_ref(),
@@ -81,23 +82,23 @@ impl Setup {
         }
     }
 
-    /// A set-up with a closed wall, which blood fills to its ends.
+    /// A set-up with a closed wall, filled with blood to its ends.
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         let wall = Arc::new(wall.clone());
         Self::filled(spec, Arc::clone(&wall), wall)
     }
 
-    /// A set-up with a closed wall and what blood fills.
+    /// A set-up with a closed wall and a given blood-filled lumen.
     pub(crate) fn filled(spec: &ViewSpec, wall: Arc<SurfaceMesh>, filled: Arc<SurfaceMesh>) -> Result<Self> {
         Self::made(spec, (wall, filled), None)
     }
 
-    /// That of another view of the same vessel, with what both have in common.
+    /// The set-up of another view of the same vessel, sharing common data.
     pub(crate) fn beside(&self, spec: &ViewSpec) -> Result<Self> {
         Self::made(spec, (Arc::clone(&self.wall), Arc::clone(&self.filled)), Some(self))
     }
 
-    /// The same for a run of its own: what comes out of a tip is not that of another.
+    /// The same for a separate run: medium from a tip belongs to one run only.
     pub(crate) fn of_own_run(mut self) -> Self {
         self.flow = self.flow.map(|flow| if flow.follows_tip() { Arc::new(flow.anew()) } else { flow });
         self
@@ -131,7 +132,8 @@ impl Setup {
             let other = other.filter(|other| other.c_arm.is_some());
             let known = other.is_some_and(|other| other.lumen);
             let closed = if known { Ok(()) } else { check_closed(&filled) };
-            // Only contrast medium shows what is inside the wall: blood is nearly tissue, and a device is drawn without it.
+            // Only contrast medium shows the inside of the wall: blood resembles tissue, and a device is drawn
+            // without it.
             if !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0 {
                 closed?;
             } else {
@@ -150,7 +152,7 @@ impl Setup {
         }
         let beam: Vec<_> = match &setup.c_arm {
             Some(c_arm) if spec.camera.c_arm => {
-                // Source and detector are a metre apart: a frame that held them would show the vessel as a speck.
+                // Source and detector are a metre apart: in a frame containing both the vessel would be a speck.
                 c_arm.field_corners_mm(c_arm.sod_mm()).to_vec()
             }
             _ => vec![],
@@ -162,7 +164,7 @@ impl Setup {
     }
 }
 
-/// What carries the medium of a view, with what it has in common with that of another.
+/// The flow of a view, sharing data with that of another.
 fn flow(spec: &ViewSpec, filled: &SurfaceMesh, other: Option<&Setup>) -> Result<Option<Arc<Flow>>> {
     let known = other.filter(|other| other.spec.flow == spec.flow && !spec.injection.is_empty());
     match known.and_then(|other| Some((other.flow.as_ref()?, &other.spec.injection))) {

@@ -1,11 +1,11 @@
 //! Ends of vessels in the beam.
 //!
-//! A wall ends where its surface was cut; in the beam a vessel that is filled with contrast medium up to a flat end would look sawn off.
-//! There it goes on straight and tapers to a point, as if it had gone on into branches too fine to be seen.
+//! A wall ends where its surface was cut; in the beam a vessel filled with contrast medium up to a flat end would
+//! look sawn off. So it continues straight and tapers to a point, as if it divided into invisibly fine branches.
 
 use endowire_core::vessel::{Opening, SurfaceMesh, Wall};
 
-/// Length of what is added over the radius of the opening, and rings along it.
+/// Length of an added tail relative to the radius of the opening, and number of rings along it.
 const LENGTH: f64 = 3.0;
 const RINGS: u32 = 14;
 
@@ -23,7 +23,7 @@ fn add_tail(mesh: &mut SurfaceMesh, opening: &Opening) {
     let mut last = rim.clone();
     for ring in 1..RINGS {
         let part = f64::from(ring) / f64::from(RINGS);
-        // Without a kink where it begins.
+        // Without a kink at its start.
         let scale = libm::cos(part * std::f64::consts::FRAC_PI_2);
         let first = mesh.vertices_mm.len() as u32;
         for &vertex in &rim {

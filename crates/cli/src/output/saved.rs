@@ -18,7 +18,7 @@ use super::whole;
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 16";
+const FORMAT: &str = "endowire state 17";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.

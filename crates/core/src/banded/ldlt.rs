@@ -1,18 +1,20 @@
 //! The LDLᵀ factorisation of symmetric block tridiagonal matrices without pivoting.
 //!
-//! The rows of a rod's Newton system couple only neighbouring nodes, so with the unknowns of a node as one block the matrix is
-//! block tridiagonal. faer has no such solver and LAPACK's band solver works with a run-time width; with the block a
-//! compile-time constant the inner loops unroll and vectorise, and a block's share of the band is worked off in one go.
+//! The rows of a rod's Newton system couple only neighbouring nodes, so with the unknowns of a node as one block the
+//! matrix is block tridiagonal. faer has no such solver and LAPACK's band solver has a run-time width; with a
+//! compile-time block size the inner loops unroll and vectorise, and a block's share of the band is processed at
+//! once.
 //!
-//! The factorisation is the right-looking outer product form (Golub and Van Loan, *Matrix Computations*, 4th ed., section
-//! 4.1.2, block by block as in 4.5.1): the rows of a block are eliminated one after the other, then they are taken from the
-//! next block all at once. The forward solve rides along. All of it is compiled for AVX2 too, which [`pulp`] looks for at run time; nothing is
-//! fused, so that bits do not hang on it. By Sylvester's law the signs of D are the inertia of the matrix.
+//! The factorisation is the right-looking outer product form (Golub and Van Loan, *Matrix Computations*, 4th ed.,
+//! section 4.1.2, block by block as in 4.5.1): the rows of a block are eliminated one after the other, then all are
+//! subtracted from the next block at once. The forward solve is done in the same pass. All of it is also compiled for
+//! AVX2, which [`pulp`] detects at run time; no operations are fused, so the bits do not depend on it. By Sylvester's
+//! law the signs of D are the inertia of the matrix.
 //!
-//! No pivoting: an LDLᵀ of an indefinite matrix exists for the order of unknowns used here (a constraint comes
-//! after the unknowns it constrains, see [`crate::rod::layout`]), and where it does not, the caller shifts and
-//! tries again. A pivot that is zero or not finite stops the factorisation with its row, so NaN never spreads
-//! unseen.
+//! No pivoting: an LDLᵀ of an indefinite matrix exists for the order of unknowns used here (a constraint comes after
+//! the unknowns it constrains, see [`crate::rod::layout`]), and where it does not, the caller adds a shift and
+//! retries. A pivot that is zero or not finite stops the factorisation and is reported with its row, so NaN never
+//! spreads unnoticed.
 
 use super::matrix::{BandMatrix, Shift};
 use pulp::{Arch, Simd, WithSimd};
@@ -35,7 +37,7 @@ pub enum FactorError {
         /// The row.
         row: usize,
     },
-    /// A pivot is NaN or infinite: the matrix holds one, or overflowed.
+    /// A pivot is NaN or infinite: the matrix contains one, or overflowed.
     #[error("pivot in row {row} is not a finite number")]
     NotFinite {
         /// The row.
@@ -43,23 +45,23 @@ pub enum FactorError {
     },
 }
 
-/// An LDLᵀ factorisation; its memory is reused from one factorisation to the next.
+/// An LDLᵀ factorisation; its memory is reused.
 #[derive(Debug, Clone)]
 pub struct Factor<const C: usize> {
-    /// Rows as those of the matrix: the inverse pivot on the diagonal, right of it the column of L below the diagonal. A block of
-    /// zeros more than the dimension, so that the kernel needs no special last block.
+    /// Rows like those of the matrix: the inverse pivot on the diagonal, and right of it the column of L below the
+    /// diagonal. One extra block of zeros, so that the kernel needs no special case for the last block.
     rows: Vec<[f64; C]>,
     dimension: usize,
     inertia: Inertia,
 }
 
 impl<const C: usize> Factor<C> {
-    /// Room for matrices of this dimension.
+    /// Allocates for matrices of this dimension.
     pub fn new(dimension: usize) -> Self {
         Self { rows: vec![[0.0; C]; dimension + C / 2], dimension, inertia: Inertia::default() }
     }
 
-    /// Changes the dimension; keeps the memory.
+    /// Changes the dimension without releasing memory.
     pub fn resize(&mut self, dimension: usize) {
         self.rows.resize(dimension + C / 2, [0.0; C]);
         self.dimension = dimension;
@@ -86,7 +88,7 @@ impl<const C: usize> Factor<C> {
     }
 
     /// Factors `matrix` and replaces `b` by the solution of `A x = b`; the forward solve is fused with the
-    /// factorisation. On an error `b` is spoilt.
+    /// factorisation. On an error `b` is overwritten with garbage.
     pub fn factor_solve(&mut self, matrix: &BandMatrix<C>, b: &mut [f64]) -> Result<Inertia, FactorError> {
         let inertia = self.eliminate::<true>(matrix, None, b)?;
         Arch::new().dispatch(Solve::<C, false> { factor: self, b });
@@ -128,10 +130,12 @@ impl<const C: usize> Factor<C> {
         let mut known = [0.0; C];
         for (k, rows) in self.rows[..self.dimension].chunks_exact(block).enumerate().rev() {
             let now = &mut b[k * block..(k + 1) * block];
-            // First what the next block gives, row by row for itself; then the rows of this one, from the last.
+            // First the contribution of the next block, independently for each row; then the rows of this block, last
+            // to first.
             let mut given = [0.0; C];
             for r in 0..block {
-                // Two partial sums: one chain of additions would cost more than the multiplications.
+                // Two partial sums: the latency of one chain of additions would exceed the cost of the
+                // multiplications.
                 let (mut even, mut odd) = (0.0, 0.0);
                 for j in 0..block / 2 {
                     even += rows[r][block + 2 * j] * known[2 * j];
@@ -150,7 +154,7 @@ impl<const C: usize> Factor<C> {
         }
     }
 
-    /// Sets the rows to those of the factor of a matrix with a multiple of a shift, and `b` to what its forward solve gives.
+    /// Factors a matrix with a multiple of a shift into the rows, and replaces `b` by its forward solution.
     fn eliminate<const SOLVE: bool>(
         &mut self,
         matrix: &BandMatrix<C>,
@@ -167,12 +171,12 @@ impl<const C: usize> Factor<C> {
         shift: Option<(&Shift, f64)>,
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
-        // Rows are worked off in whole vectors: what stands left of where a row begins is of no account. Short ones in halves, which all fit
-        // into registers.
+        // Rows are processed in whole vectors: entries left of the start of a row are ignored. Short rows are
+        // processed in halves, which all fit into registers.
         let whole: usize = const { if C >= 20 { 4 } else { 2 } };
         let n = self.dimension;
         let mut negative = 0;
-        // What the block before takes from the block at hand.
+        // What the previous block subtracts from the current one.
         let mut taken = [[0.0; B]; B];
         let mut known = begun(b);
         let (blocks, _) = self.rows[..n].as_chunks_mut::<B>();
@@ -232,7 +236,7 @@ impl<const C: usize> Factor<C> {
     }
 }
 
-/// A factorisation, for the processor at hand.
+/// A factorisation, dispatched to the processor's instruction set.
 struct Eliminate<'a, const C: usize, const SOLVE: bool> {
     factor: &'a mut Factor<C>,
     matrix: &'a BandMatrix<C>,
@@ -256,8 +260,8 @@ impl<const C: usize, const SOLVE: bool> WithSimd for Eliminate<'_, C, SOLVE> {
     }
 }
 
-/// A solution with factors at hand, likewise; without its forward half where that rode along. Within the elimination the other half would
-/// cost that registers.
+/// A solution with existing factors, dispatched in the same way; without its forward half if that was fused with the
+/// factorisation. Within the elimination the backward half would take up registers.
 struct Solve<'a, const C: usize, const FORWARD: bool> {
     factor: &'a Factor<C>,
     b: &'a mut [f64],
@@ -276,7 +280,7 @@ impl<const C: usize, const FORWARD: bool> WithSimd for Solve<'_, C, FORWARD> {
     }
 }
 
-/// What a forward solve of `b` begins with: see [`forward`].
+/// The rows with which a forward solve of `b` starts: see [`forward`].
 #[inline(always)]
 fn begun<const C: usize>(b: &[f64]) -> [f64; C] {
     let mut known = [0.0; C];
@@ -286,8 +290,8 @@ fn begun<const C: usize>(b: &[f64]) -> [f64; C] {
     known
 }
 
-/// The forward solve of one block: `b` begins with its rows. The second half of `known` is what they are after all blocks before, and those of
-/// the next block after this one: handed on in registers, not through memory.
+/// The forward solve of one block: `b` begins with its rows. The second half of `known` holds their values after all
+/// previous blocks, and on return those of the next block: passed in registers, not through memory.
 #[inline(always)]
 fn forward<const C: usize>(rows: &[[f64; C]], b: &mut [f64], known: &mut [f64; C]) {
     let block = C / 2;

@@ -2,8 +2,8 @@
 
 /// A symmetric matrix of blocks of `C / 2` rows, each coupled with the next.
 ///
-/// A row of the upper triangle holds `C` numbers: the columns of its own block and of the next. Those left of the diagonal are
-/// zero.
+/// A row of the upper triangle holds `C` numbers: the columns of its own block and of the next. Those left of the
+/// diagonal are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BandMatrix<const C: usize> {
     pub(super) rows: Vec<[f64; C]>,
@@ -29,13 +29,13 @@ impl<const C: usize> BandMatrix<C> {
         &self.rows[i]
     }
 
-    /// Changes the dimension; keeps the memory, and no entry that means anything.
+    /// Changes the dimension without releasing memory; entries are undefined afterwards.
     pub fn resize(&mut self, dimension: usize) {
         self.rows.resize(dimension, [0.0; C]);
     }
 
-    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`. Entries outside the blocks are ignored; they can
-    /// only be asked for by a caller that numbered its unknowns wrongly, which debug builds report.
+    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`. Entries outside the blocks are ignored; they are an
+    /// error of the caller's numbering, which debug builds report.
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
@@ -53,15 +53,15 @@ impl<const C: usize> BandMatrix<C> {
         self.rows.get(i).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
     }
 
-    /// Begins a matrix that is put together with [`Self::lay_blocks`]: clears the first block and the last two.
+    /// Begins a matrix that is assembled with [`Self::lay_blocks`]: clears the first block and the last two.
     pub(crate) fn begin_blocks(&mut self) {
         let last = self.rows.len() - 2 * Self::BLOCK;
         self.rows[..Self::BLOCK].fill([0.0; C]);
         self.rows[last..].fill([0.0; C]);
     }
 
-    /// Adds the upper triangle of two blocks, the first of which begins at row `at`: what couples one node with the
-    /// next, node by node. Of the second block and of what couples the two, what was there before is overwritten.
+    /// Adds the upper triangle of two blocks, the first beginning at row `at`; called node by node, each with the
+    /// next. Adds to the first block and overwrites the second block and the coupling of both.
     #[inline(always)]
     pub(crate) fn lay_blocks(&mut self, at: usize, entry: impl Fn(usize, usize) -> f64) {
         let targets = &mut self.rows[at..at + C];
@@ -106,7 +106,8 @@ impl<const C: usize> BandMatrix<C> {
     }
 }
 
-/// A matrix that is added to another before it is factored: a diagonal, and one entry a row at the same place of the next block.
+/// A matrix that is added to another before it is factored: a diagonal, and one entry per row in the same column of
+/// the next block.
 #[derive(Debug, Clone, Default)]
 pub struct Shift {
     /// Entries of the diagonal.
@@ -116,7 +117,7 @@ pub struct Shift {
 }
 
 impl Shift {
-    /// The zero shift of this dimension; keeps the memory.
+    /// Resets to the zero shift of this dimension; keeps the memory.
     pub fn reset(&mut self, dimension: usize) {
         for list in [&mut self.diagonal, &mut self.next] {
             list.clear();
@@ -124,7 +125,7 @@ impl Shift {
         }
     }
 
-    /// Adds `factor` times row `i` to that row of a matrix.
+    /// Adds `factor` times row `i` of the shift to that row of a matrix.
     #[inline(always)]
     pub(super) fn add_to<const C: usize>(&self, i: usize, factor: f64, row: &mut [f64; C]) {
         let own = i % (C / 2);

@@ -9,13 +9,13 @@ fn multiply<const C: usize>(a: &BandMatrix<C>, x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// A small deterministic generator: tests need spread, not quality.
+/// A small deterministic generator: tests need variety, not quality.
 fn noise(seed: &mut u64) -> f64 {
     *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     ((*seed >> 11) as f64) / (1u64 << 53) as f64 * 2.0 - 1.0
 }
 
-/// A random quasi-definite band: positive and negative diagonal entries that dominate, spread over `decades`.
+/// A random quasi-definite band: dominant positive and negative diagonal entries, spread over `decades`.
 fn random<const C: usize>(n: usize, seed: u64, decades: f64) -> BandMatrix<C> {
     let mut s = seed;
     let scale: Vec<f64> = (0..n).map(|_| 10f64.powf(0.5 * decades * noise(&mut s))).collect();
@@ -74,7 +74,7 @@ fn solution_and_inertia_agree_with_faer() {
 
 #[test]
 fn badly_scaled_rows_cost_no_accuracy() {
-    // Eight decades between unknowns: eigenvalues of faer lose the small ones, so only solutions are compared.
+    // Eight decades between unknowns: faer's eigenvalues lose the small ones, so only solutions are compared.
     for seed in 1..20 {
         let n = 84;
         let a = random::<12>(n, seed, 8.0);
@@ -139,7 +139,7 @@ fn a_shift_while_factoring_is_that_of_the_matrix() {
 
 #[test]
 fn a_wrong_entry_is_seen_by_the_comparison() {
-    // Twin of the comparison with faer: spoil one entry and the residual must show it.
+    // Counter-check of the comparison with faer: after changing one entry the residual must be large.
     let mut a = random::<12>(42, 9, 0.0);
     let mut x = vec![1.0; 42];
     let mut factor = Factor::new(42);

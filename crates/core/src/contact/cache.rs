@@ -1,7 +1,7 @@
-//! What the contact points of a device know of the wall about them, from one question to the next.
+//! What the contact points of a device know of the wall around them, kept between queries.
 //!
-//! What is known at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step takes it over, slides it with the device and
-//! goes on from there in its own memory ([`ContactCache`]), so that a step that fails has changed nothing.
+//! The knowledge at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step copies it, shifts
+//! it along the device and updates it in its own memory ([`ContactCache`]), so that a failed step changes nothing.
 
 use std::ops::Range;
 
@@ -15,25 +15,26 @@ use super::wall::{Aside, Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
 
-/// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those.
+/// What a point knows of its surroundings. Positions are material points of the vessel, and clearances are distances
+/// between these.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct KnownPoint {
-    /// Where the wall was last looked for.
+    /// Where the wall was last queried.
     pub(super) looked_at: Vec3,
-    /// Arc length from the tip of the piece of device that lies there now, mm.
+    /// Arc length from the tip of the piece of device now there, mm.
     pub(super) from_tip_mm: f64,
-    /// No wall is nearer to that place than this, mm.
+    /// A lower bound of the distance from that position to the wall, mm.
     pub(super) clearance_mm: f64,
-    /// The nearest piece then ([`super::surface`]), if the wall was near.
+    /// The nearest piece at that query ([`super::surface`]), if the wall was near.
     pub(super) piece: Option<u32>,
-    /// While it is no farther than this from there, mm, it is free whatever else would be found.
+    /// Within this distance of that position, mm, the point is free of contact.
     pub(super) free_mm: f64,
-    /// Of a point that has sunk into the wall at its base, a piece of the wall that it has sunk into.
+    /// For a point that has sunk into the wall at its base: a piece of the wall into which it has sunk.
     pub(super) side: Option<u32>,
-    /// The material point where it is at the state that Newton's method is leaving.
+    /// The material point of the vessel where it is at the base, the state from which Newton's step starts.
     pub(super) base: Vec3,
-    /// Where the wall was looked for when that state was assembled, and the piece that was found: what points feel on the way from
-    /// there hangs on where they are alone, not on other steps that were tried.
+    /// Where the wall was queried when the base was assembled, and the piece found: forces at trials from there
+    /// depend only on their positions, not on other trials.
     pub(super) base_looked_at: Vec3,
     /// See `base_looked_at`.
     pub(super) base_piece: Option<u32>,
@@ -41,9 +42,9 @@ pub(super) struct KnownPoint {
     pub(super) base_looked_clearance_mm: f64,
     /// See `base_looked_at`.
     pub(super) base_free_mm: f64,
-    /// No wall is nearer to it than this, mm.
+    /// A lower bound of its distance to the wall at the base, mm.
     pub(super) base_clearance_mm: f64,
-    /// Whether it is active there ([`super::wall`]): the reading of the point is the one taken there.
+    /// Whether it is active at the base ([`super::wall`]): its reading is the one taken there.
     pub(super) presses: bool,
     /// Its force on the wall, N; 0 where it is not active.
     pub(super) force_n: f64,
@@ -69,16 +70,16 @@ const NOTHING: KnownPoint = KnownPoint {
 /// A distance that a point has read in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TakenReading {
-    /// Where, mm.
+    /// Position of the reading, mm.
     pub(super) at_mm: Vec3,
-    /// The piece of wall about which it was read: where two are near, they read differently.
+    /// The piece of wall from which the distance was computed: between two close pieces the result depends on it.
     pub(super) hint: Hint,
-    /// How near the wall is.
+    /// The distance to the wall.
     pub(super) nearness: Nearness,
 }
 
 impl TakenReading {
-    /// That of a point that has read nothing since the step began.
+    /// No reading since the step began.
     const NONE: Self = Self {
         at_mm: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
         hint: Hint::Near(0),
@@ -86,27 +87,27 @@ impl TakenReading {
     };
 }
 
-/// The memory of all contact points of a device in a step.
+/// Memory of all contact points of a device in a step.
 #[derive(Debug, Clone)]
 pub struct ContactCache {
     pub(super) points: Vec<KnownPoint>,
     /// The points element by element.
     pub(super) spans: Vec<Span>,
-    /// Numbers of the points that press at the base.
+    /// Indices of the points that press at the base.
     pub(super) pressing: Vec<usize>,
-    /// Where each point last read the distance of a near wall, and what it read. Apart from `points`: most points are free, and
-    /// all of them are looked at many times a step.
+    /// The last reading of each point near the wall. Stored apart from `points` for speed: most points are free, and
+    /// all of them are visited many times per step.
     pub(super) readings: Vec<TakenReading>,
     pub(super) proximity: ProximityCache,
-    /// What a step does to the points that it leads to the wall, to first order, …
+    /// Points that the step moves to the wall, with their linearised gaps.
     pub(super) foreseen: Vec<Foreseen>,
-    /// … those near it that no step has led there, …
+    /// Points near the wall that no step has moved there yet.
     pub(super) aside: Vec<Aside>,
-    /// … and to those with friction.
+    /// Points with friction, and their motion in the step.
     pub(super) slipping: Vec<Slipping>,
-    /// Whether forces are aimed at.
+    /// Whether contact forces have a target.
     pub(super) aimed: bool,
-    /// Changes of gaps by a round of that, mm, and what it does to points with friction.
+    /// Changes of gaps in a round, mm, and slips of the points with friction.
     pub(super) ends: (Vec<f64>, Vec<Slip>),
 }
 
@@ -117,27 +118,27 @@ pub struct KnownPoints {
 }
 
 impl KnownPoints {
-    /// Takes memory for `points` points.
+    /// Allocates for `points` points.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
     }
 
-    /// Forgets all. Keeps the memory.
+    /// Clears all knowledge; keeps the memory.
     pub fn clear(&mut self) {
         self.points.clear();
     }
 
-    /// What some of the points know.
+    /// The knowledge of some of the points.
     pub(crate) fn part(&self, points: Range<usize>) -> Self {
         Self { points: self.points.get(points).unwrap_or_default().to_vec() }
     }
 
-    /// Leaves the first points. Keeps the memory.
+    /// Keeps the first points only. Keeps the memory.
     pub(crate) fn truncate(&mut self, points: usize) {
         self.points.truncate(points);
     }
 
-    /// Keeps what the last points know, whose distances from the tip are others by so much, mm.
+    /// Keeps the knowledge of the last points only; their distances from the tip change by `farther_mm`.
     pub(crate) fn keep_last(&mut self, points: usize, farther_mm: f64) {
         self.points.drain(..self.points.len().saturating_sub(points));
         self.points.iter_mut().for_each(|known| known.from_tip_mm += farther_mm);
@@ -148,7 +149,7 @@ impl KnownPoints {
         self.points.len()
     }
 
-    /// Whether they may be what a device of `points` points knows of a wall of `pieces` pieces.
+    /// Whether it fits a device of `points` points and a wall of `pieces` pieces.
     pub(crate) fn fits(&self, points: usize, pieces: usize) -> bool {
         let there = |piece: Option<u32>| piece.is_none_or(|piece| (piece as usize) < pieces);
         self.points.len() == points
@@ -157,7 +158,7 @@ impl KnownPoints {
 }
 
 impl ContactCache {
-    /// Nothing is known yet of `surface`.
+    /// An empty cache for `surface`.
     pub fn new(surface: &ContactSurface) -> Self {
         let proximity = ProximityCache::new(LOOK_AGAIN * surface.thinnest_mm, surface.reach_mm);
         Self {
@@ -174,7 +175,7 @@ impl ContactCache {
         }
     }
 
-    /// Takes memory for `points` points.
+    /// Allocates for `points` points.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
         self.spans.reserve(points.saturating_sub(self.spans.len()));
@@ -187,7 +188,7 @@ impl ContactCache {
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }
 
-    /// Is of these points, of none of which is known that it is clear of the wall.
+    /// Resets to these points, without knowledge of their clearance.
     pub(super) fn look_at(&mut self, points: &[ContactPoint]) {
         self.points.resize(points.len(), NOTHING);
         self.readings.resize(points.len(), TakenReading::NONE);
@@ -196,7 +197,7 @@ impl ContactCache {
         self.pressing.clear();
     }
 
-    /// The distance that point `index` read at its base, if it presses on the wall there.
+    /// The distance that point `index` read at its base, if it is active there.
     pub(super) fn pressed(&self, index: usize) -> Option<&Distance> {
         match &self.readings[index].nearness {
             Nearness::Within(distance) if self.points[index].presses => Some(distance),
@@ -204,13 +205,14 @@ impl ContactCache {
         }
     }
 
-    /// The points that press at the base, ascending, and the distance that each read there.
+    /// The points active at the base, ascending, with the distance that each read there.
     pub(super) fn all_pressed(&self) -> impl Iterator<Item = (usize, &Distance)> {
         self.pressing.iter().filter_map(|&index| Some((index, self.pressed(index)?)))
     }
 
-    /// Takes over what was known before the device advanced along its own curve: what was known of a place, the point of `after` that comes
-    /// to lie nearest to it knows, since the wall does not move. Beyond the tip each of the points `before` keeps its own.
+    /// Transfers the knowledge from before the device advanced along its own curve: the wall does not move, so what
+    /// was known of a position goes to the point of `after` that is then nearest to it. Beyond the tip each of the
+    /// points `before` keeps its own.
     pub fn begin(
         &mut self,
         known: &KnownPoints,
@@ -232,7 +234,7 @@ impl ContactCache {
             let nearest = near.iter().zip(before.get(places).unwrap_or_default());
             let nearest = nearest.min_by(|(a, _), (b, _)| off(a).total_cmp(&off(b)));
             let slid = nearest.map(|(n, was)| {
-                // Where a thinner piece has lain free, a thicker one is so within less.
+                // Where a thinner piece was free, a thicker one is free within a smaller distance.
                 let thicker_mm = (point.potential.radius_mm - was.potential.radius_mm).max(0.0);
                 let less_mm = (1.0 + FOLLOW) * thicker_mm;
                 KnownPoint {
@@ -248,20 +250,20 @@ impl ContactCache {
         self.readings.resize(self.points.len(), TakenReading::NONE);
     }
 
-    /// Goes on with the points of another rod, which lie where they were.
+    /// Continues with the points of another rod, which have not moved.
     pub(crate) fn go_on(&mut self, known: &KnownPoints) {
         self.points.extend_from_slice(&known.points);
         self.readings.resize(self.points.len(), TakenReading::NONE);
     }
 
-    /// Goes on with what was kept of the same points.
+    /// Continues with the stored knowledge of the same points.
     pub fn resume(&mut self, known: &KnownPoints) {
         self.points.clear();
         self.readings.clear();
         self.go_on(known);
     }
 
-    /// Keeps what is known at the end of a step.
+    /// Stores the knowledge at the end of a step.
     pub fn keep(&self, known: &mut KnownPoints) {
         known.points.clone_from(&self.points);
     }

@@ -1,9 +1,10 @@
 //! A smooth signed distance to a triangulated wall.
 //!
-//! The distance to flat triangles is not smooth where a device leans: inside a tube the closest triangle jumps at every
-//! bisector of two facets, the force's direction with it, and Newton's method chatters; and the flat wall stands off the
-//! vessel it samples by edge²/8R. Here every vertex carries a quadric fitted to its neighbours, and the quadrics are
-//! blended by a partition of unity (Ohtake et al., *Multi-level partition of unity implicits*, SIGGRAPH 2003):
+//! The distance to flat triangles is not smooth where a device leans: inside a tube the closest triangle jumps at
+//! every bisector of two facets, and with it the direction of the force, so Newton's method chatters; and the flat
+//! wall deviates from the vessel it samples by edge²/8R. Here every vertex has a quadric fitted to its neighbours,
+//! and the quadrics are blended by a partition of unity (Ohtake et al., *Multi-level partition of unity implicits*,
+//! SIGGRAPH 2003):
 //!
 //! ```text
 //! y = x − Vᵢ,  h = Nᵢ·y,  τ = y − Nᵢ(Nᵢ·y)      height and offset
@@ -14,15 +15,17 @@
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature, Mᵢ an ellipse that holds the neighbours of the vertex, and cᵢ = 1, or 0.02 where no quadric
-//! fits these. The window b, e^{−Qᵢ/0.3w} for small |Qᵢ| and 0 beyond a width w, leaves out the other side of a narrow lumen and the back of a thin septum; where a device
-//! touches two sides at once, the nearer holds it. Behind a quadric, towards the rim of its support, the window is narrower, by
-//! 1 − σᵀMᵢσ: over a ridge that stands into the lumen each flank would go on beyond the crest, and as the nearer of the two hold what
-//! is not there. How well the vertices reach says their coverage Σ aᵢwᵢ / Σ wᵢ, 0.35 and more on any even mesh. Feet, not offsets,
-//! say which vertices are near: at height h in a tube of radius R offsets shrink by 1 − h/R, and a device that nearly fills the
-//! tube would blend walls all around it, and find a play too large by a tenth of the radius. f is twice continuously
-//! differentiable, so a device feels an energy with an exact gradient and Hessian; from the distance to the sampled surface it
-//! differs at fourth order in the edge length, on a tube with 50 edges around by a hundredth of what the flat triangles do.
+//! with Nᵢ the inward normal, Sᵢ the curvature, Mᵢ an ellipse that contains the neighbours of the vertex, and cᵢ = 1,
+//! or 0.02 where no quadric fits these. The window b, e^{−Qᵢ/0.3w} for small |Qᵢ| and 0 beyond a width w, excludes
+//! the other side of a narrow lumen and the back of a thin septum; where a device touches two sides at once, the
+//! nearer one counts. Behind a quadric, towards the rim of its support, the window is narrower, by 1 − σᵀMᵢσ:
+//! otherwise each flank of a ridge that stands into the lumen would extend beyond the crest and, as the nearer of the
+//! two, act where there is no wall. The coverage Σ aᵢwᵢ / Σ wᵢ measures how well vertices reach a point; it is 0.35
+//! or more on any uniform mesh. Whether a vertex is near is decided by feet, not offsets: at height h in a tube of
+//! radius R offsets shrink by 1 − h/R, and for a device that nearly fills the tube walls all around would be blended,
+//! which would overestimate the clearance by a tenth of the radius. f is twice continuously differentiable, so the
+//! contact energy has an exact gradient and Hessian; its difference from the distance to the sampled surface is of
+//! fourth order in the edge length, on a tube with 50 edges around a hundredth of that of the flat triangles.
 //!
 //! With W = Σ wᵢ,
 //!
@@ -61,20 +64,20 @@ pub struct Distance {
 }
 
 impl Distance {
-    /// Unit normal of the wall, into the lumen: along the gradient, whose length is not quite 1.
+    /// Unit normal of the wall, into the lumen: the normalised gradient.
     pub fn normal(&self) -> Vec3 {
         self.gradient / self.gradient.norm()
     }
 }
 
-/// How near a point is to a wall that may be out of its reach.
+/// How near a point is to the wall, exact only within a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Nearness {
-    /// As far as was asked or farther: the distance, mm.
+    /// At least as far as the limit: the distance, mm.
     Beyond(f64),
-    /// The same, and no wall is within that of it.
+    /// As `Beyond`, and no wall is closer than this distance.
     Clear(f64),
-    /// Nearer.
+    /// Closer than the limit.
     Within(Distance),
 }
 
@@ -88,42 +91,42 @@ impl Nearness {
     }
 }
 
-/// Most vertices that are noted as reaching a point; on any sensible mesh there are about ten.
+/// Number of reaching vertices that are stored; on any sensible mesh there are about ten.
 const NOTED: usize = 32;
 
-/// A point behind the surface that is asked about. How deep it is says the sheet that it has gone through, which faces this way: no
-/// window tells it from others, as one does in front.
+/// For a query behind the surface. Depth does not tell which wall is meant, as the window does in front; the meant
+/// sheet is the one that faces the same way as the given triangle.
 #[derive(Debug, Clone, Copy)]
 struct Behind {
     facing: Vec3,
 }
 
-/// Least cosine between the normals of vertices of one sheet.
+/// Smallest cosine between the normals of vertices of one sheet.
 const FACING: f64 = 0.3;
 
 /// A vertex that reaches a point.
 pub(super) struct Reaching {
     pub(super) vertex: u32,
-    /// wᵢ, …
+    /// wᵢ.
     pub(super) weight: f64,
-    /// … ∇wᵢ, …
+    /// ∇wᵢ.
     pub(super) gradient: Vec3,
-    /// … and ∇∇wᵢ.
+    /// ∇∇wᵢ.
     pub(super) hessian: Matrix3<f64>,
-    /// aᵢ, …
+    /// aᵢ.
     support: f64,
-    /// … and ∇aᵢ.
+    /// ∇aᵢ.
     support_gradient: Vec3,
 }
 
-/// What the vertices that reach a point make of its distance.
+/// The blended distance of a point from the vertices that reach it.
 struct Reached {
     weight: f64,
     value_mm: f64,
     /// Σ aᵢwᵢ / Σ wᵢ.
     coverage: f64,
     behind: Option<Behind>,
-    /// How many they are; the first of them.
+    /// Number of these vertices; the first of them.
     count: usize,
     vertices: [u32; NOTED],
 }
@@ -132,16 +135,16 @@ struct Reached {
 #[derive(Debug, Clone)]
 pub struct SmoothWall {
     quadrics: Vec<Quadric>,
-    /// For every vertex, a triangle that it is a corner of.
+    /// For every vertex, a triangle of which it is a corner.
     triangles: Vec<u32>,
     lists: Lists,
-    /// How far the smooth wall lies inside each triangle and its neighbours, mm, …
+    /// How far the smooth wall lies inside each triangle and its neighbours, mm.
     insets_mm: Vec<f32>,
-    /// … and the largest inset of all.
+    /// The largest of these insets, mm.
     deepest_inset_mm: f64,
     /// How far it lies outside each triangle and its neighbours, mm.
     outsets_mm: Vec<f32>,
-    /// Depth on which what is felt in front of the surface passes into what is felt behind it, mm.
+    /// Depth behind the surface over which the front distance blends into the back distance, mm.
     passing_mm: f64,
 }
 
@@ -178,8 +181,8 @@ impl SmoothWall {
         smooth
     }
 
-    /// How far the smooth wall lies inside each triangle and outside of it, at few points, or one that shares a corner with it: a point
-    /// that is next to one triangle may feel the other.
+    /// Samples how far the smooth wall lies inside and outside each triangle or one that shares a corner with it, at
+    /// a few points: a point next to one triangle may touch the other.
     fn measure_insets(&mut self, mesh: &SurfaceMesh) {
         let measured = |part: Range<usize>| {
             let (mut seen, mut list) = (vec![u32::MAX; mesh.vertices_mm.len()], Vec::new());
@@ -198,13 +201,13 @@ impl SmoothWall {
         self.outsets_mm = self.spread(&outsets);
     }
 
-    /// Takes over what the smooth wall lies inside of each triangle.
+    /// Stores the inset of each triangle, the largest of its neighbourhood.
     fn take_insets(&mut self, own_mm: &[f32]) {
         self.insets_mm = self.spread(own_mm);
         self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
     }
 
-    /// For each triangle the largest of those that share a corner with it.
+    /// For each triangle the largest value of those that share a corner with it.
     fn spread(&self, own: &[f32]) -> Vec<f32> {
         let triangles = &self.lists.triangles;
         let mut around = vec![0.0f32; self.quadrics.len()];
@@ -216,13 +219,13 @@ impl SmoothWall {
         triangles.iter().map(most).collect()
     }
 
-    /// Triangles that the smooth wall lies inside of by more than this, mm.
+    /// Triangles inside which the smooth wall lies by more than this, mm.
     pub(super) fn inside_of(&self, least_mm: f64) -> Vec<u32> {
         let inside = |triangle: &u32| self.inset_mm(*triangle) > least_mm;
         (0..self.insets_mm.len() as u32).filter(inside).collect()
     }
 
-    /// Takes over what the smooth wall lies inside of triangles elsewhere than on them, where that is more.
+    /// Increases the insets of triangles to larger ones found elsewhere than on them.
     pub(super) fn deepen(&mut self, seen: impl Iterator<Item = (u32, f64)>) {
         let mut own = self.insets_mm.clone();
         for (triangle, inset_mm) in seen {
@@ -253,8 +256,8 @@ impl SmoothWall {
         self.lists.of(&self.quadrics, triangle)
     }
 
-    /// The triangle to ask for the distance of `x`, from `triangle` on along the surface: while a vertex of its list is nearer than its
-    /// corners, one that this vertex is a corner of.
+    /// The triangle from which to compute the distance of `x`: walks along the surface from `triangle`, to a triangle
+    /// at a vertex of the list that is nearer than its corners, until there is none.
     pub(super) fn walk(&self, mut triangle: u32, x: &Vec3) -> u32 {
         let square = |v: u32| (self.quadrics[v as usize].position - x).norm_squared();
         let mut least = f64::INFINITY;
@@ -279,7 +282,7 @@ impl SmoothWall {
         self.quadrics.iter().map(|q| &q.position)
     }
 
-    /// f alone, of a point that the vertices of `list` reach: in front of the surface or behind it.
+    /// f alone at a point that the vertices of `list` reach, in front of the surface or behind it.
     fn reach(&self, x: &Vec3, list: &[u32]) -> Option<Reached> {
         let found = self.reach_from(x, list, None);
         if found.as_ref().is_some_and(|found| found.value_mm > 0.0) {
@@ -288,7 +291,7 @@ impl SmoothWall {
         self.reach_from(x, list, Some(self.behind(list))).or(found)
     }
 
-    /// The same in front of the surface, or behind it.
+    /// As [`Self::reach`], in front of the surface, or behind it.
     fn reach_from(&self, x: &Vec3, list: &[u32], behind: Option<Behind>) -> Option<Reached> {
         let mut found =
             Reached { weight: 0.0, value_mm: 0.0, coverage: 0.0, behind, count: 0, vertices: [0; NOTED] };
@@ -312,12 +315,12 @@ impl SmoothWall {
             found.count += 1;
         }
         found.value_mm /= found.weight;
-        // Deep behind the surface feet lie far apart, and there are no triangles to go by instead.
+        // Deep behind the surface feet are far apart, and triangles are no substitute there.
         found.coverage = if behind.is_some() { 1.0 } else { found.coverage / found.weight };
         (found.weight >= LEAST_WEIGHT).then_some(found)
     }
 
-    /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
+    /// The distance of `x`, given a triangle at or near the nearest. `None` where no vertex reaches.
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
         match self.within(x, triangle, f64::INFINITY)? {
             (Nearness::Within(distance), _) => Some(distance),
@@ -325,14 +328,15 @@ impl SmoothWall {
         }
     }
 
-    /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
+    /// As [`SmoothWall::distance`]; `also` is called with every vertex that reaches `x`, its weight and the weight's
+    /// derivatives.
     pub(super) fn weigh(&self, x: &Vec3, triangle: u32, also: impl FnMut(&Reaching)) -> Option<Distance> {
         let list = self.list(triangle as usize);
         let reached = self.reach(x, list)?;
         Some(self.derive(x, list, &reached, also))
     }
 
-    /// The derivatives of f where its value is known.
+    /// The derivatives of f, given its value.
     #[inline]
     fn derive(&self, x: &Vec3, list: &[u32], reached: &Reached, mut also: impl FnMut(&Reaching)) -> Distance {
         let (mut slope, mut gradient, mut hessian) = (Vec3::zeros(), Vec3::zeros(), Matrix3::zeros());
@@ -386,7 +390,8 @@ impl SmoothWall {
     }
 }
 
-/// The middle of a triangle, and those of its sides along which it runs upwards: of two triangles at a side one does.
+/// The middle of a triangle, and those of its sides along which its indices increase, so that of two adjacent
+/// triangles only one includes a side.
 fn few(mesh: &SurfaceMesh, triangle: usize) -> impl Iterator<Item = Vec3> {
     let (ends, [a, b, c]) = (mesh.triangles[triangle], mesh.corners(triangle));
     let sides = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5].into_iter().enumerate();

@@ -1,8 +1,8 @@
-//! Forces of the flow along a device.
+//! Drag of the flow on a device.
 //!
-//! Each contact point stands for the length half-way to its neighbours, and carries the drag on that ([`crate::flow`]). The forces are those at
-//! a state that the equilibrium is near to, and dead while it is looked for, V = −Σ fᵢ·(xᵢ − x₀): they change with the place in the lumen,
-//! over millimetres, and are renewed where they have.
+//! Each contact point represents the length half-way to its neighbours, and carries the drag on it ([`crate::flow`]).
+//! The forces are those at a state near the equilibrium, and dead during its solution, V = −Σ fᵢ·(xᵢ − x₀): they vary
+//! with position in the lumen over millimetres, and are renewed when they have changed.
 
 use super::{ContactPoint, MovedWall};
 use crate::Vec3;
@@ -14,14 +14,14 @@ use crate::rod::{ElementData, PointSum, RodState, Stencils};
 pub struct Drag {
     /// Force on each point, N.
     forces_n: Vec<Vec3>,
-    /// The same, gathered by elements, as derivatives of V.
+    /// The same forces summed by element, as derivatives of V.
     sums: Vec<(usize, PointSum)>,
-    /// Sum of the sizes of all, N.
+    /// Sum of the magnitudes, N.
     size_n: f64,
 }
 
 impl Drag {
-    /// Takes the forces at a state. Returns the sum of the changes over that of the forces, 0 where there are none.
+    /// Renews the forces at a state. Returns the sum of their changes over the sum of the forces, 0 without forces.
     pub fn renew(
         &mut self,
         flow: &BloodFlow,
@@ -31,7 +31,7 @@ impl Drag {
         state: &RodState,
     ) -> f64 {
         self.forces_n.resize(points.len(), Vec3::zeros());
-        // From the tip: ends of elements, and where points are between them.
+        // From the tip: element boundaries, and midpoints between contact points.
         let mut begins: Vec<f64> =
             elements.iter().rev().scan(0.0, |sum, e| Some(std::mem::replace(sum, *sum + e.length))).collect();
         let line_mm = elements.iter().map(|e| e.length).sum::<f64>();
@@ -84,12 +84,12 @@ impl Drag {
         self.forces_n.get(index).copied().unwrap_or_default()
     }
 
-    /// Force on all of the device, N.
+    /// Total force on the device, N.
     pub fn total_n(&self) -> Vec3 {
         self.forces_n.iter().sum()
     }
 
-    /// Sum of the sizes of the forces, N.
+    /// Sum of the magnitudes of the forces, N.
     pub fn size_n(&self) -> f64 {
         self.size_n
     }

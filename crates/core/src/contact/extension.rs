@@ -1,16 +1,19 @@
-//! The wall as a device feels it: the vessel goes on beyond its ends.
+//! The felt wall beyond the vessel's openings.
 //!
-//! A surface ends where the scan ended, and a wall that stops holding a tip from one point to the next has no
-//! equilibrium there. Every opening that a device can pass is extended straight along its direction, as flow extensions
-//! are in vessel models, and closed where that ends, so that nothing is ever where no wall is; smaller ones are holes of the mesh and
-//! closed. Extensions that would meet each other or the vessel are shorter. The triangles of the vessel keep their numbers.
+//! A surface ends where the scan ended, and a wall that ceases to hold a tip from one point to the next has no
+//! equilibrium there. Every opening that a device can pass is extended straight along its direction, like flow
+//! extensions in vessel models, and closed at its end, so that there is a wall everywhere; smaller openings are holes
+//! of the mesh and are closed. Extensions that would meet each other or the vessel are shortened. The triangles of
+//! the vessel keep their numbers.
 //!
-//! An extension begins as the wall arrives, which may lean from the opening's direction, as the lip of a dome that was cut off does: else their kink would
-//! be a crest all around, into the lumen at a lip, on which a device that leaves finds no equilibrium. The lean is gone on with, less and less, over a radius of
-//! the opening, x(w) = w (1 − w/R)².
+//! An extension starts in the direction of the wall at the rim, which may be inclined to the opening's direction, for
+//! example at the lip of a dome that was cut off: otherwise the kink would be a crest all around, at a lip one that
+//! points into the lumen, over which a device finds no equilibrium. The inclination decreases over a radius of the
+//! opening, x(w) = w (1 − w/R)².
 //!
-//! A rim has the corners of a surface that was cut there, and drawn out straight they would be furrows in which a tip is caught. So
-//! the rim passes into the ellipse next to it, r(s) = c + a cos s + b sin s with the part s of its length, over its own width.
+//! A rim has the corners of the cut surface, which would become furrows that catch a tip if extruded. So the rim
+//! blends into its best-fit ellipse, r(s) = c + a cos s + b sin s with the fraction s of its length, over its own
+//! width.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -20,15 +23,16 @@ use nalgebra::Matrix3;
 use crate::vessel::{Opening, SurfaceMesh, Wall};
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// How much is left of an extension, mm, where a tip that goes there has left.
+/// Length of an extension left, mm, at which a tip counts as having left the vessel.
 const LEFT_MM: f64 = 2.0;
-/// Length over which a rim passes into an ellipse, in radii of the opening.
+/// Length over which a rim blends into an ellipse, in radii of the opening.
 const ROUNDING: f64 = 2.0;
-/// Length over which the wall's own lean at the rim ends, in radii of the opening.
+/// Length over which the wall's inclination at the rim decays, in radii of the opening.
 const STRAIGHTENING: f64 = 1.0;
-/// Steepest lean that is gone on with: 4/27 of it in radii is how much wider an extension becomes, and a tenth is kept free around it.
+/// Largest slope of the wall against the opening's direction that is continued: an extension widens by 4/27 of it
+/// times the radius, and a tenth of the radius is kept free around it.
 const STEEPEST: f64 = 0.67;
-/// Half of the part of a rim that a lean is the mean of, in radii of the opening.
+/// Half length of rim over which the inclination is averaged, in radii of the opening.
 const NEIGHBOURHOOD: f64 = 0.3;
 
 /// The surface of `wall` with its openings wider than `radius_mm` extended and the others closed.
@@ -53,7 +57,7 @@ fn beside_rims(wall: &Wall) -> Vec<[u32; 3]> {
     wall.mesh().triangles.iter().filter(is_beside).copied().collect()
 }
 
-/// Rings along the opening's direction, as far apart as the rim's vertices.
+/// Adds rings along the opening's direction, as far apart as the rim's vertices.
 fn extend(mesh: &mut SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) {
     let count = opening.boundary.len();
     let at = |k: usize| mesh.vertices_mm[opening.boundary[k % count] as usize];
@@ -75,7 +79,7 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) {
         let next: Vec<u32> = (first..first + count as u32).collect();
         for k in 0..count {
             let l = (k + 1) % count;
-            // A cap would run along the boundary like this; so does the first triangle of the strip.
+            // Oriented like a cap along the boundary, as is the first triangle of the strip.
             mesh.triangles.push([last[k], last[l], next[k]]);
             mesh.triangles.push([last[l], next[l], next[k]]);
         }
@@ -86,8 +90,8 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) {
     mesh.triangles.extend((0..count).map(|k| [last[k], last[(k + 1) % count], centre]));
 }
 
-/// By how much the wall leans from the opening's direction at each corner of its rim: the way across that direction over that along it, in
-/// the mean over the rim's neighbourhood, for a rim may be jagged. Triangles `beside` it go on in their own planes.
+/// Slope of the wall against the opening's direction at each corner of its rim: across over along, averaged over the
+/// rim's neighbourhood, since a rim may be jagged. It is that of the planes of the triangles `beside` it.
 fn leans(mesh: &SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) -> Vec<Vec3> {
     let boundary = &opening.boundary;
     let count = boundary.len();
@@ -120,7 +124,7 @@ fn leans(mesh: &SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) -> Vec<Vec3
     (0..count).map(lean).collect()
 }
 
-/// The points of the ellipse next to a closed line, one for each of its corners: least squares over its length.
+/// The points of the best-fit ellipse of a closed line, one for each of its corners: least squares over its length.
 fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
     let count = line.len();
     let side = |k: usize| (line[(k + 1) % count] - line[k]).norm();
@@ -140,7 +144,7 @@ fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
             let found = factor.solve(&right);
             rows.iter().map(|row| found.tr_mul(row)).collect()
         }
-        // A triangle without an area.
+        // A degenerate triangle.
         None => line.to_vec(),
     }
 }
@@ -150,7 +154,7 @@ pub fn leave_mm(opening: &Opening) -> f64 {
     opening.beyond_mm - LEFT_MM
 }
 
-/// The opening beyond whose plane `x` lies, within its extension, and how far, mm.
+/// The opening beyond whose plane `x` lies, within its extension, and the distance beyond it, mm.
 pub fn left_through<'a>(openings: &'a [Opening], x: &Vec3) -> Option<(&'a Opening, f64)> {
     openings.iter().find_map(|o| {
         let (beyond, aside) = o.beyond_and_aside_mm(x);
@@ -158,7 +162,7 @@ pub fn left_through<'a>(openings: &'a [Opening], x: &Vec3) -> Option<(&'a Openin
     })
 }
 
-/// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
+/// Rejects a tip that, `ahead_mm` farther, would be too far beyond an opening.
 ///
 /// # Errors
 /// [`PhysicalEnd::Left`].
@@ -209,7 +213,7 @@ mod tests {
 
     #[test]
     fn an_extension_begins_as_the_wall_arrives() {
-        // A tube of radius 4 that narrows to its end, by 0.5 mm a mm.
+        // A tube of radius 4 that narrows towards its end by 0.5 mm per mm.
         let ring = |z: f64, r: f64| {
             (0..24).map(move |k| {
                 let (sin, cos) = (TAU * f64::from(k) / 24.0).sin_cos();
@@ -232,14 +236,14 @@ mod tests {
             let out = wall.mesh().vertices_mm[*lean.1 as usize].xy().normalize();
             assert!((lean.0.xy() + out * 0.5).norm() < 0.02 && lean.0.z.abs() < 1e-12, "{lean:?}");
         }
-        // Where the tube is straight nothing leans.
+        // Where the tube is straight the slope is zero.
         let bottom = wall.openings().iter().find(|o| o.direction.z < -0.5).unwrap();
         assert!(leans(wall.mesh(), bottom, &beside_rims(&wall)).iter().all(|lean| lean.norm() < 1e-9));
         let mesh = extended(&wall, 0.5);
         let radii = mesh.vertices_mm.iter().filter(|v| v.z > 10.5).map(|v| v.xy().norm());
         let (least, most) =
             radii.filter(|r| *r > 0.1).fold((f64::MAX, 0.0f64), |(a, b), r| (a.min(r), b.max(r)));
-        // 0.5 · 4/27 of the radius, and wide again.
+        // Wider by 0.5 · 4/27 of the radius, and back to it at the end.
         assert!(
             (least - (3.0 - 3.0 * 0.5 * 4.0 / 27.0)).abs() < 0.03 && (most - 3.0).abs() < 0.03,
             "{least} {most}"

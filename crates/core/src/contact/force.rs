@@ -1,10 +1,11 @@
-//! The force of a contact as an unknown of its own: what it adds to the merit of a step. Derived in [`super::wall`] (`wall/forces.rs`); walls and
-//! pairs of a rod's own loops have the same.
+//! The merit of a contact whose force is an unknown. Derived in [`super::wall`] (`wall/forces.rs`); walls and
+//! self-contact pairs share it.
 
-/// c: ρ over the stiffness of the element. Larger ones let points go and take them up by less depth, smaller ones by less force.
+/// c: penalty ρ over the stiffness of the element. With a larger one points activate and release at smaller depths,
+/// with a smaller one at smaller forces.
 pub(super) const PENALTY: f64 = 0.1;
 
-/// Merit of a point, mJ, its force, N, and its slope in ln κ, mJ.
+/// Merit of a point, mJ, its force, N, and derivative in ln κ, mJ.
 pub(super) fn merit(kappa: f64, rho: f64, force_n: f64, depth_mm: f64) -> (f64, f64, f64) {
     let t = (force_n + rho * depth_mm).max(0.0);
     let by_force = t / (kappa + rho);
@@ -29,7 +30,7 @@ mod tests {
             let slope = (stiffer(h) - stiffer(-h)) / (2.0 * h);
             assert!((slope - by_modulus_mj).abs() < 1e-8, "{force_n} {depth_mm}");
         }
-        // At the depth of its force it exerts that, whatever the penalty.
+        // At the depth f/κ the force is f, whatever the penalty.
         for rho in [0.1, 2.0, 1e4] {
             assert!((merit(kappa, rho, 0.6, 0.6 / kappa).1 - 0.6).abs() < 1e-12);
         }

@@ -6,25 +6,25 @@
 //! u = P (x − a) + r (θ − θₐ) n × t,    P = I − n nᵀ,    a = x̄ − Δ t̄
 //! ```
 //!
-//! where x̄ and t̄ are its place and direction after the device has slid by the advance Δ of its hand along the line's curve, so that a
-//! device that follows its curve slips by Δ t̄ exactly, whatever the length of the step; θ is the material angle, θₐ that
-//! before the step, and n × t the direction in which a surface that touches the wall with normal n moves when the
-//! device spins. Friction is then
+//! where x̄ and t̄ are its position and direction after the device has slid by the advance Δ of its hand along the
+//! line's curve, so that a device that follows its curve slips by exactly Δ t̄ for any step length; θ is the material
+//! angle, θₐ that before the step, and n × t the direction in which a surface that touches the wall with normal n
+//! moves when the device spins. Friction is then
 //!
 //! ```text
 //! D = Σ μ Nᵢ φ(|uᵢ|),    φ(y) = y  for y ≥ ε,    y²/ε − y³/3ε² + ε/3  for less
 //! ```
 //!
-//! of Li et al., *Incremental potential contact*, SIGGRAPH 2020 (eq. 14): twice continuously differentiable, with a force
-//! μN against the slip wherever the point slips farther than ε, and less where it sticks. A stuck point creeps
-//! by less than ε a step, and ε is a thousandth of what the hand moved in it, or of the radius where it rests.
+//! of Li et al., *Incremental potential contact*, SIGGRAPH 2020 (eq. 14): twice continuously differentiable, with a
+//! force μN against the slip wherever the point slips farther than ε, and less where it sticks. A stuck point creeps
+//! by less than ε per step; ε is a thousandth of the hand's motion in the step, or of the radius if the hand rests.
 //!
-//! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
-//! a symmetric Hessian and steps that descend; between steps they are renewed (`friction/follow.rs`). What is left at the end is Coulomb's law of the
-//! final state.
+//! The normal force N and the normal n are lagged: within one Newton step they are fixed in D, so the energy keeps a
+//! symmetric Hessian and steps that descend; between steps they are renewed (`friction/follow.rs`). The final state
+//! satisfies Coulomb's law.
 //!
-//! Where a wall is smoother in some places than in others μ is the largest coefficient, and N the normal force times the
-//! part of it that acts where the point is: the coefficient of a place is lagged with its force.
+//! Where the coefficient varies over the wall, μ is the largest one, and N the normal force times the local
+//! coefficient over μ, which is lagged with the force.
 
 mod between;
 mod follow;
@@ -43,27 +43,30 @@ use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
 use crate::vessel::Displacement;
 
-/// Slip below which a point sticks, as a part of the motion of the hand, or of the radius of a device whose hand rests: what the
-/// regularisation gives away.
+/// Slip below which a point sticks, as a fraction of the hand's motion, or of the device's radius if the hand rests:
+/// the error of the regularisation.
 const STICK: f64 = 1e-3;
-/// In every slide while the hand holds still it shrinks to this part, …
+/// Factor by which it shrinks in every relaxation while the hand holds still.
 pub(in crate::contact) const STICK_AT_REST: f64 = 0.3;
-/// … but to no less than this part of what it was in the step: a spring that holds a point within less is stiffer than any wall.
+/// Smallest slip after shrinking, as a fraction of that of the step: a smaller one would make friction stiffer than
+/// any wall.
 const LEAST_AT_REST: f64 = 0.01;
-/// Least slip length, mm: below it steps are lost in the rounding of positions.
+/// Smallest slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
-/// Friction at a point is worth another round of the contacts of a step where its force is off by more than this part of the largest that it can be; …
+/// Friction at a point causes another round in a step where its force is wrong by more than this fraction of its
+/// bound.
 pub(in crate::contact) const CHANGED: f64 = 0.05;
-/// … and a round has it as it is where it is off by more than this: left as it was, steps were uphill by what it was off.
+/// A round updates friction where it is wrong by more than this fraction: without the update, the error would make
+/// steps uphill.
 pub(in crate::contact) const RENEWED: f64 = 5e-3;
-/// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
-/// one that was felt where they come to lie, since the wall does not move.
+/// Points nearer to the tip than this many radii (plus the advance) keep their own normal force; the others take the
+/// one felt before at their new position, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
 
 /// A contact point in a step with friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Slider {
-    /// a: where the point comes from.
+    /// a: where the point slips from.
     from_mm: Vec3,
     /// θₐ: its material angle before the step.
     from_rad: f64,
@@ -71,16 +74,16 @@ struct Slider {
     along: Vec3,
     /// Normal of the wall, into the lumen.
     normal: Vec3,
-    /// N: normal force, less where the wall is smoother.
+    /// N: normal force, scaled down where the coefficient is below its largest value.
     force_n: f64,
-    /// Normal and force with which the step began.
+    /// Normal and force at the start of the step.
     begun: (Vec3, f64),
-    /// Normal and force at the state seen last.
+    /// Normal and force at the last base.
     seen: (Vec3, f64),
 }
 
 impl Slider {
-    /// A point that has come by `advance_mm` along its own curve, on which nothing presses yet.
+    /// A point that has moved by `advance_mm` along its own curve, without normal force yet.
     fn at(point: &ContactPoint, elements: &[ElementData], state: &RodState, advance_mm: f64) -> Self {
         let e = point.element;
         let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
@@ -98,12 +101,12 @@ impl Slider {
     }
 }
 
-/// What presses at a contact point in an equilibrium.
+/// Normal force on a contact point at an equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NormalForce {
     /// Normal of the wall, into the lumen.
     normal: Vec3,
-    /// Force, less where the wall is smoother, N.
+    /// Force, scaled down where the coefficient is below its largest value, N.
     force_n: f64,
 }
 
@@ -128,17 +131,17 @@ pub struct Friction {
     coefficient: f64,
     /// ε, mm.
     stick_mm: f64,
-    /// What it does not shrink below while the hand holds still, mm.
+    /// Lower bound of ε as it shrinks while the hand holds still, mm.
     least_stick_mm: f64,
     renewal: follow::Renewal,
-    /// Energy that was taken before the points were anchored anew, mJ.
+    /// Energy dissipated before slip was reset, mJ.
     taken_mj: f64,
     sliders: Vec<Slider>,
-    /// That between instruments.
+    /// Friction between instruments.
     pub(crate) between: Between,
 }
 
-/// What a hand does in a step.
+/// Motion of a hand in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandMotion {
     /// Length inserted before, mm.
@@ -150,7 +153,7 @@ pub struct HandMotion {
 }
 
 impl HandMotion {
-    /// Length that is pushed in, mm.
+    /// Advance, mm; positive inwards.
     pub fn advance_mm(&self) -> f64 {
         self.to_mm - self.from_mm
     }
@@ -162,27 +165,27 @@ impl HandMotion {
 }
 
 impl Friction {
-    /// Friction of coefficient μ ≥ 0; none at all for 0.
+    /// Friction of coefficient μ ≥ 0; 0 disables it.
     pub fn new(coefficient: f64) -> Self {
         Self { coefficient, ..Self::default() }
     }
 
-    /// Takes memory for `points` points.
+    /// Allocates for `points` points.
     pub fn reserve(&mut self, points: usize) {
         if self.acts() {
             self.sliders.reserve(points.saturating_sub(self.sliders.len()));
         }
     }
 
-    /// Whether there is any.
+    /// Whether there is friction.
     pub fn acts(&self) -> bool {
         self.coefficient > 0.0
     }
 
     /// Begins a step: `state` is the device after it has slid along its own curve, with the angles it had before.
     ///
-    /// `before` are the points of the last equilibrium and what pressed there, from which the first normal forces come. `hands` are those
-    /// of all instruments: a point slips by what its own does.
+    /// `before` are the points of the last equilibrium and `forces` the normal forces on them, the first estimate.
+    /// `hands` are the motions of all instruments: a point slips by the motion of its own.
     pub fn begin(
         &mut self,
         elements: &[ElementData],
@@ -213,7 +216,7 @@ impl Friction {
                     (slider.normal, slider.force_n) = (old[index].normal, old[index].force_n);
                 }
             } else {
-                // Label of the piece of device that was here before.
+                // Arc length from the tip of the piece of device that was here before.
                 let label = point.from_tip_mm - advance;
                 while k + 1 < count && old_points[k + 1].from_tip_mm < label {
                     k += 1;
@@ -232,7 +235,7 @@ impl Friction {
         }
     }
 
-    /// Goes on with the points of a rod that no hand moves, where these forces pressed.
+    /// Continues with the points of a rod that no hand moves, with these normal forces.
     pub(crate) fn go_on(
         &mut self,
         elements: &[ElementData],
@@ -243,7 +246,7 @@ impl Friction {
         if !self.acts() {
             return;
         }
-        // Where no hand has anything in, none says how much is little.
+        // With no hand on the rod, ε follows from its radius.
         if let ([], Some(first)) = (&self.sliders[..], points.first()) {
             self.stick_within(STICK * first.potential.radius_mm);
         }
@@ -253,13 +256,14 @@ impl Friction {
         }));
     }
 
-    /// The wall has moved since the step began, and its material points have taken along what slip is counted from: see [`moving`].
+    /// The wall has moved since the step began; the reference points of slip move with its material points: see
+    /// [`moving`].
     pub(crate) fn carry(&mut self, (before, after): (&Displacement, &Displacement), hands: &[HandMotion]) {
         let mut farthest_mm = 0.0f64;
         for slider in &mut self.sliders {
             farthest_mm = farthest_mm.max(slider.carry(before, after));
         }
-        // A hand that rests has no way of its own: that of the wall says how much is little then.
+        // If the hands rest, the motion of the wall sets ε.
         let moves = hands.iter().any(|hand| hand.parts() != [0.0; 2]);
         let stick_mm = STICK * farthest_mm;
         if farthest_mm > 0.0 {
@@ -272,18 +276,18 @@ impl Friction {
         [self.stick_mm, self.least_stick_mm] = sticking_mm(stick_mm);
     }
 
-    /// Keeps the normal forces that a step has ended with.
+    /// Stores the normal forces at the end of a step.
     pub fn keep(&self, forces: &mut Vec<NormalForce>) {
         forces.clear();
         forces.extend(self.sliders.iter().map(|s| NormalForce { normal: s.normal, force_n: s.force_n }));
     }
 
-    /// Force of friction on a point over its `slip`, N/mm.
+    /// Friction force on a point divided by its `slip`, N/mm.
     pub(crate) fn resistance(&self, index: usize, slip: &Vec3) -> f64 {
         resistance(self.largest_n(index), slip, self.stick_mm)
     }
 
-    /// Slip vector of a point and the direction its surface takes when it spins.
+    /// Slip vector of a point and the direction in which its surface moves when it spins.
     pub(crate) fn slip(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> (Vec3, Vec3) {
         let s = &self.sliders[index];
         let spin = s.normal.cross(&s.along) * radius_mm;
@@ -301,7 +305,7 @@ impl Friction {
         self.sliders.get(index).is_some_and(|slider| slider.force_n > 0.0)
     }
 
-    /// Whether nothing rubs at a point, and nothing did where the step began.
+    /// Whether a point has no friction, now and at the start of the step.
     pub(super) fn is_free(&self, index: usize) -> bool {
         self.sliders.get(index).is_none_or(|slider| slider.force_n == 0.0 && slider.begun.1 == 0.0)
     }
@@ -315,12 +319,13 @@ impl Friction {
         force * phi(self.slip(index, x, angle, radius_mm).0.norm(), self.stick_mm)
     }
 
-    /// Energy that friction has taken in the step with the normal forces of its end, mJ.
+    /// Energy dissipated by friction in the step, with the normal forces of its end, mJ.
     fn taken_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
         self.taken_mj + self.rubbed_mj(elements, state, points)[1]
     }
 
-    /// The least and the most that friction has taken in the step, mJ: with the normal forces of its beginning, and with those of its end.
+    /// Lower and upper estimate of the energy dissipated in the step, mJ: with the normal forces of its start and of
+    /// its end.
     pub fn dissipated_mj(
         &self,
         elements: &[ElementData],
@@ -328,7 +333,7 @@ impl Friction {
         points: &[ContactPoint],
     ) -> (f64, f64) {
         let [at_start_mj, at_end_mj] = self.rubbed_mj(elements, state, points);
-        // Once slip has begun anew the forces of the beginning are long gone.
+        // After slip was reset, the forces of the start no longer apply.
         if self.taken_mj != 0.0 {
             let taken_mj = self.taken_mj + at_end_mj;
             return (taken_mj, taken_mj);
@@ -336,7 +341,7 @@ impl Friction {
         (at_start_mj.min(at_end_mj), at_start_mj.max(at_end_mj))
     }
 
-    /// What friction takes from the slip that has begun last, mJ: with the normal forces of the step's beginning, and with those of its end.
+    /// Energy dissipated since slip was last reset, mJ: with the normal forces of the step's start and of its end.
     fn rubbed_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> [f64; 2] {
         let mut sums_mj = [0.0; 2];
         for (index, (slider, point)) in self.sliders.iter().zip(points).enumerate() {
@@ -354,8 +359,8 @@ impl Friction {
         sums_mj
     }
 
-    /// Slip begins anew at `state`, with the normal forces seen there, which are held: the hand holds still, and the device slides on to where it comes
-    /// to rest. What a point has slipped within ε it has slipped within the new, smaller one, in proportion: friction holds it as it did.
+    /// Resets slip at `state` and holds the normal forces there: the hand holds still, and the device slides on until
+    /// it rests. Slip of a stuck point is scaled to the new, smaller ε, so that friction holds it as before.
     pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
         self.hold();
         let taken_mj = self.taken_mj(elements, state, points);
@@ -376,7 +381,7 @@ impl Friction {
         self.taken_mj = taken_mj - self.taken_mj(elements, state, points);
     }
 
-    /// Derivatives of a point's friction energy; `None` where nothing presses.
+    /// Derivatives of a point's friction energy; `None` without a normal force.
     pub fn derivatives(
         &self,
         index: usize,
@@ -400,8 +405,8 @@ impl Friction {
     }
 }
 
-/// The ε of a step of these hands and a device of that radius, and what it does not shrink below while they hold still, mm. An instrument that rests sticks
-/// within as much as the others move.
+/// ε for a step with these hand motions and a device of that radius, and its lower bound while the hands hold still,
+/// mm. An instrument at rest gets the ε of those that move.
 pub(crate) fn stick_mm(hands: &[HandMotion], radius_mm: f64) -> [f64; 2] {
     let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius_mm * hand.turn_rad.abs());
     let way_mm = ways.fold(0.0, f64::max);
@@ -412,7 +417,7 @@ fn sticking_mm(stick_mm: f64) -> [f64; 2] {
     [stick_mm, LEAST_AT_REST * stick_mm].map(|mm| mm.max(LEAST_STICK_MM))
 }
 
-/// Gradient of μ N φ in a slip in a plane, N, and its derivative, N/mm.
+/// Gradient of μ N φ in a slip in the wall's plane, N, and its derivative, N/mm.
 pub(in crate::contact) fn force_of_slip(
     largest_n: f64,
     plane: &Matrix3<f64>,
@@ -426,17 +431,17 @@ pub(in crate::contact) fn force_of_slip(
     (slip_mm * (largest_n * over), hessian)
 }
 
-/// Force of friction over its slip, N/mm.
+/// Friction force divided by its slip, N/mm.
 pub(in crate::contact) fn resistance(largest_n: f64, slip_mm: &Vec3, stick_mm: f64) -> f64 {
     largest_n * rates(slip_mm.norm(), stick_mm).0
 }
 
-/// The way on which friction takes energy in a slip, mm: what sticks takes nothing.
+/// The slip length over which friction dissipates energy, mm: 0 while sticking.
 pub(in crate::contact) fn rubbed_mm(slip_mm: f64, stick_mm: f64) -> f64 {
     phi(slip_mm, stick_mm) - phi(0.0, stick_mm)
 }
 
-/// φ(y) with its ε, `e`.
+/// φ(y) with ε = `e`.
 pub(in crate::contact) fn phi(y: f64, e: f64) -> f64 {
     if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
 }

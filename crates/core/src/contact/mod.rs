@@ -1,4 +1,4 @@
-//! What the wall does to a device, and what its own loops do to each other: distance, energy, friction.
+//! Contact of a device with the wall and with itself: distance, energy, friction.
 
 mod cache;
 pub mod distance;

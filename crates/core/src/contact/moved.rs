@@ -1,7 +1,8 @@
 //! The felt wall of a vessel that moves.
 //!
-//! The wall is felt in the reference, where nothing has to be made anew, and what is known of it stays with its material points: of a point
-//! at x all questions are asked at X, x = X + u(X) ([`Displacement::material`]). Only distances and their derivatives are those of the moved wall.
+//! Queries are made in the reference configuration, where nothing has to be recomputed, and knowledge stays with the
+//! vessel's material points: for a point x the wall is queried at X, x = X + u(X) ([`Displacement::material`]). Only
+//! distances and their derivatives are transformed to the moved wall.
 //!
 //! With f the distance in the reference and F = I + ∂u/∂X, the moved wall is f(X(x)) = 0, and the gap along its normal is, to first order in f,
 //!
@@ -9,10 +10,11 @@
 //! d(x) = f s,    s = (1 + q)^(−1/2),    q = ∇fᵀ (F⁻¹F⁻ᵀ − I) ∇f / φ(|∇f|²)
 //! ```
 //!
-//! which is f |∇f|/|F⁻ᵀ∇f| with φ(n) = n: s is a stretch along one direction, however steep f is where quadrics cease. Below n = ½ it is
-//! φ(n) = n + 4 (½ − n)³, so that s is smooth where ∇f vanishes. In a rigid motion F⁻¹F⁻ᵀ = I and d = f to rounding. Otherwise d
-//! is off by ½ f² (|κ| + |∂²u|) |∂u| at most, κ the curvature of the wall: by some micrometres at a radius of half a millimetre in a vessel of 3 mm that is
-//! strained by a twentieth.
+//! which is f |∇f|/|F⁻ᵀ∇f| with φ(n) = n: s is a stretch along one direction, however steep f is at the edge of the
+//! quadrics' supports. Below n = ½ it is φ(n) = n + 4 (½ − n)³, so that s is smooth where ∇f vanishes. In a rigid
+//! motion F⁻¹F⁻ᵀ = I and d = f to rounding. Otherwise the error of d is at most ½ f² (|κ| + |∂²u|) |∂u|, κ the
+//! curvature of the wall: some micrometres at a radius of half a millimetre in a vessel of 3 mm with a strain of a
+//! twentieth.
 //!
 //! With D = F⁻¹F⁻ᵀ − I, g = ∇f, H = ∇∇f, p = gᵀDg, n = |g|², Uₖ = ∂²uₖ/∂X², m = F⁻ᵀg and b = F⁻¹m,
 //!
@@ -24,9 +26,9 @@
 //! ∇(fs) = s g + f ∇s,    ∇∇(fs) = s H + g ∇sᵀ + ∇s gᵀ + f ∇∇s
 //! ```
 //!
-//! The gradient is exact. In the Hessian f ∇∇s is that of a true distance, H g = 0 and so on, to a wall whose curvature does not change, and is without
-//! ∂²u: what is left out is f times a strain times |∇κ|, and f κ |∂²u|, thousandths of H. Into space both come by the chain rule
-//! ([`Local::in_space`]).
+//! The gradient is exact. In the Hessian f ∇∇s is that of a true distance, H g = 0 and so on, to a wall of constant
+//! curvature, and without ∂²u: the neglected terms are f times a strain times |∇κ|, and f κ |∂²u|, thousandths of H.
+//! Both are transformed into space by the chain rule ([`Local::in_space`]).
 
 use std::ops::Deref;
 
@@ -39,7 +41,7 @@ use crate::products::outer;
 use crate::vessel::motion::{Displacement, Local};
 use nalgebra::Matrix3;
 
-/// The felt wall where its vessel is at one time. What it says of itself by [`Deref`] is of the reference.
+/// The felt wall at one displacement of its vessel. Methods through [`Deref`] refer to the reference.
 #[derive(Debug, Clone, Copy)]
 pub struct MovedWall<'a> {
     surface: &'a ContactSurface,
@@ -67,23 +69,23 @@ impl<'a> MovedWall<'a> {
         Self { surface, displacement }
     }
 
-    /// The material point that is at `x`.
+    /// The material point at position `x`.
     pub(crate) fn material(&self, x: &Vec3) -> Vec3 {
         self.displacement.map_or(*x, |displacement| displacement.material(x))
     }
 
-    /// Where a material point is.
+    /// Position of a material point.
     pub(crate) fn place(&self, material: &Vec3) -> Vec3 {
         self.displacement.map_or(*material, |displacement| displacement.place(material))
     }
 
-    /// A unit direction in the reference, at a material point, as it is in space.
+    /// A unit direction in the reference, at a material point, transformed to space.
     pub(super) fn carried(&self, material: &Vec3, direction: &Vec3) -> Vec3 {
         let Some(displacement) = self.displacement else { return *direction };
         (direction + displacement.gradient(material) * direction).normalize()
     }
 
-    /// Lengths in space are no more than this times those in the reference, and the other way round.
+    /// Upper bound of the ratio of lengths in space and in the reference, either way.
     pub(super) fn stretch(&self) -> f64 {
         self.displacement.map_or(1.0, Displacement::stretch)
     }
@@ -93,7 +95,7 @@ impl<'a> MovedWall<'a> {
         let Some(displacement) = self.displacement else {
             return self.surface.nearness(material, hint, limit_mm);
         };
-        // The value in space takes the gradient in the reference.
+        // The value in space needs the gradient in the reference.
         let wanted_mm = limit_mm.max(self.surface.reach_mm) * displacement.stretch();
         match self.surface.nearness(material, hint, wanted_mm) {
             Nearness::Beyond(value_mm) => Nearness::Beyond(value_mm / displacement.stretch()),
@@ -120,13 +122,13 @@ impl<'a> MovedWall<'a> {
     }
 }
 
-/// What |∇f|² is taken for, with its derivatives: what it is, and not nothing where it vanishes.
+/// The modified |∇f|² with its derivatives: unchanged except near zero, where it stays positive.
 fn size(n: f64) -> [f64; 3] {
     let below = (0.5 - n).max(0.0);
     [n + 4.0 * below.powi(3), 1.0 - 12.0 * below * below, 24.0 * below]
 }
 
-/// The distance in space of a point that has this one in the reference.
+/// The distance in space, given that in the reference.
 fn moved(f: &Distance, local: &Local) -> Distance {
     let Distance { value_mm, gradient: g, hessian: h } = f;
     let back = local.inverse.transpose();
@@ -135,7 +137,7 @@ fn moved(f: &Distance, local: &Local) -> Distance {
     let p = g.dot(&strained);
     let [size, size1, size2] = size(g.norm_squared());
     let q = p / size;
-    // The square of |F⁻ᵀ| along one direction, or nearer to 1.
+    // s⁻² is the square of |F⁻ᵀ| along one direction, or nearer to 1.
     let s = 1.0 / (1.0 + q).sqrt();
     let square = h * h;
     let turned = square * strained;
@@ -162,7 +164,7 @@ mod tests {
     use crate::vessel::{GeneratedWall, NoStore, Resolution, VesselMotion, anatomy};
     use nalgebra::{Rotation3, Unit};
 
-    /// That of a torus about z with a tube of radius 3 mm around a circle of 20 mm, inside.
+    /// The distance inside a torus about z: a tube of radius 3 mm around a circle of 20 mm.
     fn torus(x: &Vec3) -> Distance {
         let value = |x: &Vec3| 3.0 - ((x.xy().norm() - 20.0).powi(2) + x.z * x.z).sqrt();
         let gradient = |x: &Vec3| {
@@ -188,13 +190,13 @@ mod tests {
         }
     }
 
-    /// A field that strains by a tenth where the torus is.
+    /// A field with a strain of a tenth at the torus.
     fn breathing() -> Displacement {
         let still = Some(Around { centre_mm: [-70.0, 5.0, -10.0], radius_mm: 20.0, fade_mm: 120.0 });
         VesselMotion::new(&[MotionMode { still, ..mode() }]).unwrap().unwrap().at(0.0)
     }
 
-    /// Places near the wall of the torus, seen from its tube's middle.
+    /// Positions near the wall of the torus, seen from its tube's middle.
     fn places(depth_mm: f64) -> impl Iterator<Item = Vec3> {
         (0..60).map(move |k| {
             let (around, along) = (0.7 * f64::from(k), 0.31 * f64::from(k));
@@ -224,7 +226,7 @@ mod tests {
                 let slope = (plus.value_mm - minus.value_mm) / (2.0 * h);
                 assert!((slope - here.gradient[k]).abs() < 1e-8, "{slope} {}", here.gradient[k]);
                 let bend = (plus.gradient - minus.gradient) / (2.0 * h);
-                // What is left out: f times a strain of 0.15 times |∇κ| = 1/60, and f κ |∂²u|.
+                // Neglected terms: f times a strain of 0.15 times |∇κ| = 1/60, and f κ |∂²u|.
                 assert!((bend - here.hessian.column(k)).norm() < 2e-3, "{bend} {}", here.hessian);
             }
             assert!((here.gradient.norm() - 1.0).abs() < 0.02, "{}", here.gradient.norm());
@@ -232,11 +234,11 @@ mod tests {
         assert!(strain > 0.1, "{strain}");
     }
 
-    /// Where quadrics cease what is felt is steep, and level on a vessel's axis.
+    /// At the edge of the quadrics' supports the distance is steep, and flat on a vessel's axis.
     #[test]
     fn what_is_no_distance_is_stretched_as_one_and_has_its_own_gradient() {
         let field = breathing();
-        // k d, with a curvature of its own.
+        // k d, plus curvature.
         let felt = |k: f64, x: &Vec3| {
             let Distance { value_mm: d, gradient, hessian } = torus(x);
             let (slope, bend) = (k * (1.0 + 0.8 * (d - 0.5)), 0.8 * k);
@@ -273,7 +275,7 @@ mod tests {
     #[test]
     fn the_gap_is_that_of_the_moved_surface() {
         let field = breathing();
-        // The distance to the moved surface, from its points about the nearest.
+        // The distance to the moved surface, from its points near the closest.
         let exact = |x: &Vec3| {
             let at = |a: f64, b: f64| {
                 let ring = Vec3::new(a.cos(), a.sin(), 0.0);
@@ -302,7 +304,7 @@ mod tests {
             off = off.max((moved(&f, &field.local(&material)).value_mm - true_mm).abs());
             plain = plain.max((f.value_mm - true_mm).abs());
         }
-        // What the distance in the reference would be off by.
+        // The error if the distance in the reference were used.
         assert!(plain > 0.03, "{plain}");
         assert!(off < 0.002, "{off}");
     }

@@ -1,13 +1,13 @@
-//! How wide the way on from a device's front is: the radius of the largest sphere that passes.
+//! Width of the passage ahead of a device's front: the radius of the largest sphere that can pass.
 //!
-//! The lumen about the front is looked at on a grid. A way is as wide as its least clearance, and the widest of all ways is found as
-//! shortest ones are, with the least clearance of a way in place of the sum of its lengths (Pollack, "The maximum capacity through a
-//! network", Operations Research 8, 1960). Ways begin beside the last piece of the device, end at a stated distance from it, and do not go
-//! back past the cross-section of the lumen at which that piece begins.
+//! The lumen about the front is sampled on a grid. A path is as wide as its smallest clearance, and the widest path
+//! is found like a shortest one, with the smallest clearance in place of the sum of lengths (Pollack, "The maximum
+//! capacity through a network", Operations Research 8, 1960). Paths begin beside the last piece of the device, end at
+//! a given distance from it, and do not cross back over the lumen's cross-section at the start of that piece.
 //!
-//! A place is no farther than √3/2 h from a place of a grid of spacing h, and a clearance changes by no more than the distance. So a
-//! sphere of radius r passes nowhere where the widest way on the grid is narrower than r − √3/2 h, and it does where that is r. Between the
-//! two a finer grid tells.
+//! Every point is within √3/2 h of a point of a grid of spacing h, and a clearance changes by at most the distance.
+//! So a sphere of radius r cannot pass if the widest path on the grid is narrower than r − √3/2 h, and can if it is r
+//! or wider. In between, a finer grid is used.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -20,29 +20,30 @@ use crate::Vec3;
 use crate::rod::Frame;
 use crate::vessel::Opening;
 
-/// Spacings of the grids, in radii of the device.
+/// Grid spacings, in radii of the device.
 const SPACINGS: [f64; 2] = [0.25, 0.0625];
-/// A way ends so far from the front, in radii of the device: what is farther ahead does not hold it.
+/// A path ends at this distance from the front, in radii of the device: what is farther ahead does not block it.
 const AHEAD: f64 = 6.0;
-/// Length of the front at least, and how far beside it ways begin, in radii.
+/// Smallest length of the front, and distance beside it within which paths begin, in radii.
 const BESIDE: f64 = 2.0;
-/// Most places that are asked for one answer: what is not known by then is not narrow.
+/// Largest number of grid points per query: if undecided by then, the passage counts as wide.
 const MOST_ASKED: usize = 400_000;
 
-/// Places of a grid.
+/// Index of a grid point.
 type Cell = [i32; 3];
 
-/// A way that is narrower than the device.
+/// A passage narrower than the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Narrow {
-    /// Radius of the largest sphere that passes, mm: 0 where the lumen ends.
+    /// Radius of the largest sphere that can pass, mm: 0 where the lumen ends.
     pub(crate) radius_mm: f64,
-    /// Where it is narrowest, in the reference.
+    /// The narrowest position, in the reference.
     pub(crate) place_mm: Vec3,
 }
 
-/// The narrowest place of the widest way on from the front of a device of this radius, if that is narrower than the device. `axis_mm` are
-/// places of the device in the reference, from the tip on, a radius or two apart; at least two of them.
+/// The narrowest position of the widest path ahead of the front of a device of this radius, if narrower than the
+/// device. `axis_mm` are positions of the device in the reference, from the tip on, a radius or two apart; at least
+/// two of them.
 pub(crate) fn narrow_ahead(
     surface: &ContactSurface,
     openings: &[Opening],
@@ -63,7 +64,7 @@ pub(crate) fn narrow_ahead(
     None
 }
 
-/// The last piece of a device, from its tip to a cross-section that all of it is ahead of, and one place more.
+/// The last piece of a device, from its tip to a cross-section that all of it is ahead of, and one point more.
 fn front(axis_mm: &[Vec3], radius_mm: f64) -> Option<&[Vec3]> {
     let mut length_mm = 0.0;
     for last in 1..axis_mm.len().checked_sub(1)? {
@@ -78,23 +79,24 @@ fn front(axis_mm: &[Vec3], radius_mm: f64) -> Option<&[Vec3]> {
     None
 }
 
-/// The lumen about a front, on a grid about its tip.
+/// The lumen near a front, on a grid about its tip.
 struct Grid<'a> {
     surface: &'a ContactSurface,
     openings: &'a [Opening],
-    /// Places of the device from the tip to the cross-section at which its front begins.
+    /// Positions of the device from the tip to the cross-section at which its front begins.
     piece: &'a [Vec3],
-    /// The middle of that cross-section, and its triad: across it towards the tip, and two directions in it.
+    /// The middle of that cross-section, and its triad: the normal towards the tip, and two directions in the
+    /// section.
     middle: Vec3,
     frame: Frame,
     radius_mm: f64,
     spacing_mm: f64,
 }
 
-/// A way to a cell.
+/// A path to a grid point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Way {
-    /// Its least clearance, mm, and where that is.
+    /// Its smallest clearance, mm, and the position of that.
     least_mm: f64,
     narrowest: Cell,
     to: Cell,
@@ -115,7 +117,7 @@ impl PartialOrd for Way {
 }
 
 impl<'a> Grid<'a> {
-    /// About a front, places from the tip to one behind its cross-section, the last but one.
+    /// For a front given by positions from the tip to one behind its cross-section, the last but one.
     fn new(
         (surface, openings): (&'a ContactSurface, &'a [Opening]),
         front: &'a [Vec3],
@@ -128,7 +130,8 @@ impl<'a> Grid<'a> {
         Some(Self { surface, openings, piece, middle: *middle, frame, radius_mm, spacing_mm })
     }
 
-    /// The narrowest place of the widest way; none where the front is not in the lumen, or where that takes too long to find.
+    /// The narrowest position of the widest path; `None` if the front is not in the lumen, or if the search takes too
+    /// long.
     fn widest(&self) -> Option<Narrow> {
         let section = self.section();
         let mut ways = self.beside();
@@ -169,12 +172,12 @@ impl<'a> Grid<'a> {
         ((x - self.piece[0]) / self.spacing_mm).map(|c| c.round() as i32).into()
     }
 
-    /// How far a place is from the felt wall, at least as far as a device sees; not positive outside the lumen.
+    /// Distance of a position from the felt wall, exact up to the reach of a device; not positive outside the lumen.
     fn clearance_mm(&self, x: &Vec3) -> f64 {
         self.surface.clearance_mm(x, self.radius_mm)
     }
 
-    /// How far a place is from the front, mm, and whether that is ahead of its tip.
+    /// Distance of a position from the front, mm, and whether it is ahead of its tip.
     fn distance_mm(&self, x: &Vec3) -> (f64, bool) {
         let mut least = (f64::INFINITY, false);
         for (k, side) in self.piece.windows(2).enumerate() {
@@ -188,7 +191,7 @@ impl<'a> Grid<'a> {
         least
     }
 
-    /// The ways of no length that begin beside the front, in the lumen that it lies in.
+    /// The initial paths, of zero length, beside the front in its part of the lumen.
     fn beside(&self) -> BinaryHeap<Way> {
         let mut ways = BinaryHeap::new();
         let mut seen = FxHashSet::default();
@@ -207,12 +210,13 @@ impl<'a> Grid<'a> {
         ways
     }
 
-    /// How far a place is ahead of the cross-section, mm.
+    /// Distance of a position ahead of the cross-section, mm.
     fn ahead_mm(&self, x: &Vec3) -> f64 {
         (x - self.middle).dot(&self.frame.t)
     }
 
-    /// The cells of the cross-section at which the front begins: what of its plane is in the lumen next to the device.
+    /// The grid points of the cross-section at which the front begins: the part of its plane in the lumen next to the
+    /// device.
     fn section(&self) -> FxHashSet<[i32; 2]> {
         let Frame { u, v, .. } = self.frame;
         let most = (AHEAD / self.spacing_mm * self.radius_mm) as i32;
@@ -230,7 +234,7 @@ impl<'a> Grid<'a> {
         seen
     }
 
-    /// Whether a step leads through the cross-section.
+    /// Whether a step crosses the cross-section.
     fn passes_section(&self, from: &Vec3, to: &Vec3, section: &FxHashSet<[i32; 2]>) -> bool {
         let (before, after) = (self.ahead_mm(from), self.ahead_mm(to));
         if (before < 0.0) == (after < 0.0) {
@@ -243,7 +247,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The cells about one.
+/// The neighbours of a grid point.
 fn around([i, j, k]: Cell) -> impl Iterator<Item = Cell> {
     (0..27).filter(|n| *n != 13).map(move |n| [i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1])
 }
@@ -254,7 +258,7 @@ mod tests {
     use crate::contact::WallProperties;
     use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, Wall};
 
-    /// A vessel along z whose radius changes as stated, with a side branch of 1 mm at z = 20 mm where one is wanted.
+    /// A vessel along z with the given radius, optionally with a side branch of 1 mm at z = 20 mm.
     fn vessel(radius_mm: impl Fn(f64) -> f64, branch: bool) -> (ContactSurface, Wall) {
         let along = (0..81).map(|k| {
             let z = 0.5 * f64::from(k);
@@ -273,7 +277,7 @@ mod tests {
         (surface, wall)
     }
 
-    /// What is said of a wire of radius 0.4 mm whose tip is at z, aside by x.
+    /// The result for a wire of radius 0.4 mm whose tip is at z, offset by x.
     fn ahead((surface, wall): &(ContactSurface, Wall), z: f64, x: f64) -> Option<Narrow> {
         let axis: Vec<Vec3> = (0..20).map(|k| Vec3::new(x, 0.0, z - 0.6 * f64::from(k))).collect();
         narrow_ahead(surface, wall.openings(), &axis, 0.4)
@@ -288,10 +292,10 @@ mod tests {
             let found = ahead(&narrowing, 20.0, x).unwrap();
             assert!((found.radius_mm - 0.25).abs() < 0.09 && found.place_mm.z > 19.5, "{found:?}");
         }
-        // Far ahead it does not hold the device, and behind it neither.
+        // Far ahead it does not block the device, nor behind it.
         assert_eq!(ahead(&narrowing, 15.0, 0.0), None);
         assert_eq!(ahead(&narrowing, 27.0, 0.0), None);
-        // A hair wider than the device.
+        // Slightly wider than the device.
         let enough = vessel(|z| 2.0 - 1.57 * (z - 19.0).clamp(0.0, 1.0), false);
         assert_eq!(ahead(&enough, 20.0, 0.0), None);
     }

@@ -1,4 +1,4 @@
-//! Places on a device where the wall is felt, and what happens there.
+//! Contact points of a device: where the wall is evaluated.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,25 +7,26 @@ use crate::contact::{Distance, WallPotential};
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
 
-/// Beyond its radius, a point is followed within this part of it.
+/// Distance from the wall, beyond its radius and as a fraction of it, within which a point is tracked.
 pub(in crate::contact) const FOLLOW: f64 = 0.5;
-/// A triangle is the nearest, or close to it, within this part of a point's radius from where it was found.
+/// Distance, as a fraction of a point's radius, over which a query's triangle is reused as the nearest or a close
+/// one.
 pub(super) const LOOK_AGAIN: f64 = 0.5;
 
-/// A place on the device where the wall is felt.
+/// A point of the device at which contact with the wall is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPoint {
     /// Element and local coordinate 0…1.
     pub element: usize,
     /// Local coordinate in the element.
     pub xi: f64,
-    /// Number of the instrument that feels the wall there, the outermost; 0 of a device alone.
+    /// Index of the outermost instrument there, which touches the wall; 0 for a single device.
     pub instrument: usize,
     /// Its set of material angles; 0 where it has none.
     pub set: usize,
     /// Arc length from the tip, mm.
     pub from_tip_mm: f64,
-    /// Length of device that the point stands for, mm.
+    /// Length of device that the point represents, mm.
     pub weight_mm: f64,
     /// Energy per length.
     pub potential: WallPotential,
@@ -38,7 +39,7 @@ impl ContactPoint {
         self.between(&[x[e], x[e + 1], frames[e].t, frames[e + 1].t], elements[e].length)
     }
 
-    /// Position between places and tangents of two nodes, on an element of that length, mm.
+    /// Position on an element of that length, given positions and tangents of its nodes, mm.
     pub(super) fn between(&self, [x0, x1, t0, t1]: &[Vec3; 4], length_mm: f64) -> Vec3 {
         if self.xi == 1.0 {
             return *x1;
@@ -47,9 +48,10 @@ impl ContactPoint {
         x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * length_mm
     }
 
-    /// Normal of the wall and force on it at a distance, N; `factor` as in [`Stiffness`](super::regions::Stiffness).
+    /// Normal of the wall and force on it at this distance, N; `factor` as in
+    /// [`Stiffness`](super::regions::Stiffness).
     pub(super) fn pressed(&self, d: &Distance, factor: f64) -> (Vec3, f64) {
-        // The smooth distance has a gradient of nearly unit length; the normal has one.
+        // The gradient of the smooth distance is only nearly of unit length; the normal is normalised.
         let size = d.gradient.norm();
         (d.gradient / size, -factor * self.weight_mm * self.potential.derivatives(d.value_mm).0 * size)
     }
@@ -68,26 +70,26 @@ impl ContactPoint {
     }
 }
 
-/// One place where the wall holds the device.
+/// A contact with the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Position on the device's axis, mm.
     pub position_mm: Vec3,
-    /// Direction of the wall's elastic force on the device: its normal into the lumen, unit length. At the edge of a region it
-    /// leans to the softer side.
+    /// Direction of the wall's elastic force on the device: the unit normal into the lumen. At the edge of a region
+    /// it is inclined to the softer side.
     pub normal: Vec3,
-    /// Elastic force, N: that by which the wall presses.
+    /// Elastic normal force of the wall, N.
     pub force_n: f64,
     /// Friction force on the device, along the wall and against its slip, N.
     pub friction_n: Vec3,
-    /// Depth to which the device's surface is beyond the wall, mm.
+    /// Penetration of the device's surface into the wall, mm.
     pub penetration_mm: f64,
     /// Triangle of the wall mesh.
     pub triangle: u32,
 }
 
 impl Contact {
-    /// Force of the wall on the device, normal and friction together, N.
+    /// Total force of the wall on the device, N.
     pub fn total_n(&self) -> Vec3 {
         self.normal * self.force_n + self.friction_n
     }
@@ -98,26 +100,26 @@ impl Contact {
 pub struct Touch {
     /// Energy stored in the wall there, mJ.
     pub energy_mj: f64,
-    /// Place and forces.
+    /// Position and forces.
     pub contact: Contact,
     /// Moment of friction on the device about its axis, N·mm.
     pub friction_nmm: f64,
 }
 
-/// Questions about the wall, asked and avoided. They tell of the work that was done, which hangs on what a simulation still knows of places
-/// where a device has been, and not of the state of an insertion.
+/// Wall queries made and avoided. They measure work, which depends on what a simulation still remembers of earlier
+/// positions, and are not part of the state of an insertion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counters {
-    /// Questions to the bounding volume hierarchy.
+    /// Queries of the bounding volume hierarchy.
     pub queries: u64,
-    /// Questions that the quadrics about the last triangle answered.
+    /// Queries answered by the quadrics about the last triangle.
     pub near: u64,
-    /// Questions that the last clearance answered, or the same question before, of the same point or of another in its place.
+    /// Queries answered by the last clearance, or by an earlier query at the same position.
     pub avoided: u64,
 }
 
 impl Counters {
-    /// Adds another count.
+    /// Adds other counts.
     pub fn add(&mut self, other: &Self) {
         self.queries += other.queries;
         self.near += other.near;

@@ -1,14 +1,15 @@
-//! The energy of a wall that is pressed, per length of device.
+//! Contact energy of the wall per length of device.
 //!
-//! With d the distance of the device's axis from the wall, negative beyond it, r the device's radius and p = r − d the depth to which
-//! its surface is beyond the wall,
+//! With d the distance of the device's axis from the wall, negative beyond it, r the device's radius and p = r − d
+//! the penetration of its surface,
 //!
 //! ```text
 //! ψ(d) = ½ k p²  for p > 0
 //! ```
 //!
-//! a foundation of modulus k (N/mm²), soft or rigid, that gives way as far as its modulus says: a stiff device may sink into a soft
-//! wall by many times its radius. Which side of the wall it is on is a matter of continuity ([`super::wall`]), not of the sign of d.
+//! a foundation of modulus k (N/mm²), soft or rigid, whose deflection is not limited: a stiff device may sink into a
+//! soft wall by many times its radius. The side of the wall it is on follows by continuity ([`super::wall`]), not
+//! from the sign of d.
 
 /// Wall energy per length at one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +21,7 @@ pub struct WallPotential {
 }
 
 impl WallPotential {
-    /// Depth of the surface beyond the wall, mm; 0 where it is clear of it.
+    /// Penetration of the surface, mm; 0 where it is clear of the wall.
     pub fn penetration_mm(&self, distance_mm: f64) -> f64 {
         (self.radius_mm - distance_mm).max(0.0)
     }
@@ -31,7 +32,7 @@ impl WallPotential {
         0.5 * self.modulus_n_per_mm2 * p * p
     }
 
-    /// As [`WallPotential::derivatives`], with a spring that also pulls: what holds a point to a wall that it has come off.
+    /// As [`WallPotential::derivatives`], for a spring that also pulls and so holds a point that has left the wall.
     pub(super) fn holding(&self, distance_mm: f64) -> (f64, f64) {
         let k = self.modulus_n_per_mm2;
         (k * (distance_mm - self.radius_mm), k)

@@ -1,4 +1,4 @@
-//! How a vessel's wall answers a device that presses on it, the same everywhere or region by region.
+//! Stiffness and friction of a vessel's wall, uniform or by region.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,15 +8,15 @@ use crate::{Error, Result, Vec3};
 
 /// Largest foundation modulus, N/mm².
 const LARGEST_MODULUS: f64 = 1e9;
-/// Largest coefficient of friction: nothing in a vessel is rougher.
+/// Largest coefficient of friction, far above any in a vessel.
 const LARGEST_FRICTION: f64 = 2.0;
-/// Largest radius of a region, mm: it holds any vessel.
+/// Largest radius of a region, mm: it contains any vessel.
 const LARGEST_RADIUS_MM: f64 = 1e6;
-/// Width over which the wall changes at the edge of a region, mm, unless the scene says otherwise. A device feels its wall at
-/// points about a diameter apart, and a change much narrower than that lies between two of them.
+/// Default width over which the wall changes at the edge of a region, mm. Contact points are about a diameter apart,
+/// and a much narrower transition would fall between two of them.
 const TRANSITION_MM: f64 = 2.0;
 
-/// How far the felt wall may be from the given one, mm, unless the scene says otherwise: less than a scanner resolves.
+/// Default for the largest distance of the felt wall from the given one, mm: less than a scanner resolves.
 const DEVIATION_MM: f64 = 0.1;
 /// Largest such distance, mm.
 const LARGEST_DEVIATION_MM: f64 = 10.0;
@@ -25,25 +25,26 @@ const LARGEST_DEVIATION_MM: f64 = 10.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WallProperties {
-    /// Foundation modulus k, N/mm²: force per length per depth.
+    /// Foundation modulus k, N/mm²: force per length and depth.
     pub modulus_n_per_mm2: f64,
     /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
     pub friction: f64,
-    /// How far the surface may be moved to be smooth, mm; where the lumen's radius is less than twenty times this, a twentieth of the radius.
-    /// How far the wall that is felt comes to be says [`ContactSurface::deviation`](super::FeltMesh::deviation). 0 leaves it as it is meshed, for surfaces whose meshes are known to be good.
+    /// How far smoothing may move the surface, mm; at most a twentieth of the lumen's local radius. The resulting
+    /// distance of the felt wall is measured by [`ContactSurface::deviation`](super::FeltMesh::deviation). 0 uses the
+    /// given mesh, for surfaces whose meshes are known to be good.
     pub deviation_mm: f64,
-    /// Where the wall is another, each laid over those before it.
+    /// Regions with other properties; later ones override earlier ones.
     pub region: Vec<WallRegion>,
 }
 
 impl Default for WallProperties {
-    /// An artery's modulus in order of magnitude, frictionless.
+    /// Order of magnitude of an artery's modulus, frictionless.
     fn default() -> Self {
         Self { modulus_n_per_mm2: 1.0, friction: 0.0, deviation_mm: DEVIATION_MM, region: Vec::new() }
     }
 }
 
-/// The wall inside a sphere: plaque, a stent, an aneurysm. What it does not give stays as it is.
+/// The wall inside a sphere: plaque, a stent, an aneurysm. Absent properties stay unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WallRegion {
@@ -51,8 +52,8 @@ pub struct WallRegion {
     pub centre_mm: [f64; 3],
     /// Radius of the sphere, mm.
     pub radius_mm: f64,
-    /// Width, half of it on each side of the sphere, over which the wall changes, mm; 2 or the radius, if that is less, if
-    /// absent. It changes over an edge of the mesh at least.
+    /// Width over which the wall changes, mm, half of it on each side of the sphere; if absent, 2 or the radius,
+    /// whichever is less. The transition extends over at least one edge of the mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transition_mm: Option<f64>,
     /// Foundation modulus, N/mm².
@@ -72,12 +73,12 @@ impl WallRegion {
         self.transition_mm.unwrap_or(TRANSITION_MM.min(self.radius_mm))
     }
 
-    /// Farther than this from its centre nothing is changed, mm.
+    /// Distance from its centre beyond which it changes nothing, mm.
     fn reach_mm(&self) -> f64 {
         self.radius_mm + 0.5 * self.width_mm()
     }
 
-    /// 1 where the wall is that of the region, 0 where the region is not, smooth between.
+    /// 1 inside the region, 0 outside, smooth between.
     fn share(&self, x: &Vec3) -> f64 {
         let inside = self.reach_mm() - (x - self.centre()).norm();
         let t = if inside >= self.width_mm() { 1.0 } else { (inside / self.width_mm()).max(0.0) };
@@ -101,11 +102,12 @@ impl WallProperties {
         self.region.iter().filter_map(|r| r.modulus_n_per_mm2).fold(self.modulus_n_per_mm2, f64::max)
     }
 
-    /// ln(k/k₀), with k₀ the modulus outside all regions, and coefficient of friction at a place of the wall.
+    /// ln(k/k₀), with k₀ the modulus outside all regions, and the coefficient of friction at a position on the wall.
     ///
-    /// The logarithm, since moduli differ by powers of ten: between walls of 10⁻³ and 10⁴ N/mm² each decade gets the same part
-    /// of the way. Blended as it is, the modulus would rise a thousandfold within the first ten-thousandth of the way, and
-    /// what a step of Newton's method may trust, k/|∇k|, would be least where the wall is softest.
+    /// The logarithm is blended because moduli differ by powers of ten: between walls of 10⁻³ and 10⁴ N/mm² each
+    /// decade takes the same part of the transition. Blended linearly, the modulus would rise a thousandfold within
+    /// the first ten-thousandth of it, and the range in which a Newton step is reliable, k/|∇k|, would be smallest
+    /// where the wall is softest.
     pub fn at(&self, x: &Vec3) -> (f64, f64) {
         let (mut ln_modulus, mut friction) = (0.0, self.friction);
         for region in &self.region {
@@ -124,7 +126,7 @@ impl WallProperties {
         (ln_modulus, friction)
     }
 
-    /// Refuses regions on behalf of a method that knows one wall for the whole vessel.
+    /// Rejects regions, for a method that supports only a uniform wall.
     ///
     /// # Errors
     /// Any region.
@@ -141,10 +143,11 @@ impl WallProperties {
         ))
     }
 
-    /// Checks all values, and that every region has a place on the wall of `lumen`, whose mesh comes from `store` if there are any.
+    /// Checks all values, and that every region contains part of the wall of `lumen`, whose mesh comes from `store`
+    /// if there are any.
     ///
     /// # Errors
-    /// Values out of range, a region that changes nothing or reaches no vertex.
+    /// Values out of range; a region that changes nothing or contains no vertex.
     pub(crate) fn check(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<()> {
         in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
         check_friction("vessel.wall.friction", self.friction)?;
@@ -197,7 +200,7 @@ impl WallProperties {
     }
 }
 
-/// Most that a valve holds an instrument with, N.
+/// Largest force of a valve on an instrument, N.
 const LARGEST_VALVE_N: f64 = 100.0;
 
 /// Checks the force of a valve.

@@ -1,45 +1,45 @@
-//! What is nearest to places where a device has been.
+//! The nearest piece of wall, cached by position.
 //!
-//! A device goes the same way again and again, and each of its points asks for the triangle nearest to it. Space is cut into
-//! cubic cells, and what is nearest to the middle of a cell is asked once, for all points that come to lie in it. Answers
-//! depend on the cell alone, not on what was asked before.
+//! A device takes the same way again and again, and each of its points queries the triangle nearest to it. Space is
+//! divided into cubic cells, and the piece nearest to the middle of a cell is found once, for all points in it.
+//! Results depend on the cell alone, not on earlier queries.
 
 use crate::Vec3;
 use crate::contact::ContactSurface;
 
-/// Cells that are remembered at a time; a power of two. A device of a metre lies in some thousands.
+/// Number of cells cached; a power of two. A device of a metre occupies some thousands.
 const CELLS: usize = 1 << 14;
-/// Cells are counted up to this from the origin.
+/// Largest magnitude of a cell's index.
 const FARTHEST: f64 = 1e9;
-/// How often a wall is looked for so many times as far away before it is looked for anywhere.
+/// Number of times the search radius is multiplied by `FARTHER_BY` before it becomes unlimited.
 const FARTHER: i32 = 6;
 /// See [`FARTHER`].
 const FARTHER_BY: f64 = 4.0;
-/// How much farther than a triangle that is known to be there a nearer one is looked for, in parts of its distance and of the reach:
-/// against rounding.
+/// Margin of the search for a piece nearer than a known one, as a fraction of its distance and of the reach: against
+/// rounding.
 const CLOSE: f64 = 1e-9;
 /// Stands for no triangle.
 const NONE: u32 = u32::MAX;
 
-/// What is known of the wall around a point in space.
+/// The wall around a position.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Proximity {
-    /// The point.
+    /// The position.
     pub(super) middle: Vec3,
-    /// No wall is nearer to it than this, mm.
+    /// A lower bound of its distance to the wall, mm.
     pub(super) clearance_mm: f64,
-    /// The nearest piece; none beyond the reach of the question or past the end of the vessel.
+    /// The nearest piece; `None` beyond the reach of the query or past the end of the vessel.
     pub(super) piece: Option<u32>,
 }
 
 impl Proximity {
-    /// No wall is nearer to `x` than this, mm.
+    /// A lower bound of the distance from `x` to the wall, mm.
     pub(super) fn clearance(&self, x: &Vec3) -> f64 {
         self.clearance_mm - (x - self.middle).norm()
     }
 }
 
-/// A cell that was asked for.
+/// A cell that was queried.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     key: [i32; 3],
@@ -47,7 +47,7 @@ struct Cell {
     clearance_mm: f64,
 }
 
-/// What was found about the cells that were asked for.
+/// The results for queried cells.
 #[derive(Debug, Clone)]
 pub(super) struct ProximityCache {
     size_mm: f64,
@@ -55,25 +55,24 @@ pub(super) struct ProximityCache {
     cells: Vec<Cell>,
     /// The piece that was found last.
     last: u32,
-    /// Questions to the hierarchy since they were counted last.
+    /// Hierarchy queries since the last count.
     pub(super) queries: u64,
 }
 
 impl ProximityCache {
-    /// Cells no point of which is farther than `radius_mm` from the middle, from which walls are looked for up to
-    /// `reach_mm` away.
+    /// Cells with all points within `radius_mm` of their middle, from which walls are sought up to `reach_mm` away.
     pub(super) fn new(radius_mm: f64, reach_mm: f64) -> Self {
         let unknown = Cell { key: [i32::MIN; 3], piece: NONE, clearance_mm: 0.0 };
         let size_mm = radius_mm * 2.0 / 3f64.sqrt();
         Self { size_mm, reach_mm, cells: vec![unknown; CELLS], last: NONE, queries: 0 }
     }
 
-    /// What is nearest to `x` itself.
+    /// The piece nearest to `x` itself.
     fn ask(&mut self, surface: &ContactSurface, x: &Vec3) -> Proximity {
         self.queries += 1;
-        // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall;
-        // what was found last is mostly close to what is sought, and nothing farther is the answer. Which of several triangles at one
-        // distance is found does not hang on the limit.
+        // If no wall is near, the point may be far from it on either side. An unlimited query would visit most of the
+        // wall; the last piece found is mostly close to the nearest and limits the search. Which of several triangles
+        // at equal distance is found does not depend on the limit.
         let found_mm = match self.last {
             NONE => f64::MAX,
             last => {
@@ -93,10 +92,10 @@ impl ProximityCache {
         }
     }
 
-    /// What is nearest to the middle of the cell that `x` lies in.
+    /// The piece nearest to the middle of the cell that contains `x`.
     pub(super) fn around(&mut self, surface: &ContactSurface, x: &Vec3) -> Proximity {
         let at = x.map(|c| (c / self.size_mm).floor());
-        // Also for what is not a number.
+        // Also false for NaN.
         if !at.iter().all(|c| c.abs() < FARTHEST) {
             return self.ask(surface, x);
         }
@@ -115,7 +114,7 @@ impl ProximityCache {
     }
 }
 
-/// Where a cell is kept: neighbours far apart, so that few drive each other out.
+/// Slot of a cell: neighbours are far apart, so that collisions are rare.
 fn slot(key: [i32; 3]) -> usize {
     // Odd constants near 2⁶⁴ times the fractional parts of √2, √3 and √5: their multiples spread evenly.
     const MIX: [u64; 3] = [0x6A09_E667_F3BC_C909, 0xBB67_AE85_84CA_A73B, 0x3C6E_F372_FE94_F82B];
@@ -158,7 +157,7 @@ mod tests {
     fn what_was_found_before_leads_to_the_same_answers() {
         let surface = tube(0.7);
         let mut proximity = ProximityCache::new(0.2, 0.5);
-        // On a lattice about the axis many triangles are at one distance.
+        // On a lattice about the axis many triangles are at equal distance.
         let at =
             |k: i32| Vec3::new(f64::from(k % 7 - 3), f64::from(k / 7 % 7 - 3), f64::from(k / 49 % 40)) * 0.9;
         for k in 0..2000 {

@@ -4,13 +4,13 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use crate::Vec3;
 
-/// Height times curvature is taken as it is up to this, …
+/// Height times curvature is exact up to this value.
 const STEEP: f64 = 0.7;
-/// … and beyond levels off within this, so that feet stay finite at the centre of curvature.
+/// Beyond, it saturates within this range, so that feet stay finite at the centre of curvature.
 const LEVEL: f64 = 0.4;
 
-/// The quadric of one vertex. In the order in which it is read: most vertices that are asked are too far, and the first line of a
-/// processor's cache says so.
+/// The quadric of one vertex. Fields are in the order of access: most vertices tested are too far, which the first
+/// cache line shows.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Quadric {
@@ -19,24 +19,25 @@ pub(super) struct Quadric {
     pub(super) extent: Extent,
     /// Principal directions, across the normal.
     pub(super) axes: [Vec3; 2],
-    /// S along them, 1/mm, the larger first; positive where the wall bends around the lumen.
+    /// S along them, 1/mm, the larger first; positive where the wall is concave, bending around the lumen.
     pub(super) curvature: [f64; 2],
     /// M in them, 1/mm².
     pub(super) support: Matrix2<f64>,
-    /// The window falls from 1 at the first to 0 at the second, above and below the surface, mm.
+    /// Heights above and below the surface at which the window begins to fall from 1 and reaches 0, mm.
     pub(super) above_mm: (f64, f64),
     pub(super) below_mm: (f64, f64),
-    /// n, by which the window below is narrower towards the rim of the support: 1 − n at the rim itself.
+    /// n: reduction of the lower window towards the rim of the support, where it is 1 − n times as wide.
     pub(super) narrowing: f64,
     /// Half axes of the support, shortest and longest, mm.
     pub(super) half_axes_mm: (f64, f64),
-    /// c, how much it counts.
+    /// c, its weight.
     pub(super) trust: f64,
-    /// No point within the window that is farther from the normal than this is reached, mm; infinite until it is open.
+    /// Largest distance from the normal of a reached point within the window, mm; infinite until the window is set.
     pub(super) farthest_mm: f64,
 }
 
-/// How far from the normal a vertex reaches at a height h, in few numbers: feet |σ| within the longer half axis are those of offsets
+/// A compact bound of the offset that a vertex reaches at a height h: feet |σ| within the longer half axis are those
+/// of offsets
 ///
 /// ```text
 /// |τ| ≤ max (1 − hκ) |σ|,    1 − hκ ≥ 1 − `STEEP`
@@ -48,16 +49,16 @@ pub(super) struct Extent {
     curvature: [f32; 2],
 }
 
-/// What single precision may take from an extent.
+/// Allowance for single precision in an extent.
 const ROUNDED: f64 = 1.0 + 1e-5;
 
 impl Extent {
-    /// That of a support with this longer half axis, mm, and these curvatures, the larger first.
+    /// From the longer half axis of a support, mm, and its curvatures, the larger first.
     pub(super) fn new(long_mm: f64, curvature: [f64; 2]) -> Self {
         Self { long_mm: (long_mm * ROUNDED) as f32, curvature: curvature.map(|c| c as f32) }
     }
 
-    /// The farthest offset that may be reached at a height, mm.
+    /// Largest offset that may be reached at a height, mm.
     #[inline]
     fn at(&self, height_mm: f64) -> f64 {
         let [larger, smaller] = self.curvature;
@@ -66,25 +67,26 @@ impl Extent {
     }
 }
 
-/// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
+/// Height of the window, in radii of the device, and in supports of a vertex: the error of a fit on a coarse mesh.
 const WINDOW: (f64, f64) = (1.25, 0.3);
-/// In heights of the window: it falls from 1 at the first to 0 at the second, above and below the surface.
+/// Window above and below the surface: heights at which it begins to fall from 1 and reaches 0, in heights of the
+/// window.
 const ABOVE: (f64, f64) = (1.0, 1.8);
 const BELOW: (f64, f64) = (-0.3, -0.8);
-/// In heights of the window: a wall that is farther than another by this much counts e times less. In a lumen narrower than
-/// the device both sides are near, and their mean would hold nothing.
+/// Distance, in heights of the window, by which a wall that is farther than another counts e times less. In a lumen
+/// narrower than the device both sides are near, and their mean would hold nothing.
 const NEARER: f64 = 0.3;
-/// Beyond its centre of curvature a vertex is not the nearest: there, or this far above the thickest device in radii, its window
-/// begins to fall, …
+/// Beyond its centre of curvature a vertex is not the nearest: there, or this far above the surface in radii of the
+/// thickest device, its window begins to fall.
 const CENTRE: f64 = 1.05;
-/// … and is closed at this many times that height.
+/// The window is closed at this many times that height.
 const BEYOND_CENTRE: f64 = 1.15;
 
-/// In a tube so narrow, radii of the device over that of the tube, the wall behind a device is no other piece: from the first on the
-/// window below is less narrow towards the rim, and from the second on not at all.
+/// Ratios of the device's radius to that of a tube. In a narrow tube the wall behind a device is not another piece:
+/// from the first ratio on the window below is narrowed less towards the rim, from the second on not at all.
 const NARROW: (f64, f64) = (0.5, 0.8);
 
-/// Z: what is behind the surface counts by at most e^Z.
+/// Z: the weight behind the surface is at most e^Z.
 const BOUND: f64 = 8.0;
 
 /// A window and its derivatives: 1 up to `from`, 0 from `to` on, in between 1 − t³(10 − 15t + 6t²).
@@ -106,7 +108,7 @@ fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
     ]
 }
 
-/// 1/(1 − hκ), by which feet are farther than offsets, with its derivatives in h. It levels off before hκ comes to 1.
+/// 1/(1 − hκ), the ratio of feet to offsets, with its derivatives in h. It saturates before hκ reaches 1.
 #[derive(Debug, Clone, Copy)]
 struct Spread {
     value: f64,
@@ -115,14 +117,14 @@ struct Spread {
 }
 
 impl Spread {
-    /// The value alone: of most vertices nothing else is asked.
+    /// The value alone, which is all that most vertices need.
     #[inline]
     fn value(height: f64, curvature: f64) -> f64 {
         let t = height * curvature;
         1.0 / (1.0 - if t <= STEEP { t } else { Self::levelled(t).0 })
     }
 
-    /// What hκ is taken for beyond `STEEP`, and the part of the way on which it levels off.
+    /// hκ saturated beyond `STEEP`, and the position in the range of saturation.
     fn levelled(t: f64) -> (f64, f64) {
         let x = ((t - STEEP) / LEVEL).clamp(0.0, 1.0);
         (STEEP + LEVEL * (x - x * x * x + 0.5 * x * x * x * x), x)
@@ -132,7 +134,7 @@ impl Spread {
     fn at(height: f64, curvature: f64) -> Self {
         let t = height * curvature;
         let (s, x) = if t <= STEEP { (t, 0.0) } else { Self::levelled(t) };
-        // It levels off with the slope 1 − 3x² + 2x³.
+        // It saturates with the slope 1 − 3x² + 2x³.
         let slope = (1.0 - 3.0 * x * x + 2.0 * x * x * x) * curvature;
         let bend = 6.0 * (x * x - x) / LEVEL * curvature * curvature;
         let value = 1.0 / (1.0 - s);
@@ -152,7 +154,7 @@ pub(super) struct Opened {
     pub(super) in_qu: f64,
 }
 
-/// A point seen from a vertex, along its principal directions.
+/// A point relative to a vertex, along its principal directions.
 pub(super) struct Local {
     pub(super) tau: Vector2<f64>,
     /// Along the normal, mm.
@@ -166,7 +168,7 @@ pub(super) struct Local {
 }
 
 impl Quadric {
-    /// What is seen of `x`; `None` beyond the support.
+    /// `x` relative to the vertex; `None` beyond the support.
     #[inline]
     pub(super) fn local(&self, x: &Vec3) -> Option<Local> {
         let y = x - self.position;
@@ -178,7 +180,7 @@ impl Quadric {
         let [k, l] = self.curvature;
         let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
         let sigma = Vector2::new(Spread::value(rise, k) * tau.x, Spread::value(rise, l) * tau.y);
-        // Written out: it is the innermost product of all.
+        // Written out because it is the innermost product.
         let s = &self.support;
         let across = Vector2::new(
             s[(0, 0)] * sigma.x + s[(0, 1)] * sigma.y,
@@ -222,7 +224,8 @@ impl Quadric {
         [(f1, f2), (u1, u2)]
     }
 
-    /// Sets the window for devices up to `thickest_mm` in radius; `around` says that the support reaches around the lumen.
+    /// Sets the window for devices up to `thickest_mm` in radius; `around` tells whether the support reaches around
+    /// the lumen.
     pub(super) fn open_window(&mut self, thickest_mm: f64, around: bool) {
         let size = (WINDOW.0 * thickest_mm).max(WINDOW.1 * self.half_axes_mm.0);
         // The first curvature is the larger one.
@@ -235,15 +238,16 @@ impl Quadric {
         self.below_mm = (BELOW.0 * size, BELOW.1 * size);
         let narrow = (NARROW.1 - self.curvature[0] * thickest_mm) / (NARROW.1 - NARROW.0);
         self.narrowing = if around { 0.0 } else { narrow.clamp(0.0, 1.0) };
-        // Where the window is open heights differ from Q by the sag of the support at most, and feet are nearer than offsets by
-        // height times curvature.
+        // Within the window heights differ from Q by at most the sag of the support, and feet are nearer than offsets
+        // by height times curvature.
         let (long, [k, l]) = (self.half_axes_mm.1, self.curvature);
         let sag = 0.5 * k.abs().max(l.abs()) * long * long;
         let (highest, lowest) = (self.above_mm.1 + sag, self.below_mm.1 - sag);
         self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
-    /// b(Q, u) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
+    /// b(Q, u) and its derivatives; behind the surface unlimited in depth, but bounded: e^{−Z tanh(z/Z)} with z =
+    /// Q/0.3w.
     #[inline]
     pub(super) fn opened(&self, local: &Local, behind: bool) -> Opened {
         let (value, rate) = (local.value, BELOW.0 / (NEARER * self.below_mm.0));
@@ -253,7 +257,7 @@ impl Quadric {
             let second = (slope * slope + 2.0 * rate * slope * t / BOUND) * e;
             return Opened { value: e, in_q: -slope * e, in_qq: second, ..Opened::default() };
         }
-        // What is behind the surface near the rim of the support is next to another piece of wall.
+        // Points behind the surface near the rim of the support are next to another piece of wall.
         let n = if value > 0.0 { 0.0 } else { self.narrowing };
         let (g, (from, to)) = (1.0 - n * local.u, if value > 0.0 { self.above_mm } else { self.below_mm });
         let z = value / g;

@@ -1,37 +1,40 @@
-//! Quadrics fitted to the vertices of a mesh: normals, curvatures and the ellipses that hold a vertex's neighbours.
+//! Quadrics fitted to the vertices of a mesh: normals, curvatures and the ellipses that contain a vertex's
+//! neighbours.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::quadric::{Extent, Quadric};
 use crate::Vec3;
 
-/// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
+/// Support of a vertex relative to its edges: every point of a triangle lies well inside that of its three corners.
 const SUPPORT: f64 = 1.1;
-/// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
+/// Largest product of curvature and support: a sharper corner cannot be represented, and its quadric would fold over.
 const LARGEST_BEND: f64 = 0.8;
-/// Square of the thinnest ellipse's ratio of axes, about.
+/// Approximate square of the smallest ratio of an ellipse's axes.
 const THINNEST: f64 = 0.01;
-/// Power by which neighbours count less with their distance: n of (1 + u)^−n. A quadric is asked within its support, and what is beyond a kink
-/// next to it must not bend it. With n = 1, the outer ring counting most, the smooth wall was off by 0.1 mm at 3 of 100 places of
-/// coarse wide vessels, with 6 at 1 of 1,000, and from a vessel that is known it was twice as far; with 16 it is worse again.
+/// Power by which the weight of neighbours decreases with distance: n of (1 + u)^−n. A quadric is evaluated within
+/// its support, and must not be bent by what lies beyond a kink next to it. With n = 1, the outer ring counting most,
+/// the smooth wall was wrong by 0.1 mm at 3 of 100 places of coarse wide vessels, with 6 at 1 of 1,000; compared with
+/// a known vessel the error was twice as large; with 16 it is worse again.
 const NEAR: i32 = 6;
-/// How much a vertex counts whose neighbours no quadric fits, as on the teeth of a rim: it knows a plane alone, and where vertices that
-/// fit reach as well it must not stand in front of them.
+/// Weight of a vertex whose neighbours no quadric fits, as on the teeth of a rim: it represents only a plane, which
+/// must not prevail where fitted vertices reach as well.
 const UNFIT: f64 = 0.02;
-/// Weight that holds the fit of a vertex with few neighbours, |g|² and tr S²: 1e-6 of what a neighbour one edge away contributes.
+/// Regularisation of the fit of a vertex with few neighbours, |g|² and tr S²: 1e-6 of the contribution of a neighbour
+/// one edge away.
 const REGULAR: f64 = 1e-6;
 
-/// For every vertex those that share an edge with it, ascending.
+/// For every vertex its neighbours by edges, ascending.
 #[derive(Debug, Clone)]
 pub(super) struct Neighbours {
-    /// Where the list of each vertex begins, and where the last one ends.
+    /// Start of the list of each vertex, and the end of the last one.
     starts: Vec<u32>,
     lists: Vec<u32>,
 }
 
 impl Neighbours {
     pub(super) fn new(triangles: &[[u32; 3]], count: usize) -> Self {
-        // Both other corners of every triangle, counted out by vertex; most come twice.
+        // Both other corners of every triangle, sorted by vertex; most occur twice.
         let mut places = vec![0_u32; count + 1];
         triangles.iter().flatten().for_each(|v| places[*v as usize + 1] += 2);
         for v in 0..count {
@@ -72,14 +75,14 @@ impl Neighbours {
     }
 }
 
-/// The smallest ellipse of its shape that holds points of a plane, as a matrix: Σ y yᵀ gives the shape.
+/// The smallest ellipse of the shape given by Σ y yᵀ that contains points of a plane, as a matrix.
 fn ellipse(points: impl Iterator<Item = (f64, f64)> + Clone) -> Matrix2<f64> {
     let mut spread = Matrix2::zeros();
     for (p, q) in points.clone() {
         let y = Vector2::new(p, q);
         spread += y * y.transpose();
     }
-    // Neighbours on a line, or none: no needles.
+    // Neighbours on a line, or none: the ellipse must not be a needle.
     spread += Matrix2::identity() * (THINNEST * spread.trace()).max(f64::MIN_POSITIVE);
     let shape = spread.try_inverse().unwrap_or_else(Matrix2::identity);
     let farthest =
@@ -127,14 +130,14 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
         right += row * (h * weight);
     }
     let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
-    // A fit that leans over is none; neither is one that is not a number.
+    // A fit that is inclined too much, or NaN, is rejected.
     let usable = libm::hypot(found[0], found[1]) <= 0.5;
     let (tilt, bend) = if usable {
         (Vector2::new(found[0], found[1]), Matrix2::new(found[2], found[3], found[3], found[4]) / long)
     } else {
         (Vector2::zeros(), Matrix2::zeros())
     };
-    // Sag over the support against its half axes, in all directions together.
+    // Sag over the support relative to its half axes, in all directions together.
     let shrink =
         shape.eigenvectors * Matrix2::from_diagonal(&shape.eigenvalues.map(|l| l.sqrt().sqrt().recip()));
     let size = (shrink.transpose() * bend * shrink).norm();

@@ -1,4 +1,4 @@
-//! How near single points of space are to a wall, for methods that feel it at their nodes.
+//! Distances of single points from a wall, for methods with contact at their nodes.
 
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::{Proximity, ProximityCache};
@@ -6,20 +6,20 @@ use super::surface::Hint;
 use super::{ContactSurface, Nearness};
 use crate::Vec3;
 
-/// Reads a [`ContactSurface`] at points, and remembers which pieces of it are nearest to places that were asked for.
+/// Evaluates a [`ContactSurface`] at points, and caches the nearest pieces by position.
 ///
-/// What is within the limit of a question depends on the point alone, not on what was asked before: a reader may be dropped and made anew
-/// at any moment.
+/// Results within the limit of a query depend on the point alone, not on earlier queries: a reader may be dropped and
+/// recreated at any time.
 #[derive(Debug, Clone)]
 pub struct WallReader {
     proximity: ProximityCache,
     near_mm: f64,
-    /// The last place around which the lumen was wide: nodes that follow each other lie in one such ball.
+    /// The last ball without wall: consecutive nodes often lie in the same one.
     wide: Option<Proximity>,
 }
 
 impl WallReader {
-    /// A reader of `surface`, and of no other, for points of devices for which that was made.
+    /// A reader for this `surface` only, and for points of the devices that it was made for.
     pub fn new(surface: &ContactSurface) -> Self {
         let radius_mm = surface.thinnest_mm;
         Self {
@@ -29,10 +29,11 @@ impl WallReader {
         }
     }
 
-    /// How near `x` is to the wall, with derivatives below `limit_mm`, and the piece of wall that is nearest to its surroundings.
+    /// Distance of `x` from the wall, with derivatives below `limit_mm`, and the piece of wall nearest to its
+    /// surroundings.
     ///
-    /// Where the wall is farther than the limit, or the radius of the device, by more than half of that radius, no piece is returned, and a
-    /// distance that may be less than it is; past the end of the vessel that is infinite.
+    /// Where the wall is farther than the limit, or the radius of the device, by more than half of that radius, no
+    /// piece is returned, and the distance is only a lower bound; past the end of the vessel it is infinite.
     pub fn read(&mut self, surface: &ContactSurface, x: &Vec3, limit_mm: f64) -> (Nearness, Option<u32>) {
         let near_mm = limit_mm.max(surface.thinnest_mm) + self.near_mm;
         let deepest_mm = surface.deepest_inset_mm();
@@ -47,7 +48,7 @@ impl WallReader {
         let clear_mm = place.clearance(x) - surface.inset_mm(piece);
         if clear_mm > near_mm {
             self.wide = Some(place);
-            // By as much as holds all around.
+            // The clearance that holds all around.
             return (Nearness::Beyond(place.clearance(x) - deepest_mm), None);
         }
         (surface.nearness(x, Hint::Near(piece), limit_mm), Some(piece))

@@ -1,4 +1,4 @@
-//! A wall that is not the same everywhere: modulus and friction, vertex by vertex.
+//! A wall with variable modulus and friction, given per vertex.
 //!
 //! Vertex i has sᵢ = ln(kᵢ/k₀) and a friction coefficient μᵢ, blended by the weights of the distance
 //! ([`super::distance`]), so both are twice continuously differentiable wherever the distance is:
@@ -16,9 +16,9 @@
 //! ∇∇(eˢψ) = eˢ (ψ″ ∇d ∇dᵀ + ψ′ ∇∇d + ψ′ (∇d ∇sᵀ + ∇s ∇dᵀ) + ψ (∇s ∇sᵀ + ∇∇s))
 //! ```
 //!
-//! for a foundation, ψ = ½k₀p²: ½p²∇k beside −kp∇d. The first is along the wall, towards the softer side: a device that is
-//! pushed on sinks less and must be paid for. It is the wall's elastic answer, not a pressure, and Coulomb's
-//! law does not count it.
+//! for a foundation, ψ = ½k₀p²: ½p²∇k beside −kp∇d. The first is along the wall, towards the softer side: a device
+//! that is pushed on there gains energy. It is the wall's elastic force, not a pressure, and is not part of the
+//! normal force in Coulomb's law.
 //!
 //! The logarithm is blended because moduli differ by powers of ten (see [`WallProperties::at`]); |∇k|/k is at most
 //! |Δ ln k| over the width of a transition, and k stays between those of the vertices. Friction may be 0 and is blended as it is. It
@@ -39,16 +39,16 @@ struct Blend {
 }
 
 impl Blend {
-    /// The same around.
+    /// A uniform quantity.
     fn constant(value: f64) -> Self {
         Self { value, gradient: Vec3::zeros(), hessian: Matrix3::zeros() }
     }
 }
 
-/// The wall's modulus at a place.
+/// The wall's modulus at a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stiffness {
-    /// eˢ: over the modulus k₀ of the potential.
+    /// eˢ: ratio to the modulus k₀ of the potential.
     pub factor: f64,
     /// ∇s, 1/mm, and ∇∇s, 1/mm², where moduli differ.
     pub slope: Option<(Vec3, Matrix3<f64>)>,
@@ -70,7 +70,8 @@ impl Stiffness {
         (even + along, plane * (w * second) + d.hessian * (w * first) + graded)
     }
 
-    /// What changes of the modulus add to gradient and Hessian of so much energy that has the gradient `even` where it does not change.
+    /// Contribution of the modulus gradient to gradient and Hessian of the energy `stored_mj`, whose gradient at
+    /// constant modulus is `even`.
     pub(super) fn graded(&self, stored_mj: f64, even: &Vec3) -> (Vec3, Matrix3<f64>) {
         let Some((s1, s2)) = &self.slope else { return (Vec3::zeros(), Matrix3::zeros()) };
         let mixed = even * s1.transpose();
@@ -88,7 +89,7 @@ pub struct RegionMap {
 }
 
 impl RegionMap {
-    /// What `properties` give to the vertices of `wall`; `None` where all are the same.
+    /// The values of `properties` at the vertices of `wall`; `None` if uniform.
     pub(super) fn new(wall: &SmoothWall, properties: &WallProperties) -> Option<Self> {
         let largest = properties.largest_friction();
         let share = |friction: f64| if largest > 0.0 { friction / largest } else { 1.0 };
@@ -103,7 +104,7 @@ impl RegionMap {
         (!ln_moduli.is_empty() || !rough.is_empty()).then_some(Self { ln_moduli, rough })
     }
 
-    /// The modulus at `x`, over `triangle` or close to it.
+    /// The modulus at `x`, given a triangle near it.
     pub(super) fn stiffness(&self, wall: &SmoothWall, x: &Vec3, triangle: u32) -> Stiffness {
         if self.ln_moduli.is_empty() {
             return Stiffness { factor: 1.0, slope: None };
@@ -112,13 +113,13 @@ impl RegionMap {
         Stiffness { factor: libm::exp(s.value), slope: Some((s.gradient, s.hessian)) }
     }
 
-    /// Coefficient of friction at `x`, over the largest of all.
+    /// Coefficient of friction at `x`, relative to the largest.
     pub(super) fn rough(&self, wall: &SmoothWall, x: &Vec3, triangle: u32) -> f64 {
         if self.rough.is_empty() { 1.0 } else { blend(wall, x, triangle, |v| self.rough[v as usize]).value }
     }
 }
 
-/// What `of` gives the vertices, blended at `x`.
+/// The vertex values of `of`, blended at `x`.
 fn blend(wall: &SmoothWall, x: &Vec3, triangle: u32, of: impl Fn(u32) -> f64) -> Blend {
     let list = wall.list(triangle as usize);
     let first = of(list[0]);
@@ -138,7 +139,7 @@ fn blend(wall: &SmoothWall, x: &Vec3, triangle: u32, of: impl Fn(u32) -> f64) ->
         value2 += at.hessian * s;
     });
     if reached.is_none() {
-        // A torn surface, where the triangles are what there is: the list begins with its corners.
+        // A torn surface without reaching vertices: use the triangle. The list begins with its corners.
         let corners = &list[..list.len().min(3)];
         return Blend::constant(corners.iter().map(|&v| of(v)).sum::<f64>() / corners.len() as f64);
     }
@@ -205,7 +206,7 @@ mod tests {
         }
     }
 
-    /// Points about the edges of a region, from deep in the wall to where nothing is pressed, and near the axis.
+    /// Points about the edges of a region, from deep in the wall to outside contact, and near the axis.
     fn points() -> impl Iterator<Item = Vec3> {
         (0..400).map(|i| {
             let i = f64::from(i);
@@ -237,7 +238,7 @@ mod tests {
                     let regions = wall.regions.as_ref().unwrap();
                     let s = regions.stiffness(&wall.smooth, &x, triangle);
                     across += u32::from(d < radius_mm && s.slope.unwrap().0.norm() > 0.1);
-                    // Differences round like the energy and its gradient.
+                    // Finite differences have the rounding of the energy and its gradient.
                     let scale = here.2.norm() + 10.0 * (here.1.norm() + here.0);
                     for k in 0..3 {
                         let e = Vec3::ith(k, h);
@@ -269,7 +270,7 @@ mod tests {
         let h = 1e-5;
         let value = |x: Vec3| wall.energy(&potential, &x).0;
         let slope = (value(x + Vec3::z() * h) - value(x - Vec3::z() * h)) / (2.0 * h);
-        // Softer ahead: the wall pushes on.
+        // Softer ahead: the wall pushes forwards.
         assert!(
             off.z < -0.1 * potential.derivatives(d.value_mm).0.abs() && (slope / off.z - 1.0).abs() < 0.05
         );

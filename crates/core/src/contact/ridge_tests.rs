@@ -56,7 +56,8 @@ fn neither_flank_goes_on_beyond_the_crest() {
         let felt_mm = surface.nearness(&x, Hint::Near(triangle), f64::INFINITY).value_mm();
         farthest = farthest.max((felt_mm - flat_mm).abs());
     }
-    // The crest is rounded off by part of an edge; flanks that go on as far as their supports are felt 0.77 mm off.
+    // Part of an edge of the crest is rounded off; flanks extended to the ends of their supports would be wrong by
+    // 0.77 mm.
     assert!(farthest < 0.5, "{farthest}");
 }
 
@@ -69,7 +70,7 @@ fn derivatives_are_those_of_the_value_there_too() {
     for x in points() {
         let triangle = surface.query.nearest(&x, 5.0).unwrap().triangle;
         let Some((here, coverage, slope)) = surface.smooth.covered(&x, triangle) else { continue };
-        // On the surface itself what is felt in front begins to pass into what is felt behind: third derivatives jump there.
+        // At the surface the front distance begins to blend into the back distance: third derivatives jump there.
         if coverage < 0.1 || here.value_mm.abs() < 2.0 * h {
             continue;
         }

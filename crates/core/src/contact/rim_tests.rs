@@ -1,4 +1,4 @@
-//! The smooth wall about a rim that was cut from triangle to triangle, aslant, in a surface made of voxels.
+//! The smooth wall about an oblique, jagged rim along triangles of a surface made from voxels.
 
 use super::surface::{ContactSurface, Hint};
 use crate::Vec3;
@@ -11,17 +11,17 @@ const EDGE_MM: f64 = 0.9;
 /// Radius of the tube, mm.
 const RADIUS_MM: f64 = 4.0;
 
-/// A number of a seed, -1 to 1.
+/// A pseudorandom number, -1 to 1.
 fn noise(seed: u64, n: u64) -> f64 {
     2.0 * unit(splitmix64(seed, n)) - 1.0
 }
 
-/// How far above the cut a point is, mm.
+/// Height of a point above the cut, mm.
 fn above_cut(x: &Vec3) -> f64 {
     x.z - 20.0 - 0.45 * x.x
 }
 
-/// A tube along z, uneven by what voxels leave, that ends in a rim with teeth of an edge.
+/// A tube along z with the unevenness of voxels, which ends in a rim with teeth of one edge.
 fn stump(seed: u64) -> Wall {
     let (rows, columns) = (32, 28);
     let mut mesh = SurfaceMesh::default();
@@ -48,7 +48,7 @@ fn stump(seed: u64) -> Wall {
             }
         }
     }
-    // What hangs on by a corner is no vessel.
+    // What is attached by a corner only is not vessel.
     let mut whole = vec![mesh.triangles[0]];
     let mut rest = mesh.triangles.split_off(1);
     loop {
@@ -86,6 +86,6 @@ fn no_spikes_stand_on_the_teeth_of_a_rim() {
         }
         all = [all[0].max(farthest[0]), all[1].max(farthest[1])];
     }
-    // With the teeth on it, it stands up to 3.2 mm before the flat one.
+    // With the teeth in the fit, it stands up to 3.2 mm before the flat one.
     assert!(all[0] < 0.3 && all[1] < 0.2, "{all:?}");
 }

@@ -1,9 +1,9 @@
-//! The wall as a device feels it: that of a surface, evenly meshed, extended beyond its openings, smooth and ready for queries
-//! ([`FeltMesh`]), or that of a centre line, which is all of this by itself (`vessel::swept`).
+//! The felt wall: of a surface, remeshed uniformly, extended beyond its openings, smoothed and ready for queries
+//! ([`FeltMesh`]), or of a centre line, which needs no such preparation (`vessel::swept`).
 //!
-//! What a point of a device knows of the wall about it is the *piece* that is next to it: a triangle of the felt mesh, or a place on the
-//! centre line. A point looks for the wall through space, near a piece ([`Hint::Near`]); one that has sunk in follows it along the wall
-//! from the piece that it sank into ([`Hint::Side`]).
+//! A contact point remembers the *piece* of wall next to it: a triangle of the felt mesh, or a position on the centre
+//! line. It seeks the wall through space, near a piece ([`Hint::Near`]); once sunk in, it follows the wall from the
+//! piece into which it sank ([`Hint::Side`]).
 
 mod deviation;
 mod mesh;
@@ -18,11 +18,13 @@ use crate::{Result, Vec3};
 pub use deviation::Deviation;
 pub use mesh::FeltMesh;
 
-/// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again. A point on the axis of a
-/// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
+/// Distance beyond the necessary reach up to which a point seeks the wall, mm: while it moves less, no new query is
+/// needed. For a point on the axis of a tube all triangles are at one distance, and a query that reaches them visits
+/// all: a small extra reach is enough.
 const LOOK_MM: f64 = 0.5;
 
-/// How far a point of a device must see, whose thickest radius is that, where a smooth wall lies inside of flat triangles by so much, mm.
+/// Reach of the queries of a device's points, mm, given its largest radius and by how much the smooth wall may lie
+/// inside flat triangles.
 fn reach_mm(thickest_mm: f64, inset_mm: f64) -> f64 {
     (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + inset_mm + LOOK_MM
 }
@@ -33,29 +35,29 @@ pub struct ContactSurface {
     felt: Felt,
     /// Radius of the thinnest piece of the device, mm.
     pub(super) thinnest_mm: f64,
-    /// How far a point of the device must see, mm.
+    /// Reach of the queries of the device's points, mm.
     pub(super) reach_mm: f64,
 }
 
-/// What the wall is made of.
+/// The representation of the wall.
 #[derive(Debug)]
 enum Felt {
     Mesh(Box<FeltMesh>),
-    /// With the radius of the thickest piece of the device, mm.
+    /// With the largest radius of the device, mm.
     Swept(SweptField, f64),
 }
 
-/// Where the wall is looked for.
+/// Where to seek the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hint {
-    /// Through space, of a point whose nearest piece is that or close to it.
+    /// Through space, for a point whose nearest piece is this one or close to it.
     Near(u32),
-    /// Along the wall, of a point that has sunk into it at that piece.
+    /// Along the wall, for a point that has sunk into it at this piece.
     Side(u32),
 }
 
 impl Hint {
-    /// Its piece.
+    /// The piece of the hint.
     pub(super) fn piece(self) -> u32 {
         match self {
             Self::Near(piece) | Self::Side(piece) => piece,
@@ -63,19 +65,19 @@ impl Hint {
     }
 }
 
-/// The wall that is nearest to a point.
+/// The piece of wall nearest to a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NearPiece {
-    /// How far it is, mm, or less; negative beyond the wall.
+    /// A lower bound of its distance, mm; negative beyond the wall.
     pub(super) distance_mm: f64,
-    /// The piece; none past the end of the vessel, …
+    /// The piece; `None` past the end of the vessel.
     pub(super) piece: Option<u32>,
-    /// … and what was nearest there.
+    /// What was nearest, also past the end of the vessel.
     pub(super) bound: u32,
 }
 
 impl ContactSurface {
-    /// Prepares `wall` for devices of this smallest and largest radius, mm, with its even mesh from `store`.
+    /// Prepares `wall` for devices with these smallest and largest radii, mm, with its uniform mesh from `store`.
     ///
     /// # Errors
     /// As [`FeltMesh::new`].
@@ -89,9 +91,9 @@ impl ContactSurface {
         Ok(Self { reach_mm: mesh.reach_mm, felt: Felt::Mesh(Box::new(mesh)), thinnest_mm })
     }
 
-    /// Prepares the wall of `lumen`. One that is given by a centre line is felt as it is, unless the device nearly fills it somewhere (there the distance
-    /// has a crest along the axis, which the smooth wall of a mesh rounds off), or the wall has regions: those are laid over the vertices
-    /// of a mesh.
+    /// Prepares the wall of `lumen`. One given by a centre line is used directly, unless the device nearly fills it
+    /// somewhere (then the distance has a crest along the axis, which the smooth wall of a mesh rounds off), or the
+    /// wall has regions, which are defined on the vertices of a mesh.
     ///
     /// # Errors
     /// As [`Lumen::wall`] and [`ContactSurface::new`].
@@ -113,7 +115,7 @@ impl ContactSurface {
         }
     }
 
-    /// Its mesh; none of a centre line.
+    /// Its mesh; `None` for a centre line.
     pub fn mesh(&self) -> Option<&FeltMesh> {
         match &self.felt {
             Felt::Mesh(mesh) => Some(mesh),
@@ -129,7 +131,7 @@ impl ContactSurface {
         }
     }
 
-    /// The piece that is nearest to `x`; one that is `limit_mm` away or farther need not be found.
+    /// The piece nearest to `x`; one at `limit_mm` or farther need not be found.
     pub(super) fn nearest(&self, x: &Vec3, limit_mm: f64) -> Option<NearPiece> {
         match &self.felt {
             Felt::Mesh(mesh) => {
@@ -146,18 +148,19 @@ impl ContactSurface {
         }
     }
 
-    /// How far `x` is from a piece, mm, for a bound of what is nearest; none of a centre line, which needs no bound.
+    /// Distance of `x` from a piece, mm, as a bound of the search; `None` for a centre line, which needs no bound.
     pub(super) fn distance_to(&self, piece: u32, x: &Vec3) -> Option<f64> {
         self.mesh().map(|mesh| mesh.query.distance_to(piece, x))
     }
 
-    /// The piece nearest to `x` within `reach_mm`, with how far it is, mm, or less; none past the end of the vessel.
+    /// The piece nearest to `x` within `reach_mm`, with a lower bound of its distance, mm; `None` past the end of the
+    /// vessel.
     pub fn nearest_piece(&self, x: &Vec3, reach_mm: f64) -> Option<(u32, f64)> {
         let near = self.nearest(x, reach_mm).filter(|near| near.distance_mm.abs() < reach_mm)?;
         Some((near.piece?, near.distance_mm))
     }
 
-    /// Distance of `x`, whose nearest piece is that or close to it. None where no wall is known there.
+    /// Distance of `x`, whose nearest piece is this one or close to it. `None` where no wall is known there.
     pub fn distance(&self, x: &Vec3, piece: u32) -> Option<Distance> {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.smooth.distance(x, piece),
@@ -168,13 +171,13 @@ impl ContactSurface {
         }
     }
 
-    /// How near `x` is; with derivatives below `limit_mm`.
+    /// Distance of `x`; with derivatives below `limit_mm`.
     pub(crate) fn nearness(&self, x: &Vec3, hint: Hint, limit_mm: f64) -> Nearness {
         let (field, thickest_mm) = match &self.felt {
             Felt::Mesh(mesh) => return mesh.nearness(x, hint.piece(), limit_mm),
             Felt::Swept(field, thickest_mm) => (field, *thickest_mm),
         };
-        // What is farther than any device is thick presses nowhere, and how far it is need not be known exactly.
+        // Beyond the thickness of any device there is no contact, and the distance need not be exact.
         let closest = match field.closer_than(x, from(hint), limit_mm.max(thickest_mm)) {
             Ok(Some(closest)) => closest,
             Ok(None) => return Nearness::Beyond(self.reach_mm),
@@ -188,7 +191,7 @@ impl ContactSurface {
         }
     }
 
-    /// The piece next to `x` along the wall, from one that it has sunk into.
+    /// The piece next to `x`, following the wall from one into which it has sunk.
     pub(super) fn follow(&self, side: u32, x: &Vec3) -> u32 {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.smooth.walk(side, x),
@@ -198,7 +201,7 @@ impl ContactSurface {
         }
     }
 
-    /// The piece that a point at `x` has sunk into, which found the wall with that hint.
+    /// The piece into which a point at `x` has sunk, given the hint with which it found the wall.
     pub(super) fn side(&self, x: &Vec3, hint: Hint) -> u32 {
         match &self.felt {
             Felt::Mesh(_) => hint.piece(),
@@ -206,8 +209,8 @@ impl ContactSurface {
         }
     }
 
-    /// Distance of `x` from the piece of wall that is next to it seen from a piece, mm: negative behind that piece, whatever wall is
-    /// nearest.
+    /// Distance of `x` from the wall next to it, following from a piece, mm: negative behind it, even if another wall
+    /// is nearer.
     pub(super) fn distance_from(&self, piece: u32, x: &Vec3) -> f64 {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.distance_from(piece, x),
@@ -215,7 +218,7 @@ impl ContactSurface {
         }
     }
 
-    /// How far the felt wall lies inside of what [`ContactSurface::nearest`] tells of a piece, mm.
+    /// How far the felt wall lies inside the distance of [`ContactSurface::nearest`] for a piece, mm.
     pub(super) fn inset_mm(&self, piece: u32) -> f64 {
         self.mesh().map_or(0.0, |mesh| mesh.smooth.inset_mm(piece))
     }
@@ -225,7 +228,7 @@ impl ContactSurface {
         self.mesh().map_or(0.0, |mesh| mesh.smooth.deepest_inset_mm())
     }
 
-    /// Where a straight way meets the wall first, as a part of it, up to `farthest` times its length.
+    /// Where a straight path first meets the wall, as a fraction of it, up to `farthest` times its length.
     pub(super) fn crossing(&self, from: &Vec3, to: &Vec3, farthest: f64) -> Option<f64> {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.query.crossing(from, to, farthest),
@@ -233,12 +236,13 @@ impl ContactSurface {
         }
     }
 
-    /// Whether what looks as if it were in the lumen at `x` is outside of it, by more than a point may sink.
+    /// Whether `x`, though it appears to be in the lumen, is outside it by more than a point may sink.
     ///
-    /// What the smooth wall of a mesh takes for the lumen may be that of another wall, seen through one that is thin, or the far side of a
-    /// lumen much narrower than the device. Where facets are coarse the smooth wall stands beyond them, and what is outside of
-    /// those is still in front of their own piece of it: by no more than the wall stands beyond them, or ever less, the farther
-    /// behind the facet. From another it goes away. The wall of a centre line has one lumen.
+    /// What appears as the lumen of a smooth wall may be that of another wall, seen through a thin one, or the far
+    /// side of a lumen much narrower than the device. Where facets are coarse the smooth wall lies outside them, and
+    /// points between are still in front of their own piece of it: by at most the distance of the smooth wall from
+    /// the facets, and ever less, the farther behind the facet. From another wall the distance grows instead. The
+    /// wall of a centre line has one lumen.
     pub(super) fn is_beyond(&self, x: &Vec3, sunk_mm: f64) -> bool {
         let Some(mesh) = self.mesh() else { return false };
         mesh.query.nearest(x, self.reach_mm).is_some_and(|flat| {
@@ -250,8 +254,8 @@ impl ContactSurface {
         })
     }
 
-    /// How far `x` is from the felt wall, mm, at least as far as a device sees; not positive outside the lumen. Of what is deeper outside than
-    /// `radius_mm` it may be any such number.
+    /// Distance of `x` from the felt wall, mm, exact up to the reach of a device; not positive outside the lumen, and
+    /// any such number deeper outside than `radius_mm`.
     pub(super) fn clearance_mm(&self, x: &Vec3, radius_mm: f64) -> f64 {
         match &self.felt {
             Felt::Mesh(mesh) => match mesh.query.nearest(x, self.reach_mm) {
@@ -269,7 +273,7 @@ impl ContactSurface {
         }
     }
 
-    /// The wall's modulus at `x`, whose nearest piece is that or close to it.
+    /// The wall's modulus at `x`, whose nearest piece is this one or close to it.
     pub(super) fn stiffness(&self, x: &Vec3, piece: Option<u32>) -> Stiffness {
         match self.regions(piece) {
             Some((mesh, regions, triangle)) => regions.stiffness(&mesh.smooth, x, triangle),
@@ -277,7 +281,7 @@ impl ContactSurface {
         }
     }
 
-    /// Coefficient of friction there, over the largest of all.
+    /// Coefficient of friction there, relative to the largest.
     pub(super) fn rough(&self, x: &Vec3, piece: Option<u32>) -> f64 {
         self.regions(piece).map_or(1.0, |(mesh, regions, triangle)| regions.rough(&mesh.smooth, x, triangle))
     }

@@ -1,16 +1,17 @@
-//! The wall as an energy of the rod: quadrature points along the device, each with its distance from the wall.
+//! The wall as an energy of the rod: contact points along the device, each with its distance from the wall.
 //!
-//! U = Σᵢ wᵢ ψ(d(xᵢ)) with the trapezoidal rule over each element, which is the most exact one for a pressure that
-//! begins and ends inside it, and the tip's cap as a further weight r at the last point: ½ k r p² (without it the force of
-//! the tip gathers in a layer that no mesh resolves). Points are labelled from the tip, like everything on a device, so
-//! what is known of their surroundings stays with them while the device slides.
+//! U = Σᵢ wᵢ ψ(d(xᵢ)) with the trapezoidal rule over each element, which is the most accurate one for a pressure that
+//! begins and ends inside it, and the tip's cap as a further weight r at the last point: ½ k r p² (without it the
+//! force of the tip concentrates in a layer that no mesh resolves). Points are identified by their arc length from
+//! the tip, so what is known of their surroundings stays with them while the device slides.
 //!
-//! On a wall with regions ψ is multiplied by eˢ, s of the place ([`super::regions`]), and so is the cap's.
+//! On a wall with regions ψ is multiplied by the local eˢ ([`super::regions`]), and so is the cap's.
 //!
-//! What presses is no matter of depth alone: points have forces of their own (`wall/forces.rs`), which Newton's method solves for.
+//! Whether a point is active does not depend on depth alone: points have forces of their own (`wall/forces.rs`), for
+//! which Newton's method solves.
 //!
-//! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
-//! its last clearance, nothing can touch it.
+//! A point queries the bounding volume hierarchy only when it may have come near something new: while it has moved
+//! less than its last clearance, it cannot touch anything.
 
 mod clear;
 mod forces;
@@ -33,17 +34,17 @@ pub(super) use model::{Aside, Foreseen};
 use reading::Reading;
 pub(super) use slipping::{Slip, Slipping};
 
-/// Radius of the gentlest bend worth a number, mm.
+/// Radius of the gentlest relevant bend, mm.
 const LEAST_BEND_MM: f64 = 100.0;
-/// Part of its clearance that a point may move in one step of Newton's method.
+/// Fraction of its clearance by which a point may move in one Newton step.
 const SAFE: f64 = 0.9;
-/// A point whose axis is nearer to the wall than this part of its radius has sunk into it: on which side of the wall it is says the
-/// side that it came from, and the nearest piece of wall is looked for along the wall, not through space.
+/// A point whose axis is nearer to the wall than this fraction of its radius has sunk into it: the side of the wall
+/// follows from where it came from, and the nearest piece is sought along the wall, not through space.
 const SUNK: f64 = 0.3;
-/// Roundings of a coordinate by which a distance is off.
+/// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;
 
-/// What a device of this bending stiffness, N·mm², carries when it is bent to a radius of 100 mm, N.
+/// Force scale of a device of this bending stiffness, N·mm², bent to a radius of 100 mm, N.
 pub(crate) fn least_force_n(bending_nmm2: f64) -> f64 {
     bending_nmm2 / (LEAST_BEND_MM * LEAST_BEND_MM)
 }
@@ -54,18 +55,18 @@ pub struct WallContact<'a> {
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
-    /// What the blood that flows does.
+    /// Drag of flowing blood.
     drag: Option<&'a mut Drag>,
     cache: &'a mut ContactCache,
     friction: &'a mut Friction,
-    /// What rounding of positions leaves of the forces at the last state, N.
+    /// Rounding error of the forces at the last state due to rounding of positions, N.
     rounding_n: f64,
     counters: Counters,
 }
 
 impl<'a> WallContact<'a> {
-    /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
-    /// least bending stiffness.
+    /// The wall's energy at `points` (tip first), with knowledge from earlier steps. `softest_nmm2` is the device's
+    /// smallest bending stiffness.
     pub fn new(
         surface: impl Into<MovedWall<'a>>,
         points: &'a [ContactPoint],
@@ -86,12 +87,12 @@ impl<'a> WallContact<'a> {
         }
     }
 
-    /// The material point of the vessel where point `index` is at a state. What is known of the wall is known of those.
+    /// The material point of the vessel where point `index` is at a state; knowledge of the wall refers to these.
     fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
         self.surface.material(&self.points[index].position(elements, state))
     }
 
-    /// Has a flow drag at the device, as it does at a state; nothing where there is none. Returns its potential there, mJ.
+    /// Sets the drag of a flow at a state; none without flow. Returns its potential there, mJ.
     pub(crate) fn begin_drag(
         &mut self,
         flow: Option<&BloodFlow>,
@@ -105,13 +106,13 @@ impl<'a> WallContact<'a> {
         self.drag_mj(elements, state)
     }
 
-    /// Takes the drag of a flow at a state. Returns the part by which it has changed.
+    /// Renews the drag of a flow at a state. Returns its relative change.
     pub(crate) fn renew_drag(&mut self, flow: &BloodFlow, elements: &[ElementData], state: &RodState) -> f64 {
         let Some(drag) = &mut self.drag else { return 0.0 };
         drag.renew(flow, self.surface, self.points, elements, state)
     }
 
-    /// Potential of the drag as it is held, mJ; 0 where nothing flows.
+    /// Potential of the current drag, mJ; 0 without flow.
     pub(crate) fn drag_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
         self.drag.as_ref().map_or(0.0, |drag| drag.value_mj(elements, state))
     }
@@ -121,13 +122,13 @@ impl<'a> WallContact<'a> {
         &mut self.friction.between
     }
 
-    /// Work done and avoided since it was counted last, looking for the tip's way included.
+    /// Work done and avoided since the last count, including the search for the tip's passage.
     pub fn count(&mut self) -> Counters {
         self.counters.queries += std::mem::take(&mut self.cache.proximity.queries);
         std::mem::take(&mut self.counters)
     }
 
-    /// Part of its way from the base to `to`, at most `fraction`, that point `index` may go.
+    /// Fraction of its way from the base to `to`, at most `fraction`, that point `index` may move.
     fn safe_fraction_of(
         &mut self,
         elements: &[ElementData],
@@ -142,7 +143,7 @@ impl<'a> WallContact<'a> {
         if known.side.is_some() || fraction * way_mm <= safe_mm {
             return fraction;
         }
-        // Between two places that are as far from the wall as from each other there is none.
+        // Between two positions that are as far from the wall as from each other there is no wall.
         let to_mm = self.read(index, &x).distance_mm();
         if way_mm <= safe_mm + SAFE * to_mm / self.surface.stretch() {
             return fraction;
@@ -152,7 +153,7 @@ impl<'a> WallContact<'a> {
         let Some(met) = self.surface.crossing(&known.base, &x, fraction / SAFE) else {
             return fraction;
         };
-        // Near the wall flat triangles may stand into the smooth lumen, and what it says counts.
+        // Near the wall flat triangles may stand into the smooth lumen, and the smooth distance decides.
         let from_mm = known.base_clearance_mm;
         match known.piece.map(|triangle| self.surface.distance_from(triangle, &x)) {
             Some(to_mm) if to_mm > 0.0 => fraction,
@@ -166,7 +167,7 @@ impl<'a> WallContact<'a> {
         self.least_moment_nmm / LEAST_BEND_MM
     }
 
-    /// What happens at point `index` at the given state, where the wall is pressed.
+    /// Contact at point `index` at a state, if it presses on the wall.
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
@@ -196,7 +197,7 @@ impl<'a> WallContact<'a> {
         })
     }
 
-    /// What happens at all points that press on the wall at a state.
+    /// Contacts of all points that press on the wall at a state.
     pub fn touches(&mut self, elements: &[ElementData], state: &RodState, to: &mut Vec<(usize, Touch)>) {
         to.clear();
         for span in 0..self.cache.spans.len() {
@@ -219,7 +220,7 @@ impl External for WallContact<'_> {
         let mut sum = PointSum::default();
         for span in 0..self.cache.spans.len() {
             let Span { ref points, element, at_base, .. } = self.cache.spans[span];
-            // What is not known there is clear of the wall.
+            // Points not known there are clear of the wall.
             if !at_base {
                 continue;
             }
@@ -246,7 +247,7 @@ impl External for WallContact<'_> {
         sum
     }
 
-    /// In a device that carries less, force and moment have no scale of their own to be compared with.
+    /// In a device with smaller loads, force and moment have no scale of their own to compare with.
     fn sizes(&self) -> Sizes {
         Sizes {
             force_n: self.least_force_n(),
@@ -259,9 +260,9 @@ impl External for WallContact<'_> {
         Some(self)
     }
 
-    /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
-    /// straight way meets no wall, and nearly up to the wall where it does. A point that has sunk in knows its side, and the energy
-    /// holds it there.
+    /// A point may move by nearly its clearance in any direction: the ball about it contains no wall. Farther it may
+    /// move if its straight path does not meet the wall, or nearly up to the wall if it does. A point that has sunk
+    /// in knows its side, and the energy holds it there.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
         for span in 0..self.cache.spans.len() {

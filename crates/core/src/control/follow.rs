@@ -1,8 +1,8 @@
-//! A hand that follows the centre line with a shaped wire.
+//! A controller that follows the centre line with a shaped wire.
 //!
-//! It turns the tail until the tip points to where the way goes, pushes on, and where the tip has gone astray or makes no way it pulls
-//! back, and until it is past that place points aside of the way, each time elsewhere. A tip that falls into the way as it is pulled back is
-//! pushed on from there.
+//! It rotates the tail until the tip points along the path, and pushes. If the tip has left the path or does not
+//! advance, it pulls back, and until it is past that place points away from the path, each time in another direction.
+//! A tip that finds the path while it is pulled back is pushed on from there.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,51 +11,51 @@ use crate::insertion::{Command, Move, Simulation};
 use crate::vessel::CentrelinePath;
 use crate::{Result, Vec3};
 
-/// Advance of one command, mm.
+/// Advance per command, mm.
 pub(super) const STEP_MM: f64 = 2.0;
-/// How far ahead on the way the hand aims, in radii of the vessel.
+/// Distance along the path of the point at which the hand aims, in radii of the vessel.
 const AHEAD_RADII: f64 = 1.5;
 const LEAST_AHEAD_MM: f64 = 15.0;
-/// Largest turn of one command, rad.
+/// Largest rotation per command, rad.
 pub(super) const TURN_RAD: f64 = 0.35;
-/// Most turns between two pushes.
+/// Largest number of rotations between two pushes.
 const TURNS: usize = 12;
-/// Pulled back after going astray, mm.
+/// Length pulled back after leaving the path, mm.
 const BACK_MM: f64 = 30.0;
-/// How far beyond the vessel's wall the tip has gone astray, as a part of its bent length: as deep as a bend dips into the mouth of a branch
-/// while the wire behind it goes on past.
+/// Distance beyond the vessel's wall at which the tip counts as astray, as a fraction of its bent length: as far as a
+/// bend dips into the mouth of a branch while the wire behind it continues past.
 const ASTRAY: f64 = 0.5;
-/// The least of it, mm: the axis is a polyline, outside of whose corners the wall bulges.
+/// Its smallest value, mm: the axis is a polyline, outside of whose corners the wall bulges.
 const LEAST_ASTRAY_MM: f64 = 3.0;
-/// Farther on the way by this is farther, mm.
+/// Smallest progress along the path, mm.
 const FARTHER_MM: f64 = 1.0;
-/// So far beyond the place where the last try ended the hand points at the way again, mm.
+/// Distance beyond the end of the last attempt at which the hand points along the path again, mm.
 const PAST_MM: f64 = 10.0;
-/// Pushed in without getting farther, mm, before the hand tries something else.
+/// Length pushed without progress, mm, before the hand tries something else.
 const PATIENCE_MM: f64 = 24.0;
-/// Golden angle: turns by it, one after another, fill the circle evenly.
+/// Golden angle: successive rotations by it fill the circle evenly.
 pub(super) const GOLDEN_RAD: f64 = PI * (3.0 - 2.236_067_977_499_79);
 
-/// Follows a path with the bent tip of the instrument that leads.
+/// Follows a path with the bent tip of the leading instrument.
 #[derive(Debug, Clone)]
 pub struct FollowPath {
     path: CentrelinePath,
     team: Team,
     arrived_mm: f64,
-    /// Farthest point on the way so far, mm, and the insertion then.
+    /// Farthest point on the path so far, mm, and the insertion then.
     best_mm: f64,
     best_inserted_mm: f64,
-    /// Length that is still to be pulled back, mm.
+    /// Length still to be pulled back, mm.
     back_mm: f64,
     retries: usize,
-    /// Farthest place within the way's vessel since it was pulled back last, mm, and that of the try before.
+    /// Farthest position within the path's vessel since the last pull, mm, and that of the attempt before.
     within_mm: f64,
     failed_mm: f64,
-    /// Angle between the way ahead and where the tip is pointed, rad.
+    /// Angle between the path ahead and the target direction of the tip, rad.
     aside_rad: f64,
-    /// Turns since the last push.
+    /// Rotations since the last push.
     turns: usize,
-    /// Where on the way the tip of the whole line was at first, mm: that of a wire over which the lead follows.
+    /// Initial position on the path of the tip of the whole line, mm: that of a wire over which the lead follows.
     held_mm: Option<f64>,
 }
 
@@ -78,7 +78,8 @@ impl FollowPath {
         }
     }
 
-    /// The wire over which the lead follows is held where it is: what the lead straightens would push it on, so it is drawn back by as much.
+    /// The wire over which the lead follows is held in place: straightening by the lead would push it on, so it is
+    /// drawn back by as much.
     fn hold(&mut self, simulation: &Simulation, moves: &mut Vec<Move>) {
         let lengths_mm = simulation.report().lengths_mm();
         let Some(farthest) = (0..lengths_mm.len()).max_by(|a, b| lengths_mm[*a].total_cmp(&lengths_mm[*b]))
@@ -91,7 +92,7 @@ impl FollowPath {
             return;
         }
         let on = self.path.nearest(&simulation.shape().tip_mm().unwrap_or_default());
-        // Beyond the end of the way arc lengths end, and the distance goes on.
+        // Beyond the end of the path arc lengths end, and the distance is added.
         let tip_mm = on.arc_mm + (on.distance_mm - on.radius_mm).max(0.0);
         let beyond_mm = tip_mm - *self.held_mm.get_or_insert(tip_mm);
         if beyond_mm > 0.0 {
@@ -134,10 +135,11 @@ impl FollowPath {
             self.aside_rad = (self.aside_rad + GOLDEN_RAD) % TAU;
             return Command::rotate(0.0);
         }
-        // The two differ at the mouths of branches. Which of them leads on there is not known beforehand: every second try goes by the other.
+        // The two differ at the mouths of branches. Which of them leads on is not known in advance: attempts
+        // alternate between them.
         let from = if self.retries.is_multiple_of(2) { on } else { within };
         let turn = self.aim(simulation, from.arc_mm, from.radius_mm, tip_mm);
-        // Far off the mark, the hand turns before it pushes on.
+        // If far from the target direction, the hand rotates before it pushes on.
         if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
             self.turns += 1;
             return Command::rotate(turn);
@@ -146,7 +148,7 @@ impl FollowPath {
         Command { advance_mm: STEP_MM, rotate_rad: turn }
     }
 
-    /// Turn of the tail that brings the bend of the tip towards the way ahead, or aside of it.
+    /// Rotation of the tail that turns the bend of the tip towards the path ahead, or away from it.
     fn aim(&self, simulation: &Simulation, reached_mm: f64, radius_mm: f64, tip_mm: f64) -> f64 {
         if tip_mm == 0.0 || self.team.inserted_mm(simulation) < tip_mm + 2.0 * STEP_MM {
             return 0.0;
@@ -160,7 +162,7 @@ impl FollowPath {
         let across = |v: Vec3| v - axis * axis.dot(&v);
         let ahead = (AHEAD_RADII * radius_mm).max(LEAST_AHEAD_MM);
         let (bend, wish) = (across(tip - root), across(self.path.at(reached_mm + ahead) - root));
-        // A way that goes straight on needs no turn.
+        // A straight path needs no rotation.
         if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
             return 0.0;
         }

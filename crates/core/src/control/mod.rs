@@ -1,10 +1,10 @@
-//! Hands that steer: a [`Controller`] looks at a simulation and says what to do next.
+//! Controllers: a [`Controller`] observes a simulation and decides what to do next.
 //!
 //! ```text
 //! Simulation ──► Controller::next ──► Action::Move(moves) ──► Simulation::step_together ──► …
 //! ```
-//! A controller reads no clock and draws no random number that its seed does not give: the same simulation and controller make the same
-//! moves, to the bit.
+//! A controller reads no clock and draws no random number except from its seed: the same simulation and controller
+//! make the same moves, to the bit.
 
 mod follow;
 mod search;
@@ -19,46 +19,46 @@ pub use follow::FollowPath;
 pub use search::SearchAhead;
 pub use team::{Follower, Team};
 
-/// What a hand does next.
+/// The next action of a controller.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Moves these, all at the same time.
+    /// Makes these moves, all at the same time.
     Move(Vec<Move>),
-    /// Nothing: it is where it should be.
+    /// Nothing: it has arrived.
     Arrived,
-    /// Nothing: it knows no further.
+    /// Nothing: it has given up.
     GivenUp,
 }
 
-/// A hand that steers instruments somewhere.
+/// A controller that steers instruments to a target.
 pub trait Controller {
-    /// What to do with a simulation as it is now. It is asked once before every step, and what it said last has been carried out.
+    /// The action for the current simulation. Called once before every step; its last action has been carried out.
     ///
     /// # Errors
-    /// Instruments that the simulation does not have.
+    /// Instruments that do not exist in the simulation.
     fn next(&mut self, simulation: &Simulation) -> Result<Action>;
 
-    /// How often it has pulled back to try something else.
+    /// Number of times it has pulled back to try something else.
     fn retries(&self) -> usize;
 }
 
-/// How a controller's way ended.
+/// How a controlled run ended.
 #[derive(Debug)]
 pub enum Outcome {
-    /// It is where it should be.
+    /// The target was reached.
     Arrived,
-    /// It knows no further.
+    /// The controller gave up.
     GivenUp,
-    /// It was stopped after as many steps as it was given.
+    /// It used up its steps.
     Stopped,
-    /// A step could not be carried out.
+    /// A step failed.
     Failed(Error),
 }
 
-/// Has a controller move a simulation for at most `most_steps`; `seen` is called after every step.
+/// Lets a controller move a simulation for at most `most_steps`; `seen` is called after every step.
 ///
 /// # Errors
-/// As [`Controller::next`], and what `seen` says.
+/// Those of [`Controller::next`] and of `seen`.
 pub fn drive<E: From<Error>>(
     simulation: &mut Simulation,
     controller: &mut dyn Controller,
@@ -76,7 +76,7 @@ pub fn drive<E: From<Error>>(
         }
         seen(simulation, &moves)?;
     }
-    // The last step may have been the one that arrived.
+    // The last step may have reached the target.
     Ok(match controller.next(simulation)? {
         Action::Arrived => Outcome::Arrived,
         _ => Outcome::Stopped,

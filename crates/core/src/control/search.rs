@@ -1,8 +1,8 @@
-//! A hand that tries turns on copies of the simulation before it makes one.
+//! A controller that tries rotations on copies of the simulation before it makes one.
 //!
-//! It copies the simulation, turns one of the instruments, pushes or pulls for a while and sees how far along the way that leads; of all
-//! that it has tried it takes the best, goes up to where that brought the most, and looks again. Pulling is how a bent catheter
-//! that lies beyond a branch falls into it. Where nothing leads on it pulls back.
+//! It copies the simulation, rotates one of the instruments, pushes or pulls for a while and measures the progress
+//! along the path; it carries out the best trial, up to its point of largest progress, and repeats. Pulling lets a
+//! bent catheter beyond a branch fall into it. If no trial makes progress, it pulls back.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -13,58 +13,58 @@ use crate::insertion::{Command, Move, Simulation};
 use crate::vessel::CentrelinePath;
 use crate::{Error, Result};
 
-/// How far it looks ahead, mm.
+/// Length of a trial, mm.
 const AHEAD_MM: f64 = 20.0;
-/// Turns that are tried of each instrument, evenly around the circle.
+/// Number of rotations tried per instrument, evenly around the circle.
 const TURNS: usize = 6;
-/// Progress on the way that a plan must bring, mm.
+/// Smallest progress of a plan along the path, mm.
 const LEAST_GAIN_MM: f64 = 1.0;
-/// A millimetre beyond the wall of the way's vessel costs so many of progress.
+/// Cost of a millimetre beyond the wall of the path's vessel, mm of progress.
 const ASTRAY_COST: f64 = 2.0;
-/// A newton of push costs so many mm of progress, and a radian of turn so many: of equal ways the gentle one.
+/// Cost of a newton of push force, and of a radian of rotation, mm of progress: among equal trials the gentlest wins.
 const PUSH_COST_MM_PER_N: f64 = 2.0;
 const TURN_COST_MM_PER_RAD: f64 = 0.2;
-/// Pulled back where no turn leads on, mm: once, twice or three times as far, in turns.
+/// Length pulled back if no rotation helps, mm; multiplied by one, two or three in turn.
 const BACK_MM: f64 = 15.0;
-/// Pulled back so often without getting farther, it gives up.
+/// Number of times it pulls back without progress before it gives up.
 const MOST_BACKS: usize = 12;
 
-/// Searches its way along a path by turning and looking ahead.
+/// Searches its way along a path by trial rotations.
 #[derive(Debug, Clone)]
 pub struct SearchAhead {
     path: CentrelinePath,
     team: Team,
-    /// Instruments that are turned.
+    /// Instruments that are rotated.
     turned: Vec<usize>,
     arrived_mm: f64,
     plan: VecDeque<Vec<Move>>,
-    /// Farthest point on the way so far, mm, and how often it was pulled back since.
+    /// Farthest point on the path so far, mm, and the number of pulls since.
     best_mm: f64,
     backs: usize,
     retries: usize,
 }
 
-/// Moves that were tried on a copy, and what they bring, mm.
+/// Moves tried on a copy, and their progress, mm.
 struct Trial {
     plan: VecDeque<Vec<Move>>,
     worth_mm: f64,
 }
 
 impl SearchAhead {
-    /// Leads a team along a path until the tip is no more than `arrived_mm` before its end; `turned` are the instruments that are turned
-    /// on the way, of which the first is also turned while it pulls back.
+    /// Leads a team along a path until the tip is no more than `arrived_mm` before its end; `turned` are the
+    /// instruments that are rotated, of which the first is also rotated while it pulls back.
     pub fn new(path: CentrelinePath, team: Team, turned: Vec<usize>, arrived_mm: f64) -> Self {
         let plan = VecDeque::new();
         Self { path, team, turned, arrived_mm, plan, best_mm: f64::MIN, backs: 0, retries: 0 }
     }
 
-    /// How far along the way the tip is, mm, less for what is beside it.
+    /// Progress of the tip along the path, mm, reduced by its distance from the path's vessel.
     fn progress_mm(&self, simulation: &Simulation) -> f64 {
         let on = self.team.on_path(simulation, &self.path);
         on.arc_mm - ASTRAY_COST * (on.distance_mm - on.radius_mm).max(0.0)
     }
 
-    /// Turns an instrument on a copy and pushes on, or pulls, as far as that goes; the better of the two.
+    /// Rotates an instrument on a copy and pushes, or pulls, as far as possible; returns the better of the two.
     fn try_turn(&self, simulation: &Simulation, instrument: usize, turn_rad: f64) -> Option<Trial> {
         let mut turned = simulation.clone();
         let mut plan = VecDeque::new();
@@ -83,9 +83,10 @@ impl SearchAhead {
         Some(if pull.worth_mm > push.worth_mm { pull } else { push })
     }
 
-    /// Goes on in steps of so much, as far as that goes: what cannot be done is the end of the trial, not of the way.
+    /// Continues in steps of this length, as far as possible: an impossible step ends the trial, not the run.
     ///
-    /// The plan ends where it has brought the most, so that every plan carried out brings the tip farther and none leads in a circle.
+    /// The plan ends at its largest progress, so every plan carried out brings the tip farther and none repeats for
+    /// ever.
     fn try_length(&self, mut copy: Simulation, step_mm: f64, mut plan: VecDeque<Vec<Move>>) -> Trial {
         let (mut worth_mm, mut worthy) = (f64::MIN, 0);
         for _ in 0..(AHEAD_MM / STEP_MM) as usize {
@@ -106,7 +107,7 @@ impl SearchAhead {
         Trial { plan, worth_mm }
     }
 
-    /// Pulls back, with a turn that has not been tried yet.
+    /// Pulls back, with a rotation that has not been tried yet.
     fn back(&mut self, simulation: &Simulation) -> VecDeque<Vec<Move>> {
         let mut copy = simulation.clone();
         let parts = (BACK_MM * (1 + self.backs % 3) as f64 / STEP_MM).round();
@@ -153,7 +154,7 @@ impl Controller for SearchAhead {
         }
         let turns = |instrument: &usize| {
             let instrument = *instrument;
-            // Both ways around, the small turns first: of equal ones the first is taken.
+            // Both directions, small rotations first: among equals the first wins.
             (1..TURNS).map(move |k| {
                 let part = if k % 2 == 1 { k.div_ceil(2) as f64 } else { -(k as f64) / 2.0 };
                 (instrument, TAU * part / TURNS as f64)

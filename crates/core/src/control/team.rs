@@ -1,30 +1,30 @@
-//! Instruments that go together: one leads, and others follow over it or in it.
+//! Instruments that move together: one leads, and others follow over it or in it.
 
 use crate::insertion::{Command, Move, Simulation};
 use crate::shape::Shape;
 use crate::vessel::{CentrelinePath, OnPath};
 use crate::{Error, Result};
 
-/// An instrument whose tip stays behind that of the one that leads.
+/// An instrument whose tip stays behind that of the leading one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follower {
-    /// Its number.
+    /// Its index.
     pub instrument: usize,
-    /// How far behind, mm.
+    /// Distance behind, mm.
     pub behind_mm: f64,
 }
 
-/// One instrument that is steered, and those that follow.
+/// One instrument that is steered, and its followers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Team {
-    /// Number of the instrument that leads; a device alone is 0.
+    /// Index of the leading instrument; 0 for a single device.
     pub lead: usize,
-    /// Those that follow.
+    /// The followers.
     pub followers: Vec<Follower>,
 }
 
 impl Team {
-    /// Refuses instruments that are not there or twice in the team.
+    /// Rejects instruments that do not exist or are in the team twice.
     pub(super) fn check(&self, simulation: &Simulation) -> Result<()> {
         let count = simulation.stack().instruments().len();
         let mut members = vec![self.lead];
@@ -38,28 +38,29 @@ impl Team {
         Ok(())
     }
 
-    /// Length in of the one that leads, mm.
+    /// Inserted length of the leading instrument, mm.
     pub(super) fn inserted_mm(&self, simulation: &Simulation) -> f64 {
         simulation.report().lengths_mm()[self.lead]
     }
 
-    /// The line up to the tip of the one that leads.
+    /// The line up to the tip of the leading instrument.
     pub(super) fn shape(&self, simulation: &Simulation) -> Shape {
         simulation.shape().behind(simulation.report().inserted_mm - self.inserted_mm(simulation))
     }
 
-    /// Where on a path the tip of the one that leads is.
+    /// Position of the leading instrument's tip on a path.
     pub(super) fn on_path(&self, simulation: &Simulation, path: &CentrelinePath) -> OnPath {
         path.nearest(&self.shape(simulation).tip_mm().unwrap_or_default())
     }
 
-    /// Where on a path the tip of the one that leads is, and in which place of its vessel.
+    /// Position of the leading instrument's tip on a path, and within the path's vessel.
     pub(super) fn on_and_in(&self, simulation: &Simulation, path: &CentrelinePath) -> (OnPath, OnPath) {
         let tip = self.shape(simulation).tip_mm().unwrap_or_default();
         (path.nearest(&tip), path.deepest(&tip))
     }
 
-    /// Whether the tip of the one that leads is in the vessel and no more than `arrived_mm` before the end of a path.
+    /// Whether the tip of the leading instrument is in the vessel and no more than `arrived_mm` before the end of a
+    /// path.
     pub(super) fn has_arrived(
         &self,
         simulation: &Simulation,
@@ -70,7 +71,7 @@ impl Team {
         on.arc_mm > path.length_mm() - arrived_mm && on.distance_mm < on.radius_mm
     }
 
-    /// Length of the tip of the one that leads, up to where its last bend ends, mm; 0 of a straight one.
+    /// Length of the tip of the leading instrument, up to the end of its last bend, mm; 0 if straight.
     pub(super) fn bent_mm(&self, simulation: &Simulation) -> f64 {
         let (mut end_mm, mut bent_mm) = (0.0, 0.0);
         for section in simulation.stack().instruments()[self.lead].device.sections() {
@@ -82,8 +83,8 @@ impl Team {
         bent_mm
     }
 
-    /// The moves with which the one that leads goes by `command`, and the others to their places behind it: by no more than it on the
-    /// way forwards, and by no more than twice of it on the way back.
+    /// The moves in which the leading instrument follows `command`, and the others move to their positions behind it:
+    /// forwards by at most as much, and backwards by at most twice as much.
     pub(super) fn moves(&self, simulation: &Simulation, command: Command) -> Vec<Move> {
         let lengths_mm = simulation.report().lengths_mm();
         let lead_mm = lengths_mm[self.lead] + command.advance_mm;

@@ -1,4 +1,4 @@
-//! Hands that steer: they arrive, keep their team together, and make the same moves again.
+//! Controllers arrive, keep their team together, and are reproducible.
 
 use super::*;
 use crate::device::{Device, Instrument, Section, Stack};
@@ -6,7 +6,7 @@ use crate::insertion::{Command, Sheath};
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::vessel::{CentrelinePath, GeneratedWall, Resolution, anatomy};
 
-/// A bent wire in a catheter at the mouth of the arch or of the tube, and the way to a row.
+/// A bent wire in a catheter at the mouth of the arch or of the tube, and the path to a row.
 fn scene(name: &str, row: usize) -> (Simulation, CentrelinePath) {
     let tree = anatomy::tree(name).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(2.0)).unwrap();
@@ -31,7 +31,7 @@ fn wire_first() -> Team {
     Team { lead: 0, followers: vec![Follower { instrument: 1, behind_mm: 25.0 }] }
 }
 
-/// Drives to the end; lengths in after every step.
+/// Drives to the end; returns the inserted lengths after every step.
 fn driven(simulation: &mut Simulation, hand: &mut dyn Controller) -> (Outcome, Vec<Vec<f64>>) {
     let mut lengths_mm = Vec::new();
     let outcome = drive::<Error>(simulation, hand, 300, |simulation, _| {

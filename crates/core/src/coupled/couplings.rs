@@ -1,16 +1,16 @@
-//! Blocks of a symmetric matrix that couple nodes which are no neighbours.
+//! Blocks of a symmetric matrix that couple nodes which are not neighbours.
 
 use rustc_hash::FxHashMap;
 
-/// Blocks of `C / 2` rows and columns beside a [`BandMatrix`](crate::banded::BandMatrix) of the same unknowns: each couples a node with one
-/// at least two nodes after it.
+/// Blocks of `C / 2` rows and columns beside a [`BandMatrix`](crate::banded::BandMatrix) of the same unknowns: each
+/// couples a node with one at least two nodes later.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Couplings<const C: usize> {
-    /// Nodes (i, j), i < j, of each block, in the order in which they came.
+    /// Nodes (i, j), i < j, of each block, in the order of insertion.
     nodes: Vec<(usize, usize)>,
     /// Entries, block by block and row by row; rows are those of the earlier node.
     values: Vec<f64>,
-    /// Number of the block of two nodes.
+    /// Index of the block of two nodes.
     numbers: FxHashMap<(usize, usize), usize>,
 }
 
@@ -18,19 +18,19 @@ impl<const C: usize> Couplings<C> {
     /// Rows of a block.
     const BLOCK: usize = C / 2;
 
-    /// Whether nodes are coupled with neighbours alone.
+    /// Whether only neighbouring nodes are coupled.
     pub(crate) fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// Takes all blocks away; keeps the memory.
+    /// Removes all blocks; keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.nodes.clear();
         self.values.clear();
         self.numbers.clear();
     }
 
-    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`, whose nodes are no neighbours.
+    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`; their nodes are not neighbours.
     pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let block = Self::BLOCK;
@@ -45,7 +45,7 @@ impl<const C: usize> Couplings<C> {
         self.values[number * block * block + i % block * block + j % block] += value;
     }
 
-    /// Entry `(i, j)`; zero where no block is.
+    /// Entry `(i, j)`; zero outside the blocks.
     #[cfg(test)]
     pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };

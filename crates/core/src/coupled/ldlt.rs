@@ -1,9 +1,11 @@
 //! The LDLᵀ factorisation of a band with couplings, without pivoting.
 //!
-//! Whole nodes are eliminated in an order that keeps the factor sparse (approximate minimum degree: P. R. Amestoy, T. A. Davis, I. S. Duff,
-//! SIAM J. Matrix Anal. Appl. 17 (1996)), supernode by supernode, both by faer. The unknowns of a node stay together and in their order, and the rows of end
-//! supports come last. So a multiplier is eliminated after the node at the end of its element, whose own unknowns it constrains: with the
-//! augmentation of [`crate::rod::assembly`] their block is positive definite in any order of nodes, and the multiplier's pivot is negative. By Sylvester's law the signs of D are the inertia, as they are in the band ([`crate::banded::ldlt`]).
+//! Whole nodes are eliminated in an order that keeps the factor sparse (approximate minimum degree: P. R. Amestoy, T.
+//! A. Davis, I. S. Duff, SIAM J. Matrix Anal. Appl. 17 (1996)), supernode by supernode, both by faer. The unknowns of
+//! a node stay together and in their order, and the rows of end supports come last. So a multiplier is eliminated
+//! after the node at the end of its element, whose own unknowns it constrains: with the augmentation of
+//! [`crate::rod::assembly`] their block is positive definite in any order of nodes, and the multiplier's pivot is
+//! negative. By Sylvester's law the signs of D are the inertia, as in the band ([`crate::banded::ldlt`]).
 
 use std::sync::Arc;
 
@@ -21,33 +23,33 @@ use faer::{Conj, MatMut, Par, Side, Spec};
 use super::Couplings;
 use crate::banded::{BandMatrix, FactorError, Inertia, Shift};
 
-/// A block of the lower triangle in the order of elimination, and where its entries come from.
+/// A block of the lower triangle in the order of elimination, and the source of its entries.
 #[derive(Debug, Clone, Copy)]
 struct Block {
-    /// Places of its rows and of its columns.
+    /// Positions of its rows and of its columns in the order of elimination.
     row: usize,
     column: usize,
     source: Source,
 }
 
-/// Where the entries of a block come from.
+/// Source of the entries of a block.
 #[derive(Debug, Clone, Copy)]
 enum Source {
-    /// The band's own block of a node.
+    /// The band's diagonal block of a node.
     Own(usize),
-    /// The band's block of a node and the next; its rows are those of the next where `true`.
+    /// The band's block of a node and the next; if `true`, its rows are those of the next.
     Next(usize, bool),
-    /// A coupling; its rows are those of the later node where `true`.
+    /// A coupling; if `true`, its rows are those of the later node.
     Coupling(usize, bool),
 }
 
-/// A factorisation; its memory, and its structure where that stays, are reused from one to the next.
+/// A factorisation; its memory is reused, and its structure as long as the couplings are the same.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CoupledFactor {
-    /// Couplings of which the structure is.
+    /// The couplings for which the structure was computed.
     nodes: Vec<(usize, usize)>,
     dimension: usize,
-    /// Node at each place of the elimination.
+    /// Node at each position of the elimination.
     order: Vec<usize>,
     blocks: Vec<Block>,
     column_starts: Vec<usize>,
@@ -100,7 +102,7 @@ impl CoupledFactor {
         Ok(self.inertia)
     }
 
-    /// Replaces `b` by the solution of `A x = b` with the matrix factored last; nothing where there is none.
+    /// Replaces `b` by the solution of `A x = b` with the matrix factored last; does nothing without one.
     pub(crate) fn solve<const C: usize>(&self, b: &mut [f64]) {
         let Some(symbolic) = &self.symbolic else { return };
         let block = C / 2;
@@ -118,7 +120,7 @@ impl CoupledFactor {
         }
     }
 
-    /// Row of the matrix that is eliminated at a place.
+    /// Row of the matrix that is eliminated at a position.
     fn row_of<const C: usize>(&self, place: usize) -> usize {
         self.order[place / (C / 2)] * (C / 2) + place % (C / 2)
     }
@@ -165,7 +167,7 @@ impl CoupledFactor {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..CholeskySymbolicParams::default()
         };
-        // In the order given faer reads the structure from the upper triangle.
+        // faer reads the structure from the upper triangle in the given order.
         let mut upper: Vec<Block> =
             self.blocks.iter().map(|b| Block { row: b.column, column: b.row, ..*b }).collect();
         upper.sort_unstable_by_key(|b| (b.column, b.row));
@@ -238,8 +240,8 @@ impl CoupledFactor {
     }
 }
 
-/// Begins of columns and rows in them, of the triangle that blocks of this many rows make, which come column by column; `own` are the rows of a
-/// column of a block on the diagonal.
+/// Column starts and row indices of the triangle of blocks with this number of rows, given column by column; `own`
+/// are the rows of a column of a diagonal block.
 fn columns(
     blocks: &[Block],
     size: usize,
@@ -259,12 +261,12 @@ fn columns(
     (starts, rows)
 }
 
-/// Memory for a computation of faer's.
+/// Workspace for faer.
 fn memory(size: StackReq) -> Result<MemBuffer, FactorError> {
     MemBuffer::try_new(size).map_err(|_| FactorError::NotFinite { row: 0 })
 }
 
-/// An order in which to eliminate `blocks` nodes, the last of which, that of end supports, comes last.
+/// An order in which to eliminate `blocks` nodes; the last one, that of end supports, stays last.
 fn order(blocks: usize, couplings: &[(usize, usize)]) -> Result<Vec<usize>, FactorError> {
     let nodes = blocks - 1;
     let mut edges: Vec<(usize, usize)> = couplings.to_vec();

@@ -1,7 +1,7 @@
-//! Matrices that couple distant nodes beside neighbouring ones, and their factorisation.
+//! Matrices that also couple distant nodes, and their factorisation.
 //!
-//! Where a rod touches itself the Newton system has blocks far from its band. [`couplings`] holds them, [`ldlt`] factors band and
-//! blocks together.
+//! Where a rod touches itself the Newton system has blocks far from its band. [`couplings`] holds them, [`ldlt`]
+//! factors band and blocks together.
 
 pub(crate) mod couplings;
 pub(crate) mod ldlt;

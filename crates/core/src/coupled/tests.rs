@@ -4,7 +4,7 @@ use super::*;
 use crate::banded::{BandMatrix, Shift};
 use crate::random::{splitmix64, unit};
 
-/// A random band with couplings: positive and negative diagonal entries that dominate.
+/// A random band with couplings, with dominant positive and negative diagonal entries.
 fn random<const C: usize>(nodes: usize, seed: u64) -> (BandMatrix<C>, Couplings<C>) {
     let block = C / 2;
     let n = nodes * block;
@@ -59,7 +59,7 @@ fn agrees<const C: usize>(nodes: usize, seed: u64) {
     let eigen = full.self_adjoint_eigenvalues(faer::Side::Lower).unwrap();
     let negative = eigen.iter().filter(|v| **v < 0.0).count();
     assert_eq!((inertia.negative, inertia.positive), (negative, n - negative));
-    // The twin: without its couplings it is another matrix.
+    // Counter-check: without its couplings the matrix is another one.
     let mut other = b;
     factor.factor_shifted(&band, &Couplings::default(), &shift, 3.0).unwrap();
     factor.solve::<C>(&mut other);

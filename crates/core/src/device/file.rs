@@ -1,4 +1,4 @@
-//! Device files: one TOML document that says what a device is, in a maker's terms or by sections.
+//! Device files: one TOML document that describes a device, in a maker's terms or by sections.
 //!
 //! ```toml
 //! name = "0.035 inch wire"
@@ -36,11 +36,11 @@ use crate::file::{FileSystem, Files};
 use crate::input::from_toml_of;
 use crate::{Error, Result};
 
-/// What a device is.
+/// Kinds of devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Wire that leads: 0.035 inch and the like.
+    /// Guide wire: 0.035 inch and similar.
     Guidewire,
     /// Wire for small vessels: 0.014 and 0.018 inch.
     Microwire,
@@ -48,7 +48,7 @@ pub enum Kind {
     Microcatheter,
     /// Diagnostic catheter.
     Catheter,
-    /// Catheter that other catheters run in.
+    /// Catheter in which other catheters run.
     GuidingCatheter,
     /// Sheath.
     Sheath,
@@ -79,34 +79,35 @@ pub(crate) struct FileTable {
     pub(crate) part: Vec<PartTable>,
 }
 
-/// A device file: parts with their names, materials and sources, and the device they make.
+/// A device file: parts with their names, materials and sources, and the resulting device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceFile {
     /// Name of the device; the file's stem if absent.
     pub name: String,
-    /// What it is; files of sections need not say.
+    /// Its kind; optional in files of sections.
     pub kind: Option<Kind>,
-    /// Where its data come from.
+    /// Source of its data.
     pub source: Option<String>,
-    /// Its parts, tip first; a section of a file of sections is a part too.
+    /// Its parts, tip first; in a file of sections each section is a part.
     pub parts: Vec<Part>,
-    /// What is pushed.
+    /// The resulting device.
     pub device: Device,
 }
 
-/// Lengths may differ by so much, mm: what tables round.
+/// Tolerance of lengths, mm: rounding in tables.
 const SAME_LENGTH_MM: f64 = 1e-3;
 
 impl DeviceFile {
     /// Reads a device file.
     ///
     /// # Errors
-    /// [`Error::File`] for what cannot be read; else [`Error::Content`] that names file, part, key, value and mend.
+    /// [`Error::File`] if the file cannot be read; otherwise [`Error::Content`] with file, part, key, value and
+    /// correction.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_of(&FileSystem, path)
     }
 
-    /// The same of a device file that is among `files`.
+    /// As [`Self::read`], for a file of `files`.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -119,7 +120,7 @@ impl DeviceFile {
 }
 
 impl FileTable {
-    /// The first of its keys that is given, for messages; none where sections alone are, or nothing is.
+    /// The first of its keys that is present, for messages; `None` if there are only sections, or nothing.
     pub(crate) fn given(&self) -> Option<&'static str> {
         let keys = [
             ("kind", self.kind.is_some()),
@@ -131,10 +132,10 @@ impl FileTable {
         keys.into_iter().find(|(_, given)| *given).map(|(key, _)| key)
     }
 
-    /// The device that the tables say.
+    /// The device described by the tables.
     ///
     /// # Errors
-    /// Values that are missing, out of range, given twice, or contradict each other, by part and key.
+    /// Values that are missing, out of range, given twice, or contradictory, by part and key.
     pub(crate) fn resolve(self) -> Result<DeviceFile> {
         let length = one_of("device", length_ways(self.length_mm, self.length_cm), LENGTH_LIMIT_MM)?;
         let length_mm = length.map(|length| length.ends.at(0.0));
@@ -183,7 +184,7 @@ impl FileTable {
         }
         let mut device = Device::new(parts.iter().flat_map(Part::sections).collect())?;
         if kind == Kind::Coil {
-            // What is wound is the coil; behind it is the pusher.
+            // The wound part is the coil; behind it is the pusher.
             let wound = self.part.iter().zip(&parts).take_while(|(table, _)| table.is_wound());
             let coil_mm: f64 = wound.map(|(_, part)| part.from_tip_mm[1] - part.from_tip_mm[0]).sum();
             if coil_mm > 0.0 && coil_mm < device.length_mm() {
@@ -193,7 +194,7 @@ impl FileTable {
         Ok((parts, device))
     }
 
-    /// Lengths of the parts: one may leave its own out, and is what the others leave.
+    /// Lengths of the parts: one may omit its own, and gets the remaining length.
     fn lengths(&self, length_mm: Option<f64>) -> Result<Vec<f64>> {
         let given: Vec<Option<f64>> = self.part.iter().map(PartTable::length_mm).collect::<Result<_>>()?;
         let absent = |index: usize, mend: String| {

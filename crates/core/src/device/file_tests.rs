@@ -1,4 +1,4 @@
-//! Device files: units, tapers, arcs, and every way to get them wrong.
+//! Device files: units, tapers, arcs, and all kinds of errors.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use super::{CutError, DeviceFile, Kind};
 use crate::Vec3;
 
-/// A catheter that is right, to be spoilt one value at a time.
+/// A valid catheter, to be invalidated one value at a time.
 const GOOD: &str = r#"
 name = "test"
 kind = "catheter"
@@ -57,7 +57,7 @@ fn a_whole_file_is_read() {
     let sections = file.device.sections();
     assert_eq!(sections.len(), 12);
     assert_eq!(file.device.length_mm(), 100.0);
-    // The arc is as long as it must be, and the shaft is what is left.
+    // The arc's length follows from radius and angle, and the shaft gets the remaining length.
     assert!((sections[0].length_mm - 5.0 * PI).abs() < 1e-12);
     assert!((sections[11].length_mm - (80.0 - 5.0 * PI)).abs() < 1e-12);
     // E π (D⁴ − d⁴)/64.
@@ -114,7 +114,7 @@ fn a_taper_is_cut_within_the_error_that_is_stated() {
         let file = read(&GOOD.replace("sections = 10", &format!("sections = {count}"))).unwrap();
         let taper = file.parts[1].clone();
         assert_eq!(taper.sections().len(), count);
-        // Asked for densely, no place differs by more than what is stated.
+        // At dense samples the difference nowhere exceeds the stated one.
         let CutError { radius_mm, stiffness } = taper.cut_error();
         let mut largest = (0.0f64, 0.0f64);
         for k in 0..1000 {
@@ -140,7 +140,7 @@ fn a_taper_is_cut_within_the_error_that_is_stated() {
     };
     assert!((cut_into(10) / cut_into(20) - 2.0).abs() < 1e-9);
     cut_into(1);
-    // From a modulus EI follows the fourth power of the diameter.
+    // With a given modulus EI follows the fourth power of the diameter.
     let wire = "name = \"w\"\nkind = \"microwire\"\n[[part]]\nname = \"core\"\nlength_mm = 40.0\nsections = 4\n\
                 outer_diameter_inch = [0.005, 0.010]\nflexural_modulus_gpa = 60\n";
     let core = read(wire).unwrap().parts[0].clone();
@@ -209,7 +209,7 @@ fn what_is_wrong_is_named_by_file_part_key_and_value() {
             "part \"tip\".coat.thickness_mm = 0.5: must be above 0 and less than the wall, 0.5000 mm",
         ),
         ("thickness_mm = 0.1", "thickness_mm = 0.0", "part \"tip\".coat.thickness_mm = 0: must be above 0"),
-        // What is missing.
+        // Missing values.
         (
             "outer_diameter_french = 6.0",
             "",
@@ -229,7 +229,7 @@ fn what_is_wrong_is_named_by_file_part_key_and_value() {
         ("kind = \"catheter\"", "", "kind = absent: say what it is"),
         ("length_cm = 10.0", "", "part \"shaft\".length_mm = absent: give it, or the device's own"),
         ("length_mm = 20.0", "", "part \"shaft\".length_mm = absent: part \"taper\" leaves it out too"),
-        // What is given twice or in vain.
+        // Values given twice or without effect.
         (
             "length_cm = 10.0",
             "length_cm = 10.0\nlength_mm = 100.0",

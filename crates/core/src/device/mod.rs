@@ -1,7 +1,8 @@
-//! What is pushed: a wire or catheter of sections, from the tip backwards.
+//! The inserted device: a wire or catheter of sections, from the tip backwards.
 //!
-//! A [`Device`] is what methods see: sections of constant properties. A [`DeviceFile`] is what a maker's data sheet becomes: named
-//! parts in the units of the trade, tapers and arcs, materials and sources, and the sections made of them.
+//! A [`Device`] is the input of methods: sections of constant properties. A [`DeviceFile`] represents a maker's data
+//! sheet: named parts in the units of the trade, tapers and arcs, materials and sources, and the sections made of
+//! them.
 
 mod file;
 #[cfg(test)]
@@ -24,11 +25,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
-/// One length of a device with constant properties.
+/// A section of a device with constant properties.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Section {
-    /// Length, mm; at most ten metres, as that of the whole device.
+    /// Length, mm; at most ten metres, like that of the whole device.
     pub length_mm: f64,
     /// Outer radius, mm; 10⁻⁶ to 50.
     pub radius_mm: f64,
@@ -63,7 +64,8 @@ impl Section {
         self.torsional_stiffness_nmm2.unwrap_or(self.bending_stiffness_nmm2 / 1.3)
     }
 
-    /// Energy a length that straightens it, ½ EI |κ⁰|², mJ/mm = N: also the force with which it comes out of a straight sheath.
+    /// Energy per length to straighten it, ½ EI |κ⁰|², mJ/mm = N: also the force with which it comes out of a
+    /// straight sheath.
     pub fn straightening_n(&self) -> f64 {
         let [u, v] = self.rest_curvature_per_mm;
         0.5 * self.bending_stiffness_nmm2 * (u * u + v * v)
@@ -117,12 +119,12 @@ impl Section {
 
 /// A device: its sections, **tip first**, because the tip is what enters first.
 ///
-/// Points of a device are named by their arc length from the tip, which does not change as it is pushed.
+/// Points of a device are identified by their arc length from the tip, which does not change as it is pushed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Device {
     sections: Vec<Section>,
     length_mm: f64,
-    /// Length from the tip that can be left behind, mm; 0 where nothing can.
+    /// Length from the tip that can be detached, mm; 0 if none.
     coil_mm: f64,
 }
 
@@ -130,13 +132,14 @@ pub struct Device {
 pub(crate) const LENGTH_LIMIT_MM: f64 = 10_000.0;
 /// Thickest device accepted, mm. A 30 F sheath has radius 5 mm; more than 50 mm is a unit mistake.
 const RADIUS_LIMIT_MM: f64 = 50.0;
-/// Thinnest device accepted, mm: a molecule. Contact points begin at the tip closer than a radius, and their number grows with its
-/// logarithm.
+/// Thinnest device accepted, mm: a molecule. The spacing of contact points starts at the tip with less than a radius,
+/// and their number grows with its logarithm.
 const LEAST_RADIUS_MM: f64 = 1e-6;
-/// Most sections: each point of a device looks for its own among them.
+/// Largest number of sections: each point of a device searches for its own.
 const MOST_SECTIONS: usize = 1000;
-/// Most flexible section accepted, N·mm²: a fifth of the softest there is. A coil of platinum wire of 0.038 mm, wound to 0.25 mm, has
-/// E d⁵/(32 D (1 + ν/2)) = 0.0014 (Wahl, Mechanical Springs, 1963). What is softer takes its shape from friction alone, which takes up to 18 times as long to find.
+/// Most flexible section accepted, N·mm²: a fifth of the softest real one. A coil of platinum wire of 0.038 mm, wound
+/// to 0.25 mm, has E d⁵/(32 D (1 + ν/2)) = 0.0014 (Wahl, Mechanical Springs, 1963). The shape of softer ones depends
+/// on friction alone, and takes up to 18 times as long to find.
 const LEAST_STIFFNESS_NMM2: f64 = 2e-4;
 /// Stiffest device accepted, N·mm²: a solid steel rod of 12 mm diameter.
 const STIFFNESS_LIMIT_NMM2: f64 = 2e8;
@@ -163,10 +166,10 @@ impl Device {
         Ok(Self { sections, length_mm, coil_mm: 0.0 })
     }
 
-    /// The same device as a coil on its pusher: so much of it, from the tip on, can be detached.
+    /// The same device as a coil on its pusher, with this length, from the tip on, that can be detached.
     ///
     /// # Errors
-    /// A length that is not above 0 and less than that of the device.
+    /// A length that is not positive and less than that of the device.
     pub fn with_coil(self, coil_mm: f64) -> Result<Self> {
         if coil_mm > 0.0 && coil_mm < self.length_mm {
             return Ok(Self { coil_mm, ..self });
@@ -178,9 +181,14 @@ impl Device {
         Err(Error::parameter("device.coil_mm", coil_mm, mend))
     }
 
-    /// Length from the tip that can be detached, mm; 0 of devices that are no coils.
+    /// Length from the tip that can be detached, mm; 0 for devices without a coil.
     pub fn coil_mm(&self) -> f64 {
         self.coil_mm
+    }
+
+    /// Whether the coil ends so far from the tip, to rounding.
+    pub(crate) fn is_coil_end(&self, from_tip_mm: f64) -> bool {
+        self.coil_mm > 0.0 && (from_tip_mm - self.coil_mm).abs() < 1e-9 * self.length_mm
     }
 
     /// Volume of the coil, the circle of its outer radius along its length, mm³; 0 of devices that are no coils.
@@ -194,7 +202,7 @@ impl Device {
         each.sum()
     }
 
-    /// A device that is the same everywhere.
+    /// A uniform device.
     ///
     /// # Errors
     /// As [`Device::new`].
@@ -202,7 +210,7 @@ impl Device {
         Self::new(vec![Section::straight(length_mm, radius_mm, bending_stiffness_nmm2)])
     }
 
-    /// Whole length, mm.
+    /// Total length, mm.
     pub fn length_mm(&self) -> f64 {
         self.length_mm
     }
@@ -221,16 +229,16 @@ impl Device {
                 return section;
             }
         }
-        // `new` refuses devices without sections.
+        // `new` rejects devices without sections.
         &self.sections[self.sections.len() - 1]
     }
 
-    /// Whether the device has a shape of its own, so that turning its tail moves it.
+    /// Whether the device has a rest shape, so that rotating its tail moves it.
     pub fn is_shaped(&self) -> bool {
         self.sections.iter().any(|s| s.rest_curvature_per_mm != [0.0; 2])
     }
 
-    /// Length from the tip within which the device has a shape of its own, mm.
+    /// Length from the tip within which the device has a rest shape, mm.
     pub fn shaped_mm(&self) -> f64 {
         let mut end_mm = 0.0;
         let mut shaped_mm = 0.0;
@@ -243,8 +251,8 @@ impl Device {
         shaped_mm
     }
 
-    /// Energy that straightens so much of the device from its tip on, ∫ ½ EI |κ⁰|² ds, mJ. When that much is out of a sheath, this is
-    /// what it stores less of a shape than when nothing is.
+    /// Energy to straighten this length of the device from its tip on, ∫ ½ EI |κ⁰|² ds, mJ: the energy released by a
+    /// sheath when this length is out of it.
     pub fn straightening_mj(&self, from_tip_mm: f64) -> f64 {
         let mut left_mm = from_tip_mm;
         let each = self.sections.iter().map(|section| {
@@ -265,7 +273,7 @@ impl Device {
         self.max_radius_within(f64::INFINITY)
     }
 
-    /// Largest outer radius nearer to the tip than this, mm; 0 where that is nothing.
+    /// Largest outer radius within this distance of the tip, mm; 0 if the distance is 0.
     pub fn max_radius_within(&self, from_tip_mm: f64) -> f64 {
         let begins = self.sections.iter().scan(0.0, |end_mm, section| {
             let begin_mm = *end_mm;

@@ -1,4 +1,4 @@
-//! One part of a device file: data in, sections out.
+//! One part of a device file: its data, and the sections made of it.
 
 use serde::Deserialize;
 
@@ -14,12 +14,12 @@ pub(super) const INCH_MM: f64 = 25.4;
 const FRENCH_MM: f64 = 1.0 / 3.0;
 /// Stiffest material, MPa: diamond.
 pub(super) const MODULUS_LIMIT_MPA: f64 = 1.2e6;
-/// Most sections that a taper is cut into.
+/// Largest number of sections that represent a taper.
 const MOST_CUTS: usize = 200;
-/// Widest arc of a tip, degrees: three turns.
+/// Largest arc of a tip, degrees: three turns.
 const MOST_ANGLE_DEG: f64 = 1080.0;
 
-/// A `[[part]]` table as it stands in the file. Values that may be tapered are a number or two.
+/// A `[[part]]` table of the file. Values that may be tapered are one number or two.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PartTable {
@@ -48,7 +48,7 @@ pub(crate) struct PartTable {
     source: Option<String>,
 }
 
-/// An arc that a part has at rest.
+/// An arc of a part's rest shape.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Bend {
@@ -56,7 +56,8 @@ struct Bend {
     radius_mm: f64,
     /// Angle between the tangents of the two ends.
     angle_deg: f64,
-    /// Where the arc bends to, about the device's axis; 0 is the first material direction, 180 the opposite bend in the same plane.
+    /// Direction of bending, about the device's axis; 0 is the first material direction, 180 the opposite bend in the
+    /// same plane.
     #[serde(default)]
     direction_deg: f64,
 }
@@ -67,11 +68,11 @@ struct Bend {
 pub struct Coat {
     /// Its material.
     pub material: String,
-    /// From the outer radius inwards, mm.
+    /// Thickness, inwards from the outer radius, mm.
     pub thickness_mm: f64,
 }
 
-/// How EI is known.
+/// How EI is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stiffness {
     /// N·mm².
@@ -80,8 +81,8 @@ enum Stiffness {
     Modulus(Ends),
 }
 
-/// Largest differences between a taper and its sections, which are at the ends of sections where EI rises or falls along each: everywhere,
-/// unless modulus and size are tapered against each other.
+/// Largest differences between a taper and its sections. They occur at the ends of sections if EI is monotonic along
+/// each, that is, unless modulus and size are tapered against each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutError {
     /// Of the outer radius, mm.
@@ -90,30 +91,31 @@ pub struct CutError {
     pub stiffness: f64,
 }
 
-/// A named part of a device: constant or linearly tapered between its ends, of one curvature at rest or a line of arcs.
+/// A named part of a device: constant or linearly tapered between its ends, with one rest curvature or a sequence of
+/// arcs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// Its name.
     pub name: String,
-    /// Where it begins and ends, in arc length from the tip, mm.
+    /// Its start and end, in arc length from the tip, mm.
     pub from_tip_mm: [f64; 2],
-    /// What it is made of. Names are the viewer's to know.
+    /// Its material, by a name that the viewer defines.
     pub material: Option<String>,
-    /// Its outermost layer, where that is of another material.
+    /// Its outermost layer, if of another material.
     pub coat: Option<Coat>,
-    /// Where its data come from.
+    /// Source of its data.
     pub source: Option<String>,
     radius_mm: Ends,
     inner_radius_mm: Option<Ends>,
     stiffness: Stiffness,
     torsion_nmm2: Option<Ends>,
-    /// Its arcs at rest, tip first; a part of several is not tapered.
+    /// Its arcs of the rest shape, tip first; a part with several is not tapered.
     arcs: Vec<Arc>,
     cuts: usize,
 }
 
 impl Part {
-    /// A section of a device file that has no parts.
+    /// A section of a device file without parts.
     pub(super) fn of_section(name: String, section: &Section, begin_mm: f64) -> Self {
         Self {
             name,
@@ -130,12 +132,13 @@ impl Part {
         }
     }
 
-    /// Whether its shape at rest is more than one arc.
+    /// Whether its rest shape is more than one arc.
     pub fn has_secondary_shape(&self) -> bool {
         self.arcs.len() > 1
     }
 
-    /// The part as it is at a fraction (0 to 1) of its length from the end towards the tip, as a section of its whole length.
+    /// Its properties at a fraction (0 to 1) of its length from the end towards the tip, as a section of its whole
+    /// length.
     pub fn at(&self, fraction: f64) -> Section {
         let radius_mm = self.radius_mm.at(fraction);
         let inner_radius_mm = self.inner_radius_mm.map(|inner| inner.at(fraction));
@@ -164,7 +167,8 @@ impl Part {
         *here.unwrap_or(&self.arcs[self.arcs.len() - 1])
     }
 
-    /// The sections that stand for it, tip first: an arc each, and a taper is cut into equal lengths, each as the taper is in its middle.
+    /// The sections that represent it, tip first: one per arc, and for a taper equal lengths, each with the
+    /// properties of its middle.
     pub fn sections(&self) -> Vec<Section> {
         if self.has_secondary_shape() {
             let whole = self.at(0.0);
@@ -183,7 +187,7 @@ impl Part {
         (0..self.cuts).map(cut).collect()
     }
 
-    /// How far the sections are from the taper that they stand for.
+    /// The largest differences between the sections and the taper they represent.
     pub fn cut_error(&self) -> CutError {
         let count = self.cuts as f64;
         let mut error = CutError { radius_mm: 0.0, stiffness: 0.0 };
@@ -203,17 +207,17 @@ impl Part {
 }
 
 impl PartTable {
-    /// How errors call the part.
+    /// Its name in errors.
     fn place(&self) -> String {
         format!("part \"{}\"", self.name)
     }
 
-    /// Whether it is wound of a wire.
+    /// Whether it is wound from a wire.
     pub(super) fn is_wound(&self) -> bool {
         self.winding.is_some()
     }
 
-    /// Its length, if it says one, mm.
+    /// Its length, mm, if given.
     ///
     /// # Errors
     /// A length given twice or out of range, an arc without a length.
@@ -240,10 +244,11 @@ impl PartTable {
         Ok(Some(bend.radius_mm * bend.angle_deg.to_radians()))
     }
 
-    /// The part that begins at an arc length from the tip. `is_tube`: whether it must have a lumen. `source` stands in where it has none.
+    /// The part that begins at an arc length from the tip. `is_tube`: whether it must have a lumen. `source` is used
+    /// if it has none.
     ///
     /// # Errors
-    /// Values that are missing, out of range, given twice, or contradict each other, by key.
+    /// Values that are missing, out of range, given twice, or contradictory, by key.
     pub(super) fn resolve(
         &self,
         begin_mm: f64,
@@ -298,7 +303,7 @@ impl PartTable {
             let mend = "the part is tapered: a part with a secondary shape is the same everywhere";
             return Err(Error::parameter(format!("{place}.secondary"), "a table", mend));
         }
-        // EI and GJ follow from other values: out of range they are known only now.
+        // EI and GJ follow from other values, so their ranges can be checked only now.
         [0.0, 1.0].iter().try_for_each(|end| part.at(*end).check(&place))?;
         Ok(part)
     }
@@ -323,7 +328,7 @@ impl PartTable {
         one_of(place, ways, RADIUS_LIMIT_MM)
     }
 
-    /// How EI is known, and the values that say it.
+    /// The given form of EI, and its values.
     fn stiffness(&self, place: &str) -> Result<Option<(Stiffness, Ends)>> {
         let modulus = [
             Way { key: "flexural_modulus_mpa", given: self.flexural_modulus_mpa, factor: 1.0 },
@@ -342,7 +347,8 @@ impl PartTable {
         }
     }
 
-    /// The lumen is narrower than the part, and the coat thinner than the wall, at both ends and so everywhere between.
+    /// Checks that the lumen is narrower than the part, and the coat thinner than the wall, at both ends and so
+    /// everywhere between.
     fn check_layers(&self, place: &str, outer: Quantity, inner: Option<Quantity>) -> Result<()> {
         for end in [0, 1] {
             let radius_mm = outer.ends.0[end];
@@ -364,7 +370,7 @@ impl PartTable {
         Ok(())
     }
 
-    /// Its arcs at rest: at most one key gives them, and none a straight part.
+    /// Its arcs of the rest shape: at most one key gives them; without, it is straight.
     fn arcs(&self, place: &str, length_mm: f64, radius_mm: Ends) -> Result<Vec<Arc>> {
         let widest_mm = radius_mm.0[0].max(radius_mm.0[1]);
         let keys = [
@@ -416,7 +422,7 @@ impl PartTable {
     }
 }
 
-/// The keys that may give a length.
+/// The keys that can give a length.
 pub(super) fn length_ways(length_mm: Option<f64>, length_cm: Option<f64>) -> [Way; 2] {
     [
         Way { key: "length_mm", given: length_mm.map(Ends::constant), factor: 1.0 },

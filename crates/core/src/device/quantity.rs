@@ -1,4 +1,4 @@
-//! Values of a data sheet: one number or a taper, in the unit that the key names.
+//! Values of a data sheet: one number or a taper, in the unit in the key's name.
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -13,7 +13,7 @@ use crate::{Error, Result};
 pub(super) struct Ends(pub(super) [f64; 2]);
 
 impl Ends {
-    /// The same everywhere.
+    /// A constant value.
     pub(super) fn constant(value: f64) -> Self {
         Self([value; 2])
     }
@@ -66,11 +66,11 @@ impl<'de> Deserialize<'de> for Ends {
     }
 }
 
-/// One key that may give a quantity.
+/// One of the keys that can give a quantity.
 pub(super) struct Way {
     /// The key, with its unit.
     pub(super) key: &'static str,
-    /// What the file says.
+    /// The value in the file.
     pub(super) given: Option<Ends>,
     /// Units of the simulation in one unit of the key.
     pub(super) factor: f64,
@@ -80,15 +80,16 @@ pub(super) struct Way {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quantity {
     pub(super) key: &'static str,
-    /// As the file has it, in the unit of the key.
+    /// The value in the file, in the unit of the key.
     pub(super) given: Ends,
     pub(super) ends: Ends,
 }
 
-/// The quantity that at most one of `ways` gives. `limit` is its largest value, in units of the simulation.
+/// The quantity given by at most one of `ways`. `limit` is its largest value, in units of the simulation.
 ///
 /// # Errors
-/// A second way, naming both; a value that is not above 0 and at most the limit, in the unit of its key. Names begin with `place`.
+/// Two ways given, naming both; a value that is not positive or exceeds the limit, in the unit of its key. Names
+/// begin with `place`.
 pub(super) fn one_of<const N: usize>(place: &str, ways: [Way; N], limit: f64) -> Result<Option<Quantity>> {
     let mut found: Option<Quantity> = None;
     for Way { key, given, factor } in ways {

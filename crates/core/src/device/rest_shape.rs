@@ -1,20 +1,21 @@
-//! The shape of a device that nothing touches: one arc a section.
+//! The rest shape of a device, without contact: one arc per section.
 
 use super::Device;
 use crate::Vec3;
 use crate::rod::Frame;
 use crate::shape::Shape;
 
-/// Most points that a section is drawn with.
+/// Largest number of points per section.
 const MOST_POINTS: f64 = 10_000.0;
 
 impl Device {
-    /// The centre line at rest of the last `length_mm` before the tip, with points at most `step_mm` apart.
+    /// The centre line of the last `length_mm` before the tip in the rest shape, with points at most `step_mm` apart.
     ///
-    /// It begins at the origin along z, its first material direction along x. Arcs are exact: a section of curvature κ and length L bends by
-    /// κL in the plane of its curvature, which the arcs behind it have carried along without twist.
+    /// It begins at the origin along z, its first material direction along x. Arcs are exact: a section of curvature
+    /// κ and length L bends by κL in the plane of its curvature, which is transported along the arcs behind it
+    /// without twist.
     pub fn rest_shape(&self, length_mm: f64, step_mm: f64) -> Shape {
-        // Where each section that is seen begins, from the tip, and its length.
+        // Start of each section in view, from the tip, and its length.
         let mut pieces = Vec::new();
         let mut seen_mm = 0.0;
         for section in self.sections() {
@@ -44,7 +45,7 @@ impl Device {
     }
 }
 
-/// From the beginning of an arc to the point at arc length `s`.
+/// From the start of an arc to the point at arc length `s`.
 fn along_arc(frame: &Frame, [first, second]: [f64; 2], s: f64) -> Vec3 {
     let curvature = libm::hypot(first, second);
     let angle = curvature * s;
@@ -52,7 +53,7 @@ fn along_arc(frame: &Frame, [first, second]: [f64; 2], s: f64) -> Vec3 {
         return frame.t * s;
     }
     let across = (frame.u * first + frame.v * second) / curvature;
-    // (1 − cos)/κ as 2 sin²(half)/κ, which small angles do not cancel.
+    // (1 − cos)/κ as 2 sin²(half)/κ, to avoid cancellation at small angles.
     frame.t * (libm::sin(angle) / curvature) + across * (2.0 * libm::sin(0.5 * angle).powi(2) / curvature)
 }
 
@@ -81,7 +82,7 @@ mod tests {
     #[test]
     fn arcs_in_two_planes_follow_one_another() {
         let quarter = std::f64::consts::FRAC_PI_2;
-        // From the shaft: a quarter towards x, then a quarter towards the second direction, which is y still.
+        // From the shaft: a quarter turn towards x, then one towards the second direction, which is still y.
         let device =
             Device::new(vec![bent(5.0 * quarter, [0.0, 0.2]), bent(10.0 * quarter, [0.1, 0.0])]).unwrap();
         let shape = device.rest_shape(1e3, 0.5);

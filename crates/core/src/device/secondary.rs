@@ -1,8 +1,8 @@
-//! The shape of a coil at rest: its secondary shape, which it takes where nothing holds it straight.
+//! The rest shape of a coil, its secondary shape, which it takes where nothing holds it straight.
 //!
-//! A part is an arc or a line of arcs that follow one another without twist. The curvature of a helix of radius R that rises by c a radian
-//! is R/(R² + c²), and its direction turns about the axis by the torsion c/(R² + c²) a length; a curve through points has the arcs between
-//! the middles of its chords.
+//! A part is an arc or a sequence of arcs joined without twist. The curvature of a helix of radius R that rises by c
+//! per radian is R/(R² + c²), and its direction rotates about the axis by the torsion c/(R² + c²) per length; a curve
+//! through points consists of arcs between the middles of its chords.
 
 use serde::Deserialize;
 
@@ -10,14 +10,14 @@ use super::LENGTH_LIMIT_MM;
 use crate::rod::Frame;
 use crate::{Error, Result, Vec3};
 
-/// An arc turns its plane by at most this from the arc before it in a helix, rad: half of it is how far the direction of bending is off at
-/// its ends.
+/// Largest rotation of the plane between consecutive arcs of a helix, rad: half of it is the error of the direction
+/// of bending at their ends.
 const PLANE_TURN: f64 = 0.1;
-/// Angle between points of a cage, seen from its middle, rad.
+/// Angle between points of a cage, seen from its centre, rad.
 const CAGE_STEP: f64 = 0.25;
-/// Most arcs of a part.
+/// Largest number of arcs of a part.
 const MOST_ARCS: usize = 400;
-/// Two chords of a curve of points turn by at most this, rad: above it the curve between them is anyone's guess.
+/// Largest angle between two chords of a curve of points, rad: above it the curve between them is ambiguous.
 const LARGEST_TURN: f64 = 1.0;
 
 /// A length of constant curvature.
@@ -28,22 +28,22 @@ pub(super) struct Arc {
     pub(super) curvature_per_mm: [f64; 2],
 }
 
-/// A `secondary` table as it stands in the file.
+/// A `secondary` table of the file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum Secondary {
     /// A helix.
     Helix {
-        /// Between opposite places of the centre line.
+        /// Diameter of the centre line's cylinder.
         diameter_mm: f64,
-        /// Advance of a turn.
+        /// Advance per turn.
         pitch_mm: f64,
     },
-    /// Loops around a ball, each of them tilted against an axis about which the next is turned: a cage.
+    /// Loops on a sphere, each tilted against an axis about which the next one is rotated: a cage.
     Complex {
-        /// Of the ball on which the centre line lies.
+        /// Diameter of the sphere on which the centre line lies.
         diameter_mm: f64,
-        /// Angle between the loops and the plane across the axis.
+        /// Angle between the loops and the plane normal to the axis.
         tilt_deg: f64,
         /// Angle about the axis from one loop to the next.
         turn_deg: f64,
@@ -56,7 +56,7 @@ pub(super) enum Secondary {
 }
 
 impl Secondary {
-    /// The length of the curve, where the shape has one of its own, mm.
+    /// The length of the curve, if the shape determines it, mm.
     pub(super) fn length_mm(&self) -> Option<f64> {
         let Self::Curve { points_mm } = self else { return None };
         Some(points_mm.windows(2).map(|ends| (Vec3::from(ends[1]) - Vec3::from(ends[0])).norm()).sum())
@@ -65,7 +65,7 @@ impl Secondary {
     /// The arcs of a part of this length and radius, mm, tip first.
     ///
     /// # Errors
-    /// Values out of range, by key; a shape that bends tighter than the part is thick; one of more arcs than a device may have.
+    /// Values out of range, by key; a shape with a radius below the part's own; one with too many arcs.
     pub(super) fn arcs(&self, place: &str, length_mm: f64, radius_mm: f64) -> Result<Vec<Arc>> {
         let place = format!("{place}.secondary");
         let arcs = match self {
@@ -81,7 +81,8 @@ impl Secondary {
                 let count = (length_mm * torsion / PLANE_TURN).ceil().max(1.0);
                 check_count(&place, count)?;
                 let arc_mm = length_mm / count;
-                // From the tip backwards a right-handed helix turns the other way about the material directions.
+                // From the tip backwards the direction of a right-handed helix rotates the other way about the
+                // material directions.
                 let arc = |k: usize| turned(arc_mm, curvature, -torsion * arc_mm * (k as f64 + 0.5));
                 (0..count as usize).map(arc).collect()
             }
@@ -108,7 +109,7 @@ fn turned(length_mm: f64, curvature: f64, angle: f64) -> Arc {
     Arc { length_mm, curvature_per_mm: [curvature * cos, curvature * sin] }
 }
 
-/// The radius of a shape, no less than the part's own.
+/// The radius of a shape, at least the part's own.
 fn bend_radius_mm(place: &str, diameter_mm: f64, radius_mm: f64) -> Result<f64> {
     crate::error::in_range(&format!("{place}.diameter_mm"), diameter_mm, LENGTH_LIMIT_MM)?;
     if 0.5 * diameter_mm < radius_mm {
@@ -127,7 +128,8 @@ fn check_count(place: &str, count: f64) -> Result<()> {
     Ok(())
 }
 
-/// Points, tip first, of a curve of this length on a ball: loops at a tilt, rad, that go on by `turn` of a loop about the axis.
+/// Points, tip first, of a curve of this length on a sphere: loops with a tilt, rad, advancing by `turn` about the
+/// axis per loop.
 fn cage(length_mm: f64, ball_mm: f64, tilt: f64, turn: f64) -> Vec<[f64; 3]> {
     let (sin_tilt, cos_tilt) = libm::sincos(tilt);
     let place = |k: usize| {
@@ -141,7 +143,7 @@ fn cage(length_mm: f64, ball_mm: f64, tilt: f64, turn: f64) -> Vec<[f64; 3]> {
     for k in 1.. {
         let chord = place(k) - place(k - 1);
         let size_mm = chord.norm();
-        // The last chord is no sliver.
+        // The last chord must not be a sliver.
         if left_mm <= 1.5 * size_mm {
             points.push(place(k - 1) + chord * (left_mm / size_mm));
             break;
@@ -152,7 +154,8 @@ fn cage(length_mm: f64, ball_mm: f64, tilt: f64, turn: f64) -> Vec<[f64; 3]> {
     points.into_iter().map(Into::into).collect()
 }
 
-/// The arcs of a curve through points: half chords at its ends, and around each point between them the arc that turns as the chords do.
+/// The arcs of a curve through points: half chords at its ends, and around each interior point an arc that bends by
+/// the angle of its chords.
 fn curve(place: &str, points_mm: &[[f64; 3]]) -> Result<Vec<Arc>> {
     let name = format!("{place}.points_mm");
     let few = points_mm.len() < 3;
@@ -161,7 +164,7 @@ fn curve(place: &str, points_mm: &[[f64; 3]]) -> Result<Vec<Arc>> {
         return Err(Error::parameter(name, value, "give at least 3 points of finite numbers, tip first"));
     }
     check_count(place, points_mm.len() as f64)?;
-    // Seen from behind, as the material directions are: from the last point to the tip.
+    // In the order of the material directions: from the last point to the tip.
     let chords: Vec<Vec3> =
         points_mm.windows(2).rev().map(|ends| Vec3::from(ends[0]) - Vec3::from(ends[1])).collect();
     if let Some(k) = chords.iter().position(|chord| chord.norm() == 0.0) {
@@ -197,7 +200,7 @@ mod tests {
     use super::*;
     use crate::device::{Device, Section};
 
-    /// The centre line at rest of a coil of this shape.
+    /// The centre line of the rest shape of a coil with this secondary shape.
     fn rest(secondary: &Secondary, length_mm: f64) -> Vec<Vec3> {
         let arcs = secondary.arcs("part", length_mm, 0.15).unwrap();
         let section = |arc: &Arc| Section {
@@ -216,14 +219,14 @@ mod tests {
         let helix = Secondary::Helix { diameter_mm: diameter, pitch_mm: pitch };
         let points = rest(&helix, 5.0 * turn_mm);
         let turn = points.len() / 5;
-        // Places one turn apart differ by the pitch along the axis.
+        // Points one turn apart differ by the pitch along the axis.
         let rise = points[2 * turn] - points[turn];
         assert!((rise.norm() - pitch).abs() < 0.02 * pitch, "{}", rise.norm());
         let axis = rise.normalize();
         let across = points[2 * turn] - points[turn + turn / 2];
         let across = across - axis * across.dot(&axis);
         assert!((across.norm() - diameter).abs() < 0.01 * diameter, "{}", across.norm());
-        // A quarter of a turn goes on about the axis in its direction.
+        // A quarter turn advances about the axis in its direction.
         let centre = points[turn] - across * 0.5;
         let out = |k: usize| {
             let off = points[k] - centre;
@@ -264,7 +267,7 @@ mod tests {
         };
         let device = Device::new(arcs.iter().map(section).collect()).unwrap();
         let shape = device.rest_shape(length_mm, 0.1);
-        // Distances within the curve do not know where it lies.
+        // Distances within the curve do not depend on its position.
         let (found, given) = (|mm: f64| shape.position_at(mm).unwrap(), |k: usize| Vec3::from(points_mm[k]));
         let along = |k: usize| -> f64 { (1..=k).map(|i| (given(i) - given(i - 1)).norm()).sum() };
         for (a, b) in [(0, 40), (20, 150), (80, 120), (5, 159)] {

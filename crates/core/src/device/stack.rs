@@ -1,4 +1,4 @@
-//! Instruments that lie in one another: a wire in a microcatheter in a catheter.
+//! Coaxial instruments: a wire in a microcatheter in a catheter.
 
 use super::Device;
 use crate::contact::{check_friction, check_valve};
@@ -6,35 +6,36 @@ use crate::error::nearest_name;
 use crate::rod::MAX_ANGLES;
 use crate::{Error, Result};
 
-/// A device by its name.
+/// A device with a name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instrument {
-    /// What commands and reports call it.
+    /// Its name in commands and reports.
     pub name: String,
     /// Its sections.
     pub device: Device,
-    /// Whether its tip may be farther in than that of the instrument in it; one that must not lead is pushed over that alone.
+    /// Whether its tip may be farther in than that of the instrument inside it; if not, it can only be pushed over
+    /// that one.
     pub may_lead: bool,
 }
 
-/// Instruments on one line, the innermost first; those that are never in at the same time may share a place.
+/// Instruments on one line, the innermost first; those that are never inserted at the same time may be alternatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
     instruments: Vec<Instrument>,
-    /// Set of material angles of each, where it has one; coils, of which one is in at a time, share one.
+    /// Set of material angles of each, if any; coils, of which only one is inserted at a time, share a set.
     sets: Vec<Option<usize>>,
     /// Coefficient of friction between each and those outside it.
     frictions: Vec<f64>,
-    /// Friction of the valve on the hub of each, by which what lies in it is sealed, N.
+    /// Friction force, N, of the valve on the hub of each, which seals the instruments inside it.
     valves_n: Vec<f64>,
 }
 
-/// Most instruments of a stack.
+/// Largest number of instruments of a stack.
 const MOST: usize = 16;
 /// Slack in inserted lengths, mm: the rounding of thousands of summed increments.
 pub(crate) const LENGTH_SLACK_MM: f64 = 1e-6;
 
-/// Sets of angles that are given out.
+/// Assignment of sets of angles.
 #[derive(Default)]
 struct Angles {
     count: usize,
@@ -57,7 +58,7 @@ impl Angles {
 }
 
 impl From<Device> for Stack {
-    /// A device alone, named `device`.
+    /// A single device, named `device`.
     fn from(device: Device) -> Self {
         let sets = vec![device.is_shaped().then_some(0)];
         let instruments = vec![Instrument { name: "device".to_owned(), device, may_lead: true }];
@@ -69,7 +70,8 @@ impl Stack {
     /// Instruments, the innermost first.
     ///
     /// # Errors
-    /// No instrument or more than 16, a name that is empty or given twice, and more than three instruments with a shape of their own.
+    /// No instrument or more than 16, a name that is empty or given twice, and more than three instruments with a
+    /// rest shape.
     pub fn new(instruments: Vec<Instrument>) -> Result<Self> {
         if instruments.is_empty() || instruments.len() > MOST {
             let mend = format!("give 1 to {MOST} instruments, the innermost first");
@@ -98,10 +100,11 @@ impl Stack {
         Ok(Self { instruments, sets, frictions, valves_n })
     }
 
-    /// The same instruments, rubbing in each other with these Coulomb coefficients, each between one and those outside it.
+    /// The same instruments with these Coulomb coefficients of friction, each between one and those outside it.
     ///
     /// # Errors
-    /// Another number of coefficients than instruments, one that is not from 0 to 2, and any but 0 of the outermost.
+    /// A number of coefficients other than that of instruments, one outside 0 to 2, or a nonzero one of the
+    /// outermost.
     pub fn rubbing(mut self, frictions: Vec<f64>) -> Result<Self> {
         if frictions.len() != self.instruments.len() {
             let mend = format!("there are {} instruments: give one for each", self.instruments.len());
@@ -120,10 +123,11 @@ impl Stack {
         Ok(self)
     }
 
-    /// The same instruments, with a valve on the hub of each that rubs with this force, N, on what slips and turns in it; 0 for none.
+    /// The same instruments, with a valve on the hub of each whose friction, N, acts on what slips and rotates in it;
+    /// 0 for none.
     ///
     /// # Errors
-    /// Another number of forces than instruments, one that is not from 0 to 100 N, and any but 0 of the innermost.
+    /// A number of forces other than that of instruments, one outside 0 to 100 N, or a nonzero one of the innermost.
     pub fn sealed(mut self, valves_n: Vec<f64>) -> Result<Self> {
         if valves_n.len() != self.instruments.len() {
             let mend = format!("there are {} instruments: give one for each", self.instruments.len());
@@ -151,15 +155,15 @@ impl Stack {
         self.frictions[instrument]
     }
 
-    /// Whether any instrument rubs in another.
+    /// Whether there is friction between any instruments.
     pub fn has_inner_friction(&self) -> bool {
         self.frictions.iter().any(|friction| *friction > 0.0)
     }
 
-    /// The same instruments with a set of material angles each: friction twists straight ones too.
+    /// The same instruments with a set of material angles each: friction also twists straight ones.
     ///
     /// # Errors
-    /// More than three instruments, coils counting as one.
+    /// More than three instruments, all coils counting as one.
     pub fn twisted(mut self) -> Result<Self> {
         let mut angles = Angles::default();
         let sets = self.devices().map(|device| Some(angles.of(device))).collect();
@@ -173,7 +177,7 @@ impl Stack {
         Ok(self)
     }
 
-    /// Sets of material angles on the line.
+    /// Number of sets of material angles on the line.
     pub(crate) fn angles(&self) -> usize {
         self.sets.iter().flatten().max().map_or(0, |last| last + 1)
     }
@@ -183,9 +187,9 @@ impl Stack {
         &self.instruments
     }
 
-    /// The innermost; of a device alone the device.
+    /// The innermost instrument's device, or the single device.
     pub fn first(&self) -> &Device {
-        // `new` refuses stacks without instruments.
+        // `new` rejects stacks without instruments.
         &self.instruments[0].device
     }
 
@@ -194,20 +198,31 @@ impl Stack {
         self.instruments.len() > 1
     }
 
+    /// How far an instrument must be in for its coil to be out of all others where these lengths are in, mm: its end comes free of what it lay in where it
+    /// no longer touches that.
+    pub(crate) fn out_mm(&self, instrument: usize, inserted_mm: &[f64]) -> f64 {
+        let device = &self.instruments[instrument].device;
+        let end_mm = device.section_at(device.coil_mm()).radius_mm;
+        let outside = self.devices().zip(inserted_mm).skip(instrument + 1).filter(|(_, mm)| **mm > 0.0);
+        let free_mm = outside.map(|(outer, mm)| mm + outer.section_at(0.0).radius_mm + end_mm);
+        device.coil_mm() + free_mm.fold(0.0, f64::max)
+    }
+
     /// The devices, the innermost first.
     pub fn devices(&self) -> impl DoubleEndedIterator<Item = &Device> + ExactSizeIterator {
         self.instruments.iter().map(|instrument| &instrument.device)
     }
 
-    /// Set of material angles of each instrument: those with a shape of their own have one, and all where friction twists them.
+    /// Set of material angles of each instrument, if any: instruments with a rest shape have one, and all if friction
+    /// twists them.
     pub fn sets(&self) -> &[Option<usize>] {
         &self.sets
     }
 
-    /// Number of the instrument of that name.
+    /// Index of the instrument of this name.
     ///
     /// # Errors
-    /// A name that no instrument has, with the nearest one that is there.
+    /// An unknown name, with the most similar one.
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.instruments.iter().position(|instrument| instrument.name == name);
         found.ok_or_else(|| {
@@ -228,13 +243,14 @@ impl Stack {
         (thinnest, self.devices().map(Device::max_radius_mm).fold(0.0, f64::max))
     }
 
-    /// Least bending stiffness, N·mm².
+    /// Smallest bending stiffness, N·mm².
     pub(crate) fn softest_nmm2(&self) -> f64 {
         let sections = self.devices().flat_map(Device::sections);
         sections.map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
     }
 
-    /// Outer radius of the outermost instrument at a place so far from the tip of the line, mm, with these lengths inserted.
+    /// Outer radius of the outermost instrument at this distance from the tip of the line, mm, with these lengths
+    /// inserted.
     pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
         let line_mm = line_mm(inserted_mm.iter().copied());
         self.felt_instrument(inserted_mm, from_tip_mm).map_or(0.0, |index| {
@@ -243,20 +259,20 @@ impl Stack {
         })
     }
 
-    /// The outermost instrument there; none where none reaches so far.
+    /// The outermost instrument there; `None` if none reaches it.
     pub(crate) fn felt_instrument(&self, inserted_mm: &[f64], from_tip_mm: f64) -> Option<usize> {
         let line_mm = line_mm(inserted_mm.iter().copied());
         inserted_mm.iter().rposition(|inserted| from_tip_mm - (line_mm - inserted) >= 0.0)
     }
 
-    /// Checks that instruments with these lengths inserted can be in together: each in the lumen of the next, with its tail out of that
-    /// one's, and behind or in front as it may be.
+    /// Checks that instruments with these lengths inserted can be combined: each in the lumen of the next, with its
+    /// tail out of that one's, and its tip ahead or behind as permitted.
     ///
     /// # Errors
-    /// The first that does not go with the next one that is in.
+    /// The first that cannot be combined with the next inserted one.
     pub fn check_places(&self, inserted_mm: impl Iterator<Item = f64>) -> Result<()> {
         let mut inner: Option<(&Instrument, f64)> = None;
-        // What is pulled back to the mouth is out, whatever rounding leaves of it.
+        // An instrument pulled back to the mouth is out, whatever its rounding.
         for outer in self.instruments.iter().zip(inserted_mm).filter(|(_, mm)| *mm > LENGTH_SLACK_MM) {
             if let Some(inner) = inner.replace(outer) {
                 check_pair(inner.0, outer.0)?;
@@ -268,12 +284,12 @@ impl Stack {
     }
 }
 
-/// Length of the line that instruments with these lengths inserted make, mm: that of the one that is farthest in.
+/// Length of the line for these inserted lengths, mm: the largest.
 pub fn line_mm(inserted_mm: impl IntoIterator<Item = f64>) -> f64 {
     inserted_mm.into_iter().fold(0.0, f64::max)
 }
 
-/// Whether the tail of an inner instrument stays out of that of the outer one, where its hand is.
+/// Checks that the tail of an inner instrument stays out of that of the outer one, at its hand.
 fn check_tails((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instrument, f64)) -> Result<()> {
     let tail_mm = outer.device.length_mm() - outer_mm;
     let most_mm = inner.device.length_mm() - tail_mm;
@@ -291,7 +307,7 @@ fn check_tails((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instr
     Err(Error::parameter(format!("{}.inserted_mm", inner.name), inner_mm, mend))
 }
 
-/// Whether an outer instrument that must not lead is behind the inner one.
+/// Checks that an outer instrument that must not lead is behind the inner one.
 fn check_lead((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instrument, f64)) -> Result<()> {
     if outer.may_lead || outer_mm <= inner_mm + LENGTH_SLACK_MM {
         return Ok(());
@@ -303,7 +319,7 @@ fn check_lead((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instru
     Err(Error::parameter(format!("{}.inserted_mm", outer.name), outer_mm, mend))
 }
 
-/// Whether one instrument goes into another.
+/// Checks that one instrument fits into another.
 fn check_pair(inner: &Instrument, outer: &Instrument) -> Result<()> {
     let lumen = outer.device.sections().iter().map(|s| s.inner_radius_mm);
     let narrowest = lumen.reduce(|a, b| a.zip(b).map(|(a, b)| a.min(b))).flatten();

@@ -1,13 +1,15 @@
-//! The stiffness of a part that is wound of a stock wire, as coils are.
+//! The stiffness of a part wound from a stock wire, such as a coil.
 //!
-//! A helix of small pitch, seen as a rod along its axis: bending it twists and bends the wire, twisting it bends the wire alone. With the
-//! wire's E, ν and diameter w, its second moment I = πw⁴/64, the mean diameter D of the winding and its pitch p
+//! A helix of small pitch, regarded as a rod along its axis: bending it twists and bends the wire, twisting it only
+//! bends the wire. With the wire's E, ν and diameter w, its second moment I = πw⁴/64, the mean diameter D of the
+//! winding and its pitch p
 //!
 //! ```text
 //! EI = 2 p E I / (π D (2 + ν)),     GJ = p E I / (π D)
 //! ```
 //!
-//! (A. M. Wahl, *Mechanical Springs*, 2nd ed., 1963, chapters 16 and 17; turns that touch each other press with nothing.)
+//! (A. M. Wahl, *Mechanical Springs*, 2nd ed., 1963, chapters 16 and 17; turns in contact exert no force on each
+//! other.)
 
 use serde::Deserialize;
 
@@ -15,7 +17,7 @@ use super::part::{INCH_MM, MODULUS_LIMIT_MPA};
 use super::quantity::{Ends, Way, one_of, second_moment_mm4};
 use crate::{Error, Result};
 
-/// A `winding` table as it stands in the file.
+/// A `winding` table of the file.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Winding {
@@ -25,11 +27,11 @@ pub(super) struct Winding {
     modulus_gpa: f64,
     /// Poisson ratio of the metal.
     poisson_ratio: f64,
-    /// Advance of a turn, mm; the wire's diameter if absent: turn beside turn.
+    /// Advance per turn, mm; if absent the wire's diameter: close-wound.
     pitch_mm: Option<f64>,
 }
 
-/// What a winding makes of a part.
+/// Properties of a wound part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Wound {
     /// EI, N·mm².
@@ -39,10 +41,10 @@ pub(super) struct Wound {
 }
 
 impl Winding {
-    /// What it makes of a part of this outer radius, mm.
+    /// The properties of a wound part of this outer radius, mm.
     ///
     /// # Errors
-    /// Values that are missing, out of range, given twice, or contradict each other, by key.
+    /// Values that are missing, out of range, given twice, or contradictory, by key.
     pub(super) fn resolve(&self, place: &str, outer_mm: Ends) -> Result<Wound> {
         let place = format!("{place}.winding");
         let given = |value: Option<f64>| value.map(Ends::constant);
@@ -101,7 +103,8 @@ mod tests {
 
     #[test]
     fn windings_of_embolisation_coils_have_the_stiffness_of_the_formula() {
-        // Worked out by hand from the formula, five digits: wires of 0.00125, 0.00175 and 0.002 inch wound to 0.010, 0.003 to 0.015.
+        // Computed by hand from the formula, five digits: wires of 0.00125, 0.00175 and 0.002 inch wound to 0.010,
+        // 0.003 to 0.015.
         for (wire, outer, expected) in [
             (0.00125, 0.010, 3.2404e-4),
             (0.00175, 0.010, 1.8484e-3),
@@ -111,7 +114,7 @@ mod tests {
             let found = bending_nmm2(wire, outer);
             assert!((found / expected - 1.0).abs() < 1e-4, "{wire}: {found}");
         }
-        // A thicker wire in the same winding is stiffer by its fifth power and more.
+        // A thicker wire in the same winding is stiffer by at least the fifth power.
         assert!(bending_nmm2(0.002, 0.010) / bending_nmm2(0.001, 0.010) > 32.0);
     }
 

@@ -1,28 +1,29 @@
-//! Energies of a device in a field: a magnet at its tip, its weight, anything of one's own.
+//! Energies of a device in a field: a magnet at its tip, its weight, or a user-defined energy.
 //!
-//! A field is an energy u per length of the material points of a device, which may depend on where a point is and on the direction of the centre
-//! line there. With s the distance of a point from the tip of its instrument, r(s) its position and r′(s) the tangent,
+//! A field is an energy u per length of the material points of a device, which may depend on the position of a point and on the direction of the
+//! centre line there. With s the distance of a point from the tip of its instrument, r(s) its position and r′(s) the tangent,
 //!
 //! ```text
 //! U = ∫ [u(s, r, r′) − u(s, r₀, t₀)] ds
 //! ```
 //!
-//! over the length inside the vessel. r₀ and t₀ are those of the sheath's mouth: what comes in brings no energy with it, so a constant in u changes
-//! nothing, not even what the hand feels. In Li et al. 2011 (eq. 1) it is the external energy.
+//! over the length inside the vessel. r₀ and t₀ are those of the sheath's mouth: material that enters brings no energy with it, so a constant in u
+//! changes nothing, not even the hand force. In Li et al. 2011 (eq. 1) it is the external energy.
 //!
-//! The integral is taken by three Gauss points on each element, or on the part of it on which the field acts. With q = (x₀, h t₀, x₁, h t₁), the
+//! The integral uses three Gauss points on each element, or on the part of it on which the field acts. With q = (x₀, h t₀, x₁, h t₁), the
 //! unknowns of an element of length h, a point is r = Σ cᵢ qᵢ and its tangent r′ = Σ dᵢ qᵢ ([`hermite`](crate::rod::quadrature::hermite)), so
 //!
 //! ```text
 //! ∂u/∂qᵢ = cᵢ uᵣ + dᵢ uₜ,    ∂²u/∂qᵢ∂qⱼ = cᵢcⱼ uᵣᵣ + cᵢdⱼ uᵣₜ + dᵢcⱼ uᵣₜᵀ + dᵢdⱼ uₜₜ
 //! ```
 //!
-//! where derivatives by the tangent treat it as any vector: r′ has unit length only to the order of the element.
+//! where derivatives by the tangent do not assume unit length: |r′| = 1 holds only to the order of the element.
 //!
-//! [`FieldLoad`] is what a solver takes: `Simulation` makes one itself, and a static problem of one's own adds it to what acts on the rod.
+//! [`FieldLoad`] is the energy that a solver takes: `Simulation` and `StaticProblem` construct it themselves.
 
 mod load;
 mod magnet;
+mod spec;
 #[cfg(test)]
 mod tests;
 mod weight;
@@ -36,6 +37,7 @@ use crate::{Error, Result, Vec3};
 
 pub use load::FieldLoad;
 pub use magnet::Magnet;
+pub use spec::FieldSpec;
 pub use weight::Weight;
 
 /// A material point of a device in a field.
@@ -70,9 +72,8 @@ pub struct EnergyDensity {
 
 /// An energy per length of a device's material points.
 ///
-/// It is asked from many threads, and must give the same answer to the same question: simulations with it are deterministic then.
-/// Derivatives must be those of the value: with others a step finds no equilibrium. A field that is not finite where the device may go ends a step
-/// with an error.
+/// It is called from many threads and must be a pure function, so that simulations are deterministic. The derivatives must be those of the value:
+/// otherwise a step finds no equilibrium. A step into a region where the field is not finite ends with an error.
 pub trait Field: Debug + Send + Sync {
     /// Distances from the tip of an instrument between which it acts, mm: `0.0..f64::INFINITY` for all of it, an empty range for none.
     fn acts_on(&self, instrument: usize) -> Range<f64>;

@@ -1,16 +1,16 @@
-//! The drag on a length of a thread.
+//! Drag on a piece of a thread.
 
 use std::f64::consts::PI;
 
 use super::FlowAt;
 use crate::Vec3;
 
-/// A thread is taken to be at most this part of the lumen's radius thick, …
+/// Largest ratio of a thread's radius to the lumen's; thicker threads are treated as this.
 const THICKEST: f64 = 0.99;
-/// … and so near to the wall, in its radii, to lie on it.
+/// Distance from the wall, in radii of the lumen, within which a thread counts as lying on it.
 const NEXT_TO_WALL: f64 = 1e-6;
 
-/// Drag on a thread along a tube, `offset_mm` off its axis, N/mm.
+/// Drag per length on a thread along a tube, `offset_mm` off its axis, N/mm.
 pub fn drag_n_per_mm(gradient_n_per_mm3: f64, radius_mm: f64, thread_mm: f64, offset_mm: f64) -> f64 {
     let (r, e) = (radius_mm, offset_mm);
     let a = thread_mm.min(THICKEST * r);
@@ -25,7 +25,7 @@ pub fn drag_n_per_mm(gradient_n_per_mm3: f64, radius_mm: f64, thread_mm: f64, of
 }
 
 impl FlowAt {
-    /// Drag on a thread of this radius with this unit tangent, N/mm.
+    /// Drag per length on a thread of this radius with this unit tangent, N/mm.
     pub fn drag_n_per_mm(&self, thread_mm: f64, tangent: &Vec3) -> Vec3 {
         let along = drag_n_per_mm(self.gradient_n_per_mm3, self.radius_mm, thread_mm, self.offset_mm);
         (self.direction * 2.0 - tangent * self.direction.dot(tangent)) * along
@@ -37,8 +37,8 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// The same by the least squares of a series: u + G|x|²/4μ as harmonic functions of the tube and of what is outside of the thread, whose
-    /// logarithm has all of the flux.
+    /// The same drag by least squares of a series: u + G|x|²/4μ as harmonic functions of the tube and of the outside
+    /// of the thread, whose logarithm carries the whole flux.
     fn by_series(r: f64, a: f64, e: f64) -> f64 {
         const TERMS: usize = 24;
         const PLACES: usize = 200;
@@ -77,7 +77,7 @@ mod tests {
                     "{r} {a} {e}: {found} {series}"
                 );
             }
-            // On the wall it is the limit.
+            // On the wall it has the limit's value.
             let [on, near] = [1.0, 1.0 - 1e-5].map(|part| drag_n_per_mm(1.0, r, a, part * (r - a)));
             assert!(
                 (on / (PI * a * (r - a)) - 1.0).abs() < 1e-12 && (near / on - 1.0).abs() < 1e-4,
@@ -92,7 +92,7 @@ mod tests {
         let along = at.drag_n_per_mm(0.2, &-Vec3::z());
         let across = at.drag_n_per_mm(0.2, &Vec3::x());
         assert!((across - along * 2.0).norm() < 1e-15 && along.z > 0.0, "{along} {across}");
-        // Aslant it drives a thread aside.
+        // An oblique flow also pushes a thread sideways.
         let aslant = at.drag_n_per_mm(0.2, &Vec3::new(0.6, 0.0, 0.8));
         assert!(aslant.x < 0.0 && aslant.z > along.z);
     }

@@ -1,29 +1,33 @@
-//! Blood that flows, and drags at what lies in it.
+//! Blood flow, and its drag on devices.
 //!
-//! The flow is steady, laminar and developed: that of Poiseuille in a tube of the local radius R, with the share of the inflow that passes
-//! there ([`flow_nodes`]),
+//! The flow is steady, laminar and developed: Poiseuille flow in a tube of the local radius R, with the local share
+//! of the inflow ([`flow_nodes`]),
 //!
 //! ```text
 //! G = 8 μ Q / π R⁴
 //! ```
 //!
-//! the pressure gradient. It is a fair estimate in small arteries and low by the pulse and the unsteady profile in large ones. What a device
-//! takes away of the flow is left out: Q is given, and G that of the tube without it.
+//! the pressure gradient. This is a fair estimate in small arteries, and too low in large ones because of the pulse
+//! and the unsteady profile. The obstruction by a device is neglected: Q is given, and G is that of the tube without
+//! it.
 //!
-//! A thread of radius a along the tube, e off its axis, is dragged by
+//! The drag on a thread of radius a along the tube, e off its axis, is
 //!
 //! ```text
 //! f = ½ π G (S / acosh((R² + a² − e²) / 2aR) − 2a²),    S² = ((R − e)² − a²) ((R + e)² − a²)
 //! ```
 //!
-//! a length. It is exact: u + G|x|²/4μ is harmonic between two circles that are not concentric; seen through the conformal map that makes
-//! them so, its flux out of the inner circle is 2π/acosh(…) times the difference of its means over both circles, and that over the inner one
-//! is the value of a² − e² + 2ex at the limiting point within it, x = (R² + e² − a² − S)/2e. At e = 0 it is the annulus, f = ½πG ((R² − a²)/ln(R/a) − 2a²) (Bird, Stewart and Lightfoot, *Transport
-//! Phenomena*, section 2.4); next to the wall, πGa(R − a). Across the flow a thread is dragged twice as much as along it (Cox, *Journal of
-//! Fluid Mechanics* 44, 1970), so that one whose tangent t is not along the flow's direction d feels f (2d − (d·t) t).
+//! per length. It is exact: u + G|x|²/4μ is harmonic between two eccentric circles; under the conformal map that
+//! makes them concentric, its flux out of the inner circle is 2π/acosh(…) times the difference of its means over both
+//! circles, and that over the inner one is the value of a² − e² + 2ex at the limiting point within it, x = (R² + e² −
+//! a² − S)/2e. At e = 0 it is that of the annulus, f = ½πG ((R² − a²)/ln(R/a) − 2a²) (Bird, Stewart and Lightfoot,
+//! *Transport Phenomena*, section 2.4); next to the wall, πGa(R − a). The drag on a thread across the flow is twice
+//! that along it (Cox, *Journal of Fluid Mechanics* 44, 1970), so for a tangent t that is not along the flow's
+//! direction d it is f (2d − (d·t) t).
 //!
-//! Pressure is left out: on the ends of a device πa² times that at the tip, which falls by πa²G a length downstream. That is a part a/(R − a) of
-//! the drag of a thread on the wall, and less on the axis.
+//! Pressure is neglected: its force on the ends of a device is πa² times the pressure at the tip, which decreases by
+//! πa²G per length downstream. That is a fraction a/(R − a) of the drag of a thread on the wall, and less on the
+//! axis.
 
 mod drag;
 mod tree;
@@ -40,32 +44,33 @@ use crate::error::{self, in_range};
 use crate::vessel::{CentrelineTree, Lumen};
 use crate::{Error, Result, Vec3};
 
-/// Most of what flows in, ml/s: ten times the heart's.
+/// Largest inflow, ml/s: ten times the heart's.
 const MOST_INFLOW_ML_PER_S: f64 = 1000.0;
-/// Most viscosity, mPa·s.
+/// Largest viscosity, mPa·s.
 const MOST_VISCOSITY_MPA_S: f64 = 1000.0;
-/// Largest exponent by which flow divides.
+/// Largest exponent of the division of flow.
 const MOST_EXPONENT: f64 = 10.0;
-/// Most points of the centre line that are looked for in a vessel.
+/// Largest number of points of the centre line that are tested for being inside a vessel.
 const POINTS_ASKED: usize = 200;
-/// Beyond so many radii of the axis there is no flow.
+/// Distance from the axis, in radii, beyond which there is no flow.
 const OUTSIDE_RADII: f64 = 2.0;
 
-/// `[vessel.flow]`: what flows through the vessel's centre line and drags at devices.
+/// `[vessel.flow]`: the flow through the vessel's centre line, with its drag on devices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VesselFlow {
-    /// What flows in, ml/s, in the mean over a heartbeat.
+    /// Inflow, ml/s, averaged over a heartbeat.
     pub inflow_ml_per_s: f64,
-    /// A place next to the end of the centre line where it flows in, mm; the widest end, and of those about as wide the one nearest to the
-    /// head, if absent.
+    /// A position next to the end of the centre line that is the inlet, mm; if absent, the widest end, or of several
+    /// about as wide the one nearest to the head.
     #[serde(default)]
     pub inlet_mm: Option<[f64; 3]>,
-    /// Flow divides as this power of the radius.
+    /// Exponent n of the division: flow is proportional to radiusⁿ.
     #[serde(default = "murray")]
     pub split_exponent: f64,
-    /// Viscosity of the blood, mPa·s; 3.5 if absent: in tubes wider than a millimetre blood with a hematocrit of 45 % is 3.2 times as viscous
-    /// as its plasma (Pries, Neuhaus and Gaehtgens, *American Journal of Physiology* 263, 1992), and that has about 1.1 mPa·s.
+    /// Viscosity of the blood, mPa·s; 3.5 if absent: in tubes wider than a millimetre blood with a hematocrit of 45 %
+    /// is 3.2 times as viscous as its plasma (Pries, Neuhaus and Gaehtgens, *American Journal of Physiology* 263,
+    /// 1992), which has about 1.1 mPa·s.
     #[serde(default = "blood")]
     pub viscosity_mpa_s: f64,
 }
@@ -78,7 +83,7 @@ fn blood() -> f64 {
     3.5
 }
 
-/// The flow at a place.
+/// The flow at a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowAt {
     /// Downstream along the centre line, unit length.
@@ -95,9 +100,9 @@ pub struct FlowAt {
 #[derive(Debug, Clone)]
 pub struct BloodFlow {
     nodes: Vec<FlowNode>,
-    /// Stretches between a node and the one before it; …
+    /// Stretches, each between a node and the one before it.
     line: Polyline,
-    /// … the node of each.
+    /// The downstream node of each stretch.
     downstream: Vec<u32>,
     inflow_mm3_per_s: f64,
     viscosity_ns_per_mm2: f64,
@@ -107,7 +112,7 @@ impl BloodFlow {
     /// The flow through `tree`.
     ///
     /// # Errors
-    /// Values out of range, an inlet that is next to no end, and a centre line that cannot be followed.
+    /// Values out of range, an inlet that is not next to an end, and a centre line that is not a tree of usable size.
     pub fn new(tree: &CentrelineTree, flow: &VesselFlow) -> Result<Self> {
         in_range("vessel.flow.inflow_ml_per_s", flow.inflow_ml_per_s, MOST_INFLOW_ML_PER_S)?;
         in_range("vessel.flow.viscosity_mpa_s", flow.viscosity_mpa_s, MOST_VISCOSITY_MPA_S)?;
@@ -136,7 +141,7 @@ impl BloodFlow {
         })
     }
 
-    /// Refuses a centre line of which nothing lies within the vessel; its ends may stick out.
+    /// Rejects a centre line with no part within the vessel; its ends may stick out.
     pub(crate) fn check_within(&self, lumen: &Lumen) -> Result<()> {
         let Some((low, high)) = lumen.bounds_mm() else { return Ok(()) };
         let points = self.nodes.iter().map(|node| node.position_mm);
@@ -157,7 +162,7 @@ impl BloodFlow {
         Err(Error::parameter("vessel.centreline", value, mend))
     }
 
-    /// The flow at a place, of the stretch of the centre line that is nearest; none outside of the vessel.
+    /// The flow at a position, from the nearest stretch of the centre line; `None` outside the vessel.
     pub fn at(&self, x: &Vec3) -> Option<FlowAt> {
         if !x.iter().all(|c| c.is_finite()) {
             return None;
@@ -168,7 +173,7 @@ impl BloodFlow {
         let [_, part] = place.barycentric_coordinates();
         let radius_mm = node.from_radius_mm + (node.radius_mm - node.from_radius_mm) * part;
         let direction = (node.position_mm - from.position_mm).normalize();
-        // Beyond an end of the centre line the tube goes on along it.
+        // Beyond an end of the centre line the tube continues straight.
         let away = x - Vec3::new(near.point.x, near.point.y, near.point.z);
         let offset_mm = (away - direction * away.dot(&direction)).norm();
         let flow = node.share * self.inflow_mm3_per_s;
@@ -230,7 +235,7 @@ mod tests {
             ["dome", "left posterior cerebral", "right posterior cerebral"].map(share)
         };
         assert_eq!(shares(&vessel), [0.2, 0.5, 0.5]);
-        // Through an open end it would be lost.
+        // With an open end its share would be lost.
         let open = vessel.with_closed_ends(vec![]).unwrap();
         assert!((shares(&open).iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
@@ -240,7 +245,7 @@ mod tests {
         let cuboid = SurfaceMesh::cuboid(Vec3::new(-4.0, -4.0, 0.0), Vec3::new(4.0, 4.0, 50.0), 2.0);
         let lumen = Lumen::from(crate::vessel::Wall::from_surface(&cuboid).unwrap());
         let within = |x_mm, z_mm| flow(&line(x_mm, z_mm), None).unwrap().check_within(&lumen);
-        // It may stick out at its ends, or be that of a longer vessel.
+        // It may stick out at its ends, or belong to a longer vessel.
         for z_mm in [[0.0, 50.0], [-3.0, 55.0], [-200.0, 300.0], [45.0, 300.0]] {
             assert!(within(0.0, z_mm).is_ok(), "{z_mm:?}");
         }

@@ -1,48 +1,50 @@
-//! A centre-line tree directed from its inlet, and how the flow divides in it.
+//! A centre-line tree directed from its inlet, and the division of flow in it.
 //!
-//! Blood enters at the inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches the same mean velocity, as in
-//! large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of Sciences 12, 1926). What a sac takes in
-//! comes back: it has a share of its own, and the other branches divide the whole.
+//! Blood enters at the inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches the same
+//! mean velocity, as in large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of
+//! Sciences 12, 1926). The inflow of a sac comes back: it has a share of its own, and the other branches divide the
+//! whole.
 
 use crate::vessel::{CentrelineNode, CentrelineTree};
 use crate::{Error, Result, Vec3, error};
 
-/// An inlet is at most so many radii from the end that it tells.
+/// Largest distance of a given inlet from its end of the tree, in radii.
 const INLET_RADII: f64 = 5.0;
-/// Points are set at most this far apart, mm.
+/// Largest distance between points, mm.
 const SPACING_MM: f64 = 2.0;
-/// Most points: every cell of a lumen asks all of them which is nearest.
+/// Largest number of points: every cell of a lumen searches all of them for the nearest.
 const MOST_NODES: f64 = 50_000.0;
-/// Ends of at least this part of the widest's radius are about as wide.
+/// Ratio of radii from which an end counts as about as wide as the widest.
 const ABOUT_AS_WIDE: f64 = 0.95;
 
-/// Part of the flow past a sac that turns around in it: an estimate.
+/// Fraction of the flow past a sac that circulates through it: an estimate.
 const EXCHANGE: f64 = 0.2;
 
-/// A point of the tree, after those upstream of it.
+/// A point of the tree; points upstream of it come before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowNode {
     /// Position, mm.
     pub position_mm: Vec3,
     /// Radius of the lumen, mm.
     pub radius_mm: f64,
-    /// The point before it, towards the inlet; none of the inlet.
+    /// The point before it, towards the inlet; `None` for the inlet.
     pub upstream: Option<usize>,
-    /// Share of the inflow that passes here.
+    /// Local share of the inflow.
     pub share: f64,
     /// Distance from the point before, mm.
     pub length_mm: f64,
-    /// Radius where the stretch from the point before begins, mm: a side branch begins with its own in the middle of the trunk, …
+    /// Radius at the start of the stretch from the point before, mm: a side branch starts in the middle of the trunk
+    /// with its own radius.
     pub from_radius_mm: f64,
-    /// … and this says whether it is still within that.
+    /// Whether the stretch is still within the trunk.
     pub within_trunk: bool,
 }
 
-/// The points of a tree and some between them, from the inlet downstream.
+/// The points of a tree, with intermediate ones, from the inlet downstream.
 ///
 /// # Errors
-/// A tree of too many points, one that has no end, and an inlet that is not next to the end nearest to it; `keys` are those that gave the tree
-/// and the inlet.
+/// A tree with too many points, or without an end, and an inlet that is not next to its nearest end; `keys` are those
+/// that gave the tree and the inlet.
 pub fn flow_nodes(
     tree: &CentrelineTree,
     inlet_mm: Option<Vec3>,
@@ -102,12 +104,12 @@ pub fn flow_nodes(
         from_radius_mm: radius_mm,
         within_trunk: false,
     }];
-    // Points whose downstream neighbours are still to come, with the point before and the node they became.
+    // Points with downstream neighbours to be processed, with the point before and their node.
     let mut open = vec![(inlet, usize::MAX, 0_usize)];
     while let Some((at, before, becomes)) = open.pop() {
         let onwards: Vec<usize> = neighbours[at].iter().copied().filter(|&n| n != before).collect();
         let weight = |i: usize| libm::pow(points[i].radius_mm, split_exponent);
-        // Within a sac all is of it.
+        // Everything within a sac belongs to it.
         let is_sac = |i: usize| in_sac[i] && !in_sac[at];
         let total: f64 = onwards.iter().filter(|&&i| !is_sac(i)).map(|&i| weight(i)).sum();
         let widest = onwards.iter().map(|&i| points[i].radius_mm).fold(0.0, f64::max);
@@ -115,7 +117,7 @@ pub fn flow_nodes(
             let part = if is_sac(next) { EXCHANGE } else { weight(next) / total };
             let share = nodes[becomes].share * part;
             let ((x0, r0), (x1, r1)) = (place(at), place(next));
-            // A side branch begins where it leaves the trunk, and has its own radius from there on.
+            // A side branch starts where it leaves the trunk, and has its own radius from there on.
             let is_side = r1 < widest;
             let steps = pieces(&x0, &x1) as usize;
             let mut last = becomes;
@@ -138,7 +140,7 @@ pub fn flow_nodes(
     Ok(nodes)
 }
 
-/// The end where an artery is supplied: the widest, and of those about as wide the one nearest to the head.
+/// The inlet end: the widest, or of several about as wide the one nearest to the head.
 fn supplying(points: &[CentrelineNode], ends: impl Iterator<Item = usize> + Clone) -> Option<usize> {
     let widest = ends.clone().map(|i| points[i].radius_mm).fold(0.0, f64::max);
     let wide = ends.filter(|&i| points[i].radius_mm >= ABOUT_AS_WIDE * widest);

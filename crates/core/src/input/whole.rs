@@ -1,7 +1,7 @@
-//! Lists read to their ends.
+//! Deserialisation of lists without ignoring surplus elements.
 //!
-//! A list of fixed length takes the elements that it has room for, and the reader of TOML leaves what is behind them unread. [`Whole`]
-//! passes all on between a reader and what is read, and refuses a list of which elements are left.
+//! A list of fixed length takes as many elements as it has room for, and the TOML reader ignores the rest. [`Whole`]
+//! wraps the reader and the value that is read, and rejects a list with surplus elements.
 
 use std::fmt;
 
@@ -10,10 +10,10 @@ use serde::de::{
     DeserializeSeed, EnumAccess, Error, Expected, IgnoredAny, MapAccess, SeqAccess, VariantAccess, Visitor,
 };
 
-/// A reader, or what is read, with all lists in it read to their ends.
+/// A reader or a value, with all lists in it checked for surplus elements.
 pub(super) struct Whole<T>(pub(super) T);
 
-/// What a list should have been.
+/// The expected length of a list.
 struct Elements(usize);
 
 impl Expected for Elements {
@@ -108,7 +108,7 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Whole<V> {
     }
 }
 
-/// A list, and how many of its elements have been read.
+/// A list, and the number of elements read.
 struct List<A> {
     list: A,
     read: usize,

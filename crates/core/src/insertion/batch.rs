@@ -1,4 +1,4 @@
-//! Many insertions stepped side by side, each as if it were alone.
+//! Many insertions stepped in parallel, each with the same result as alone.
 
 use std::cmp::Reverse;
 
@@ -7,17 +7,17 @@ use rayon::iter::{ParallelBridge, ParallelIterator};
 use crate::insertion::{Command, Move, Simulation};
 use crate::{Error, Result};
 
-/// Simulations that are stepped on all cores, or on as many threads as `RAYON_NUM_THREADS` says.
+/// Simulations that are stepped on all cores, or on the number of threads in `RAYON_NUM_THREADS`.
 ///
-/// Each has its own state and shares what clones share: a thousand clones of one simulation hold one vessel. What comes out is to the bit
-/// what stepping one after the other gives.
+/// Each has its own state and shares what clones share: a thousand clones of one simulation contain one vessel.
+/// Results are bitwise those of stepping one after the other.
 #[derive(Clone, Default)]
 pub struct Batch {
     simulations: Vec<Simulation>,
 }
 
 impl Batch {
-    /// A batch of these, in this order. They may differ in everything.
+    /// A batch of these simulations, in this order. They may differ in everything.
     pub fn new(simulations: Vec<Simulation>) -> Self {
         Self { simulations }
     }
@@ -32,13 +32,13 @@ impl Batch {
         &mut self.simulations
     }
 
-    /// Carries out one command in each simulation. One that fails is left as it was and does not concern the others: what
-    /// [`Simulation::step`] says of it stands in its place.
+    /// Carries out one command in each simulation. One that fails is unchanged and does not affect the others; its
+    /// entry is the error of [`Simulation::step`].
     ///
-    /// A command that moves nothing ([`Command::default`]) costs nothing: for those that wait.
+    /// A command without motion ([`Command::default`]) costs nothing: for simulations that wait.
     ///
     /// # Errors
-    /// As many commands as simulations are wanted ([`Error::Parameter`]); otherwise nothing is stepped.
+    /// [`Error::Parameter`] if the numbers of commands and simulations differ; then nothing is stepped.
     pub fn step(&mut self, commands: &[Command]) -> Result<Vec<Result<()>>> {
         self.each("commands", commands, |simulation, command| simulation.step(*command).map(drop))
     }
@@ -51,8 +51,8 @@ impl Batch {
         self.each("moves", moves, |simulation, moves| simulation.step_together(moves).map(drop))
     }
 
-    /// As [`Batch::step_together`], in ticks of about so many linear solves each ([`Simulation::tick`]): no simulation keeps the others waiting for long. One that
-    /// has something left over goes on with it, moves or not.
+    /// As [`Batch::step_together`], in ticks of about `solves` linear solves each ([`Simulation::tick`]): no
+    /// simulation delays the others for long. One with unfinished motion continues it, even without moves.
     ///
     /// # Errors
     /// As [`Batch::step`].
@@ -60,7 +60,7 @@ impl Batch {
         self.each("moves", moves, |simulation, moves| simulation.tick(moves, solves, None).map(drop))
     }
 
-    /// Does something with each simulation and what is given for it.
+    /// Calls a function on each simulation with its input.
     fn each<T: Sync>(
         &mut self,
         name: &str,
@@ -71,12 +71,13 @@ impl Batch {
             let mend = format!("give one for each of the {} simulations", self.simulations.len());
             return Err(Error::parameter(name, given.len(), mend));
         }
-        // Threads are started for many, and not for one: a program may have to fork.
+        // Threads are started only for several simulations, since a program may have to fork.
         if let ([simulation], [one]) = (&mut self.simulations[..], given) {
             return Ok(vec![work(simulation, one)]);
         }
-        // Steps differ in length by orders of magnitude: each is a piece of work of its own, and those that may be long come first, so
-        // that no thread begins one when the others have done. A step is mostly like the one before it.
+        // Steps differ in duration by orders of magnitude: each is a task of its own, and those expected to be long
+        // come first, so that no thread starts one when the others have finished. A step usually resembles the one
+        // before.
         let mut all: Vec<_> = self.simulations.iter_mut().zip(given).enumerate().collect();
         all.sort_by_cached_key(|(_, (simulation, _))| Reverse(labour(simulation)));
         let step = |(index, (simulation, one))| (index, work(simulation, one));
@@ -86,7 +87,7 @@ impl Batch {
     }
 }
 
-/// What the last step took: iterations, times what each of them goes through.
+/// Cost of the last step: iterations times the number of nodes.
 fn labour(simulation: &Simulation) -> usize {
     simulation.report().iterations as usize * simulation.shape().positions_mm.len()
 }
@@ -108,7 +109,7 @@ mod tests {
         Simulation::builder(vessel.wall, wire, sheath).properties(rough).build().unwrap()
     }
 
-    /// What environment `k` does in its `step`th step.
+    /// The command of environment `k` in its `step`th step.
     fn command(k: usize, step: usize) -> Command {
         Command { advance_mm: 1.0 + 0.25 * k as f64, rotate_rad: 0.1 * ((k + step) % 5) as f64 }
     }

@@ -1,4 +1,4 @@
-//! What a simulation is made of, and the checks before it begins.
+//! Construction of a simulation, with the checks before it begins.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::rod::MAX_ANGLES;
 use crate::vessel::{Lumen, NoStore, VesselMotion, WallStore};
 use crate::{Error, Result};
 
-/// A simulation to be built: vessel, device and sheath, and what else is given.
+/// A simulation to be built from vessel, device and sheath, and optional settings.
 pub struct SimulationBuilder<'a> {
     lumen: Lumen,
     stack: Stack,
@@ -25,8 +25,8 @@ pub struct SimulationBuilder<'a> {
     store: &'a dyn WallStore,
 }
 
-/// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
-/// opening, where inside and outside meet.
+/// Distance in front of the sheath's mouth, mm, at which the inside test is made: the mouth itself may lie in the
+/// plane of an opening, where inside and outside meet.
 const MOUTH_MM: f64 = 1e-3;
 
 impl<'a> SimulationBuilder<'a> {
@@ -35,35 +35,35 @@ impl<'a> SimulationBuilder<'a> {
         Self { lumen, stack, sheath, properties, motion: None, flow: None, method: None, store: &NoStore }
     }
 
-    /// How the wall yields and rubs; [`WallProperties::default`] unless set.
+    /// Stiffness and friction of the wall; [`WallProperties::default`] unless set.
     #[must_use]
     pub fn properties(mut self, properties: WallProperties) -> Self {
         self.properties = properties;
         self
     }
 
-    /// How the vessel moves; not at all unless set.
+    /// Motion of the vessel; none unless set.
     #[must_use]
     pub fn motion(mut self, motion: Option<VesselMotion>) -> Self {
         self.motion = motion;
         self
     }
 
-    /// What flows through the vessel and drags at the device; nothing unless set.
+    /// Blood flow, with drag on the device; none unless set.
     #[must_use]
     pub fn flow(mut self, flow: Option<BloodFlow>) -> Self {
         self.flow = flow;
         self
     }
 
-    /// How equilibria are found; [`KirchhoffOptions::default`], the exact rod, unless set.
+    /// The method for equilibria; [`KirchhoffOptions::default`], the exact rod, unless set.
     #[must_use]
     pub fn method(mut self, method: &'a dyn MethodChoice) -> Self {
         self.method = Some(method);
         self
     }
 
-    /// Where walls that take long to make are kept; nowhere unless set.
+    /// A store for walls that are costly to build; none unless set.
     #[must_use]
     pub fn store(mut self, store: &'a dyn WallStore) -> Self {
         self.store = store;
@@ -73,8 +73,9 @@ impl<'a> SimulationBuilder<'a> {
     /// The device at the mouth of the sheath, nothing inserted.
     ///
     /// # Errors
-    /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
-    /// tell, blood that flows nowhere in the vessel, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
+    /// A sheath outside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too damaged for
+    /// an inside test, blood that flows nowhere in the vessel, wall properties or method options out of range, more
+    /// than three instruments with friction, and features that the method does not support.
     pub fn build(self) -> Result<Simulation> {
         let Self { lumen, stack, sheath, properties, motion, flow, method, store } = self;
         properties.check(&lumen, store)?;
@@ -83,7 +84,7 @@ impl<'a> SimulationBuilder<'a> {
         let room_mm = lumen.distance_mm(&sheath.position_mm)?;
         stack.devices().try_for_each(|device| check_mouth(room_mm, device, &sheath))?;
         motion.iter().try_for_each(|motion| check_still(room_mm, motion, &stack, &sheath))?;
-        // Of more than three those without a shape rub along the line alone.
+        // With more than three instruments, those without a rest shape have friction along the line only.
         let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
         let twists = stack.is_several() && (properties.has_friction() || rub);
         let stack = if twists { stack.twisted()? } else { stack };
@@ -96,11 +97,11 @@ impl<'a> SimulationBuilder<'a> {
         }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;
         let (fields, fields_before) = (Arc::new([]), Arc::new([]));
-        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before })
+        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before, stop: None })
     }
 }
 
-/// Refuses a sheath whose mouth is outside the vessel.
+/// Rejects a sheath whose mouth is outside the vessel.
 fn check_inside(lumen: &Lumen, sheath: &Sheath) -> Result<()> {
     if lumen.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
         return Ok(());
@@ -120,7 +121,8 @@ fn check_inside(lumen: &Lumen, sheath: &Sheath) -> Result<()> {
     ))
 }
 
-/// Refuses a motion that takes the wall, which is `mouth_mm` away, through what lies in the sheath's mouth, which stays where it is.
+/// Rejects a motion that would move the wall, `mouth_mm` away, through the device in the sheath's mouth, which does
+/// not move.
 fn check_still(mouth_mm: f64, motion: &VesselMotion, stack: &Stack, sheath: &Sheath) -> Result<()> {
     let mouth = &sheath.position_mm;
     let radius_mm = stack.radii_mm().1;
@@ -137,10 +139,11 @@ fn check_still(mouth_mm: f64, motion: &VesselMotion, stack: &Stack, sheath: &She
     Err(Error::parameter("vessel.motion", format!("{moved_mm:.3} mm"), mend))
 }
 
-/// A device so many times as thick as the vessel comes from another unit.
+/// Ratio of a device's thickness to the vessel's from which a mistake of units is assumed.
 const MISFIT: f64 = 5.0;
 
-/// Refuses a device that is in the wall from the start, which is `room_mm` from the sheath's mouth. Further in a vessel may be narrower: there the device does not pass.
+/// Rejects a device that is in contact from the start, `room_mm` being the distance of the wall from the sheath's
+/// mouth. Farther in, a vessel may be narrower: there the device cannot pass.
 fn check_mouth(room_mm: f64, device: &Device, sheath: &Sheath) -> Result<()> {
     let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
     match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {

@@ -1,4 +1,4 @@
-//! Pushing, pulling and turning a device through a sheath into a vessel.
+//! Pushing, pulling and rotating a device through a sheath into a vessel.
 
 mod batch;
 mod builder;

@@ -1,7 +1,7 @@
-//! What coils fill of a sac.
+//! Packing of a sac (aneurysm) with coils.
 //!
-//! A coil is as much volume as the circle of its outer radius along its centre line, π/4 D² L, which is how packing densities are told. It is counted
-//! where its centre line lies beyond the neck's plane.
+//! The volume of a coil is that of its outer radius along its centre line, π/4 D² L, the usual definition in packing
+//! densities. It counts where its centre line is beyond the neck's plane.
 
 use serde::Serialize;
 
@@ -13,29 +13,29 @@ use crate::shape::Shape;
 use crate::vessel::{NoStore, Sac};
 use crate::{Error, Result};
 
-/// Pieces of a coil between two nodes; of each a middle stands for all.
+/// Number of pieces of a coil between two nodes; each is represented by its middle.
 const PIECES: usize = 8;
-/// What is nearer to the neck's plane than this, mm, covers it.
+/// Distance from the neck's plane, mm, within which a coil covers it.
 const NECK_MM: f64 = 1.0;
-/// Points across the neck and across the sac at which it is asked what is free.
+/// Number of sample points across the neck and across the sac.
 const ACROSS: (usize, usize) = (60, 24);
-/// A coil that is outside the neck by more than this, mm, herniates.
+/// Distance outside the neck, mm, beyond which a coil counts as herniated.
 const HERNIATED_MM: f64 = 1.0;
 
-/// What coils do in a sac.
+/// Coils in a sac.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Packing {
     /// Volume of coils in the sac, mm³.
     pub coils_mm3: f64,
-    /// The same over the volume of the sac.
+    /// Ratio of that to the volume of the sac.
     pub density: f64,
-    /// Part of the neck's circle that is behind coils within a millimetre of it.
+    /// Fraction of the neck's circle covered by coils within a millimetre of it.
     pub neck_coverage: f64,
-    /// Length of coils that is out of the catheter and outside the neck, mm.
+    /// Length of coils out of the catheter and outside the neck, mm.
     pub outside_mm: f64,
-    /// Whether that is more than a millimetre: loops have herniated.
+    /// Whether loops have herniated: whether that is more than a millimetre.
     pub herniated: bool,
-    /// Sum of the forces by which what is pushed presses on the wall of the sac, N.
+    /// Sum of the forces of inserted devices on the wall of the sac, N.
     pub dome_force_n: f64,
 }
 
@@ -47,10 +47,10 @@ struct Piece {
 }
 
 impl Packing {
-    /// That of a simulation in the sac of its vessel.
+    /// The packing of a simulation in the sac of its vessel.
     ///
     /// # Errors
-    /// A sac without a volume, and a wall that cannot be asked.
+    /// A sac without a volume, and a wall that cannot be queried.
     pub fn of(simulation: &Simulation, sac: &Sac) -> Result<Self> {
         if !(sac.volume_mm3.is_finite() && sac.volume_mm3 > 0.0) {
             let mend = "there is nothing to fill: measure the sac of this vessel";
@@ -74,10 +74,11 @@ impl Packing {
         })
     }
 
-    /// Diameter of the largest ball that has room in the sac beside wall, neck and coils, mm: about a point of a grid of a twenty-fourth of its height.
+    /// Diameter of the largest ball that fits in the sac between wall, neck and coils, mm, centred on a point of a
+    /// grid with a spacing of a twenty-fourth of its height.
     ///
     /// # Errors
-    /// A wall that cannot be asked.
+    /// A wall that cannot be queried.
     pub fn largest_void_mm(simulation: &Simulation, sac: &Sac) -> Result<f64> {
         let coils = pieces(simulation);
         let query = simulation.lumen().query(&NoStore)?;
@@ -88,7 +89,7 @@ impl Packing {
             for (i, j) in (-half..=half).flat_map(|i| (-half..=half).map(move |j| (i, j))) {
                 let up_mm = (k as f64 + 0.5) * step_mm;
                 let at = sac.neck_mm + sac.normal * up_mm + (u * f64::from(i) + v * f64::from(j)) * step_mm;
-                // No larger one is above the neck, and none is looked for where coils leave no room.
+                // Skip points where no larger ball fits above the neck or between the coils.
                 let mut room_mm = up_mm.min(sac.height_mm);
                 for piece in &coils {
                     room_mm = room_mm.min((piece.at_mm - at).norm() - piece.radius_mm);
@@ -107,7 +108,7 @@ impl Packing {
     }
 }
 
-/// The coils that were detached, and what is out of the one that is in.
+/// The detached coils, and the part of the inserted one that is out.
 fn pieces(simulation: &Simulation) -> Vec<Piece> {
     let stack = simulation.stack();
     let device = |instrument: usize| &stack.instruments()[instrument].device;
@@ -127,7 +128,7 @@ fn pieces(simulation: &Simulation) -> Vec<Piece> {
     all
 }
 
-/// Cuts what is nearer to the tip of a device than `out_mm`.
+/// Cuts the part of a device within `out_mm` of its tip into pieces.
 fn cut(shape: &Shape, device: &Device, out_mm: f64, into: &mut Vec<Piece>) {
     for e in 0..shape.len().saturating_sub(1) {
         let (from_mm, to_mm) = (shape.from_tip_mm[e].min(out_mm), shape.from_tip_mm[e + 1]);
@@ -151,7 +152,7 @@ fn across(normal: &Vec3) -> [Vec3; 2] {
     [frame.u, frame.v]
 }
 
-/// Part of the circle of the neck's area onto which coils near it fall.
+/// Fraction of the circle of the neck's area covered by the projection of coils near it.
 fn covered(sac: &Sac, coils: &[&Piece]) -> f64 {
     let [u, v] = across(&sac.normal);
     let near = coils.iter().filter(|piece| (piece.at_mm - sac.neck_mm).dot(&sac.normal) <= NECK_MM);
@@ -220,7 +221,7 @@ mod tests {
             aspect_ratio: 1.0,
         };
         let all: Vec<&Piece> = pieces.iter().collect();
-        // The annulus of 1.85 to 2.15 mm; of a ring higher up nothing counts.
+        // The annulus of 1.85 to 2.15 mm; a ring higher up does not count.
         let expected = (2.15 * 2.15 - 1.85 * 1.85) / (2.5 * 2.5);
         assert!((covered(&sac(0.5), &all) - expected).abs() < 0.03, "{}", covered(&sac(0.5), &all));
         assert_eq!(covered(&sac(1.5), &all), 0.0);

@@ -8,16 +8,17 @@ use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
 use crate::methods::{
-    Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings, WallForce,
+    Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Stop, Surroundings,
+    WallForce,
 };
 use crate::shape::Shape;
 use crate::vessel::{Displacement, Lumen, VesselMotion};
 use crate::{Error, Result, Vec3};
 
-/// An insertion under way.
+/// A running insertion.
 ///
-/// What surrounds the device is shared by all clones of a simulation, which may run on any threads; what a clone has of its own is its
-/// state, and with its first step a workspace.
+/// Clones of a simulation share the device's environment, and may run on any threads; each has its own state and,
+/// from its first step on, its own workspace.
 pub struct Simulation {
     pub(super) scene: Arc<Environment>,
     pub(super) method: Box<dyn Method>,
@@ -27,12 +28,14 @@ pub struct Simulation {
     pub(super) fields: Fields,
     /// … and those in which it was when it last came to rest.
     pub(super) fields_before: Fields,
+    /// Says whether a step is to be stopped.
+    pub(super) stop: Option<Arc<Stop>>,
 }
 
 /// Fields that clones share.
 type Fields = Arc<[Arc<dyn Field>]>;
 
-/// What a simulation never changes.
+/// The immutable part of a simulation.
 pub(super) struct Environment {
     pub(super) lumen: Lumen,
     pub(super) properties: WallProperties,
@@ -47,7 +50,8 @@ impl Environment {
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
         let Self { lumen, properties, sheath, stack, motion, flow } = self;
         let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
-        Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields: [&[], &[]], time_s }
+        let fields = [&[][..]; 2];
+        Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields, stop: None, time_s }
     }
 }
 
@@ -59,21 +63,24 @@ impl Clone for Simulation {
             time_s: self.time_s,
             fields: Arc::clone(&self.fields),
             fields_before: Arc::clone(&self.fields_before),
+            stop: self.stop.clone(),
         }
     }
 }
 
-/// What surrounds the device in a step until a time. The method is not part of it: it works in these surroundings.
-fn surroundings<'a>(
-    scene: &'a Environment,
-    [before, after]: [&'a Fields; 2],
-    time_s: [f64; 2],
-) -> Surroundings<'a> {
-    Surroundings { fields: [before, after], ..scene.surroundings(time_s) }
+/// What surrounds the device in a step of a simulation until a time; apart from its method, which works in these surroundings.
+macro_rules! surroundings {
+    ($simulation:expr, $time_s:expr) => {
+        Surroundings {
+            fields: [&$simulation.fields_before, &$simulation.fields],
+            stop: $simulation.stop.as_deref(),
+            ..$simulation.scene.surroundings([$simulation.time_s, $time_s])
+        }
+    };
 }
 
 impl Simulation {
-    /// A simulation of a device, or of several instruments, that enter a vessel through `sheath`, to be built.
+    /// A builder for a simulation of a device, or of several instruments, that enter a vessel through `sheath`.
     pub fn builder<'a>(
         lumen: impl Into<Lumen>,
         stack: impl Into<Stack>,
@@ -82,33 +89,36 @@ impl Simulation {
         SimulationBuilder::new(lumen.into(), stack.into(), sheath)
     }
 
-    /// Carries out one command, of several instruments on the innermost. After an error the state is as before, to the bit.
+    /// Carries out one command; with several instruments, of the innermost. After an error the state is unchanged, to
+    /// the bit.
     ///
     /// # Errors
-    /// A command that is not finite, turns more than a thousand times, pushes in more than the device's length or pulls out more than is inserted
-    /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
+    /// A command that is not finite, rotates by more than a thousand turns, pushes in more than the device's length
+    /// or pulls out more than is inserted (all [`Error::Parameter`]); a step without an equilibrium
+    /// ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
         self.step_together(&[Move { instrument: 0, command }])
     }
 
-    /// Moves instruments, each by its own command, all at the same time. After an error the state is as before, to the bit.
+    /// Moves instruments, each by its own command, all at the same time. After an error the state is unchanged, to
+    /// the bit.
     ///
     /// # Errors
-    /// As [`Simulation::step`] for each; an instrument that is not there or moved twice, and instruments that cannot be in
-    /// together so far ([`Stack::check_places`]; all [`Error::Parameter`]).
+    /// As [`Simulation::step`] for each; an instrument that does not exist or is moved twice, and instruments that
+    /// cannot be inserted together by these lengths ([`Stack::check_places`]; all [`Error::Parameter`]).
     pub fn step_together(&mut self, moves: &[Move]) -> Result<&StepReport> {
         self.step_until(moves, None)
     }
 
-    /// As [`Simulation::step_together`], while time goes on evenly until `time_s`, with the vessel if it moves; no time goes by where none is given.
+    /// As [`Simulation::step_together`], while time proceeds uniformly to `time_s`, and the vessel with it if it
+    /// moves; without a time none passes.
     ///
     /// # Errors
-    /// As [`Simulation::step_together`], and a time before that of the last step or none at all.
+    /// As [`Simulation::step_together`], and a time before that of the last step or not finite.
     pub fn step_until(&mut self, moves: &[Move], time_s: Option<f64>) -> Result<&StepReport> {
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
-        let surroundings =
-            surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s, time_s]);
+        let surroundings = surroundings!(self, time_s);
         if self.scene.stack.is_several() {
             self.method.step_together(&surroundings, moves)?;
         } else {
@@ -120,23 +130,24 @@ impl Simulation {
         Ok(self.method.report())
     }
 
-    /// As [`Simulation::step_until`] in a tick of fixed cost: in about `solves` linear solves ([`StepReport::solves`]), whether the device comes to rest in them or not.
-    /// For haptics and screens that must have an answer in time.
+    /// As [`Simulation::step_until`] in a tick of bounded cost: in about `solves` linear solves
+    /// ([`StepReport::solves`]), whether the device comes to rest in them or not. For haptics and displays that need
+    /// an answer in time.
     ///
-    /// What is left over is reported ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step goes on with it; with hands at rest ticks lead to
-    /// an equilibrium. No state lies beyond a wall: hands whose way is blocked in the tick wait. Where the vessel moves and so many solves do not do, the tick takes
-    /// what a step takes. Methods other than `kirchhoff` step.
+    /// Unfinished motion is reported ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step
+    /// continues it; with hands at rest ticks reach an equilibrium. No state is beyond a wall: hands whose way is
+    /// blocked in the tick wait. If the vessel moves and these solves do not suffice, the tick takes as many as a
+    /// step. Methods other than `kirchhoff` take a step.
     ///
     /// # Errors
-    /// As [`Simulation::step_until`], and no solves at all.
+    /// As [`Simulation::step_until`], and zero solves.
     pub fn tick(&mut self, moves: &[Move], solves: usize, time_s: Option<f64>) -> Result<&StepReport> {
         if solves == 0 {
             return Err(Error::parameter("solves", solves, "allow at least one"));
         }
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
-        let surroundings =
-            surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s, time_s]);
+        let surroundings = surroundings!(self, time_s);
         self.method.tick(&surroundings, moves, solves)?;
         self.time_s = time_s;
         if !self.method.report().is_under_way() {
@@ -145,7 +156,7 @@ impl Simulation {
         Ok(self.method.report())
     }
 
-    /// The time that a step ends at.
+    /// The time at the end of a step.
     fn check_time(&self, time_s: Option<f64>) -> Result<f64> {
         let time_s = time_s.unwrap_or(self.time_s);
         if (self.time_s..=LATEST_S).contains(&time_s) {
@@ -155,46 +166,67 @@ impl Simulation {
         Err(Error::parameter("time_s", time_s, mend))
     }
 
-    /// Leaves the coil of an instrument behind, where it comes to rest, and takes its pusher out. After an error the state is as before, to the
-    /// bit.
+    /// Detaches the coil of an instrument, which comes to rest, and withdraws its pusher. After an error the state is
+    /// unchanged, to the bit.
     ///
     /// # Errors
-    /// An instrument that is not there, is no coil, is detached already or not out yet ([`Error::Parameter`]); a coil, or what is left in the vessel,
-    /// that does not come to rest ([`Error::Computation`]).
+    /// An instrument that does not exist, is not a coil, is already detached or is not yet fully out
+    /// ([`Error::Parameter`]); a coil or remaining device that does not come to rest ([`Error::Computation`]).
     pub fn detach(&mut self, instrument: usize) -> Result<&StepReport> {
-        let instruments = self.scene.stack.instruments().len();
-        if instrument >= instruments {
-            let mend = format!("there are {instruments}, the innermost is 0");
-            return Err(Error::parameter("detach", instrument, mend));
-        }
-        let surroundings = surroundings(&self.scene, [&self.fields_before, &self.fields], [self.time_s; 2]);
+        self.check_detach(instrument)?;
+        let surroundings = surroundings!(self, self.time_s);
         self.method.detach(&surroundings, instrument)?;
         self.fields_before = Arc::clone(&self.fields);
         Ok(self.method.report())
     }
 
-    /// Puts the device into these fields, in place of those in which it was: it goes over into them with the next step or tick, along equilibria
-    /// as far as there are some, and a step without a motion will do. What lies in the sheath and coils that were detached do not feel them; a [`State`] has none, so that a
-    /// simulation that is restored is in the fields that it has.
+    /// Checks whether the coil of an instrument can be detached where it is.
     ///
     /// # Errors
-    /// A method that takes none.
+    /// As [`Simulation::detach`], except [`Error::Computation`].
+    pub fn check_detach(&self, instrument: usize) -> Result<()> {
+        let instruments = self.scene.stack.instruments().len();
+        if instrument >= instruments {
+            let mend = format!("there are {instruments}, the innermost is 0");
+            return Err(Error::parameter("detach", instrument, mend));
+        }
+        self.method.check_detach(&surroundings!(self, self.time_s), instrument)
+    }
+
+    /// Replaces the fields in which the device lies. The next step or tick follows the equilibrium from the old fields to the new ones; a command
+    /// without motion is enough. The length inside the sheath and detached coils do not feel fields. A [`State`] contains none: a restored simulation
+    /// keeps its own.
+    ///
+    /// # Errors
+    /// A method that supports no fields; a field that acts on none of the instruments.
     pub fn set_fields(&mut self, fields: impl IntoIterator<Item = Arc<dyn Field>>) -> Result<()> {
         let fields: Fields = fields.into_iter().collect();
         if !fields.is_empty() && !self.method.takes_fields() {
             let mend = "this method knows no fields: use kirchhoff";
             return Err(Error::parameter("fields", fields.len(), mend));
         }
+        let instruments = self.scene.stack.instruments().len();
+        let acts = |field: &Arc<dyn Field>| (0..instruments).any(|index| !field.acts_on(index).is_empty());
+        if let Some(index) = fields.iter().position(|field| !acts(field)) {
+            let mend = format!("acts on none of the {instruments} instruments: the innermost is 0");
+            return Err(Error::parameter(format!("field[{index}]"), format!("{:?}", fields[index]), mend));
+        }
         self.fields = fields;
         Ok(())
     }
 
-    /// Coils that were detached, in their order.
+    /// Ends long steps of this simulation and its later clones with [`Error::Stopped`] once `stop` returns true. It is called between the sub-steps of a
+    /// command, and not in commands of a single sub-step.
+    pub fn stop_when(&mut self, stop: impl Fn() -> bool + Send + Sync + 'static) {
+        self.stop = Some(Arc::new(stop));
+    }
+
+    /// Detached coils, in the order of detachment.
     pub fn coils(&self) -> &[DetachedCoil] {
         self.method.coils()
     }
 
-    /// Refuses to advance an instrument whose coil was left behind.
+    /// Rejects advancing an instrument whose coil is detached.
     fn check_attached(&self, command: Command, instrument: usize) -> Result<()> {
         if command.advance_mm <= 0.0 || self.coils().iter().all(|coil| coil.instrument != instrument) {
             return Ok(());
@@ -207,7 +239,7 @@ impl Simulation {
     fn check_moves(&self, moves: &[Move]) -> Result<()> {
         let report = self.method.report();
         let instruments = self.scene.stack.instruments();
-        // With what ticks have left over.
+        // Including motion left over by ticks.
         let inserted = |index: usize| {
             report.hand(index).inserted_mm + report.behind.get(index).map_or(0.0, |left| left.advance_mm)
         };
@@ -222,7 +254,7 @@ impl Simulation {
             }
             self.check_attached(one.command, one.instrument)?;
             let checked = check_command(one.command, inserted(one.instrument), instrument.device.length_mm());
-            // A device alone has no name that a user has given it.
+            // A single device has no name given by the user.
             let several = instruments.len() > 1;
             checked.map_err(|error| if several { within(&instrument.name, error) } else { error })?;
         }
@@ -232,16 +264,17 @@ impl Simulation {
         self.scene.stack.check_places(after)
     }
 
-    /// All that the next step depends on, beside what surrounds the device.
+    /// Everything the next step depends on, except the device's environment.
     pub fn state(&self) -> State {
         self.method.state().at(self.time_s)
     }
 
-    /// Goes on from a state of this scene as if nothing else had been: shape, report and all further steps are those of the simulation that
-    /// it was taken from, to the bit. After an error nothing has changed.
+    /// Continues from a state of this scene: shape, report and all further steps are those of the simulation it was
+    /// taken from, to the bit. After an error nothing has changed.
     ///
     /// # Errors
-    /// A state of another method, vessel, device, sheath or element length, as far as its numbers show it ([`Error::Parameter`]).
+    /// A state of another method, vessel, device, sheath or element length, as far as its numbers reveal it
+    /// ([`Error::Parameter`]).
     pub fn restore(&mut self, state: &State) -> Result<()> {
         if !(0.0..=LATEST_S).contains(&state.time_s()) {
             let mend = format!("must be a time from 0 to {LATEST_S} s: restore a state of this scene");
@@ -253,23 +286,24 @@ impl Simulation {
         Ok(())
     }
 
-    /// Drops the memory that steps work with, which the next one takes anew; no result changes. For simulations that wait.
+    /// Frees the workspace, which the next step allocates again; results do not change. For simulations that wait.
     pub fn drop_workspace(&mut self) {
         self.method.drop_workspace();
     }
 
-    /// Questions about the wall since the start, of the simulation and those it was cloned from.
+    /// Wall queries since the start, of the simulation and those it was cloned from.
     pub fn counters(&self) -> Counters {
         self.method.counters()
     }
 
-    /// What holds an instrument, and all that lies in it, on the line of those outside it: at every node of [`shape`](Simulation::shape) the
-    /// force across the line. None where nothing is outside the instrument or it has ended, at the sheath's mouth, and of a device alone.
+    /// Forces across the line on an instrument and all inside it by those outside it, at every node of
+    /// [`shape`](Simulation::shape). `None` where nothing is outside the instrument or it has ended, and at the
+    /// sheath's mouth; empty for a single device.
     pub fn lateral_forces(&self, instrument: usize) -> Vec<LateralForce> {
         self.method.lateral_forces(&self.scene.surroundings([self.time_s; 2]), instrument)
     }
 
-    /// Where loops of the device press on each other; nothing where the method does not know of them.
+    /// Contacts between loops of the device; empty for methods without self-contact.
     pub fn touching(&self) -> Vec<Touching> {
         self.method.touching(&self.scene.surroundings([self.time_s; 2]))
     }
@@ -279,20 +313,20 @@ impl Simulation {
         self.method.shape()
     }
 
-    /// Position of the tip of an instrument; none while it is not in.
+    /// Position of the tip of an instrument; `None` while it is not inserted.
     pub fn tip_of_mm(&self, instrument: usize) -> Option<Vec3> {
         let report = self.report();
         let inserted_mm = report.lengths_mm().get(instrument).copied().filter(|mm| *mm > 0.0)?;
         self.shape().behind(report.inserted_mm - inserted_mm).tip_mm()
     }
 
-    /// What the last step found.
+    /// The report of the last step.
     pub fn report(&self) -> &StepReport {
         self.method.report()
     }
 
-    /// How hard the wall holds what is in ([`StepReport::wall_force`]); the tip is that of the farthest instrument, of several as far in the
-    /// thickest.
+    /// Magnitudes of the wall's forces ([`StepReport::wall_force`]); the tip is that of the instrument inserted
+    /// farthest, of several that far the thickest.
     pub fn wall_force(&self) -> WallForce {
         let lengths_mm = self.report().lengths_mm();
         let line_mm = line_mm(lengths_mm.iter().copied());
@@ -306,22 +340,22 @@ impl Simulation {
         self.time_s
     }
 
-    /// How the vessel moves; none where it rests.
+    /// Motion of the vessel; `None` if it rests.
     pub fn motion(&self) -> Option<&VesselMotion> {
         self.scene.motion.as_ref()
     }
 
-    /// Where the vessel is; none where it never moves.
+    /// Displacement of the vessel; `None` if it never moves.
     pub fn displacement(&self) -> Option<Displacement> {
         self.motion().map(|motion| motion.at(self.time_s))
     }
 
-    /// The vessel, as it is at rest.
+    /// The vessel at rest.
     pub fn lumen(&self) -> &Lumen {
         &self.scene.lumen
     }
 
-    /// The device; of several instruments the innermost.
+    /// The device; with several instruments the innermost.
     pub fn device(&self) -> &Device {
         self.scene.stack.first()
     }
@@ -337,14 +371,14 @@ impl Simulation {
     }
 }
 
-/// Latest time of a step, s: beyond it hardly any digits are left for a heartbeat.
+/// Latest time of a step, s: beyond it too few digits are left to resolve a heartbeat.
 const LATEST_S: f64 = 1e9;
 
-/// Largest turn of one command, rad: a thousand turns. Beyond that a hand's input is a mistake, and far beyond it an angle has no digits
-/// left that tell where on the circle it is.
+/// Largest rotation of one command, rad: a thousand turns. More is a mistake, and far beyond it an angle has too few
+/// digits to resolve the position on the circle.
 const TURN_LIMIT_RAD: f64 = 1000.0 * std::f64::consts::TAU;
 
-/// The same error, of the instrument of that name.
+/// The same error, with the name of the instrument.
 fn within(instrument: &str, error: Error) -> Error {
     match error {
         Error::Parameter { name, value, mend } => {
@@ -355,7 +389,7 @@ fn within(instrument: &str, error: Error) -> Error {
 }
 
 pub(super) fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
-    // Without the last digits of a sum of increments.
+    // Rounded, to hide the error of summed increments.
     let shown_mm = (inserted_mm * 1e6).round() / 1e6;
     for (name, value) in [("advance_mm", command.advance_mm), ("rotate_rad", command.rotate_rad)] {
         if !value.is_finite() {

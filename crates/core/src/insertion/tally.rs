@@ -1,30 +1,31 @@
-//! How a run went, counted over its steps.
+//! Statistics of a run over its steps.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Simulation, WallForce};
 
-/// What is counted over the steps of a run, whatever carries it out.
+/// Statistics over the steps of a run, whatever carries it out.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Tally {
-    /// Steps that did not meet the method's own convergence test, ticks on their way to an equilibrium left out: their shapes are no equilibria.
+    /// Steps that did not meet the method's own convergence test, except ticks on their way to an equilibrium: their
+    /// shapes are not equilibria.
     pub unconverged_steps: usize,
     /// The first of them, from 1.
     pub first_unconverged_step: Option<usize>,
     /// Steps in which the device jumped to a lower minimum.
     pub jumps: usize,
-    /// Last resorts of all steps ([`StepReport::relaxations`](super::StepReport::relaxations)).
+    /// Relaxations of all steps ([`StepReport::relaxations`](super::StepReport::relaxations)).
     pub relaxations: u64,
     /// Largest imbalance of any step ([`StepReport::imbalance`](super::StepReport::imbalance)).
     pub max_imbalance: f64,
     /// Deepest penetration of the wall in any step, mm.
     pub max_penetration_mm: f64,
-    /// Each of these forces where it was largest.
+    /// The maximum of each of these forces.
     pub max_wall_force: WallForce,
 }
 
 impl Tally {
-    /// Counts step number `step`, from 1, which the simulation has just carried out.
+    /// Adds step number `step`, from 1, which the simulation has just carried out.
     pub fn count(&mut self, step: usize, simulation: &Simulation) {
         let (report, force) = (simulation.report(), simulation.wall_force());
         if report.has_failed() {
@@ -44,7 +45,8 @@ impl Tally {
         most.tip_n = most.tip_n.max(force.tip_n);
     }
 
-    /// What went otherwise than it should, in words: "3 of 60 steps without an equilibrium, the first step 12; 1 jump". None where nothing did.
+    /// Irregularities in words: "3 of 60 steps without an equilibrium, the first step 12; 1 jump". `None` if there
+    /// were none.
     pub fn remarks(&self, steps: usize) -> Option<String> {
         let mut remarks = Vec::new();
         if let Some(first) = self.first_unconverged_step {

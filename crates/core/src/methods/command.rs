@@ -1,4 +1,4 @@
-//! What the hand does: advance, retract and rotate, alone or together.
+//! Motions of the hand: advance, retract and rotate, alone or together.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct Command {
     /// Length pushed in, mm; negative pulls back.
     pub advance_mm: f64,
-    /// Turn of the tail about its axis, rad; positive is right-handed about the direction of insertion.
+    /// Rotation of the tail about its axis, rad; positive is right-handed about the direction of insertion.
     pub rotate_rad: f64,
 }
 
@@ -22,16 +22,16 @@ impl Command {
         Self::advance(-mm)
     }
 
-    /// Turns the tail by `rad`.
+    /// Rotates the tail by `rad`.
     pub fn rotate(rad: f64) -> Self {
         Self { advance_mm: 0.0, rotate_rad: rad }
     }
 }
 
-/// What the hand of one of several instruments does.
+/// The motion of the hand of one of several instruments.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Move {
-    /// Number of the instrument, the innermost being 0 ([`Stack::find`](crate::device::Stack::find) has it by name).
+    /// Index of the instrument, 0 being the innermost ([`Stack::find`](crate::device::Stack::find) finds it by name).
     pub instrument: usize,
     /// Its motion.
     pub command: Command,

@@ -1,14 +1,14 @@
-//! Coils that were detached from their pushers.
+//! Coils detached from their pushers.
 
 use serde::{Deserialize, Serialize};
 
 use crate::shape::Shape;
 
-/// A coil that was detached and lies in the vessel: a rod that nothing holds. What is pushed on touches it and moves it.
+/// A detached coil in the vessel: a rod that nothing holds. Devices that are pushed on touch and move it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DetachedCoil {
-    /// Number of the instrument whose coil it was.
+    /// Index of the instrument whose coil it was.
     pub instrument: usize,
-    /// Its centre line, from the end that was detached to its tip.
+    /// Its centre line, from the detached end to the tip.
     pub shape: Shape,
 }

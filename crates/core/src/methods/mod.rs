@@ -1,5 +1,4 @@
-//! Whole methods that answer a command with the next equilibrium, behind one trait: what surrounds them, what they are told, and what
-//! they tell.
+//! Complete methods that compute the equilibrium after a command, behind one trait, with their inputs and outputs.
 
 mod command;
 mod detached;
@@ -28,34 +27,47 @@ use crate::vessel::{Displacement, Lumen, VesselMotion, WallStore};
 use crate::{Error, Result};
 use kirchhoff::KirchhoffOptions;
 
-/// What surrounds a method's unknowns: it may read all of it and change none.
+/// The environment of a method's unknowns, which it may read but not change.
 #[derive(Clone, Copy)]
 pub struct Surroundings<'a> {
     /// The vessel.
     pub lumen: &'a Lumen,
-    /// How the vessel's wall yields and rubs.
+    /// Stiffness and friction of the vessel's wall.
     pub properties: &'a WallProperties,
-    /// Where the device comes from.
+    /// The sheath, from which the device comes.
     pub sheath: &'a Sheath,
-    /// The device; of several instruments the innermost.
+    /// The device; with several instruments the innermost.
     pub device: &'a Device,
     /// All instruments.
     pub stack: &'a Stack,
-    /// How the vessel moves; none where it rests.
+    /// Motion of the vessel; `None` if it rests.
     pub motion: Option<&'a VesselMotion>,
-    /// What flows through the vessel and drags at the device; nothing where it is left out.
+    /// Blood flow, which exerts drag on the device; `None` if not modelled.
     pub flow: Option<&'a BloodFlow>,
     /// The fields in which the device is before and after the step.
     pub fields: [&'a [Arc<dyn Field>]; 2],
+    /// Returns true once a long step is to end without a result; called between sub-steps.
+    pub stop: Option<&'a Stop>,
     /// Time before and after the step, s.
     pub time_s: [f64; 2],
 }
+
+/// Returns true once a long computation is to end; called from any thread.
+pub type Stop = dyn Fn() -> bool + Send + Sync;
 
 impl<'a> Surroundings<'a> {
     /// Whether the vessel moves in the step.
     pub fn moves(&self) -> bool {
         let [before, after] = self.time_s;
         before != after && self.motion.is_some_and(VesselMotion::changes)
+    }
+
+    /// Ends a step that is to be stopped.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn check_stop(&self) -> Result<()> {
+        if self.stop.is_some_and(|stop| stop()) { Err(Error::Stopped) } else { Ok(()) }
     }
 
     /// Whether the device is in other fields after the step.
@@ -78,7 +90,7 @@ impl<'a> Surroundings<'a> {
             .map(|motion| motion.at(if part == 1.0 { after } else { before + (after - before) * part }))
     }
 
-    /// Refuses a vessel that moves, and blood that does, on behalf of a method that knows both at rest.
+    /// Rejects a moving vessel and blood flow, for a method that supports neither.
     ///
     /// # Errors
     /// Any motion and any flow.
@@ -92,17 +104,17 @@ impl<'a> Surroundings<'a> {
 
 /// A method keeps its own unknowns from step to step and moves them by commands.
 ///
-/// What the next step depends on is its [`State`]; what it works with besides is a workspace, which may be dropped at any moment.
+/// The next step depends on its [`State`] alone; everything else is a workspace, which may be dropped at any time.
 pub trait Method: Send {
     /// Carries out one command and finds the equilibrium after it.
     ///
-    /// After an error the state is what it was before the command, to the bit.
+    /// After an error the state is bitwise the same as before the command.
     ///
     /// # Errors
-    /// A command that the device or the method cannot follow (input), or an equilibrium not found (computation).
+    /// A command that the device or the method cannot follow (input), or no equilibrium found (computation).
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()>;
 
-    /// Moves several instruments at the same time; asked of methods that take several, and of no other.
+    /// Moves several instruments at the same time; only called for methods that support several.
     ///
     /// # Errors
     /// As [`Method::step`].
@@ -111,12 +123,13 @@ pub trait Method: Send {
         Err(Error::parameter("moves", moves.len(), mend))
     }
 
-    /// Moves instruments in about so many linear solves, whether the device comes to rest in them or not: no state lies beyond a wall, and what is left over, of
-    /// the hands' motions or of forces, the next tick or step goes on with ([`StepReport::behind`]). Where the vessel moves, and takes the device
-    /// where that many do not do, it takes as many as a step does. Methods that know of no ticks step.
+    /// Moves instruments within about `solves` linear solves, whether the device comes to rest in them or not: no
+    /// state is beyond a wall, and remaining motion of the hands, or imbalance of forces, is left to the next tick or
+    /// step ([`StepReport::behind`]). If the vessel moves, and moves the device, and these solves do not suffice, it
+    /// takes as many as a step. Methods without ticks take a step.
     ///
     /// # Errors
-    /// As [`Method::step`], except that an equilibrium that is not found is none.
+    /// As [`Method::step`], except that a missing equilibrium is not an error.
     fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], _solves: usize) -> Result<()> {
         if surroundings.stack.is_several() {
             return self.step_together(surroundings, moves);
@@ -124,12 +137,20 @@ pub trait Method: Send {
         self.step(surroundings, moves.first().map_or_else(Command::default, |one| one.command))
     }
 
-    /// Leaves the coil of an instrument behind and takes its pusher out; asked of methods that know coils, and of no other.
+    /// Detaches the coil of an instrument and withdraws its pusher; only called for methods that support coils.
     ///
     /// # Errors
-    /// An instrument that is no coil, is detached already or is not out yet (input); a coil, or what is left, that does not come to rest
-    /// (computation).
+    /// An instrument that is not a coil, is already detached or is not yet fully out (input); a coil or a device that
+    /// does not come to rest afterwards (computation).
     fn detach(&mut self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
+    }
+
+    /// Checks whether [`Method::detach`] is possible in the current state.
+    ///
+    /// # Errors
+    /// As [`Method::detach`], except [`Error::Computation`].
+    fn check_detach(&self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
         Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
     }
 
@@ -138,7 +159,7 @@ pub trait Method: Send {
         &[]
     }
 
-    /// Whether it knows of fields ([`Surroundings::fields`]).
+    /// Whether it supports fields ([`Surroundings::fields`]).
     fn takes_fields(&self) -> bool {
         false
     }
@@ -146,20 +167,20 @@ pub trait Method: Send {
     /// The inserted centre line.
     fn shape(&self) -> &Shape;
 
-    /// What the last step found.
+    /// The report of the last step.
     fn report(&self) -> &StepReport;
 
-    /// Questions about the wall since the method was made; those of the one it was cloned from are among them.
+    /// Wall queries since the method was created, including those of the one it was cloned from.
     fn counters(&self) -> Counters {
         Counters::default()
     }
 
-    /// Forces that the instruments outside one exert on it, at every node; none of methods that push one device.
+    /// Forces on an instrument from those outside it, at every node; empty for methods with a single device.
     fn lateral_forces(&self, _surroundings: &Surroundings<'_>, _instrument: usize) -> Vec<LateralForce> {
         vec![LateralForce::default(); self.shape().len()]
     }
 
-    /// Where loops of the device press on each other; nothing of methods that do not know.
+    /// Contacts between loops of the device; empty for methods without self-contact.
     fn touching(&self, _surroundings: &Surroundings<'_>) -> Vec<Touching> {
         Vec::new()
     }
@@ -167,35 +188,36 @@ pub trait Method: Send {
     /// All that the next step depends on.
     fn state(&self) -> State;
 
-    /// Goes on from `state`. After an error nothing has changed.
+    /// Continues from `state`. After an error nothing has changed.
     ///
     /// # Errors
-    /// A state of another method, vessel or device, as far as that shows.
+    /// A state of another method, vessel or device, as far as that can be detected.
     fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()>;
 
-    /// Drops what makes steps fast and no other: the next one makes it anew.
+    /// Drops caches that make steps faster but not different: the next one rebuilds them.
     fn drop_workspace(&mut self) {}
 
-    /// The method in the same state.
+    /// A clone in the same state.
     fn boxed_clone(&self) -> Box<dyn Method>;
 }
 
 /// A method with its options: what a scene names in `[method]`, and what a simulation starts with.
 ///
-/// A scene reads its table into any type that has this and `serde`'s `Deserialize`: this crate's is [`OwnMethod`].
+/// A scene deserialises its table into any type with this trait and `serde`'s `Deserialize`: in this crate
+/// [`OwnMethod`].
 pub trait MethodChoice: Debug {
     /// The name used in scene files and results.
     fn name(&self) -> &'static str;
 
-    /// Whether it takes several instruments that lie in one another.
+    /// Whether it supports several coaxial instruments.
     fn takes_several(&self) -> bool {
         false
     }
 
-    /// The method at rest at the sheath, nothing inserted; walls that take long to make come from `store`.
+    /// The method at rest at the sheath, nothing inserted; walls that are costly to build come from `store`.
     ///
     /// # Errors
-    /// Options out of range, and what the method cannot do.
+    /// Options out of range, and features the method does not support.
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>>;
 }
 

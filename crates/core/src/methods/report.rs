@@ -14,7 +14,7 @@ pub struct Energy {
     pub bend: f64,
     /// Twist; 0 for methods without it.
     pub twist: f64,
-    /// Deformation of the vessel wall, and of the device's surface where its loops touch each other.
+    /// Deformation of the vessel wall, and of the device's surface at contacts between its loops.
     pub wall: f64,
     /// In a [`Field`](crate::field::Field); 0 without one.
     #[serde(default)]
@@ -29,7 +29,7 @@ impl Energy {
 }
 
 impl StepReport {
-    /// The report of a step in which the hand does nothing.
+    /// Turns it into the report of a step without hand motion.
     pub(crate) fn rest(&mut self) {
         (self.iterations, self.solves, self.substeps) = (0, 0, 0);
         (self.dissipated_mj, self.jumped, self.jump) = (0.0, false, None);
@@ -38,17 +38,17 @@ impl StepReport {
 }
 
 impl StepReport {
-    /// Whether the device is on its way still, after ticks: it has not followed its hands, or has not come to rest.
+    /// Whether the device is still moving after ticks: it has not caught up with its hands, or has not come to rest.
     pub fn is_under_way(&self) -> bool {
         !self.behind.is_empty()
     }
 
-    /// Whether no equilibrium was found, which is another thing than being on the way to one.
+    /// Whether no equilibrium was found, in contrast to being on the way to one.
     pub fn has_failed(&self) -> bool {
         !self.converged && !self.is_under_way()
     }
 
-    /// What one hand has done and feels: that of an instrument, or of a device alone the whole.
+    /// Motion and forces of one hand: of an instrument, or of a single device.
     pub fn hand(&self, index: usize) -> InstrumentReport {
         self.instruments.get(index).copied().unwrap_or(InstrumentReport {
             inserted_mm: self.inserted_mm,
@@ -59,20 +59,21 @@ impl StepReport {
         })
     }
 
-    /// What every hand has done and feels: of several instruments, or of a device alone.
+    /// Motions and forces of all hands: of several instruments, or of a single device.
     pub fn hands(&self) -> Vec<InstrumentReport> {
         self.each_hand().collect()
     }
 
-    /// Length inserted of each instrument, or of the device alone, mm.
+    /// Length inserted of each instrument, or of the single device, mm.
     pub fn lengths_mm(&self) -> Vec<f64> {
         self.each_hand().map(|hand| hand.inserted_mm).collect()
     }
 
-    /// How hard the wall holds the device, whose line `shape` is and whose outer radius at the tip is `tip_radius_mm`.
+    /// Forces of the wall on the device, whose centre line is `shape` and whose outer radius at the tip is
+    /// `tip_radius_mm`.
     ///
-    /// A contact is at the tip where its place on the device's axis is no farther from the end of the line than that radius: there the wall
-    /// is felt by the end itself, and not by the shaft beside it.
+    /// A contact counts as at the tip if its position on the axis is within that radius of the end of the line: there
+    /// it is the end itself that touches the wall, not the shaft beside it.
     pub fn wall_force(&self, shape: &Shape, tip_radius_mm: f64) -> WallForce {
         let tip_mm = shape.tip_mm();
         let mut force = WallForce::default();
@@ -92,115 +93,120 @@ impl StepReport {
     }
 }
 
-/// What one of several instruments does after a step.
+/// Motion and forces of one of several instruments after a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InstrumentReport {
     /// Length inside the sheath's mouth, mm.
     pub inserted_mm: f64,
-    /// Turn of its hand since the start, rad.
+    /// Rotation of its hand since the start, rad.
     pub rotation_rad: f64,
-    /// Turn of its tip, carried along the axis without twist, rad.
+    /// Rotation of its tip, transported along the axis without twist, rad.
     pub tip_rotation_rad: f64,
-    /// Force with which its hand must push, N: the slope of the energy with respect to its inserted length. None where that jumps: its
-    /// tip is at that of another, or nothing of it is in.
+    /// Push force of its hand, N: derivative of the energy in its inserted length. `None` where it jumps: its tip is
+    /// at that of another, or it is not inserted.
     pub push_force_n: Option<f64>,
-    /// Torque with which its hand must hold it, N·mm: the slope of the energy with respect to its turn.
+    /// Holding torque of its hand, N·mm: derivative of the energy in its rotation.
     pub torque_nmm: f64,
 }
 
-/// How hard the wall holds a device: sizes of the forces at its contacts, each of normal and friction together.
+/// Magnitudes of the wall's forces on a device, each contact's normal force and friction combined.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct WallForce {
     /// Their sum, N.
     pub sum_n: f64,
-    /// The largest one, N. Contacts stand for lengths of the device: it depends on how far they are apart.
+    /// The largest, N. Contacts represent lengths of the device, so it depends on their spacing.
     pub largest_n: f64,
-    /// The sum of those at the tip ([`StepReport::wall_force`]), N.
+    /// Sum of those at the tip ([`StepReport::wall_force`]), N.
     pub tip_n: f64,
 }
 
-/// Force across the line, at a node, by which instruments that lie in one another hold each other.
+/// Force across the line between coaxial instruments at a node.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LateralForce {
-    /// Force on the inner one, N.
+    /// Force on the inner instrument, N.
     pub force_n: Vec3,
-    /// Length of it that the node stands for, mm; 0 where nothing holds it. Where one ends the force is not spread over that: it gathers there.
+    /// Length that the node represents, mm; 0 without a force. Where an instrument ends the force is not distributed
+    /// over it but concentrated there.
     pub length_mm: f64,
-    /// Axial force of the inner one, and all that lies in it, behind the node, N.
+    /// Axial force behind the node of the inner instrument with all inside it, N.
     pub tension_n: f64,
     /// Friction on it along the line, towards the tip, N.
     pub friction_n: f64,
-    /// Couple of the friction on it about the line, N·mm.
+    /// Couple of friction on it about the line, N·mm.
     pub friction_nmm: f64,
 }
 
-/// A jump: from the end of a path of equilibria to where the device comes to rest.
+/// A jump (snap-through): from a fold to where the device comes to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Jump {
-    /// Energy that was lost in it, to motion and friction, mJ. Work of hands, wall and blood = energy stored + `dissipated_mj` + this.
+    /// Energy lost in it to motion and friction, mJ. Work of hands, wall and blood = increase of stored energy +
+    /// `dissipated_mj` + this.
     pub released_mj: f64,
-    /// Where the device has moved farthest for the room that it had, mm: its place after the jump.
+    /// Position after the jump, mm, of the node with the largest motion relative to its room.
     pub position_mm: Vec3,
 }
 
-/// What is seen and felt of an insertion after a step.
+/// Observable results of an insertion after a step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StepReport {
-    /// Length inside the sheath's mouth, mm; of several instruments that of the farthest.
+    /// Length inside the sheath's mouth, mm; with several instruments, of the one inserted farthest.
     pub inserted_mm: f64,
-    /// Turn of the tail since the start, rad; of several instruments that of the innermost, as the next.
+    /// Rotation of the tail since the start, rad; with several instruments this and the next are those of the
+    /// innermost.
     pub rotation_rad: f64,
-    /// Turn of the tip about the device's axis since the start, carried along the axis without twist, rad: what is left of the
-    /// hand's turn, or what a whip adds to it.
+    /// Rotation of the tip about the device's axis since the start, transported along the axis without twist, rad:
+    /// the hand's rotation reduced by lag or increased by whip.
     pub tip_rotation_rad: f64,
     /// Energy terms, mJ.
     pub energy: Energy,
-    /// Force with which the hand must push to hold the device, N; negative where it must pull. Of several instruments the sum.
+    /// Force of the hand that holds the device, N; positive pushes, negative pulls. With several instruments, the
+    /// sum.
     ///
-    /// F = −n·t − |m|²/(2EI) at the sheath, with n and m the internal force and moment: the second,
-    /// configurational term makes it the derivative of the energy with respect to the inserted length.
+    /// F = −n·t − |m|²/(2EI) at the sheath, with n and m the internal force and moment: with the second,
+    /// configurational term it is the derivative of the energy in the inserted length.
     pub push_force_n: f64,
-    /// Torque with which the hand must hold the tail, N·mm; of several instruments the sum.
+    /// Torque of the hand that holds the tail, N·mm; with several instruments, the sum.
     pub torque_nmm: f64,
-    /// Each of several instruments, the innermost first; empty for a device alone.
+    /// Each of several instruments, the innermost first; empty for a single device.
     pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,
-    /// Energy that friction took in this step, mJ; in jumps it is not separated ([`Jump`]).
+    /// Energy dissipated by friction in this step, mJ; in jumps it is not separated ([`Jump`]).
     pub dissipated_mj: f64,
-    /// Where the wall holds the device.
+    /// Contacts with the wall.
     pub contacts: Vec<Contact>,
-    /// Force of the blood that flows on the device, N; zero where no flow is given.
+    /// Drag of blood flow on the device, N; zero without flow.
     pub drag_n: Vec3,
     /// The opening through which the tip has left the vessel, while it is beyond it.
     pub left_through: Option<usize>,
-    /// Newton iterations of this step, those of attempts in vain included.
+    /// Newton iterations of this step, including failed attempts.
     pub iterations: u32,
-    /// Linear solves of these: in an iteration as often as it takes to find which contacts press at its end.
+    /// Linear solves in these iterations: each takes as many as finding the active contacts at its end needs.
     pub solves: u32,
-    /// Parts that the command was cut into.
+    /// Number of sub-steps of the command.
     pub substeps: u32,
-    /// How often the device slid on while the hand held still, because friction and wall forces were not to be had in one step.
+    /// Number of relaxations with the hands held still, needed where friction and wall forces could not be solved for
+    /// at once.
     pub slides: u32,
-    /// Parts of the command in which no equilibrium was near, at a fold or in a jam, and the device moved until it came to rest: the last
-    /// resort. 0 nearly always.
+    /// Sub-steps without a nearby equilibrium, at a fold or in a jam, in which the device moved until it came to
+    /// rest: the last resort, almost always 0.
     pub relaxations: u32,
-    /// What is left over where it came to rest, over the largest force in the device: of the forces at a node, or of those on the wall
-    /// that friction goes with.
+    /// Imbalance where it came to rest, relative to the largest force in the device: of the forces at a node, or of
+    /// the normal forces that friction follows.
     pub imbalance: f64,
-    /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
+    /// Whether the device jumped to a lower minimum: it released energy that the hand had put in.
     pub jumped: bool,
-    /// What was set free, and where; none where nothing was, or the method does not report it.
+    /// Energy released, and where; `None` if none was, or the method does not report it.
     pub jump: Option<Jump>,
-    /// Whether the device carries material angles: only with a shape or friction.
+    /// Whether the device has material angles: only with a rest shape or friction.
     pub angles: bool,
-    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start; where it is in one as it has slid, nothing is
-    /// solved for.
+    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start; sub-steps need no solution
+    /// if the device is in equilibrium after sliding.
     pub nodes_solved: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
-    /// What each hand, of a device alone the one, has done in ticks ([`Method::tick`](crate::methods::Method::tick)) that the device has not yet followed: the next tick or
-    /// step goes on with it. Empty where nothing is left over.
+    /// Motion of each hand (of a single device one) in ticks ([`Method::tick`](crate::methods::Method::tick)) that
+    /// the device has not yet followed: the next tick or step continues with it. Empty if none remains.
     pub behind: Vec<Command>,
 }
 
@@ -230,10 +236,10 @@ mod tests {
             assert!(told.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{told:?}");
         };
         close(report.wall_force(&shape, 0.5), [0.8, 0.5, 0.3]);
-        // A thinner tip has the last alone, one as thick as the way is long all of them.
+        // A thin tip includes the last contact alone, one as thick as the distance all of them.
         close(report.wall_force(&shape, 0.3), [0.8, 0.5, 0.2]);
         close(report.wall_force(&shape, 10.0), [0.8, 0.5, 0.8]);
-        // Nothing inserted, and nothing touched.
+        // Nothing inserted, no contacts.
         close(report.wall_force(&Shape::default(), 0.5), [0.8, 0.5, 0.0]);
         close(StepReport::default().wall_force(&shape, 0.5), [0.0; 3]);
     }

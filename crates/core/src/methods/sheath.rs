@@ -1,16 +1,17 @@
-//! The introducer sheath: where the device comes out, and in which direction.
+//! The introducer sheath: position and direction of the device's entry.
 
 use crate::contact::{check_friction, check_valve};
 use crate::vessel::Opening;
 use crate::{Error, Result, Vec3};
 
-/// The mouth of the introducer sheath. It prescribes position and tangent of the device there, and may rub on it: against its slip u, along and around,
+/// The mouth of the introducer sheath. It prescribes position and tangent of the device there, and may exert friction
+/// against its slip u, along and around the axis,
 ///
 /// ```text
 /// |f| = F₀ + μ |n⊥|
 /// ```
 ///
-/// with the force n⊥ that the mouth exerts across the device. It is felt by the hand alone and moves nothing inside.
+/// with the force n⊥ between mouth and device across the axis. Only the hand feels it; nothing inside moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sheath {
     /// Mouth of the sheath, mm.
@@ -24,7 +25,7 @@ pub struct Sheath {
 }
 
 impl Sheath {
-    /// The same sheath with friction, 0 for none.
+    /// The same sheath with friction; 0 for none.
     ///
     /// # Errors
     /// A force that is not from 0 to 100 N, a coefficient that is not from 0 to 2.
@@ -39,7 +40,7 @@ impl Sheath {
         self.friction_n > 0.0 || self.friction > 0.0
     }
 
-    /// Refuses friction on behalf of a method that tells none.
+    /// Rejects friction, for a method that does not report it.
     ///
     /// # Errors
     /// A sheath with friction.
@@ -70,7 +71,7 @@ impl Sheath {
                 "must be three finite numbers",
             ));
         }
-        // Of any length: the largest component is taken out first, so that squares neither overflow nor vanish.
+        // Of any length: the largest component is factored out first, so that squares neither overflow nor underflow.
         let largest = direction.amax();
         let unit = (direction / largest).normalize();
         if !(direction.iter().all(|c| c.is_finite()) && unit.iter().all(|c| c.is_finite())) {

@@ -1,4 +1,4 @@
-//! All that the next step of an insertion depends on, whatever its method.
+//! The complete state of an insertion, for any method.
 
 use std::sync::Arc;
 
@@ -11,10 +11,11 @@ use crate::methods::StepReport;
 use crate::shape::Shape;
 use crate::{Error, Result, Vec3};
 
-/// The state of an insertion: with vessel, device, sheath and options all that its next step depends on.
+/// The state of an insertion: together with vessel, device, sheath and options it determines the next step.
 ///
-/// Two simulations of one scene in one state answer the same commands with the same bits. It can be cloned, sent, and written by any
-/// format of `serde` that keeps every bit of a number. Clones share their numbers, which nothing changes.
+/// Two simulations of one scene in the same state respond to the same commands with the same bits. It can be cloned,
+/// sent, and written in any format of `serde` that keeps every bit of a number. Clones share their data, which is
+/// immutable.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct State {
     /// Name of the method.
@@ -24,19 +25,19 @@ pub struct State {
     content: Content,
 }
 
-/// What a method keeps from step to step.
+/// State of a method between steps.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Content {
     /// The exact rod.
     Kirchhoff(#[serde(with = "shared")] Arc<KirchhoffState>),
-    /// A method that keeps nodes, tangents and the planes that hold them.
+    /// A method with nodes, tangents and the planes that hold them.
     Chain(Box<ChainState>),
-    /// A method that keeps nodes and triads alone.
+    /// A method with nodes and triads alone.
     Nodes(Box<NodesState>),
 }
 
-/// What is shared is written and read as it is.
+/// Serialises shared data in place.
 pub(super) mod shared {
     use std::sync::Arc;
 
@@ -56,7 +57,7 @@ pub(super) mod shared {
     }
 }
 
-/// Nodes and tangents, and the planes of the wall that they touch.
+/// Nodes and tangents, and the planes of the wall in contact.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct ChainState {
     /// The centre line.
@@ -76,9 +77,9 @@ pub struct TouchedPlane {
     pub offset_mm: f64,
     /// The wall triangle.
     pub triangle: u32,
-    /// How far the device's surface is in the wall, mm.
+    /// Penetration of the device's surface, mm.
     pub depth_mm: f64,
-    /// Force with which the wall pressed in the last step, N; negative where it pulled, 0 where it was not felt.
+    /// Force of the wall in the last step, N; negative where it pulled, 0 without contact.
     pub force_n: f64,
 }
 
@@ -91,19 +92,19 @@ pub struct NodesState {
     pub frames: Vec<Rotation3<f64>>,
     /// Arc lengths of the nodes from the tip, mm.
     pub from_tip_mm: Vec<f64>,
-    /// Turn of the clamp, rad.
+    /// Rotation of the clamp, rad.
     pub turn_rad: f64,
     /// The report of the last step.
     pub report: StepReport,
 }
 
 impl State {
-    /// The state of a method of that name.
+    /// The state of the method `method`.
     pub fn new(method: &str, content: Content) -> Self {
         Self { method: method.to_owned(), time_s: 0.0, content }
     }
 
-    /// The same at a time since the start, s.
+    /// The same state at a time since the start, s.
     pub(crate) fn at(self, time_s: f64) -> Self {
         Self { time_s, ..self }
     }
@@ -118,7 +119,7 @@ impl State {
         &self.method
     }
 
-    /// The report of the step that led to it.
+    /// The report of the step that led to this state.
     pub fn report(&self) -> &StepReport {
         match &self.content {
             Content::Kirchhoff(state) => state.report(),
@@ -127,7 +128,7 @@ impl State {
         }
     }
 
-    /// What a method of that name has kept.
+    /// The content, if it is of the method `method`.
     ///
     /// # Errors
     /// A state of another method.
@@ -135,7 +136,7 @@ impl State {
         if self.method == method { Ok(&self.content) } else { Err(self.of_another(method)) }
     }
 
-    /// The error of a state that is none of `method`.
+    /// The error for a state that is not of `method`.
     pub fn of_another(&self, method: &str) -> Error {
         let mend =
             format!("this simulation is one of {method}: restore a state of the same scene and method");
@@ -143,10 +144,10 @@ impl State {
     }
 }
 
-/// Checks the inserted length of a state that is restored.
+/// Checks the inserted length of a state to be restored.
 ///
 /// # Errors
-/// A length that the device does not have.
+/// A length greater than the device's.
 pub fn check_inserted(inserted_mm: f64, device: &Device) -> Result<()> {
     if (0.0..=device.length_mm()).contains(&inserted_mm) {
         return Ok(());

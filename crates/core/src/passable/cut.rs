@@ -1,36 +1,39 @@
-//! The least bent way through a tube: how far the lumen lets a device cut bends, and how long it is then.
+//! The least bent path through a tube: how far the lumen lets a device cut bends, and its length then.
 //!
-//! Least ½∫κ² ds of a line through points, each of which may be so far from its place of the centre line, across it: what bends a uniform
-//! wire in a smooth wall, and in a wide bend lies on its outer side, where it is longer and less bent. By the method of Levenberg and
-//! Marquardt (Nocedal and Wright, Numerical Optimization, 2006, section 10.3), with springs in the place of the wall.
+//! Minimises ½∫κ² ds of a line through points, each of which may be off its position on the centre line by a given
+//! distance, across it: the shape of a uniform wire in a smooth wall, which in a wide bend lies on the outer side,
+//! where it is longer and less bent. By the method of Levenberg and Marquardt (Nocedal and Wright, Numerical
+//! Optimization, 2006, section 10.3), with springs in place of the wall.
 
 use nalgebra::Matrix3;
 
 use crate::Vec3;
 use crate::banded::{BandMatrix, Factor};
 
-/// Points move in planes across the centre line's chord over so many times their room: planes along a sharp corner then meet beyond the room, and
-/// leave a line the way through the corner's inner side.
+/// Points move in planes across a chord of the centre line over this many times their room: at a sharp corner the
+/// planes then meet beyond the room, and a line can pass the corner's inner side.
 const CHORD_ROOMS: f64 = 1.3;
-/// Stiffness of the wall, over that of bending between neighbouring points: the line gives way to it by some thousandths of their distance.
+/// Stiffness of the wall, relative to that of bending between neighbouring points: the line sinks in by some
+/// thousandths of their distance.
 const WALL: f64 = 10.0;
-/// Damping at first, and how much less and more it becomes after a step that lowers the energy and one that does not; at least, where long
-/// lines move as a whole, and at most, where no step is left.
+/// Initial damping, its factors after a step that lowers the energy and one that does not, its minimum, where long
+/// lines move as a whole, and its maximum, where no step is left.
 const DAMPING: f64 = 1e-3;
 const DAMPING_CHANGE: f64 = 8.0;
 const DAMPING_RANGE: [f64; 2] = [1e-12, 1e8];
-/// A step so short, over the distance of points, is the last, if there is no more damping than this.
+/// A step this short, relative to the distance of points, is the last, if the damping is at most this.
 const NEAR: f64 = 1e-3;
 const UNDAMPED: f64 = 1e-6;
-/// Steps at most.
+/// Largest number of steps.
 const STEPS: usize = 500;
 
-/// The least bent line whose points are at most `room_mm` beside these, `spacing_mm` apart. At least four points, an even number of them.
+/// The least bent line whose points are at most `room_mm` from these, `spacing_mm` apart. An even number of points,
+/// at least four.
 pub(super) fn least_bent(points: &[Vec3], room_mm: &[f64], spacing_mm: f64) -> Vec<Vec3> {
     let last = points.len() - 1;
     let along = |k: usize| {
         let reach = 1 + (CHORD_ROOMS * room_mm[k] / spacing_mm) as usize;
-        // As far to both sides, so that the chord is along the line also next to its ends.
+        // Equally far to both sides, so that the chord follows the line near its ends too.
         let reach = reach.min(k.max(1)).min((last - k).max(1));
         let chord = points[(k + reach).min(last)] - points[k.saturating_sub(reach)];
         chord.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vec3::z)
@@ -47,7 +50,7 @@ pub(super) fn least_bent(points: &[Vec3], room_mm: &[f64], spacing_mm: f64) -> V
         let step = loop {
             (0..3 * points.len()).for_each(|row| matrix.add(row, row, damping - added));
             added = damping;
-            // What rounding leaves of the softest ways of a long line may be nothing.
+            // By rounding, the stiffness of the softest modes of a long line may vanish.
             if factor.factor(&matrix).is_ok() {
                 let mut step = downhill.clone();
                 factor.solve(&mut step);
@@ -73,22 +76,23 @@ pub(super) fn least_bent(points: &[Vec3], room_mm: &[f64], spacing_mm: f64) -> V
     line
 }
 
-/// What a line is in.
+/// The tube around a line.
 struct Tube<'a> {
     points: &'a [Vec3],
-    /// Across these the points of a line move.
+    /// Normals of the planes in which the points move.
     along: &'a [Vec3],
     room_mm: &'a [f64],
     spacing_mm: f64,
 }
 
-/// A point of a line whose sides are these, towards the point and on from it.
+/// A point of a line, given the sides towards it and from it.
 struct Corner {
     lengths_mm: [f64; 2],
     tangents: [Vec3; 2],
     /// Mean of both lengths, mm.
     mean_mm: f64,
-    /// By what the turn of the tangent is multiplied, so that half of its square is the energy, in units of a point's distance cubed.
+    /// Factor of the angle of the tangent, such that half its square is the energy, in units of the points' distance
+    /// cubed.
     scale: f64,
 }
 
@@ -97,14 +101,14 @@ impl Corner {
         self.tangents[1] - self.tangents[0]
     }
 
-    /// Derivatives of the scaled turn with respect to both sides.
+    /// Derivatives of the scaled angle with respect to both sides.
     fn derivatives(&self) -> [Matrix3<f64>; 2] {
         let turn = self.turn();
         [0, 1].map(|side| {
             let (t, length_mm) = (self.tangents[side], self.lengths_mm[side]);
             let sign = [-1.0, 1.0][side];
             let across = (Matrix3::identity() - t * t.transpose()) * (sign / length_mm);
-            // A longer side is less bent by the same turn.
+            // A longer side is less bent by the same angle.
             (across - turn * t.transpose() * (0.25 / self.mean_mm)) * self.scale
         })
     }
@@ -113,14 +117,14 @@ impl Corner {
 impl Tube<'_> {
     fn corner(&self, line: &[Vec3], k: usize) -> Corner {
         let sides = [line[k + 1] - line[k], line[k + 2] - line[k + 1]];
-        // Points that meet have no direction, and a great energy.
+        // Coincident points have no direction, and a very large energy.
         let lengths_mm = sides.map(|side| side.norm().max(f64::MIN_POSITIVE.sqrt()));
         let tangents = [sides[0] / lengths_mm[0], sides[1] / lengths_mm[1]];
         let mean_mm = 0.5 * (lengths_mm[0] + lengths_mm[1]);
         Corner { lengths_mm, tangents, mean_mm, scale: self.spacing_mm * (self.spacing_mm / mean_mm).sqrt() }
     }
 
-    /// How far a point is from its place: the direction along, by how much along it, and across it.
+    /// Distance of a point from its position: the direction along, the distance along it, and the vector across it.
     fn beside(&self, line: &[Vec3], k: usize) -> (Vec3, f64, Vec3) {
         let along = self.along[k];
         let offset = line[k] - self.points[k];
@@ -128,7 +132,7 @@ impl Tube<'_> {
         (along, along_mm, offset - along * along_mm)
     }
 
-    /// Of bending and springs.
+    /// Energy of bending and springs.
     fn energy(&self, line: &[Vec3]) -> f64 {
         let bent = (0..line.len() - 2).map(|k| {
             let corner = self.corner(line, k);
@@ -142,7 +146,7 @@ impl Tube<'_> {
         0.5 * (bent.sum::<f64>() + held.sum::<f64>())
     }
 
-    /// Its matrix by Gauss and Newton, and its negative gradient. Two points make a block of the matrix.
+    /// Its Gauss–Newton matrix and negative gradient. Two points form a block of the matrix.
     fn slopes(&self, line: &[Vec3]) -> (BandMatrix<12>, Vec<f64>) {
         let mut matrix = BandMatrix::<12>::zeros(3 * line.len());
         let mut downhill = vec![0.0; 3 * line.len()];

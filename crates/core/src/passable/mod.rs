@@ -1,7 +1,8 @@
-//! Whether a device can follow a way through a vessel: the room it has, and the bends it must take.
+//! Whether a device can follow a path through a vessel: its clearance, and the bends it must take.
 //!
-//! This looks at geometry and stiffness alone and takes hundredths of a second; what a device does when it is pushed is what a simulation tells.
-//! In at least 95 of 100 random vessels both agree: `cargo run --release -p endowire-benches --bin passages`.
+//! This considers only geometry and stiffness and takes hundredths of a second; a simulation shows what a device
+//! really does when pushed. In at least 95 of 100 random vessels both agree: `cargo run --release -p endowire-benches
+//! --bin passages`.
 
 mod cut;
 #[cfg(test)]
@@ -13,83 +14,87 @@ use crate::device::Device;
 use crate::vessel::CentrelinePath;
 use crate::{Error, Result, Vec3};
 
-/// Force along a device that is taken for none, N, unless set: some tenths of what a haemostatic valve holds it with (an assumption).
+/// Default for the force along a device that counts as negligible, N: some tenths of a haemostatic valve's friction
+/// (an assumption).
 pub const NO_FORCE_N: f64 = 0.1;
-/// A way is tight where there is less room than this part of the device's radius.
+/// Clearance, as a fraction of the device's radius, below which a path is tight.
 const TIGHT: f64 = 0.1;
-/// So far may the wall that a device feels be off the surface: a part of the lumen's radius, and at most this, mm (as
-/// [`WallProperties::deviation_mm`](crate::contact::WallProperties::deviation_mm) has it). What is thicker by no more may pass.
+/// Largest distance of the felt wall from the surface, as a fraction of the lumen's radius and in mm (as
+/// [`WallProperties::deviation_mm`](crate::contact::WallProperties::deviation_mm)). A device too thick by at most
+/// this may pass.
 const WALL_OFF: f64 = 0.05;
 const WALL_OFF_MM: f64 = 0.1;
-/// Points of a way: so many in a least lumen radius, and no fewer or more than this in all.
+/// Number of points of a path: per smallest lumen radius, and smallest and largest in all.
 const POINTS_PER_RADIUS: f64 = 3.0;
 const POINTS: [f64; 2] = [40.0, 2000.0];
-/// Bends are measured over so many points before and behind where the line is smooth.
+/// Number of points before and behind over which bends of the smooth line are measured.
 const SMOOTH_POINTS: usize = 2;
 
-/// A device on its way, in one word.
+/// The verdict on a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Passage {
-    /// There is room all the way, and no bend that takes force.
+    /// Clearance all the way, and no bend that takes force.
     Passes,
-    /// There is less room than a tenth of the device's radius, which may be none, or a bend is sharper than the device takes without force.
+    /// The clearance is less than a tenth of the device's radius, possibly zero, or a bend is sharper than the device
+    /// takes without force.
     Tight,
-    /// The lumen is narrower than the device by more than a twentieth of the lumen's radius or 0.1 mm, whichever is less: by so much the
-    /// wall that is felt may be off the surface.
+    /// The lumen is narrower than the device by more than a twentieth of the lumen's radius or 0.1 mm, whichever is
+    /// less: the possible error of the felt wall.
     Blocked,
-    /// The device is shorter than the way that it takes.
+    /// The device is shorter than its path.
     Short,
 }
 
-/// What a device finds at a place of its way.
+/// A point of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WayPoint {
-    /// Length of the way to here, mm.
+    /// Length of the path to this point, mm.
     pub arc_mm: f64,
-    /// The place on the centre line, mm.
+    /// The position on the centre line, mm.
     pub position_mm: [f64; 3],
     /// Radius of the lumen, mm.
     pub lumen_radius_mm: f64,
-    /// Largest radius of what has passed here when the tip is at the end of the way, mm.
+    /// Largest radius of the part of the device that has passed here when the tip is at the end, mm.
     pub device_radius_mm: f64,
-    /// The one less the other, mm.
+    /// Lumen radius minus device radius, mm.
     pub clearance_mm: f64,
-    /// Radius of curvature of the centre line over two radii of the lumen, mm; infinite where that is straight.
+    /// Radius of curvature of the centre line over two radii of the lumen, mm; infinite where straight.
     pub bend_radius_mm: f64,
-    /// Radius of curvature of the least bent way that the room allows, as a uniform wire lies in it without friction, mm; infinite where that
-    /// is straight.
+    /// Radius of curvature of the least bent path within the clearance, that of a uniform wire without friction, mm;
+    /// infinite where straight.
     pub cut_radius_mm: f64,
-    /// Smallest radius of curvature that all of the device that passes here takes without force, mm.
+    /// Smallest radius of curvature that all of the device passing here takes without force, mm.
     pub bears_radius_mm: f64,
 }
 
-/// Whether a device passes along a way, and where it is hardest.
+/// Whether a device passes along a path, and its most difficult points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Passable {
-    /// In one word.
+    /// The verdict.
     pub passage: Passage,
-    /// Length of the way along the centre line, mm.
+    /// Length of the path along the centre line, mm.
     pub length_mm: f64,
-    /// Length of the device that the way takes: of the least bent line, mm.
+    /// Length of device along the path, that of the least bent line, mm.
     pub taken_mm: f64,
-    /// How far along the way the tip comes, mm: all of it, or to where the device is too thick for the lumen, or ends.
+    /// How far along the path the tip gets, mm: to its end, or to where the device is too thick for the lumen, or
+    /// ends.
     pub reaches_mm: f64,
-    /// Where there is least room.
+    /// The point with the smallest clearance.
     pub narrowest: WayPoint,
-    /// Where the bend is sharpest beside what the device takes.
+    /// The point with the sharpest bend relative to what the device takes.
     pub sharpest: WayPoint,
-    /// All of the way, evenly.
+    /// The whole path, evenly spaced.
     pub way: Vec<WayPoint>,
 }
 
-/// Looks at a device on a way from the inlet to a target, where its tip is in the end.
+/// Evaluates a device on a path from the inlet to a target, where its tip ends.
 ///
-/// A section of stiffness EI and rest curvature κ₀ takes a curvature κ without force where ½ EI (κ − κ₀)², what it costs to push a length
-/// of it into the bend, is at most `force_n` ([`NO_FORCE_N`] for most uses).
+/// A section of stiffness EI and rest curvature κ₀ takes a curvature κ without force if ½ EI (κ − κ₀)², the push
+/// force into the bend, is at most `force_n` ([`NO_FORCE_N`] for most uses).
 ///
 /// # Errors
-/// [`Error::Parameter`] for a force that is not positive and finite, or a way of no length.
+/// [`Error::Parameter`] for a force that is not positive and finite, or a path of zero length.
 pub fn passable(way: &CentrelinePath, device: &Device, force_n: f64) -> Result<Passable> {
     if !(force_n > 0.0 && force_n.is_finite()) {
         return Err(Error::parameter("force_n", force_n, "must be positive and finite, N"));
@@ -97,7 +102,7 @@ pub fn passable(way: &CentrelinePath, device: &Device, force_n: f64) -> Result<P
     let length_mm = way.length_mm();
     let least_mm = way.least_radius_mm();
     let wanted = (POINTS_PER_RADIUS * length_mm / least_mm).clamp(POINTS[0], POINTS[1]);
-    // The solver has blocks of two.
+    // The solver uses blocks of two points.
     let count = 2 * (0.5 * wanted).ceil() as usize;
     let spacing_mm = length_mm / (count - 1) as f64;
     let arcs: Vec<f64> = (0..count).map(|k| spacing_mm * k as f64).collect();
@@ -107,7 +112,7 @@ pub fn passable(way: &CentrelinePath, device: &Device, force_n: f64) -> Result<P
     let mut room_mm: Vec<f64> =
         places.iter().zip(&passed).map(|(place, p)| (place.1 - p.0).max(0.0)).collect();
     let points: Vec<Vec3> = places.iter().map(|place| place.0).collect();
-    // It comes out of its sheath in the middle of the inlet, along the way.
+    // It comes out of its sheath at the middle of the inlet, along the path.
     room_mm.iter_mut().take(2).for_each(|room_mm| *room_mm = 0.0);
     let cut = cut::least_bent(&points, &room_mm, spacing_mm);
     let point = |k: usize| {
@@ -136,7 +141,7 @@ pub fn passable(way: &CentrelinePath, device: &Device, force_n: f64) -> Result<P
     let blocked_mm = way.iter().map(|point| point.arc_mm + fits_mm(point.lumen_radius_mm));
     let blocked_mm = blocked_mm.fold(f64::INFINITY, f64::min);
     let taken_mm = cut.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum::<f64>();
-    // Both lines have their points at the same places of the way.
+    // Both lines have their points at the same positions along the path.
     let ends_mm =
         if device.length_mm() < taken_mm { length_mm * device.length_mm() / taken_mm } else { f64::INFINITY };
     let passage = if blocked_mm <= length_mm && blocked_mm <= ends_mm {
@@ -152,7 +157,7 @@ pub fn passable(way: &CentrelinePath, device: &Device, force_n: f64) -> Result<P
     Ok(Passable { passage, length_mm, taken_mm, reaches_mm, narrowest, sharpest, way })
 }
 
-/// Length of a device from its tip that is no thicker than this, mm; infinite if all of it is.
+/// Length of a device from its tip that is at most this thick, mm; infinite if all of it is.
 fn thinner_mm(device: &Device, radius_mm: f64) -> f64 {
     let mut begin_mm = 0.0;
     for section in device.sections() {
@@ -164,9 +169,10 @@ fn thinner_mm(device: &Device, radius_mm: f64) -> f64 {
     f64::INFINITY
 }
 
-/// Of the part of a device up to this far from its tip: the largest radius, and the smallest radius of curvature that all of it takes.
+/// For the part of a device within this distance of its tip: the largest radius, and the smallest radius of curvature
+/// that all of it takes.
 fn passes(device: &Device, from_tip_mm: f64, force_n: f64) -> (f64, f64) {
-    // At the end of the way it is the tip itself that arrives.
+    // At the end of the path the tip itself arrives.
     let from_tip_mm = from_tip_mm.max(f64::MIN_POSITIVE);
     let mut begin_mm = 0.0;
     let mut bears_mm = 0.0_f64;
@@ -182,14 +188,15 @@ fn passes(device: &Device, from_tip_mm: f64, force_n: f64) -> (f64, f64) {
     (device.max_radius_within(from_tip_mm), bears_mm)
 }
 
-/// Radius of the circle through a point of a line and those so many before and behind; of the nearest such at the ends.
+/// Radius of the circle through a point of a line and those `window` points before and behind; of the nearest such
+/// circle at the ends.
 fn bend_radius_mm(line: &[Vec3], at: usize, window: usize) -> f64 {
     let window = window.clamp(1, (line.len() - 1) / 2);
     let at = at.clamp(window, line.len() - 1 - window);
     let (a, b, c) = (line[at - window], line[at], line[at + window]);
     let (u, v) = (b - a, c - b);
     let area = u.cross(&v).norm();
-    // Rounding bends a straight line by no more.
+    // Rounding bends a straight line by no more than this.
     if area <= 1e-9 * u.norm() * v.norm() {
         return f64::INFINITY;
     }

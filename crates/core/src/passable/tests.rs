@@ -2,19 +2,19 @@ use super::*;
 use crate::device::Section;
 use crate::vessel::anatomy;
 
-/// A way along z of radius 2 mm that is 1 mm wide in the middle.
+/// A path along z of radius 2 mm that narrows to 1 mm in the middle.
 fn narrowing() -> CentrelinePath {
     let radius_mm = |z: f64| 0.5 + 1.5 * ((z - 50.0).abs() / 10.0).min(1.0);
     let points = (0..=100).map(f64::from).map(|z| (Vec3::z() * z, radius_mm(z)));
     CentrelinePath::new(points.collect()).unwrap()
 }
 
-/// Straight for 60 mm, a bend, and straight again, in a lumen of this radius.
+/// Straight for 60 mm, a bend, and straight again, with this radius of the lumen.
 fn bend(bend_mm: f64, degrees: f64, radius_mm: f64) -> CentrelinePath {
     bend_between(60.0, bend_mm, degrees, radius_mm)
 }
 
-/// The same, straight for so long.
+/// As [`bend`], with straight pieces of this length.
 fn bend_between(leg: f64, bend_mm: f64, degrees: f64, radius_mm: f64) -> CentrelinePath {
     let arc = bend_mm * degrees.to_radians();
     let at = |s: f64| {
@@ -40,12 +40,12 @@ fn a_narrowing_lets_pass_what_is_thinner() {
         assert_eq!(found.passage, passage, "{radius_mm}: {:?}", found.narrowest);
         assert!((found.narrowest.arc_mm - 50.0).abs() < 1.0, "{:?}", found.narrowest);
         assert!((found.narrowest.clearance_mm - (0.5 - radius_mm)).abs() < 0.08, "{:?}", found.narrowest);
-        // What is blocked comes to where the lumen, and what the wall may be off, is as wide as the device.
+        // A blocked device gets to where the lumen, with the possible error of the wall, is as wide as the device.
         let reaches_mm =
             if passage == Passage::Blocked { 50.0 - 10.0 * (0.56 / 1.05 - 0.5) / 1.5 } else { 100.0 };
         assert!((found.reaches_mm - reaches_mm).abs() < 0.3, "{radius_mm}: {}", found.reaches_mm);
     }
-    // A thick shaft that stays before the narrow place holds nothing up, and one that must go in does.
+    // A thick shaft that stays before the narrow point does not block, and one that must enter does.
     let shaft = |tip_mm: f64| {
         let sections = vec![Section::straight(tip_mm, 0.3, 10.0), Section::straight(300.0, 1.0, 10.0)];
         passable(&narrowing(), &Device::new(sections).unwrap(), NO_FORCE_N).unwrap().passage
@@ -59,25 +59,25 @@ fn a_narrowing_lets_pass_what_is_thinner() {
 #[test]
 fn the_room_lets_a_device_cut_a_bend() {
     let sharpest = |way: &CentrelinePath| passable(way, &wire(0.5, 10.0), NO_FORCE_N).unwrap().sharpest;
-    // With hardly any room the way is the centre line's.
+    // With hardly any clearance the path is the centre line's.
     let narrow = sharpest(&bend(30.0, 90.0, 0.52));
     assert!((narrow.cut_radius_mm / 30.0 - 1.0).abs() < 0.1, "{narrow:?}");
-    // A wire that touches the outer wall, the inner one in the middle of the bend and the outer one again has a moment that is a triangle:
-    // for a small angle θ the radius in the middle is ¾ρ + 12 room/θ².
+    // The moment of a wire that touches the outer wall, the inner one in the middle of the bend and the outer one
+    // again is a triangle: for a small angle θ the radius in the middle is ¾ρ + 12 room/θ².
     let (bend_mm, degrees, room_mm) = (100.0, 20.0_f64, 1.0);
     let expected_mm = 0.75 * bend_mm + 12.0 * room_mm / degrees.to_radians().powi(2);
-    // It comes in in the middle, far away.
+    // It enters at the middle, far away.
     let wide = sharpest(&bend_between(160.0, bend_mm, degrees, 0.5 + room_mm));
     assert!((wide.cut_radius_mm / expected_mm - 1.0).abs() < 0.05, "{wide:?} {expected_mm}");
     assert!((wide.bend_radius_mm / bend_mm - 1.0).abs() < 0.1, "{wide:?}");
-    // A bend by little is straight for a wire that has room.
+    // A slight bend is straight for a wire with clearance.
     let [slight, narrow] = [4.0, 0.52].map(|lumen_mm| sharpest(&bend(30.0, 3.0, lumen_mm)));
     assert!(slight.cut_radius_mm > 1e4 && narrow.cut_radius_mm < 200.0, "{slight:?} {narrow:?}");
 }
 
 #[test]
 fn a_sharp_corner_in_a_wide_lumen_is_cut() {
-    // An artery of 4 mm leaves one of 11 mm at a right angle, as tables of anatomies have it.
+    // An artery of 4 mm leaves one of 11 mm at a right angle, as in tables of anatomies.
     let points = [(0.0, 0.0, 11.0), (0.0, 60.0, 11.0), (14.0, 60.0, 4.0), (60.0, 60.0, 4.0)];
     let way = points.map(|(x, z, radius_mm)| (Vec3::new(x, 0.0, z), radius_mm)).to_vec();
     let found = passable(&CentrelinePath::new(way).unwrap(), &wire(0.3, 1.0), NO_FORCE_N).unwrap();
@@ -89,11 +89,11 @@ fn a_device_lies_on_the_outer_side_of_a_wide_bend_and_is_longer_there() {
     let (bend_mm, room_mm) = (33.0, 13.0);
     let way = bend(bend_mm, 180.0, room_mm);
     let found = passable(&way, &wire(0.01, 1.0), NO_FORCE_N).unwrap();
-    // Half a circle about the outer side; a little less, as a wire cuts where the bend begins and ends.
+    // Half a circle about the outer side; slightly less, because a wire cuts the start and end of the bend.
     let longer_mm = found.taken_mm - found.length_mm;
     assert!((0.75..1.0).contains(&(longer_mm / (std::f64::consts::PI * room_mm))), "{longer_mm}");
     assert!((bend_mm..bend_mm + room_mm).contains(&found.sharpest.cut_radius_mm), "{:?}", found.sharpest);
-    // So one of the centre line's length is too short.
+    // So a device with the length of the centre line is too short.
     let short = Device::uniform(found.length_mm, 0.01, 1.0).unwrap();
     assert_eq!(passable(&way, &short, NO_FORCE_N).unwrap().passage, Passage::Short);
 }

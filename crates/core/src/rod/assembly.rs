@@ -4,9 +4,9 @@
 //!
 //!   r(q) + Cᵀ N = 0,   c(q) − D N = 0,   C = ∂c/∂q,
 //!
-//! and Newton's step solves [K Cᵀ; C −D](dq, dN) = −(r, c). Along the rod K alone has no stiffness (bending energy is blind
-//! to stretch) and an inextensible element has D = 0, so without pivoting that matrix has no LDLᵀ. Adding γCᵀ times the
-//! second row to the first, and writing dN = m/(1 − γD), gives the symmetric system
+//! and Newton's step solves [K Cᵀ; C −D](dq, dN) = −(r, c). Along the rod K alone has no stiffness (bending energy
+//! does not depend on stretch) and an inextensible element has D = 0, so without pivoting that matrix has no LDLᵀ.
+//! Adding γCᵀ times the second row to the first, and writing dN = m/(1 − γD), gives the symmetric system
 //!
 //!   [K + γCᵀC, Cᵀ; C, −D/(1 − γD)](dq, m) = −(r + γCᵀc, c)
 //!
@@ -26,28 +26,28 @@ use pulp::{Arch, Simd, WithSimd, bytemuck};
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RankOne {
-    /// First of three consecutive rows p lives in.
+    /// First of the three consecutive rows of p.
     pub(crate) row: usize,
     /// Its entries.
     pub(crate) p: [f64; 3],
-    /// First of three consecutive columns q lives in.
+    /// First of the three consecutive columns of q.
     pub(crate) column: usize,
     /// Its entries.
     pub(crate) q: [f64; 3],
 }
 
-/// Matrix, residual and energy at one state. External energies add to it by its [`Stencils`](super::Stencils).
+/// Matrix, residual and energy at one state. External energies are added through its [`Stencils`](super::Stencils).
 #[derive(Debug, Clone)]
 pub struct Assembly<const C: usize> {
     /// The augmented matrix.
     pub matrix: BandMatrix<C>,
-    /// What it has beside its band: blocks of nodes that touch.
+    /// Blocks of the matrix outside its band, which couple nodes in contact.
     pub(crate) couplings: Couplings<C>,
     /// Gradient of the Lagrangian; in the rows of N, c − D N; in support rows, the gaps.
     pub residual: Vec<f64>,
-    /// γCᵀ(c − D N), which the right-hand side needs beside the residual.
+    /// γCᵀ(c − D N), added to the residual in the right-hand side.
     pub correction: Vec<f64>,
-    /// Stored energy of the rod.
+    /// Elastic energy of the rod.
     pub energy: Energy,
     /// Energy of everything outside the rod.
     pub external_energy: f64,
@@ -55,12 +55,12 @@ pub struct Assembly<const C: usize> {
     pub(crate) rank_ones: Vec<RankOne>,
     /// Largest force and moment an element exerts on a node: the scale of the residual.
     pub scale: [f64; 2],
-    /// Whether the matrix is wanted beside the residual. Where it is not, it is left empty.
+    /// Whether the matrix is assembled as well as the residual. If not, it stays empty.
     pub hessian: bool,
 }
 
 impl<const C: usize> Assembly<C> {
-    /// Room for a rod of `elements` elements.
+    /// Allocates for a rod of `elements` elements.
     pub fn new(elements: usize) -> Self {
         let n = Layout::<C>::dimension(elements);
         Self {
@@ -76,7 +76,7 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Changes the size; keeps the memory.
+    /// Changes the size without releasing memory.
     pub fn resize(&mut self, elements: usize) {
         let n = Layout::<C>::dimension(elements);
         self.matrix.resize(n);
@@ -101,7 +101,7 @@ impl<const C: usize> Assembly<C> {
         }
         Arch::new().dispatch(AddElements::<C, true> { to: self, elements, state });
         let l = Layout::<C>;
-        // Rows without meaning.
+        // Unused rows hold the identity.
         self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
         for set in 0..Layout::<C>::ANGLES {
             self.matrix.add(set, set, 1.0);
@@ -128,7 +128,7 @@ impl<const C: usize> Assembly<C> {
         slope
     }
 
-    /// Angles of instruments that have ended mean nothing.
+    /// Holds the angles of instruments that have ended: they have no meaning.
     fn add_absent(&mut self, elements: &[ElementData]) {
         let l = Layout::<C>;
         if Layout::<C>::ANGLES == 0 {
@@ -137,7 +137,7 @@ impl<const C: usize> Assembly<C> {
         for (e, data) in elements.iter().enumerate() {
             for set in (0..Layout::<C>::ANGLES).filter(|set| !data.materials[*set].is_present()) {
                 self.matrix.add(l.bubble(e, set), l.bubble(e, set), 1.0);
-                // The instrument may be in the rod that begins behind a gap.
+                // The instrument may begin behind a gap, in the next rod.
                 let begins = data.is_break()
                     && elements.get(e + 1).is_some_and(|next| next.materials[set].is_present());
                 if !begins {
@@ -147,9 +147,9 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Sets `shift` to ∫|δr′|² (and ∫δθ²) of a rod of which the rows in `held` are held: the stiffness of a uniform unit tension,
-    /// which is what cures the negative curvature of compression, the commonest kind. Over a gap between two rods it acts as well, so that one which
-    /// nothing holds is held by it.
+    /// Sets `shift` to ∫|δr′|² (and ∫δθ²) of a rod whose rows in `held` are held: the stiffness of a uniform unit
+    /// tension. It removes negative curvature due to compression, the commonest kind. It also acts across the gap
+    /// between two rods, so that the shift keeps an unsupported rod in place.
     pub fn unit_shift(elements: &[ElementData], held: &[Option<usize>], shift: &mut Shift) {
         let l = Layout::<C>;
         shift.reset(Layout::<C>::dimension(elements.len()));
@@ -181,7 +181,7 @@ impl<const C: usize> Assembly<C> {
     }
 }
 
-/// The elements of a rod that are added to its assembly, several side by side.
+/// Adds the elements of a rod to its assembly, several lanes at once.
 pub(super) struct AddElements<'a, const C: usize, const HESSIAN: bool> {
     pub(super) to: &'a mut Assembly<C>,
     pub(super) elements: &'a [ElementData],
@@ -214,7 +214,7 @@ impl<const C: usize, const HESSIAN: bool> WithSimd for AddElements<'_, C, HESSIA
 }
 
 impl<const C: usize> Assembly<C> {
-    /// Adds nothing where one rod ends and the next begins: the axial force that is not there is held.
+    /// Adds nothing at the gap between two rods: its axial force does not exist, so its row is held.
     #[inline(always)]
     fn add_break<const HESSIAN: bool>(&mut self, e: usize) {
         if HESSIAN {
@@ -223,7 +223,7 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Adds element `e`, which is in this lane of all.
+    /// Adds element `e`, which is in this lane of `all`.
     #[inline(always)]
     fn add_lane<S: Simd, const HESSIAN: bool>(
         &mut self,

@@ -1,4 +1,4 @@
-//! Elements side by side, a lane each: what they are made of and where they are, as [`super::lanes`] computes with it.
+//! Elements side by side, one per lane: their data and states as [`super::lanes`] computes with them.
 
 use super::element::{ElementData, ElementState};
 use super::frame::Frame;
@@ -9,7 +9,7 @@ use super::torsion::TorsionInput;
 use crate::Vec3;
 use pulp::Simd;
 
-/// Most lanes of any processor.
+/// Largest number of lanes on any processor.
 pub(super) const MOST: usize = 8;
 
 /// An element on its way into a lane.
@@ -24,7 +24,7 @@ pub(super) struct Lane<'a> {
 }
 
 impl<'a> Lane<'a> {
-    /// An element that stands alone.
+    /// A single element.
     #[inline(always)]
     pub(super) fn of(data: &'a ElementData, s: &'a ElementState) -> Self {
         let ElementState { first, second, chord, tension, angles } = s;
@@ -68,9 +68,9 @@ impl<S: Simd> Axes<S> {
 /// An instrument in the elements.
 #[derive(Clone, Copy)]
 pub(super) struct Instrument<S: Simd> {
-    /// Whether it is in any of them, …
+    /// Whether it is in any of the elements.
     pub(super) present: bool,
-    /// … and has rest curvature there.
+    /// Whether it has rest curvature in any of them.
     pub(super) curved: bool,
     bending: [Lanes<S>; 3],
     torsion: [Lanes<S>; 3],
@@ -104,14 +104,14 @@ impl<S: Simd> Instrument<S> {
     }
 }
 
-/// Elements side by side.
+/// Several elements, one per lane.
 #[derive(Clone, Copy)]
 pub(super) struct Batch<S: Simd> {
     pub(super) simd: S,
     pub(super) length: Lanes<S>,
-    /// EI of all instruments together.
+    /// Total EI of all instruments.
     pub(super) bending: [Lanes<S>; 3],
-    /// Axial flexibility, and whether any is above zero.
+    /// Axial flexibility, and whether it is above zero in any lane.
     pub(super) flexibility: Lanes<S>,
     pub(super) stretches: bool,
     pub(super) instruments: [Instrument<S>; MAX_ANGLES],
@@ -122,7 +122,7 @@ pub(super) struct Batch<S: Simd> {
 }
 
 impl<S: Simd> Batch<S> {
-    /// Of as many elements as there are lanes, where two neighbouring nodes have `C` unknowns.
+    /// From one element per lane; two neighbouring nodes have `C` unknowns.
     #[inline(always)]
     pub(super) fn new<const C: usize>(simd: S, lanes: &[Lane<'_>]) -> Self {
         const { assert!(S::F64_LANES <= MOST) }

@@ -44,7 +44,7 @@ pub(super) fn bending_value<S: Simd>(y: Vector<S>, z: Vector<S>) -> Lanes<S> {
     cross.dot(cross) * 0.5 * a * a * a.sqrt()
 }
 
-/// The density with its derivatives. Where no Hessian is wanted the compiler leaves its half out.
+/// The density with its derivatives. Without a Hessian the compiler removes that half.
 #[inline(always)]
 pub(super) fn bending<S: Simd>(y: Vector<S>, z: Vector<S>) -> BendingDensity<S> {
     let a = y.dot(y).inverse();

@@ -1,4 +1,4 @@
-//! What a clamp at the start of a rod exerts, and with what force a rod is driven through it.
+//! The reaction of a clamp at the start of a rod, and the force that pushes the rod through it.
 
 use super::layout::{Layout, MAX_ANGLES};
 use super::state::RodState;
@@ -13,7 +13,7 @@ pub struct Clamp {
     pub moment: Vec3,
     /// Moment along the tangent, on all instruments together; 0 without angles.
     pub torque: f64,
-    /// That on the instrument of each set of angles.
+    /// Moment along the tangent on the instrument of each set of angles.
     pub torques: [f64; MAX_ANGLES],
 }
 
@@ -36,15 +36,15 @@ impl Clamp {
         }
     }
 
-    /// Force with which the rod must be pushed through the clamp, a rigid straight sleeve without friction, to stay where it
-    /// is; negative where it must be pulled.
+    /// Force needed to hold the rod in the clamp, a rigid, straight, frictionless sleeve; positive pushes it in,
+    /// negative pulls it back.
     ///
-    /// F = −n·t − ½EI|t′|² − ½GJτ² with n the internal force. The terms after the first are configurational: what the
-    /// next piece takes up as it leaves the sleeve. F is the derivative of the total potential energy, sleeve included, by the
-    /// length outside. `bending`, `torsion` and `rest_curvature` (as a vector across the tangent) are the rod's in the
-    /// clamp.
+    /// F = −n·t − ½EI|t′|² − ½GJτ² with n the internal force. The terms after the first are configurational: the
+    /// energy that the next piece stores as it leaves the sleeve. F is the derivative of the total potential energy,
+    /// sleeve included, by the length outside. `bending`, `torsion` and `rest_curvature` (as a vector across the
+    /// tangent) are those of the rod in the clamp.
     pub fn push_force(&self, tangent: &Vec3, bending: f64, torsion: f64, rest_curvature: &Vec3) -> f64 {
-        // The clamp balances −EI(t′ − κ⁰): t′ from its moment is more exact than from the cubic.
+        // The clamp balances −EI(t′ − κ⁰): t′ from its moment is more accurate than t′ of the cubic.
         let bend = rest_curvature - self.moment.cross(tangent) / bending;
         self.force.dot(tangent)
             - 0.5 * bending * bend.norm_squared()

@@ -1,4 +1,4 @@
-//! Energies of two points of the centre line, on elements that are no neighbours.
+//! Energies of two points of the centre line on elements that are not neighbours.
 //!
 //! The points are Σ cᵢ qᵢ with q = (x₀, h t₀, x₁, h t₁) of each element, as in [`super::points`], and an energy of both is given by its
 //! derivatives in the eight. Tangents turn on a sphere: at second order tᵢ moves by −½|δ|² tᵢ as well.
@@ -19,17 +19,18 @@ pub const PLACES: usize = 8;
 pub struct Couple {
     /// The element of the first point.
     pub first: usize,
-    /// That of the second.
+    /// The element of the second point.
     pub second: usize,
     /// First derivatives.
     pub gradient: [Vec3; PLACES],
-    /// Those under which tangents turn: the first derivatives, or where forces are unknowns of their own, what these are.
+    /// Derivatives with which tangents turn: the first derivatives or, where forces are unknowns of their own, the
+    /// values of these.
     pub carried: [Vec3; PLACES],
-    /// Second derivatives, i ≤ j; the rest is not read.
+    /// Second derivatives, i ≤ j; the other entries are not read.
     pub hessian: [[Matrix3<f64>; PLACES]; PLACES],
 }
 
-/// An unknown: its row, which of the eight it moves, and how.
+/// A degree of freedom: its row, which of the eight vectors it moves, and in which direction.
 type Way = (usize, usize, Vec3);
 
 impl<const C: usize> Assembly<C> {
@@ -59,7 +60,7 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Adds to an entry of the matrix, wherever it lies.
+    /// Adds to an entry of the matrix, in or outside the band.
     fn add_entry(&mut self, i: usize, j: usize, value: f64) {
         let block = Layout::<C>::BLOCK;
         if (i / block).abs_diff(j / block) <= 1 {
@@ -71,7 +72,7 @@ impl<const C: usize> Assembly<C> {
 }
 
 impl Couple {
-    /// No energy, of a point on each of two elements.
+    /// Zero energy, for a point on each of two elements.
     pub fn none([first, second]: [usize; 2]) -> Self {
         Self {
             first,
@@ -82,7 +83,7 @@ impl Couple {
         }
     }
 
-    /// The points by number, and their elements.
+    /// The two points, numbered, and their elements.
     fn sides(&self) -> impl Iterator<Item = (usize, usize)> {
         [self.first, self.second].into_iter().enumerate()
     }

@@ -44,7 +44,7 @@ fn material(s: &mut u64) -> Material {
     }
 }
 
-/// An element of three instruments with shapes of their own, and one without.
+/// An element with three instruments that have rest shapes, and one without.
 pub(super) fn data(seed: &mut u64) -> ElementData {
     let materials = [material(seed), material(seed), material(seed)];
     let bending =
@@ -210,7 +210,7 @@ fn the_hessian_of_a_nearly_straight_element_is_that_of_the_beam() {
         let mut out = ElementSystem::<PLAIN>::zeros();
         element_system::<_, true>(&d, &q, 0.0, &mut out);
         let (x0, t0, x1, t1) = (0, 3, 6, 9);
-        // A turn changes entries by its own size; beside it there is rounding of 192 along each pair of axes.
+        // The rotation changes entries by its own size; rounding is 192 along each pair of axes.
         let room = 1e3 * turn + 1e-12;
         let along = |i: usize, j: usize| first.u[i] * first.u[j] + first.v[i] * first.v[j];
         for i in 0..3 {

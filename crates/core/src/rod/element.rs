@@ -1,4 +1,4 @@
-//! What an element is made of, where it is, and what it yields: the types that the parts of its Lagrangian share, and its kinematics.
+//! Data, state and derivatives of an element, the types shared by the parts of its Lagrangian, and its kinematics.
 
 use super::frame::Frame;
 use super::lanes::{Lanes, Vector};
@@ -8,12 +8,12 @@ use crate::Vec3;
 use pulp::Simd;
 use std::ops::{Add, Mul, Sub};
 
-/// One instrument in an element, sampled at its Gauss points: what its material angle is needed for.
+/// One instrument in an element, sampled at its Gauss points, as far as its material angle needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Its own bending stiffness EI.
+    /// Bending stiffness EI of this instrument alone.
     pub bending: [f64; 3],
-    /// Torsion stiffness GJ; unused where nothing twists.
+    /// Torsional stiffness GJ; unused without twist.
     pub torsion: [f64; 3],
     /// Rest curvature along d₁ and d₂.
     pub rest_curvature: [[f64; 2]; 3],
@@ -33,16 +33,16 @@ impl Material {
     }
 }
 
-/// What an element is made of, sampled at its Gauss points.
+/// Data of an element, sampled at its Gauss points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementData {
     /// Length h along the rod.
     pub length: f64,
-    /// Bending stiffness EI of all instruments together.
+    /// Total bending stiffness EI of all instruments.
     pub bending: [f64; 3],
     /// Axial flexibility ∫ds/EA; zero = inextensible.
     pub flexibility: f64,
-    /// The instruments that have material angles, by set of angles.
+    /// The instruments that have material angles, one per set of angles.
     pub materials: [Material; MAX_ANGLES],
 }
 
@@ -51,8 +51,8 @@ impl ElementData {
     pub(crate) const EMPTY: Self =
         Self { length: 0.0, bending: [0.0; 3], flexibility: 0.0, materials: [Material::NONE; MAX_ANGLES] };
 
-    /// The gap between the end of one rod and the begin of the next, where several are solved for together: nothing is there, and what is on one side does
-    /// not feel the other. Its length only says what its chord is counted in.
+    /// The gap between two rods that are solved together, from the end of one to the start of the next. It has no
+    /// stiffness, so neither side acts on the other. Its length is only the unit of its chord.
     pub(crate) const BREAK: Self = Self { length: 1.0, ..Self::EMPTY };
 
     /// Whether it is the gap between two rods.
@@ -74,7 +74,8 @@ impl ElementData {
         Self::of(length, Material { bending: [stiffness; 3], torsion: [stiffness; 3], ..Material::NONE })
     }
 
-    /// Energy that it takes to straighten the element, mJ: the size of the terms that bending energy is a difference of.
+    /// Energy that straightening the element takes, mJ: the magnitude of the terms whose difference is the bending
+    /// energy.
     pub fn straightening_energy(&self) -> f64 {
         let each = self.materials.iter().map(|material| {
             let [u, v] = material.rest_curvature[1];
@@ -83,7 +84,7 @@ impl ElementData {
         each.sum()
     }
 
-    /// Largest moment that it takes to bend one of several instruments into the shape of all: the others exert it. 0 for a single one.
+    /// Largest moment by which the other instruments bend one to their common shape; 0 for a single instrument.
     pub fn mutual_moment(&self) -> f64 {
         let all = self.bending[1];
         if self.materials[0].bending[1] == all {
@@ -164,7 +165,7 @@ where
     length * (2.0 / 3.0) * (speed - 1.0)
 }
 
-/// What the bending energy is multiplied by beside its mean speed, with its first and second derivative in c = t₀·t₁.
+/// Factor of the bending energy beside the mean speed, with its first and second derivative in c = t₀·t₁.
 ///
 /// A cubic with unit end slopes and |r′(½)| = 1 that spans a circular arc of angle φ costs more than the arc, by 7φ⁴/2880 of its
 /// energy: 4/2880 because its curvature wavers (the interpolation error r⁗B, B = s²(h−s)²/24, has the normal part κ³B), 4/2880
@@ -180,7 +181,7 @@ pub(super) fn arc_factor<S: Simd>(t0: Vector<S>, t1: Vector<S>) -> (Lanes<S>, La
     (one - q * EXCESS * q, q * (4.0 * EXCESS), -8.0 * EXCESS)
 }
 
-/// Mean of |r′| over the element from that in its middle, Simpson's rule with unit slopes at the nodes.
+/// Mean of |r′| over the element from its value at the middle, by Simpson's rule with unit slopes at the nodes.
 #[inline(always)]
 pub(super) fn mean_speed<S: Simd>(mid: Lanes<S>) -> Lanes<S> {
     (mid * 2.0 + 1.0) / 3.0
@@ -195,8 +196,9 @@ pub(super) fn angles<S: Simd>(a: &[Lanes<S>; 3], p: &Point) -> (Lanes<S>, Lanes<
     )
 }
 
-/// Gradient and upper triangle of the Hessian in the unknowns of the element's nodes, in the order of [`super::layout`]. Those
-/// that belong to the element before, its N and b at the first node, are empty. A number is one or, of elements side by side, one of each.
+/// Gradient and upper triangle of the Hessian in the unknowns of the element's nodes, in the order of
+/// [`super::layout`]. N and b at the first node belong to the element before and stay empty. `T` is one number, or
+/// one per lane for elements side by side.
 #[derive(Debug, Clone)]
 pub struct ElementSystem<const C: usize, T = f64> {
     /// Gradient of the Lagrangian; the last entry is the constraint c − D N.
@@ -217,7 +219,7 @@ impl<const C: usize> ElementSystem<C> {
 }
 
 impl<const C: usize, T: Copy> ElementSystem<C, T> {
-    /// Everything is `value`.
+    /// Fills all entries with `value`.
     pub(super) const fn filled(value: T) -> Self {
         let energy = Energy { bend: value, twist: value, axial: value };
         Self { gradient: [value; C], rows: [[value; C]; C], stretch: [value; C], energy }

@@ -1,11 +1,12 @@
-//! Twist and rest curvature of one element: the part of its energy that sees material frames.
+//! Twist and rest curvature of one element: the part of its energy that depends on material frames.
 //!
-//! Instruments that share the centre line share its geometry, each turned against it by an angle of its own. In the first node's triad
-//! the energy depends on the chord, on the far tangent, and on (φ₀, φ₁, b) of every instrument, φ₁ = θ₁ + reference twist: local
-//! unknowns, of which energies and derivatives are sums over Gauss points and instruments; at a point the twist of the reference triad, its
-//! derivatives and what they are multiplied with, the sum of torques, are those of all instruments. Then comes the chain rule. Turns of either
-//! tangent move all local unknowns, and every φ₁ by the same; displacements move the chord alone and angles themselves. So it needs
-//! products with four columns, not with all unknowns, and is gone through once, however many instruments there are.
+//! Instruments that share the centre line share its geometry; each is turned against it by its own angle. In the
+//! first node's triad the energy depends on the chord, the far tangent, and (φ₀, φ₁, b) of every instrument, φ₁ =
+//! θ₁ + reference twist. In these local unknowns, energies and derivatives are sums over Gauss points and
+//! instruments; at a Gauss point the twist of the reference triad, its derivatives, and their factor, the sum of the
+//! torques, are common to all instruments. Then comes the chain rule. Turning either tangent changes all local
+//! unknowns, and every φ₁ equally; displacements change the chord alone, and angles change themselves. So the chain
+//! rule needs products with four columns instead of all unknowns, and is applied once for any number of instruments.
 
 use super::batch::{Axes, Batch};
 use super::element::{ElementSystem, Energy, angles};
@@ -25,7 +26,7 @@ struct ShapeDerivatives<S: Simd> {
     end_end: Matrix<S>,
 }
 
-/// Derivatives in (φ₀, φ₁, b) of one instrument. Mixed ones have rows for the angles.
+/// Derivatives in (φ₀, φ₁, b) of one instrument. Mixed derivatives have a row per angle.
 #[derive(Clone, Copy)]
 struct AngleDerivatives<S: Simd> {
     angles: [Lanes<S>; 3],
@@ -49,7 +50,7 @@ impl<S: Simd> AngleDerivatives<S> {
     }
 }
 
-/// What a unit turn of a tangent changes: chord and far tangent, and the reference twist.
+/// Changes of chord, far tangent and reference twist by a unit turn of a tangent.
 #[derive(Clone, Copy)]
 struct Turn<S: Simd> {
     chord: Vector<S>,
@@ -66,9 +67,9 @@ struct Geometry<S: Simd> {
     across: [Vector<S>; 2],
     /// 1/(1 + t₀·t₁).
     closeness: Lanes<S>,
-    /// Rates of the reference twist in turns of the first tangent, …
+    /// Rates of the reference twist in turns of the first tangent.
     near: [Lanes<S>; 2],
-    /// … and of the second.
+    /// Rates of the reference twist in turns of the second tangent.
     far: [Lanes<S>; 2],
 }
 
@@ -107,7 +108,7 @@ impl<S: Simd> Geometry<S> {
     }
 }
 
-/// Adds twist and rest curvature of all instruments that have angles.
+/// Adds twist and rest curvature of all instruments with angles.
 #[inline(always)]
 pub(super) fn add_torsion<S: Simd, const C: usize, const HESSIAN: bool>(
     s: &Batch<S>,
@@ -178,7 +179,7 @@ const fn angle_rows<const C: usize>(set: usize) -> [usize; 3] {
     [l.angle(0, set), l.angle(1, set), l.bubble(0, set)]
 }
 
-/// Derivatives in y and z as those in chord or far tangent, whose weights in y and z at a point these are.
+/// Turns derivatives in y and z into those in chord or far tangent, given its weights in y and z at a point.
 #[inline(always)]
 fn weighed<S: Simd>(p: Vector<S>, q: Vector<S>, (y, z): (f64, f64)) -> Vector<S> {
     p * y + q * z
@@ -200,7 +201,7 @@ fn add_point<S: Simd, const C: usize>(
     let twist = ReferenceTwist::new(y, z);
     let (weight, slope) = (point.phi, point.dphi);
     let ([yc, _, ye], [zc, _, ze]) = (point.y, point.z);
-    // The gradient of the twist, of which all stiffness against it is a multiple of the square.
+    // Gradient of the twist: the twist stiffness is a multiple of its square.
     let tc = weighed(twist.along_y, twist.along_z, (yc, zc));
     let te = weighed(twist.along_y, twist.along_z, (ye, ze));
     let mut torques = Lanes::splat(s.simd, 0.0);

@@ -80,7 +80,7 @@ impl Frame {
 /// sin(φ)/φ and (1 − cos φ)/φ² from φ².
 #[inline]
 pub(super) fn turn_parts(square: f64) -> (f64, f64) {
-    // Up to half a radian the first term left out is below 10⁻¹⁶.
+    // Up to half a radian the first neglected term is below 10⁻¹⁶.
     if square < 0.25 {
         let x = square;
         let first = 1.0 / 39_916_800.0 - x / 6_227_020_800.0;
@@ -94,13 +94,13 @@ pub(super) fn turn_parts(square: f64) -> (f64, f64) {
     (sin / angle, (1.0 - cos) / square)
 }
 
-/// A vector whose length differs from 1 by rounding, with that taken out: it would add up over millions of steps.
+/// Renormalises a vector whose length differs from 1 by rounding, which would add up over millions of steps.
 #[inline]
 pub(super) fn normalised(w: &Vec3) -> Vec3 {
     w * (1.5 - 0.5 * w.norm_squared())
 }
 
-/// Angle by which `second` is turned about its tangent against `first` carried to it by the smallest rotation.
+/// Angle by which `second` is turned about its tangent against `first` transported to it by the smallest rotation.
 ///
 /// With Q the components of `second` in `first`: atan2(Q₃₂ − Q₂₃, Q₂₂ + Q₃₃), the twist of the swing–twist
 /// decomposition; the reference twist of Bergou et al. 2010, sec. 6.

@@ -1,16 +1,19 @@
-//! The element's Hessian from its four invariants.
+//! The element's Hessian from its four rotation invariants.
 //!
-//! Turned as a whole an element keeps its energy, so with unit tangents bending and stretch depend on chord e and end tangents
-//! t₀, t₁ through g = (e·e, e·t₀, e·t₁, t₀·t₁) alone. At a Gauss point y·y, y·z and z·z are linear in g with constant
-//! weights ([`GRAMS`]), and so is |r′(½)|² ([`MIDDLE`]). With V(g) the Lagrangian of the element the Hessian is
+//! The energy of an element does not change when the element is rotated, so with unit tangents bending and stretch
+//! depend on chord e and end tangents t₀, t₁ through g = (e·e, e·t₀, e·t₁, t₀·t₁) alone. At a Gauss point y·y, y·z
+//! and z·z are linear in g with constant weights ([`GRAMS`]), and so is |r′(½)|² ([`MIDDLE`]). With V(g) the
+//! Lagrangian of the element the Hessian is
 //!
 //!   Σ V_ij ∇gᵢ ∇gⱼᵀ + Σ V_i ∇²gᵢ,
 //!
-//! so Gauss points add to ten scalars V_ij and four V_i, and vectors come in once. (Terms beyond the straight element's cancel
-//! to rounding of EI/h, the size of the entries. The gradient is not written so: of its forces nothing may cancel.)
+//! so Gauss points add to ten scalars V_ij and four V_i, and vectors enter once. (Terms beyond the straight element's
+//! cancel to rounding of EI/h, the size of the entries. The gradient is not computed this way, because its forces
+//! must not lose digits to cancellation.)
 //!
-//! V = f S + N c + ½γ(c − c₀)²: S the bending energy at unit speed, f = arc · mean the factors that [`super::element`]
-//! explains, c the elongation with its axial force, and the augmentation of [`super::assembly`], of which only γ∇c∇cᵀ counts.
+//! V = f S + N c + ½γ(c − c₀)²: S is the bending energy at unit speed, f = arc · mean the factors explained in
+//! [`super::element`], c the elongation with its axial force, and the last term the augmentation of
+//! [`super::assembly`], of which only γ∇c∇cᵀ counts.
 
 use super::bending::Partials;
 use super::lanes::Lanes;
@@ -44,16 +47,16 @@ const GRAMS: [Gram; 3] = [Gram::at(&GAUSS[0]), Gram::at(&GAUSS[1]), Gram::at(&GA
 /// Weights of g in |r′(½)|² = |3/2 e − ¼(t₀ + t₁)|².
 const MIDDLE: [f64; 4] = [2.25, -0.75, -0.75, 0.125];
 
-/// First derivatives of a function of g, and the upper triangle of its second ones.
+/// First derivatives of a function of g, and the upper triangle of its second derivatives.
 #[derive(Clone, Copy)]
 pub(super) struct Derivatives<S: Simd> {
     /// By gᵢ.
     pub(super) first: [Lanes<S>; 4],
-    /// By gᵢ and gⱼ, i ≤ j; the rest means nothing.
+    /// By gᵢ and gⱼ, i ≤ j; the other entries are unused.
     pub(super) second: [[Lanes<S>; 4]; 4],
 }
 
-/// What the bending energy at unit speed is multiplied by, and what is added to it.
+/// Factors of the bending energy at unit speed, and the terms added to it.
 #[derive(Clone, Copy)]
 pub(super) struct Factors<S: Simd> {
     /// Bending energy at unit speed.
@@ -97,7 +100,7 @@ impl<S: Simd> Derivatives<S> {
         }
     }
 
-    /// From those of the bending energy at unit speed to those of the whole Lagrangian.
+    /// Turns derivatives of the bending energy at unit speed into those of the whole Lagrangian.
     #[inline(always)]
     pub(super) fn complete(&self, f: &Factors<S>) -> Self {
         let (arc, slope, curve) = f.arc;

@@ -1,11 +1,11 @@
 //! One element's energy, gradient and Hessian in the unknowns of Newton's method.
 //!
-//! The unknowns of an element are, in this order, the displacement of the first node (3), the turn of its tangent
-//! (2: along u and v of its triad, moved by the smallest rotation), with twist its angles θ₀ and the element's
-//! angle bubbles b, one of each for every instrument that has them, the same of the second node, and the axial force N. Derivatives are those of the energy pulled
-//! back by that retraction, exact at the current state, so second derivatives hold the curvature of the sphere (−(g·t)I)
-//! and of the reference twist. Energy and gradient come from the vectors y and z of each Gauss point, the Hessian from the
-//! element's invariants (`invariants`).
+//! The unknowns of an element are, in this order: the displacement of the first node (3); the turn of its tangent (2:
+//! along u and v of its triad, moved by the smallest rotation); with twist, its angles θ₀ and the element's angle
+//! bubbles b, one of each per instrument that has angles; the same of the second node; and the axial force N.
+//! Derivatives are those of the energy pulled back by that retraction, exact at the current state, so second
+//! derivatives include the curvature of the sphere (−(g·t)I) and of the reference twist. Energy and gradient come
+//! from the vectors y and z of each Gauss point, the Hessian from the element's invariants (`invariants`).
 
 use super::batch::{Batch, Lane, MOST};
 use super::bending::{bending, bending_value};
@@ -26,8 +26,8 @@ pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> E
     energy::<_, C>(&Batch::new::<C>(Scalar, &[Lane::of(data, s)]))
 }
 
-/// The element's Lagrangian with derivatives; the Hessian only where `HESSIAN` is set, and with the augmentation `gamma` (γ
-/// in [`super::assembly`]; with 0 it is the Lagrangian's own).
+/// The element's Lagrangian with derivatives. The Hessian is computed only if `HESSIAN` is set, with the augmentation
+/// `gamma` (γ in [`super::assembly`]; 0 gives the Hessian of the Lagrangian itself).
 pub fn element_system<const C: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,
@@ -38,12 +38,12 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     system::<_, C, HESSIAN>(&batch, Lanes::splat(Scalar, gamma), out);
 }
 
-/// Energy of all elements of a rod.
+/// Elastic energy of all elements of a rod.
 pub(crate) fn stored_energy<const C: usize>(elements: &[ElementData], state: &RodState) -> f64 {
     Arch::new().dispatch(Stored::<C> { elements, state })
 }
 
-/// What a rod stores.
+/// Sums the elastic energy of a rod.
 pub(super) struct Stored<'a, const C: usize> {
     pub(super) elements: &'a [ElementData],
     pub(super) state: &'a RodState,
@@ -68,7 +68,8 @@ impl<const C: usize> WithSimd for Stored<'_, C> {
     }
 }
 
-/// Tells of each of `count` elements, made by `data`, the gradient and the derivative of its elongation where `state` is, without axial force.
+/// Calls `tell` with the gradient and the derivative of the elongation of each of `count` elements, made by `data`,
+/// at `state`, without axial force.
 pub(crate) fn element_gradients<const C: usize>(
     count: usize,
     data: impl Fn(usize) -> ElementData,
@@ -78,7 +79,7 @@ pub(crate) fn element_gradients<const C: usize>(
     Arch::new().dispatch(Gradients { count, data, state, tell });
 }
 
-/// The gradients of elements that are made one after the other.
+/// Computes gradients of elements that are made one after the other.
 pub(super) struct Gradients<'a, const C: usize, D, T> {
     pub(super) count: usize,
     pub(super) data: D,
@@ -120,7 +121,7 @@ where
     }
 }
 
-/// As many elements from `first` on as there are lanes, and how many of them there are: the last one fills what is left over.
+/// The elements from `first` on, as many as there are lanes, and their number; the last one fills unused lanes.
 #[inline(always)]
 pub(super) fn beside<S: Simd, const C: usize>(
     simd: S,
@@ -186,7 +187,7 @@ fn stretch_energy<S: Simd>(s: &Batch<S>, c: Lanes<S>) -> Lanes<S> {
     (c * 0.5 * c / s.flexibility).where_positive(s.flexibility)
 }
 
-/// First places of x₀, t₀, x₁ and t₁.
+/// First rows of x₀, t₀, x₁ and t₁.
 #[inline(always)]
 const fn places<const C: usize>() -> [usize; 4] {
     let l = Layout::<C>;
@@ -235,7 +236,7 @@ pub(super) fn system<S: Simd, const C: usize, const HESSIAN: bool>(
     let arc = arc_factor(t0, t1);
     let mean = mean_speed(speed);
     let f = arc.0 * mean;
-    // Axial force at the middle: N c, c = ⅔h(|r′| − 1). Its derivative in |r′| and that of f U are of one kind.
+    // Axial force at the middle: N c, c = ⅔h(|r′| − 1). Its derivative in |r′| has the same form as that of f U.
     let c = elongation(h, speed);
     let mut energy = Energy { bend: stored * f, twist: zero, axial: zero };
     if s.stretches {
@@ -270,7 +271,7 @@ pub(super) fn system<S: Simd, const C: usize, const HESSIAN: bool>(
     if HESSIAN {
         let factors = Factors { stored, arc, mean, slow, length: h, tension: s.tension, gamma };
         add_hessian(s, ih, &second.complete(&factors), out);
-        // With the augmentation goes the flexibility of the transformed multiplier.
+        // The flexibility of the transformed multiplier, which belongs to the augmentation.
         out.rows[C - 1][C - 1] = (-s.flexibility / (-(gamma * s.flexibility) + 1.0)).stored();
         for i in 0..C - 1 {
             out.rows[i][C - 1] = out.stretch[i];
@@ -302,7 +303,7 @@ fn add_hessian<S: Simd, const C: usize>(
     let wq = combined(&by_x, [vv[0][2], vv[1][2], vv[2][2]]);
     let wr = combined(&by_x, [vv[0][3], vv[1][3], vv[2][3]]);
     if Layout::<C>::ANGLES > 0 {
-        // What is set below is the same every time; torsion adds to more.
+        // Set here on every call, so that only torsion has to add to it.
         let zero = Lanes::splat(s.simd, 0.0).stored();
         for i in 0..C {
             for j in i..C {

@@ -1,4 +1,4 @@
-//! Elements side by side have the bits of each alone.
+//! Elements computed side by side have the same bits as each alone.
 
 use super::assembly::{AddElements, Assembly};
 use super::derivative_tests::{data, noise};
@@ -10,7 +10,7 @@ use super::state::RodState;
 use crate::Vec3;
 use pulp::{Arch, Scalar, Simd};
 
-/// Elements of all kinds: straight and curved, that stretch and do not, some of which instruments have ended in.
+/// Elements of all kinds: straight and curved, extensible and not, some after the end of an instrument.
 fn rod(seed: u64, sets: usize, count: usize) -> (Vec<ElementData>, RodState) {
     let mut s = seed;
     let mut elements: Vec<ElementData> = (0..count).map(|_| data(&mut s)).collect();
@@ -38,7 +38,7 @@ fn rod(seed: u64, sets: usize, count: usize) -> (Vec<ElementData>, RodState) {
     (elements, rod)
 }
 
-/// Assembled as on the processor at hand, and element by element.
+/// Assembled with the lanes of this processor, and element by element.
 fn both_ways<const C: usize>(elements: &[ElementData], rod: &RodState) -> [(Assembly<C>, f64); 2] {
     let of = |one: bool| {
         let mut to = Assembly::<C>::new(elements.len());
@@ -69,7 +69,7 @@ fn have_the_bits_of_each_alone<const C: usize>() {
         let (elements, rod) = rod(7 + count as u64, Layout::<C>::ANGLES, count);
         let mut ways = both_ways::<C>(&elements, &rod);
         assert!(same(&ways), "{count} elements of {C} unknowns");
-        // The energy alone is that which comes with derivatives, and the last digit of any entry would be seen.
+        // The energy alone equals the one with derivatives; the test would notice the last digit of any entry.
         let [(ref assembly, stored), _] = ways;
         assert!((assembly.energy.total() - stored).abs() < 1e-13 * stored.abs());
         let last = &mut ways[0].0.residual[C / 2 * count];

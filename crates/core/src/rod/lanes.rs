@@ -1,15 +1,16 @@
-//! Numbers of several elements side by side, an element a lane, and vectors and matrices of three of them.
+//! Numbers of several elements side by side, one element per lane, and vectors and matrices of three of them.
 //!
-//! One code computes four elements at once with AVX2, and one where the processor has none: [`pulp`] looks at run time. Lanes never
-//! meet, every operation rounds as that of a single number does, and no product is fused with a sum, so bits hang neither on the
-//! number of lanes nor on the processor.
+//! The same code computes four elements at once with AVX2, and one on processors without it: [`pulp`] selects at run
+//! time. Lanes are independent, every operation rounds like that of a single number, and no product is fused with a
+//! sum, so the bits depend neither on the number of lanes nor on the processor.
 //!
-//! Everything here, and whatever is computed with it, has to be inlined into the function that [`pulp`] compiles for the processor.
+//! Everything here, and all code that uses it, has to be inlined into the function that [`pulp`] compiles for the
+//! processor.
 
 use pulp::{Simd, bytemuck};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A number of every lane.
+/// A number per lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
     simd: S,
@@ -23,7 +24,7 @@ impl<S: Simd> Lanes<S> {
         Self { simd, all: simd.splat_f64s(value) }
     }
 
-    /// Each lane's own number.
+    /// A number for each lane from `of`.
     #[inline(always)]
     pub(super) fn gather(simd: S, of: impl Fn(usize) -> f64) -> Self {
         let mut all = simd.splat_f64s(0.0);
@@ -34,25 +35,25 @@ impl<S: Simd> Lanes<S> {
         Self { simd, all }
     }
 
-    /// The same number in every lane, as many as here.
+    /// The same number in every lane of this processor.
     #[inline(always)]
     pub(super) fn like(self, value: f64) -> Self {
         Self::splat(self.simd, value)
     }
 
-    /// As it is stored.
+    /// For storing.
     #[inline(always)]
     pub(super) fn stored(self) -> S::f64s {
         self.all
     }
 
-    /// Adds to what is stored.
+    /// Adds to a stored sum.
     #[inline(always)]
     pub(super) fn add_to(self, sum: &mut S::f64s) {
         *sum = self.simd.add_f64s(*sum, self.all);
     }
 
-    /// Takes from what is stored.
+    /// Subtracts from a stored sum.
     #[inline(always)]
     pub(super) fn take_from(self, sum: &mut S::f64s) {
         *sum = self.simd.sub_f64s(*sum, self.all);
@@ -70,7 +71,7 @@ impl<S: Simd> Lanes<S> {
         self.like(1.0) / self
     }
 
-    /// Itself in lanes where `sign` is positive, 0 in others.
+    /// The number in lanes where `sign` is positive, 0 in others.
     #[inline(always)]
     pub(super) fn where_positive(self, sign: Self) -> Self {
         let zero = self.simd.splat_f64s(0.0);
@@ -120,7 +121,7 @@ impl<S: Simd> Neg for Lanes<S> {
     }
 }
 
-/// Operators that work on every component.
+/// Operators that act on each component.
 macro_rules! componentwise {
     ($type:ident, $($component:tt)*) => {
         impl<S: Simd> Add for $type<S> {
@@ -161,7 +162,7 @@ macro_rules! componentwise {
     };
 }
 
-/// A vector of every lane.
+/// A vector per lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector<S: Simd> {
     pub(super) x: Lanes<S>,
@@ -219,7 +220,7 @@ impl<S: Simd> Vector<S> {
     }
 }
 
-/// A 3 × 3 matrix of every lane, by its rows.
+/// A 3 × 3 matrix per lane, by rows.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Matrix<S: Simd> {
     pub(super) x: Vector<S>,

@@ -5,27 +5,28 @@
 //!
 //!   b₁ … b_k, x (3), t (2), θ₁ … θ_k, N
 //!
-//! where N and the angle bubbles b belong to the element that **ends** at the node. A multiplier comes after every unknown it
-//! constrains: an inextensible element has a zero on the diagonal of N, and only elimination of both its nodes fills it. (Putting N
-//! between its nodes would narrow the band by one and break the factorisation of every clamped inextensible rod.) After the last node
-//! come six rows for the multipliers of end supports. Rows without meaning (N and b of the first node, angles where their
-//! instrument has ended, supports that are absent) hold the identity.
+//! where N and the angle bubbles b belong to the element that **ends** at the node. A multiplier comes after every
+//! unknown it constrains: an inextensible element has a zero on the diagonal of N, which is filled only by
+//! eliminating both its nodes. (Putting N between its nodes would narrow the band by one and break the factorisation
+//! of every clamped inextensible rod.) After the last node come six rows for the multipliers of end supports. Unused
+//! rows (N and b of the first node, angles where their instrument has ended, supports that are absent) hold the
+//! identity.
 
-/// Unknowns of two neighbouring nodes without angles.
+/// Number of unknowns of two neighbouring nodes without angles.
 pub const PLAIN: usize = 12;
-/// Unknowns of two neighbouring nodes with one set of angles.
+/// Number of unknowns of two neighbouring nodes with one set of angles.
 pub const TWISTED: usize = 16;
-/// Most sets of angles.
+/// Largest number of sets of angles.
 pub const MAX_ANGLES: usize = 3;
 
-/// Places of the unknowns where two neighbouring nodes have `C` = 12 + 4k of them.
+/// Row numbers of the unknowns where two neighbouring nodes have `C` = 12 + 4k of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout<const C: usize>;
 
 impl<const C: usize> Layout<C> {
-    /// Sets of angles, k.
+    /// Number of sets of angles, k.
     pub const ANGLES: usize = (C - PLAIN) / 4;
-    /// Unknowns a node.
+    /// Unknowns per node.
     pub const BLOCK: usize = C / 2;
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
@@ -91,7 +92,7 @@ mod tests {
             (0..angles).for_each(|set| take(l.bubble(e, set), 1));
         }
         take(l.support(n), 6);
-        // Left over are b and N of the first node, and what supports have more room than rows.
+        // Unused rows: b and N of the first node, and spare rows of the supports.
         let first = l.support(n);
         let spare = |row: usize| row < angles || row == Layout::<C>::BLOCK - 1 || row >= first + 6;
         assert!(taken.iter().enumerate().all(|(row, count)| *count == usize::from(!spare(row))), "{taken:?}");

@@ -5,22 +5,24 @@
 //! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
 //! the element. The Lagrangian is
 //!
-//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending (`bending`)
+//!   ½∫EI |r′×r″|²/|r′|⁵ ds · ∫|r′| ds / h                      bending (`bending`)
 //!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature (`torsion`)
 //!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist (`torsion`)
 //!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
 //!
-//! where instruments i that lie in one another share the centre line, EI is the sum of theirs, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂) turns with the
-//! angle of each: Σ ½EIᵢ|t′ − κᵢ⁰|² (Dupont, Lock, Itkowitz and Butler, IEEE Trans. Robotics 26(2), 2010). A rod is one instrument.
+//! where coaxial instruments i share the centre line, EI is the sum of their stiffnesses, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂)
+//! turns with the angle of each: Σ ½EIᵢ|t′ − κᵢ⁰|² (Dupont, Lock, Itkowitz and Butler, IEEE Trans. Robotics 26(2),
+//! 2010). A single rod is one instrument.
 //!
-//! with c = ⅔h(|r′(½)| − 1), Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
+//! c = ⅔h(|r′(½)| − 1) is Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
 //! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for
-//! geometrically exact curved Kirchhoff rods*, CMAME 278 (2014); *A locking-free finite element formulation and reduced models
-//! for geometrically exact Kirchhoff rods*, CMAME 290 (2015); M. Bergou et al., *Discrete viscous threads*, SIGGRAPH 2010.
+//! geometrically exact curved Kirchhoff rods*, CMAME 278 (2014); *A locking-free finite element formulation and
+//! reduced models for geometrically exact Kirchhoff rods*, CMAME 290 (2015); M. Bergou et al., *Discrete viscous
+//! threads*, SIGGRAPH 2010.
 //!
-//! Assemblies and stored energies are computed for several elements at once, a lane each (`lanes`, `batch`).
+//! Assemblies and elastic energies are computed for several elements at once, one per lane (`lanes`, `batch`).
 //!
-//! Units are the caller's, any consistent set: nothing here knows a millimetre.
+//! Any consistent units may be used: nothing here assumes millimetres.
 
 pub mod assembly;
 mod batch;

@@ -16,11 +16,11 @@ use crate::field::EnergyDensity;
 /// Gradients and Hessians of energies of points of one element.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PointSum {
-    /// In x₀, h t₀, x₁ and h t₁.
+    /// Gradients in x₀, h t₀, x₁ and h t₁.
     forces: [Vec3; 4],
-    /// In pairs of them, i ≤ j; the rest is zero.
+    /// Hessians in pairs of these, i ≤ j; the other entries are zero.
     stiffness: [[Matrix3<f64>; 4]; 4],
-    /// Whether there is anything.
+    /// Whether anything has been added.
     felt: bool,
 }
 
@@ -30,7 +30,7 @@ impl PointSum {
         !self.felt
     }
 
-    /// Energy of gradients that do not change, from where all is at the device's first node: Σ gᵢ·(xᵢ − x₀).
+    /// Energy of constant gradients, zero where all points are at the device's first node: Σ gᵢ·(xᵢ − x₀).
     pub fn along(&self, state: &RodState, element: &ElementData, e: usize) -> f64 {
         let start = state.positions[0];
         let [x0, x1] = [e, e + 1].map(|node| state.positions[node] - start);
@@ -39,7 +39,7 @@ impl PointSum {
         f0.dot(&x0) + g0.dot(&t0) + f1.dot(&x1) + g1.dot(&t1)
     }
 
-    /// Adds an energy of the point at ξ, whose gradient and, if wanted, Hessian in that point's position are given.
+    /// Adds an energy of the point at ξ from its gradient and, if wanted, Hessian in the position of that point.
     pub fn add(&mut self, xi: f64, gradient: &Vec3, hessian: Option<&Matrix3<f64>>) {
         self.felt = true;
         let c = hermite(xi);
@@ -77,7 +77,7 @@ impl PointSum {
 }
 
 impl<const C: usize> Assembly<C> {
-    /// Adds energies of points of element `e`.
+    /// Adds the summed energies of points of element `e`.
     pub(super) fn add_gathered(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
         let l = Layout::<C>;
         let h = element.length;
@@ -111,7 +111,7 @@ impl<const C: usize> Assembly<C> {
             }
         }
         for a in 0..2 {
-            let (near, across) = (s[0][1] * d0[a], s[1][2] * d0[a]);
+            let (near, across) = (s[0][1] * d0[a], s[1][2].tr_mul(&d0[a]));
             let (far, along) = (s[0][3] * d1[a], s[2][3] * d1[a]);
             for b in 0..3 {
                 rows[x0 + b][t0 + a] = near[b];
@@ -119,7 +119,7 @@ impl<const C: usize> Assembly<C> {
                 rows[x0 + b][t1 + a] = far[b];
                 rows[x1 + b][t1 + a] = along[b];
             }
-            let (own, other, last) = (s[1][1] * d0[a], s[1][3] * d0[a], s[3][3] * d1[a]);
+            let (own, other, last) = (s[1][1] * d0[a], s[1][3].tr_mul(&d0[a]), s[3][3] * d1[a]);
             for b in 0..2 {
                 rows[t0 + a][t1 + b] = other.dot(&d1[b]);
                 if b >= a {

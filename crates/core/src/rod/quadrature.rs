@@ -5,14 +5,14 @@
 //!   y = r′   = 6ξ(1−ξ) e + (1−4ξ+3ξ²) t₀ + (3ξ²−2ξ) t₁,
 //!   z = h r″ = 6(1−2ξ) e + (6ξ−4) t₀ + (6ξ−2) t₁,
 //!
-//! both free of the unit of length: energies of an element depend on h only through EI/h and GJ/h.
+//! both independent of the unit of length: energies of an element depend on h only through EI/h and GJ/h.
 
 use std::ops::{Add, Mul};
 
 /// Weights of (e, t₀, t₁) in y and z, and of (θ₀, θ₁, b) in the angle, at one point of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Place in the element, 0 to 1.
+    /// Position in the element, 0 to 1.
     pub xi: f64,
     /// Quadrature weight; the weights sum to 1.
     pub weight: f64,
@@ -53,8 +53,8 @@ impl Point {
 /// Distance of the outer Gauss points from the middle, ½√(3/5).
 const OUTER: f64 = 0.387_298_334_620_741_7;
 
-/// The three-point Gauss rule on [0, 1], exact for polynomials of degree 5: one more than the squared curvature of
-/// a straight-reference element needs, and enough for order 4 where the element is strongly bent.
+/// The three-point Gauss rule on [0, 1], exact for polynomials of degree 5: one more than the squared curvature of an
+/// initially straight element needs, and enough for order 4 where the element is strongly bent.
 pub const GAUSS: [Point; 3] =
     [Point::at(0.5 - OUTER, 5.0 / 18.0), Point::at(0.5, 8.0 / 18.0), Point::at(0.5 + OUTER, 5.0 / 18.0)];
 
@@ -68,8 +68,8 @@ pub fn hermite(xi: f64) -> [f64; 4] {
 /// The largest of ξ (1 − ξ)².
 const BULGE: f64 = 4.0 / 27.0;
 
-/// By how much a point of an element of length h moves at most, mm, whose nodes move by |Δx| and have tangents that change by |Δt|: a point is a mean of
-/// its nodes and a part of their tangents ([`hermite`]), so that it is
+/// Upper bound of the motion, mm, of any point of an element of length h whose nodes move by |Δx| and whose tangents
+/// change by |Δt|. By [`hermite`] a point is a mean of the nodes plus a part of the tangents, so it moves by at most
 ///
 /// ```text
 /// max |Δxₖ| + 4/27 h (|Δt₀| + |Δt₁|),    ξ (1 − ξ)² ≤ 4/27

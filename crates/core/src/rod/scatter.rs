@@ -1,4 +1,4 @@
-//! The assembly scatters the stencils of energies outside the rod.
+//! Scatters the stencils of external energies into the assembly.
 
 use nalgebra::Matrix3;
 
@@ -111,15 +111,14 @@ impl<const C: usize> Assembly<C> {
     }
 }
 
-/// Weights of the angles of a set in that of the point at ξ of element `e`.
+/// Weights of the angles of a set in the angle of the point at ξ of element `e`.
 fn angle_weights<const C: usize>(e: usize, xi: f64, set: usize) -> [(usize, f64); 3] {
     let l = Layout::<C>;
     let [w0, w1, wb] = Point::at(xi, 0.0).phi;
     [(l.angle(e, set), w0), (l.bubble(e, set), wb), (l.angle(e + 1, set), w1)]
 }
 
-/// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
-/// w₀ dx₀ + s₀(u a + v b) + ….
+/// Rows that move the point at ξ of element `e`, with its displacement per unit: w₀ dx₀ + s₀(u a + v b) + ….
 fn point_columns<const C: usize>(
     state: &RodState,
     element: &ElementData,
@@ -144,7 +143,7 @@ fn point_columns<const C: usize>(
     ]
 }
 
-/// How the point at ξ of element `e` moves with the step `d`.
+/// Displacement of the point at ξ of element `e` in the step `d`.
 pub(crate) fn point_step<const C: usize>(
     state: &RodState,
     element: &ElementData,

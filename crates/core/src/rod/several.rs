@@ -1,4 +1,5 @@
-//! Rods behind one another in one state, with a gap between each and the next ([`ElementData::BREAK`](super::ElementData::BREAK)).
+//! Several rods in one state, one behind the other, with a gap between each and the next
+//! ([`ElementData::BREAK`](super::ElementData::BREAK)).
 
 use std::ops::Range;
 
@@ -6,7 +7,7 @@ use super::element::ElementData;
 use super::state::RodState;
 
 impl RodState {
-    /// Adds another rod, with as many sets of angles, behind this one.
+    /// Appends another rod with the same number of sets of angles.
     pub(crate) fn join(&mut self, other: &Self) {
         let across = other.positions[0] - self.positions[self.elements()];
         self.chords.push(across / ElementData::BREAK.length);
@@ -22,7 +23,7 @@ impl RodState {
         self.positions.extend_from_slice(&other.positions);
     }
 
-    /// The rod that some of the nodes are.
+    /// The rod that consists of these nodes.
     pub(crate) fn part(&self, nodes: Range<usize>) -> Self {
         let sets = self.sets();
         let elements = nodes.start..nodes.end - 1;
@@ -39,7 +40,7 @@ impl RodState {
         }
     }
 
-    /// Leaves the first nodes, one at least. Keeps the memory.
+    /// Keeps the first nodes only, at least one. Keeps the memory.
     pub(crate) fn truncate(&mut self, nodes: usize) {
         let sets = self.sets();
         self.angles.truncate(sets * nodes);
@@ -52,7 +53,7 @@ impl RodState {
         }
     }
 
-    /// Whether its lists are those of so many elements and sets of angles.
+    /// Whether its lists have the sizes for this number of elements and sets of angles.
     pub(crate) fn fits(&self, elements: usize, sets: usize) -> bool {
         let nodes = [self.frames.len(), self.positions.len()];
         let each = [self.chords.len(), self.tensions.len(), self.reference_twists.len()];

@@ -1,12 +1,13 @@
-//! An instrument that is in a part of an element: what it is made of there, as weights of the element's Gauss points.
+//! The material of an instrument that covers part of an element, as weights of the element's Gauss points.
 
 use super::element::Material;
 use super::quadrature::GAUSS;
 
-/// Shares below which a section touches an element and is not in it: as rounding leaves them of places that are the same.
+/// Shares below which a section only touches an element: such shares are the rounding of equal positions.
 const ROUNDING: f64 = 1e-9;
 
-/// Weights of the Gauss points in the integral over a part of an element, in units of their weights in that over all of it.
+/// Weights of the Gauss points in the integral over a part of an element, as multiples of their weights over all of
+/// it.
 pub fn shares(from: f64, to: f64) -> [f64; 3] {
     let power = |n: i32| (to.powi(n) - from.powi(n)) / f64::from(n);
     let [a, b, c] = GAUSS.map(|point| point.xi);
@@ -20,9 +21,10 @@ pub fn shares(from: f64, to: f64) -> [f64; 3] {
 }
 
 impl Material {
-    /// Adds a share of a section to what else an instrument is made of there; rest states are means, weighed by stiffness.
+    /// Adds a share of a section to the instrument's material in this element; rest states are averaged, weighted by
+    /// stiffness.
     pub(crate) fn add_share(&mut self, part: &Self, shares: &[f64; 3]) {
-        // A mean weighed by a stiffness of nothing is no number.
+        // A mean weighted by zero stiffness would not be a number.
         if shares.iter().all(|share| share.abs() < ROUNDING) {
             return;
         }
@@ -56,7 +58,7 @@ mod tests {
             assert!(sum.rest_curvature.iter().flatten().all(|curvature| *curvature == 0.0));
             assert!(sum.bending.iter().all(|bending| (bending - 2.0).abs() < 1e-12));
         }
-        // One that is in half of it counts by half.
+        // A section in half of the element counts by half.
         let mut sum = Material::NONE;
         sum.add_share(&bent, &shares(0.0, 0.5));
         sum.add_share(&straight, &shares(0.5, 1.0));

@@ -1,4 +1,4 @@
-//! Where the rod is, and how a Newton step moves it.
+//! The configuration of the rod, and how a Newton step moves it.
 
 use super::batch::Lane;
 use super::element::{ElementData, ElementState, mid_slope};
@@ -9,19 +9,20 @@ use serde::{Deserialize, Serialize};
 
 /// State of a rod of n elements: n + 1 nodes.
 ///
-/// Chords are kept beside positions, not as their differences: on a fine mesh the difference of two positions has
-/// lost the digits that curvature is made of.
+/// Chords are stored beside positions, not computed as their differences: on a fine mesh the difference of two
+/// positions loses the digits that determine curvature.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RodState {
-    /// Node triads. `t` is the tangent of the rod; `u`, `v` are the reference the angles are counted from.
+    /// Node triads. `t` is the tangent of the rod; angles are measured from `u` and `v`.
     pub frames: Vec<Frame>,
     /// Chords (x₁ − x₀)/h of the elements.
     pub chords: Vec<Vec3>,
     /// Axial forces of the elements.
     pub tensions: Vec<f64>,
-    /// Angles of the material triads against the reference triad, at the nodes: node by node, those of a node set by set.
+    /// Angles of the material triads against the reference triad at the nodes: node by node, and within a node set by
+    /// set.
     pub angles: Vec<f64>,
-    /// Angle bubbles of the elements, in the same order: the angle at the middle beyond the mean of its ends.
+    /// Angle bubbles of the elements, in the same order: the angle at the middle minus the mean of the ends.
     pub bubbles: Vec<f64>,
     /// Reference twist of the elements, followed continuously over full turns.
     pub reference_twists: Vec<f64>,
@@ -63,14 +64,14 @@ impl RodState {
         self.chords.len()
     }
 
-    /// Positions of the nodes of these elements, the first of all, from the first node and the chords.
+    /// Computes all node positions from the first node and the chords of these elements.
     pub fn place(&mut self, elements: &[ElementData]) {
         for (e, data) in elements.iter().enumerate() {
             self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;
         }
     }
 
-    /// The same centre line with room for `sets` of angles, at least one, all of them those of the first.
+    /// The same centre line with `sets` sets of angles, at least one, all equal to the first.
     pub(crate) fn with_sets(mut self, sets: usize) -> Self {
         let repeat = |list: &[f64]| list.iter().flat_map(|angle| std::iter::repeat_n(*angle, sets)).collect();
         self.angles = repeat(&self.angles);
@@ -90,7 +91,7 @@ impl RodState {
         }
     }
 
-    /// Element `e` beside others.
+    /// Element `e` as a lane.
     #[inline(always)]
     pub(super) fn lane<'a, const C: usize>(&'a self, data: &'a ElementData, e: usize) -> Lane<'a> {
         Lane {
@@ -115,7 +116,7 @@ impl RodState {
         angles
     }
 
-    /// Sets of angles there is room for.
+    /// Number of sets of angles allocated.
     pub(crate) fn sets(&self) -> usize {
         self.angles.len() / self.frames.len().max(1)
     }
@@ -135,7 +136,7 @@ impl RodState {
         self.angle(i, set) - self.angle(0, set) + self.reference_twists[..i].iter().sum::<f64>()
     }
 
-    /// By how much each node's triad is turned from one that is carried along the rod without twist, rad.
+    /// Angles by which the nodes' triads are turned against one carried along the rod without twist, rad.
     pub(crate) fn carried_twists(&self) -> impl Iterator<Item = f64> {
         std::iter::once(0.0).chain(self.reference_twists.iter().scan(0.0, |sum, twist| {
             *sum += twist;
@@ -148,7 +149,7 @@ impl RodState {
         self.frames[i].turned(self.angle(i, 0))
     }
 
-    /// Takes memory for `elements` elements, so that a rod may grow to them without allocating.
+    /// Allocates for `elements` elements, so that a rod can grow to that size without allocating.
     pub(crate) fn reserve(&mut self, elements: usize) {
         let more = |len: usize| (elements + 1).saturating_sub(len);
         self.frames.reserve(more(self.frames.len()));
@@ -160,7 +161,7 @@ impl RodState {
         }
     }
 
-    /// Largest distance of a node from where it is in another state of the same size, mm.
+    /// Largest distance of a node from its position in another state of the same size, mm.
     pub(crate) fn farthest_mm(&self, other: &Self) -> f64 {
         self.positions.iter().zip(&other.positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
     }
@@ -178,11 +179,11 @@ impl RodState {
 
     /// Sets this state to `base` moved by `alpha` times the Newton step `d`.
     ///
-    /// Node tangents and the slopes in the middle of the elements move along geodesics of the sphere, axial forces
-    /// of stretchable elements move linearly and give the strain (an inextensible element keeps |r′| = 1 exactly), and chords and positions follow. So a state that
-    /// satisfies the constraints stays on them: no feasibility is lost to the length of a step, and the energy
-    /// along the step is the potential energy itself. Constant curvature is reproduced exactly: a pure end moment of
-    /// any size is solved by one full step.
+    /// Node tangents and the slopes in the middle of the elements move along geodesics of the sphere, axial forces of
+    /// extensible elements move linearly and give the strain (an inextensible element keeps |r′| = 1 exactly), and
+    /// chords and positions follow. So a state that satisfies the constraints stays on the constraint manifold for
+    /// any step length, and the energy along the step is the potential energy itself. Constant curvature is
+    /// reproduced exactly: one full step solves a pure end moment of any size.
     pub fn advance<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64], alpha: f64) {
         let l = Layout::<C>;
         let k = Layout::<C>::ANGLES;
@@ -209,7 +210,8 @@ impl RodState {
             let square = turn.norm_squared();
             let (first, second) = turn_parts(square);
             let direction = normalised(&(m * (1.0 - square * second) + turn * first));
-            // c = D N exactly: the strain follows from the force, not the force from a strain that rounding has spoilt.
+            // c = D N exactly: the strain is computed from the force, since a force from the strain would amplify its
+            // rounding.
             let length = if data.flexibility > 0.0 {
                 self.tensions[e] = base.tensions[e] + alpha * d[l.tension(e)];
                 1.0 + 1.5 * data.flexibility * self.tensions[e] / data.length
@@ -230,8 +232,8 @@ impl RodState {
         }
     }
 
-    /// Axial forces of inextensible elements after the Newton step `d` from `base`: they are multipliers and take their full step,
-    /// however far the state moves. (Those of stretchable elements move with the state.)
+    /// Sets the axial forces of inextensible elements after the Newton step `d` from `base`: as multipliers they take
+    /// the full step, however far the state moves. (Those of extensible elements move with the state.)
     pub(crate) fn take_tensions<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64]) {
         for (e, data) in elements.iter().enumerate() {
             if data.flexibility == 0.0 {
@@ -240,15 +242,15 @@ impl RodState {
         }
     }
 
-    /// Whether an element bends by more than 120° from end to end: the curve that is drawn of it is shorter than it by a fiftieth then, and
-    /// by a tenth at 180°, where its twist is not defined any more.
+    /// Whether an element bends by more than 120° from end to end: then the drawn curve is a fiftieth shorter than
+    /// the element, at 180° a tenth, where its twist is no longer defined.
     pub fn is_folded(&self, elements: &[ElementData]) -> bool {
         const COSINE: f64 = -0.5;
         let mut each = self.frames.windows(2).zip(elements).filter(|(_, data)| !data.is_break());
         each.any(|(ends, _)| ends[0].t.dot(&ends[1].t) < COSINE)
     }
 
-    /// The largest rotation a step holds, at nodes and in the middle of elements, and the largest change of angle.
+    /// The largest rotation in a step, at nodes and at the middle of elements, and the largest change of angle.
     pub fn largest_turn<const C: usize>(elements: &[ElementData], base: &Self, d: &[f64]) -> (f64, f64) {
         let l = Layout::<C>;
         let (mut square, mut twist) = (0.0f64, 0.0f64);
@@ -279,7 +281,7 @@ fn mid_rate<const C: usize>(elements: &[ElementData], base: &RodState, d: &[f64]
     (mid_slope(f0.t, base.chords[e], f1.t), chord * 1.5 - ends * 0.25)
 }
 
-/// Three entries of a step.
+/// The three entries of a step from `at` on.
 #[inline]
 fn position_step(d: &[f64], at: usize) -> Vec3 {
     Vec3::new(d[at], d[at + 1], d[at + 2])

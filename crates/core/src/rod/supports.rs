@@ -1,9 +1,9 @@
-//! What holds the ends: the first node directly, the last one through multipliers.
+//! Supports of the ends: the first node is held directly, the last one through multipliers.
 //!
-//! The first node does not move unless all of it is free; its tangent and angle are held or free. Conditions on the last node are equations with
-//! multipliers, so a shape may start anywhere and the multipliers are the reactions. Their rows carry a flexibility far
-//! below that of the rod: it decides nothing (each Newton step removes what the last one left), but lets a rod that is
-//! held twice along its axis be factored.
+//! The first node is fixed unless it is entirely free; its tangent and angle are held or free. Conditions on the last
+//! node are equations with multipliers, so the initial shape need not satisfy them and the multipliers are the
+//! reactions. Their rows carry a flexibility far below that of the rod: it does not affect the result (each Newton
+//! step removes the error of the last), but allows the factorisation of a rod that is held twice along its axis.
 
 use super::assembly::Assembly;
 use super::element::ElementData;
@@ -11,8 +11,8 @@ use super::layout::{Layout, MAX_ANGLES};
 use super::state::RodState;
 use crate::Vec3;
 
-/// Flexibility of the end supports, as a fraction of the rod's own: above rounding, and so far below the shift that is always on
-/// that a shape which can turn freely between its supports still counts as neutral.
+/// Flexibility of the end supports, as a fraction of the rod's own: above rounding, and so far below the permanent
+/// shift that a shape which can turn freely between its supports still counts as neutral.
 const SUPPORT_FLEXIBILITY: f64 = 1e-12;
 
 /// Supports of both ends.
@@ -26,7 +26,7 @@ pub struct Supports {
     pub start_angle: bool,
     /// Directions (orthonormal) in which the last node's position is held; none to three.
     pub end_directions: Vec<Vec3>,
-    /// Where it is held.
+    /// The position at which it is held.
     pub end_position: Vec3,
     /// Tangent of the last node, if held.
     pub end_tangent: Option<Vec3>,
@@ -43,7 +43,7 @@ pub struct EndAngle {
     pub normal: Vec3,
     /// Further rotation about the tangent, any number of turns.
     pub turns: f64,
-    /// The angle wanted, against the current reference triad; it keeps count of whole turns.
+    /// The target angle against the current reference triad, whole turns included.
     pub target: f64,
 }
 
@@ -55,7 +55,7 @@ impl Supports {
             + usize::from(self.end_angle.is_some())
     }
 
-    /// How far the last node is from each condition: three of position, two of the tangent, one of the angle.
+    /// Errors of the last node in each condition: three of position, two of the tangent, one of the angle.
     pub fn gaps(&self, state: &RodState) -> [f64; 6] {
         let mut gaps = [0.0; 6];
         let n = state.elements();
@@ -72,7 +72,7 @@ impl Supports {
         gaps
     }
 
-    /// The end angle wanted, on the branch nearest to the last one used.
+    /// The target end angle, on the branch nearest to the last one used.
     fn angle_target(&self, state: &RodState) -> f64 {
         let Some(end) = &self.end_angle else { return 0.0 };
         let frame = &state.frames[state.elements()];
@@ -81,7 +81,7 @@ impl Supports {
         angle + ((end.target - angle) / std::f64::consts::TAU).round() * std::f64::consts::TAU
     }
 
-    /// Fixes the branch of the end angle for a shape to start from: the one nearest to `turns` beyond an untwisted rod.
+    /// Chooses the branch of the end angle for an initial shape: the one nearest to `turns` beyond an untwisted rod.
     pub fn begin(&mut self, state: &RodState) {
         let n = state.elements();
         let untwisted = state.angles[0] - state.reference_twists.iter().sum::<f64>();
@@ -95,7 +95,7 @@ impl Supports {
         debug_assert!(n > 0);
     }
 
-    /// Follows the branch of the end angle after an accepted step.
+    /// Updates the branch of the end angle after an accepted step.
     pub fn follow(&mut self, state: &RodState) {
         let target = self.angle_target(state);
         if let Some(end) = &mut self.end_angle {
@@ -153,7 +153,7 @@ impl Supports {
         }
     }
 
-    /// Rows of the first node that are held.
+    /// Rows of the first node's unknowns that are held.
     pub fn held<const C: usize>(&self) -> [Option<usize>; 5 + MAX_ANGLES] {
         let l = Layout::<C>;
         let mut held = [None; 5 + MAX_ANGLES];

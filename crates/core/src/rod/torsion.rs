@@ -9,7 +9,7 @@
 //!   curvature along w      h κ_w = t′·w, w carried = (z·w)/a − (y·w) G (z₁ + y·z/a)   for w = (0, w₂, w₃).
 //!
 //! The energy of the isotropic cross-section, ½EI|t′ − κ⁰|² + ½GJ(τ − τ⁰)², is the bending energy of the straight rod
-//! plus −EI κ⁰·t′ + ½EI|κ⁰|² + ½GJ(τ − τ⁰)², κ⁰ = k₁d₁ + k₂d₂; this file holds the addition.
+//! plus −EI κ⁰·t′ + ½EI|κ⁰|² + ½GJ(τ − τ⁰)², κ⁰ = k₁d₁ + k₂d₂; this file computes the addition.
 
 use super::lanes::{Lanes, Matrix, Vector};
 use pulp::Simd;
@@ -25,7 +25,8 @@ pub(super) struct TorsionInput<S: Simd> {
     pub(super) rest_twist: Lanes<S>,
 }
 
-/// What all instruments have in common at a Gauss point: the twist −DG of the reference triad with its derivatives in y and z.
+/// The part common to all instruments at a Gauss point: the twist −DG of the reference triad with its derivatives in
+/// y and z.
 #[derive(Clone, Copy)]
 pub(super) struct ReferenceTwist<S: Simd> {
     y: Vector<S>,
@@ -39,18 +40,18 @@ pub(super) struct ReferenceTwist<S: Simd> {
     hg: Matrix<S>,
     /// −DG.
     value: Lanes<S>,
-    /// Gradients of −DG in y …
+    /// Gradient of −DG in y.
     pub(super) along_y: Vector<S>,
-    /// … and z.
+    /// Gradient of −DG in z.
     pub(super) along_z: Vector<S>,
-    /// Its second derivatives: y, y, …
+    /// Its second derivatives in y, y.
     yy: Matrix<S>,
-    /// … y (rows), z (columns).
+    /// Its second derivatives in y (rows), z (columns).
     yz: Matrix<S>,
 }
 
-/// Derivatives in y and z. There are none in z twice: both twist and curvature are linear in it, and the twist's square is added in
-/// chord and far tangent.
+/// Derivatives in y and z. The second derivative in z vanishes: both twist and curvature are linear in z, and the
+/// square of the twist is added in chord and far tangent.
 #[derive(Clone, Copy)]
 pub(super) struct PointDerivatives<S: Simd> {
     /// Gradient in y.
@@ -77,7 +78,7 @@ pub(super) struct AngleDensity<S: Simd> {
     pub(super) along_z: Vector<S>,
 }
 
-/// What all instruments have in common at a Gauss point where energies alone are asked for.
+/// The part common to all instruments at a Gauss point, for energies without derivatives.
 #[derive(Clone, Copy)]
 pub(super) struct TwistValue<S: Simd> {
     y: Vector<S>,
@@ -90,7 +91,7 @@ pub(super) struct TwistValue<S: Simd> {
 }
 
 impl<S: Simd> TwistValue<S> {
-    /// That of y and z.
+    /// Evaluated at y and z.
     #[inline(always)]
     pub(super) fn new(y: Vector<S>, z: Vector<S>) -> Self {
         let a = y.norm();
@@ -128,7 +129,7 @@ impl<S: Simd> PointDerivatives<S> {
 }
 
 impl<S: Simd> ReferenceTwist<S> {
-    /// That of y and z. Where no Hessian is wanted the compiler leaves its half out.
+    /// Evaluated at y and z. Without a Hessian the compiler removes that half.
     #[inline(always)]
     pub(super) fn new(y: Vector<S>, z: Vector<S>) -> Self {
         let a = y.norm();
@@ -168,13 +169,13 @@ impl<S: Simd> ReferenceTwist<S> {
         }
     }
 
-    /// The torque of an instrument.
+    /// The torque of an instrument at the point.
     #[inline(always)]
     pub(super) fn torque(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
         p.stiffness * self.tau(dphi, p)
     }
 
-    /// Its twist energy.
+    /// The twist energy of an instrument.
     #[inline(always)]
     pub(super) fn energy(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
         self.torque(dphi, p) * 0.5 * self.tau(dphi, p)
@@ -206,7 +207,7 @@ impl<S: Simd> ReferenceTwist<S> {
         Curvature { m, n, value, along_y, along_z }
     }
 
-    /// Adds the derivatives of an instrument's rest curvature, −P, and returns −P with those in φ.
+    /// Adds the derivatives of an instrument's rest curvature energy, −P, and returns −P with its derivatives in φ.
     #[inline(always)]
     pub(super) fn add_rest_curvature(
         &self,

@@ -1,5 +1,5 @@
-//! The centre line of a scene's vessel: the tree it is built from, the one given beside its surface, or the one found in that. It is looked
-//! for where something needs it, and once.
+//! The centre line of a scene's vessel: the tree it is built from, the one given with its surface, or one computed
+//! from that surface. It is computed at most once, and only when needed.
 
 use std::path::PathBuf;
 
@@ -14,21 +14,22 @@ use crate::vessel::{CentrelineEnd, CentrelineRecipe, CentrelineTree, Lumen, Wall
 use crate::{Error, Result, Vec3};
 
 impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
-    /// The vessel's centre line: the tree it is built from, the one given beside its surface, or without either the one that is found in the
-    /// surface, from the sheath's opening (`Wall::inlet`, if the sheath is at a place) to all others, its targets called `opening 1`.
+    /// The vessel's centre line: the tree it is built from, the one given with its surface, or, without either, one
+    /// computed from the surface, from the sheath's opening (`Wall::inlet` if the sheath is given by a position) to
+    /// all others, with targets named `opening 1` and so on.
     ///
     /// # Errors
-    /// A missing or unusable file; one given beside a tree; a surface in which none is found.
+    /// A missing or unusable file; one given in addition to a tree; a surface from which none can be computed.
     pub fn centreline(&self, store: &dyn WallStore) -> Result<&CentrelineTree> {
         self.known_or(store, || self.wall(store))
     }
 
-    /// The centre line that was found in the surface so far: one was needed, and none is given.
+    /// The centre line computed from the surface, if one was needed so far and none is given.
     pub fn found_centreline(&self) -> Option<&CentrelineTree> {
         self.centreline.get().filter(|_| !self.gives_centreline())
     }
 
-    /// Whether the centre line has to be found in the surface, or was: something needs one, and none is given.
+    /// Whether the centre line must be, or was, computed from the surface: something needs one, and none is given.
     pub fn finds_centreline(&self) -> bool {
         let is_needed = self.vessel.flow.is_some() || self.script.iter().any(ScriptLine::has_target);
         !self.gives_centreline() && (is_needed || self.centreline.get().is_some())
@@ -38,7 +39,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         self.vessel.tree.is_some() || self.vessel.centreline.is_some()
     }
 
-    /// What flows through the vessel, which is at hand; none where it is left out.
+    /// The blood flow in the given vessel; `None` if the scene has none.
     ///
     /// # Errors
     /// As [`SceneOf::centreline`] and [`BloodFlow::new`].
@@ -48,7 +49,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         BloodFlow::new(tree, flow).map(Some)
     }
 
-    /// The file of the centre line and the key that names it; none where there is neither.
+    /// The file of the centre line and the key that names it; `None` if there is neither.
     pub(super) fn centreline_path(&self) -> Result<Option<(&'static str, PathBuf)>> {
         match (&self.vessel.tree, &self.vessel.centreline) {
             (None, None) => Ok(None),
@@ -61,7 +62,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// The centre line that is known, or that of the scene's files.
+    /// The centre line if already known, or that of the scene's files.
     fn known_or(
         &self,
         store: &dyn WallStore,
@@ -80,7 +81,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(self.centreline.get_or_init(|| tree))
     }
 
-    /// Finds the centre line of the surface.
+    /// Computes the centre line of the surface.
     fn find(&self, wall: &Wall, store: &dyn WallStore) -> Result<CentrelineTree> {
         let recipe = CentrelineRecipe { wall, from: self.begin(wall) };
         store.centreline(&recipe).map_err(|error| {
@@ -92,11 +93,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         })
     }
 
-    /// Where the centre line begins that is looked for: at the sheath, unless another opening is needed to lead to.
+    /// The start of the centre line to be computed: at the sheath, unless another opening is needed.
     fn begin(&self, wall: &Wall) -> Option<CentrelineEnd> {
         let count = wall.openings().len();
         match (self.sheath.opening, self.sheath.position_mm) {
-            // One that is not there is refused where the sheath is placed.
+            // A nonexistent opening is rejected where the sheath is placed.
             (Some(opening), _) if opening < count => Some(CentrelineEnd::Opening(opening)),
             (None, Some(position)) if count == 1 => Some(CentrelineEnd::Place(Vec3::from(position))),
             _ => None,

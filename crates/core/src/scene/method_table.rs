@@ -1,4 +1,4 @@
-//! `[method]` without a name: the options of the method that a scene has where the table is absent.
+//! `[method]` without a name: options of the method that a scene has without the table.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -12,7 +12,7 @@ use crate::methods::MethodChoice;
 /// The key that names the method.
 const NAME: &str = "name";
 
-/// Reads the table, with the name of the default method where it has none.
+/// Reads the table, adding the name of the default method if it has none.
 pub(super) fn read<'de, M, D>(reader: D) -> Result<M, D::Error>
 where
     M: MethodChoice + Deserialize<'de> + Default,
@@ -36,12 +36,12 @@ impl<'de, M: MethodChoice + Deserialize<'de> + Default> Visitor<'de> for Table<M
     }
 }
 
-/// A table, with a name at its end where it has none.
+/// A table, with a name appended if it has none.
 struct Named<A> {
     table: A,
-    /// The name, until the table has given one.
+    /// The name, until one has been read.
     missing: Option<&'static str>,
-    /// Whether the table has come to its end.
+    /// Whether the end of the table has been reached.
     ended: bool,
 }
 

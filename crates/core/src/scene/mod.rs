@@ -1,4 +1,4 @@
-//! Scene files: one TOML document that says what is pushed into what, how, and what is recorded.
+//! Scene files: one TOML document with vessel, device, method, script and what is recorded.
 //!
 //! The core reads every table but `[view]`, which belongs to the viewer. Paths are relative to the scene file.
 //!
@@ -27,7 +27,7 @@
 //! step_mm = 1.0
 //! ```
 //!
-//! Several instruments that lie in one another take the place of `[device]`, the innermost first, and lines of the script name theirs:
+//! Several coaxial instruments replace `[device]`, the innermost first; lines of the script name theirs:
 //!
 //! ```toml
 //! [[instrument]]

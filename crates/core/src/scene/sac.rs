@@ -1,4 +1,4 @@
-//! The sac that a scene's coils fill.
+//! The sac to be filled by a scene's coils.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -8,18 +8,18 @@ use crate::methods::MethodChoice;
 use crate::vessel::{Lumen, Sac, WallStore};
 use crate::{Error, Result, Vec3};
 
-/// `[vessel.sac]`: the sac of an aneurysm, whose filling by coils is reported.
+/// `[vessel.sac]`: the sac of an aneurysm; its packing with coils is reported.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SacSpec {
-    /// A place in the sac, mm.
+    /// A position in the sac, mm.
     pub dome_mm: [f64; 3],
-    /// A place in the artery, mm; the nearest one of the vessel's centre line if absent.
+    /// A position in the artery, mm; if absent, the nearest one of the vessel's centre line.
     pub parent_mm: Option<[f64; 3]>,
 }
 
 impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
-    /// The sac of the vessel, which is at hand; none where the scene names none.
+    /// The sac of the given vessel; `None` if the scene names none.
     ///
     /// # Errors
     /// As [`Sac::measure`] and, without `parent_mm`, [`SceneOf::centreline`] and [`Sac::on_artery`]; parameters are those of the scene.

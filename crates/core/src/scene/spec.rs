@@ -1,4 +1,4 @@
-//! A scene file and what it builds.
+//! A scene file, and building a simulation from it.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -9,6 +9,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use super::method_table;
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
 use crate::device::{Device, DeviceFile, FileTable, Instrument, Stack, line_mm};
+use crate::field::FieldSpec;
 use crate::file::{FileSystem, Files};
 use crate::input::{from_toml_of, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
@@ -22,35 +23,38 @@ use crate::{Error, Result};
 /// A scene whose `[method]` is one of this crate's: the exact rod.
 pub type Scene = SceneOf<OwnMethod>;
 
-/// A scene as its file says it, with the folder that its paths start from. `M` is what its `[method]` may be.
+/// The contents of a scene file, with the folder to which its paths are relative. `M` is the type of its `[method]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, bound(deserialize = "M: MethodChoice + Deserialize<'de> + Default"))]
 pub struct SceneOf<M> {
     /// Name of the scene; the file's stem if absent.
     #[serde(default)]
     pub name: String,
-    /// Seed of everything random in the scene.
+    /// Seed of all random numbers of the scene.
     #[serde(default)]
     pub seed: u64,
-    /// What the device is pushed into.
+    /// The vessel.
     pub vessel: VesselSpec,
-    /// What is pushed, where it is one device.
+    /// The device, if it is a single one.
     pub device: Option<DeviceSpec>,
-    /// What is pushed, where it is several that lie in one another, the innermost first.
+    /// The coaxial instruments, if there are several, the innermost first.
     #[serde(default)]
     pub instrument: Vec<InstrumentSpec>,
-    /// Where it enters.
+    /// Where the device enters.
     pub sheath: SheathSpec,
-    /// How its equilibrium is found.
+    /// The method for its equilibria.
     #[serde(default, deserialize_with = "method_table::read")]
     pub method: M,
+    /// Fields that the device is in from the start.
+    #[serde(default)]
+    pub field: Vec<FieldSpec>,
     /// What the hand does.
     #[serde(default)]
     pub script: Vec<ScriptLine>,
-    /// Left to the viewer.
+    /// Read by the viewer.
     #[serde(default, rename = "view")]
     _view: IgnoredAny,
-    /// The file that the script comes from, where it is not the scene's.
+    /// The file of the script, if not the scene's.
     #[serde(skip)]
     script_file: Option<PathBuf>,
     #[serde(skip)]
@@ -59,10 +63,10 @@ pub struct SceneOf<M> {
     folder: PathBuf,
     #[serde(skip)]
     text: String,
-    /// Where the files are that it names.
+    /// Access to the files that it names.
     #[serde(skip, default = "of_file_system")]
     pub(super) files: Arc<dyn Files>,
-    /// The vessel's centre line, once it was needed.
+    /// The vessel's centre line, once needed.
     #[serde(skip)]
     pub(super) centreline: OnceLock<CentrelineTree>,
 }
@@ -79,14 +83,14 @@ struct ScriptFile {
     script: Vec<ScriptLine>,
 }
 
-/// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
+/// Increment in which initially inserted instruments are pushed in together, of the farthest, mm.
 const START_MM: f64 = 1.0;
 
-/// An error of a device that stands in a table of the scene.
+/// An error of a device given in a table of the scene.
 fn in_table(table: &str, error: Error) -> Error {
     match error {
         Error::Parameter { name, value, mend } => {
-            let name = match name.strip_prefix("device.") {
+            let name = match ["device.", "magnet.", "weight."].iter().find_map(|own| name.strip_prefix(own)) {
                 Some(key) => format!("{table}.{key}"),
                 None => format!("{table}.{name}"),
             };
@@ -96,7 +100,7 @@ fn in_table(table: &str, error: Error) -> Error {
     }
 }
 
-/// A file that cannot be read, with the key that names it in front.
+/// The error for an unreadable file, prefixed by the key that names it.
 pub(super) fn missing(key: &str, error: Error) -> Error {
     match error {
         Error::File { path, source } => Error::parameter(key, path.display(), source.to_string()),
@@ -104,7 +108,7 @@ pub(super) fn missing(key: &str, error: Error) -> Error {
     }
 }
 
-/// A tree that cannot be read, with a hint where a built-in vessel is meant.
+/// The error for an unreadable tree, with a hint if a built-in vessel is meant.
 pub(super) fn missing_tree(path: &Path, error: Error) -> Error {
     let name = path.file_name().and_then(|name| name.to_str()).filter(|name| anatomy::NAMES.contains(name));
     match (missing("vessel.tree", error), name) {
@@ -118,7 +122,7 @@ pub(super) fn missing_tree(path: &Path, error: Error) -> Error {
     }
 }
 
-/// Recordings get a folder of the scene's name: it must be one word to a file system.
+/// Recordings get a folder with the scene's name, so it must be a valid file name.
 fn check_name(name: &str) -> Result<()> {
     let odd = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':');
     if name.chars().any(odd) || matches!(name, "." | "..") {
@@ -135,12 +139,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// Names file, line and key of what does not fit.
+    /// Names file, line and key of the error.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_of(of_file_system(), path)
     }
 
-    /// The same of a scene that is among `files`, where those that it names are too.
+    /// As [`Self::read`], for a scene in `files`, with the files that it names.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -149,15 +153,15 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Self { files, ..scene }.of_file(text, path)
     }
 
-    /// Reads a scene from the text of a file, from whose folder its paths start; errors call it `path`.
+    /// Reads a scene from the text of a file, to whose folder its paths are relative; errors name it `path`.
     ///
     /// # Errors
-    /// As [`Self::read`], less those of reading a file.
+    /// As [`Self::read`], except those of reading the file.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         parse_toml::<Self>(text, path)?.of_file(text.to_owned(), path)
     }
 
-    /// The same scene, whose files are looked for among `files`.
+    /// The same scene, with its files read from `files`.
     #[must_use]
     pub fn with_files(self, files: Arc<dyn Files>) -> Self {
         Self { files, ..self }
@@ -174,10 +178,10 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(self)
     }
 
-    /// Takes the script of a file of `[[script]]` tables in place of the scene's own.
+    /// Replaces the scene's script by that of a file with `[[script]]` tables.
     ///
     /// # Errors
-    /// Names file, line and key of what does not fit.
+    /// Names file, line and key of the error.
     pub fn take_script(&mut self, path: &Path) -> Result<()> {
         let (file, _): (ScriptFile, String) = from_toml_of(&*self.files, path)?;
         (self.script, self.script_file) = (file.script, Some(path.to_owned()));
@@ -189,15 +193,15 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         &self.text
     }
 
-    /// A path of the scene, seen from the working directory.
+    /// A path of the scene, relative to the working directory.
     pub fn resolve(&self, path: &Path) -> PathBuf {
         self.folder.join(path)
     }
 
-    /// The file the vessel comes from.
+    /// The file of the vessel.
     ///
     /// # Errors
-    /// None or two of `vessel.file` and `vessel.tree`.
+    /// Neither or both of `vessel.file` and `vessel.tree`.
     pub(crate) fn vessel_path(&self) -> Result<PathBuf> {
         match (&self.vessel.file, &self.vessel.tree) {
             (Some(path), None) | (None, Some(path)) => Ok(self.resolve(path)),
@@ -210,8 +214,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// The files that the scene names, in the order of its tables, and that of a script in place of its own: with [`SceneOf::text`] all that
-    /// it is made of.
+    /// The files that the scene names, in the order of its tables, including that of a replaced script: with
+    /// [`SceneOf::text`] its complete input.
     pub fn input_paths(&self) -> Vec<PathBuf> {
         let devices = self.device.iter().map(|device| &device.file);
         let devices = devices.chain(self.instrument.iter().map(|instrument| &instrument.file));
@@ -220,18 +224,19 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         named.flatten().map(|path| self.resolve(path)).chain(self.script_file.clone()).collect()
     }
 
-    /// The wall of the vessel as triangles, read, built, or from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).
+    /// The wall of the vessel as triangles, read, built, or from `store` ([`NoStore`](crate::vessel::NoStore) stores
+    /// nothing).
     ///
     /// # Errors
-    /// As [`SceneOf::lumen`], and a centre line of which no mesh comes.
+    /// As [`SceneOf::lumen`], and a centre line that cannot be meshed.
     pub fn wall(&self, store: &dyn WallStore) -> Result<Wall> {
         self.lumen(store)?.into_wall(store).map_err(|error| self.of_tree(error))
     }
 
-    /// The vessel: a surface that is read, or has been and is kept in `store`, or what its centre line says, of which a mesh is made when somebody wants one.
+    /// The vessel: a surface that is read or stored in `store`, or a centre line, which is meshed only if needed.
     ///
     /// # Errors
-    /// A missing or unusable file, options that do not belong together, a wall that cannot be used.
+    /// A missing or unusable file, inconsistent options, an unusable wall.
     pub fn lumen(&self, store: &dyn WallStore) -> Result<Lumen> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
@@ -268,7 +273,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         store.wall(&recipe).map(Lumen::from).map_err(|e| Error::content(&path, e.to_string()))
     }
 
-    /// What is wrong with a vessel that comes from a tree is wrong with its file.
+    /// Attributes an error of a vessel from a tree to the tree's file.
     fn of_tree(&self, error: Error) -> Error {
         let Some(path) = self.vessel.tree.as_ref().map(|path| self.resolve(path)) else { return error };
         match error {
@@ -279,7 +284,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// The device of a scene that pushes one.
+    /// The device of a scene with a single one.
     ///
     /// # Errors
     /// A missing or unusable file, values out of range, several instruments.
@@ -294,7 +299,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// What is pushed: the device alone, or all instruments.
+    /// The single device, or all instruments.
     ///
     /// # Errors
     /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, `may_lead` of the first, and as [`Stack::new`], [`Stack::rubbing`] and
@@ -333,10 +338,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// Lengths of the instruments that are in at the start, mm.
+    /// Initial inserted lengths of the instruments, mm.
     ///
     /// # Errors
-    /// A length that an instrument does not have, and instruments that cannot be in together so far ([`Stack::check_places`]).
+    /// A length greater than the instrument's, and instruments that cannot be inserted together by these lengths
+    /// ([`Stack::check_places`]).
     pub fn inserted_mm(&self, stack: &Stack) -> Result<Vec<f64>> {
         let mut lengths_mm = vec![0.0; stack.instruments().len()];
         for (index, (spec, device)) in self.instrument.iter().zip(stack.devices()).enumerate() {
@@ -354,11 +360,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(lengths_mm)
     }
 
-    /// The device files with their paths, and with parts, materials and sources, of the device or of each instrument, where the scene
-    /// names them; parts that stand in the scene are those of a file of its own path.
+    /// The device files with their paths, parts, materials and sources, of the device or of each instrument, if the
+    /// scene names them; parts given in the scene form a file with the scene's path.
     ///
     /// # Errors
-    /// A missing or unusable file, values out of range, sections or parts in the scene too.
+    /// A missing or unusable file, values out of range, sections or parts also given in the scene.
     pub fn device_files(&self) -> Result<Vec<Option<(PathBuf, DeviceFile)>>> {
         let device = self.device.iter().map(|spec| ("device".to_owned(), &spec.file, spec.tables()));
         let each = self.instrument.iter().enumerate();
@@ -367,7 +373,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         all.map(|(name, file, tables)| self.read_file(&name, file.as_deref(), tables)).collect()
     }
 
-    /// A device of the scene by its table's name.
+    /// A device of the scene, by its table's name.
     fn read_device(&self, name: &str, file: Option<&Path>, tables: FileTable) -> Result<Device> {
         let sections = tables.section.clone();
         match self.read_file(name, file, tables)? {
@@ -376,7 +382,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// The device file that a table names or is; none where it has sections alone.
+    /// The device file that a table names or contains; `None` if it has only sections.
     fn read_file(
         &self,
         name: &str,
@@ -409,12 +415,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// The sheath in the vessel.
     ///
     /// # Errors
-    /// An opening that is not there, keys that contradict each other, values that are not finite.
+    /// A nonexistent opening, contradictory keys, values that are not finite.
     pub fn sheath(&self, vessel: &impl AsRef<[Opening]>) -> Result<Sheath> {
         self.sheath.place(vessel)
     }
 
-    /// The commands of the script of a device alone, checked against it.
+    /// The commands of the script of a single device, checked against it.
     ///
     /// # Errors
     /// A line that is not finite, contradictory, absurd, or moves the device beyond its ends.
@@ -422,20 +428,20 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         script_commands(&self.script, device)
     }
 
-    /// The script, checked against what is pushed and the targets of the vessel, whose centre line is looked for where a line has one and the scene
-    /// names none; `store` keeps it.
+    /// The script, checked against the instruments and the targets of the vessel. If a line has a target and the
+    /// scene has no centre line, it is computed, and stored in `store`.
     ///
     /// # Errors
     /// As [`Script::new`], [`SceneOf::inserted_mm`] and [`SceneOf::centreline`].
     pub fn steps(&self, stack: &Stack, store: &dyn WallStore) -> Result<Script> {
-        // A file is not opened for nothing.
+        // Do not open a file unnecessarily.
         let centreline = match self.script.iter().any(ScriptLine::has_target) {
             true => Some(self.centreline(store)?),
             false => None,
         };
         let script = Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline)?;
         if script.injects() && self.device.as_ref().is_some_and(|device| device.file.is_some()) {
-            // Sections in the scene may leave the lumen to the pictures; a file says all of a device.
+            // Sections in the scene may give the lumen for rendering only; a file describes a device completely.
             let solid = |device: &Device| device.sections().iter().all(|s| s.inner_radius_mm.is_none());
             if stack.devices().all(solid) {
                 let mend = "its device has no lumen: medium comes through a catheter, not along a wire";
@@ -454,14 +460,14 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(script)
     }
 
-    /// The simulation at the start, with walls from `store`: nothing inserted but what instruments say.
+    /// The simulation at the start, with walls from `store`: only the initial lengths of instruments are inserted.
     ///
     /// # Errors
     /// As [`SceneOf::wall`], [`SceneOf::stack`], [`SceneOf::sheath`], [`SceneOf::inserted_mm`], [`Simulation::step_together`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
     pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
         let lumen = self.lumen(store)?;
         let hints = |error| match &error {
-            // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
+            // An absurd size of the vessel is the likeliest cause of any error.
             Error::Parameter { .. } | Error::Content { .. } => {
                 let told = self.lumen(store).and_then(|lumen| self.hints(&lumen)).unwrap_or_default();
                 told.iter().fold(error, |error, hint| with_hint(error, hint))
@@ -471,8 +477,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         self.simulation_in(lumen, store).map_err(hints)
     }
 
-    /// What the user may want to know of the wall of a surface file, a sentence each, as
-    /// [`wall_hints`](crate::vessel::wall_hints); nothing of a wall from a tree.
+    /// Hints for the user about the wall of a surface file, one sentence each, as
+    /// [`wall_hints`](crate::vessel::wall_hints); none for a wall from a tree.
     ///
     /// # Errors
     /// As [`wall_hints`](crate::vessel::wall_hints).
@@ -483,7 +489,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// [`SceneOf::simulation`] in a vessel that is at hand: its mesh instead of its centre line, one that several scenes share.
+    /// [`SceneOf::simulation`] in a given vessel: for example its mesh instead of its centre line, or one that
+    /// several scenes share.
     ///
     /// # Errors
     /// As [`SceneOf::simulation`].
@@ -492,6 +499,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let stack = self.stack()?;
         let inserted_mm = self.inserted_mm(&stack)?;
         let mut simulation = self.built(lumen, stack, sheath, store)?;
+        let fields =
+            self.field.iter().enumerate().map(|(index, spec)| {
+                spec.field().map_err(|error| in_table(&format!("field[{index}]"), error))
+            });
+        simulation.set_fields(fields.collect::<Result<Vec<_>>>()?)?;
         push_in(&mut simulation, &inserted_mm)?;
         Ok(simulation)
     }
@@ -506,11 +518,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             .store(store)
             .build()
             .map_err(|error| match error {
-                // What is wrong with a surface is wrong with its file.
+                // Attributes an error of a surface to its file.
                 Error::Mesh(reason) => {
                     self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
                 }
-                // The position came from an opening: what can be changed is the depth.
+                // The position follows from an opening: what can be changed is the depth.
                 Error::Parameter { name, value, mend } if name == "sheath.position_mm" => {
                     match self.sheath.opening {
                         Some(_) => Error::parameter(
@@ -526,7 +538,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     }
 }
 
-/// An error about input with a hint behind its mend.
+/// An error about input with a hint appended to its correction.
 fn with_hint(error: Error, hint: &str) -> Error {
     match error {
         Error::Parameter { name, value, mend } => {
@@ -537,7 +549,7 @@ fn with_hint(error: Error, hint: &str) -> Error {
     }
 }
 
-/// Pushes these lengths in together, from nothing inserted.
+/// Pushes in these lengths together, from nothing inserted.
 fn push_in(simulation: &mut Simulation, lengths_mm: &[f64]) -> Result<()> {
     let steps = (line_mm(lengths_mm.iter().copied()) / START_MM).ceil();
     let part = |(instrument, mm): (usize, &f64)| Move { instrument, command: Command::advance(mm / steps) };

@@ -1,4 +1,4 @@
-//! Vessel, devices and sheath as a scene file has them.
+//! The tables of a scene file for vessel, devices and sheath.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::insertion::{Sheath, WallProperties};
 use crate::vessel::{CentrelineTree, MotionMode, Opening, PatientAxes, Resolution, SurfaceFrame};
 use crate::{Error, Result, Vec3};
 
-/// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
+/// `[vessel]`: a surface file, or a centre-line tree from which the surface is built.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VesselSpec {
@@ -19,35 +19,35 @@ pub struct VesselSpec {
     pub file: Option<PathBuf>,
     /// Millimetres per unit of the surface file; 1 if absent.
     pub unit_mm: Option<f64>,
-    /// Axes of the surface file, in place of those given by its header.
+    /// Axes of the surface file, overriding those of its header.
     pub axes: Option<PatientAxes>,
-    /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
+    /// Centre-line table (x y z radius parent, mm) from which the wall is built; rows may name targets.
     pub tree: Option<PathBuf>,
-    /// Centre-line table beside `file`, in place of the one that is found in it where something needs one.
+    /// Centre-line table for `file`, used instead of a computed one.
     pub centreline: Option<PathBuf>,
     /// Edge length of the wall built from the tree, mm.
     pub edge_mm: Option<f64>,
-    /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
+    /// Number of triangles of the wall built from the tree, instead of `edge_mm`.
     pub triangles: Option<usize>,
-    /// How the wall yields and rubs.
+    /// Stiffness and friction of the wall.
     #[serde(default)]
     pub wall: WallProperties,
-    /// How the vessel moves: modes that add up.
+    /// Motion of the vessel: a sum of modes.
     #[serde(default)]
     pub motion: Vec<MotionMode>,
-    /// What flows through its centre line and drags at devices; nothing if absent.
+    /// Flow through its centre line, with drag on devices; none if absent.
     pub flow: Option<VesselFlow>,
-    /// The sac that coils fill; none if absent.
+    /// The sac to be filled by coils; none if absent.
     pub sac: Option<SacSpec>,
 }
 
 impl VesselSpec {
-    /// How the coordinates of `file` are meant.
+    /// The coordinate frame of `file`.
     pub(super) fn frame(&self) -> SurfaceFrame {
         SurfaceFrame { unit_mm: self.unit_mm.unwrap_or(1.0), axes: self.axes }
     }
 
-    /// How fine the wall is built from `tree`.
+    /// Resolution of the wall built from `tree`.
     pub(super) fn resolution(&self, tree: &CentrelineTree) -> Result<Resolution> {
         match (self.edge_mm, self.triangles) {
             (Some(edge_mm), None) => Ok(Resolution::EdgeMm(edge_mm)),
@@ -62,7 +62,7 @@ impl VesselSpec {
     }
 }
 
-/// `[device]`: sections or parts here, or a file that has them.
+/// `[device]`: sections or parts, or a file with them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeviceSpec {
@@ -71,7 +71,7 @@ pub struct DeviceSpec {
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
-    /// What it is, where it is given by parts: as in a device file.
+    /// Its kind, if it is given by parts: as in a device file.
     kind: Option<Kind>,
     length_mm: Option<f64>,
     length_cm: Option<f64>,
@@ -81,7 +81,7 @@ pub struct DeviceSpec {
 }
 
 impl DeviceSpec {
-    /// What a file would say.
+    /// The contents as those of a file.
     pub(super) fn tables(&self) -> FileTable {
         FileTable {
             name: String::new(),
@@ -95,39 +95,41 @@ impl DeviceSpec {
     }
 }
 
-/// `[[instrument]]`: one of several that lie in one another, with sections or parts here, or a file that has them.
+/// `[[instrument]]`: one of several coaxial instruments, with sections or parts, or a file with them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSpec {
-    /// What script and recording call it.
+    /// Its name in script and recording.
     pub name: String,
     /// A [`DeviceFile`](crate::device::DeviceFile).
     pub file: Option<PathBuf>,
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
-    /// What it is, where it is given by parts: as in a device file.
+    /// Its kind, if it is given by parts: as in a device file.
     kind: Option<Kind>,
     length_mm: Option<f64>,
     length_cm: Option<f64>,
     source: Option<String>,
     #[serde(default)]
     part: Vec<PartTable>,
-    /// Length that is in at the start, mm.
+    /// Initial inserted length, mm.
     #[serde(default)]
     pub inserted_mm: f64,
-    /// Whether its tip may be farther in than that of the instrument in it, of all but the first; it may if absent.
+    /// Whether its tip may be farther in than that of the instrument inside it, for all but the first; it may if
+    /// absent.
     pub may_lead: Option<bool>,
-    /// Coulomb coefficient of friction between it and the instruments outside it, along the line and around it; 0 is none and costs nothing.
+    /// Coulomb coefficient of friction between it and the instruments outside it, along the line and around it; 0
+    /// disables it.
     #[serde(default)]
     pub friction: f64,
-    /// Friction of the valve on its hub, which seals what lies in it, N; 0 is none and costs nothing.
+    /// Friction of the valve on its hub, which seals what is inside, N; 0 disables it.
     #[serde(default)]
     pub valve_n: f64,
 }
 
 impl InstrumentSpec {
-    /// What a file would say.
+    /// The contents as those of a file.
     pub(super) fn tables(&self) -> FileTable {
         FileTable {
             name: self.name.clone(),
@@ -145,27 +147,27 @@ impl InstrumentSpec {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheathSpec {
-    /// Number of an opening; the device enters in its middle, against its outward direction.
+    /// Index of an opening; the device enters at its middle, against its outward direction.
     pub opening: Option<usize>,
-    /// How far inside the opening the mouth lies, mm; 1 if absent.
+    /// Depth of the mouth inside the opening, mm; 1 if absent.
     pub depth_mm: Option<f64>,
     /// Mouth of the sheath, mm.
     pub position_mm: Option<[f64; 3]>,
     /// Direction of insertion, any length.
     pub direction: Option<[f64; 3]>,
-    /// Friction of the valve, N; 0 is none and costs nothing.
+    /// Friction of the valve, N; 0 disables it.
     #[serde(default)]
     pub friction_n: f64,
-    /// Coulomb coefficient in the mouth; 0 is none and costs nothing.
+    /// Coulomb coefficient in the mouth; 0 disables it.
     #[serde(default)]
     pub friction: f64,
 }
 
-/// Depth of the sheath's mouth inside an opening, mm, unless the scene says otherwise: clear of the rim.
+/// Default depth of the sheath's mouth inside an opening, mm: clear of the rim.
 pub(super) const DEPTH_MM: f64 = 1.0;
 
 impl SheathSpec {
-    /// The keys that are given, for messages.
+    /// The keys present, for messages.
     fn given(&self) -> String {
         let keys = [
             ("opening", self.opening.is_some()),
@@ -180,7 +182,7 @@ impl SheathSpec {
     /// The sheath in a vessel.
     ///
     /// # Errors
-    /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
+    /// A nonexistent opening, contradictory keys, values that are not finite or out of range.
     pub fn place(&self, vessel: &impl AsRef<[Opening]>) -> Result<Sheath> {
         let sheath = match (self.opening, self.position_mm, self.direction) {
             (Some(opening), None, None) => {

@@ -1,20 +1,22 @@
-//! The step of Newton's method with the contacts at its end.
+//! Newton's step with the contacts that are active at its end.
 //!
-//! Newton's step knows of the contacts that press where it begins. It is found anew with those at its end, as the minimum of the model
+//! Newton's step includes only the contacts that press at the base. It is replaced by the step with the contacts
+//! active at its end: the minimum of the model
 //!
 //! ```text
 //! m(δ) = r·δ + ½ δᵀ K δ + Σ ½ κᵢ (gᵢ + ∇dᵢ·δ)₋²
 //! ```
 //!
-//! of energy and contacts, K being the matrix without their springs and gᵢ the gap at the base. That is the semi-smooth Newton method of contact
-//! (M. Hintermüller, K. Ito, K. Kunisch, *The primal-dual active set strategy as a semismooth Newton method*, SIAM J. Optim. 13 (2002))
-//! within the step, at the cost of a factorisation a round and no question to the wall. Whole steps of it go round in circles where dozens of
-//! contacts change at once; each goes as far as m falls along it, which is a search over the kinks of a parabola, and ends at the
-//! minimum where m is convex. Where it is not, or its minimum is uphill of the merit, the matrix is shifted until it is.
+//! of energy and contacts, K being the matrix without contact springs and gᵢ the gap at the base. This is the
+//! semi-smooth Newton method of contact (M. Hintermüller, K. Ito, K. Kunisch, *The primal-dual active set strategy as
+//! a semismooth Newton method*, SIAM J. Optim. 13 (2002)) within the step, at the cost of one factorisation per round
+//! and without wall queries. Its full steps cycle where dozens of contacts change at once; so each is taken only as
+//! far as m decreases along it, which is a search over the kinks of a piecewise parabola and ends at the minimum
+//! where m is convex. If m is not convex, or its minimum is uphill of the merit, the matrix is shifted until it is.
 //!
-//! Nothing but the contacts is asked for that search. Of a step δ that is a mean of solutions, with the same weights, r + Kδ = −Σ Fᵢ ∇dᵢ,
-//! where Fᵢ is that mean of the forces κᵢ (gᵢ + ∇dᵢ·δ) of the springs in each; so along p = δ′ − δ, to the solution δ′ with the forces
-//! Fᵢ′,
+//! That search needs nothing but the contacts. A step δ that is a mean of solutions satisfies r + Kδ = −Σ Fᵢ ∇dᵢ,
+//! where Fᵢ is the mean, with the same weights, of the spring forces κᵢ (gᵢ + ∇dᵢ·δ) of the solutions; so along p =
+//! δ′ − δ, to the solution δ′ with the forces Fᵢ′,
 //!
 //! ```text
 //! dm/ds = Σ [κᵢ (gᵢ + ∇dᵢ·(δ + s p))₋ − Fᵢ − s (Fᵢ′ − Fᵢ)] ∇dᵢ·p
@@ -29,17 +31,18 @@ use crate::Vec3;
 use crate::rod::scatter::{point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
 
-/// Most rounds in which the contacts that a step leads to are looked for.
+/// Largest number of rounds, one factorisation each, in which the active set at the end of a step is sought.
 const ROUNDS: usize = 100;
-/// Turn of a step, rad, at which a round ends: planes are no model of what is farther away.
+/// Largest rotation of a step, rad, in a round: the linearised planes are no model farther away.
 const LARGEST_TURN: f64 = 1.0;
 
-/// A search ends where this part of the slope is left, …
+/// A search ends when the slope has fallen to this part of the initial slope.
 const SEARCHED: f64 = 1e-3;
-/// … and after so many trials.
+/// Largest number of trials of a search.
 const SEARCHES: usize = 60;
 
-/// Part of a way, at most all of it, up to which a convex function falls whose slope is given (the Illinois method).
+/// Fraction of the way, at most 1, up to which a convex function with the given slope decreases (the Illinois
+/// method).
 pub(crate) fn falls_until(mut slope: impl FnMut(f64) -> f64) -> f64 {
     let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
     if high.1 <= 0.0 || low.1 >= 0.0 {
@@ -63,7 +66,7 @@ pub(crate) fn falls_until(mut slope: impl FnMut(f64) -> f64) -> f64 {
     low.0
 }
 
-/// What a step does to points of the rod.
+/// Displacement and rotation of points of the rod in a step.
 pub(crate) fn moved<'a, const C: usize>(
     elements: &'a [ElementData],
     state: &'a RodState,
@@ -76,8 +79,9 @@ pub(crate) fn moved<'a, const C: usize>(
 }
 
 impl<const C: usize> Newton<C> {
-    /// Replaces the step from the assembled state, found under a `shift`, by that with the contacts at its end, where a minimum is looked for
-    /// and the matrix is that of the state. Returns what they add to the merit along it.
+    /// Replaces the step from the assembled state, found under a `shift`, by the step with the contacts active at its
+    /// end, if a minimum is sought and the matrix is that of the state. Returns the contacts' contribution to the
+    /// merit along it.
     pub(super) fn meet_contacts(
         &mut self,
         problem: &mut Problem<'_>,
@@ -110,7 +114,7 @@ impl<const C: usize> Newton<C> {
         Err(StopReason::NoDescent)
     }
 
-    /// Asks contacts what the step does to them.
+    /// Calls the contacts with the motion of the step.
     fn with_contacts<T: Default>(
         &self,
         problem: &mut Problem<'_>,
@@ -121,7 +125,8 @@ impl<const C: usize> Newton<C> {
         problem.external.contacts().map_or_else(T::default, |contacts| ask(contacts, &moved))
     }
 
-    /// Whether the step is uphill of the merit with this, beyond rounding.
+    /// Whether the slope of the merit along the step, with this contribution of contacts, is positive beyond
+    /// rounding.
     fn is_uphill(
         &self,
         problem: &Problem<'_>,
@@ -133,11 +138,13 @@ impl<const C: usize> Newton<C> {
         slope > ENERGY_ROUNDING * self.assembly.energy.total().abs()
     }
 
-    /// Finds the minimum of the model under a `shift`. Returns whether it is convex in all rounds; otherwise the system has no minimum.
+    /// Finds the minimum of the model under a `shift`. Returns whether the model is convex in all rounds; otherwise
+    /// it has no minimum.
     fn contacts_at_end(&mut self, problem: &mut Problem<'_>, state: &RodState, shift: f64) -> bool {
         let elements = problem.elements;
         for _ in 0..ROUNDS {
-            // With the same contacts the next round would go the same way, and this one went as far as the model falls.
+            // With the same active set the next round would take the same direction, and this one went as far as the
+            // model decreases.
             if self.change_contacts(problem, state) == 0 {
                 break;
             }
@@ -162,15 +169,16 @@ impl<const C: usize> Newton<C> {
         true
     }
 
-    /// Factors the system under a shift and sets the step that answers it. Returns whether its matrix is that of a minimum.
+    /// Factors the system under a shift and solves for the step. Returns whether the matrix has the inertia of a
+    /// minimum.
     fn factors_minimum(&mut self, problem: &Problem<'_>, shift: f64) -> bool {
         let found = self.factor_step(Self::regularisation(problem.elements) + shift);
         Self::restore_tensions(problem.elements, &mut self.step);
         found.is_ok_and(|inertia| inertia.negative == problem.multipliers())
     }
 
-    /// Has those contacts in the system to which the step leads; returns how many that changes. The slope of the energy stays that at the
-    /// base: what they change is for the right-hand side alone.
+    /// Changes the active contacts in the system to those at the end of the step; returns how many change. The slope
+    /// of the energy stays that at the base: the change enters the right-hand side alone.
     fn change_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState) -> usize {
         let Problem { elements, supports, external, .. } = problem;
         let Some(contacts) = external.contacts() else { return 0 };

@@ -1,26 +1,26 @@
-//! Factors of the assembled matrix: of the band where it couples neighbouring nodes alone, and sparse ones where distant nodes touch.
+//! Factors of the assembled matrix: banded if it couples neighbouring nodes alone, sparse if distant nodes touch.
 
 use crate::banded::{Factor, FactorError, Inertia, Shift};
 use crate::coupled::CoupledFactor;
 use crate::rod::Assembly;
 
-/// A factorisation; its memory is reused from one to the next.
+/// A factorisation; its memory is reused.
 #[derive(Debug, Clone)]
 pub(super) struct Factors<const C: usize> {
     band: Factor<C>,
-    /// Made when first a matrix has couplings.
+    /// Created with the first matrix that has couplings.
     coupled: Option<Box<CoupledFactor>>,
-    /// Whether the matrix factored last had some.
+    /// Whether the matrix factored last had couplings.
     is_coupled: bool,
 }
 
 impl<const C: usize> Factors<C> {
-    /// Room for matrices of this dimension.
+    /// Allocates for matrices of this dimension.
     pub(super) fn new(dimension: usize) -> Self {
         Self { band: Factor::new(dimension), coupled: None, is_coupled: false }
     }
 
-    /// Changes the dimension; keeps the memory.
+    /// Changes the dimension without releasing memory.
     pub(super) fn resize(&mut self, dimension: usize) {
         self.band.resize(dimension);
     }
@@ -45,7 +45,7 @@ impl<const C: usize> Factors<C> {
         self.band.factor_shifted(&assembly.matrix, shift, factor)
     }
 
-    /// The same, and replaces `b` by the solution. On an error `b` is spoilt.
+    /// As [`Self::factor_shifted`], and replaces `b` by the solution. On an error `b` is overwritten with garbage.
     pub(super) fn factor_solve_shifted(
         &mut self,
         assembly: &Assembly<C>,

@@ -1,8 +1,9 @@
-//! The line search: how much of a step is taken.
+//! The line search: what fraction of a step is taken.
 //!
-//! The merit is the potential energy, with contacts a merit of theirs, and where the far end is held the weighted distance from its conditions.
-//! The first trial is the whole step, or as much of it as turns no node too far and crosses no wall; others follow at the minimum of a parabola until the merit
-//! falls enough (Armijo's condition; Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.1).
+//! The merit is the potential energy, plus a term of the contacts and, where the far end is held, the weighted errors
+//! of its conditions. The first trial is the full step, limited so that no node turns too far and no wall is crossed;
+//! further trials are at the minimum of a parabola until the merit decreases enough (Armijo's condition; Nocedal and
+//! Wright, *Numerical Optimization*, 2nd ed., section 3.1).
 
 use super::external::ContactMerit;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
@@ -11,23 +12,24 @@ use super::shift::REGULARISATION;
 use super::stop::SHORT;
 use crate::rod::{ElementData, Layout, RodState};
 
-/// Most trials.
+/// Largest number of trials.
 const TRIALS: usize = 24;
-/// Part of what the slope promises that a trial must gain.
+/// Armijo's constant: the fraction of the decrease predicted by the slope that a trial must reach.
 const ARMIJO: f64 = 1e-4;
-/// A step that is not whole counts as one where axial forces changed by less than 1 / STIFFENING of its turn times EI/L².
+/// Changes of axial force count as rotation: STIFFENING times their ratio to EI/L², in radians.
 const STIFFENING: f64 = 1e-2;
-/// Trials after which loads without potential may let the residual grow.
+/// Number of trials after which the residual may grow if loads have no potential.
 const PATIENCE: usize = 6;
 
-/// What line searches hand on from one to the next.
+/// State kept from one line search to the next.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LineSearch {
-    /// Weights of the gaps of position and of direction in the merit.
+    /// Weights of the errors of position and of direction in the merit.
     penalty: [f64; 2],
-    /// Whether the state is assembled already: as the trial that was taken.
+    /// Whether the state is already assembled, as the accepted trial.
     pub(super) assembled: bool,
-    /// A device in its own shape stores nothing, as the difference of terms of this size.
+    /// Energy of straightening the rod: in its rest shape the bending energy is zero as a difference of terms of this
+    /// size.
     straightening: f64,
 }
 
@@ -37,50 +39,50 @@ impl LineSearch {
         Self { penalty: [0.0; 2], assembled: false, straightening }
     }
 
-    /// Weighs the gaps of the end conditions.
+    /// Weighted sum of the errors of the end conditions.
     fn weigh(&self, gaps: &[f64; 6]) -> f64 {
         self.penalty[0] * (gaps[0].abs() + gaps[1].abs() + gaps[2].abs())
             + self.penalty[1] * (gaps[3].abs() + gaps[4].abs() + gaps[5].abs())
     }
 }
 
-/// The merit where a step begins.
+/// The merit at the start of a step.
 #[derive(Debug, Clone, Copy)]
 struct Merit {
     /// Potential energy.
     energy: f64,
-    /// Weighted gaps.
+    /// Weighted errors of the end conditions.
     gaps: f64,
     /// Slope of both along the step.
     slope: f64,
-    /// Size of the energies it is made of.
+    /// Magnitude of the energies that are summed.
     scale: f64,
 }
 
-/// A step as a line search takes it.
+/// A step for the line search.
 #[derive(Debug, Clone, Copy)]
 struct Stride {
     merit: Merit,
-    /// Part of it that is tried first.
+    /// Fraction of the step that is tried first.
     part: f64,
-    /// How far it turns nodes, rad, …
+    /// Largest rotation of a node in the step, rad.
     turn: f64,
-    /// … and where it says how near the minimum is.
+    /// Rotation that measures the distance to the minimum, see [`Newton::whole_turn`].
     whole_turn: f64,
 }
 
 impl Merit {
-    /// What rounding leaves of a change.
+    /// Rounding error of a change of the merit.
     fn rounding(&self) -> f64 {
         ENERGY_ROUNDING * self.scale
     }
 
-    /// Whether a change along a part of the step is fall enough.
+    /// Whether a change at a fraction of the step satisfies Armijo's condition.
     fn falls_enough(&self, change: f64, part: f64) -> bool {
         change <= ARMIJO * part * self.slope.min(0.0) + self.rounding()
     }
 
-    /// Part of the step at which the parabola through value, slope and the `change` at `part` has its minimum.
+    /// Fraction of the step at which the parabola through value, slope and the `change` at `part` has its minimum.
     fn parabola(&self, change: f64, part: f64) -> f64 {
         let curve = change - self.slope * part;
         let minimum = if curve > 0.0 { -0.5 * self.slope * part / curve } else { 0.5 };
@@ -89,8 +91,8 @@ impl Merit {
 }
 
 impl<const C: usize> Newton<C> {
-    /// Moves `state` along the step from the assembled state, whose relative residual and shift are given, and what contacts add to the merit.
-    /// Returns how far nodes were turned by it.
+    /// Moves `state` along the step from the assembled state, given its relative residual and shift, and the
+    /// contribution of contacts to the merit. Returns the largest rotation of a full step, or infinity.
     pub(super) fn line_search(
         &mut self,
         problem: &mut Problem<'_>,
@@ -102,7 +104,7 @@ impl<const C: usize> Newton<C> {
         let Stride { merit, mut part, whole_turn, turn } =
             self.stride(problem, state, search, shift, contacts)?;
         let free = problem.supports.conditions() == 0;
-        // What a step gains that is less than rounding, the energies need not be asked for.
+        // The predicted decrease is below rounding, so evaluating the energies would be useless.
         let below_rounding = problem.minimum && free && turn <= SHORT && -merit.slope <= merit.rounding();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
@@ -165,7 +167,7 @@ impl<const C: usize> Newton<C> {
         Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
     }
 
-    /// Slope of energy and weighed end conditions along the step.
+    /// Slope of the energy and the weighted end conditions along the step.
     pub(super) fn slope_along(
         &self,
         problem: &Problem<'_>,
@@ -175,7 +177,7 @@ impl<const C: usize> Newton<C> {
         self.merit_along(problem, state, search).slope
     }
 
-    /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
+    /// Sets the weights of the end conditions above the reactions after the step, and evaluates the merit along it.
     fn merit_along(&self, problem: &Problem<'_>, state: &RodState, search: &mut LineSearch) -> Merit {
         let l = Layout::<C>;
         let (elements, supports) = (problem.elements, &*problem.supports);
@@ -198,8 +200,8 @@ impl<const C: usize> Newton<C> {
         Merit { energy: stored + outside, gaps: weighed, slope, scale }
     }
 
-    /// How far a whole step turns nodes, where it is Newton's own and the matrix says that it leads to a minimum.
-    /// Axial forces stiffen the rod against bending over its length.
+    /// Rotation in a full step if it is an unshifted Newton step towards a minimum; otherwise infinity. Changes of
+    /// axial force count too, because they stiffen the rod against bending over its length.
     fn whole_turn(&self, problem: &Problem<'_>, turn: f64, shift: f64) -> f64 {
         if !(problem.minimum && shift == 0.0 && problem.supports.conditions() == 0) {
             return f64::INFINITY;
@@ -210,7 +212,7 @@ impl<const C: usize> Newton<C> {
         turn.max(STIFFENING * pulled * REGULARISATION / Self::regularisation(elements))
     }
 
-    /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.
+    /// Sets the trial to a fraction of the step, at most `part`, that crosses no surface; returns the fraction.
     fn place_trial(&mut self, problem: &mut Problem<'_>, state: &RodState, mut part: f64) -> f64 {
         let Problem { elements, supports, external, .. } = problem;
         self.trial.advance::<C>(elements, state, &self.step, part);
@@ -224,7 +226,8 @@ impl<const C: usize> Newton<C> {
         }
         if supports.conditions() > 0 {
             self.correct(elements, supports, Layout::<C>.support(elements.len()));
-            // The way back to the end conditions may lead through something: then the merit weighs how far off they are.
+            // If the correction crosses a surface, it is dropped and the merit weighs the errors of the end
+            // conditions.
             if external.safe_fraction(elements, &self.trial) < 1.0 {
                 self.trial.advance::<C>(elements, state, &self.step, part);
             }
@@ -233,7 +236,7 @@ impl<const C: usize> Newton<C> {
         part
     }
 
-    /// Whether a trial, the `attempt`th, at a `part` of the step with this `change` of merit is taken.
+    /// Whether the trial number `attempt`, at a fraction `part` of the step with this `change` of merit, is accepted.
     fn accepts(
         &mut self,
         problem: &mut Problem<'_>,
@@ -251,7 +254,7 @@ impl<const C: usize> Newton<C> {
         if problem.external.is_conservative() {
             return false;
         }
-        // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
+        // Loads without potential: a smaller residual is accepted too. This costs an assembly, so it is checked last.
         search.assembled = true;
         let Problem { elements, supports, external, options, .. } = problem;
         let trial = std::mem::take(&mut self.trial);

@@ -1,8 +1,8 @@
 //! Newton's method on the rod's potential energy, with globalisation.
 //!
-//! [`newton`] is the iteration; [`report`] what goes in and comes out. An iteration is inertia and shift, step, line search and stop,
-//! a file each; beside them are the size of a residual, the trial state, contacts within a step, the way out of saddle points, and stiffness that is not
-//! symmetric.
+//! [`newton`] is the iteration, [`report`] its options and results. An iteration consists of inertia and shift, step,
+//! line search and stopping criterion, one file each; further files hold the size of a residual, the trial state,
+//! contacts within a step, the descent from saddle points, and unsymmetric stiffness.
 
 pub(crate) mod contacts;
 pub mod external;

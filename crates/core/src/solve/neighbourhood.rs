@@ -1,40 +1,41 @@
-//! What is near a prediction.
+//! How far an equilibrium may be from its prediction.
 //!
-//! A device that is moved slowly follows its path of equilibria. An equilibrium that Newton's method finds is the next one on that path if it
-//! lies near the one that was predicted, and may be any other one if not: continuation methods cut their steps until it is near
-//! (E. L. Allgower, K. Georg, *Numerical Continuation Methods*, 1990, chapter 6; P. Deuflhard, *Newton Methods for Nonlinear Problems*,
-//! 2004, chapter 5). What is near in a vessel says the vessel: a node has as much room as it has clearance, and one that touches has its
-//! radius.
+//! A device that is moved slowly follows its path of equilibria. An equilibrium found by Newton's method is the next
+//! one on that path if it is close to the prediction, and otherwise may be any other: continuation methods reduce
+//! their steps until it is close (E. L. Allgower, K. Georg, *Numerical Continuation Methods*, 1990, chapter 6; P.
+//! Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, chapter 5). The vessel determines what is close: the
+//! room of a node is its clearance, or the radius of the vessel if it touches the wall.
 
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::rod::RodState;
 
-/// A node may be this many times the room that it has from where it was predicted.
+/// Largest distance of a node from its prediction, as a multiple of its room.
 const ROOMS: f64 = 2.0;
-/// A node's material angle may be off by this, rad.
+/// Largest difference of a node's material angle from its prediction, rad.
 const LARGEST_TURN: f64 = 1.0;
-/// A solution that strays so many times as far does not come back: the first steps from a prediction may be long where contacts are lost.
+/// An iterate this many times farther than allowed does not return. Below that it may: the first steps from a
+/// prediction can be long where contacts open.
 const STRAY: f64 = 3.0;
 
-/// Where the nodes of a rod were predicted, and how far each may be from there.
+/// The predicted nodes of a rod, and how far each may be from its prediction.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Neighbourhood {
     nodes: Vec<(Vec3, f64)>,
     angles: Vec<f64>,
-    /// Whether solutions that leave it are given up.
+    /// Whether Newton's method stops when an iterate leaves the neighbourhood.
     pub(crate) bounds: bool,
 }
 
 impl Neighbourhood {
-    /// Takes memory for rods of up to `elements` elements with so many sets of angles.
+    /// Allocates for rods of up to `elements` elements with `sets` sets of angles.
     pub(crate) fn reserve(&mut self, elements: usize, sets: usize) {
         self.nodes.reserve((elements + 1).saturating_sub(self.nodes.len()));
         self.angles.reserve((sets * (elements + 1)).saturating_sub(self.angles.len()));
     }
 
-    /// Is that of a prediction in which nodes, the first one included, have this much room, mm.
+    /// Centres the neighbourhood on a prediction whose nodes, the first one included, have this room, mm.
     pub(crate) fn begin(&mut self, state: &RodState, room_mm: &[f64]) {
         let places = state.positions.iter().zip(room_mm);
         self.nodes.clear();
@@ -43,7 +44,7 @@ impl Neighbourhood {
         self.angles.extend(carried(state));
     }
 
-    /// How far a state is from the prediction, over how far it may be.
+    /// Largest deviation of a state from the prediction, as a fraction of the allowed one.
     pub(crate) fn off(&self, state: &RodState) -> f64 {
         let places = state.positions.iter().zip(&self.nodes);
         let off = places.map(|(x, (at_mm, most_mm))| (x - at_mm).norm() / most_mm).fold(0.0, f64::max);
@@ -51,7 +52,7 @@ impl Neighbourhood {
         turns.fold(off, f64::max)
     }
 
-    /// Where the node is that is farthest from its prediction for the room that it has, mm.
+    /// Position of the node with the largest deviation from its prediction relative to its room, mm.
     pub(crate) fn farthest(&self, state: &RodState) -> Vec3 {
         let off = |(x, (at_mm, most_mm)): (&Vec3, &(Vec3, f64))| (x - at_mm).norm() / most_mm;
         let places = state.positions.iter().zip(&self.nodes);
@@ -59,13 +60,13 @@ impl Neighbourhood {
         farthest.map_or_else(Vec3::zeros, |(x, _)| *x)
     }
 
-    /// Whether a solution that has come to this state is given up.
+    /// Whether Newton's method should stop because this iterate is too far away.
     pub(crate) fn is_left_by(&self, state: &RodState) -> bool {
         self.bounds && self.off(state) > STRAY
     }
 }
 
-/// The angles of all sets at all nodes, counted from triads carried along the rod without twist.
+/// The angles of all sets at all nodes, measured from triads carried along the rod without twist.
 fn carried(state: &RodState) -> impl Iterator<Item = f64> {
     let nodes = state.carried_twists().zip(state.angles.chunks(state.sets()));
     nodes.flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
@@ -98,7 +99,7 @@ mod tests {
         let mut turned = rod.clone();
         turned.angles[2] += 0.3;
         assert!((near.off(&turned) - 0.3).abs() < 1e-12);
-        // The triads that it is counted from have turned back by as much.
+        // The reference triads have turned back by the same angle.
         turned.reference_twists[1] -= 0.3;
         assert!(near.off(&turned) < 1e-12);
     }

@@ -1,17 +1,17 @@
 //! Newton's method on the rod's potential energy, globalised to find minima.
 //!
-//! The merit is the potential energy itself: a step moves along the constraint manifold (see
-//! [`RodState::advance`]), so nothing has to be weighed against it. Contacts have a merit of their own, and every step is found with those at
-//! its end (`contacts.rs`). Where the far end is held, the distance from its
-//! conditions is added with a weight above the reactions (an exact penalty), after second-order corrections that
-//! re-use the factorisation; once the conditions hold the merit is the energy again. Every accepted step lowers the merit.
+//! The merit is the potential energy itself: a step moves along the constraint manifold (see [`RodState::advance`]),
+//! so no constraint violation has to be penalised. Contacts add a merit of their own, and every step includes the
+//! contacts active at its end (`contacts.rs`). Where the far end is held, the errors of its conditions are added with
+//! a weight above the reactions (an exact penalty), after second-order corrections that re-use the factorisation;
+//! once the conditions hold the merit is the energy again. Every accepted step lowers the merit.
 //!
-//! Each iteration: assemble, factor, look at the inertia. Minima have one negative pivot per multiplier; with more
-//! the matrix is shifted by the stiffness of a uniform tension ([`Assembly::unit_shift`]) until they are right, so every
-//! step descends. At an equilibrium that is not a minimum the method leaves along the direction of most negative
-//! curvature (inverse iteration with the shifted factor). A whisper of the shift stays on always, for regularisation: it makes states that
-//! can turn freely (a buckled column about its axis) solvable and cannot be seen in the result, since the
-//! residual is never shifted.
+//! Each iteration assembles and factors the matrix and checks its inertia. Minima have one negative pivot per
+//! multiplier; if there are more, the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added until the
+//! number is right, so every step descends. From an equilibrium that is not a minimum the method descends along the
+//! direction of most negative curvature (inverse iteration with the shifted factor). A tiny shift is always present,
+//! as regularisation: it makes states that can turn freely (a buckled column about its axis) solvable and does not
+//! change the result, since the residual is never shifted.
 
 use super::external::External;
 use super::factors::Factors;
@@ -24,20 +24,20 @@ use super::stop::Progress;
 use crate::banded::{Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
-/// Changes of energy below this part of the energies' size are rounding.
+/// Changes of energy below this fraction of the energies' magnitude are rounding.
 pub(super) const ENERGY_ROUNDING: f64 = 1e-13;
-/// Steps of a solution that are remembered without new memory.
+/// Number of steps of a solution that are recorded without allocation.
 const STEPS: usize = 1024;
 
-/// Newton's method with its memory, for rods of one size. Nothing is allocated per iteration.
+/// Newton's method and its memory, for rods of one size. Iterations do not allocate.
 #[derive(Debug, Clone)]
 pub struct Newton<const C: usize> {
     /// The system at the current state.
     pub assembly: Assembly<C>,
-    /// Residual rows of the first two nodes before the first was held: its reactions.
+    /// Residual rows of the first two nodes before the first node was held: its reactions.
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
-    /// Shift of the last step that took one, and what is left of it since.
+    /// Shift of the last shifted step, reduced in each iteration since.
     pub(super) last_shift: f64,
     pub(super) factor: Factors<C>,
     pub(super) step: Vec<f64>,
@@ -45,16 +45,16 @@ pub struct Newton<const C: usize> {
     pub(super) columns: Vec<Vec<f64>>,
     pub(super) trial: RodState,
     pub(super) other: RodState,
-    /// The steps that the last solution took.
+    /// The steps of the last solution.
     pub steps: Vec<StepRecord>,
-    /// Linear solves that it took.
+    /// Linear solves of the last solution.
     pub(super) solves: usize,
-    /// Where solutions are looked for.
+    /// The neighbourhood in which solutions are sought.
     pub(crate) neighbourhood: Neighbourhood,
 }
 
 impl<const C: usize> Newton<C> {
-    /// Room for a rod of `elements` elements.
+    /// Allocates for a rod of `elements` elements.
     pub fn new(elements: usize) -> Self {
         let n = Layout::<C>::dimension(elements);
         Self {
@@ -74,7 +74,7 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// Takes memory for rods of up to `elements` elements.
+    /// Allocates for rods of up to `elements` elements.
     pub(crate) fn reserve(&mut self, elements: usize) {
         let now = self.trial.elements();
         self.resize(elements);
@@ -84,7 +84,7 @@ impl<const C: usize> Newton<C> {
         self.neighbourhood.reserve(elements, Layout::<C>::ANGLES.max(1));
     }
 
-    /// Changes the size; keeps the memory.
+    /// Changes the size without releasing memory.
     pub fn resize(&mut self, elements: usize) {
         let n = Layout::<C>::dimension(elements);
         if self.step.len() == n {
@@ -109,7 +109,7 @@ impl<const C: usize> Newton<C> {
         self.assemble_parts(elements, supports, external, state);
     }
 
-    /// Assembles the system at `state`, without the matrix where the assembly wants none.
+    /// Assembles the system at `state`, without the matrix unless the assembly wants it.
     pub(super) fn assemble_parts(
         &mut self,
         elements: &[ElementData],
@@ -126,7 +126,7 @@ impl<const C: usize> Newton<C> {
         supports.hold(&mut self.assembly);
     }
 
-    /// Moves `state` to an equilibrium, and leaves residual, energies and reactions assembled there.
+    /// Moves `state` to an equilibrium; residual, energies and reactions are assembled there.
     pub fn solve(
         &mut self,
         elements: &[ElementData],
@@ -136,7 +136,8 @@ impl<const C: usize> Newton<C> {
         options: &NewtonOptions,
     ) -> NewtonReport {
         self.solves = 0;
-        // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
+        // Loads without potential make the stiffness unsymmetric: the inertia of its symmetric part does not indicate
+        // minima.
         let minimum = options.minimum && external.is_conservative();
         let problem = Problem { elements, supports, external, options, minimum };
         let report = self.iterate(problem, state);
@@ -155,7 +156,7 @@ impl<const C: usize> Newton<C> {
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
         self.last_shift = 0.0;
-        // Whether the last state was an equilibrium but for what its contacts and friction know of each other.
+        // Whether the last state was an equilibrium except for contacts or lagged friction.
         let mut renewed = false;
         loop {
             let size =
@@ -170,7 +171,8 @@ impl<const C: usize> Newton<C> {
                     return report.stopped(StopReason::Unsettled);
                 }
                 progress = Progress::default();
-                // Where that does not come of the next base, it takes a step: forces of contacts change with those alone.
+                // If renewing the base does not settle the contacts, take a step: contact forces change only in
+                // steps.
                 if !std::mem::replace(&mut renewed, true) {
                     report.iterations += 1;
                     continue;
@@ -195,7 +197,8 @@ impl<const C: usize> Newton<C> {
                 return report.stopped(StopReason::MaxIterations);
             }
             if arrived {
-                // A saddle: leave it along the most negative curvature. One that gains nothing is as good as neutral, but no minimum.
+                // A saddle: descend along the most negative curvature. Without a decrease it is practically neutral,
+                // but not a minimum.
                 self.negative_curvature(elements, problem.supports, state);
                 let Some(step) = self.leave(elements, problem.supports, problem.external, state) else {
                     return report.converged(size.reason());
@@ -226,8 +229,8 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// Assembles `state`, unless it is `assembled` already, and measures its residual: without the matrix where it is likely to be
-    /// small enough, and with it where it turns out not to be.
+    /// Assembles `state`, unless `assembled`, and measures its residual. The matrix is left out if the residual is
+    /// expected to be small enough, and assembled if it turns out not to be.
     fn residual_at(
         &mut self,
         problem: &mut Problem<'_>,
@@ -248,8 +251,8 @@ impl<const C: usize> Newton<C> {
         self.residual(elements, *external, supports, options.tolerance)
     }
 
-    /// Sets the step that lowers the energy from the assembled state, and the `shift` it took; returns the inertia of the matrix
-    /// without it, if that is known.
+    /// Solves for the descent step from the assembled state and its `shift`; returns the inertia of the unshifted
+    /// matrix, if known.
     fn descent_step(
         &mut self,
         problem: &Problem<'_>,
@@ -257,7 +260,7 @@ impl<const C: usize> Newton<C> {
         arrived: bool,
     ) -> Result<Option<Inertia>, StopReason> {
         if !self.assembly.hessian {
-            // An equilibrium asks for the inertia alone.
+            // At an equilibrium only the inertia is needed.
             if !arrived {
                 self.right_hand_side();
                 self.factor.solve(&mut self.step);
@@ -270,7 +273,7 @@ impl<const C: usize> Newton<C> {
         Ok(natural)
     }
 
-    /// Says of an equilibrium with this inertia whether it is stable.
+    /// Reports whether an equilibrium with this inertia is stable.
     fn judge(&mut self, problem: &Problem<'_>, natural: Option<Inertia>, report: &mut NewtonReport) {
         let Some(inertia) = natural else { return };
         report.inertia = inertia;
@@ -283,7 +286,7 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// No step lowers the energy: an equilibrium to rounding, or none.
+    /// No step lowers the energy: the state is an equilibrium to rounding, or the method has failed.
     fn without_descent(
         &mut self,
         problem: &mut Problem<'_>,
@@ -308,18 +311,18 @@ impl<const C: usize> Newton<C> {
     }
 }
 
-/// What is solved.
+/// The problem to be solved.
 pub(super) struct Problem<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) supports: &'a mut Supports,
     pub(super) external: &'a mut dyn External,
     pub(super) options: &'a NewtonOptions,
-    /// Whether a minimum is looked for, and there may be one.
+    /// Whether a minimum is sought and can exist.
     pub(super) minimum: bool,
 }
 
 impl Problem<'_> {
-    /// Whether contacts, if there are any, leave an equilibrium one.
+    /// Whether an equilibrium is valid for the contacts, if there are any.
     fn settles(&mut self) -> bool {
         let tolerance = self.options.tolerance;
         self.external.contacts().is_none_or(|contacts| contacts.settled(tolerance))

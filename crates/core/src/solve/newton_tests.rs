@@ -1,4 +1,4 @@
-//! The bare solver on cantilevers.
+//! The solver alone on cantilevers.
 
 use super::{External, Newton, NewtonOptions, NewtonReport, StepRecord};
 use crate::Vec3;
@@ -123,18 +123,18 @@ fn an_element_that_would_fold_is_told_and_shorter_ones_bend() {
     assert!(!r.converged && is_folded(&state));
     let (state, r) = cantilever(32, &mut back());
     assert!(r.converged && r.stable && !is_folded(&state), "{}", r.reason);
-    // From its clamped end to its tip it has turned round.
+    // The rod has turned round between its clamped end and its tip.
     assert!(state.frames[0].t.dot(&state.frames[32].t) < -0.9);
 }
 
-/// A force at a node, and a spring at each of some nodes to where it was.
+/// A force at a node, and springs that hold some nodes at their initial positions.
 pub(crate) struct Held {
     pub(crate) force: (usize, Vec3),
     pub(crate) springs: Vec<(usize, Vec3)>,
     pub(crate) stiffness: f64,
 }
 impl Held {
-    /// By what the springs are pulled.
+    /// Total force of the springs.
     pub(crate) fn pulls(&self, state: &RodState) -> Vec3 {
         self.springs.iter().map(|(i, was)| (state.positions[*i] - was) * self.stiffness).sum()
     }
@@ -162,7 +162,7 @@ fn rods_behind_a_gap_are_solved_for_together_and_do_not_feel_each_other() {
     let clamped = RodState::straight(&elements, Vec3::zeros(), frame(Vec3::x()));
     let free = RodState::straight(&elements, Vec3::new(1.0, 0.2, 0.0), frame(-Vec3::x()));
     let bent = (N, Vec3::new(0.0, -2.0, 0.5));
-    // All that acts on it is its weight at one end and springs: it sinks by their ratio in the mean, and turns and bends.
+    // Only a weight at one end and springs act on it: its mean displacement is their ratio, and it turns and bends.
     let sinks = (0, Vec3::new(0.1, 0.3, -0.2));
     let springs = |first: usize| (0..=N).map(|i| (first + i, free.positions[i])).collect::<Vec<_>>();
     let solve =

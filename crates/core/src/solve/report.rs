@@ -1,21 +1,21 @@
-//! What Newton's method is told and what it tells.
+//! Options and results of Newton's method.
 
 use crate::banded::Inertia;
 
 /// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonOptions {
-    /// Iterations (steps) allowed.
+    /// Largest number of iterations (steps).
     pub max_iterations: usize,
-    /// Linear solves allowed, those included that look for contacts and for the shift of an iteration: no iteration begins when they are used
-    /// up, and the last may take a few more.
+    /// Largest number of linear solves, including those for contacts and shifts within iterations. No iteration
+    /// begins once they are used up; the last one may exceed the limit slightly.
     pub max_solves: usize,
-    /// Residual over force scale below which a state is an equilibrium.
+    /// Residual, relative to the force scale, below which a state is an equilibrium.
     pub tolerance: f64,
-    /// Largest rotation of a node in one step, in radians. Somewhat less than a right angle is best: a dead load across a rod turns it
-    /// by no more.
+    /// Largest rotation of a node in one step, rad. Slightly less than a right angle is best: a dead load across a
+    /// rod turns it by no more.
     pub max_turn: f64,
-    /// Whether to look for a minimum (or take any equilibrium, as continuation does).
+    /// Whether to find a minimum (or any equilibrium, as continuation does).
     pub minimum: bool,
 }
 
@@ -30,21 +30,22 @@ impl Default for NewtonOptions {
 pub enum StopReason {
     /// The residual is below its tolerance.
     Converged,
-    /// The residual is as small as rounding lets it be on this mesh.
+    /// The residual is as small as rounding permits on this mesh.
     RoundingFloor,
     /// The iterations or linear solves allowed are used up.
     MaxIterations,
     /// No step along the search direction lowers the merit.
     NoDescent,
-    /// The matrix stayed singular or of wrong inertia under every shift.
+    /// The matrix stayed singular or of wrong inertia under every shift tried.
     Singular,
-    /// It has come too far from where the state was predicted.
+    /// An iterate was too far from the predicted state.
     Left,
-    /// It is one with normal forces of friction that are not those of the wall.
+    /// An equilibrium, but friction does not follow the current normal forces of the wall.
     Unsettled,
-    /// An element bends farther than it can say ([`RodState::is_folded`](crate::rod::RodState::is_folded)).
+    /// An element bends more than its interpolation can represent
+    /// ([`RodState::is_folded`](crate::rod::RodState::is_folded)).
     Folded,
-    /// The state or the matrix holds a number that is not finite.
+    /// The state or the matrix contains a number that is not finite.
     NotFinite,
 }
 
@@ -69,13 +70,13 @@ impl std::fmt::Display for StopReason {
 pub struct StepRecord {
     /// Change of the potential energy.
     pub energy_change: f64,
-    /// Change of the merit: the energy, plus the weighted gaps of the end conditions.
+    /// Change of the merit: the energy, plus the weighted errors of the end conditions.
     pub merit_change: f64,
-    /// Size of the energies the change is a difference of; changes below 1e-13 of it are rounding.
+    /// Magnitude of the energies whose difference is the change; changes below 1e-13 of it are rounding.
     pub energy_scale: f64,
     /// Relative residual before the step.
     pub residual: f64,
-    /// Part of the Newton step taken.
+    /// Fraction of the Newton step taken.
     pub fraction: f64,
     /// Shift used.
     pub shift: f64,
@@ -92,7 +93,7 @@ pub struct NewtonReport {
     pub residual: f64,
     /// Inertia of the final matrix.
     pub inertia: Inertia,
-    /// Negative pivots a minimum has.
+    /// Number of negative pivots at a minimum.
     pub multipliers: usize,
     /// Whether the final state is a minimum (neutral directions allowed).
     pub stable: bool,
@@ -103,7 +104,7 @@ pub struct NewtonReport {
 }
 
 impl NewtonReport {
-    /// Nothing is found yet; a minimum has `multipliers` negative pivots.
+    /// The initial report, without a solution; a minimum has `multipliers` negative pivots.
     pub(super) fn of(multipliers: usize) -> Self {
         Self {
             iterations: 0,
@@ -117,17 +118,17 @@ impl NewtonReport {
         }
     }
 
-    /// Whether it ended at this residual or less, or at what rounding leaves of one.
+    /// Whether the final residual is at most `tolerance`, or at the rounding floor.
     pub(crate) fn is_within(&self, tolerance: f64) -> bool {
         self.residual <= tolerance || self.reason == StopReason::RoundingFloor
     }
 
-    /// An equilibrium.
+    /// The report of an equilibrium.
     pub(super) fn converged(self, reason: StopReason) -> Self {
         Self { converged: true, reason, ..self }
     }
 
-    /// None.
+    /// The report of a solution that failed.
     pub(crate) fn stopped(self, reason: StopReason) -> Self {
         Self { reason, converged: false, ..self }
     }

@@ -1,4 +1,4 @@
-//! How large a residual is, and when it is as small as it gets.
+//! The size of a residual, and whether it is at the level of rounding.
 
 use super::external::External;
 use super::newton::Newton;
@@ -7,17 +7,18 @@ use crate::rod::{ElementData, Layout, Supports};
 /// Size of a residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResidualSize {
-    /// Largest force or moment left at a node over the largest in the rod, its loads and supports.
+    /// Largest unbalanced force or moment at a node, relative to the largest in the rod, its loads and supports.
     pub relative: f64,
     /// Whether every row is below its tolerance.
     pub small: bool,
-    /// Whether every row is below its tolerance or what rounding of the unknowns may leave in it. Rows of short, stiff elements
-    /// beside weak forces get no smaller; whether one is as small as it gets shows only when steps cease to shrink it.
+    /// Whether every row is below its tolerance or its possible rounding error. Rows of short, stiff elements beside
+    /// weak forces cannot become smaller; that the floor is reached shows only when steps cease to reduce the
+    /// residual.
     pub rounding: bool,
 }
 
 impl<const C: usize> Newton<C> {
-    /// How large the residual of the assembled system is.
+    /// The size of the residual of the assembled system.
     pub fn residual(
         &self,
         elements: &[ElementData],
@@ -35,7 +36,7 @@ impl<const C: usize> Newton<C> {
         let mut moment = self.assembly.scale[1].max(outside.moment_nmm);
         moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
         if Layout::<C>::ANGLES > 0 {
-            // Instruments that hold each other may exert nothing on the rest of the world.
+            // Coaxial instruments may balance large moments among themselves without any external force.
             moment = elements.iter().map(ElementData::mutual_moment).fold(moment, f64::max);
         }
         let mut relative = 0.0f64;
@@ -50,11 +51,11 @@ impl<const C: usize> Newton<C> {
             let stiff = (a.bending[2] * before).max(b.bending[0] * after);
             before = after;
             let moments = moment + force * h;
-            // Angles round as tangents do.
+            // Angles round like tangents.
             let twisted = (0..Layout::<C>::ANGLES)
                 .map(|set| a.materials[set].torsion[2].max(b.materials[set].torsion[0]));
             let spun = twisted.fold(0.0, f64::max) / (h * h);
-            // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
+            // Rounding of unit vectors causes a force 12 EI/h² δ and a moment 6 EI/h δ.
             let floor = 100.0 * f64::EPSILON * stiff + outside.rounding_n;
             let mut rows = |value: f64, scale: f64, floor: f64| {
                 small &= value <= tolerance * scale;
@@ -86,7 +87,7 @@ impl<const C: usize> Newton<C> {
     }
 }
 
-/// The larger of two numbers that are not negative, or NaN where one is.
+/// The larger of two non-negative numbers, or NaN if one is NaN.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }

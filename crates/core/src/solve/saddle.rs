@@ -1,4 +1,5 @@
-//! The way out of an equilibrium that is no minimum: along its most negative curvature, as far as the energy falls.
+//! Descent from an equilibrium that is not a minimum, along its most negative curvature as long as the energy
+//! decreases.
 
 use super::external::External;
 use super::newton::{ENERGY_ROUNDING, Newton};
@@ -17,7 +18,7 @@ impl<const C: usize> Newton<C> {
         let n = elements.len();
         let first = l.support(n);
         self.step.fill(0.0);
-        // A start that is orthogonal to no mode: both directions across, no symmetry along the rod.
+        // The initial vector must not be orthogonal to any mode: both directions across, no symmetry along the rod.
         for i in 0..=n {
             let s = (i as f64 + 0.37) / (n as f64 + 1.0);
             let frame = &state.frames[i];
@@ -52,7 +53,7 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// Moves along the negative curvature in `self.step`, as far as the energy falls.
+    /// Moves along the negative curvature in `self.step` as long as the energy decreases.
     pub(super) fn leave(
         &mut self,
         elements: &[ElementData],
@@ -74,7 +75,8 @@ impl<const C: usize> Newton<C> {
                     self.correct(elements, supports, first);
                 }
                 let energy_change = self.energy(elements, external, state) - before;
-                // Reactions times gaps: what opening the supports would gain is no descent.
+                // Reactions times errors of the conditions: energy gained by violating the supports does not count as
+                // descent.
                 let opened: f64 = supports
                     .gaps(&self.trial)
                     .iter()

@@ -1,22 +1,24 @@
-//! Inertia and shift: a matrix that is not that of a minimum is made one by a uniform tension.
+//! Inertia and shift: a uniform tension is added to a matrix until it has the inertia of a minimum.
 //!
-//! A minimum has one negative pivot for each multiplier. With more, the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added until they are right
-//! (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a failed Cholesky factorisation).
+//! A minimum has one negative pivot per multiplier. If there are more, the stiffness of a uniform tension
+//! ([`Assembly::unit_shift`]) is added until the number is right (Nocedal and Wright, *Numerical Optimization*, 2nd
+//! ed., section 3.4, with the inertia in place of a failed Cholesky factorisation).
 
 use super::newton::{Newton, Problem};
 use super::report::StopReason;
 use crate::banded::{FactorError, Inertia};
 use crate::rod::{Assembly, ElementData, Supports};
 
-/// Part of EI/L² that is always added as a uniform tension.
+/// Regularisation that is always added: a uniform tension, as a fraction of EI/L².
 pub(super) const REGULARISATION: f64 = 1e-8;
-/// Least shift, over the one that is always on.
+/// Smallest shift, as a multiple of the regularisation.
 const LEAST_SHIFT: f64 = 1e5;
-/// A shift that does not do grows by this factor.
+/// Factor by which an insufficient shift grows.
 pub(super) const SHIFT_GROWTH: f64 = 4.0;
-/// One is looked for from this part of the last on, which it falls to in an iteration that needs none.
+/// The search for a shift starts at this fraction of the last one, to which that also decays in an iteration without
+/// shift.
 pub(super) const SHIFT_DECAY: f64 = 1.0 / 8.0;
-/// Shifts tried before a matrix is called singular.
+/// Number of shifts tried before a matrix is reported as singular.
 pub(super) const SHIFTS: usize = 60;
 
 impl<const C: usize> Newton<C> {
@@ -26,19 +28,19 @@ impl<const C: usize> Newton<C> {
         self.factor.factor_shifted(&self.assembly, &self.unit_shift, sigma).ok()
     }
 
-    /// Factors the assembled matrix with the shift that is always on, for [`Self::apply_inverse`].
+    /// Factors the assembled matrix with the regularisation, for [`Self::apply_inverse`].
     pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
         self.inertia(elements, supports, Self::regularisation(elements))
     }
 
-    /// Replaces a right-hand side by the step that answers it, with the matrix factored last.
+    /// Replaces a right-hand side by the solution with the matrix factored last.
     pub fn apply_inverse(&self, elements: &[ElementData], b: &mut [f64]) {
         self.factor.solve(b);
         Self::restore_tensions(elements, b);
     }
 
-    /// Newton's step from the assembled state, with the shift that is always on, and the inertia of its matrix; `None` where that
-    /// cannot be factored.
+    /// Newton's step from the assembled state with the regularisation, and the inertia of its matrix; `None` where
+    /// that cannot be factored.
     pub(crate) fn full_step(
         &mut self,
         elements: &[ElementData],
@@ -51,7 +53,7 @@ impl<const C: usize> Newton<C> {
         Some((inertia, &self.step))
     }
 
-    /// Sets the step to the right-hand side it answers.
+    /// Sets `step` to the right-hand side of Newton's step.
     pub(super) fn right_hand_side(&mut self) {
         let (residual, correction) = (&self.assembly.residual, &self.assembly.correction);
         for (s, (r, c)) in self.step.iter_mut().zip(residual.iter().zip(correction)) {
@@ -59,18 +61,18 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// The shift that is always on.
+    /// The regularisation: the shift that is always added.
     pub(crate) fn regularisation(elements: &[ElementData]) -> f64 {
         let rods = || elements.iter().filter(|data| !data.is_break());
         let length: f64 = rods().map(|e| e.length).sum();
-        // EI averaged as springs in series: the stiffness the whole rod shows.
+        // EI averaged like springs in series: the effective stiffness of the whole rod.
         let soft: f64 = rods().map(|e| e.length / e.bending[1]).sum();
         REGULARISATION / (length * soft)
     }
 
-    /// Factors the matrix and solves for the step under the regularisation. Where its inertia is not that of a minimum, if one is looked for, a
-    /// shift is added and grows ([`Self::first_shift`]). Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
-    /// if it could be factored.
+    /// Factors the matrix and solves for the step with the regularisation. If a minimum is sought and the inertia is
+    /// not that of one, a growing shift is added ([`Self::first_shift`]). Returns the shift, 0 if none was added, and
+    /// the inertia of the unshifted matrix if it could be factored.
     pub(super) fn factor_shifted(
         &mut self,
         problem: &Problem<'_>,
@@ -99,12 +101,12 @@ impl<const C: usize> Newton<C> {
         Err(StopReason::Singular)
     }
 
-    /// The shift that is tried first where one is wanted.
+    /// The first shift to try.
     pub(super) fn first_shift(&self, elements: &[ElementData]) -> f64 {
         (LEAST_SHIFT * Self::regularisation(elements)).max(SHIFT_DECAY * self.last_shift)
     }
 
-    /// Factors the assembled matrix with a shift, and sets the step that it answers.
+    /// Factors the assembled matrix with a shift, and solves for the step.
     pub(super) fn factor_step(&mut self, sigma: f64) -> Result<Inertia, FactorError> {
         self.solves += 1;
         self.right_hand_side();

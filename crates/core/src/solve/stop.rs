@@ -1,36 +1,37 @@
-//! When the iteration has arrived, and when the residual alone says so.
+//! Stopping criterion, and when the residual is assembled without the matrix.
 //!
-//! A state is an equilibrium when its residual is within the tolerance, or is what rounding leaves of it and no longer shrinks
-//! ([`ResidualSize`]).
+//! A state is an equilibrium when its residual is within the tolerance, or at the level of rounding and no longer
+//! decreasing ([`ResidualSize`]).
 
 use super::newton::ENERGY_ROUNDING;
 use super::report::{StepRecord, StopReason};
 use super::residual::ResidualSize;
 
-/// A whole Newton step that turned no node by more than this, in radians, ends so near to the equilibrium that the residual alone is
-/// looked at, …
+/// After a full Newton step with a largest rotation below this, rad, only the residual is assembled, as the
+/// equilibrium is near.
 pub(super) const SHORT: f64 = 1e-5;
-/// … or turned them so little that a method that converges quadratically is within the tolerance: by no more than `NEAR`, and the
-/// square of the turn times `QUADRATIC` is no more than the tolerance, …
+/// The same holds below this rotation, rad, if by quadratic convergence the state is within the tolerance: if
+/// `QUADRATIC` times the square of the rotation is at most the tolerance.
 const NEAR: f64 = 1e-3;
-/// … as it is
+/// Assumed constant of quadratic convergence, 1/rad.
 const QUADRATIC: f64 = 10.0;
-/// … and another step with the same factors leaves a residual smaller by the last turn times no more than this.
+/// Another step with the same factors is assumed to leave a residual smaller by this times the last rotation, 1/rad.
 const CHORD: f64 = 10.0;
-/// States at rounding that did not halve their residual after which it is as small as it gets, though steps still turn nodes by more than
-/// the tolerance.
+/// Number of consecutive states at rounding without halving the residual after which it counts as minimal, even
+/// though steps still turn nodes by more than the tolerance.
 const HIDDEN: usize = 3;
-/// A residual that is as small as this, relative, and shrinks no more, is rounding.
+/// A relative residual below this that no longer decreases is rounding.
 const ROUNDED: f64 = 1e-6;
 
-/// How far the iteration has come since it began, or since it left a saddle.
+/// Progress of the iteration since it began, or since it left a saddle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Progress {
-    /// Least relative residual.
+    /// Smallest relative residual.
     best: f64,
-    /// States in a row that did not halve it.
+    /// Number of consecutive states that did not halve it.
     stalled: usize,
-    /// Turn of the last step, rad, if it was a whole one of Newton's; infinite otherwise. Axial forces count as turns.
+    /// Rotation of the last step, rad, if it was a full Newton step; otherwise infinite. Changes of axial force count
+    /// as rotations.
     last_turn: f64,
 }
 
@@ -41,7 +42,7 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// Takes note of a step.
+    /// Records a step.
     pub(super) fn has_turned(&mut self, turn: f64) {
         self.last_turn = turn;
     }
@@ -51,17 +52,17 @@ impl Progress {
         !residual_alone(self.last_turn, tolerance)
     }
 
-    /// Whether another step with the factors of an earlier state leads to the tolerance. Where steps no longer shrink a residual, it
-    /// takes the matrix of the state itself to say so: with factors from before a contact opened or closed, steps may lead to and fro
-    /// for ever.
+    /// Whether another step with the factors of an earlier state will reach the tolerance. If steps no longer reduce
+    /// the residual, the matrix of the state itself is needed: with factors from before a contact opened or closed,
+    /// steps may alternate for ever.
     pub(super) fn shrinks_enough(&self, size: &ResidualSize, tolerance: f64) -> bool {
         size.relative < 0.5 * self.best && CHORD * self.last_turn * size.relative <= tolerance
     }
 
-    /// Takes note of the residual of a state; returns whether it is an equilibrium.
+    /// Records the residual of a state; returns whether it is an equilibrium.
     ///
-    /// Rounding hides in the stiffest rows what is left in others. Where steps with factors of an earlier state cease to shrink it, the
-    /// last of them says how far the state still is.
+    /// Rounding in the stiffest rows hides errors in the others. If steps with factors of an earlier state cease to
+    /// reduce the residual, the length of the last step shows the remaining distance.
     pub(super) fn has_arrived(&mut self, size: &ResidualSize, tolerance: f64, steps: &[StepRecord]) -> bool {
         self.stalled = if size.relative < 0.5 * self.best { 0 } else { self.stalled + 1 };
         self.best = self.best.min(size.relative);
@@ -72,21 +73,20 @@ impl Progress {
             || (self.stalled >= 3 && tiny_steps && size.relative < ROUNDED)
     }
 
-    /// Whether the least residual is rounding, if no step leads on.
+    /// Whether the smallest residual is at the level of rounding, if no step lowers the merit.
     pub(super) fn is_at_rounding(&self) -> bool {
         self.best < ROUNDED
     }
 }
 
 impl ResidualSize {
-    /// Why the iteration stops at a state that it has arrived at.
+    /// The reason for stopping at an equilibrium.
     pub(super) fn reason(&self) -> StopReason {
         if self.small { StopReason::Converged } else { StopReason::RoundingFloor }
     }
 }
 
-/// Whether a whole step of Newton's method that turned nodes by no more than `last_turn` ends so near to the equilibrium that the
-/// residual alone is looked at.
+/// Whether, after a full Newton step that turned nodes by at most `last_turn`, only the residual is assembled.
 fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
     last_turn <= SHORT || (last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= tolerance)
 }
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn what_rounding_hides_shows_in_the_last_turn() {
         let size = |relative: f64| ResidualSize { relative, small: false, rounding: true };
-        // States at rounding that are looked at until one has arrived, each after a step that turned nodes by so much.
+        // Number of states at rounding before the iteration stops, each after a step with this rotation.
         let looks = |turn: f64| {
             let mut progress = Progress::default();
             assert!(!progress.has_arrived(&size(2e-8), TOLERANCE, &[]));

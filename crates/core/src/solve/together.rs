@@ -1,13 +1,13 @@
-//! Several energies outside the rod as one.
+//! Several external energies combined into one.
 
 use super::external::{ContactMerit, Contacts, External, Moved, Sizes};
 use crate::rod::{ElementData, RodState, Stencils};
 
-/// Energies outside the rod that act together: loads, a wall, and what the rod does to itself.
+/// External energies that act together: loads, a wall, and self-contact of the rod.
 pub struct Together<'a>(pub Vec<&'a mut dyn External>);
 
 impl Together<'_> {
-    /// The contacts of all that have some.
+    /// The contacts of all energies that have some.
     fn each(&mut self) -> impl Iterator<Item = &mut dyn Contacts> {
         self.0.iter_mut().filter_map(|part| part.contacts())
     }
@@ -87,7 +87,7 @@ impl Contacts for Together<'_> {
     }
 
     fn settled(&mut self, tolerance: f64) -> bool {
-        // Each is asked, as what is not settled lets go.
+        // Every part must be called, since the call also releases contacts that pull.
         self.each().filter_map(|part| (!part.settled(tolerance)).then_some(())).count() == 0
     }
 }

@@ -1,14 +1,14 @@
-//! The trial state of a line search: its axial forces, its energy, and its way back to the end conditions.
+//! The trial state of a line search: its axial forces, its energy, and its correction to the end conditions.
 
 use super::external::External;
 use super::newton::Newton;
 use crate::rod::{ElementData, Layout, RodState, Supports, stored_energy};
 
-/// A correction that turns a node by more than this, rad, is none.
+/// Largest rotation of a node in a correction, rad; larger corrections are rejected.
 const LARGEST_CORRECTION: f64 = 0.3;
 
 impl<const C: usize> Newton<C> {
-    /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
+    /// Undoes the substitution of the multiplier in [`crate::rod::assembly`]: dN = m/(1 − γD).
     pub(crate) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
         for (e, data) in elements.iter().enumerate() {
             if data.flexibility > 0.0 {
@@ -17,7 +17,7 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// Potential energy of the trial state, less the work done on the way from `state`.
+    /// Potential energy of the trial state, minus the work done between `state` and it.
     pub(super) fn energy(
         &self,
         elements: &[ElementData],
@@ -28,7 +28,7 @@ impl<const C: usize> Newton<C> {
         energy - external.work(state, &self.trial)
     }
 
-    /// Second-order corrections of the end conditions with the factorisation at hand.
+    /// Second-order corrections of the end conditions with the current factorisation.
     pub(super) fn correct(&mut self, elements: &[ElementData], supports: &Supports, first: usize) {
         let mut last = f64::INFINITY;
         for _ in 0..4 {

@@ -1,4 +1,4 @@
-//! Stiffness that is not symmetric: loads that follow the rod, as rank-one terms beside the band.
+//! Unsymmetric stiffness of follower loads, as rank-one terms beside the band.
 
 use super::newton::Newton;
 
@@ -6,7 +6,7 @@ use super::newton::Newton;
 const MAX_RANK: usize = 24;
 
 impl<const C: usize> Newton<C> {
-    /// Woodbury's formula for the unsymmetric rank-one terms: Newton's step stays exact. Returns the sign of
+    /// Woodbury's formula for the unsymmetric rank-one terms, which keeps Newton's step exact. Returns the sign of
     /// det(I + QᵀS⁻¹P), the ratio of the determinants with and without them.
     pub(super) fn unsymmetric(&mut self) -> f64 {
         let rank = self.assembly.rank_ones.len().min(MAX_RANK);
@@ -35,7 +35,7 @@ impl<const C: usize> Newton<C> {
             }
             small[i][MAX_RANK] = along(&self.step, i);
         }
-        // Gauss with partial pivoting.
+        // Gaussian elimination with partial pivoting.
         for k in 0..rank {
             let mut p = k;
             for i in k + 1..rank {

@@ -12,21 +12,21 @@ use std::path::Path;
 pub struct StaticCase {
     /// The rod.
     pub rod: Rod,
-    /// What holds its start.
+    /// Support of its start.
     pub start: Start,
-    /// What holds its end; free where absent.
+    /// Support of its end; free if absent.
     #[serde(default)]
     pub end: End,
     /// Loads, any number.
     #[serde(default)]
     pub load: Vec<Load>,
-    /// The rod's surface, where its loops touch each other; where absent they pass through each other.
+    /// The rod's surface, for contact between its loops; if absent, they pass through each other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub self_contact: Option<Surface>,
-    /// Where the search starts; the unloaded shape, or a shape that meets the end, where absent.
+    /// The initial shape of the solution; if absent, the unloaded shape, or one that meets the end conditions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial: Option<Initial>,
-    /// How to solve.
+    /// Options of the solver.
     #[serde(default)]
     pub solver: Solver,
 }
@@ -35,37 +35,39 @@ pub struct StaticCase {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rod {
-    /// Length; absent where there are instruments, which have theirs.
+    /// Length; absent if there are instruments, which have their own.
     #[serde(default)]
     pub length: f64,
-    /// Number of elements, 1 to 200,000; they are spread so that sections, instruments and point loads begin and end at nodes, so a
-    /// rod with more of those than elements gets one element for each.
+    /// Number of elements, 1 to 200,000. Sections, instruments and point loads begin and end at nodes; if these need
+    /// more elements, there is one for each piece between them.
     pub elements: usize,
-    /// Sections in order from the start; none where there are instruments.
+    /// Sections in order from the start; none if there are instruments.
     #[serde(default)]
     pub section: Vec<Section>,
-    /// Instruments that share one centre line, each in or on the others, in any order; none for a single rod.
+    /// Coaxial instruments that share one centre line, in any order; none for a single rod.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instrument: Vec<Instrument>,
 }
 
-/// One of several instruments on one centre line: inextensible, it slides and turns in the others without friction, and comes out of a
-/// straight sheath whose mouth is the start.
+/// One of several coaxial instruments: inextensible, it slides and turns in the others without friction, and comes
+/// out of a straight sheath whose mouth is the start.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Instrument {
-    /// What results call it.
+    /// Its name in results.
     pub name: String,
     /// Length beyond the start.
     pub inserted: f64,
     /// Angle in radians by which the hand has turned its d₁ about the tangent, against the start's.
     #[serde(default)]
     pub hand: f64,
-    /// Sections in order from its tip, `until` counted from there; the last one ends no nearer than `inserted`.
+    /// Sections in order from its tip, with `until` measured from the tip; the last one ends no nearer than
+    /// `inserted`.
     pub section: Vec<Section>,
 }
 
-/// A stretch of the rod, or of an instrument. Values with an `_end` vary linearly from the section's begin to its end.
+/// A section of the rod, or of an instrument. Values with an `_end` vary linearly from the start to the end of the
+/// section.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Section {
@@ -77,10 +79,10 @@ pub struct Section {
     /// Bending stiffness at the section's end, if it tapers.
     #[serde(rename = "EI_end", default, skip_serializing_if = "Option::is_none")]
     pub ei_end: Option<f64>,
-    /// Torsion stiffness; may be absent where nothing twists.
+    /// Torsional stiffness; may be absent if nothing twists.
     #[serde(rename = "GJ", default, skip_serializing_if = "Option::is_none")]
     pub gj: Option<f64>,
-    /// Torsion stiffness at the section's end.
+    /// Torsional stiffness at the section's end.
     #[serde(rename = "GJ_end", default, skip_serializing_if = "Option::is_none")]
     pub gj_end: Option<f64>,
     /// Axial stiffness; absent = inextensible.
@@ -95,7 +97,7 @@ pub struct Section {
     /// Rest curvature at the section's end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest_curvature_end: Option<[f64; 2]>,
-    /// Twist of the rest state per length (a rod that was twisted when made).
+    /// Twist per length of the rest state (a rod that was manufactured twisted).
     #[serde(default)]
     pub rest_twist: f64,
 }
@@ -120,11 +122,11 @@ pub struct Start {
     /// Position.
     #[serde(default)]
     pub position: [f64; 3],
-    /// Tangent (any length); along x where absent. For a pinned start: of the shape the search starts from.
+    /// Tangent (any length); along x if absent. For a pinned start: that of the initial shape.
     #[serde(default = "x_axis")]
     pub tangent: [f64; 3],
-    /// Direction d₁, made orthogonal to the tangent; where absent, the axis farthest from the tangent, y for a tangent along
-    /// x.
+    /// Direction d₁, made orthogonal to the tangent; if absent, the axis farthest from the tangent, y for a tangent
+    /// along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
 }
@@ -140,11 +142,12 @@ pub enum EndKind {
     /// Nothing is held.
     #[default]
     Free,
-    /// Tangent and rotation are held, and the position where given.
+    /// Tangent and rotation are held, and the position if given.
     Clamped,
     /// The position is held; a ball joint.
     Pinned,
-    /// Tangent and rotation are held, the position is free in all directions: a block that moves without turning.
+    /// Tangent and rotation are held, the position is free in all directions: a block that translates without
+    /// rotating.
     Guided,
 }
 
@@ -161,10 +164,10 @@ pub struct End {
     /// Direction along which the held position may slide.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slide: Option<[f64; 3]>,
-    /// Tangent (clamped, guided); the start's where absent.
+    /// Tangent (clamped, guided); that of the start if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tangent: Option<[f64; 3]>,
-    /// Direction d₁ (clamped, guided); the start's where absent.
+    /// Direction d₁ (clamped, guided); that of the start if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
     /// Further rotation about the tangent in radians, any number of turns.
@@ -192,10 +195,10 @@ pub enum LoadKind {
 pub struct Load {
     /// Kind.
     pub kind: LoadKind,
-    /// Arc length of the point; the end of the rod where absent. Not for distributed loads.
+    /// Arc length of the point; the end of the rod if absent. Not for distributed loads.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<f64>,
-    /// Begin of a distributed load.
+    /// Start of a distributed load.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<f64>,
     /// End of a distributed load.
@@ -205,14 +208,15 @@ pub struct Load {
     pub value: [f64; 3],
 }
 
-/// A shape to start the search from: constant curvature, or a curve.
+/// An initial shape of the solution: constant curvature, or a curve.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
     /// Curvature along the start's d₁ and d₂; zero = straight.
     #[serde(default)]
     pub curvature: [f64; 2],
-    /// Points of a curve, the first of which is the start: the rod takes the directions of the curve, at the same parts of its length.
+    /// Points of a curve that begins at the start: the rod takes the directions of the curve at equal fractions of
+    /// length.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<[f64; 3]>,
 }
@@ -223,20 +227,20 @@ pub struct Initial {
 pub struct Surface {
     /// Radius of the rod.
     pub radius: f64,
-    /// Force per length per depth by which two pieces press each other; 10 EI/radius⁴, which is rigid for a rod, where absent.
+    /// Penalty stiffness, force per length and depth; if absent, 10 EI/radius⁴, which is rigid compared with the rod.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub modulus: Option<f64>,
 }
 
-/// How to solve.
+/// Options of the solver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// Newton iterations allowed (in each load step), 1 to 100,000.
+    /// Largest number of Newton iterations per load step, 1 to 100,000.
     pub max_iterations: usize,
-    /// Number of equal load steps, 1 to a million; with the elements no more than ten million in all.
+    /// Number of equal load steps, 1 to a million; at most ten million load steps times elements.
     pub load_steps: usize,
-    /// Largest force or moment out of balance at any node, as a part of the largest in the rod; 1e-14 to 1e-2.
+    /// Largest unbalanced force or moment at a node, relative to the largest in the rod; 1e-14 to 1e-2.
     pub tolerance: f64,
 }
 
@@ -255,10 +259,10 @@ impl Rod {
 }
 
 impl StaticCase {
-    /// Reads a case from TOML text and checks it; `name` is what errors call it.
+    /// Reads a case from TOML text and checks it; `name` is its name in errors.
     ///
     /// # Errors
-    /// Names file, line and key of what does not fit, or key and value of what cannot be.
+    /// Names file, line and key of a value of the wrong form, or key and value of an impossible one.
     pub fn from_toml(text: &str, name: &Path) -> Result<Self> {
         input::parse_toml::<Self>(text, name)?.checked(name)
     }
@@ -266,7 +270,7 @@ impl StaticCase {
     /// Reads a case from a file and checks it.
     ///
     /// # Errors
-    /// As [`Self::from_toml`], and a file that cannot be read.
+    /// As [`Self::from_toml`], and if the file cannot be read.
     pub fn from_file(path: &Path) -> Result<Self> {
         let (case, _) = input::from_toml::<Self>(path)?;
         case.checked(path)
@@ -277,11 +281,11 @@ impl StaticCase {
         Ok(self)
     }
 
-    /// Solves the case. A case that is wrong is an error; one whose solution is not found is a solution with
-    /// `converged = false` and the reason.
+    /// Solves the case. An invalid case is an error; a solution that does not converge is returned with `converged =
+    /// false` and the reason.
     ///
     /// # Errors
-    /// Values that contradict each other, or a rod that twists and has no torsion stiffness.
+    /// Values that contradict each other, or a rod that twists without a torsional stiffness.
     pub fn solve(&self) -> Result<StaticSolution> {
         StaticProblem::new(self)?.solve()
     }

@@ -1,7 +1,7 @@
 //! Paths of equilibria past limit points: arc-length continuation in the load factor.
 //!
-//! Riks' method (1979) with the plane normal to the predictor: the step along the path is measured by the rotation of the
-//! rod, √∫|δt|² ds/L, so it is the same whatever the units, and the load factor is whatever the shape needs.
+//! Riks' method (1979) with the plane normal to the predictor: the step along the path is measured by the rotation of
+//! the rod, √∫|δt|² ds/L, so it does not depend on units, and the load factor follows from the shape.
 
 use super::problem::StaticProblem;
 use crate::rod::{ElementData, Layout, RodState};
@@ -15,17 +15,17 @@ pub struct PathPoint {
     pub factor: f64,
     /// Position of the end.
     pub tip: [f64; 3],
-    /// Stored energy.
+    /// Elastic energy.
     pub energy: f64,
-    /// Dimension of the unstable space.
+    /// Dimension of the unstable subspace.
     pub negative_modes: usize,
     /// Relative residual.
     pub residual: f64,
 }
 
-/// Corrections tried before a step is halved.
+/// Largest number of corrector iterations before a step is halved.
 const CORRECTIONS: usize = 12;
-/// Halvings of one step before the path is given up.
+/// Largest number of halvings of one step before the path is abandoned.
 const HALVINGS: usize = 12;
 
 impl StaticProblem {
@@ -137,8 +137,8 @@ impl StaticProblem {
         Ok(out)
     }
 
-    /// The step that answers a unit of load factor: K⁻¹ of the difference of two residuals, which is exact since they are
-    /// linear in the factor.
+    /// The derivative of the shape in the load factor: K⁻¹ times the difference of two residuals, which is exact
+    /// because they are linear in the factor.
     fn load_response<const C: usize>(
         &self,
         newton: &mut Newton<C>,

@@ -1,11 +1,11 @@
-//! Critical loads: where the stiffness on a path of equilibria ceases to be positive.
+//! Critical loads: where the stiffness on a path of equilibria ceases to be positive definite.
 
 use super::problem::StaticProblem;
 use crate::rod::{RodState, Supports};
 use crate::solve::{Newton, NewtonOptions};
 use crate::{Error, Result, Vec3};
 
-/// What grows along the path.
+/// The parameter of the path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameter {
     /// The factor of all loads.
@@ -14,7 +14,7 @@ pub enum Parameter {
     Turns,
 }
 
-/// Follows the equilibria of one problem over a parameter, without leaving them where they become unstable.
+/// Follows the equilibria of one problem over a parameter, including unstable ones.
 #[derive(Debug, Clone)]
 struct Path<const C: usize> {
     problem: StaticProblem,
@@ -48,7 +48,7 @@ impl<const C: usize> Path<C> {
                     let change = value - end.turns;
                     end.turns = value;
                     end.target += change;
-                    // An even share for every node: the path starts twisted, not with all twist in the last element.
+                    // Distribute the twist over all nodes: otherwise it would all start in the last element.
                     let n = problem.elements.len();
                     let length: f64 = problem.elements.iter().map(|e| e.length).sum();
                     let mut s = 0.0;
@@ -78,8 +78,8 @@ impl<const C: usize> Path<C> {
 }
 
 impl StaticProblem {
-    /// The lowest parameter between `from` and `to` at which an eigenvalue of the stiffness changes sign, by bisection on the
-    /// inertia, to the relative `tolerance`. For problems whose loads have a potential.
+    /// The lowest parameter between `from` and `to` at which an eigenvalue of the stiffness changes sign, by
+    /// bisection on the inertia, to the relative `tolerance`. Only for loads with a potential.
     pub fn critical(&self, parameter: Parameter, from: f64, to: f64, tolerance: f64) -> Result<f64> {
         by_angles!(self.angles, self.bisect(parameter, from, to, tolerance))
     }
@@ -118,9 +118,10 @@ impl StaticProblem {
         Ok(0.5 * (low + high))
     }
 
-    /// The parameter at which the response to a small `probe` (force per length) grows without bound: for loads without
-    /// potential, whose stiffness is not symmetric, this is what "critical" means. The reciprocal of the deflection goes to
-    /// zero linearly there; the zero is found by the secant method from the two values given, both below it.
+    /// The parameter at which the response to a small `probe` (force per length) becomes infinite: the definition of
+    /// "critical" for loads without potential, whose stiffness is not symmetric. There the reciprocal of the
+    /// deflection goes to zero linearly; the zero is found by the secant method from the two values given, both below
+    /// it.
     pub fn critical_by_softening(
         &self,
         parameter: Parameter,
@@ -158,7 +159,7 @@ impl StaticProblem {
             if (c - b).abs() <= tolerance * c.abs() {
                 return Ok(c);
             }
-            // Stop short of the zero: the response stays small there.
+            // Stop short of the zero, where the response is still small.
             let next = b + 0.9 * (c - b);
             (a, fa) = (b, fb);
             b = next;

@@ -1,11 +1,11 @@
-//! Shapes to start the search from.
+//! Initial shapes of the solution.
 
 use crate::Vec3;
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Frame, RodState, Supports};
 use std::f64::consts::PI;
 
-/// The rest state, laid out from the start.
+/// The rest shape, laid out from the start.
 pub(super) fn rest_shape(elements: &[ElementData], start: Vec3, frame: Frame) -> RodState {
     let mut frames = vec![frame];
     let mut material = frame;
@@ -41,7 +41,7 @@ pub(super) fn arc(elements: &[ElementData], start: Vec3, frame: Frame, curvature
     RodState::from_frames(elements, start, frames)
 }
 
-/// Directions of the curve through points, at the same parts of its length.
+/// A shape with the directions of the curve through points, at equal fractions of its length.
 pub(super) fn along(elements: &[ElementData], start: Vec3, frame: Frame, points: &[[f64; 3]]) -> RodState {
     let points: Vec<Vec3> = points.iter().map(|p| Vec3::from(*p)).collect();
     let arcs: Vec<f64> = std::iter::once(0.0)
@@ -52,7 +52,7 @@ pub(super) fn along(elements: &[ElementData], start: Vec3, frame: Frame, points:
         .collect();
     let total: f64 = elements.iter().map(|e| e.length).sum();
     let stretch = arcs[arcs.len() - 1] / total;
-    // Chords have the direction of the curve in their middle.
+    // Chords have the direction of the curve at their middle.
     let middle = |k: usize| 0.5 * (arcs[k] + arcs[k + 1]);
     let last = points.len() - 2;
     let direction = |s: f64| {
@@ -73,8 +73,8 @@ pub(super) fn along(elements: &[ElementData], start: Vec3, frame: Frame, points:
     RodState::from_frames(elements, start, frames)
 }
 
-/// A shape near one that meets the end: the rest shape or an arc, whichever comes closest, bowed where it is too straight for
-/// its span.
+/// A shape that roughly meets the end conditions: the rest shape or an arc, whichever ends closer, bowed if it is too
+/// straight for its span.
 pub(super) fn towards_end(
     elements: &[ElementData],
     start: Vec3,
@@ -82,7 +82,7 @@ pub(super) fn towards_end(
     supports: &Supports,
 ) -> RodState {
     let length: f64 = elements.iter().map(|e| e.length).sum();
-    // A pinned start may point at the end first.
+    // A pinned start may first be directed at the end.
     let aim = supports.end_position - start;
     let frame = if !supports.start_tangent && supports.end_directions.len() == 3 && aim.norm() > 1e-9 * length
     {
@@ -104,7 +104,7 @@ pub(super) fn towards_end(
             let (sin, cos) = libm::sincos(f64::from(way) * PI / 4.0);
             let trial = arc(elements, start, frame, [k * cos, k * sin]);
             let found = score(&trial);
-            // Only what is clearly better: symmetric choices must not depend on rounding.
+            // Only clear improvements count: the choice between symmetric shapes must not depend on rounding.
             if found < least - 1e-6 {
                 (best, least) = (trial, found);
             }

@@ -1,4 +1,4 @@
-//! Loads: dead forces, moments and weight, and forces that follow the rod.
+//! Loads: dead forces, moments and weight, and follower forces.
 
 use crate::Vec3;
 use crate::rod::{ElementData, Frame, RodState, Stencils, Triple};
@@ -14,11 +14,11 @@ pub struct Loads {
     pub moments: Vec<(usize, Vec3)>,
     /// Dead forces per length (first element, one past the last, force per length).
     pub distributed: Vec<(usize, usize, Vec3)>,
-    /// Forces that follow the rod (node, components along t, d₁, d₂).
+    /// Follower forces (node, components along t, d₁, d₂).
     pub followers: Vec<(usize, Vec3)>,
-    /// Dead forces that `factor` leaves alone.
+    /// Dead forces that are not multiplied by `factor`.
     pub constant: Vec<(usize, Vec3)>,
-    /// All other loads are multiplied by this.
+    /// Factor of all other loads.
     pub factor: f64,
 }
 
@@ -106,7 +106,8 @@ impl External for Loads {
     fn work(&self, from: &RodState, to: &RodState) -> f64 {
         let mut sum = 0.0;
         for (i, m) in &self.moments {
-            // The tangent goes along a geodesic, the angle linearly with it: spin t × δ at constant rate, and θ′ t.
+            // The tangent moves along a geodesic and the angle linearly with it: spin t × δ at constant rate, and θ′
+            // t.
             let frame = &from.frames[*i];
             let (a, b) = frame.log(&to.frames[*i].t);
             sum += m.dot(&(frame.v * a - frame.u * b));
@@ -147,8 +148,8 @@ fn centroid(elements: &[ElementData], state: &RodState, e: usize) -> Vec3 {
         + (state.frames[e].t - state.frames[e + 1].t) * (h / 12.0)
 }
 
-/// A dead moment on node `i`: its virtual work is M·(t × δt + t δθ). The derivative of that is half symmetric and half not: a dead
-/// moment has no potential.
+/// A dead moment on node `i`: its virtual work is M·(t × δt + t δθ). The derivative is half symmetric and half skew:
+/// a dead moment has no potential.
 fn linearise_moment(i: usize, frame: &Frame, m: &Vec3, into: &mut dyn Stencils) {
     let (u, v, t) = (m.dot(&frame.u), m.dot(&frame.v), m.dot(&frame.t));
     let (a, b) = (-0.5 * u, -0.5 * v);

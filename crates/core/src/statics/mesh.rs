@@ -1,13 +1,13 @@
-//! Meshes of static problems: nodes where something begins or ends, and elements of sections.
+//! Meshes of static problems: nodes where sections, instruments or loads begin or end, and the elements' data.
 
 use super::case::{Rod, Section};
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material};
 
-/// GJ/EI assumed where GJ is absent and turns out not to matter (a round wire with ν = 0.3).
+/// GJ/EI assumed if GJ is absent, which is accepted only if the rod does not twist (a round wire with ν = 0.3).
 pub(super) const ASSUMED_GJ_RATIO: f64 = 1.0 / 1.3;
 
-/// Elements between each break and the next, `elements` of them if that is enough, as even as can be.
+/// Number of elements between consecutive breaks, `elements` in all if that is enough, as uniform as possible.
 pub(super) fn spread(breaks: &[f64], elements: usize) -> Vec<usize> {
     let length = breaks[breaks.len() - 1];
     let mut counts: Vec<usize> = breaks
@@ -30,7 +30,7 @@ pub(super) fn spread(breaks: &[f64], elements: usize) -> Vec<usize> {
     counts
 }
 
-/// Arc lengths of nodes, so many between each break and the next.
+/// Arc lengths of nodes, given the number of elements between consecutive breaks.
 pub(super) fn nodes(breaks: &[f64], counts: &[usize]) -> Vec<f64> {
     let mut nodes = vec![0.0];
     for (w, count) in breaks.windows(2).zip(counts) {
@@ -41,7 +41,7 @@ pub(super) fn nodes(breaks: &[f64], counts: &[usize]) -> Vec<f64> {
     nodes
 }
 
-/// The section in which an arc length lies, and where it begins.
+/// The section at an arc length, and where it begins.
 pub(super) fn section_at(sections: &[Section], place: f64) -> (&Section, f64) {
     let k = sections.iter().position(|s| place < s.until).unwrap_or(sections.len() - 1);
     (&sections[k], if k == 0 { 0.0 } else { sections[k - 1].until })
@@ -80,7 +80,7 @@ pub(super) fn material(section: &Section, begin: f64, places: &[f64; 3]) -> Mate
     material
 }
 
-/// A value at a place of a section, from those at its begin and its end.
+/// Linear interpolation of a section's value at a position between its start and its end.
 fn mix(section: &Section, begin: f64, place: f64, a: f64, b: Option<f64>) -> f64 {
     let w = ((place - begin) / (section.until - begin)).clamp(0.0, 1.0);
     a + w * (b.unwrap_or(a) - a)

@@ -1,8 +1,8 @@
-//! General static problems of one rod, or of several instruments on one centre line: what `endowire rod CASE.toml` solves.
+//! General static problems of one rod, or of several coaxial instruments: what `endowire rod CASE.toml` solves.
 //!
-//! Units are the caller's: any consistent set, or none at all (a case may well say length 1 and EI 1).
+//! Any consistent units may be used, or none at all (a case may have length 1 and EI 1).
 
-/// Calls a method that is generic in the unknowns of two nodes for a rod with so many sets of angles.
+/// Calls a method that is generic in the number of unknowns of two nodes, given the number of sets of angles.
 macro_rules! by_angles {
     ($angles:expr, $this:ident.$method:ident($($argument:expr),*)) => {
         match $angles {

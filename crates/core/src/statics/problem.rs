@@ -14,7 +14,7 @@ use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 use crate::{Error, Result, Vec3};
 
-/// Twist energy above this part of the rest shows that GJ did matter.
+/// Twist energy, as a fraction of the other energy, above which GJ matters.
 const TWIST_MATTERS: f64 = 1e-9;
 
 /// A static problem, ready to solve.
@@ -22,17 +22,17 @@ const TWIST_MATTERS: f64 = 1e-9;
 pub struct StaticProblem {
     /// The mesh.
     pub elements: Vec<ElementData>,
-    /// What holds the ends.
+    /// Supports of the ends.
     pub supports: Supports,
     /// Loads.
     pub loads: Loads,
-    /// What loops of the rod do to each other, if they touch.
+    /// Contact between loops of the rod, if modelled.
     pub touching: Option<SelfContact>,
-    /// Shape the search starts from.
+    /// Initial shape.
     pub initial: RodState,
-    /// Sets of angles that are carried: none where nothing twists.
+    /// Number of sets of angles: none where nothing twists.
     pub angles: usize,
-    /// Settings of Newton's method.
+    /// Options of Newton's method.
     pub options: NewtonOptions,
     /// Number of load steps.
     pub load_steps: usize,
@@ -43,26 +43,26 @@ pub struct StaticProblem {
     stack: Option<Stack>,
 }
 
-/// Result of the solver before it is written out.
+/// Result of the solver, from which [`StaticSolution`] is made.
 #[derive(Debug, Clone)]
 pub struct Solved {
     /// Final state.
     pub state: RodState,
     /// Supports with their multipliers.
     pub supports: Supports,
-    /// Report of the last load step; iterations count all.
+    /// Report of the last load step; its iterations are those of all load steps.
     pub report: NewtonReport,
     /// Whether every accepted step of every load step lowered the energy.
     pub monotone: bool,
-    /// Stored energies.
+    /// Elastic energies.
     pub energy: Energies,
-    /// What the start exerts on the rod.
+    /// Reaction at the start.
     pub start: Reaction,
     /// As in [`StaticSolution::push_force`].
     pub push_force: Option<f64>,
-    /// Where the rod presses on itself.
+    /// Self-contacts of the rod.
     pub touching: Vec<Touching>,
-    /// Of each of several instruments, as in [`InstrumentSolution`]: push force and torque.
+    /// Push force and torque of each of several instruments, as in [`InstrumentSolution`].
     pub instruments: Vec<(Option<f64>, f64)>,
 }
 
@@ -148,7 +148,7 @@ impl StaticProblem {
         })
     }
 
-    /// Adds a constant force along the end's tangent that load factors leave alone.
+    /// Adds a constant force along the end's tangent that is not scaled by load factors.
     pub fn pulled_by(&mut self, tension: f64) {
         let n = self.elements.len();
         self.loads.constant.push((n, self.initial.frames[n].t * tension));
@@ -160,7 +160,7 @@ impl StaticProblem {
         Ok(self.solution(&solved))
     }
 
-    /// Solves from the initial shape and returns the state itself.
+    /// Solves from the initial shape and returns the state.
     pub fn solve_state(&self) -> Result<Solved> {
         self.solve_in(&[])
     }
@@ -183,9 +183,9 @@ impl StaticProblem {
         Ok(solved)
     }
 
-    /// How much one more Newton step would change the bend of a solved state: changes of the angle between the end tangents of
-    /// the elements, summed along the rod, in radians. It tells how far the state is from the equilibrium of its mesh, whatever
-    /// the scale of its residual, and is blind to turns of the whole rod that change nothing. For loads with a potential.
+    /// Change of bend by one more Newton step from a solved state: changes of the angle between the end tangents of
+    /// the elements, summed along the rod, rad. It measures the distance from the equilibrium of the mesh, whatever
+    /// the scale of the residual, and ignores neutral rotations of the whole rod. For loads with a potential.
     pub fn next_bend(&self, solved: &Solved) -> f64 {
         by_angles!(self.angles, self.bend_after(solved))
     }
@@ -224,7 +224,7 @@ impl StaticProblem {
         let mut state = self.initial.clone();
         let mut supports = self.supports.clone();
         if let (Some(end), true) = (supports.end_angle, supports.start_angle) {
-            // Spread the rotation: a straight rod is then twisted without one step.
+            // Distribute the rotation along the rod: a straight rod is then twisted without a single step.
             supports.begin(&state);
             let target = supports.end_angle.map_or(end.target, |e| e.target);
             let total: f64 = self.elements.iter().map(|e| e.length).sum();
@@ -287,7 +287,7 @@ impl StaticProblem {
         Solved { state, supports, report, monotone, energy, start, push_force, touching, instruments }
     }
 
-    /// Push force and torque of each of several instruments at an equilibrium among energies outside the rod, as in
+    /// Push force and torque of each of several instruments at an equilibrium with these external energies, as in
     /// [`InstrumentSolution`]; empty for a single rod.
     pub fn hands<const C: usize>(
         &self,
@@ -305,7 +305,7 @@ impl StaticProblem {
         sets.map(hand).collect()
     }
 
-    /// What each of several instruments does.
+    /// The solution of each of several instruments.
     fn instruments(&self, solved: &Solved) -> Vec<InstrumentSolution> {
         let Some(stack) = &self.stack else { return Vec::new() };
         let each = stack.instruments().zip(&solved.instruments).enumerate();
@@ -323,7 +323,7 @@ impl StaticProblem {
         told.collect()
     }
 
-    /// Writes a solved state out.
+    /// The solution of a solved state.
     pub fn solution(&self, solved: &Solved) -> StaticSolution {
         let state = &solved.state;
         let n = self.elements.len();
@@ -414,7 +414,7 @@ fn loads(case: &StaticCase, nodes: &[f64]) -> Loads {
     loads
 }
 
-/// What holds the ends of a case whose start has this triad.
+/// Supports of the ends of a case whose start has this triad.
 fn supports(case: &StaticCase, frame: &Frame, twisted: bool) -> Supports {
     let clamped = case.start.kind == StartKind::Clamped;
     let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };

@@ -1,4 +1,4 @@
-//! What a static problem returns.
+//! Results of a static problem.
 
 use crate::contact::Touching;
 use serde::Serialize;
@@ -12,20 +12,20 @@ pub struct Energies {
     pub twist: f64,
     /// Stretch.
     pub axial: f64,
-    /// The sum of the three.
+    /// Sum of the three.
     pub total: f64,
     /// Potential of dead forces, zero at the start of the rod.
     pub load: f64,
 }
 
-/// What a support exerts on the rod.
+/// Force and moment of a support on the rod.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Reaction {
     /// Force.
     pub force: [f64; 3],
     /// Moment about the support, including torque.
     pub moment: [f64; 3],
-    /// Its part along the tangent.
+    /// The component of the moment along the tangent.
     pub torque: f64,
 }
 
@@ -38,7 +38,7 @@ pub struct Reactions {
     pub end: Reaction,
 }
 
-/// What one of several instruments does and what its hand feels.
+/// Position and hand forces of one of several instruments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InstrumentSolution {
     /// Its name.
@@ -47,26 +47,26 @@ pub struct InstrumentSolution {
     pub inserted: f64,
     /// Position of its tip.
     pub tip: [f64; 3],
-    /// Angle of the tip's d₁ against that at the start, in radians, any number of turns: its twist.
+    /// Twist: angle of the tip's d₁ against that at the start, rad, any number of turns.
     pub twist: f64,
-    /// Force with which its hand pushes: the derivative of the energy of all instruments, loads and what lies in the sheath included, in
-    /// its inserted length, at fixed angles and other lengths. `None` where that jumps, as the energy has a kink: where its tip or the end
-    /// of one of its sections is at that of another, at the start or at a load.
+    /// Push force of its hand: the derivative of the total energy (instruments, loads, and what lies in the sheath)
+    /// in its inserted length, at fixed angles and other lengths. `None` where the energy has a kink: where its tip
+    /// or the end of one of its sections coincides with that of another, with the start or with a load.
     pub push_force: Option<f64>,
-    /// Torque with which its hand turns it: the derivative of the energy in its angle.
+    /// Torque of its hand: the derivative of the energy in its angle.
     pub torque: f64,
 }
 
-/// A place where the rod presses on itself.
+/// A self-contact of the rod.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TouchSolution {
     /// Arc lengths of the two points.
     pub arcs: [f64; 2],
-    /// Where they are.
+    /// Their positions.
     pub positions: [[f64; 3]; 2],
-    /// Force on the first, along the line from the second to it; the second feels the opposite.
+    /// Force on the first point, along the line from the second to it; the second has the opposite force.
     pub force: f64,
-    /// Depth to which the surfaces are in each other.
+    /// Penetration of the surfaces.
     pub penetration: f64,
 }
 
@@ -96,9 +96,9 @@ pub struct StaticSolution {
     pub nodes: Vec<[f64; 3]>,
     /// Tangents of the nodes.
     pub tangents: Vec<[f64; 3]>,
-    /// Material directions d₁ of the nodes; of a rod that carries no angles, the untwisted reference.
+    /// Material directions d₁ of the nodes; for a rod without angles, the untwisted reference.
     pub normals: Vec<[f64; 3]>,
-    /// Twist of the whole rod in radians, any number of turns; zero where the rod carries no angles, and with several instruments.
+    /// Twist of the whole rod, rad, any number of turns; zero for a rod without angles, and for several instruments.
     pub twist: f64,
     /// Axial force of the elements.
     pub tensions: Vec<f64>,
@@ -106,38 +106,38 @@ pub struct StaticSolution {
     pub energy: Energies,
     /// Reactions.
     pub reactions: Reactions,
-    /// Force with which the rod must be pushed to stay where it is, if the clamp at its start is a frictionless sleeve that it
-    /// slides through; `None` where the start is not clamped. See [`Clamp::push_force`](crate::rod::Clamp::push_force).
+    /// Force that holds the rod in place if the clamp at its start is a frictionless sleeve it can slide through;
+    /// `None` if the start is not clamped. See [`Clamp::push_force`](crate::rod::Clamp::push_force).
     pub push_force: Option<f64>,
-    /// Where the rod presses on itself, along it; left out where it does not.
+    /// Self-contacts, in order along the rod; omitted if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub touching: Vec<TouchSolution>,
-    /// Each instrument, in the order of the case; left out for a single rod.
+    /// Each instrument, in the order of the case; omitted for a single rod.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<InstrumentSolution>,
-    /// Newton iterations, all load steps together.
+    /// Newton iterations of all load steps.
     pub iterations: usize,
-    /// Largest residual over the force scale.
+    /// Largest residual, relative to the force scale.
     pub residual: f64,
     /// Positive and negative pivots of the final matrix.
     pub inertia: [usize; 2],
-    /// Negative pivots beyond those of the multipliers: dimension of the unstable space.
+    /// Negative pivots beyond one per multiplier: dimension of the unstable subspace.
     pub negative_modes: usize,
-    /// Whether the state is a minimum of the energy. With loads that have no potential (moments, followers) this speaks of
-    /// the symmetric part of the stiffness.
+    /// Whether the state is a minimum of the energy. With loads that have no potential (moments, followers) this
+    /// refers to the symmetric part of the stiffness.
     pub stable: bool,
     /// Whether the state is an equilibrium.
     pub converged: bool,
     /// Why the iteration stopped.
     pub stop: String,
-    /// Whether the rod carried angles.
+    /// Whether the rod had material angles.
     pub twisted: bool,
-    /// Whether the energy fell at every accepted step (to rounding); true where loads have no potential to fall.
+    /// Whether the energy decreased (to rounding) at every accepted step; true for loads without potential.
     pub monotone: bool,
 }
 
 impl StaticSolution {
-    /// Why this is no equilibrium; `None` where it is one.
+    /// Why the state is not an equilibrium; `None` if it is one.
     pub fn failure(&self) -> Option<String> {
         (!self.converged).then(|| {
             format!(
@@ -147,10 +147,10 @@ impl StaticSolution {
         })
     }
 
-    /// Itself if it is an equilibrium, an error that says why not otherwise.
+    /// Returns itself if it is an equilibrium, otherwise an error with the reason.
     ///
     /// # Errors
-    /// [`Self::failure`] as a failed computation.
+    /// [`Self::failure`] as [`crate::Error::Computation`].
     pub fn checked(self) -> crate::Result<Self> {
         match self.failure() {
             None => Ok(self),

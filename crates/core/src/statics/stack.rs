@@ -1,21 +1,22 @@
-//! Several instruments on one centre line.
+//! Several coaxial instruments on one centre line.
 //!
-//! Instruments that lie in one another share a centre line r(s) where they overlap. Each is inextensible, comes out of a straight sheath
-//! at s = 0 where its hand holds its angle, and ends at its inserted length lᵢ. They slide and turn in each other without friction, so
-//! the energy is a sum over the instruments present at s,
+//! Coaxial instruments share a centre line r(s) where they overlap. Each is inextensible, comes out of a straight
+//! sheath at s = 0 where its hand holds its angle, and ends at its inserted length lᵢ. They slide and turn in each
+//! other without friction, so the energy is a sum over the instruments present at s,
 //!
 //! ```text
 //! U = Σᵢ ∫₀^lᵢ ½ EIᵢ |κ − R(θᵢ) κᵢ|² + ½ GJᵢ (τ + θᵢ′)² ds − Σᵢ ∫₀^lᵢ ½ EIᵢ |κᵢ|² ds
 //! ```
 //!
-//! with the rest curvature κᵢ in the instrument's own material frame, which is turned by θᵢ against the line's reference (Dupont, Lock,
-//! Itkowitz and Butler, *Design and control of concentric-tube robots*, IEEE Trans. Robotics 26(2), 2010). The last sum is what the
-//! sheath no longer stores: it straightens what is in it. Angles are unknowns for instruments with a shape of their own; on the others acts
-//! no torque.
+//! with the rest curvature κᵢ in the instrument's own material frame, which is turned by θᵢ against the line's
+//! reference (Dupont, Lock, Itkowitz and Butler, *Design and control of concentric-tube robots*, IEEE Trans. Robotics
+//! 26(2), 2010). The last sum is the energy released by the sheath, which straightens the part inside. Angles are
+//! unknowns for instruments with a rest shape; on the others no torque acts.
 //!
-//! An instrument is pushed with Fᵢ = ∂U/∂lᵢ. By the envelope theorem that is the derivative of the discrete energy in the mesh
-//! alone, while tangents, chords over lengths and angles stay as they are: the ends of the instrument and of its sections take their nodes
-//! along. It needs no second solution, holds for any load with a potential, and is exact for the mesh.
+//! An instrument is pushed with Fᵢ = ∂U/∂lᵢ. By the envelope theorem that is the derivative of the discrete energy in
+//! the mesh alone, at fixed tangents, chords per length and angles: the ends of the instrument and of its sections
+//! move with their nodes. It needs no second solution, holds for any load with a potential, and is exact for the
+//! mesh.
 
 use super::case::{Instrument, StaticCase};
 use super::mesh::{material, nodes, section_at, spread};
@@ -24,30 +25,30 @@ use crate::rod::{ElementData, Frame, MAX_ANGLES, Material, RodState, Supports, e
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
-/// Breaks nearer to each other than this part of the line share a node: over an element that is shorter, differences of unit vectors have
-/// lost the digits that curvature is made of.
+/// Breaks closer together than this fraction of the line's length share a node: in shorter elements, differences of
+/// unit vectors lose the digits that determine curvature.
 const NEAR: f64 = 1e-5;
-/// Step of the differences of the energy, as a part of the shortest piece between breaks.
+/// Step of finite differences of the energy, as a fraction of the shortest piece between breaks.
 const STEP: f64 = 1e-3;
 
-/// A node that something ends at.
+/// A node at which an instrument, a section or a load begins or ends.
 #[derive(Debug, Clone)]
 struct Break {
     at: f64,
-    /// Instruments that take it along when they are pushed.
+    /// Instruments whose insertion moves it.
     owners: Vec<usize>,
-    /// Whether something holds it that is not pushed.
+    /// Whether it also belongs to something that does not move with an instrument.
     fixed: bool,
 }
 
-/// Instruments on one centre line, and where the mesh has its nodes.
+/// Coaxial instruments, and the nodes of their mesh.
 #[derive(Debug, Clone)]
 pub(super) struct Stack {
     instruments: Vec<Instrument>,
-    /// Set of angles of each, where it has one.
+    /// Set of angles of each instrument that has one.
     sets: Vec<Option<usize>>,
     breaks: Vec<Break>,
-    /// Elements between each break and the next.
+    /// Number of elements between consecutive breaks.
     counts: Vec<usize>,
 }
 
@@ -55,7 +56,7 @@ impl Stack {
     /// The instruments of a case, if there are any, with nodes also at `held` arc lengths.
     ///
     /// # Errors
-    /// More instruments with shapes of their own than have angles.
+    /// More instruments with rest shapes than there can be sets of angles.
     pub(super) fn new(case: &StaticCase, held: impl Iterator<Item = f64>) -> Result<Option<Self>> {
         let instruments = case.rod.instrument.clone();
         if instruments.is_empty() {
@@ -81,12 +82,12 @@ impl Stack {
         Ok(Some(Self { instruments, sets, breaks, counts }))
     }
 
-    /// Sets of angles.
+    /// Number of sets of angles.
     pub(super) fn angles(&self) -> usize {
         self.sets.iter().flatten().count()
     }
 
-    /// The instruments, each with its set of angles, if it has one.
+    /// The instruments, each with its set of angles, if any.
     pub(super) fn instruments(&self) -> impl Iterator<Item = (&Instrument, Option<usize>)> {
         self.instruments.iter().zip(self.sets.iter().copied())
     }
@@ -96,7 +97,7 @@ impl Stack {
         self.mesh_with(None)
     }
 
-    /// The same with one instrument pushed on.
+    /// As [`Self::mesh`], with one instrument pushed by a length.
     fn mesh_with(&self, pushed: Option<(usize, f64)>) -> (Vec<f64>, Vec<ElementData>) {
         let by = |index: usize| pushed.filter(|(i, _)| *i == index).map_or(0.0, |(_, by)| by);
         let along = |b: &Break| pushed.filter(|(i, _)| b.owners.contains(i)).map_or(0.0, |(_, by)| by);
@@ -123,7 +124,7 @@ impl Stack {
         data
     }
 
-    /// The shape that instruments take which are not twisted: everywhere the mean of their rest curvatures, weighed by their stiffness.
+    /// The shape of untwisted instruments: everywhere the mean of their rest curvatures, weighted by stiffness.
     pub(super) fn untwisted(&self, elements: &[ElementData], start: Vec3, frame: Frame) -> RodState {
         let mut frames = vec![frame];
         let mut last = frame;
@@ -158,8 +159,7 @@ impl Stack {
         self.counts[..k.unwrap_or(self.counts.len())].iter().sum()
     }
 
-    /// Force with which the hand of an instrument pushes, at the equilibrium `state`, energies outside the rod included; `None` where
-    /// that jumps.
+    /// Push force of an instrument at the equilibrium `state`, external energies included; `None` where it jumps.
     pub(super) fn push_force<const C: usize>(
         &self,
         index: usize,
@@ -194,7 +194,7 @@ impl Stack {
 }
 
 impl Instrument {
-    /// Whether it has a shape of its own, so that torque acts on it.
+    /// Whether it has a rest shape, so that torque acts on it.
     pub(super) fn is_shaped(&self) -> bool {
         self.section.iter().any(|s| {
             s.rest_curvature != [0.0; 2]
@@ -203,8 +203,8 @@ impl Instrument {
         })
     }
 
-    /// What lies between two arc lengths with the tip at a third, at the Gauss points: of a section that ends between them, the part that is
-    /// there, by weights that integrate it exactly up to squares.
+    /// Material between two arc lengths with the tip at a third, at the Gauss points. A section that ends in between
+    /// contributes by weights that integrate its part exactly up to squares.
     fn between(&self, from: f64, to: f64, tip: f64) -> Material {
         let h = to - from;
         let places = GAUSS.map(|point| tip - (from + point.xi * h));
@@ -226,7 +226,7 @@ impl Instrument {
         sum
     }
 
-    /// Energy per length that the sheath sets free when it is pushed on: ½ EI |κ⁰|² at the start.
+    /// Energy per length released by the sheath as the instrument is pushed: ½ EI |κ⁰|² at the start.
     fn straightening(&self) -> f64 {
         let (section, begin) = section_at(&self.section, self.inserted);
         let here = material(section, begin, &[self.inserted; 3]);
@@ -235,13 +235,13 @@ impl Instrument {
     }
 }
 
-/// The start, the ends of instruments and of their sections, and `held` arc lengths, in order. Those that are nearer to each other than
-/// `near` are one, at the last of them: instruments end before their node, not beyond it.
+/// The start, the ends of instruments and of their sections, and `held` arc lengths, in order. Breaks closer than
+/// `near` are merged at the last one: instruments end before their node, not beyond it.
 fn breaks(instruments: &[Instrument], held: impl Iterator<Item = f64>, near: f64) -> Vec<Break> {
     let fixed = held.chain([0.0]).map(|at| Break { at, owners: vec![], fixed: true });
     let mut all: Vec<Break> = fixed.collect();
     for (index, instrument) in instruments.iter().enumerate() {
-        // What begins at the tip and after each section but the last, as far as it is beyond the start.
+        // Breaks at the tip and after each section but the last, where they are beyond the start.
         let inner = &instrument.section[..instrument.section.len() - 1];
         let begins = [0.0].into_iter().chain(inner.iter().map(|s| s.until));
         let places = begins.map(|from_tip| instrument.inserted - from_tip).filter(|at| *at > 0.0);
@@ -251,7 +251,7 @@ fn breaks(instruments: &[Instrument], held: impl Iterator<Item = f64>, near: f64
     all.dedup_by(|b, a| {
         let one = b.at - a.at <= near;
         if one {
-            // The start stays where it is.
+            // The start does not move.
             a.at = if a.at > 0.0 { b.at } else { 0.0 };
             a.owners.append(&mut b.owners);
             a.fixed |= b.fixed;

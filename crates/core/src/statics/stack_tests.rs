@@ -1,11 +1,11 @@
-//! Several instruments on one line against differences of their energy, and what is no such case.
+//! Several coaxial instruments, compared with differences of their energy; and invalid cases.
 
 use std::path::Path;
 
 use super::{StaticCase, StaticSolution};
 
-/// A shaft with a soft tip, a catheter with a curved tip in it, and a wire that is curved everywhere and more so at its tip, under a load
-/// at the end and one on the way.
+/// A shaft with a soft tip, in it a catheter with a curved tip, and a wire that is curved everywhere and more so at
+/// its tip, under a load at the end and one on the way.
 fn instruments(lengths: [f64; 3], hands: [f64; 2]) -> StaticCase {
     let [shaft, catheter, wire] = lengths;
     let [first, second] = hands;
@@ -56,7 +56,8 @@ fn solved(lengths: [f64; 3], hands: [f64; 2]) -> StaticSolution {
     instruments(lengths, hands).solve().unwrap().checked().unwrap()
 }
 
-/// Energy of the line and its loads, less what the sheath no longer stores of the wire, the only one that is curved there.
+/// Energy of the line and its loads, minus the energy released by the sheath from the wire, the only one curved
+/// there.
 fn energy(lengths: [f64; 3], hands: [f64; 2]) -> f64 {
     let energy = solved(lengths, hands).energy;
     energy.total + energy.load - 0.5 * 0.3 * (0.7 * 0.7 + 0.3 * 0.3) * lengths[2]
@@ -107,7 +108,7 @@ fn torques_are_the_slopes_of_the_energy() {
 
 #[test]
 fn an_end_passes_others_and_nothing_jumps() {
-    // The shaft's tip passes the begin of the catheter's curve at 0.6, the load at 0.35 and the end of the catheter.
+    // The shaft's tip passes the start of the catheter's curve at 0.6, the load at 0.35 and the end of the catheter.
     for at in [0.6, 0.35, 0.9] {
         let [before, there, after] =
             [-1e-7, 0.0, 1e-7].map(|by| solved([at + by, LENGTHS[1], LENGTHS[2]], HANDS));
@@ -151,13 +152,13 @@ fn a_single_instrument_is_a_rod() {
     let [rod, one] = [rod, one].map(|t| StaticCase::from_toml(&t, Path::new("a")).unwrap().solve().unwrap());
     assert_eq!(rod.tip, one.tip);
     assert_eq!(rod.twist, one.instruments[0].twist);
-    // The read-out of the single rod takes EI|t′ − κ⁰|² at the clamp from its moment; this one is the slope of the energy.
+    // The single rod computes EI|t′ − κ⁰|² at the clamp from its moment; this push force is the slope of the energy.
     let push = one.instruments[0].push_force.unwrap();
     assert!((push - rod.push_force.unwrap()).abs() < 1e-3 * push.abs(), "{push} and {:?}", rod.push_force);
     assert!((one.instruments[0].torque - rod.reactions.start.torque).abs() < 1e-12);
 }
 
-/// `count` instruments that together are one of EI 1.2 and GJ 0.9, under a load that bends and twists.
+/// `count` instruments with EI 1.2 and GJ 0.9 in total, under a load that bends and twists.
 fn parts(count: usize) -> StaticSolution {
     let share = |value: f64| value / count as f64;
     let part = format!(

@@ -1,4 +1,4 @@
-//! Cases of rods that touch themselves, as they are written.
+//! Written cases of rods that touch themselves.
 
 use super::*;
 use std::path::Path;

@@ -4,22 +4,23 @@ use super::case::{EndKind, Initial, LoadKind, Section, StartKind, StaticCase, Su
 use crate::{Error, Result, Vec3};
 use std::fmt::Display;
 
-/// Most elements a case may ask for: far beyond use, and about a gigabyte of memory with twist.
+/// Largest number of elements: far beyond practical use, and about a gigabyte of memory with twist.
 const MAX_ELEMENTS: usize = 200_000;
 
-/// Most iterations of a load step, most load steps, and most of them times elements: beyond it the answer takes longer than a coffee.
+/// Largest numbers of iterations per load step, of load steps, and of load steps times elements: beyond them a
+/// solution takes many minutes.
 const MAX_ITERATIONS: usize = 100_000;
 const MAX_LOAD_STEPS: usize = 1_000_000;
 const MAX_WORK: usize = 10_000_000;
 
-/// Tolerances that mean something: below, there is rounding alone; above, a shape that is no equilibrium would pass for one.
+/// Useful tolerances: below, there is only rounding; above, a shape that is not an equilibrium would be accepted.
 const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
 
-/// Least length over the radius of a rod that touches itself, and most places on it that may.
+/// Self-contact: smallest ratio of a rod's length to its radius, and largest number of contact sites.
 const LEAST_SLENDERNESS: f64 = 10.0;
 const MAX_SITES: f64 = 1e6;
 
-/// A key of an entry of a list, written only where it is wrong.
+/// A key of an entry of a list, formatted only for errors.
 struct Key<'a> {
     list: &'a str,
     index: usize,
@@ -69,7 +70,7 @@ fn across(name: &str, normal: &[f64; 3], tangent: &[f64; 3]) -> Result<()> {
     Ok(())
 }
 
-/// Points of a curve to begin with: two at least, no two in a row the same.
+/// The points of an initial curve: at least two, no two in a row equal.
 fn check_points(initial: &Initial) -> Result<()> {
     let points = &initial.points;
     points.iter().try_for_each(|point| finite("initial.points", point))?;
@@ -83,7 +84,7 @@ fn check_points(initial: &Initial) -> Result<()> {
     Ok(())
 }
 
-/// Sections of a rod or an instrument: in order, and each with values that can be.
+/// Sections of a rod or an instrument: in order, with valid values.
 fn check_sections(list: &str, sections: &[Section]) -> Result<()> {
     if sections.is_empty() {
         return Err(Error::parameter(list, "none", format!("there must be at least one [[{list}]]")));
@@ -131,7 +132,7 @@ fn check_sections(list: &str, sections: &[Section]) -> Result<()> {
 }
 
 impl StaticCase {
-    /// Checks every value and that none contradicts another.
+    /// Checks every value, and that none contradicts another.
     pub fn check(&self) -> Result<()> {
         if self.rod.instrument.is_empty() {
             positive("rod.length", self.rod.length)?;
@@ -270,7 +271,7 @@ impl StaticCase {
         Ok(())
     }
 
-    /// Several instruments on one line.
+    /// Checks several coaxial instruments.
     fn check_instruments(&self) -> Result<()> {
         let given = |key: &str, mend: &str| Err(Error::parameter(key, "given", mend));
         if self.rod.length != 0.0 || !self.rod.section.is_empty() {
@@ -400,7 +401,7 @@ impl StaticCase {
         Ok(())
     }
 
-    /// A rod as long as its span is straight: the tangents that are held must lie along it.
+    /// A rod as long as its span is straight: held tangents must lie along it.
     fn check_straight(&self, span: &Vec3) -> Result<()> {
         let clamped = self.start.kind == StartKind::Clamped;
         let held =

@@ -1,7 +1,8 @@
 //! Built-in vessels, as centre-line trees made from published dimensions.
 //!
-//! Anatomies use patient axes: +x to the patient's left, +y to the back (posterior), +z to the head (cranial); millimetres. Published
-//! diameters are averages of living adults; courses are drawn to look like the textbook, not measured on one patient.
+//! Anatomies use patient axes: +x to the patient's left, +y to the back (posterior), +z to the head (cranial);
+//! millimetres. Published diameters are averages of living adults; courses are drawn to resemble textbooks, not
+//! measured on a patient.
 
 use std::f64::consts::PI;
 
@@ -20,7 +21,7 @@ pub const NAMES: [&str; 8] = [
     "basilar_aneurysm",
 ];
 
-/// The built-in vessel of that name.
+/// The built-in vessel of this name.
 pub fn tree(name: &str) -> Option<CentrelineTree> {
     let nodes = match name {
         "straight_tube" => straight_tube(),
@@ -39,10 +40,10 @@ pub fn tree(name: &str) -> Option<CentrelineTree> {
     tree.with_targets(named.collect()).ok()
 }
 
-/// What the end of a sac is called.
+/// Name of the end of a sac.
 const DOME: &str = "dome";
 
-/// Rows that have names: ends of branches but for the coeliac trunk, which is on the way.
+/// Named rows: ends of branches, except for the coeliac trunk, which is on the way.
 fn targets(name: &str) -> &'static [(usize, &'static str)] {
     match name {
         "aortic_arch" | "aortic_arch_ii" | "aortic_arch_iii" => {
@@ -62,7 +63,7 @@ fn targets(name: &str) -> &'static [(usize, &'static str)] {
     }
 }
 
-/// What a built-in vessel is and where its numbers come from, for the head of its table.
+/// A description of a built-in vessel with the sources of its dimensions, for the head of its table.
 pub fn description(name: &str) -> Option<&'static str> {
     match name {
         "straight_tube" => Some(STRAIGHT_TUBE),
@@ -77,7 +78,8 @@ pub fn description(name: &str) -> Option<&'static str> {
     }
 }
 
-/// How fine the wall of a built-in vessel is in `assets/vessels`: small enough to keep in a repository, fine enough to use.
+/// Resolution of the wall of a built-in vessel in `assets/vessels`: coarse enough for a repository, fine enough to
+/// use.
 pub fn asset_resolution(name: &str) -> Resolution {
     match name {
         "straight_tube" => Resolution::EdgeMm(1.25),
@@ -110,7 +112,7 @@ fn curved_tube() -> Vec<CentrelineNode> {
     const BEND: f64 = 45.0;
     const END: f64 = 20.0;
     const RADIUS: f64 = 4.0;
-    // Points 2.5 mm apart: the spline then follows lines and arc within a few micrometres.
+    // With points 2.5 mm apart the spline follows lines and arc to within a few micrometres.
     const SPACING: f64 = 2.5;
     let mut course = Course::new().root(Vec3::zeros(), RADIUS);
     let steps = |length: f64| (length / SPACING).round() as usize;
@@ -144,16 +146,17 @@ const AORTIC_ARCH_III: &str = "aortic_arch_iii: as aortic_arch, with a type III 
 the top of the arch. Types by that height, less than 1, 1 to 2 and more than 2 diameters for I, II and III: Tayal et al., J. Cardiol.
 Curr. Res. 6, 00191, 2016. Course of the axis drawn.";
 
-/// Diameter of the left common carotid artery, by which types of the arch are told, mm.
+/// Diameter of the left common carotid artery, which defines the types of the arch, mm.
 const LEFT_CAROTID_MM: f64 = 8.3;
 
-/// Where branches leave an arch that rises in the right front and comes down in the left back, and where they go.
+/// Starts and courses of the branches of an arch that rises in the right front and descends in the left back.
 struct Arch {
     /// Height above its feet, mm.
     height_mm: f64,
-    /// Angle of each point about the middle of the arch, from behind left, degrees; diameter there, mm; number of the branch that leaves.
+    /// For each point the angle about the middle of the arch, from behind left, degrees; diameter there, mm; index of
+    /// the branch that starts there.
     points: [(f64, f64, Option<usize>); 8],
-    /// Innominate, left carotid, left subclavian: points from where each leaves, mm.
+    /// Innominate, left carotid, left subclavian: points from the start of each, mm.
     branches: [[[f64; 3]; 4]; 3],
 }
 
@@ -176,7 +179,7 @@ const TYPE_I: Arch = Arch {
     ],
 };
 
-/// Branches leave from the ascending part, nearer to each other, and begin along its slope.
+/// Branches start on the ascending part, closer to each other, in the direction of its slope.
 const TYPE_II: Arch = Arch {
     height_mm: 46.0,
     points: [
@@ -317,7 +320,7 @@ fn sidewall_aneurysm() -> Vec<CentrelineNode> {
     for [x, z] in &artery[1..] {
         course = course.to(Vec3::new(*x, 0.0, *z), 2.5);
     }
-    // Backwards from the artery's axis: the neck, and the ball that begins there.
+    // Backwards from the artery's axis: the neck, and the sphere that begins there.
     course = course.at(3);
     for (y, radius) in [(1.5, 1.6), (2.7, 1.6), (3.48, 2.607), (4.57, 3.271), (5.81, 3.5)] {
         course = course.to(Vec3::new(2.0, y, 36.0), radius);
@@ -348,7 +351,7 @@ fn basilar_aneurysm() -> Vec<CentrelineNode> {
     course.nodes
 }
 
-/// A pen that draws a tree point by point.
+/// A pen for drawing a tree point by point.
 struct Course {
     nodes: Vec<CentrelineNode>,
     at: usize,
@@ -364,7 +367,7 @@ impl Course {
         self
     }
 
-    /// Goes on from `row`.
+    /// Continues from `row`.
     fn at(mut self, row: usize) -> Self {
         self.at = row;
         self
@@ -400,7 +403,7 @@ mod tests {
             assert!(report.triangles <= most, "{name}: {}", report.triangles);
             let inlet = &made.wall.openings()[made.inlet];
             assert!(inlet.centre_mm.norm() < 0.01, "{name}: the root is the origin");
-            // Devices come in there, also where blood does not: the widest opening of an arch is its other end.
+            // The inlet for devices, not that for blood: the widest opening of an arch is its other end.
             assert_eq!(made.wall.inlet().map(|opening| opening.index), Some(made.inlet), "{name}");
             assert!(made.inlet != 0 || !name.starts_with("aortic_arch"), "{name}");
             assert_stored(name, &tree, made.wall.mesh());
@@ -408,10 +411,10 @@ mod tests {
         assert!(super::tree("aorta").is_none());
     }
 
-    /// The files in `assets/` are what this code makes; the example `make_assets` renews them.
+    /// The files in `assets/` are the output of this code; the example `make_assets` updates them.
     fn assert_stored(name: &str, tree: &CentrelineTree, mesh: &SurfaceMesh) {
         if !asset("straight_tube.csv").exists() {
-            // A packaged crate is without the assets of the repository.
+            // A packaged crate does not contain the repository's assets.
             return;
         }
         assert_eq!(&CentrelineTree::read(&asset(&format!("{name}.csv"))).unwrap(), tree);

@@ -1,10 +1,11 @@
 //! The centre line of a vessel tree: points with radii, each joined to its parent.
 //!
-//! As a table, one point a line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons; millimetres; `parent`
-//! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. Words behind it name the point as a
-//! target; the word `closed` alone, or after a name, closes the vessel there with a dome, as the sac of an aneurysm.
-//! `#` starts a comment, and the first line that is not a comment may be a header of words. Lists of points without parents are read
-//! too where the header names their columns ([`super::point_lists`]).
+//! As a table, one point per line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons;
+//! millimetres; `parent` is the row (counted from 0, without comments and header) of an earlier point, −1 for the
+//! root. Words after it name the point as a target; the word `closed` alone, or after a name, closes the vessel there
+//! with a dome, like the sac of an aneurysm. `#` starts a comment, and the first line that is not a comment may be a
+//! header of words. Lists of points without parents can be read too if the header names their columns
+//! ([`super::point_lists`]).
 
 use std::fmt::Write;
 use std::path::Path;
@@ -28,22 +29,22 @@ pub struct CentrelineNode {
     pub parent: Option<usize>,
 }
 
-/// A tree of centre-line points: one root, parents before their children, no two joined points in one place.
+/// A tree of centre-line points: one root, parents before their children, no two joined points coincident.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CentrelineTree {
     nodes: Vec<CentrelineNode>,
     /// Leaves where the vessel is closed by a dome, ascending.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     closed: Vec<usize>,
-    /// Not of the vessel's shape: a wall is the same by whatever names.
+    /// Not part of the vessel's shape: the wall does not depend on names.
     #[serde(skip)]
     targets: Vec<Target>,
 }
 
-/// A point of a tree that has a name: a place to go to.
+/// A named point of a tree: a place to navigate to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Target {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its row.
     pub row: usize,
@@ -67,11 +68,11 @@ impl CentrelineTree {
         Ok(Self { nodes, closed: Vec::new(), targets: Vec::new() })
     }
 
-    /// The tree with these rows named, in place of those that were.
+    /// The tree with these rows named, replacing earlier names.
     ///
     /// # Errors
-    /// A row that is not there, and a name that a table could not hold: empty, a number, given twice, with commas, semicolons, `#` or
-    /// blanks beside others.
+    /// A nonexistent row, and a name that a table cannot contain: empty, a number, given twice, with commas,
+    /// semicolons, `#` or repeated blanks.
     pub fn with_targets(mut self, targets: Vec<Target>) -> Result<Self> {
         for (index, target) in targets.iter().enumerate() {
             if target.row >= self.nodes.len() {
@@ -85,11 +86,11 @@ impl CentrelineTree {
         Ok(self)
     }
 
-    /// The tree with the vessel closed at these leaves, in place of those that were: by half a ball of the leaf's radius, as the sac of an
-    /// aneurysm ends.
+    /// The tree with the vessel closed at these leaves, replacing earlier ones: by a hemisphere of the leaf's radius,
+    /// like the end of an aneurysm's sac.
     ///
     /// # Errors
-    /// A row that is not there, or is no leaf: the root and points with others behind them go on.
+    /// A nonexistent row, or one that is not a leaf: the root and points with children continue.
     pub fn with_closed_ends(mut self, mut rows: Vec<usize>) -> Result<Self> {
         rows.sort_unstable();
         rows.dedup();
@@ -109,7 +110,7 @@ impl CentrelineTree {
         &self.closed
     }
 
-    /// For each row whether all that lies behind it, seen from the root, and it itself end in closed ends: the sacs of the tree.
+    /// For each row whether it and all its descendants end in closed ends: the sacs of the tree.
     pub(crate) fn in_sacs(&self) -> Vec<bool> {
         let children = self.children();
         let mut inside = vec![false; self.nodes.len()];
@@ -127,10 +128,10 @@ impl CentrelineTree {
         &self.targets
     }
 
-    /// The point of that name.
+    /// The point of this name.
     ///
     /// # Errors
-    /// A name that no point has, with the nearest one that is there.
+    /// An unknown name, with the most similar one.
     pub fn target(&self, name: &str) -> Result<&Target> {
         self.targets.iter().find(|target| target.name == name).ok_or_else(|| {
             let mend = match nearest_name(self.targets.iter().map(|target| target.name.as_str()), name) {
@@ -143,13 +144,13 @@ impl CentrelineTree {
         })
     }
 
-    /// The row nearest to a place.
+    /// The row nearest to a position.
     pub fn nearest_row(&self, place_mm: &Vec3) -> usize {
         let away_mm = |row: &usize| (self.nodes[*row].position_mm - place_mm).norm();
         (0..self.nodes.len()).min_by(|a, b| away_mm(a).total_cmp(&away_mm(b))).unwrap_or(0)
     }
 
-    /// The way from the root to a row; `None` where the tree has no such row, or it is the root.
+    /// The path from the root to a row; `None` if the row does not exist or is the root.
     pub fn path_to(&self, row: usize) -> Option<CentrelinePath> {
         let mut points = Vec::new();
         let mut at = (row > 0).then_some(row);
@@ -165,13 +166,13 @@ impl CentrelineTree {
     /// Reads a table.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be read; [`Error::Content`] naming line and value for what [`CentrelineTree::new`] refuses
-    /// and for what is no number.
+    /// [`Error::File`] if it cannot be read; [`Error::Content`] with line and value for what [`CentrelineTree::new`]
+    /// rejects and for what is not a number.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_of(&FileSystem, path)
     }
 
-    /// The same of a table that is among `files`.
+    /// As [`Self::read`], for a table in `files`.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -179,10 +180,10 @@ impl CentrelineTree {
         Self::from_bytes(&files.read(path, SIZE_LIMIT)?, path)
     }
 
-    /// Reads a table from the bytes of a file, which errors call `path`.
+    /// Reads a table from the bytes of a file; errors name it `path`.
     ///
     /// # Errors
-    /// As [`Self::read`], less those of reading a file.
+    /// As [`Self::read`], except those of reading the file.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         Self::parse(&String::from_utf8_lossy(bytes)).map_err(|reason| Error::content(path, reason))
     }
@@ -191,7 +192,7 @@ impl CentrelineTree {
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut nodes: Vec<CentrelineNode> = Vec::new();
         let mut targets: Vec<Target> = Vec::new();
-        // Rows that are closed, and their lines.
+        // Closed rows, and their lines.
         let mut closed: Vec<(usize, usize)> = Vec::new();
         let mut may_be_header = true;
         let mut columns: Option<Columns> = None;
@@ -212,7 +213,7 @@ impl CentrelineTree {
                 columns = Columns::of_header(&words);
                 continue;
             }
-            // A header may name the first four columns alone.
+            // A header may name only the first four columns.
             if nodes.is_empty() && columns.is_some_and(|columns| columns.count != words.len()) {
                 columns = None;
             }
@@ -257,7 +258,7 @@ impl CentrelineTree {
         Ok(Self { nodes, closed, targets })
     }
 
-    /// Writes the table with `comment` above it. Reading it back gives the same bits.
+    /// Writes the table below `comment`. Reading it back gives the same bits.
     ///
     /// # Errors
     /// [`Error::File`] if writing fails.
@@ -288,7 +289,7 @@ impl CentrelineTree {
         &self.nodes
     }
 
-    /// For each node its children, in order.
+    /// The children of each node, in order.
     pub fn children(&self) -> Vec<Vec<usize>> {
         let mut children = vec![Vec::new(); self.nodes.len()];
         for (row, node) in self.nodes.iter().enumerate() {
@@ -300,12 +301,12 @@ impl CentrelineTree {
     }
 }
 
-/// Values of a row without a name.
+/// Number of values of a row without a name.
 const COLUMNS: usize = 5;
-/// The last word of a row where the vessel is closed.
+/// The last word of a row that closes the vessel.
 const CLOSED: &str = "closed";
 
-/// Why a name cannot be that of a target beside others, if it cannot.
+/// Why a name is invalid as that of a target beside others; `Ok` if it is valid.
 fn check_name(name: &str, others: &[Target]) -> std::result::Result<(), String> {
     let words = name.split(|c: char| c.is_whitespace() || c == ',' || c == ';');
     if name.contains('#') || words.clone().any(str::is_empty) || words.collect::<Vec<_>>().join(" ") != name {
@@ -323,7 +324,7 @@ fn check_name(name: &str, others: &[Target]) -> std::result::Result<(), String> 
     }
 }
 
-/// A whole number, which may be written as a decimal one: `numpy.savetxt` writes `3.000000000000000000e+00`.
+/// A whole number, possibly written as a decimal: `numpy.savetxt` writes `3.000000000000000000e+00`.
 fn whole(word: &str) -> Option<i64> {
     let as_decimal = || word.parse().ok().filter(|number: &f64| number.fract() == 0.0 && number.abs() < 1e15);
     word.parse().ok().or_else(|| as_decimal().map(|number| number as i64))
@@ -340,7 +341,7 @@ fn parse_row(words: &[&str]) -> std::result::Result<CentrelineNode, String> {
     Ok(CentrelineNode {
         position_mm: Vec3::new(number("x", x)?, number("y", y)?, number("z", z)?),
         radius_mm: number("radius", radius)?,
-        // What is negative but not −1 becomes a row that cannot be there, and is refused as such.
+        // A negative number other than −1 becomes an impossible row, which is then rejected.
         parent: (parent != -1).then(|| usize::try_from(parent).unwrap_or(usize::MAX)),
     })
 }
@@ -350,15 +351,16 @@ const SIZE_LIMIT: u64 = 64 << 20;
 
 /// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
 const LARGEST_MM: f64 = 1e6;
-/// Longest way from a point to its parent, mm: as long as a body; and in radii of the wider of the two: no vessel is straight for so long. One
-/// number that is wrong would have a vessel made that takes minutes, or one that runs out and back through itself.
+/// Longest distance from a point to its parent, mm, the length of a body; and in radii of the wider of the two, since
+/// no vessel is straight for longer. Otherwise a single wrong number would create a vessel that takes minutes, or
+/// that intersects itself.
 const LONGEST_SEGMENT_MM: f64 = 2000.0;
 const LONGEST_SEGMENT_RADII: f64 = 250.0;
 
-/// Least radius: powers of it, as flow takes them, stay numbers, and no vessel is thinner than a molecule.
+/// Smallest radius, mm: its powers, as used for flow, stay finite, and no vessel is thinner than a molecule.
 const LEAST_RADIUS_MM: f64 = 1e-6;
 
-/// Checks a row against the rows before it: (column, value, how to mend it).
+/// Checks a row against the rows before it; an error is (column, value, correction).
 fn check_row(
     nodes: &[CentrelineNode],
     row: usize,
@@ -394,7 +396,7 @@ fn check_row(
     }
 }
 
-/// Checks what a point is by itself.
+/// Checks a single point.
 fn check_numbers(node: &CentrelineNode) -> std::result::Result<(), (&'static str, String, String)> {
     for (name, value) in ["x", "y", "z"].into_iter().zip(node.position_mm.iter()) {
         if value.is_nan() || value.abs() > LARGEST_MM {
@@ -466,7 +468,7 @@ mod tests {
         assert_eq!(tree.targets().len(), 2);
         assert_eq!(CentrelineTree::parse(&tree.table("")).unwrap(), tree);
         assert_eq!(tree.in_sacs(), [false, false, false, true, true, true]);
-        // It is of the vessel's shape.
+        // It is part of the vessel's shape.
         let open = CentrelineTree::new(tree.nodes().to_vec()).unwrap();
         let json = |tree: &CentrelineTree| serde_json::to_string(tree).unwrap();
         assert!(json(&open) != json(&tree));
@@ -484,7 +486,7 @@ mod tests {
         assert_eq!(told(&tree, "left carotd"), "target = \"left carotd\": did you mean \"left carotid\"?");
         let nameless = CentrelineTree::new(tree.nodes().to_vec()).unwrap();
         assert!(told(&nameless, "a").contains("names no targets"));
-        // Names are no part of a wall's recipe.
+        // Names are not part of a wall's recipe.
         let json = |tree: &CentrelineTree| serde_json::to_string(tree).unwrap();
         assert_eq!(json(&nameless), json(&tree));
         for (row, name) in [(3, "a"), (1, ""), (1, "a,b"), (1, "a  b"), (1, "1e3"), (1, "a#")] {
@@ -505,7 +507,7 @@ mod tests {
             let tree = CentrelineTree::new(nodes).unwrap();
             let text = tree.table("two\nlines");
             prop_assert_eq!(&CentrelineTree::parse(&text).unwrap(), &tree);
-            // The twin: one changed digit is a different tree.
+            // Counter-check: one changed digit gives a different tree.
             let mut moved = tree.nodes().to_vec();
             moved[0].radius_mm *= 1.0 + 1e-15;
             prop_assert_ne!(CentrelineTree::new(moved).unwrap(), tree);

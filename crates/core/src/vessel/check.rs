@@ -1,4 +1,4 @@
-//! What is right and wrong with a surface, as it is.
+//! Properties and faults of a surface as given.
 
 use super::crossings::crossings;
 use super::hints::{facing_hints, unit_hint};
@@ -9,9 +9,9 @@ use super::weld::Welding;
 use super::{RepairReport, SurfaceMesh, Wall, opening, sliver};
 use crate::{Error, Result};
 
-/// Intersecting pairs named in a report; a list of thousands helps nobody.
+/// Number of intersecting pairs named in a report; a list of thousands would not help.
 const PAIRS_NAMED: usize = 10;
-/// Intersecting pairs after which counting ends.
+/// Number of intersecting pairs after which counting stops.
 const PAIRS_COUNTED: usize = 100_000;
 
 /// A boundary loop in a report.
@@ -29,15 +29,15 @@ pub struct OpeningReport {
     pub edges: usize,
 }
 
-/// What [`check`] found. Volume and openings are those of the repaired wall, which is what is simulated; faces and counts of faults
-/// are those of the surface as given, with duplicate vertices welded.
+/// The result of [`check`]. Volume and openings are those of the repaired wall, which is used in simulations; faces
+/// and counts of faults are those of the surface as given, with duplicate vertices welded.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct CheckReport {
     /// Triangles as given.
     pub triangles: usize,
     /// Vertices after welding.
     pub vertices: usize,
-    /// Vertices that lie on another one (normal in STL, which stores each corner anew).
+    /// Vertices that coincide with another one (normal in STL, which stores each corner separately).
     pub duplicate_vertices: usize,
     /// Pieces connected by edges.
     pub components: usize,
@@ -49,9 +49,9 @@ pub struct CheckReport {
     pub stray_edges: usize,
     /// The loops of open edges.
     pub openings: Vec<OpeningReport>,
-    /// The number of the opening that devices come in by unless another is given ([`Wall::inlet`]).
+    /// The index of the default opening for devices ([`Wall::inlet`]).
     pub inlet: Option<usize>,
-    /// Pairs of openings of like size that face each other within a radius: a vessel that is cut through there.
+    /// Pairs of openings of similar size that face each other within a radius: a vessel that is cut through there.
     pub facing_openings: Vec<[usize; 2]>,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
@@ -65,11 +65,11 @@ pub struct CheckReport {
     pub duplicate_triangles: usize,
     /// Pairs of triangles that cross, touch or are folded onto each other beyond their common vertices.
     pub self_intersections: usize,
-    /// Whether counting ended before all pairs were seen: there are at least so many.
+    /// Whether counting stopped before all pairs were found: there are at least this many.
     pub self_intersections_capped: bool,
     /// The first of these pairs, by triangle number in the file.
     pub intersecting_pairs: Vec<[usize; 2]>,
-    /// Whether the surface encloses nothing but rounding: a sheet.
+    /// Whether the surface encloses nothing beyond rounding: a sheet.
     pub flat: bool,
     /// Volume enclosed by the wall and flat caps in mm³.
     pub volume_mm3: f64,
@@ -85,15 +85,15 @@ pub struct CheckReport {
     pub edge_median_mm: f64,
     /// Longest edge in mm.
     pub edge_max_mm: f64,
-    /// What the repair does to the surface, and what it leaves.
+    /// What the repair changed, and what faults remain.
     pub repair: RepairReport,
-    /// Width of the lumen, thin septa and a place to begin, of the repaired wall.
+    /// Width of the lumen, thin septa and a suitable start, of the repaired wall.
     #[serde(flatten)]
     pub survey: Survey,
-    /// Whether the repaired wall is closed but for its openings, which contrast medium in fluoroscopy needs. Fluoroscopy without
-    /// needs nothing.
+    /// Whether the repaired wall is closed except for its openings, which is required only for contrast medium in
+    /// fluoroscopy.
     pub contrast: bool,
-    /// What the user may want to know or change.
+    /// Hints for the user.
     pub hints: Vec<String>,
 }
 
@@ -101,8 +101,8 @@ pub struct CheckReport {
 const SEPTUM_MM: f64 = 1.0;
 
 impl CheckReport {
-    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults, in one, around a
-    /// volume. Open ends are fine.
+    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults,
+    /// connected, around a volume. Open ends are fine.
     pub fn is_sound(&self) -> bool {
         let faults = [
             self.non_manifold_edges,
@@ -126,7 +126,7 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
     check_with(surface, 1.0, SEPTUM_MM)
 }
 
-/// As [`check`], of a surface read with `unit_mm`, which hints name, and with septa counted below `septum_mm`.
+/// As [`check`], for a surface read with `unit_mm`, which hints name, and with septa counted below `septum_mm`.
 ///
 /// # Errors
 /// As [`check`], and [`Error::Parameter`] for a thickness that is not a number of 0 or more.
@@ -136,7 +136,8 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
     }
     let welding = Welding::of(surface)?;
     let wall = Wall::mended(welding.clone(), true)?;
-    // What needed no more than welding and turning over is what was given: it is neither welded nor searched again.
+    // If only welding and turning over was needed, the wall is the surface as given: it is neither welded nor
+    // searched again.
     let as_given = wall.report().is_as_given();
     let given = if as_given { None } else { Some(Wall::mended(welding.clone(), false)?) };
     let Welding { mesh: welded, bounds_mm: (low, high), tolerance_mm, merged } = welding;
@@ -237,12 +238,12 @@ pub(crate) fn area_mm2(mesh: &SurfaceMesh) -> f64 {
     (0..mesh.triangles.len()).map(|i| super::mesh::area(&mesh.corners(i))).sum()
 }
 
-/// What [`self_intersections`] found.
+/// The result of [`self_intersections`].
 #[derive(Default)]
 pub(crate) struct Intersections {
-    /// Intersecting pairs, all or those seen before the limit.
+    /// Number of intersecting pairs, all or those found before the limit.
     pub(crate) count: usize,
-    /// Whether the limit ended the count.
+    /// Whether the limit stopped the count.
     pub(crate) capped: bool,
     /// The pairs with the smallest numbers.
     pub(crate) first: Vec<[usize; 2]>,

@@ -1,8 +1,9 @@
-//! Which triangles of a surface meet where they should not.
+//! Triangles of a surface that intersect.
 //!
-//! Triangles are put in the order of a space-filling curve (Morton), and a binary tree of boxes stands over that order: building
-//! it is one sort, and neighbours lie side by side. Nearly all pairs whose boxes meet are neighbours of a smooth surface; simple
-//! tests in plain arithmetic, each with a margin far above its rounding, distinguish most of them before exact predicates decide.
+//! Triangles are sorted along a space-filling curve (Morton), and a binary tree of boxes is built over that order:
+//! this takes one sort, and neighbours are adjacent. Nearly all pairs with overlapping boxes are neighbours of a
+//! smooth surface; simple tests in plain arithmetic, each with a margin far above its rounding, exclude most of them
+//! before exact predicates decide.
 
 use super::intersect::triangles_intersect;
 use super::{SurfaceMesh, sliver};
@@ -10,10 +11,11 @@ use crate::Vec3;
 
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
-/// Pairs of close triangles that are looked at, for each triangle and in all: a sound mesh needs about twenty each.
+/// Limits of the number of pairs of close triangles tested, per triangle and in all: a sound mesh needs about twenty
+/// each.
 const TRIES_EACH: usize = 64;
 const TRIES_BEYOND: usize = 1_000_000;
-/// Part of a triangle's size below which a distance is rounding to the tests that need not be exact.
+/// Fraction of a triangle's size below which inexact tests treat a distance as rounding.
 const MARGIN: f64 = 1e-9;
 
 /// Pairs of triangles that intersect.
@@ -21,14 +23,14 @@ const MARGIN: f64 = 1e-9;
 pub(crate) struct Crossings {
     /// Pairs, the smaller number first, sorted.
     pub(crate) pairs: Vec<[u32; 2]>,
-    /// Whether a limit ended the search: there may be more.
+    /// Whether a limit stopped the search: there may be more.
     pub(crate) capped: bool,
 }
 
 struct Tree {
-    /// Triangles along the curve.
+    /// Triangles in the order of the curve.
     order: Vec<u32>,
-    /// Bounds of the triangles, along the curve.
+    /// Bounds of the triangles, in the order of the curve.
     boxes: Vec<[Vec3; 2]>,
     /// Bounds of the nodes: node k has children 2k and 2k + 1, leaves begin at `leaves`.
     nodes: Vec<[Vec3; 2]>,
@@ -76,12 +78,12 @@ impl Tree {
         Self { order, boxes, nodes, leaves }
     }
 
-    /// Puts into `close` the leaves from `first` on whose bounds meet those of leaf `of`.
+    /// Adds to `close` the leaves from `first` on whose bounds overlap those of leaf `of`.
     fn close_to(&self, of: usize, first: usize, stack: &mut Vec<(usize, usize)>, close: &mut Vec<usize>) {
         let bounds = &self.nodes[self.leaves + of];
         stack.clear();
         close.clear();
-        // Node, and the leaf behind its last one.
+        // Node, and one past its last leaf.
         stack.push((1, self.leaves));
         while let Some((node, end)) = stack.pop() {
             if end <= first || !meet(bounds, &self.nodes[node]) {
@@ -98,7 +100,7 @@ impl Tree {
         }
     }
 
-    /// The triangles of a leaf, each with its place.
+    /// The triangles of a leaf, each with its position in the order.
     fn leaf(&self, leaf: usize) -> impl Iterator<Item = (usize, u32)> {
         let first = (leaf * LEAF).min(self.order.len());
         let end = (first + LEAF).min(self.order.len());
@@ -106,7 +108,7 @@ impl Tree {
     }
 }
 
-/// The lower 20 bits, two zeros between each.
+/// The lower 20 bits, with two zeros between each.
 fn spread(bits: u64) -> u64 {
     let mut x = bits & 0x1f_ffff;
     x = (x | x << 32) & 0x001f_0000_0000_ffff;
@@ -116,7 +118,8 @@ fn spread(bits: u64) -> u64 {
     (x | x << 2) & 0x1249_2492_4924_9249
 }
 
-/// The intersecting pairs among the triangles with area, up to `limit`; with `marked` those pairs alone of which one is marked.
+/// The intersecting pairs among the triangles with area, up to `limit`; with `marked` only pairs with a marked
+/// member.
 pub(crate) fn crossings(
     mesh: &SurfaceMesh,
     tolerance_mm: f64,
@@ -136,7 +139,7 @@ pub(crate) fn crossings(
         if !tree.leaf(leaf).any(|(_, t)| is_marked(t)) {
             continue;
         }
-        // Without marks each pair is met from its earlier member. A marked triangle looks at all others.
+        // Without marks each pair is found from its earlier member. A marked triangle is tested against all others.
         tree.close_to(leaf, if marked.is_some() { 0 } else { leaf }, &mut stack, &mut close);
         for (place, a) in tree.leaf(leaf).filter(|(_, t)| is_marked(*t)) {
             let bounds = &tree.boxes[place];
@@ -167,7 +170,7 @@ pub(crate) fn crossings(
     found
 }
 
-/// Whether two triangles are apart beyond doubt but for the vertices that they share.
+/// Whether two triangles are certainly apart, except for vertices that they share.
 fn apart(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
     let at = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
     let (pa, pb) = (at(a), at(b));
@@ -179,7 +182,7 @@ fn apart(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
             fans_apart(&pa, k, &pb, l) || fans_apart(&pb, l, &pa, k) || cones_apart(&pa, k, &pb, l)
         }
         (Some(k), Some(l), None) => {
-            // Neighbours at an angle of more than a right one, seen along their edge, are not folded.
+            // Neighbours at an angle of more than a right angle, seen along their edge, are not folded.
             let along = pa[l] - pa[k];
             let free = |t: [u32; 3], other: [u32; 3]| (0..3).find(|&j| !other.contains(&t[j])).unwrap_or(0);
             let (p, q) = (pa[free(a, b)] - pa[k], pb[free(b, a)] - pa[k]);
@@ -189,7 +192,8 @@ fn apart(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
     }
 }
 
-/// Whether `direction` times an offset of length `reach` at most is positive beyond its rounding; squared, without roots.
+/// Whether `direction` times an offset of at most `reach` in length is positive beyond its rounding; squared, to
+/// avoid roots.
 fn clear(dot: f64, direction: &Vec3, reach_squared: f64) -> bool {
     dot > 0.0 && dot * dot > MARGIN * MARGIN * direction.norm_squared() * reach_squared
 }
@@ -223,7 +227,8 @@ fn fans_apart(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], l: usize) -> bool {
     beyond(next.cross(&normal)) || beyond(normal.cross(&last)) || beyond(normal) || beyond(-normal)
 }
 
-/// Whether the round cones about two triangles that share a corner (`k` of one, `l` of the other) share nothing else.
+/// Whether the circular cones about two triangles that share a corner (`k` of one, `l` of the other) share nothing
+/// else.
 fn cones_apart(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], l: usize) -> bool {
     // Axis of the cone, and cosine and sine of its half angle.
     let cone = |t: &[Vec3; 3], k: usize| {
@@ -233,7 +238,7 @@ fn cones_apart(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], l: usize) -> bool {
         (axis, axis.dot(&u), (u - v).norm() / 2.0)
     };
     let ((m, cos_a, sin_a), (n, cos_b, sin_b)) = (cone(a, k), cone(b, l));
-    // Half angles are below a right angle, so their sum is below two.
+    // Half angles are below a right angle, so their sum is below two right angles.
     m.dot(&n) < cos_a * cos_b - sin_a * sin_b - MARGIN
 }
 

@@ -1,13 +1,13 @@
-//! Guesses at what a user may have meant. They are said, never taken.
+//! Guesses at what a user may have meant. They are reported, never applied.
 
 use std::ops::RangeInclusive;
 
 use super::{Opening, Wall, opening, survey};
 use crate::Result;
 
-/// Diagonals of a surface in mm between which its unit is believed: a single small artery, and a whole body.
+/// Plausible diagonals of a surface, mm: from a single small artery to a whole body.
 const BELIEVED_MM: RangeInclusive<f64> = 5.0..=3000.0;
-/// Medians of half of the lumen, mm, between which its unit is believed: a distal artery, and a wide aneurysm.
+/// Plausible medians of half the lumen's width, mm: from a distal artery to a wide aneurysm.
 const BELIEVED_LUMEN_MM: RangeInclusive<f64> = 1.0..=30.0;
 /// Units of files, millimetres each.
 const UNITS: [(&str, f64); 5] = [
@@ -17,11 +17,11 @@ const UNITS: [(&str, f64); 5] = [
     ("micrometres", 1e-3),
     ("millimetres", 1.0),
 ];
-/// Diagonals of vessels that are usual, mm.
+/// Usual diagonals of vessels, mm.
 const USUAL_MM: RangeInclusive<f64> = 20.0..=1500.0;
 
-/// What a user may want to know of a wall that was read with `unit_mm`, a sentence each: a unit that may be another, and openings that
-/// face each other.
+/// Hints for the user on a wall that was read with `unit_mm`, one sentence each: on a possibly wrong unit, and on
+/// openings that face each other.
 ///
 /// # Errors
 /// [`Error::Mesh`](crate::Error::Mesh) if the wall cannot be queried.
@@ -31,7 +31,7 @@ pub fn wall_hints(wall: &Wall, unit_mm: f64) -> Result<Vec<String>> {
     Ok(unit.into_iter().chain(facing_hints(wall.openings())).collect())
 }
 
-/// A sentence for each pair of openings that face each other.
+/// One sentence for each pair of openings that face each other.
 pub(super) fn facing_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
     opening::facing(openings).into_iter().map(|[i, j]| {
         let (a, b) = (&openings[i], &openings[j]);
@@ -45,8 +45,8 @@ pub(super) fn facing_hints(openings: &[Opening]) -> impl Iterator<Item = String>
     })
 }
 
-/// A guess at the unit of a surface that is `diagonal_mm` across, with half of its lumen in the median where that is known, when it is read with
-/// `unit_mm`; none if that may be right or no other unit is likelier.
+/// A guess at the right unit of a surface with this diagonal and median of half the lumen's width, if known, read
+/// with `unit_mm`; `None` if that is plausible or no other unit is more so.
 pub(crate) fn unit_hint(diagonal_mm: f64, half_lumen_mm: Option<f64>, unit_mm: f64) -> Option<String> {
     let is_odd = !BELIEVED_MM.contains(&diagonal_mm);
     let is_odd_inside = half_lumen_mm.is_some_and(|mm| !BELIEVED_LUMEN_MM.contains(&mm));
@@ -74,12 +74,12 @@ pub(crate) fn unit_hint(diagonal_mm: f64, half_lumen_mm: Option<f64>, unit_mm: f
             "the surface is {}, unlike any vessel: set vessel.unit_mm (--unit-mm) to the millimetres per unit of the file",
             measures(1.0)
         )),
-        // A small vessel that is nothing else in another unit.
+        // A small vessel that is implausible in every other unit.
         None => None,
     }
 }
 
-/// Three digits.
+/// Rounded to three digits.
 fn rounded(value: f64) -> String {
     let scale = 10_f64.powi(2 - libm::log10(value.abs()).floor() as i32);
     crate::error::number((value * scale).round() / scale)

@@ -1,26 +1,26 @@
 //! Inside or outside, by the generalized winding number.
 //!
-//! Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", ACM TOG 32
-//! (2013): the sum of the signed solid angles of all triangles over 4π is 1 inside and 0 outside a closed surface, and
-//! departs from integers where the surface is broken. Solid angles by Van Oosterom and Strackee, IEEE Trans. Biomed.
-//! Eng. 30 (1983), eq. 8.
+//! Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", ACM TOG
+//! 32 (2013): the sum of the signed solid angles of all triangles over 4π is 1 inside and 0 outside a closed surface,
+//! and deviates from integers where the surface is damaged. Solid angles by Van Oosterom and Strackee, IEEE Trans.
+//! Biomed. Eng. 30 (1983), eq. 8.
 
 use std::f64::consts::PI;
 
 use super::{SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3};
 
-/// How far a winding number may be from an integer before the answer is refused.
+/// Largest deviation of a winding number from an integer that is accepted.
 const LARGEST_DEVIATION: f64 = 0.1;
 
-/// Signed solid angle of a triangle seen from the origin, in steradian: positive if its winding is clockwise from there,
-/// which is what an outward triangle shows to a point inside.
+/// Signed solid angle of a triangle seen from the origin, in steradian: positive if its winding is clockwise from
+/// there, as that of an outward triangle is from inside.
 fn solid_angle(corners: [Vec3; 3]) -> f64 {
     let [a, b, c] = corners;
     let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
     let volume = a.dot(&b.cross(&c));
     let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-    // A point in the plane of the triangle: in its interior the angle has no sign, and we count none.
+    // A point in the plane of the triangle: in its interior the sign is undefined, and the angle counts as zero.
     if volume == 0.0 { 0.0 } else { 2.0 * libm::atan2(volume, denominator) }
 }
 
@@ -32,8 +32,8 @@ pub(super) fn winding(mesh: &SurfaceMesh, caps: &[[Vec3; 3]], point_mm: &Vec3) -
 }
 
 impl Wall {
-    /// Generalized winding number of the wall and its caps around `point_mm`: 1 in the lumen, 0 outside, for a sound surface.
-    /// Exact sum over all triangles; NaN for a point that is not finite.
+    /// Generalized winding number of the wall and its caps around `point_mm`: 1 in the lumen, 0 outside, for a sound
+    /// surface. Exact sum over all triangles; NaN for a point that is not finite.
     pub fn winding_number(&self, point_mm: &Vec3) -> f64 {
         winding(&self.mesh, &self.caps, point_mm)
     }
@@ -41,11 +41,11 @@ impl Wall {
     /// Whether `point_mm` is in the lumen.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if the winding number is more than 0.1 from an integer: the surface is too broken to tell, or the
+    /// [`Error::Mesh`] if the winding number is more than 0.1 from an integer: the surface is too damaged, or the
     /// point lies on it.
     pub fn contains(&self, point_mm: &Vec3) -> Result<bool> {
         let number = self.winding_number(point_mm);
-        // Not `>`: a NaN must end here too.
+        // Written so that NaN is also an error.
         if (number - number.round()).abs() <= LARGEST_DEVIATION {
             return Ok(number.round() >= 1.0);
         }

@@ -1,7 +1,8 @@
-//! Whether two triangles meet where they should not.
+//! Exact test whether two triangles intersect.
 //!
-//! All decisions are signs of exact predicates (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust
-//! geometric predicates", 1997; crate `robust`), so that neighbours that merely touch are never taken for crossing.
+//! All decisions are signs of exact predicates (Shewchuk, "Adaptive precision floating-point arithmetic and fast
+//! robust geometric predicates", 1997; crate `robust`), so that neighbours that merely touch never count as
+//! intersecting.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
@@ -16,7 +17,7 @@ fn side(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
     orient3d(coord(a), coord(b), coord(c), coord(d))
 }
 
-/// Whether segment p–q meets triangle `t`, touching included.
+/// Whether segment p–q intersects or touches triangle `t`.
 fn segment_meets(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     let [a, b, c] = t;
     let (below, above) = (side(a, b, c, p), side(a, b, c, q));
@@ -30,7 +31,7 @@ fn segment_meets(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     around.iter().all(|s| *s >= 0.0) || around.iter().all(|s| *s <= 0.0)
 }
 
-/// The same for a segment in the plane of the triangle.
+/// As [`segment_meets`], for a segment in the plane of the triangle.
 fn flat_segment_meets(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     let normal = (t[1] - t[0]).cross(&(t[2] - t[0]));
     let drop = normal.iamax();
@@ -45,7 +46,7 @@ fn flat_segment_meets(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
 
 fn segments_meet(a: Coord<f64>, b: Coord<f64>, c: Coord<f64>, d: Coord<f64>) -> bool {
     let apart = |from: f64, to: f64| from * to > 0.0;
-    // Collinear segments are caught by the end-in-triangle test of the caller.
+    // Collinear segments are found by the caller's test for ends in triangles.
     !apart(orient2d(a, b, c), orient2d(a, b, d)) && !apart(orient2d(c, d, a), orient2d(c, d, b)) && {
         let collinear = orient2d(a, b, c) == 0.0 && orient2d(a, b, d) == 0.0;
         !collinear
@@ -55,7 +56,8 @@ fn segments_meet(a: Coord<f64>, b: Coord<f64>, c: Coord<f64>, d: Coord<f64>) -> 
 /// Opposite vertices of an edge on the same side of it within this angle (radians squared over two) are a fold.
 const FOLD_COSINE: f64 = 1.0 - 1e-10;
 
-/// Whether two triangles intersect, apart from the vertices they share. `a` and `b` are index triples into `vertices`.
+/// Whether two triangles intersect, apart from the vertices they share. `a` and `b` are index triples into
+/// `vertices`.
 pub(crate) fn triangles_intersect(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
     let at = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
     let (pa, pb) = (at(a), at(b));
@@ -66,7 +68,7 @@ pub(crate) fn triangles_intersect(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -
                 || (0..3).any(|k| segment_meets(&pb[k], &pb[(k + 1) % 3], &pa))
         }
         1 => {
-            // Only the edges opposite the common vertex can show it.
+            // Only the edges opposite the common vertex can intersect.
             let k = shared[0];
             let other = (0..3).find(|&j| b[j] == a[k]).unwrap_or(0);
             segment_meets(&pa[(k + 1) % 3], &pa[(k + 2) % 3], &pb)
@@ -81,7 +83,7 @@ pub(crate) fn triangles_intersect(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -
             };
             across(pa[free(a, b)]).dot(&across(pb[free(b, a)])) > FOLD_COSINE
         }
-        // Duplicates are reported as such.
+        // Duplicates are reported separately.
         _ => false,
     }
 }

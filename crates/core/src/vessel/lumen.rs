@@ -1,20 +1,20 @@
-//! What devices are pushed into: a surface, or what a centre line says.
+//! The lumen of a vessel, given by a surface or a centre line.
 
 use std::sync::{Arc, OnceLock};
 
 use super::{Opening, SweptVessel, Wall, WallQuery, WallStore};
 use crate::{Result, Vec3};
 
-/// The lumen of a vessel. Shared by all who have a copy.
+/// The lumen of a vessel. Clones share it.
 #[derive(Debug, Clone)]
 pub enum Lumen {
-    /// That of a surface.
+    /// Given by a surface.
     Meshed(Arc<Meshed>),
-    /// That of a centre line, which has a mesh when somebody wants one.
+    /// Given by a centre line, which is meshed only if needed.
     Swept(Arc<SweptVessel>),
 }
 
-/// A wall, and what answers questions about it once one was asked.
+/// A wall, with query structures built when first needed.
 #[derive(Debug)]
 pub struct Meshed {
     wall: Wall,
@@ -68,7 +68,7 @@ impl Lumen {
         }
     }
 
-    /// The opening that devices come in by unless another is given: that at the root of a centre line, of a surface as [`Wall::inlet`] says.
+    /// The default opening for devices: the root of a centre line; for a surface see [`Wall::inlet`].
     pub fn inlet(&self) -> Option<&Opening> {
         match self {
             Self::Meshed(meshed) => meshed.wall.inlet(),
@@ -76,10 +76,10 @@ impl Lumen {
         }
     }
 
-    /// Whether a place is in the lumen.
+    /// Whether a position is in the lumen.
     ///
     /// # Errors
-    /// As [`Wall::contains`], of a surface.
+    /// For a surface, as [`Wall::contains`].
     pub fn contains(&self, x: &Vec3) -> Result<bool> {
         match self {
             Self::Meshed(meshed) => meshed.wall.contains(x),
@@ -87,7 +87,7 @@ impl Lumen {
         }
     }
 
-    /// Whether a place is likelier in the lumen than not: of a surface however broken.
+    /// Whether a position is more likely in the lumen than not, for a surface however damaged.
     pub(crate) fn holds(&self, x: &Vec3) -> bool {
         match self {
             Self::Meshed(meshed) => meshed.wall.winding_number(x) > 0.5,
@@ -95,7 +95,7 @@ impl Lumen {
         }
     }
 
-    /// The box about the vessel, mm; none of a surface without vertices.
+    /// The bounding box of the vessel, mm; `None` for a surface without vertices.
     pub(crate) fn bounds_mm(&self) -> Option<(Vec3, Vec3)> {
         match self {
             Self::Meshed(meshed) => meshed.wall.mesh().bounds_mm(),
@@ -103,10 +103,10 @@ impl Lumen {
         }
     }
 
-    /// How far a place is from the wall, mm, on whichever side. For one question, not for many.
+    /// Distance of a position from the wall, mm, on either side. For a single query.
     ///
     /// # Errors
-    /// As [`WallQuery::new`], of a surface.
+    /// For a surface, as [`WallQuery::new`].
     pub(crate) fn distance_mm(&self, x: &Vec3) -> Result<f64> {
         match self {
             Self::Meshed(meshed) => Ok(meshed.query()?.distance_mm(x)),
@@ -114,16 +114,16 @@ impl Lumen {
         }
     }
 
-    /// Its wall as triangles; of a centre line they are made with the first question, or come from `store`
-    /// ([`NoStore`](super::NoStore) keeps nothing).
+    /// Its wall as triangles; for a centre line they are made when first needed, or come from `store`
+    /// ([`NoStore`](super::NoStore) stores nothing).
     ///
     /// # Errors
-    /// As [`GeneratedWall::new`](super::GeneratedWall::new), of a centre line.
+    /// For a centre line, as [`GeneratedWall::new`](super::GeneratedWall::new).
     pub fn wall(&self, store: &dyn WallStore) -> Result<&Wall> {
         self.meshed(store).map(|meshed| &meshed.wall)
     }
 
-    /// Its wall alone.
+    /// Extracts its wall.
     ///
     /// # Errors
     /// As [`Lumen::wall`].
@@ -136,7 +136,7 @@ impl Lumen {
         }
     }
 
-    /// Distance queries to the triangles.
+    /// Distance queries on its triangles.
     ///
     /// # Errors
     /// As [`Lumen::wall`] and [`WallQuery::new`].

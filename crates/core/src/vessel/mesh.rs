@@ -1,4 +1,4 @@
-//! A triangle surface: vertices and index triples, nothing derived.
+//! A triangle surface: vertices and index triples, without derived data.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,8 @@ impl SurfaceMesh {
         self.triangles[index].map(|v| self.vertices_mm[v as usize])
     }
 
-    /// The six faces of a box between two corners, in cells of about `cell_mm`, outwards. Faces share no vertices: weld them where they must.
+    /// The six faces of a box between two corners, in cells of about `cell_mm`, facing outwards. Faces share no
+    /// vertices; weld them if needed.
     pub fn cuboid(low: Vec3, high: Vec3, cell_mm: f64) -> Self {
         let mut mesh = Self::default();
         let size = high - low;
@@ -51,7 +52,8 @@ impl SurfaceMesh {
         mesh
     }
 
-    /// Unit normals of vertices, outwards as the triangles are: those of the triangles about each, weighted by angle; zero where there is none.
+    /// Unit normals of vertices, outwards like the triangles: those of the adjacent triangles, weighted by angle;
+    /// zero without triangles.
     pub fn vertex_normals(&self) -> Vec<Vec3> {
         let mut normals = vec![Vec3::zeros(); self.vertices_mm.len()];
         for (index, triangle) in self.triangles.iter().enumerate() {
@@ -74,8 +76,8 @@ impl SurfaceMesh {
         Some(self.vertices_mm.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))))
     }
 
-    /// [`SurfaceMesh::bounds_mm`] of the vertices that triangles use: others may be anywhere and mean nothing. Indices must
-    /// be in range.
+    /// [`SurfaceMesh::bounds_mm`] of the vertices that triangles use; others are meaningless. Indices must be in
+    /// range.
     pub(crate) fn used_bounds_mm(&self) -> Option<(Vec3, Vec3)> {
         let mut used = self.triangles.iter().flatten().map(|v| self.vertices_mm[*v as usize]);
         let first = used.next()?;
@@ -101,13 +103,13 @@ pub(crate) fn area(corners: &[Vec3; 3]) -> f64 {
     (b - a).cross(&(c - a)).norm() / 2.0
 }
 
-/// Unit inward normals of vertices, weighted by angle; some direction where there is none.
+/// Unit inward normals of vertices, weighted by angle; an arbitrary direction where undefined.
 pub(crate) fn inward_vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
     let inward = |outward: Vec3| if outward == Vec3::zeros() { Vec3::x() } else { -outward };
     mesh.vertex_normals().into_iter().map(inward).collect()
 }
 
-/// Keeps what `keep` says, in its order, by its number in the list and what it is.
+/// Keeps the elements for which `keep` holds, given index and element, in order.
 pub(super) fn retain_numbered<T>(list: &mut Vec<T>, keep: impl Fn(usize, &T) -> bool) {
     let mut next = 0;
     list.retain(|one| {

@@ -1,4 +1,4 @@
-//! What a device is pushed into.
+//! The vessel that devices are pushed into.
 
 pub mod anatomy;
 mod centreline;

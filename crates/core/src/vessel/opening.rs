@@ -1,4 +1,4 @@
-//! The holes of a wall: where blood and devices pass.
+//! The openings of a wall, through which blood and devices pass.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -7,35 +7,35 @@ use super::SurfaceMesh;
 use super::topology::{EdgeTable, EdgeUse, NONE};
 use crate::Vec3;
 
-/// Openings lead on straight for so much, mm, where nothing is in the way.
+/// Length of the straight extension of an opening, mm, if nothing is in the way.
 const MOST_BEYOND_MM: f64 = 32.0;
-/// … and for so much, mm, whatever is.
+/// Smallest length of the extension, mm, even if something is.
 const LEAST_BEYOND_MM: f64 = 3.0;
-/// What is drawn out of an opening keeps so many of its radii free about its middle.
+/// Radius of the free space around an extension's axis, in radii of the opening.
 const FREE_RADII: f64 = 1.1;
-/// Devices come in by an opening of at least this part of the widest one's radius: narrower ones are branches.
+/// Smallest radius of the default opening for devices, as a fraction of the widest one's: narrower ones are branches.
 const TRUNK: f64 = 0.4;
 
 /// An open end of a wall: one closed loop of edges that belong to a single triangle each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
-    /// Its number: largest radius first, ties by centre (x, then y, then z).
+    /// Its index: largest radius first, ties by centre (x, then y, then z).
     pub index: usize,
-    /// Centre in mm: mean of the loop, each vertex weighted with the length of its edges.
+    /// Centre in mm: mean of the loop, each vertex weighted by the length of its edges.
     pub centre_mm: Vec3,
-    /// Mean distance of the loop from the centre in mm, weighted in the same way: exact for a polygon inscribed in a circle.
+    /// Mean distance of the loop from the centre, mm, with the same weights: exact for a polygon inscribed in a
+    /// circle.
     pub radius_mm: f64,
-    /// Unit vector along the loop's vector area, pointing out of the vessel. Pushing a device in goes against it.
+    /// Unit vector along the loop's vector area, pointing out of the vessel. A device is pushed in against it.
     pub direction: Vec3,
-    /// The loop's vertices, in the direction in which the triangles of a cap would run along it; none where there is no mesh.
+    /// The loop's vertices, in the order in which triangles of a cap would traverse them; empty without a mesh.
     pub boundary: Vec<u32>,
-    /// How far the vessel may be drawn out straight beyond it, mm, before that meets the vessel again or what is drawn out of
-    /// another opening.
+    /// Possible length of a straight extension of the vessel, mm, before it meets the vessel or another extension.
     pub beyond_mm: f64,
 }
 
 impl Opening {
-    /// Centre, radius and direction of a loop of vertices; `index` is left 0.
+    /// Centre, radius and direction of a loop of vertices; `index` stays 0.
     fn of_loop(mesh: &SurfaceMesh, boundary: Vec<u32>) -> Self {
         let at = |k: usize| mesh.vertices_mm[boundary[k % boundary.len()] as usize];
         let count = boundary.len();
@@ -44,12 +44,12 @@ impl Opening {
         let centre_mm = (0..count).map(|k| weight(k) * at(k)).sum::<Vec3>() / total;
         let radius_mm = (0..count).map(|k| weight(k) * (at(k) - centre_mm).norm()).sum::<f64>() / total;
         let area: Vec3 = (0..count).map(|k| (at(k) - centre_mm).cross(&(at(k + 1) - centre_mm)) / 2.0).sum();
-        // A slit encloses no area; any direction is as good as another, but it must be a unit vector.
+        // A slit encloses no area; any unit vector will do.
         let direction = area.try_normalize(1e-12 * radius_mm * radius_mm).unwrap_or_else(Vec3::x);
         Self { index: 0, centre_mm, radius_mm, direction, boundary, beyond_mm: MOST_BEYOND_MM }
     }
 
-    /// The end of a tube of which there is no mesh. `index` is left 0.
+    /// The end of a tube without a mesh. `index` stays 0.
     pub(super) fn at_end(centre_mm: Vec3, radius_mm: f64, direction: Vec3) -> Self {
         Self { index: 0, centre_mm, radius_mm, direction, boundary: Vec::new(), beyond_mm: MOST_BEYOND_MM }
     }
@@ -61,7 +61,7 @@ impl Opening {
         (0..count).map(|k| (at(k + 1) - at(k)).norm()).sum()
     }
 
-    /// How far `x` is beyond the opening's plane, and aside from its axis, mm.
+    /// Distance of `x` beyond the opening's plane, and from its axis, mm.
     pub fn beyond_and_aside_mm(&self, x: &Vec3) -> (f64, f64) {
         let offset = x - self.centre_mm;
         let beyond_mm = offset.dot(&self.direction);
@@ -74,7 +74,7 @@ impl Opening {
         (0..self.boundary.len()).map(move |k| [at(k), at(k + 1), self.centre_mm])
     }
 
-    /// Adds that fan to the mesh whose opening it is; it shares the loop's vertices.
+    /// Adds that fan to the mesh of the opening; it shares the loop's vertices.
     pub(crate) fn close(&self, mesh: &mut SurfaceMesh) {
         let centre = mesh.vertices_mm.len() as u32;
         mesh.vertices_mm.push(self.centre_mm);
@@ -83,26 +83,26 @@ impl Opening {
     }
 }
 
-/// The opening that devices come in by, as [`Wall::inlet`](super::Wall::inlet) says.
+/// The default opening for devices, as in [`Wall::inlet`](super::Wall::inlet).
 pub(super) fn inlet(openings: &[Opening]) -> Option<&Opening> {
     let widest_mm = openings.iter().map(|opening| opening.radius_mm).fold(0.0, f64::max);
     let trunks = openings.iter().filter(|opening| opening.radius_mm >= TRUNK * widest_mm);
     trunks.min_by(|a, b| a.centre_mm.z.total_cmp(&b.centre_mm.z))
 }
 
-/// The places of a mesh that stand for all of it there: its vertices and the middles of its triangles.
+/// Sample points of a mesh: its vertices and the middles of its triangles.
 pub(super) fn places(mesh: &SurfaceMesh) -> impl Iterator<Item = Vec3> {
     let centres = (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<Vec3>() / 3.0);
     mesh.vertices_mm.iter().copied().chain(centres)
 }
 
-/// Shortens what may be drawn out beyond the openings to where it meets nothing: no other, and none of these places of the wall.
+/// Shortens the extensions of openings so that they meet neither each other nor these sample points of the wall.
 pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, openings: &mut [Opening]) {
     let mut beyond = vec![MOST_BEYOND_MM; openings.len()];
     for (i, a) in openings.iter().enumerate() {
         for (j, b) in openings.iter().enumerate().skip(i + 1) {
             let free = FREE_RADII * (a.radius_mm + b.radius_mm);
-            // Neighbours may be as near as they begin.
+            // Neighbours may be as close as they are at the openings.
             let least = free.min((a.centre_mm - b.centre_mm).norm() * (1.0 - 1e-9));
             if apart(a, b, MOST_BEYOND_MM) >= least {
                 continue;
@@ -131,8 +131,8 @@ pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, openings: &mut [Openi
     }
 }
 
-/// Least distance of the straight ways of this length out of two openings, mm: Ericson, *Real-Time Collision Detection*, 2005,
-/// section 5.1.9, for unit directions.
+/// Smallest distance between the straight extensions of this length of two openings, mm: Ericson, *Real-Time
+/// Collision Detection*, 2005, section 5.1.9, for unit directions.
 fn apart(a: &Opening, b: &Opening, length_mm: f64) -> f64 {
     let (d, e, r) = (a.direction, b.direction, a.centre_mm - b.centre_mm);
     let (cos, c, f) = (d.dot(&e), d.dot(&r), e.dot(&r));
@@ -144,22 +144,22 @@ fn apart(a: &Opening, b: &Opening, length_mm: f64) -> f64 {
     (r + d * s - e * t).norm()
 }
 
-/// Cosine of the angle between the directions of openings that face each other, at most.
+/// Largest cosine of the angle between the directions of openings that face each other.
 const OPPOSITE: f64 = -0.8;
-/// The smaller radius of such openings over the larger one, at least.
+/// Smallest ratio of the radii of such openings.
 const ALIKE: f64 = 0.7;
 
-/// Part of the radius by which the parts of such a vessel may overlap.
+/// Fraction of the radius by which the two parts of such a vessel may overlap.
 const OVERLAP: f64 = 0.25;
 
-/// Pairs of openings of like size that face each other no farther apart than the larger radius.
+/// Pairs of openings of similar size that face each other at a distance of at most the larger radius.
 pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
     let mut pairs = Vec::new();
     for (i, a) in openings.iter().enumerate() {
         // The largest come first.
         for b in openings[i + 1..].iter().take_while(|b| b.radius_mm >= ALIKE * a.radius_mm) {
             let offset = b.centre_mm - a.centre_mm;
-            // The ends of a short tube look away from each other.
+            // The ends of a short tube face away from each other.
             let is_before = offset.dot(&a.direction) >= -OVERLAP * a.radius_mm;
             if is_before && offset.norm() <= a.radius_mm && a.direction.dot(&b.direction) <= OPPOSITE {
                 pairs.push([a.index, b.index]);
@@ -169,14 +169,14 @@ pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
     pairs
 }
 
-/// How openings are numbered, as [`Opening::index`] says.
+/// The order of openings, as in [`Opening::index`].
 fn order(a: &Opening, b: &Opening) -> Ordering {
     let key = |o: &Opening| [-o.radius_mm, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z];
     let order = |k: usize| key(a)[k].total_cmp(&key(b)[k]);
     order(0).then(order(1)).then(order(2)).then(order(3))
 }
 
-/// Numbers openings.
+/// Sets the indices of openings.
 pub(super) fn number(openings: &mut [Opening]) {
     openings.sort_by(order);
     for (index, opening) in openings.iter_mut().enumerate() {
@@ -187,18 +187,19 @@ pub(super) fn number(openings: &mut [Opening]) {
 /// Boundary loops of a consistently oriented mesh.
 #[derive(Debug)]
 pub(crate) struct Boundary {
-    /// The openings, numbered.
+    /// The openings, with indices.
     pub(crate) openings: Vec<Opening>,
-    /// For each opening the triangle that holds its first edge.
+    /// For each opening the triangle with its first edge.
     pub(crate) first_triangle: Vec<u32>,
-    /// Open edges that close to no loop, because they end at a non-manifold edge.
+    /// Open edges that form no loop, because they end at a non-manifold edge.
     pub(crate) stray_edges: usize,
 }
 
-/// Follows all open edges of `mesh`, whose edges `table` holds, into loops.
+/// Joins all open edges of `mesh`, whose edges are in `table`, into loops.
 ///
-/// Where two sheets touch in a vertex, the walk goes around it through the triangles between the incoming and the outgoing
-/// edge and so stays on its sheet; where two holes of one sheet touch (a figure eight), the loop is cut in two there.
+/// Where two sheets touch in a vertex, the walk goes around it through the triangles between the incoming and the
+/// outgoing edge and so stays on its sheet; where two holes of one sheet touch (a figure eight), the loop is split
+/// there.
 pub(crate) fn boundary(mesh: &SurfaceMesh, table: &EdgeTable) -> Boundary {
     let triangles = &mesh.triangles;
     let single = |uses: &[EdgeUse]| if let [only] = uses { Some((only.triangle, only.side)) } else { None };
@@ -247,7 +248,7 @@ pub(crate) fn boundary(mesh: &SurfaceMesh, table: &EdgeTable) -> Boundary {
     Boundary { openings, first_triangle, stray_edges }
 }
 
-/// Cuts a closed walk at vertices it passes more than once.
+/// Splits a closed walk at vertices it passes more than once.
 fn simple_loops(walked: &[u32]) -> Vec<Vec<u32>> {
     let mut loops = Vec::new();
     let mut path: Vec<u32> = Vec::new();
@@ -267,11 +268,11 @@ fn simple_loops(walked: &[u32]) -> Vec<Vec<u32>> {
     loops
 }
 
-/// The open edge that leaves the head of open edge `from`, found by turning around that vertex inside the surface.
+/// The open edge that starts at the head of open edge `from`, found by turning around that vertex within the surface.
 fn next_open_edge(triangles: &[[u32; 3]], across: &[[u32; 3]], from: (u32, u8)) -> Option<(u32, u8)> {
     let vertex = triangles[from.0 as usize][(from.1 as usize + 1) % 3];
     let mut triangle = from.0;
-    // A fan has no more triangles than the mesh: the bound stops walks around broken vertices.
+    // A fan has at most as many triangles as the mesh: the bound stops walks around damaged vertices.
     for _ in 0..=triangles.len() {
         let corners = triangles[triangle as usize];
         let side = corners.iter().position(|&v| v == vertex)?;
@@ -347,7 +348,7 @@ mod tests {
         let nothing = SurfaceMesh::default();
         assert_eq!(beyond(&nothing, 0.0), [MOST_BEYOND_MM; 2]);
         assert_eq!(beyond(&nothing, -0.2), [MOST_BEYOND_MM; 2]);
-        // They come within 2.2 mm of each other where each has gone 7.8 mm / √2.
+        // They approach to 2.2 mm after 7.8 mm / √2 each.
         let met = 7.8 / 2.0_f64.sqrt();
         assert!(
             beyond(&nothing, 1.0).iter().all(|mm| (mm - met).abs() < 1e-3),

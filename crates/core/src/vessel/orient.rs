@@ -1,24 +1,24 @@
-//! Making neighbours agree on which side is out.
+//! Orients triangles consistently with their neighbours.
 
 use super::topology::{Edges, NONE};
 
-/// The outcome of [`make_consistent`].
+/// The result of [`make_consistent`].
 #[derive(Debug)]
 pub(crate) struct Consistency {
-    /// For each triangle the patch it belongs to: what is connected through edges of exactly two triangles.
+    /// The patch of each triangle: what is connected through edges of exactly two triangles.
     pub(crate) patch: Vec<u32>,
     /// Number of patches.
     pub(crate) patches: usize,
     /// Triangles turned over.
     #[cfg(test)]
     flipped: Vec<bool>,
-    /// Edges across which no choice agrees: the surface is one-sided there (a Möbius strip).
+    /// Edges with contradictory orientations: the surface is one-sided there (a Möbius strip).
     pub(crate) contradictions: usize,
 }
 
-/// Turns triangles over until neighbours run along their common edge in opposite directions. In each patch the
-/// majority keeps its direction (the first triangle's side on a tie), so that a few flipped faces are the ones reported.
-/// `edges` are those of the triangles.
+/// Turns triangles over until neighbours traverse their common edge in opposite directions. In each patch the
+/// majority keeps its direction (on a tie that of the first triangle), so that a few flipped faces are the ones
+/// reported. `edges` are those of the triangles.
 pub(crate) fn make_consistent(triangles: &mut [[u32; 3]], edges: &mut Edges) -> Consistency {
     let table = edges.of(triangles);
     let across = table.neighbours(triangles.len());
@@ -71,7 +71,7 @@ pub(crate) fn make_consistent(triangles: &mut [[u32; 3]], edges: &mut Edges) -> 
         triangle.swap(1, 2);
         edges.changed();
     }
-    // Each contradiction was met from both sides.
+    // Each contradiction was counted from both sides.
     Consistency {
         patch,
         patches: patches as usize,

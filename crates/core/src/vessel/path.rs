@@ -1,4 +1,4 @@
-//! The way along a centre line from the inlet to a place of the vessel.
+//! The path along a centre line from the inlet to a point of the vessel.
 
 use crate::Vec3;
 
@@ -15,11 +15,11 @@ pub struct OnPath {
     pub arc_mm: f64,
     /// Distance from the path, mm.
     pub distance_mm: f64,
-    /// The vessel's radius there, the larger of those at the ends of the piece, mm.
+    /// The vessel's radius there, the larger of those at the ends of the segment, mm.
     pub radius_mm: f64,
 }
 
-/// From one point of a path to the next, with the vessel's radius at both.
+/// A segment of a path, with the vessel's radius at both ends.
 struct Piece {
     from: Vec3,
     along: Vec3,
@@ -27,11 +27,12 @@ struct Piece {
     radii_mm: [f64; 2],
 }
 
-/// Most that a radius changes over the length in which it does so, as far as the deepest place is concerned.
+/// Largest slope of the radius along a segment in the search for the deepest position.
 const STEEPEST: f64 = 0.99;
 
 impl CentrelinePath {
-    /// The way through these points with the vessel's radius in mm at each; none of fewer than two, or where two that follow coincide.
+    /// The path through these points with the vessel's radius in mm at each; `None` for fewer than two, or if
+    /// consecutive ones coincide.
     pub fn new(points: Vec<(Vec3, f64)>) -> Option<Self> {
         let apart = points.windows(2).all(|pair| (pair[1].0 - pair[0].0).norm() > 0.0);
         (points.len() > 1 && apart).then_some(Self { points })
@@ -47,12 +48,12 @@ impl CentrelinePath {
         self.points.windows(2).map(|pair| (pair[1].0 - pair[0].0).norm()).sum()
     }
 
-    /// Where it ends, mm.
+    /// Its end, mm.
     pub fn end_mm(&self) -> Vec3 {
         self.points[self.points.len() - 1].0
     }
 
-    /// The least radius at its points, mm.
+    /// The smallest radius at its points, mm.
     pub fn least_radius_mm(&self) -> f64 {
         self.points.iter().map(|point| point.1).fold(f64::INFINITY, f64::min)
     }
@@ -69,13 +70,15 @@ impl CentrelinePath {
         self.least(on_piece, |on| on.distance_mm)
     }
 
-    /// The point of the path in whose vessel `x` is deepest: its distance less the radius there, which changes evenly between points, is the
-    /// least. At the mouth of a branch what is in the trunk is nearer to the branch's line, and deeper in the trunk.
+    /// The point of the path in whose vessel `x` is deepest, with the smallest difference of distance and local
+    /// radius, linear between points. At the mouth of a branch a position in the trunk may be nearer to the branch's
+    /// line, but deeper in the trunk.
     pub(crate) fn deepest(&self, x: &Vec3) -> OnPath {
         let on_piece = |piece: &Piece| {
             let &Piece { from, along, length_mm, radii_mm: [from_radius_mm, to_radius_mm] } = piece;
             let slope_mm = to_radius_mm - from_radius_mm;
-            // Where the distance grows as fast as the radius does: beside the foot of the perpendicular by the slope's share of the height.
+            // Where the distance grows as fast as the radius: offset from the foot of the perpendicular by the
+            // slope's share of the height.
             let foot_mm = (x - from).dot(&along) / length_mm;
             let height_mm = (x - from - along * (foot_mm / length_mm)).norm();
             let sine = (slope_mm / length_mm).clamp(-STEEPEST, STEEPEST);
@@ -87,7 +90,8 @@ impl CentrelinePath {
         self.least(on_piece, |on| on.distance_mm - on.radius_mm)
     }
 
-    /// Of the points that `on_piece` finds, one on each piece with its arc length from there, the first for which `of` is the least.
+    /// Of the points found by `on_piece`, one on each segment with its arc length from there, the first with the
+    /// smallest `of`.
     fn least(&self, on_piece: impl Fn(&Piece) -> OnPath, of: impl Fn(&OnPath) -> f64) -> OnPath {
         let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
         let mut before_mm = 0.0;
@@ -104,12 +108,13 @@ impl CentrelinePath {
         best
     }
 
-    /// The point at an arc length from the inlet; beyond the end the end.
+    /// The point at an arc length from the inlet; beyond the end, the end.
     pub fn at(&self, arc_mm: f64) -> Vec3 {
         self.place(arc_mm).0
     }
 
-    /// The point at an arc length from the inlet, and the radius there, which changes evenly between points, mm; beyond the end the end.
+    /// The point at an arc length from the inlet, and the radius there, linear between points, mm; beyond the end,
+    /// the end.
     pub fn place(&self, mut arc_mm: f64) -> (Vec3, f64) {
         for pair in self.points.windows(2) {
             let piece = pair[1].0 - pair[0].0;

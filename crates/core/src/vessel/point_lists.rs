@@ -1,7 +1,8 @@
-//! Centre lines as other programs write them: lists of points with radii, line after line, and no parents.
+//! Centre lines as written by other programs: lists of points with radii, line after line, without parents.
 //!
-//! VMTK's `.dat` and the tables that ParaView and 3D Slicer export of VMTK's lines have a header that names their columns. All lines begin
-//! at the same end, or end there. Where two lines run together, the second joins the first.
+//! VMTK's `.dat` and the tables that ParaView and 3D Slicer export of VMTK's lines have a header that names their
+//! columns. All lines begin at the same end, or end there. Where two lines coincide, the second is joined to the
+//! first.
 
 use super::CentrelineNode;
 use super::extract::{Growing, Sphere};
@@ -13,7 +14,7 @@ const Y: [&str; 3] = ["y", "points:1", "points_1"];
 const Z: [&str; 3] = ["z", "points:2", "points_2"];
 const RADIUS: [&str; 2] = ["maximuminscribedsphereradius", "radius"];
 
-/// Where the columns of a list of points are, in a header of so many words.
+/// Indices of the columns of a list of points, for a header with this number of words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Columns {
     place: [usize; 4],
@@ -21,7 +22,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Those of a header; none if it is not that of such a list.
+    /// The columns of a header; `None` if it is not that of such a list.
     pub(super) fn of_header(words: &[&str]) -> Option<Self> {
         let words: Vec<String> = words.iter().map(|word| word.trim_matches('"').to_lowercase()).collect();
         let find = |names: &[&str]| words.iter().position(|word| names.contains(&word.as_str()));
@@ -29,7 +30,7 @@ impl Columns {
         (!words.iter().any(|word| word == "parent")).then_some(Self { place, count: words.len() })
     }
 
-    /// The point of a row of as many words.
+    /// The point of a row with the same number of words.
     pub(super) fn point(&self, words: &[&str]) -> Result<CentrelineNode, String> {
         let mut numbers = [0.0; 4];
         for ((number, &column), name) in numbers.iter_mut().zip(&self.place).zip(["x", "y", "z", "radius"]) {
@@ -41,7 +42,8 @@ impl Columns {
     }
 }
 
-/// The tree of points that follow one another; a line ends where the next point is outside the sphere of the last, or the same end again.
+/// The tree of a list of points; a line ends where the next point is outside the sphere of the last one, or at the
+/// common end again.
 pub(super) fn tree(points: &[CentrelineNode]) -> Result<Vec<CentrelineNode>, String> {
     let Some(first_mm) = points.first().map(|point| point.position_mm) else { return Ok(Vec::new()) };
     let follows = |a: &CentrelineNode, b: &CentrelineNode| {
@@ -87,7 +89,7 @@ mod tests {
         CentrelineTree::from_bytes(text.as_bytes(), Path::new("lines.dat"))
     }
 
-    /// The ways to all ends of a tree, each from the root, as VMTK writes them; the second is turned over.
+    /// The paths to all ends of a tree, each from the root, as VMTK writes them; the second is reversed.
     fn list(header: &str, tree: &CentrelineTree) -> String {
         let mut text = format!("{header}\n");
         let ends = tree.targets().iter().filter_map(|target| tree.path_to(target.row));

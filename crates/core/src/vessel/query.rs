@@ -1,8 +1,8 @@
-//! How far a point is from the wall, and on which side.
+//! Distance of a point from the wall, and its side.
 //!
-//! A bounding volume hierarchy (parry) finds the closest triangle; angle-weighted pseudo-normals decide the side, which is
-//! right also where the closest feature is an edge or a vertex (Bærentzen and Aanæs, "Signed distance computation using
-//! the angle weighted pseudonormal", IEEE TVCG 11, 2005). Types of parry and glam stay inside this file.
+//! A bounding volume hierarchy (parry) finds the closest triangle; angle-weighted pseudo-normals determine the side,
+//! correctly also where the closest feature is an edge or a vertex (Bærentzen and Aanæs, "Signed distance computation
+//! using the angle weighted pseudonormal", IEEE TVCG 11, 2005). Types of parry and glam are not exposed by this file.
 
 use std::sync::OnceLock;
 
@@ -15,10 +15,11 @@ use super::topology::{EdgeTable, NONE};
 use super::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Error, Result, Vec3};
 
-/// Closer to the wall than this, in mm, the direction to the closest point is rounding: the triangle's normal is used.
+/// Distance from the wall, mm, below which the direction to the closest point is rounding: then the triangle's normal
+/// is used.
 const ON_WALL_MM: f64 = 1e-7;
 
-/// Boxes of triangles are taken for larger by this, in mm, when a way through them is looked for: more than rounding.
+/// Margin added to boxes of triangles, mm, in queries along a line: more than rounding.
 const BOX_MARGIN_MM: f64 = 1e-9;
 
 /// The closest point of a wall.
@@ -30,22 +31,22 @@ pub struct Nearest {
     pub distance_mm: f64,
     /// Unit vector from the wall into the lumen, along the line to the queried point; on the wall itself the triangle's normal.
     pub normal: Vec3,
-    /// The triangle, as numbered in the wall's mesh.
+    /// The index of the triangle in the wall's mesh.
     pub triangle: u32,
-    /// Whether the closest point is on the rim of an opening: the queried point is then past the end of the vessel (or level
-    /// with it), and the sign of the distance means nothing.
+    /// Whether the closest point is on the rim of an opening: then the queried point is past the end of the vessel
+    /// (or level with it), and the sign of the distance is meaningless.
     pub rim: bool,
 }
 
-/// Closest-point queries on a wall. What they need is made ready with the first of them, or before it where
-/// the first must not wait.
+/// Closest-point queries on a wall. Their structures are built by the first query, or in advance if that must be
+/// fast.
 #[derive(Clone)]
 pub struct WallQuery {
     mesh: SurfaceMesh,
     ready: OnceLock<Option<Ready>>,
 }
 
-/// What answers queries.
+/// The query structures.
 #[derive(Clone)]
 struct Ready {
     shape: TriMesh,
@@ -104,12 +105,12 @@ impl WallQuery {
         self.ready.get_or_init(|| Ready::new(&self.mesh)).as_ref()
     }
 
-    /// Makes ready for queries what the first one would.
+    /// Builds the query structures in advance.
     pub(crate) fn prepare(&self) {
         self.ready();
     }
 
-    /// Unit normal of a triangle, into the lumen. `triangle` is one that [`WallQuery::nearest`] returned.
+    /// Unit normal of a triangle, into the lumen. `triangle` is an index returned by [`WallQuery::nearest`].
     pub fn inward_normal(&self, triangle: u32) -> Vec3 {
         let [a, b, c] = self.mesh.corners(triangle as usize);
         (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x)
@@ -120,28 +121,28 @@ impl WallQuery {
         self.mesh.corners(triangle as usize)
     }
 
-    /// How far a point is from the wall, mm, on whichever side. For one question: it looks at all triangles, which takes less time than
-    /// to make ready for more.
+    /// Distance of a point from the wall, mm, on either side. For a single query: it visits all triangles, which is
+    /// faster than building the structures.
     pub(crate) fn distance_mm(&self, point_mm: &Vec3) -> f64 {
         (0..self.triangles() as u32).map(|t| self.distance_to(t, point_mm)).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far a point is from a triangle, mm, on whichever side.
+    /// Distance of a point from a triangle, mm, on either side.
     pub(crate) fn distance_to(&self, triangle: u32, point_mm: &Vec3) -> f64 {
         let [a, b, c] = self.corners(triangle).map(|v| to_parry(&v));
         Triangle::new(a, b, c).distance_to_local_point(to_parry(point_mm), false)
     }
 
-    /// Where the straight way from one point to another first meets the wall, as a part of the way, up to `farthest` times its
-    /// length. `None` also for points that are not finite.
+    /// Where the straight path from one point to another first meets the wall, as a fraction of the path, up to
+    /// `farthest` times its length. `None` also for points that are not finite.
     pub fn crossing(&self, from_mm: &Vec3, to_mm: &Vec3, farthest: f64) -> Option<f64> {
-        // A ray of no numbers would be tested against every triangle.
+        // A ray with NaN would be tested against every triangle.
         if !from_mm.iter().chain(to_mm.iter()).all(|c| c.is_finite()) {
             return None;
         }
         let ray = Ray::new(to_parry(from_mm), to_parry(&(to_mm - from_mm)));
         let shape = &self.ready()?.shape;
-        // As the shape's own question, but for divisions at every box.
+        // As the shape's own query, but without divisions at every box.
         let per_way = ray.dir.recip();
         let enters = |node: &BvhNode, nearest: f64| {
             let low = (node.mins() - BOX_MARGIN_MM - ray.origin) * per_way;
@@ -153,16 +154,16 @@ impl WallQuery {
         shape.bvh().find_best(farthest, enters, meets).map(|(_, part)| part)
     }
 
-    /// What a ray first meets within `reach_mm`: how far it is, and the triangle. `direction` is of unit length.
+    /// The first hit of a ray within `reach_mm`: its distance and the triangle. `direction` has unit length.
     pub(crate) fn first_met(&self, from_mm: &Vec3, direction: &Vec3, reach_mm: f64) -> Option<(f64, u32)> {
         let ray = Ray::new(to_parry(from_mm), to_parry(direction));
-        // The feature of a hit is that of a triangle by itself; which triangle it was the composite shape tells.
+        // The feature of a hit refers to a single triangle; the composite shape gives its index.
         let (triangle, way_mm) =
             CompositeShapeRef(&self.ready()?.shape).cast_local_ray(&ray, reach_mm, true)?;
         Some((way_mm, triangle))
     }
 
-    /// What is asked.
+    /// The mesh that is queried.
     pub(crate) fn mesh(&self) -> &SurfaceMesh {
         &self.mesh
     }
@@ -183,7 +184,7 @@ impl WallQuery {
         let offset = point_mm - closest;
         let length = offset.norm();
         let own = self.inward_normal(triangle);
-        // The pseudo-normal of the feature, and whether that is at a rim.
+        // The pseudo-normal of the feature, and whether it is on a rim.
         let (inward, rim) = match location {
             TrianglePointLocation::OnVertex(corner) => {
                 let vertex = self.mesh.triangles[triangle as usize][corner as usize] as usize;
@@ -216,7 +217,8 @@ mod tests {
         let (mut met, mut missed) = (0, 0);
         for k in 0..3000_u64 {
             let number = |n| unit(splitmix64(7, 12 * k + n)) - 0.5;
-            // From places around vertices, ways of 0.01 to 100 mm; some along an axis, and some that begin on a box's side.
+            // From positions around vertices, paths of 0.01 to 100 mm; some along an axis, and some that begin on a
+            // box's side.
             let vertex = wall.mesh().vertices_mm[k as usize % wall.mesh().vertices_mm.len()];
             let away = Vec3::new(number(0), number(1), number(2)) * 20.0;
             let from = if k % 7 == 0 { vertex } else { vertex + away };

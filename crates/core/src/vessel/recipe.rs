@@ -1,4 +1,4 @@
-//! Walls, and centre lines found in them, by what they are made of, so that one that takes long to make can be kept and found again.
+//! Recipes of walls and of centre lines computed from them: keys under which costly results can be stored.
 
 use serde::Serialize;
 
@@ -8,26 +8,26 @@ use super::{
 };
 use crate::Result;
 
-/// A wall that takes long to make, as all that decides its bits. Serialised, no two recipes are alike.
+/// All inputs that determine the bits of a costly wall. Different recipes serialise differently.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub enum WallRecipe<'a> {
     /// The wall of a centre-line tree, [`GeneratedWall`].
     Generated {
         /// The tree.
         tree: &'a CentrelineTree,
-        /// How fine it is meshed.
+        /// Its resolution.
         resolution: Resolution,
     },
-    /// A surface made fit to be a wall, [`Wall::from_surface`].
+    /// A repaired surface, [`Wall::from_surface`].
     Repaired {
-        /// The surface as it was given, mm.
+        /// The surface as given, mm.
         surface: &'a SurfaceMesh,
     },
-    /// The even mesh of a wall that devices feel, [`Wall::with_even_rims`] and [`condition`].
+    /// The uniform mesh of a wall for contact, [`Wall::with_even_rims`] and [`condition`].
     Even {
         /// The wall.
         wall: &'a Wall,
-        /// What may be done to its mesh.
+        /// Limits of the changes to its mesh.
         options: Conditioning,
     },
 }
@@ -44,24 +44,24 @@ impl WallRecipe<'_> {
             Self::Even { wall, options } => {
                 let trimmed = wall.with_even_rims()?;
                 let even = condition(trimmed.mesh(), options)?;
-                // What is even already keeps the numbers of its vertices.
+                // A mesh that is already uniform keeps its vertex numbers.
                 if even.changed { Wall::welded(&even.mesh) } else { Ok(trimmed.into_owned()) }
             }
         }
     }
 }
 
-/// The centre line that is found in a wall, as all that decides its bits.
+/// All inputs that determine the bits of a centre line computed from a wall.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct CentrelineRecipe<'a> {
     /// The wall.
     pub wall: &'a Wall,
-    /// Where it begins; where devices come in ([`Wall::inlet`]) if none. It leads to all other openings.
+    /// Its start; [`Wall::inlet`] if `None`. It leads to all other openings.
     pub from: Option<CentrelineEnd>,
 }
 
 impl CentrelineRecipe<'_> {
-    /// Finds the centre line.
+    /// Computes the centre line.
     ///
     /// # Errors
     /// As [`ExtractedCentreline::of`].
@@ -70,22 +70,22 @@ impl CentrelineRecipe<'_> {
     }
 }
 
-/// Where walls that take long to make, and their centre lines, are kept. The core has no such place: a program brings one.
+/// Storage of costly walls and their centre lines. The core has none: a program provides it.
 pub trait WallStore {
-    /// The wall of a recipe, to the bit that of [`WallRecipe::make`], kept or made.
+    /// The wall of a recipe, stored or made, bitwise equal to [`WallRecipe::make`].
     ///
     /// # Errors
-    /// Those of [`WallRecipe::make`]. What goes wrong with the store is none: then the wall is made.
+    /// Those of [`WallRecipe::make`]. Failures of the store are not errors: then the wall is made.
     fn wall(&self, recipe: &WallRecipe<'_>) -> Result<Wall>;
 
-    /// The centre line of a recipe, to the bit that of [`CentrelineRecipe::make`], kept or found.
+    /// The centre line of a recipe, stored or computed, bitwise equal to [`CentrelineRecipe::make`].
     ///
     /// # Errors
     /// Those of [`CentrelineRecipe::make`].
     fn centreline(&self, recipe: &CentrelineRecipe<'_>) -> Result<CentrelineTree>;
 }
 
-/// Keeps nothing.
+/// Stores nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoStore;
 
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn a_wall_that_was_written_and_read_is_the_same_wall() {
         let mut surface = tube().mesh().clone();
-        // Something to repair, so that there is something to report.
+        // Something to repair and report.
         surface.triangles.swap_remove(5);
         surface.triangles[9].swap(0, 1);
         let wall = Wall::from_surface(&surface).unwrap();

@@ -1,8 +1,9 @@
-//! The sac of an aneurysm: where its neck is, how wide that is, and what the sac holds.
+//! The sac of an aneurysm: position and width of its neck, and its volume.
 //!
-//! The neck is the plane with the least lumen between the middle of the sac and the artery: sections of the surface are closed curves, and
-//! that around the way from the one to the other has the area A = ½ |Σ xᵢ × xᵢ₊₁|. It is looked for over places and tilts, coarsely first. The sac is all that is joined to that curve on its far
-//! side; its volume is the sum of the tetrahedra from a point of the plane, for which the neck itself adds nothing.
+//! The neck is the plane with the smallest cross-section between the middle of the sac and the artery: sections of
+//! the surface are closed curves, and the one around the path between them has the area A = ½ |Σ xᵢ × xᵢ₊₁|. It is
+//! searched for over positions and tilts, coarsely first. The sac is everything connected to that curve on its far
+//! side; its volume is the sum of the tetrahedra from a point of the plane, to which the neck itself adds nothing.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +13,16 @@ use super::{CentrelineNode, CentrelineTree, NO_NEIGHBOUR, Wall, WallQuery};
 use crate::rod::Frame;
 use crate::{Error, Result, Vec3};
 
-/// Places on the way to the parent at which sections are taken.
+/// Number of positions on the path to the parent artery at which sections are taken.
 const PLACES: usize = 48;
-/// Largest tilt of a neck against the way, rad, and the rings and spokes in which tilts are tried.
+/// Largest tilt of a neck against the path, rad, and numbers of rings and spokes of tilts tried.
 const LARGEST_TILT: f64 = 0.9;
 const TILTS: (usize, usize) = (3, 8);
-/// Times that a pattern of places and tilts is halved around the best: a thousandth of the first.
+/// Number of times the pattern of positions and tilts is halved around the best: to a thousandth of the first.
 const HALVINGS: usize = 10;
-/// Most steps from the dome to the middle of the sac, and how long they are at first, in clearances.
+/// Largest number of steps from the dome to the middle of the sac, and their initial length, in clearances.
 const CLIMB: (usize, f64) = (60, 0.25);
-/// Their directions: to the faces and corners of a cube.
+/// Directions of the steps: to the faces and corners of a cube.
 const DIRECTIONS: [[f64; 3]; 14] = [
     [1.0, 0.0, 0.0],
     [-1.0, 0.0, 0.0],
@@ -52,22 +53,22 @@ pub struct Sac {
     pub neck_diameter_mm: f64,
     /// Volume beyond the neck, mm³.
     pub volume_mm3: f64,
-    /// Farthest place of the wall from the neck's plane, mm.
+    /// Distance of the farthest position of the wall from the neck's plane, mm.
     pub height_mm: f64,
-    /// Diameter of the largest ball that was found in it, mm.
+    /// Diameter of the largest ball found in it, mm.
     pub dome_diameter_mm: f64,
     /// Height over the neck's diameter.
     pub aspect_ratio: f64,
 }
 
-/// A plane that may be a neck: a place on the way, and a tilt towards two directions across it, rad.
+/// A candidate plane for the neck: position on the path, and tilts towards two directions across it, rad.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     along: f64,
     tilt: [f64; 2],
 }
 
-/// The curve in which a plane meets the wall around the way.
+/// The curve in which a plane cuts the wall around the path.
 struct Cut {
     points_mm: Vec<Vec3>,
     triangles: Vec<usize>,
@@ -75,21 +76,21 @@ struct Cut {
 }
 
 impl Sac {
-    /// Measures the sac that holds `dome_mm`, on an artery that holds `parent_mm`.
+    /// Measures the sac that contains `dome_mm`, on an artery that contains `parent_mm`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a place outside the lumen, and where no plane between them cuts off a sac without openings: it has no neck
-    /// there, or is none.
+    /// [`Error::Parameter`] for a position outside the lumen, and if no plane between them cuts off a sac without
+    /// openings.
     pub fn measure(wall: &Wall, dome_mm: Vec3, parent_mm: Vec3) -> Result<Self> {
         let ball = middle(wall, dome_mm)?;
         Self::beyond_neck(wall, ball, (dome_mm, parent_mm))
     }
 
-    /// The same on the artery of a centre line: at its nearest place around which no ball in the lumen meets the sac's. The line may pass the
-    /// sac.
+    /// As [`Self::measure`], with the artery given by a centre line: its nearest position around which no ball in the
+    /// lumen meets the sac's. The line may run through the sac.
     ///
     /// # Errors
-    /// As [`Self::measure`]; where all of the line lies in the sac.
+    /// As [`Self::measure`]; if the whole line is in the sac.
     pub fn on_artery(wall: &Wall, dome_mm: Vec3, line: &CentrelineTree) -> Result<Self> {
         let ball = middle(wall, dome_mm)?;
         let away_mm = |node: &&CentrelineNode| (node.position_mm - ball.0).norm();
@@ -101,7 +102,7 @@ impl Sac {
         Self::beyond_neck(wall, ball, (dome_mm, nearest.position_mm))
     }
 
-    /// What is beyond the neck between a ball in the sac and the artery.
+    /// The part beyond the neck between a ball in the sac and the artery.
     fn beyond_neck(
         wall: &Wall,
         (middle_mm, radius_mm): (Vec3, f64),
@@ -135,7 +136,7 @@ impl Sac {
     }
 }
 
-/// The middle of the largest ball that a place in the lumen leads to, and its radius, mm.
+/// The middle of the largest ball reached by ascent from a position in the lumen, and its radius, mm.
 fn middle(wall: &Wall, dome_mm: Vec3) -> Result<(Vec3, f64)> {
     let query = WallQuery::new(wall)?;
     let reach_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
@@ -145,7 +146,7 @@ fn middle(wall: &Wall, dome_mm: Vec3) -> Result<(Vec3, f64)> {
         let mend = "must be a place within the sac, in mm";
         return Err(Error::parameter("dome", crate::error::vector(&dome_mm), mend));
     };
-    // Where two walls are equally near the way up is between their normals: all directions are tried.
+    // Where two walls are equally near, the ascent is between their normals: all directions are tried.
     let (mut at, mut step) = (dome_mm, CLIMB.1);
     for _ in 0..CLIMB.0 {
         let steps =
@@ -159,7 +160,7 @@ fn middle(wall: &Wall, dome_mm: Vec3) -> Result<(Vec3, f64)> {
     Ok((at, near.distance_mm))
 }
 
-/// What lies beyond a neck.
+/// The part beyond a neck.
 struct Beyond {
     volume_mm3: f64,
     height_mm: f64,
@@ -176,9 +177,9 @@ struct Search<'a> {
     wall: &'a Wall,
     neighbours: Vec<[u32; 3]>,
     middle_mm: Vec3,
-    /// From the middle to the parent.
+    /// From the middle to the parent artery.
     way: Vec3,
-    /// Its tangent leads back into the sac.
+    /// Its tangent points back into the sac.
     frame: Frame,
 }
 
@@ -191,7 +192,7 @@ impl Search<'_> {
         self.middle_mm + self.way * plane.along
     }
 
-    /// The plane of least area that cuts off a sac.
+    /// The plane of smallest area that cuts off a sac.
     fn least(&self) -> Option<Neck> {
         let mut planes = Vec::new();
         for k in 0..PLACES {
@@ -241,11 +242,11 @@ impl Search<'_> {
         self.wall.mesh().vertices_mm.iter().map(|v| (v - place).dot(&normal)).collect()
     }
 
-    /// The curve of the plane around the way; none where the way is not in a closed one.
+    /// The curve of the plane around the path; `None` if the path is not inside a closed one.
     fn cut(&self, plane: Plane) -> Option<Cut> {
         let (mesh, heights) = (self.wall.mesh(), self.heights(plane));
         let is_above = |v: u32| heights[v as usize] >= 0.0;
-        // From where a triangle's border comes down through the plane to where it goes up again.
+        // Maps the edge where a triangle's boundary descends through the plane to the one where it ascends.
         let mut onwards: BTreeMap<(u32, u32), ((u32, u32), usize)> = BTreeMap::new();
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             let edges = [0, 1, 2].map(|k| (triangle[k], triangle[(k + 1) % 3]));
@@ -276,7 +277,7 @@ impl Search<'_> {
         None
     }
 
-    /// What is joined to a curve above its plane; none where that leads to an opening or through the plane again.
+    /// The part connected to a curve above its plane; `None` if that leads to an opening or through the plane again.
     fn beyond(&self, plane: Plane, cut: &Cut) -> Option<Beyond> {
         let (mesh, heights, place) = (self.wall.mesh(), self.heights(plane), self.place(plane));
         let mut seen = vec![false; mesh.triangles.len()];
@@ -308,7 +309,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether a closed curve goes around the origin.
+/// Whether a closed curve winds around the origin.
 fn winds(flat: &[[f64; 2]]) -> bool {
     let pairs = flat.iter().zip(flat.iter().cycle().skip(1));
     let crossings = pairs
@@ -316,7 +317,7 @@ fn winds(flat: &[[f64; 2]]) -> bool {
     crossings.count() % 2 == 1
 }
 
-/// Volume of the tetrahedra from the origin, a point of the plane, to what of a triangle is above the plane.
+/// Volume of the tetrahedra from the origin, a point of the plane, to the part of a triangle above the plane.
 fn part_above(corners: &[(Vec3, f64); 3]) -> f64 {
     let mut polygon: Vec<Vec3> = Vec::with_capacity(4);
     for k in 0..3 {
@@ -343,7 +344,7 @@ mod tests {
         let made = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap();
         let dome_mm = tree.nodes()[tree.target("dome").unwrap().row].position_mm;
         let parent_mm = tree.nodes()[3].position_mm;
-        // Off the middle, as a click is.
+        // Off the middle, like a mouse click.
         let click_mm = dome_mm + Vec3::new(1.0, 0.5, 0.7);
         (Sac::measure(&made.wall, click_mm, parent_mm).unwrap(), made.wall.volume_mm3())
     }
@@ -352,7 +353,7 @@ mod tests {
     fn a_sac_is_the_ball_that_it_was_made_of_and_its_neck_is_narrow() {
         let (sac, _) = measured("sidewall_aneurysm", 0.4);
         assert!((sac.dome_diameter_mm - 7.0).abs() < 0.15, "{sac:?}");
-        // The artery's fillet widens the tube of 3.2 mm that it was made of.
+        // The artery's fillet widens the tube of 3.2 mm from which it was made.
         assert!((3.2..4.2).contains(&sac.neck_diameter_mm), "{sac:?}");
         assert!(sac.normal.y > 0.95, "{sac:?}");
         // A ball of 7 mm without the cap beyond the neck.
@@ -368,7 +369,7 @@ mod tests {
             (measured("basilar_aneurysm", 0.6), measured("basilar_aneurysm", 0.35));
         assert!((coarse.neck_area_mm2 / fine.neck_area_mm2 - 1.0).abs() < 0.05, "{coarse:?} {fine:?}");
         assert!((coarse.volume_mm3 / fine.volume_mm3 - 1.0).abs() < 0.03, "{coarse:?} {fine:?}");
-        // A line from one artery to the other may pass the sac.
+        // A line from one artery to the other may run through the sac.
         let tree = anatomy::tree("basilar_aneurysm").unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(0.6)).unwrap().wall;
         let dome_mm = tree.nodes()[8].position_mm;

@@ -1,23 +1,24 @@
-//! Removing triangles without area, without opening slits.
+//! Removes triangles without area, without opening slits.
 
 use super::SurfaceMesh;
 use super::mesh::retain_numbered;
 use super::topology::{EdgeTable, NONE};
 use crate::Vec3;
 
-/// Each pass removes every sliver but those next to another one; chains of slivers need a few passes.
+/// Largest number of passes; each removes every sliver except those next to another one, and chains of slivers need a
+/// few.
 const PASSES: usize = 16;
 
-/// Whether a triangle is thinner than `tolerance_mm` (or no thicker than rounding).
+/// Whether a triangle is thinner than `tolerance_mm` (or rounding).
 pub(crate) fn is_degenerate(corners: &[Vec3; 3], tolerance_mm: f64) -> bool {
     let [a, b, c] = *corners;
     let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
     (b - a).cross(&(c - a)).norm() <= longest * tolerance_mm.max(1e-12 * longest)
 }
 
-/// Removes triangles with a repeated vertex, and needles: corners distinct but in line. Removing a needle alone would
-/// leave a slit between its long edge and its two short ones, so the long edge is flipped together with the triangle
-/// across it. Returns the number of degenerate triangles that were found; none is left.
+/// Removes triangles with a repeated vertex, and needles, whose corners are distinct but collinear. Removing only the
+/// needle would leave a slit between its long edge and its two short ones, so the long edge is flipped together with
+/// the triangle across it. Returns the number of degenerate triangles found; none remains.
 pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> usize {
     let before = mesh.triangles.len();
     let repeated = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
@@ -41,7 +42,7 @@ pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> us
             let side = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
             let beyond = across[index][side];
             if beyond == NONE {
-                // On the border the needle simply goes: its short edges become the border.
+                // On the border the needle is simply removed: its short edges become the border.
                 gone[index] = !touched[index];
             } else if !touched[index] && !touched[beyond as usize] {
                 (touched[index], touched[beyond as usize]) = (true, true);
@@ -51,7 +52,7 @@ pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> us
         }
         retain_numbered(&mut mesh.triangles, |index, t| !gone[index] && !repeated(t));
     }
-    // What is left sits in knots of slivers that flips only pass around.
+    // The remaining ones are in clusters of slivers that flips only pass around.
     let survivors: Vec<bool> =
         (0..mesh.triangles.len()).map(|i| !is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
     retain_numbered(&mut mesh.triangles, |index, _| survivors[index]);
@@ -87,7 +88,7 @@ mod tests {
             (0..m.triangles.len()).map(|i| crate::vessel::mesh::area(&m.corners(i))).sum::<f64>()
         };
         assert_eq!(opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings.len(), 1);
-        // What is flipped is found too: such a mesh is not as it was given.
+        // A flip counts too: such a mesh is not as it was given.
         assert_eq!(remove_degenerate(&mut mesh, 1e-6), 1);
         assert_eq!((mesh.triangles.len(), remove_degenerate(&mut mesh, 1e-6)), (4, 0));
         assert!((0..mesh.triangles.len()).all(|i| !is_degenerate(&mesh.corners(i), 1e-6)));

@@ -1,4 +1,4 @@
-//! What a wall holds for a device: how wide it is, where two vessels all but touch, and where one could begin.
+//! Survey of a wall: its width, where two vessels almost touch, and a suitable start for a device.
 
 use std::cell::LazyCell;
 use std::f64::consts::PI;
@@ -6,71 +6,71 @@ use std::f64::consts::PI;
 use super::{Wall, WallQuery};
 use crate::{Result, Vec3};
 
-/// Triangles that are asked, at most: evenly over the wall.
+/// Largest number of triangles sampled, evenly over the wall.
 const SAMPLES: usize = 20_000;
-/// Rays start so far, over the wall's size, from the triangle they start on.
+/// Distance of a ray's start from its triangle, relative to the wall's size.
 const OFF: f64 = 1e-7;
-/// Cosine between normals of two sheets back to back, at most.
+/// Largest cosine between normals of two sheets back to back.
 const BACK_TO_BACK: f64 = -0.5;
-/// Triangles that are so many steps apart are no longer one sheet bent around a corner.
+/// Triangles this many edges apart do not belong to one sheet bent around a corner.
 const STEPS_APART: usize = 8;
-/// Chords whose middle is tried for a sheath, and directions there.
+/// Number of chords whose middles are tried for a sheath, and of directions there.
 const PLACES: usize = 48;
 const DIRECTIONS: usize = 200;
 
-/// How wide the lumen is: half chords along the inward normals of the wall.
+/// Width of the lumen: half chords along the inward normals of the wall.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LumenReport {
     /// Smallest half chord in mm.
     pub smallest_mm: f64,
-    /// The middle of that chord, mm.
+    /// The middle of this chord, mm.
     pub smallest_at_mm: [f64; 3],
-    /// Half chord below which one in a hundred is, mm: what single faulty triangles do not change.
+    /// First percentile of half chords, mm, which single faulty triangles do not affect.
     pub percentile_1_mm: f64,
-    /// The same for one in twenty, mm.
+    /// Fifth percentile, mm.
     pub percentile_5_mm: f64,
     /// Median half chord, mm.
     pub median_mm: f64,
-    /// Chords measured.
+    /// Number of chords measured.
     pub chords: usize,
 }
 
-/// Where two sheets of the wall lie back to back, with two lumens on either side.
+/// Places where two sheets of the wall are back to back, with a lumen on either side.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct SeptaReport {
     /// Thickness below which a septum counts, mm.
     pub below_mm: f64,
-    /// Triangles asked, and how many of them are part of such a septum.
+    /// Number of triangles sampled.
     pub asked: usize,
-    /// Triangles of such septa among them.
+    /// Number of these that are part of such a septum.
     pub thin: usize,
     /// Thickness of the thinnest, mm.
     pub thinnest_mm: Option<f64>,
-    /// Where that is, mm.
+    /// Its position, mm.
     pub thinnest_at_mm: Option<[f64; 3]>,
 }
 
-/// A place for a sheath inside the vessel.
+/// A suitable position of a sheath inside the vessel.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct StartReport {
     /// For `sheath.position_mm`.
     pub position_mm: [f64; 3],
-    /// For `sheath.direction`: the way that is free the longest.
+    /// For `sheath.direction`: the one with the longest free path.
     pub direction: [f64; 3],
     /// Distance to the wall there, mm.
     pub clearance_mm: f64,
-    /// Length of the free way, mm.
+    /// Length of the free path, mm.
     pub free_mm: f64,
 }
 
-/// What [`survey`] found; parts are absent where the wall encloses nothing.
+/// The result of [`survey`]; parts are absent if the wall encloses nothing.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Survey {
     /// The lumen's width.
     pub lumen: Option<LumenReport>,
     /// Thin septa.
     pub septa: SeptaReport,
-    /// A place to begin.
+    /// A suitable start.
     pub start: Option<StartReport>,
 }
 
@@ -83,7 +83,7 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     let query = WallQuery::new(wall)?;
     let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let off_mm = OFF * size_mm;
-    // Few walls have septa.
+    // Computed only if needed, since few walls have septa.
     let neighbours = LazyCell::new(|| wall.neighbours());
     let every = mesh.triangles.len().div_ceil(SAMPLES).max(1);
     let mut chords: Vec<(f64, Vec3)> = Vec::new();
@@ -125,17 +125,18 @@ fn middle(wall: &Wall, triangle: usize) -> Vec3 {
     wall.mesh().corners(triangle).iter().sum::<Vec3>() / 3.0
 }
 
-/// Half of the way from a place on the wall along its inward normal to where that meets the wall again, mm.
+/// Half the distance from a position on the wall along its inward normal to the opposite wall, mm.
 fn half_chord(query: &WallQuery, (at, inward): (Vec3, Vec3), size_mm: f64) -> Option<f64> {
     let off_mm = OFF * size_mm;
     let (mm, _) = query.first_met(&(at + inward * off_mm), &inward, size_mm)?;
     Some((mm + off_mm) / 2.0)
 }
 
-/// Triangles asked for the median alone, at most.
+/// Largest number of triangles sampled for the median alone.
 const FEW_SAMPLES: usize = 1000;
 
-/// Median half chord along inward normals of the wall, mm, as in [`LumenReport`] but from fewer triangles; `None` where nothing is met.
+/// Median half chord along inward normals of the wall, mm, as in [`LumenReport`] but from fewer triangles; `None`
+/// without any hit.
 ///
 /// # Errors
 /// As [`survey`].
@@ -151,7 +152,7 @@ pub(super) fn median_half_lumen_mm(wall: &Wall) -> Result<Option<f64>> {
     Ok(chords.get(chords.len().saturating_sub(1) / 2).copied())
 }
 
-/// Whether one triangle is reached from the other over a few edges.
+/// Whether one triangle is reached from the other across a few edges.
 fn within_steps(neighbours: &[[u32; 3]], from: u32, to: u32) -> bool {
     let mut reached = vec![from];
     let mut ring = 0;
@@ -169,7 +170,7 @@ fn within_steps(neighbours: &[[u32; 3]], from: u32, to: u32) -> bool {
     reached.contains(&to)
 }
 
-/// The middle of a chord that is deepest in the lumen, and the direction in which the way is free the longest.
+/// The middle of a chord that is deepest in the lumen, and the direction with the longest free path.
 fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -> Option<StartReport> {
     // Few of the longest, many of the rest: the longest chords may run along the vessel.
     let count = chords.len();
@@ -182,7 +183,7 @@ fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -
             places.push((near.distance_mm, place));
         }
     }
-    // Whether a place is inside takes all triangles to tell: the deepest are asked first.
+    // An inside test visits all triangles: the deepest positions are tested first.
     places.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (clearance_mm, place) =
         places.into_iter().find(|(_, place)| wall.contains(place).is_ok_and(|inside| inside))?;
@@ -193,7 +194,7 @@ fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -
         let (sin, cos) = libm::sincos(golden * k as f64);
         let across = (1.0 - z * z).sqrt();
         let direction = Vec3::new(across * cos, across * sin, z);
-        // A way that leaves through an opening is as long as any.
+        // A path that leaves through an opening counts as the longest.
         let free = query.first_met(&place, &direction, size_mm).map_or(0.0, |met| met.0);
         if free > longest.0 {
             longest = (free, direction);

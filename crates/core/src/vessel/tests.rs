@@ -1,4 +1,4 @@
-//! Walls, queries and checks on surfaces that are dirty in known ways, and on a real one.
+//! Walls, queries and checks on surfaces with known faults, and on a real one.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ fn tube() -> Wall {
     GeneratedWall::new(&tree, Resolution::EdgeMm(2.0)).unwrap().wall
 }
 
-/// Every triangle with vertices of its own, as in an STL file.
+/// Every triangle with its own vertices, as in an STL file.
 fn soup(mesh: &SurfaceMesh) -> SurfaceMesh {
     let vertices_mm: Vec<Vec3> = (0..mesh.triangles.len()).flat_map(|i| mesh.corners(i)).collect();
     SurfaceMesh {
@@ -49,7 +49,7 @@ fn a_straight_way_is_stopped_by_the_wall_it_crosses_alone() {
     let met = query.crossing(&at(0.0, 50.0), &at(8.0, 51.0), 1.0).unwrap();
     assert!((met - 0.5).abs() < 0.02, "{met}");
     assert_eq!(query.crossing(&at(0.0, 50.0), &at(3.0, 90.0), 1.0), None);
-    // Beyond the end of the way, if asked.
+    // Beyond the end of the path, if requested.
     assert_eq!(query.crossing(&at(0.0, 50.0), &at(3.0, 50.0), 1.0), None);
     assert!((query.crossing(&at(0.0, 50.0), &at(3.0, 50.0), 2.0).unwrap() - 4.0 / 3.0).abs() < 0.05);
     assert_eq!(query.crossing(&at(0.0, 50.0), &Vec3::repeat(f64::NAN), 1.0), None);
@@ -63,7 +63,7 @@ fn one_question_is_answered_as_many_are() {
         let x = Vec3::new(6.0 * turn.cos() * (0.7 * turn).sin(), 0.6 * f64::from(k) - 10.0, turn.sin());
         let near = query.nearest(&x, f64::INFINITY).unwrap();
         assert!((query.distance_mm(&x) - near.distance_mm.abs()).abs() < 1e-12, "{x}");
-        // Next to a vertex and next to a side as well, inside is where the axis is.
+        // Next to a vertex or a side too, inside is where the axis is.
         let inside = x.x.hypot(x.z) < 4.0 - 0.2;
         assert!(near.rim || !inside || near.distance_mm > 0.0, "{x} {near:?}");
     }
@@ -263,7 +263,7 @@ fn a_vertex_that_no_triangle_uses_changes_no_tolerance() {
     assert_eq!(wall.mesh(), Wall::from_surface(&soup(clean.mesh())).unwrap().mesh());
     let report = check(&stray).unwrap();
     assert!(report.is_sound() && report.high_mm[0] < 5.0, "{report:?}");
-    // The twin: as a triangle's corner it does set the scale, and the tube is a point to it.
+    // Counter-check: as a triangle's corner it does set the scale, and the tube is a point compared with it.
     let far = stray.vertices_mm.len() as u32 - 1;
     stray.triangles.push([0, 1, far]);
     assert!(!check(&stray).is_ok_and(|report| report.is_sound()));
@@ -309,7 +309,7 @@ fn a_flat_sheet_is_no_vessel() {
 
 #[test]
 fn thousands_of_overlapping_triangles_are_counted_up_to_a_limit() {
-    // Blades about one axis, each a little turned and shifted: every one crosses every other.
+    // Blades about one axis, each slightly rotated and shifted: every one intersects every other.
     let mut pile = SurfaceMesh::default();
     for k in 0..1_000_u32 {
         let (sin, cos) = (3.0 * f64::from(k) / 1_000.0).sin_cos();
@@ -327,7 +327,7 @@ fn thousands_of_overlapping_triangles_are_counted_up_to_a_limit() {
     assert!(!check(tube().mesh()).unwrap().self_intersections_capped);
 }
 
-/// The same cases in every run, and so many: tests fail for a reason, and in bounded time.
+/// The same cases in every run, limited in number: tests must not fail at random, nor take too long.
 pub(super) fn steady(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
@@ -352,7 +352,7 @@ proptest! {
         prop_assert_eq!(wall.mesh().vertices_mm.len(), clean.mesh().vertices_mm.len());
         prop_assert!((wall.volume_mm3() / clean.volume_mm3() - 1.0).abs() < 1e-4);
         prop_assert_eq!(wall.openings().len(), 2);
-        // The twin: jitter beyond any crack tears the surface apart.
+        // Counter-check: jitter beyond any crack tears the surface apart.
         for (i, v) in dirty.vertices_mm.iter_mut().enumerate() {
             v.x += 0.8 * (i as f64).cos();
         }
@@ -360,7 +360,7 @@ proptest! {
     }
 }
 
-/// The folder of shared data, where a machine has it.
+/// The folder of shared data, if present.
 fn shared(file: &str) -> Option<PathBuf> {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let folder = std::env::var_os("ENDOWIRE_SHARED").map_or_else(beside, PathBuf::from);
@@ -373,7 +373,7 @@ fn a_real_carotid_surface_is_repaired_and_its_ends_found() {
     let Some(path) = shared("carotids.stl") else { return };
     let surface = SurfaceMesh::read(&path, 1.0).unwrap();
     let wall = Wall::from_surface(&surface).unwrap();
-    // A common carotid that divides in two, as shipped wound inwards throughout.
+    // A common carotid with its bifurcation, shipped with all triangles wound inwards.
     let report = wall.report();
     assert_eq!((report.components, report.non_manifold_edges, report.stray_edges), (1, 0, 0));
     assert!(report.inside_out && report.vertices_welded > 5000, "{report:?}");

@@ -1,6 +1,6 @@
-//! Which triangles meet at which edge.
+//! Triangles at the edges of a mesh.
 
-/// Marks an edge that has no single partner: open, or shared by more than two triangles.
+/// Marks an edge without a single partner: open, or shared by more than two triangles.
 pub const NONE: u32 = u32::MAX;
 
 /// One use of an undirected edge by a triangle.
@@ -18,19 +18,19 @@ pub(crate) struct EdgeUse {
     pub(crate) forward: bool,
 }
 
-/// All edge uses, sorted by edge and then by triangle, so that what is derived from them is deterministic.
+/// All edge uses, sorted by edge and then by triangle, so that everything derived from them is deterministic.
 #[derive(Debug, Clone)]
 pub(crate) struct EdgeTable {
     uses: Vec<EdgeUse>,
 }
 
 impl EdgeTable {
-    /// Sorts the edges of `triangles`: counted out by their smaller vertex, then by the larger one among the few that share it.
-    /// Triangles with a repeated vertex are skipped.
+    /// Sorts the edges of `triangles`: by counting their smaller vertex, then by the larger one among the few that
+    /// share it. Triangles with a repeated vertex are skipped.
     pub(crate) fn new(triangles: &[[u32; 3]]) -> Self {
         let whole = |t: &&[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
         let vertices = triangles.iter().flatten().max().map_or(0, |v| *v as usize + 1);
-        // Place of the first use of each vertex as the smaller one, moved on as uses are put down.
+        // Position of the first use of each vertex as the smaller one, advanced as uses are stored.
         let mut place = vec![0_u32; vertices + 1];
         for t in triangles.iter().filter(whole) {
             for side in 0..3 {
@@ -89,8 +89,8 @@ impl EdgeTable {
         across
     }
 
-    /// For every triangle, the number of its connected component (triangles that share an edge are connected), and
-    /// how many there are. Components are numbered by their first triangle.
+    /// For every triangle, the index of its connected component (triangles that share an edge are connected), and the
+    /// number of components. Components are numbered by their first triangle.
     pub(crate) fn components(&self, triangle_count: usize) -> (Vec<u32>, usize) {
         let mut sets = DisjointSets::new(triangle_count);
         for uses in self.edges() {
@@ -102,14 +102,14 @@ impl EdgeTable {
     }
 }
 
-/// The edges of a mesh that is being mended, sorted anew only after a change.
+/// The edges of a mesh under repair, sorted anew only after a change.
 #[derive(Debug, Default)]
 pub(crate) struct Edges {
     table: Option<EdgeTable>,
 }
 
 impl Edges {
-    /// Those of `triangles`, which must be the same since [`Edges::changed`] was last called.
+    /// The edges of `triangles`, which must not have changed since [`Edges::changed`] was last called.
     pub(crate) fn of(&mut self, triangles: &[[u32; 3]]) -> &EdgeTable {
         self.table.get_or_insert_with(|| EdgeTable::new(triangles))
     }
@@ -120,7 +120,7 @@ impl Edges {
     }
 }
 
-/// Union–find in which the smallest member stands for its set, so that the result depends on no order.
+/// Union–find in which the smallest member represents its set, so that the result does not depend on order.
 #[derive(Debug)]
 pub(crate) struct DisjointSets {
     parent: Vec<u32>,
@@ -146,7 +146,7 @@ impl DisjointSets {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// A number per item, equal within a set, counted up by smallest member; and the count.
+    /// An index per item, equal within a set, in order of smallest members; and the number of sets.
     pub(crate) fn number(&mut self) -> (Vec<u32>, usize) {
         let mut numbers = vec![0; self.parent.len()];
         let mut count = 0;

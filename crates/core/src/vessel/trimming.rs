@@ -1,15 +1,16 @@
-//! Rims with teeth are cut back to an even line.
+//! Cuts jagged rims back to an even line.
 //!
-//! A surface that was cut out of a larger one by its triangles ends in teeth of an edge or two, each with a lean of its own. Drawn out
-//! beyond the opening they would be furrows, and spikes between these. So where a rim has teeth what is beyond an even line below them
-//! is cut off: with the height h of a point beyond the opening's plane and its angle θ about its axis,
+//! A surface cut out of a larger one along its triangles ends in teeth of one or two edges, each with its own
+//! inclination. Extruded beyond the opening they would become furrows, with spikes between. So where a rim has teeth,
+//! everything beyond an even line below them is cut off: with the height h of a point beyond the opening's plane and
+//! its angle θ about its axis,
 //!
 //! ```text
 //! φ = h − H(θ),    H(θ) = Σₖ aₖ cos kθ + bₖ sin kθ,  k = 0, 1, 2
 //! ```
 //!
-//! is 0 on the line. H fits the rim, least squares over its length, and is lowered to where no tooth is below it; k = 1 and 2 are rims that
-//! stand aslant and saddles. Triangles are cut where φ changes its sign along an edge.
+//! is 0 on the line. H is fitted to the rim, by least squares over its length, and lowered until no tooth is below
+//! it; k = 1 and 2 represent oblique rims and saddles. Triangles are cut where φ changes its sign along an edge.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,16 +21,16 @@ use super::topology::{EdgeTable, NONE};
 use super::{Opening, SurfaceMesh, Wall};
 use crate::{Result, Vec3};
 
-/// Teeth that are no higher than this, in edges of the rim, are left.
+/// Largest height of teeth, in edges of the rim, that are left unchanged.
 const EVEN: f64 = 0.4;
-/// Nothing is cut back by more than this, in radii of the opening.
+/// Largest depth of the cut, in radii of the opening.
 const DEEPEST: f64 = 1.0;
-/// What stands higher beyond the line than the highest tooth, in teeth, is no tooth.
+/// Height beyond the line, in heights of the highest tooth, above which a part is not a tooth.
 const BEYOND: f64 = 1.5;
-/// A vertex nearer to the line than this, in edges of the rim, is taken to be on it: else slivers were cut.
+/// Distance from the line, in edges of the rim, within which a vertex counts as on it, to avoid slivers.
 const ON_LINE: f64 = 0.25;
 
-/// The line that a rim is cut back to.
+/// The line to which a rim is cut back.
 struct Line {
     opening: Opening,
     across: [Vec3; 2],
@@ -41,7 +42,7 @@ struct Line {
 }
 
 impl Line {
-    /// The line below the teeth of a rim; `None` where it has none, or is no rim that goes around once.
+    /// The line below the teeth of a rim; `None` if it has no teeth, or does not go around once.
     fn below(mesh: &SurfaceMesh, opening: &Opening) -> Option<Self> {
         let first = opening.direction.cross(&Vec3::ith(opening.direction.iamin(), 1.0)).normalize();
         let across = [first, opening.direction.cross(&first)];
@@ -66,7 +67,7 @@ impl Line {
         (line.teeth_mm > EVEN * edge_mm && line.teeth_mm <= DEEPEST * opening.radius_mm).then_some(line)
     }
 
-    /// Height of a point beyond the opening's plane, mm, and what H sums up at its angle.
+    /// Height of a point beyond the opening's plane, mm, and the terms of H at its angle.
     fn seen(&self, x: &Vec3) -> (f64, SVector<f64, 5>) {
         let y = x - self.opening.centre_mm;
         let [u, v] = self.across.map(|axis| axis.dot(&y));
@@ -84,7 +85,8 @@ impl Line {
         height_mm - self.heights.dot(&row)
     }
 
-    /// The triangles of `mesh` that are beyond the line in part, from the rim on; `None` where they lead on to what is no tooth.
+    /// The triangles of `mesh` that are partly beyond the line, from the rim on; `None` if they lead on to more than
+    /// teeth.
     fn teeth(&self, mesh: &SurfaceMesh) -> Option<BTreeSet<u32>> {
         let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
         let beyond = |v: u32| self.beyond_mm(&mesh.vertices_mm[v as usize]);
@@ -108,7 +110,7 @@ impl Line {
         Some(found)
     }
 
-    /// Cuts off what of `teeth` is beyond the line.
+    /// Cuts off the parts of `teeth` beyond the line.
     fn cut(&self, mesh: &mut SurfaceMesh, teeth: &BTreeSet<u32>) {
         let mut heights: BTreeMap<u32, f64> = BTreeMap::new();
         for v in teeth.iter().flat_map(|t| mesh.triangles[*t as usize]) {
@@ -133,7 +135,7 @@ impl Line {
                     }));
                 }
             }
-            // What has no corner below the line is beyond it.
+            // A triangle without a corner below the line is beyond it.
             if corners.iter().any(|v| heights[v] < 0.0) {
                 let x = |k: usize| mesh.vertices_mm[polygon[k] as usize];
                 match polygon[..] {
@@ -152,7 +154,7 @@ impl Line {
 }
 
 impl Wall {
-    /// The wall with the teeth cut off its rims; the wall itself where there are none.
+    /// The wall with the teeth of its rims cut off; the wall itself if there are none.
     ///
     /// # Errors
     /// As [`Wall::welded`].
@@ -174,7 +176,8 @@ impl Wall {
 mod tests {
     use super::*;
 
-    /// A tube of radius 5 mm along z with edges of about 1 mm, from which `is_off` cuts triangles at the upper end by their middles.
+    /// A tube of radius 5 mm along z with edges of about 1 mm, of which triangles at the upper end are removed if
+    /// `is_off` holds for their middles.
     fn tube(is_off: impl Fn(&Vec3, u32) -> bool) -> Wall {
         let (rows, columns) = (24, 32);
         let mut mesh = SurfaceMesh::default();
@@ -201,7 +204,7 @@ mod tests {
         Wall::welded(&mesh).unwrap()
     }
 
-    /// The surface of a wall whose rims were cut back, if any was.
+    /// The surface of a wall whose rims were cut back; `None` if none was.
     fn trimmed(wall: &Wall) -> Option<SurfaceMesh> {
         match wall.with_even_rims().unwrap() {
             Cow::Borrowed(_) => None,
@@ -228,12 +231,12 @@ mod tests {
         let before = rim(toothed.mesh());
         let mesh = trimmed(&toothed).unwrap();
         let after = rim(&mesh);
-        // What is within a quarter of an edge of the line is left as it is.
+        // Vertices within a quarter of an edge of the line are not moved.
         assert!(spread(&after) < 0.75 && spread(&before) > 1.8, "{} {}", spread(&after), spread(&before));
         // No lower than the deepest notch.
         let lowest = |heights: &[f64]| heights.iter().copied().fold(f64::MAX, f64::min);
         assert!(lowest(&after) > lowest(&before) - 0.6, "{} {}", lowest(&after), lowest(&before));
-        // On the surface: of the tube's facets nothing else is left.
+        // On the surface: nothing else of the tube's facets remains.
         assert!(mesh.vertices_mm.iter().all(|v| (4.95..=5.0 + 1e-9).contains(&v.xy().norm())));
         let below = |mesh: &SurfaceMesh| {
             let low = |t: &&[u32; 3]| t.iter().all(|v| mesh.vertices_mm[*v as usize].z < 11.0);
@@ -251,7 +254,7 @@ mod tests {
 
     #[test]
     fn what_is_higher_than_teeth_is_left_alone() {
-        // Four tongues that stand on are no teeth.
+        // Four tongues that protrude are not teeth.
         assert!(trimmed(&tube(|x, i| x.z > 12.0 + if i % 8 < 4 { 8.0 } else { 0.0 })).is_none());
         assert!(trimmed(&tube(|x, i| x.z > 12.0 + if i % 8 < 4 { 3.0 } else { 0.0 })).is_some(), "the twin");
     }

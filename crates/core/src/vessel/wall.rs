@@ -1,4 +1,4 @@
-//! A surface made fit to be a vessel wall, with a record of what that took.
+//! A vessel wall made from a surface, with a report of its repair.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -10,7 +10,7 @@ use super::weld::Welding;
 use super::{SurfaceMesh, orient, repair, sliver};
 use crate::{Error, Result, Vec3};
 
-/// Volume of a sheet over the cube of the surface's size below which it has no inside.
+/// Ratio of volume to the cube of the surface's size below which it is a sheet without an inside.
 const FLAT: f64 = 1e-14;
 
 /// A vessel wall: triangles counter-clockwise seen from outside the lumen, with numbered openings.
@@ -22,7 +22,7 @@ pub struct Wall {
     pub(super) report: RepairReport,
 }
 
-/// What [`Wall::from_surface`] found and did.
+/// What [`Wall::from_surface`] found and changed.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RepairReport {
     /// Triangles as given.
@@ -33,7 +33,8 @@ pub struct RepairReport {
     pub vertices_welded: usize,
     /// Vertices dropped because no triangle used them.
     pub vertices_unreferenced: usize,
-    /// Triangles without area that were removed (for needles the neighbour's edge was flipped, so that no slit opens).
+    /// Triangles without area that were removed (for needles the neighbour's edge was flipped, so that no slit
+    /// opens).
     pub degenerate_removed: usize,
     /// Triangles on the same three vertices as an earlier one, removed.
     pub duplicates_removed: usize,
@@ -41,7 +42,8 @@ pub struct RepairReport {
     pub triangles_flipped: usize,
     /// Whether the whole surface was inside out.
     pub inside_out: bool,
-    /// Connected pieces of the surface. More than one is legitimate (two vessels) or dirt: `smallest_component` helps to tell.
+    /// Connected pieces of the surface. More than one may be legitimate (two vessels) or debris: `smallest_component`
+    /// helps to decide.
     pub components: usize,
     /// Triangles of the smallest component.
     pub smallest_component: usize,
@@ -53,36 +55,36 @@ pub struct RepairReport {
     pub non_manifold_edges: usize,
     /// Edges across which no winding agrees: the surface is one-sided.
     pub one_sided_edges: usize,
-    /// Vertices merged over cracks wider than the tolerance of welding.
+    /// Vertices merged across cracks wider than the welding tolerance.
     pub cracks_closed: usize,
     /// Open edges split at the vertices of the other side of a seam, and joined to it.
     pub edges_sewn: usize,
     /// Triangles of fins, second layers and membranes removed: edges had more than two triangles.
     pub sheets_removed: usize,
-    /// Edges of more than two triangles along which the surface was cut apart, nothing moved.
+    /// Edges of more than two triangles along which the surface was cut apart, without moving anything.
     pub edges_cut: usize,
     /// Specks and floating patches dropped.
     pub pieces_dropped: usize,
-    /// Outer skins dropped of a wall that was given with two: the inner one is the lumen's.
+    /// Outer skins dropped of a wall that was given with two: the inner one is that of the lumen.
     pub skins_dropped: usize,
-    /// Triangles of what was dropped.
+    /// Triangles of dropped pieces and skins.
     pub piece_triangles_dropped: usize,
     /// Holes and tears closed.
     pub holes_filled: usize,
-    /// Triangles added to close holes, those of cut out folds too.
+    /// Triangles added to close holes, including those of folds that were cut out.
     pub triangles_added: usize,
     /// Pairs of triangles that intersected before folds were cut out.
     pub intersections_found: usize,
-    /// Pairs that still do.
+    /// Pairs that still intersect.
     pub intersections_left: usize,
-    /// Whether there were too many to be found: then none was cured.
+    /// Whether there were too many to find: then none was repaired.
     pub intersections_capped: bool,
     /// Triangles cut out because they intersected or were folded.
     pub fold_triangles_removed: usize,
 }
 
 impl RepairReport {
-    /// Whether the surface needed nothing but vertices welded and the winding made consistent, and no triangles of it intersect.
+    /// Whether the surface needed nothing but welding and a consistent winding, and no triangles of it intersect.
     pub(crate) fn is_as_given(&self) -> bool {
         let more = [
             self.degenerate_removed,
@@ -101,7 +103,7 @@ impl RepairReport {
         more.iter().all(|count| *count == 0) && !self.intersections_capped
     }
 
-    /// One line per thing that was done or is odd; empty for a clean surface.
+    /// One line per change or irregularity; empty for a clean surface.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let mut note = |count: usize, text: &str| {
@@ -141,10 +143,11 @@ impl RepairReport {
 }
 
 impl Wall {
-    /// Repairs `surface` into a wall: welds, removes degenerate and duplicate triangles, joins cracks, takes fins and second
-    /// layers away, makes the winding consistent and outward, drops specks and outer skins, closes holes and tears, cuts out
-    /// local folds, and takes the boundary loops that are left as openings. What is not faulty stays as it is, and vertices
-    /// that stay are not moved, except over cracks. [`Wall::report`] says what was done and what is left.
+    /// Repairs `surface` into a wall: welds, removes degenerate and duplicate triangles, joins cracks, removes fins
+    /// and second layers, makes the winding consistent and outward, drops specks and outer skins, closes holes and
+    /// tears, cuts out local folds, and takes the remaining boundary loops as openings. Sound parts are not changed,
+    /// and remaining vertices are not moved, except across cracks. [`Wall::report`] lists changes and remaining
+    /// faults.
     ///
     /// # Errors
     /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate that is used is not finite.
@@ -152,8 +155,8 @@ impl Wall {
         Self::mended(Welding::of(surface)?, true)
     }
 
-    /// A wall of `surface` with vertices welded, triangles without area removed and the winding made consistent, and no more:
-    /// what is faulty beyond that stays.
+    /// A wall of `surface` with only vertices welded, triangles without area removed and the winding made consistent;
+    /// other faults remain.
     ///
     /// # Errors
     /// As [`Wall::from_surface`].
@@ -161,7 +164,7 @@ impl Wall {
         Self::mended(Welding::of(surface)?, false)
     }
 
-    /// [`Wall::from_surface`], or no more than [`Wall::welded`], of a surface whose vertices are merged.
+    /// [`Wall::from_surface`], or only [`Wall::welded`], of a surface whose vertices are merged.
     pub(super) fn mended(welding: Welding, whole: bool) -> Result<Self> {
         let Welding { mut mesh, tolerance_mm, merged, .. } = welding;
         let mut report = RepairReport {
@@ -198,7 +201,7 @@ impl Wall {
         Ok(Self::finished(mesh, edges, report))
     }
 
-    /// Counts what `mesh` is made of, whose edges these are, and finds its openings.
+    /// Completes the report on `mesh`, with these edges, and finds its openings.
     fn finished(mesh: SurfaceMesh, mut edges: Edges, mut report: RepairReport) -> Self {
         let table = edges.of(&mesh.triangles);
         report.non_manifold_edges = table.non_manifold();
@@ -232,10 +235,11 @@ impl Wall {
         &self.openings
     }
 
-    /// Numbers its openings as those of the same vessel before it had a mesh: of openings of one size rounding would say which comes first.
+    /// Numbers its openings like those of the same vessel before it was meshed: for openings of equal size the order
+    /// would depend on rounding.
     ///
     /// # Errors
-    /// Another number of openings.
+    /// A different number of openings.
     pub(super) fn number_openings_as(&mut self, known: &[Opening]) -> Result<()> {
         if known.len() != self.openings.len() {
             return Err(Error::Mesh(format!(
@@ -256,27 +260,27 @@ impl Wall {
         Ok(())
     }
 
-    /// The opening that devices come in by unless another is given: the lowest (least z: the nearest to the feet, in patient axes) of those that have
-    /// at least 0.4 of the widest one's radius, as from the groin. None where there is no opening. A vessel made from a tree begins at its
-    /// root instead ([`GeneratedWall::inlet`](super::GeneratedWall::inlet)), and blood has a rule of its own
-    /// ([`VesselFlow::inlet_mm`](crate::flow::VesselFlow::inlet_mm)): it comes from the heart.
+    /// The default opening for devices: the lowest (smallest z: the nearest to the feet, in patient axes) of those
+    /// with at least 0.4 of the widest one's radius, as for access from the groin. `None` without openings. A vessel
+    /// made from a tree begins at its root instead ([`GeneratedWall::inlet`](super::GeneratedWall::inlet)), and blood
+    /// has its own rule ([`VesselFlow::inlet_mm`](crate::flow::VesselFlow::inlet_mm)): it comes from the heart.
     pub fn inlet(&self) -> Option<&Opening> {
         opening::inlet(&self.openings)
     }
 
-    /// The triangles that close the openings; they serve the inside test only and are no wall.
+    /// The triangles that close the openings; they are used for the inside test only and are not part of the wall.
     pub fn caps(&self) -> &[[Vec3; 3]] {
         &self.caps
     }
 
-    /// The wall closed by a fan of triangles over each opening, sharing its vertices: for volumes and pictures.
+    /// The wall closed by a fan of triangles over each opening, sharing its vertices: for volumes and rendering.
     pub fn closed_mesh(&self) -> SurfaceMesh {
         let mut mesh = self.mesh.clone();
         self.openings.iter().for_each(|opening| opening.close(&mut mesh));
         mesh
     }
 
-    /// What was found and done.
+    /// The report of the repair.
     pub fn report(&self) -> &RepairReport {
         &self.report
     }
@@ -288,7 +292,7 @@ impl Wall {
     }
 }
 
-/// A wall is written as its mesh and report: what else it has comes from these, to the bit.
+/// A wall is serialised as its mesh and report: the rest follows from these, to the bit.
 impl Serialize for Wall {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         (&self.mesh, &self.report).serialize(serializer)
@@ -303,12 +307,12 @@ impl<'de> Deserialize<'de> for Wall {
     }
 }
 
-/// Volume in mm³ up to which a surface is a flat sheet: it encloses nothing but rounding.
+/// Volume in mm³ up to which a surface is a flat sheet that encloses only rounding.
 pub(crate) fn flat_volume_mm3(mesh: &SurfaceMesh) -> f64 {
     FLAT * mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm()).powi(3)
 }
 
-/// Rejects what no repair can help.
+/// Rejects surfaces beyond repair.
 pub(crate) fn validate(surface: &SurfaceMesh) -> Result<()> {
     if surface.triangles.is_empty() {
         return Err(Error::Mesh("no triangles; a wall needs a surface".into()));
@@ -367,7 +371,7 @@ pub(crate) fn duplicate_pairs(triangles: &[[u32; 3]], table: &EdgeTable) -> Vec<
         _ => true,
     };
     let shared = table.edges().filter(may_repeat).flatten().map(|u| u.triangle as usize);
-    // Triangles with a repeated vertex are in no table.
+    // Triangles with a repeated vertex are not in the table.
     let repeats = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
     let alone = (0..triangles.len()).filter(|&index| repeats(&triangles[index]));
     let with_key = |index: usize| {
@@ -386,7 +390,7 @@ pub(crate) fn duplicate_pairs(triangles: &[[u32; 3]], table: &EdgeTable) -> Vec<
     pairs
 }
 
-/// Removes vertices that no triangle uses; returns how many.
+/// Removes vertices that no triangle uses; returns their number.
 pub(crate) fn drop_unreferenced(mesh: &mut SurfaceMesh) -> usize {
     let mut used = vec![false; mesh.vertices_mm.len()];
     for v in mesh.triangles.iter().flatten() {

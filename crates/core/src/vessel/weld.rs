@@ -1,7 +1,7 @@
-//! Merging vertices that are meant to be one.
+//! Merges vertices that are meant to coincide.
 //!
-//! STL stores every corner of every triangle anew, and exporters round them differently. Vertices closer than a
-//! tolerance are merged, transitively: chains of close vertices become one, so the result depends on no order.
+//! STL stores every corner of every triangle separately, and exporters round them differently. Vertices closer than a
+//! tolerance are merged, transitively: chains of close vertices become one, so the result does not depend on order.
 
 use std::collections::VecDeque;
 
@@ -10,30 +10,31 @@ use super::topology::DisjointSets;
 use super::wall::validate;
 use crate::{Result, Vec3};
 
-/// Vertices closer than this fraction of the diagonal of the triangles' bounding box are one vertex: ten times the resolution of the
-/// 32-bit floats of an STL file, and far below any detail of an anatomy.
+/// Distance below which vertices are merged, as a fraction of the diagonal of the triangles' bounding box: ten times
+/// the resolution of the 32-bit floats of an STL file, and far below any anatomical detail.
 const WELD_TOLERANCE: f64 = 1e-6;
 
-/// Vertices are sorted along this vector of hardly less than unit length: across all planes that surfaces tend to have.
+/// Vertices are sorted along this vector of slightly less than unit length, oblique to all planes that surfaces tend
+/// to have.
 const ALONG: Vec3 = Vec3::new(0.537_7, 0.371_9, 0.747_9);
-/// Largest difference along it of what is near, over the tolerance: with room for rounding.
+/// Largest difference along it of close vertices, in tolerances: with room for rounding.
 const SLACK: f64 = 1.001;
 
 /// A surface with its vertices merged.
 #[derive(Debug, Clone)]
 pub(super) struct Welding {
-    /// All vertices as given, and triangles between those that stay.
+    /// All vertices as given, and triangles between the remaining ones.
     pub(super) mesh: SurfaceMesh,
     /// Smallest and largest coordinates of the vertices that triangles use.
     pub(super) bounds_mm: (Vec3, Vec3),
-    /// Up to this distance vertices were merged.
+    /// Distance up to which vertices were merged.
     pub(super) tolerance_mm: f64,
-    /// How many were merged into another one.
+    /// Number of vertices merged into another one.
     pub(super) merged: usize,
 }
 
 impl Welding {
-    /// Merges the vertices of a surface that can be a wall.
+    /// Merges the vertices of a surface that is usable as a wall.
     ///
     /// # Errors
     /// As [`validate`].
@@ -51,15 +52,15 @@ impl Welding {
     }
 }
 
-/// For each vertex the index of the vertex it is merged into (its own index if it stays): the smallest index of
-/// all vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are joined to none.
+/// For each vertex the index of the vertex it is merged into (its own index if it stays): the smallest index of all
+/// vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are not merged.
 fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
     let usable = |v: &Vec3| v.iter().all(|c| c.is_finite());
     let mut order: Vec<(f64, u32)> =
         (0..).zip(vertices_mm).filter(|(_, v)| usable(v)).map(|(index, v)| (ALONG.dot(v), index)).collect();
     order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut sets = DisjointSets::new(vertices_mm.len());
-    // Distinct vertices that the next one may be near to.
+    // Distinct vertices that may be close to the next one.
     let mut last: VecDeque<(f64, u32, Vec3)> = VecDeque::new();
     for (at, index) in order {
         let v = vertices_mm[index as usize];
@@ -72,7 +73,7 @@ fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
             if (v - w).norm() <= tolerance_mm {
                 sets.join(index, *other);
             }
-            // What that one was near to, this one is.
+            // It is close to everything that the other one was close to.
             is_distinct = v != *w;
             if !is_distinct {
                 break;

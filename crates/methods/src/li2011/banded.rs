@@ -6,12 +6,12 @@
 //! xᵢ = xᵢ₋₁ + h tᵢ₋₁ + ½h uᵢ,   tᵢ = tᵢ₋₁ + uᵢ,   cost ½(α/h)|uᵢ|² + node terms at xᵢ,
 //! ```
 //!
-//! so the energy of everything beyond node i, minimised over its unknowns, is a quadratic of (xᵢ, tᵢ) alone:
-//! Vᵢ = ½xᵀXx + xᵀYt + ½tᵀTt − qₓ·x − q_t·t. Block elimination from the tip carries X, Y, T, qₓ, q_t to the sheath;
+//! so the energy of everything beyond node i, minimised over its unknowns, is a quadratic of (xᵢ, tᵢ) alone: Vᵢ =
+//! ½xᵀXx + xᵀYt + ½tᵀTt − qₓ·x − q_t·t. Block elimination from the tip propagates X, Y, T, qₓ, q_t to the sheath;
 //! back-substitution from the sheath, where x₀ and t₀ are known, gives all uᵢ. Per element it factors one 3×3 matrix,
-//! H_uu = α/h + (contributions of what lies beyond), positive definite for α > 0: no pivoting is ever needed.
+//! H_uu = α/h + (contributions of what lies beyond), positive definite for α > 0: pivoting is never needed.
 //!
-//! With unit tangents the row t̂·(t + u) = 1 and its multiplier λ stand beside u, and both are eliminated together:
+//! With unit tangents there is also the row t̂·(t + u) = 1 with its multiplier λ, eliminated together with u:
 //!
 //! ```text
 //! H u + λ t̂ = r,  t̂·u = 1 − t̂·t   ⇒   u = P H⁻¹r + w (1 − t̂·t),   w = H⁻¹t̂ / (t̂·H⁻¹t̂),   P = I − w t̂ᵀ
@@ -47,7 +47,7 @@ struct Beyond {
 
 /// Solves for positions x₁…xₙ and tangents t₁…tₙ at the minimum of the energy of `chain`, in O(n).
 ///
-/// Positions are measured from the sheath throughout, which keeps the rounding of far-away vessels out.
+/// Positions are relative to the sheath, which avoids the rounding of far-away vessels.
 pub fn solve(
     chain: &Chain,
     workspace: &mut Workspace,
@@ -89,7 +89,8 @@ pub fn solve(
 }
 
 impl Beyond {
-    /// Moves the quadratic one element of length `h` towards the sheath; its end's tangent is of unit length about `direction`.
+    /// Moves the quadratic one element of length `h` towards the sheath; its end's tangent has unit length about
+    /// `direction`.
     fn eliminate(&mut self, h: f64, alpha: f64, direction: Option<&Vec3>) -> Elimination {
         let (x, y, t) = (self.xx, self.xt, self.tt);
         let yt = y.transpose();
@@ -98,7 +99,7 @@ impl Beyond {
         let ux = x * (0.5 * h) + yt;
         let ut = x * (0.5 * h * h) + y * (0.5 * h) + yt * h + t;
         let qu = self.qx * (0.5 * h) + self.qt;
-        // Positive definite by construction; only NaN in the input gets here, and goes through as NaN.
+        // Positive definite by construction; only NaN in the input leads here, and is propagated.
         let inverse = Cholesky::new(uu).map_or(Matrix3::repeat(f64::NAN), |c| c.inverse());
         let (mut free, mut by_x, mut by_t) = (inverse * qu, inverse * ux, inverse * ut);
         if let Some(direction) = direction {
@@ -138,7 +139,7 @@ impl Beyond {
     }
 }
 
-/// Removes the rounding that would let the quadratic drift from symmetry over hundreds of elements.
+/// Symmetrises: otherwise rounding would accumulate over hundreds of elements.
 fn symmetric(m: Matrix3<f64>) -> Matrix3<f64> {
     (m + m.transpose()) * 0.5
 }

@@ -1,4 +1,4 @@
-//! The discrete energy of the paper, eqs. 1–9, and the constraint that the paper leaves out.
+//! The discrete energy of the paper, eqs. 1–9, and the constraint that the paper omits.
 //!
 //! Nodes 0…n, element i of length hᵢ between nodes i−1 and i. With tangents linear in between,
 //!
@@ -9,45 +9,45 @@
 //! W  = −Σᵢ fᵢ·(xᵢ − xᵢ⁰)                            (9)
 //! ```
 //!
-//! x₀ and t₀ are the sheath (section 2.2.4) and do not vary; t₁…tₙ are the unknowns.
+//! x₀ and t₀ are given by the sheath (section 2.2.4); t₁…tₙ are the unknowns.
 //!
-//! With unit tangents each node has one more row, and one multiplier λᵢ. |tᵢ| = 1 is not linear; about a direction t̂ᵢ that is close
-//! to tᵢ it is
+//! With unit tangents each node has another row with a multiplier λᵢ. |tᵢ| = 1 is not linear; about a direction t̂ᵢ
+//! close to tᵢ it is
 //!
 //! ```text
 //! t̂ᵢ·tᵢ = 1,      ∂U/∂tᵢ + λᵢ t̂ᵢ = 0
 //! ```
 //!
-//! exact but for second order in the angle between them. What is left of that order goes when tangents are divided by their length
+//! exact up to second order in the angle between them. That error vanishes when tangents are divided by their length
 //! ([`Chain::normalise`]).
 
 use endowire_core::Vec3;
 
 /// A spring of the wall at a node: energy ½ k (n·x − d)².
 ///
-/// A triangle is one spring, whose direction n is its normal and whose stiffness k is κ (eq. 7). A smooth wall adds one across the
-/// device, for the curvature of the lumen.
+/// A triangle is one spring, whose direction n is its normal and whose stiffness k is κ (eq. 7). A smooth wall has a
+/// second one across the device, for the curvature of the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
     /// The node, 1…n.
     pub node: usize,
     /// Unit direction n.
     pub direction: Vec3,
-    /// Offset d, mm: the spring is at rest where n·x = d.
+    /// Offset d, mm: the spring's force is zero where n·x = d.
     pub offset_mm: f64,
     /// Stiffness k, N/mm.
     pub stiffness_n_per_mm: f64,
 }
 
 impl Spring {
-    /// Force on the node at `x`, N along the spring's direction; negative where it pulls, which eq. 7 allows since it is quadratic on
-    /// both sides of the plane.
+    /// Force on the node at `x`, N along the spring's direction; negative where it pulls, which eq. 7 permits since
+    /// it is quadratic on both sides of the plane.
     pub fn force_n(&self, x: &Vec3) -> f64 {
         self.stiffness_n_per_mm * (self.offset_mm - self.direction.dot(x))
     }
 }
 
-/// One catheter as the paper discretises it.
+/// A catheter in the paper's discretisation.
 #[derive(Debug, Clone, Default)]
 pub struct Chain {
     /// Position x₀ of the sheath, mm.
@@ -62,7 +62,7 @@ pub struct Chain {
     pub forces_n: Vec<Vec3>,
     /// Springs of the wall, in ascending order of their nodes.
     pub springs: Vec<Spring>,
-    /// Directions t̂₁…t̂ₙ about which tangents are of unit length; empty where tangents are free, as printed.
+    /// Directions t̂₁…t̂ₙ about which tangents have unit length; empty if tangents are free, as printed.
     pub directions: Vec<Vec3>,
 }
 
@@ -91,7 +91,7 @@ impl Chain {
         self.lengths_mm.len()
     }
 
-    /// The direction t̂ of a node, 1…n; none where tangents are free.
+    /// The direction t̂ of a node, 1…n; `None` if tangents are free.
     pub fn direction(&self, node: usize) -> Option<&Vec3> {
         self.directions.get(node - 1)
     }
@@ -127,17 +127,17 @@ impl Chain {
         }
     }
 
-    /// Divides tangents by their length, and takes the positions that follow from them.
+    /// Divides tangents by their length, and computes the resulting positions.
     pub fn normalise(&self, tangents: &mut [Vec3], positions_mm: &mut Vec<Vec3>) {
         tangents.iter_mut().for_each(|t| *t /= t.norm());
         self.integrate(tangents, positions_mm);
     }
 
-    /// −∂U/∂tᵢ at the tangents t₁…tₙ and their positions: what is left of eq. 10, without the multipliers' share.
+    /// −∂U/∂tᵢ at the tangents t₁…tₙ and their positions: the residual of eq. 10, without multipliers.
     ///
-    /// Summed as a person would: the force on everything beyond an element acts on its tangents with the lever ½h, and
-    /// wall forces come from penetrations. The same residual as b − At, but free of the cancellation between
-    /// stiffness times position and offset, which costs A and b six digits.
+    /// Summed mechanically: the force on everything beyond an element acts on its tangents with the lever ½h, and
+    /// wall forces follow from penetrations. This equals b − At without the cancellation between stiffness times
+    /// position and offset, which costs A and b six digits.
     pub fn residual(&self, tangents: &[Vec3], positions_mm: &[Vec3], residual: &mut Vec<Vec3>) {
         let n = self.elements();
         residual.clear();

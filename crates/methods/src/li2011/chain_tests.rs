@@ -1,4 +1,4 @@
-//! Facts about the two solves, without a vessel.
+//! Properties of the two solves, without a vessel.
 
 use super::chain::{Chain, Spring};
 use super::{banded, dense};
@@ -65,7 +65,7 @@ fn unit_chain(elements: usize) -> Chain {
     chain
 }
 
-/// Largest component of ∂U/∂t, but for what multipliers hold.
+/// Largest component of ∂U/∂t that multipliers do not balance.
 fn largest_slope(chain: &Chain, tangents: &[Vec3]) -> f64 {
     let (mut x, mut residual) = (Vec::new(), Vec::new());
     chain.integrate(tangents, &mut x);
@@ -134,7 +134,7 @@ fn tangents_are_of_unit_length_about_their_directions() {
         chain.normalise(&mut solution.tangents, &mut solution.positions_mm);
         assert!(solution.tangents.iter().all(|t| (t.norm() - 1.0).abs() < 1e-15));
     }
-    // The twin: free tangents are of any length.
+    // Counter-check: free tangents have any length.
     let free = Chain { directions: Vec::new(), ..unit_chain(40) };
     assert!(off(&chain, &solve_banded(&free).tangents) > 0.1);
 }

@@ -1,24 +1,25 @@
 //! The paper's own solve: A B⁻¹ x = b as a dense system (eqs. 10–12), by faer's LU.
 //!
-//! With c = x₀ + ½h₁t₀ the part of every xᵢ that the sheath alone gives, eq. 11 reads B t = x − c.
-//! B is block lower triangular with Bᵢⱼ = ½(hⱼ + hⱼ₊₁) for j < i and Bᵢᵢ = ½hᵢ, and its inverse follows from
-//! tᵢ = 2(xᵢ − xᵢ₋₁)/hᵢ − tᵢ₋₁ without any factorisation, as section 2.2.4 remarks. Setting ∂U/∂t = 0,
+//! With c = x₀ + ½h₁t₀ the part of every xᵢ due to the sheath alone, eq. 11 reads B t = x − c. B is block lower
+//! triangular with Bᵢⱼ = ½(hⱼ + hⱼ₊₁) for j < i and Bᵢᵢ = ½hᵢ, and its inverse follows from tᵢ = 2(xᵢ − xᵢ₋₁)/hᵢ −
+//! tᵢ₋₁ without factorisation, as section 2.2.4 remarks. Setting ∂U/∂t = 0,
 //!
 //! ```text
 //! A = K + Σⱼ kⱼ Bⱼᵀ nⱼ nⱼᵀ Bⱼ               K: bending, block tridiagonal
 //! b = K₁₀ t₀ + Σⱼ kⱼ (dⱼ − nⱼ·c) Bⱼᵀ nⱼ + Bᵀ f
 //! ```
 //!
-//! Unit tangents add the rows t̂ᵢ·tᵢ = 1 with their multipliers λ. With T the matrix that has t̂ᵢ in the rows of node i and column i,
+//! Unit tangents add the rows t̂ᵢ·tᵢ = 1 with their multipliers λ. With T the matrix with t̂ᵢ in the rows of node i
+//! and column i,
 //!
 //! ```text
 //! ⎡ A B⁻¹    T ⎤ ⎡ x − c ⎤   ⎡ b ⎤
 //! ⎣ Tᵀ B⁻¹   0 ⎦ ⎣   λ   ⎦ = ⎣ 1 ⎦
 //! ```
 //!
-//! A B⁻¹ mixes levers of the whole length with those of one element: its condition number reaches 10¹⁰ at 300 nodes, and
-//! one solve leaves a micrometre. Iterative refinement with the residual of the equations themselves
-//! ([`Chain::residual`]) removes it for the price of a few triangular solves.
+//! A B⁻¹ mixes levers of the whole length with those of one element: its condition number reaches 10¹⁰ at 300 nodes,
+//! and one solve has an error of a micrometre. Iterative refinement with the residual of the equations themselves
+//! ([`Chain::residual`]) removes it at the cost of a few triangular solves.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -87,7 +88,7 @@ pub fn solve(chain: &Chain, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec
     chain.integrate(tangents, positions_mm);
 }
 
-/// Rounds of refinement: each gains about six digits at 300 nodes; the second reaches rounding.
+/// Number of refinements: each gains about six digits at 300 nodes; the second reaches rounding.
 const REFINEMENTS: usize = 2;
 
 /// t += B⁻¹ x for a column x.

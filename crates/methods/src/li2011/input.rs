@@ -1,14 +1,16 @@
-//! Algorithm 1 of the paper for one input of the hand: translate, collide, solve, and what is left over.
+//! Algorithm 1 of the paper for one input of the hand: translation, collision detection, solution, and remaining
+//! errors.
 //!
-//! The paper leaves open what collides. A node does here if its surface reaches the wall before or after the translation: seen only
-//! after it, pulling would lift every node off the outside of a bend, and the next solve would shoot the wire straight through the
-//! wall.
+//! The paper does not specify which nodes collide. Here a node does if its surface reaches the wall before or after
+//! the translation: if only after it, pulling would lift every node off the outside of a bend, and the next solve
+//! would throw the wire straight through the wall.
 //!
-//! One linear solve is exact but for second order in what the input moves. What that leaves is measured: how far the wall is at each node from
-//! where the solve took it to be, and how far nodes of unit tangents are from those of the solve. And a wall holds nothing: planes that the solve took for
-//! springs on both sides may pull at nodes that have come off, on a stiff wall by micrometres with as much force as others press. Let go
-//! at the next input and met again at the one after, such nodes hold a wire back for tens of inputs. Forces are those of the solve,
-//! with which bending is in balance.
+//! One linear solve is exact up to second order in the motion of the input. The remaining error is measured: the
+//! distance of the wall at each node from its position in the solve, and the distance of nodes with unit tangents
+//! from those of the solve. Moreover, a wall cannot pull: planes treated as two-sided springs may pull at nodes that
+//! have come off, on a stiff wall by micrometres with as much force as others press. Released at the next input and
+//! met again at the one after, such nodes hold a wire back for tens of inputs. Forces are those of the solve, which
+//! balance bending.
 
 use endowire_core::contact::extension::left_through;
 use endowire_core::insertion::{Contact, Energy, Surroundings, nodes_from_tip};
@@ -22,14 +24,14 @@ use super::slide::{TangentReading, translate};
 use super::wall::{FeltWall, Met};
 use super::{banded, dense};
 
-/// An input has converged if nothing is off by more than this part of the device's radius, and …
+/// Largest error, in radii of the device, of an input that has converged.
 const CONVERGED_RADII: f64 = 0.1;
-/// … if no plane pulls by more than this part of the largest force by which one presses.
+/// Largest pulling force of a plane in a converged input, relative to the largest pressing force.
 const CONVERGED_PULL: f64 = 0.2;
-/// A node that pressed at the last input is held to the wall while it is not farther from it than this part of its radius.
+/// Distance from the wall, in radii, within which a node that pressed at the last input is held to it.
 const HOLD_RADII: f64 = 0.5;
 
-/// What inputs are worked out with. An input reads a state and leaves its result here.
+/// Memory for computing inputs. An input reads a state and stores its result here.
 #[derive(Debug, Clone)]
 pub(super) struct Input {
     pub(super) options: Li2011Options,
@@ -38,18 +40,18 @@ pub(super) struct Input {
     pub(super) chain: Chain,
     pub(super) from_tip_mm: Vec<f64>,
     workspace: banded::Workspace,
-    /// What nodes met before the solve, by node.
+    /// Contacts before the solve, by node.
     met: Vec<Option<Met>>,
-    /// Positions before the solve, and by how much each node is clear of the wall there in all directions, mm.
+    /// Positions before the solve, and a lower bound of each node's clearance there, mm.
     predicted_mm: Vec<Vec3>,
     clear_mm: Vec<f64>,
-    /// Positions as solved for, before tangents were made of unit length: forces are in balance there.
+    /// Positions of the solve, before tangents were normalised: forces balance there.
     solved_mm: Vec<Vec3>,
     positions_mm: Vec<Vec3>,
     tangents: Vec<Vec3>,
-    /// How far the surface of each node is in the wall.
+    /// Penetration of each node's surface.
     depths_mm: Vec<f64>,
-    /// Largest distance of the wall from where the solve took it to be, mm.
+    /// Largest distance of the wall from its position in the solve, mm.
     misfit_mm: f64,
 }
 
@@ -73,7 +75,8 @@ impl Input {
         }
     }
 
-    /// Steps 2 to 5 of Algorithm 1 from `state` to a new inserted length. Returns how much that leaves: it has converged up to 1.
+    /// Steps 2 to 5 of Algorithm 1 from `state` to a new inserted length. Returns the remaining error: up to 1 it has
+    /// converged.
     pub(super) fn work_out(
         &mut self,
         surroundings: &Surroundings<'_>,
@@ -105,7 +108,7 @@ impl Input {
         forces_n.resize(from_tip_mm.len() - 1, Vec3::zeros());
     }
 
-    /// Step 3: what the nodes collide with, as springs.
+    /// Step 3: collisions of the nodes, as springs.
     fn collide(&mut self, surroundings: &Surroundings<'_>, state: &ChainState) {
         self.chain.springs.clear();
         self.met.clear();
@@ -120,7 +123,7 @@ impl Input {
             let direction = self.chain.directions.get(index).unwrap_or(&self.chain.start_tangent);
             let met = self.wall.met(x, direction, (radius_mm, gap_mm));
             self.clear_mm.push(met.err().unwrap_or(0.0));
-            // A plane goes on where its triangle does not.
+            // A plane extends beyond its triangle.
             let met = match self.wall {
                 FeltWall::Triangle(_) => met.ok().or(before.map(|plane| Met { plane, across: None })),
                 FeltWall::Smooth(..) => met.ok(),
@@ -165,7 +168,7 @@ impl Input {
         )))
     }
 
-    /// How much the input leaves: 1 where it has just converged.
+    /// The remaining error of the input: 1 at the limit of convergence.
     fn left_over(&mut self, surroundings: &Surroundings<'_>) -> f64 {
         self.depths_mm.clear();
         self.misfit_mm = 0.0;
@@ -183,7 +186,7 @@ impl Input {
         left_over
     }
 
-    /// Largest force by which a plane pulls a node, over the largest by which one presses: a wall holds nothing.
+    /// Largest pulling force of a plane on a node, relative to the largest pressing one: a wall cannot pull.
     fn pull(&self) -> f64 {
         let (mut pull_n, mut press_n) = (0.0f64, 0.0f64);
         for (met, x) in self.met.iter().zip(&self.solved_mm) {
@@ -194,7 +197,7 @@ impl Input {
         if pull_n > 0.0 { pull_n / press_n.max(pull_n) } else { 0.0 }
     }
 
-    /// Step 6: the new state, but for what the hand has done.
+    /// Step 6: the new state, except for the motion of the hand.
     pub(super) fn read_out(&self, surroundings: &Surroundings<'_>, state: &mut ChainState) {
         let sheath = surroundings.sheath;
         let ChainState { shape, report, touched } = state;

@@ -11,29 +11,32 @@
 //! - [`banded`]: the same minimum by block elimination along the chain, O(n);
 //! - `slide`, `wall`, `input`: one input of Algorithm 1; [`stepper`]: commands as inputs.
 //!
-//! # Three readings
-//! As printed the method cannot pass the bend of its own tube: nothing holds |t| at 1, and through a half-turn the cheapest path of
-//! tangents leads through zero. Three readings of the paper close that gap, and still one linear system is solved for each input:
+//! # Three interpretations
+//! As printed the method cannot pass the bend of its own tube: nothing keeps |t| at 1, and through a half-turn the
+//! cheapest path of tangents leads through zero. Three interpretations of the paper close that gap, still with one
+//! linear system per input:
 //!
-//! 1. "Translate each node by disp": every node moves by disp along the wire's own curve, as a wire that slides does (`slide`).
-//! 2. t(s) = x′(s) is a unit vector: one row t̂·t = 1 and one multiplier a node, t̂ the slid tangent; tangents are divided by their length
-//!    after the solve, and x = B t ([`chain`]).
+//! 1. "Translate each node by disp": every node moves by disp along the wire's own curve, like a sliding wire
+//!    (`slide`).
+//! 2. t(s) = x′(s) is a unit vector: one row t̂·t = 1 and one multiplier per node, t̂ the slid tangent; tangents are
+//!    divided by their length after the solve, and x = B t ([`chain`]).
 //! 3. A contact knows the curvature of the lumen across the device (`wall`).
 //!
 //! `tangents = "unit"` is 1 and 2, `contact = "smooth"` is 3. `tangents = "free"` with `contact = "triangle"` is the paper as printed.
 //!
-//! # What it cannot do
-//! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall, and between nodes nothing is felt.
-//! - **One linear solve per input**: what is met during an input is found at the next. What an input leaves is measured and told
-//!   (`input`), and with unit tangents inputs that have not converged are halved ([`stepper`]).
+//! # Limitations
+//! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall, and there is no contact between
+//!   nodes.
+//! - **One linear solve per input**: a collision during an input is detected at the next. The remaining error of an
+//!   input is measured and reported (`input`), and with unit tangents inputs that have not converged are halved ([`stepper`]).
 //! - No twist, no rest curvature, no friction.
-//! - With free tangents, no unit length: a cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects 10 %, 35 %, 133 %, 311 % too far, and no
-//!   mesh cures it.
+//! - With free tangents, lengths are not preserved: a cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects
+//!   10 %, 35 %, 133 %, 311 % too far, on any mesh.
 //!
-//! # Misprints read as meant
+//! # Misprints
 //! Eq. 4 and 6 drop the ½ of eq. 2: it is kept here. Eq. 5's first weight must read (sᵢ − s)/(sᵢ − sᵢ₋₁) for the
-//! interpolation to meet its nodes. Eq. 9 is the work of the forces, which enters a potential energy with a minus
-//! sign.
+//! interpolation to pass through its nodes. Eq. 9 is the work of the forces, which enters a potential energy with a
+//! minus sign.
 
 pub mod banded;
 pub mod chain;

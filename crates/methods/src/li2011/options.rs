@@ -1,4 +1,4 @@
-//! What a scene may say of the paper's method.
+//! Options of the paper's method in a scene.
 
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct Li2011Options {
     pub element_mm: f64,
     /// Wall stiffness κ per contact node, N/mm.
     pub wall_stiffness_n_per_mm: f64,
-    /// Whether tangents are of unit length.
+    /// Whether tangents have unit length.
     pub tangents: TangentReading,
     /// What nodes collide with.
     pub contact: ContactReading,
@@ -35,7 +35,7 @@ impl Default for Li2011Options {
     }
 }
 
-/// Which of the two solves of the same equations.
+/// Two solvers for the same equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinearSolver {
     /// A B⁻¹ x = b, dense.
@@ -44,10 +44,10 @@ pub enum LinearSolver {
     Banded,
 }
 
-/// Most elements: (4n)² numbers of 8 bytes in four matrices are 1.2 GB at 1,500 for the dense solve, and one step takes
-/// seconds.
+/// Largest number of elements of the dense solve: (4n)² numbers of 8 bytes in four matrices are 1.2 GB at 1,500, and
+/// one step takes seconds.
 const ELEMENT_LIMIT_DENSE: f64 = 1_500.0;
-/// Most elements of the banded solve.
+/// Largest number of elements of the banded solve.
 const ELEMENT_LIMIT_BANDED: f64 = 100_000.0;
 /// Stiffest wall, N/mm per node.
 const STIFFEST_N_PER_MM: f64 = 1e9;
@@ -70,11 +70,11 @@ impl LinearSolver {
 }
 
 impl Li2011Options {
-    /// Refuses what the method has not.
+    /// Rejects what the method does not support.
     ///
     /// # Errors
-    /// An element length or wall stiffness that is not positive, a number of nodes beyond memory, a wall with friction or regions or one
-    /// that moves.
+    /// An element length or wall stiffness that is not positive, too many nodes for memory, a wall with friction or
+    /// regions or a moving one.
     pub(super) fn check(&self, solver: LinearSolver, surroundings: &Surroundings<'_>) -> Result<()> {
         let length_mm = surroundings.device.length_mm();
         crate::refuse_shape(

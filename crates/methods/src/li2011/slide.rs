@@ -1,15 +1,15 @@
-//! Step 2 of Algorithm 1: where the nodes of a new inserted length are before the solve.
+//! Step 2 of Algorithm 1: positions of the nodes of a new inserted length before the solve.
 //!
-//! "Translate each node by disp" can be read in two ways. **Free**, as printed: all nodes move by the same vector, along the sheath. In a
-//! bend that pushes the wire sideways through the wall. **Unit**: every node moves by disp along the wire's own curve, as a wire that
-//! slides does; beyond the tip the curve goes straight on. The tangents there are the directions t̂ about which the solve keeps tangents
-//! of unit length ([`super::chain`]).
+//! "Translate each node by disp" can be read in two ways. **Free**, as printed: all nodes move by the same vector,
+//! along the sheath. In a bend that pushes the wire sideways through the wall. **Unit**: every node moves by disp
+//! along the wire's own curve, like a sliding wire; beyond the tip the curve continues straight. The tangents there
+//! are the directions t̂ about which the solve keeps tangents of unit length ([`super::chain`]).
 
 use endowire_core::Vec3;
 use endowire_core::shape::Shape;
 use serde::{Deserialize, Serialize};
 
-/// How tangents are read.
+/// Interpretation of tangents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TangentReading {
@@ -20,7 +20,8 @@ pub enum TangentReading {
     Free,
 }
 
-/// Positions of the nodes at `from_tip_mm`, sheath left out, after a push by `travel_mm`; and their directions, of unit tangents.
+/// Positions of the nodes at `from_tip_mm`, without the sheath's, after a push by `travel_mm`; and, for unit
+/// tangents, their directions.
 pub(super) fn translate(
     reading: TangentReading,
     shape: &Shape,
@@ -49,7 +50,7 @@ pub(super) fn translate(
 /// Position and tangent at arc length `s` from the tip on a chain with linear tangents; straight on beyond the tip, and straight back
 /// in the sheath.
 ///
-/// `element` is where to start looking, updated to where `s` was found: calls go from the sheath to the tip.
+/// `element` is where the search starts, updated to where `s` was found: calls go from the sheath to the tip.
 fn on_curve(shape: &Shape, s: f64, element: &mut usize) -> (Vec3, Vec3) {
     let (x, t, from_tip) = (&shape.positions_mm, &shape.tangents, &shape.from_tip_mm);
     let last = shape.len() - 1;

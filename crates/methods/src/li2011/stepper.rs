@@ -1,13 +1,14 @@
 //! The paper's method as an insertion: commands of a hand as inputs of Algorithm 1, for a catheter that enters through a sheath.
 //!
-//! The paper leaves open how the chain grows while it is pushed by fractions of an element. Here nodes sit at whole
-//! multiples of the element length from the tip, as marks on the device, and enter with it; only the first element,
-//! between the sheath and the first such node, has another length: between half and one and a half elements, so that
-//! no sliver arises.
+//! The paper does not specify how the chain grows while it is pushed by fractions of an element. Here nodes are at
+//! whole multiples of the element length from the tip, as marks on the device, and enter with it; only the first
+//! element, between the sheath and the first such node, has another length: between half and one and a half elements,
+//! so that no sliver arises.
 //!
-//! The inputs h of the paper's Table 2 are at most a third of a segment l, and a fortieth of a millimetre at least, one linear solve each. As
-//! printed (`tangents = "free"`) a command is one input, whatever its length. With unit tangents it is cut into inputs within that range: as
-//! long as l/3, and where one has not converged, shorter by halves; at the end of a command the hand holds still until one has.
+//! The inputs h of the paper's Table 2 are at most a third of a segment l, and at least a fortieth of a millimetre,
+//! with one linear solve each. As printed (`tangents = "free"`) a command is one input of any length. With unit
+//! tangents it is divided into inputs within that range: l/3 long, halved where one has not converged; at the end of
+//! a command the hand holds still until one has.
 
 use std::sync::Arc;
 
@@ -25,21 +26,22 @@ use super::options::{Li2011Options, LinearSolver};
 use super::slide::TangentReading;
 use super::wall::{ContactReading, FeltWall};
 
-/// An input that leaves so many times as much as one that has just converged has thrown the wire through the wall, by ten radii: wherever it comes to
-/// rest then, the command has not converged.
+/// Remaining error of an input, relative to the limit of convergence, from which the wire has been thrown through the
+/// wall, by ten radii: wherever it comes to rest then, the command has not converged.
 const LOST: f64 = 100.0;
-/// Longest input over the segment: that of Table 2.
+/// Longest input relative to the segment, from Table 2.
 const LONGEST_INPUT: f64 = 1.0 / 3.0;
-/// Shortest input, mm: that of Table 2, a fortieth of a millimetre.
+/// Shortest input, mm, from Table 2: a fortieth of a millimetre.
 const SHORTEST_INPUT_MM: f64 = 0.025;
-/// A command is not cut for the rounding of its length over the longest input.
+/// Tolerance, for rounding, of the ratio of a command's length to the longest input.
 const ROUNDING: f64 = 1e-6;
-/// Most inputs at the end of a command with the hand held still.
+/// Largest number of inputs at the end of a command with the hand held still.
 const SETTLING: u32 = 20;
-/// Retracting to within this of the sheath, mm, is retracting to it: the rounding of summed increments.
+/// Retracting to within this distance of the sheath, mm, counts as retracting completely: the rounding of summed
+/// increments.
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
-/// The paper's method as an insertion: see the [module docs](super) for what it leaves out.
+/// The paper's method as an insertion: see the [module docs](super) for its limitations.
 #[derive(Debug, Clone)]
 pub struct Li2011 {
     state: ChainState,
@@ -47,11 +49,11 @@ pub struct Li2011 {
 }
 
 impl Li2011 {
-    /// The method with nothing inserted; the even mesh of a smooth wall comes from `store`.
+    /// The method with nothing inserted; the uniform mesh of a smooth wall comes from `store`.
     ///
     /// # Errors
-    /// An element length or wall stiffness that is not positive, a number of nodes beyond memory, or a wall with friction or
-    /// regions.
+    /// An element length or wall stiffness that is not positive, too many nodes for memory, or a wall with friction
+    /// or regions.
     pub fn new(
         options: Li2011Options,
         solver: LinearSolver,
@@ -87,8 +89,8 @@ impl Li2011 {
         &self.input.chain
     }
 
-    /// Carries the hand to a new inserted length by inputs. Returns their number, those that were halved included, how many were
-    /// accepted, and whether the last of these has converged and none has lost the wire.
+    /// Moves the hand to a new inserted length by inputs. Returns their number, including those that were halved, how
+    /// many were accepted, and whether the last of these has converged and none has lost the wire.
     fn carry(&mut self, surroundings: &Surroundings<'_>, target_mm: f64) -> Result<(u32, u32, bool)> {
         let (mut solves, mut inputs, mut lost) = (0, 0, false);
         let Li2011Options { element_mm, tangents, .. } = self.input.options;
@@ -119,7 +121,7 @@ impl Li2011 {
             self.input.read_out(surroundings, &mut self.state);
             inputs += 1;
             if last {
-                // The hand holds still until what is left over is worked off.
+                // The hand holds still until the remaining error is gone.
                 if off && tangents == TangentReading::Unit && settling > 0 {
                     settling -= 1;
                     continue;
@@ -145,7 +147,7 @@ impl Method for Li2011 {
             Ok((solves, inputs, converged)) => {
                 let report = &mut self.state.report;
                 report.rotation_rad += command.rotate_rad;
-                // Without twist the tip turns with the hand.
+                // Without twist the tip rotates with the hand.
                 report.tip_rotation_rad = report.rotation_rad;
                 (report.iterations, report.substeps, report.converged) = (solves, inputs, converged);
                 Ok(())

@@ -1,16 +1,18 @@
-//! Step 3 of Algorithm 1: what a node of the chain meets, as planes with a normal.
+//! Step 3 of Algorithm 1: collisions of a chain's node, as planes with a normal.
 //!
-//! Two readings. **Triangle**, as printed: a node that reaches a triangle of the vessel's mesh is held off its plane. **Smooth**: the
-//! node is held off the wall that core's smooth distance d makes of the mesh, by its place, normal and curvature at the node. To
-//! second order its energy ½ κ (r − d)² has, across the device, the curvature of the lumen:
+//! Two interpretations. **Triangle**, as printed: a node that reaches a triangle of the vessel's mesh is held off its
+//! plane. **Smooth**: the node is held off the wall given by the core's smooth distance d of the mesh, with its
+//! position, normal and curvature at the node. To second order its energy ½ κ (r − d)² has, across the device, the
+//! curvature of the lumen:
 //!
 //! ```text
 //! ∇∇ ½κ(r − d)² = κ ∇d ∇dᵀ − κ (r − d) ∇∇d,        − bᵀ ∇∇d b = 1/ρ
 //! ```
 //!
-//! with b across the device in the wall, and ρ the radius on which its axis lies. In place of κ (r − d) at the place before the solve,
-//! which a step of the wire throws about, stands the force f with which the wall pressed at the last input: a spring f/ρ along b.
-//! Planes alone restore nothing along b, so that the wire wanders to the side of the tube from input to input.
+//! with b across the device in the wall, and ρ the radius on which its axis lies. Instead of κ (r − d) at the
+//! position before the solve, which varies strongly during a step, the force f of the wall at the last input is used:
+//! a spring f/ρ along b. Planes alone have no restoring force along b, so the wire drifts to the side of the tube
+//! from input to input.
 
 use std::sync::Arc;
 
@@ -20,7 +22,7 @@ use endowire_core::methods::TouchedPlane;
 use endowire_core::vessel::WallQuery;
 use serde::{Deserialize, Serialize};
 
-/// What a node collides with.
+/// The obstacles of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ContactReading {
@@ -31,41 +33,42 @@ pub enum ContactReading {
     Triangle,
 }
 
-/// A node is never lost: wherever one solve has thrown it, the next finds its nearest triangle, as the hierarchy of
-/// the paper's reference 22 would.
+/// A node is never lost: wherever a solve has thrown it, the next finds its nearest triangle, like the hierarchy of
+/// the paper's reference 22.
 const REACH_MM: f64 = f64::MAX;
 /// Collisions are detected at positions rounded to this, mm. A wire in a plane of symmetry of the mesh lies on the
 /// boundary between two triangles, where the twelfth digit of the last solve would choose one, and with it a branch
-/// millimetres away: that digit is no reason.
+/// millimetres away.
 const DETECTION_GRID_MM: f64 = 1e-6;
 
-/// What a node meets: a plane, and the curvature of the lumen across it.
+/// A collision of a node: a plane, and the curvature of the lumen across it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Met {
     pub(super) plane: TouchedPlane,
-    /// Direction across the device in the wall, and 1/ρ along it, 1/mm; none of triangles, and where the wall bends away.
+    /// Direction across the device in the wall, and 1/ρ along it, 1/mm; `None` for triangles, and where the wall is
+    /// convex.
     pub(super) across: Option<(Vec3, f64)>,
 }
 
-/// The wall as a chain meets it.
+/// The wall for a chain.
 #[derive(Debug, Clone)]
 pub(super) enum FeltWall {
-    /// Core's smooth wall, and what was read of it.
+    /// The core's smooth wall, and its cache.
     Smooth(Arc<ContactSurface>, Option<WallReader>),
     /// The triangles of the vessel.
     Triangle(Arc<WallQuery>),
 }
 
 impl FeltWall {
-    /// Drops what was read.
+    /// Clears the cache.
     pub(super) fn forget(&mut self) {
         if let Self::Smooth(_, reader) = self {
             *reader = None;
         }
     }
 
-    /// What a node at `x` with the tangent `t` meets, whose surface of radius `radius_mm` is less than `gap_mm` from the wall; or by how much it is
-    /// clear of the wall in all directions, mm, as far as that is known.
+    /// The collision of a node at `x` with the tangent `t`, if its surface of radius `radius_mm` is less than
+    /// `gap_mm` from the wall; otherwise a lower bound of its clearance, mm.
     pub(super) fn met(&mut self, x: &Vec3, t: &Vec3, (radius_mm, gap_mm): (f64, f64)) -> Result<Met, f64> {
         let (surface, reader) = match self {
             Self::Smooth(surface, reader) => (surface, reader),
@@ -93,7 +96,7 @@ impl FeltWall {
         })
     }
 
-    /// How far the surface of a node at `x` is in the wall, mm; 0 where it is clear of it.
+    /// Penetration of the surface of a node at `x`, mm; 0 where it is clear of the wall.
     pub(super) fn depth_mm(&mut self, x: &Vec3, radius_mm: f64) -> f64 {
         match self {
             Self::Smooth(surface, reader) => {

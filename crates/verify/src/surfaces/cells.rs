@@ -1,4 +1,4 @@
-//! What is varied.
+//! The parameters that are varied.
 
 use serde::Serialize;
 
@@ -10,18 +10,18 @@ const ELEMENTS_MM: [f64; 3] = [1.0, 2.0, 4.0];
 const FRICTIONS: [f64; 3] = [0.0, 0.1, 0.3];
 /// Moduli of the wall, N/mm²: an artery's, a phantom's, and one that is rigid to a wire.
 const MODULI_N_PER_MM2: [f64; 3] = [1.0, 100.0, 1e4];
-/// Turns of the hand with every command, degrees.
+/// Rotation of the hand in every command, degrees.
 const TURNS_DEG: [f64; 2] = [0.0, 5.0];
 
 /// One insertion of the matrix, into any surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cell {
-    /// Number of the wire, among those of the surface.
+    /// Index of the wire, among those of the surface.
     #[serde(skip)]
     pub wire: usize,
     /// Length pushed in by a command, mm.
     pub increment_mm: f64,
-    /// Turn of a command, degrees.
+    /// Rotation per command, degrees.
     pub turn_deg: f64,
     /// Element length, mm.
     pub element_mm: f64,
@@ -32,7 +32,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The values of the cell, as patterns meet them: `step0.5 el2 mu0.1 k100 turn0`.
+    /// The values of the cell, in the format matched by patterns: `step0.5 el2 mu0.1 k100 turn0`.
     pub fn name(&self) -> String {
         let Self { increment_mm, turn_deg, element_mm, friction, modulus_n_per_mm2, .. } = self;
         format!("step{increment_mm} el{element_mm} mu{friction} k{modulus_n_per_mm2} turn{turn_deg}")
@@ -50,12 +50,14 @@ impl Cell {
     }
 }
 
-/// The matrix for a surface that `wires` wires fit into: every combination (162 a wire), or a fixed subset (18 a wire).
+/// The matrix for a surface that `wires` wires fit into: every combination (162 per wire), or a fixed subset (18 per
+/// wire).
 ///
-/// The subset is an orthogonal array: for every wire, with and without turning, the nine rows (a, b, a + b, a + 2b) mod 3 for all
-/// a and b, in which any two of the four columns take each of their nine pairs once (Rao, *J. R. Stat. Soc. Suppl.* 9, 1947). So every
-/// pair of values is met, and with a wire or a turning every triple. The last two columns are shifted from wire to wire and
-/// turn to turn, so that no combination of the four is met twice among two wires.
+/// The subset is an orthogonal array: for every wire, with and without rotation, the nine rows (a, b, a + b, a + 2b)
+/// mod 3 for all a and b, in which any two of the four columns take each of their nine pairs once (Rao, *J. R. Stat.
+/// Soc. Suppl.* 9, 1947). So every pair of values occurs, and with a wire or a rotation every triple. The last two
+/// columns are shifted from wire to wire and rotation to rotation, so that no combination of the four occurs twice
+/// among two wires.
 pub fn cells(wires: usize, full: bool) -> Vec<Cell> {
     let mut list = Vec::new();
     for wire in 0..wires {
@@ -81,12 +83,13 @@ pub fn cells(wires: usize, full: bool) -> Vec<Cell> {
     list
 }
 
-/// Whether `name` has all words of `pattern`; a `*` in a word stands for anything. Without words, everything matches.
+/// Whether `name` contains all words of `pattern`; a `*` in a word matches anything. Without words, everything
+/// matches.
 pub fn matches(name: &str, pattern: &str) -> bool {
     let ends = |c: Option<char>| c.is_none_or(char::is_whitespace);
     pattern.split_whitespace().all(|word| {
         if !word.contains('*') {
-            // A whole word of the name, so that `k1` is not `k100`, or the beginning of the surface's.
+            // A whole word of the name, so that `k1` does not match `k100`, or the beginning of the surface's.
             return name.match_indices(word).any(|(at, _)| {
                 let (before, after) =
                     (name[..at].chars().next_back(), name[at + word.len()..].chars().next());
@@ -109,7 +112,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// The values of a cell as numbers of a list.
+    /// The values of a cell as a list of numbers.
     fn places(cell: &Cell) -> [usize; 6] {
         let place = |list: &[f64], value: f64| list.iter().position(|v| *v == value).unwrap();
         [

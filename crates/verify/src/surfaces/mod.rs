@@ -1,9 +1,9 @@
-//! Insertions into surfaces as they come: what `endowire verify --surfaces DIR` runs.
+//! Insertions into arbitrary surfaces: run by `endowire verify --surfaces DIR`.
 //!
-//! Every surface of a folder is a vessel (`sidecar`), and every one gets the same matrix of insertions (`cells`): two wires,
-//! three increments, element lengths, frictions and moduli of the wall, with and without turning. A `run` pushes one wire into one
-//! surface command by command and tells how it ended: arrived, left through an opening, blocked where the vessel is too narrow – or
-//! failed, which a matrix is run to find.
+//! Every surface of a folder is a vessel (`sidecar`), and every one gets the same matrix of insertions (`cells`): two
+//! wires, three increments, element lengths, frictions and moduli of the wall, with and without rotation. A `run`
+//! pushes one wire into one surface command by command and reports how it ended: arrived, left through an opening,
+//! blocked where the vessel is too narrow – or failed, which the matrix is meant to detect.
 //!
 //! ```
 //! use endowire_verify::surfaces::{Cell, cells};

@@ -22,12 +22,12 @@ pub enum Ending {
     Blocked,
     /// A computation failed, or took too long.
     Failed,
-    /// The input was refused before the first command.
+    /// The input was rejected before the first command.
     Refused,
 }
 
 impl Ending {
-    /// Whether it is what a vessel does to a wire.
+    /// Whether it is a valid result of a wire in a vessel.
     pub fn is_good(self) -> bool {
         matches!(self, Self::Arrived | Self::Left | Self::Blocked)
     }
@@ -44,7 +44,7 @@ impl Ending {
     }
 }
 
-/// One insertion and what became of it.
+/// One insertion and its result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CellRow {
     /// Name: surface, wire and values.
@@ -53,18 +53,18 @@ pub struct CellRow {
     pub surface: String,
     /// Wire, its diameter in inches.
     pub wire: String,
-    /// What was varied.
+    /// The parameters.
     #[serde(flatten)]
     pub cell: Cell,
     /// How it ended.
     pub ending: Ending,
     /// Why it did not arrive.
     pub message: Option<String>,
-    /// Length asked for, mm.
+    /// Requested length, mm.
     pub length_mm: f64,
     /// Length inserted, mm.
     pub inserted_mm: f64,
-    /// Commands asked for.
+    /// Number of commands requested.
     pub commands: usize,
     /// Commands carried out.
     pub steps: usize,
@@ -76,45 +76,45 @@ pub struct CellRow {
     pub most_iterations_per_mm: f64,
     /// Steps that took more than [`ITERATIONS_PER_MM`].
     pub slow_steps: usize,
-    /// Most parts that a command was cut into.
+    /// Largest number of sub-steps of a command.
     pub most_substeps: u32,
-    /// Steps that freed energy in a jump.
+    /// Steps in which a jump released energy.
     pub jumps: usize,
-    /// Deepest penetration that a step reported, mm.
+    /// Largest penetration reported by a step, mm.
     pub max_penetration_mm: f64,
-    /// Parts of commands in which the last resort was needed.
+    /// Sub-steps with relaxation as last resort.
     pub relaxations: u64,
-    /// Steps after which the device's axis passed through a triangle as it was given: where it has sunk into a soft wall by more than
-    /// its radius, and where the wall that is felt stands behind the given one.
+    /// Steps after which the device's axis passed through a given triangle: where it has sunk into a soft wall by
+    /// more than its radius, or where the felt wall is behind the given one.
     pub crossings: usize,
-    /// Length that was inserted at the first of them, mm.
+    /// Inserted length at the first of them, mm.
     pub first_crossing_mm: Option<f64>,
-    /// How much less deep than it was the device said to have sunk in there at most, mm.
+    /// Largest amount by which the reported penetration there was too small, mm.
     pub missing_mm: f64,
-    /// The same behind the triangles that are felt, mm.
+    /// The same behind the triangles of the felt wall, mm.
     pub missing_felt_mm: f64,
-    /// Steps after which a device was behind the given triangles by more than it said and these are stated to be off, or behind those
-    /// that are felt by more than it said.
+    /// Steps after which a device was behind the given triangles by more than reported plus their stated deviation,
+    /// or behind those of the felt wall by more than reported.
     pub untold: usize,
     /// Largest push force, N.
     pub most_push_force_n: f64,
-    /// Time of the slowest command, that which failed included, ms.
+    /// Time of the slowest command, including a failed one, ms.
     pub slowest_ms: f64,
-    /// Time of the middle command, ms.
+    /// Median time of a command, ms.
     pub median_ms: f64,
     /// Time to prepare the wall for the device, s.
     pub setup_s: f64,
-    /// Time of all, checks included, s.
+    /// Total time, including checks, s.
     pub total_s: f64,
 }
 
-/// What sample points, between which the largest deviation is, may miss of it, mm.
+/// Possible error of the largest deviation, which is measured at sample points, mm.
 const MISSED_MM: f64 = 0.005;
 
 impl Cell {
-    /// What the hand does in `surface`.
+    /// The motion of the hand in `surface`.
     pub fn script(&self, surface: &Surface) -> ScriptLine {
-        // Whole increments: the wire is longer than the surface asks for by its soft end.
+        // Whole increments: the wire is longer than the surface requires by its soft end.
         let steps = (surface.length_mm / self.increment_mm - 1e-9).ceil().max(1.0);
         ScriptLine {
             advance_mm: Some(steps * self.increment_mm),
@@ -152,7 +152,7 @@ impl Cell {
 }
 
 impl CellRow {
-    /// A row of `cell` of which nothing is known yet.
+    /// An empty row of `cell`.
     pub fn new(surface: &Surface, cell: &Cell) -> Self {
         Self {
             name: cell.name_in(surface),
@@ -186,12 +186,12 @@ impl CellRow {
         }
     }
 
-    /// Ends the row.
+    /// Completes the row.
     pub fn end(&mut self, ending: Ending, message: String) {
         (self.ending, self.message) = (ending, Some(message));
     }
 
-    /// Takes in what a step reported.
+    /// Adds the report of a step.
     fn count(&mut self, report: &StepReport, command: Command) {
         self.steps += 1;
         self.inserted_mm = report.inserted_mm;
@@ -207,7 +207,8 @@ impl CellRow {
         self.most_push_force_n = self.most_push_force_n.max(report.push_force_n);
     }
 
-    /// Whether the device passes through given triangles or those that it feels, and whether it has sunk in there as it says.
+    /// Whether the device passes through given triangles or those of the felt wall, and whether its reported
+    /// penetration there is correct.
     fn check(&mut self, surface: &Surface, simulation: &Simulation) {
         let given = surface.given.missing_mm(&surface.wall, simulation);
         let felt = surface.felt.missing_mm(&surface.even, simulation);
@@ -224,8 +225,8 @@ impl CellRow {
     }
 }
 
-/// Runs a cell, with the wall that its wire feels from `store`. `clock` tells seconds since any moment; a cell that takes more than
-/// `limit_s` fails.
+/// Runs a cell, with the felt wall for its wire from `store`. `clock` returns seconds since any fixed time; a cell
+/// that takes more than `limit_s` fails.
 pub fn run(
     surface: &Surface,
     cell: &Cell,
@@ -337,7 +338,7 @@ mod tests {
         assert_eq!(thick.skipped, ["0.354 is too thick at the sheath"]);
     }
 
-    /// A twin: the triangles that are checked are not those that are inserted into.
+    /// Counter-check: the triangles that are checked are not those of the insertion.
     #[test]
     fn a_device_beyond_the_given_triangles_is_seen() {
         let start = "length_mm = 60.0\n[sheath]\nposition_mm = [0, 0, 1]\ndirection = [0, 0, 1]";
@@ -346,7 +347,7 @@ mod tests {
         let free = run(&whole, &cell, &NoStore, 1e9, &|| 0.0);
         assert_eq!((free.ending, free.crossings, free.missing_mm), (Ending::Arrived, 0, 0.0));
         assert_eq!((free.missing_felt_mm, free.untold), (0.0, 0));
-        // A closed tube of 30 mm; the wire goes to 41 mm less what its tip bends back.
+        // A closed tube of 30 mm; the wire gets to 41 mm minus the length its tip bends back.
         let mut closed = whole.wall.closed_mesh();
         closed.vertices_mm.iter_mut().for_each(|v| v.z *= 0.3);
         let checked = Surface {

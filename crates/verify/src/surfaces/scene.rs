@@ -1,4 +1,4 @@
-//! A cell as a scene, to be run, drawn and changed on its own.
+//! A cell as a scene, to be run, rendered and modified separately.
 
 use std::fmt::Write;
 
@@ -6,7 +6,7 @@ use super::{Cell, Surface};
 use endowire_core::Result;
 
 impl Cell {
-    /// The scene file of the cell: `endowire run` does with it what the matrix does.
+    /// The scene file of the cell, with which `endowire run` repeats the insertion.
     ///
     /// # Errors
     /// A wire that cannot be made.
@@ -15,7 +15,7 @@ impl Cell {
         let path = std::path::absolute(&surface.path).unwrap_or_else(|_| surface.path.clone());
         let mut text = String::new();
         let mut line = |line: std::fmt::Arguments<'_>| {
-            // Into a string nothing fails.
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "{line}");
         };
         let list = |v: [f64; 3]| format!("[{:?}, {:?}, {:?}]", v[0], v[1], v[2]);
@@ -68,7 +68,7 @@ mod tests {
     use endowire_core::scene::Scene;
     use endowire_core::vessel::{GeneratedWall, NoStore, PatientAxes, Resolution, SurfaceMesh, anatomy};
 
-    /// A mesh in VTK's older format.
+    /// A mesh in VTK's legacy format.
     fn vtk(mesh: &SurfaceMesh) -> String {
         let mut text = "# vtk DataFile Version 3.0\na tube\nASCII\nDATASET POLYDATA\n".to_owned();
         text += &format!("POINTS {} double\n", mesh.vertices_mm.len());
@@ -86,7 +86,7 @@ mod tests {
         std::fs::write(folder.path().join("tube.vtk"), vtk(made.wall.mesh())).unwrap();
         std::fs::write(folder.path().join("tube.toml"), "axes = \"RAS\"").unwrap();
         let surface = Surface::read(&surfaces_in(folder.path()).unwrap()[0], &NoStore).unwrap();
-        // x and y of LPS have the other sign: the front is another side than the back.
+        // x and y of LPS have the opposite sign: front and back are swapped.
         let turned =
             |mesh: &SurfaceMesh| mesh.vertices_mm.iter().map(|v| Vec3::new(-v.x, -v.y, v.z)).collect();
         let [given, there]: [Vec<Vec3>; 2] =

@@ -1,4 +1,4 @@
-//! The surfaces of a folder, and what is said of them.
+//! The surfaces of a folder, with additional data.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use endowire_core::scene::SheathSpec;
 use endowire_core::vessel::{PatientAxes, SurfaceFrame, SurfaceMesh};
 use endowire_core::{Error, Result};
 
-/// A number, or several.
+/// One number, or several.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
 enum OneOrMore {
@@ -26,12 +26,12 @@ impl OneOrMore {
     }
 }
 
-/// `NAME.toml` beside a surface: what its file does not tell. Every key may be left out.
+/// `NAME.toml` for a surface: data that its file lacks. Every key is optional.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sidecar {
     unit_mm: Option<OneOrMore>,
-    /// Axes of the file, `LPS` or `RAS`; as its header says, or LPS, if absent.
+    /// Axes of the file, `LPS` or `RAS`; if absent, as in its header, or LPS.
     axes: Option<PatientAxes>,
     /// `[sheath]`: `opening` (and `depth_mm`), or `position_mm` and `direction`, as in a scene.
     pub sheath: Option<SheathSpec>,
@@ -46,15 +46,15 @@ impl Sidecar {
         self.unit_mm.as_ref().map_or_else(|| vec![1.0], OneOrMore::list)
     }
 
-    /// `device_radius_mm`: radii of the wires to insert, in place of the usual ones.
+    /// `device_radius_mm`: radii of the wires to insert, instead of the default ones.
     pub fn radii_mm(&self) -> Option<Vec<f64>> {
         self.device_radius_mm.as_ref().map(OneOrMore::list)
     }
 
-    /// Reads a sidecar from TOML text and checks it; `name` is what errors call it.
+    /// Reads a sidecar from TOML text and checks it; `name` is its name in errors.
     ///
     /// # Errors
-    /// Names line and key of what does not fit, or key and value of what cannot be meant.
+    /// Names line and key of a value of the wrong form, or key and value of an impossible one.
     pub fn from_toml(text: &str, name: &Path) -> Result<Self> {
         parse_toml::<Self>(text, name)?.checked(name)
     }
@@ -64,7 +64,7 @@ impl Sidecar {
         Ok(self)
     }
 
-    /// Refuses what cannot be meant.
+    /// Rejects impossible values.
     fn check(&self) -> Result<()> {
         let units = self.units_mm();
         let radii = self.radii_mm();
@@ -95,16 +95,16 @@ pub struct SurfaceFile {
     pub path: PathBuf,
     /// File name, with `@UNIT` where the sidecar gives several units.
     pub name: String,
-    /// How its coordinates are meant.
+    /// Its coordinate frame.
     pub frame: SurfaceFrame,
-    /// What is said of it.
+    /// Its additional data.
     pub sidecar: Sidecar,
 }
 
 /// The surfaces of a folder in the order of their names, with their sidecars.
 ///
 /// # Errors
-/// A folder that cannot be read or holds no surface, a sidecar that cannot be understood.
+/// A folder that cannot be read or contains no surface, or an invalid sidecar.
 pub fn surfaces_in(folder: &Path) -> Result<Vec<SurfaceFile>> {
     let failed = |e| Error::file(folder, e);
     let mut paths = Vec::new();

@@ -1,4 +1,4 @@
-//! Where a device enters a surface.
+//! Entry of a device into a surface.
 
 use serde::Serialize;
 
@@ -12,9 +12,9 @@ use endowire_core::vessel::{Wall, WallQuery};
 pub enum Found {
     /// It was given.
     Given,
-    /// The wall's inlet, or the largest opening that admits the device; its number.
+    /// The wall's inlet, or the largest opening that admits the device; its index.
     Opening(usize),
-    /// Somewhere inside: there is no opening to enter.
+    /// A position inside: there is no opening to enter.
     Inside,
 }
 
@@ -28,34 +28,35 @@ impl std::fmt::Display for Found {
     }
 }
 
-/// Openings that are tried: a torn surface has thousands, and the one to enter is among the largest.
+/// Number of openings tried: a torn surface has thousands, and a suitable one is among the largest.
 const OPENINGS_TRIED: usize = 8;
-/// Triangles that a search inside starts from.
+/// Number of triangles from which a search inside starts.
 const RAYS: usize = 512;
-/// Places inside that are looked at closely.
+/// Number of positions inside that are examined closely.
 const PLACES: usize = 48;
-/// Directions tried at a place.
+/// Number of directions tried at a position.
 const DIRECTIONS: usize = 256;
-/// How far from the best of them others are tried then, rad.
+/// Angles from the best direction at which others are then tried, rad.
 const SPREADS_RAD: [f64; 3] = [0.1, 0.04, 0.015];
-/// Room at a place that will do, as a part of the largest found: the widest place of all is often a sac with no way on.
+/// Clearance of a suitable position, as a fraction of the largest found: the widest position is often in a sac
+/// without continuation.
 const WIDE: f64 = 0.5;
 
-/// Distance of the wall from a sheath's mouth, mm; none outside the vessel or where inside cannot be told.
+/// Distance of the wall from a sheath's mouth, mm; `None` outside the vessel or if that is undecidable.
 fn room_mm(wall: &Wall, query: &WallQuery, sheath: &Sheath) -> Option<f64> {
-    // As an insertion looks: just in front of the mouth.
+    // As tested for an insertion: just in front of the mouth.
     let inside = wall.contains(&(sheath.position_mm + 1e-3 * sheath.direction)).unwrap_or(false);
     let room = query.nearest(&sheath.position_mm, f64::MAX)?.distance_mm.abs();
     inside.then_some(room)
 }
 
-/// The wall's inlet, or if a device of `radius_mm` does not fit into it the largest opening that it fits into.
+/// The wall's inlet, or if a device of `radius_mm` does not fit, the largest opening that admits it.
 pub(super) fn at_opening(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(Sheath, Found)> {
     for opening in wall.inlet().into_iter().chain(wall.openings().iter().take(OPENINGS_TRIED)) {
         if opening.radius_mm < radius_mm {
             continue;
         }
-        // The usual depth first; an opening cut askew needs more.
+        // The usual depth first; an oblique opening needs more.
         for depth_mm in [1.0, opening.radius_mm, 2.0 * opening.radius_mm] {
             let Ok(sheath) = Sheath::at_opening(wall, opening.index, depth_mm) else { continue };
             if room_mm(wall, query, &sheath).is_some_and(|room| room > radius_mm) {
@@ -66,10 +67,11 @@ pub(super) fn at_opening(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Opti
     None
 }
 
-/// A place inside with much room, and the direction from it with the longest free way.
+/// A position inside with a large clearance, and the direction with the longest free path.
 ///
-/// From triangles spread over the surface rays go along the inward normal; the middle of the chord to the wall opposite is deep
-/// inside. Of the places with room, the one with the longest way is taken: it lies along a vessel.
+/// From triangles spread over the surface rays are cast along the inward normal; the middle of the chord to the
+/// opposite wall is deep inside. Among positions with enough clearance, the one with the longest path is chosen: it
+/// points along a vessel.
 pub(super) fn inside(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(Sheath, Found)> {
     let mesh = wall.mesh();
     let (low, high) = mesh.bounds_mm()?;
@@ -86,7 +88,7 @@ pub(super) fn inside(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(
             places.push((near.distance_mm.abs(), middle));
         }
     }
-    // Stable: of places with the same room, that of the first triangle.
+    // Stable: among positions with equal clearance, that of the first triangle.
     places.sort_by(|a, b| b.0.total_cmp(&a.0));
     places.retain(|(room, _)| *room > radius_mm);
     let mut widest = None;
@@ -111,7 +113,7 @@ pub(super) fn inside(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(
     Some((sheath, Found::Inside))
 }
 
-/// The direction with the longest free way from a place, and that way as a part of `size`.
+/// The direction with the longest free path from a position, and that path as a fraction of `size`.
 fn longest_way(query: &WallQuery, from: Vec3, size: f64) -> (f64, Vec3) {
     let way = |direction: Vec3| query.crossing(&from, &(from + direction * size), 1.0).unwrap_or(1.0);
     let mut best = (0.0, Vec3::z());
@@ -126,7 +128,7 @@ fn longest_way(query: &WallQuery, from: Vec3, size: f64) -> (f64, Vec3) {
     for k in 0..DIRECTIONS {
         around = look(sphere(k));
     }
-    // Directions are a seventh of a radian apart; a narrow vessel asks for more.
+    // Directions are a seventh of a radian apart; a narrow vessel requires finer ones.
     for spread in SPREADS_RAD {
         let middle = around;
         for k in 0..DIRECTIONS / 8 {
@@ -136,7 +138,7 @@ fn longest_way(query: &WallQuery, from: Vec3, size: f64) -> (f64, Vec3) {
     best
 }
 
-/// Points spread evenly over the unit sphere, on a spiral that turns by the golden angle.
+/// Points spread evenly over the unit sphere, on a spiral with the golden angle.
 fn sphere(k: usize) -> Vec3 {
     let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
     let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
@@ -166,7 +168,7 @@ mod tests {
         let (sheath, found) = inside(&closed, &query, 0.4).unwrap();
         assert_eq!(found, Found::Inside);
         assert!(closed.contains(&sheath.position_mm).unwrap());
-        // The longest ways are in the straight leg, along it.
+        // The longest paths are in the straight leg, along it.
         assert!(sheath.direction.z.abs() > 0.95, "{sheath:?}");
         assert!(inside(&closed, &query, 4.5).is_none(), "nothing so thick fits");
     }

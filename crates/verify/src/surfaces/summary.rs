@@ -1,57 +1,58 @@
-//! The matrix in one line.
+//! Summary of the matrix in one line.
 
 use serde::Serialize;
 
 use super::{CellRow, Ending};
 
-/// Newton iterations per millimetre that no command should need: a real insertion advances a few tens of millimetres a second.
+/// Largest acceptable number of Newton iterations per millimetre of a command: a real insertion advances by a few
+/// tens of millimetres per second.
 pub const ITERATIONS_PER_MM: f64 = 300.0;
 
-/// What all rows come to.
+/// Totals over all rows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Insertions.
     pub cells: usize,
-    /// Those that carried out all commands.
+    /// Insertions that carried out all commands.
     pub arrived: usize,
-    /// Those whose tip left the vessel.
+    /// Insertions whose tip left the vessel.
     pub left: usize,
-    /// Those whose vessel was too narrow.
+    /// Insertions whose vessel was too narrow.
     pub blocked: usize,
-    /// Those whose computation failed.
+    /// Insertions whose computation failed.
     pub failed: usize,
-    /// Those that were refused.
+    /// Insertions that were rejected.
     pub refused: usize,
-    /// Part of the insertions that arrived, left or were blocked, %.
+    /// Percentage of insertions that arrived, left or were blocked.
     pub good_percent: f64,
     /// Commands carried out.
     pub steps: usize,
     /// Newton iterations.
     pub iterations: u64,
-    /// Commands of more than [`ITERATIONS_PER_MM`].
+    /// Commands with more than [`ITERATIONS_PER_MM`].
     pub slow_steps: usize,
     /// Insertions that crossed given triangles.
     pub cells_crossing: usize,
-    /// Commands after which the device's axis was in a given triangle.
+    /// Commands after which the device's axis was behind a given triangle.
     pub crossings: usize,
-    /// How much less deep than it was a device said to have sunk in there, mm.
+    /// Largest amount by which a reported penetration was too small there, mm.
     pub missing_mm: f64,
-    /// The same behind the triangles that are felt, mm.
+    /// The same behind the triangles of the felt wall, mm.
     pub missing_felt_mm: f64,
-    /// Commands after which that was more than the wall that is felt is stated to be off.
+    /// Commands after which that exceeded the stated deviation of the felt wall.
     pub untold: usize,
-    /// Parts of commands in which the last resort was needed.
+    /// Sub-steps with relaxation as last resort.
     pub relaxations: u64,
     /// Jumps.
     pub jumps: usize,
-    /// Slowest command, ms, …
+    /// Time of the slowest command, ms.
     pub slowest_ms: f64,
-    /// … and the insertion it belongs to.
+    /// The insertion of the slowest command.
     pub slowest: String,
 }
 
 impl Summary {
-    /// Sums up.
+    /// Computes the totals.
     pub fn of(rows: &[CellRow]) -> Self {
         let mut sum = Self { cells: rows.len(), ..Self::default() };
         for row in rows {

@@ -13,58 +13,58 @@ use endowire_core::{Error, Result};
 use super::start::{Found, at_opening, inside};
 use super::{SurfaceFile, WIRES, Wire};
 
-/// Longest insertion unless the sidecar says otherwise, mm.
+/// Default for the longest insertion, mm.
 const LENGTH_MM: f64 = 400.0;
-/// The same in sizes of the vessel: a wire that has gone through it, or coils up in it, has seen enough.
+/// The same in sizes of the vessel: by then a wire has passed through it, or coils up in it.
 const LENGTH_IN_SIZES: f64 = 2.0;
 
-/// A wire that fits into a surface, and where it enters.
+/// A wire that fits into a surface, and its entry.
 #[derive(Debug, Clone)]
 pub struct Place {
     /// The wire.
     pub wire: Wire,
     /// Where it enters.
     pub sheath: Sheath,
-    /// How that was found.
+    /// How the entry was found.
     pub found: Found,
-    /// How far the wall that the wire feels is stated to be from the repaired surface, mm; no less than what is aimed at.
+    /// Stated distance of the wire's felt wall from the repaired surface, mm; at least the target.
     pub stated_mm: f64,
-    /// The same from the triangles that it is made of.
+    /// Distance of the smooth wall from the triangles that it is made of, mm.
     pub smooth_mm: f64,
 }
 
-/// A surface, repaired into a wall, with what its insertions share.
+/// A surface, repaired into a wall, with data shared by its insertions.
 #[derive(Debug)]
 pub struct Surface {
-    /// Name, as in tables and patterns.
+    /// Name in tables and patterns.
     pub name: String,
     /// File.
     pub path: PathBuf,
-    /// How the coordinates of the file are meant.
+    /// Coordinate frame of the file.
     pub frame: SurfaceFrame,
     /// The wall to insert into.
     pub wall: Wall,
     /// The triangles as they were given, before any repair.
     pub given: CrossingTest,
-    /// The triangles that devices feel, as `endowire vessel check --felt` writes them, …
+    /// The triangles of the felt wall, as `endowire vessel check --felt` writes them.
     pub felt: CrossingTest,
-    /// … as a wall.
+    /// These triangles as a wall.
     pub even: Wall,
     /// Longest side of the surface's bounding box, mm.
     pub size_mm: f64,
     /// Length to insert, mm.
     pub length_mm: f64,
-    /// The wires that fit, and where they enter.
+    /// The wires that fit, with their entries.
     pub places: Vec<Place>,
-    /// The wires that do not, and why.
+    /// The wires that do not fit, and why.
     pub skipped: Vec<String>,
 }
 
 impl Surface {
-    /// Reads a surface, takes its wall from `store` and finds where the wires enter it.
+    /// Reads a surface, takes its wall from `store` and finds the entries of the wires.
     ///
     /// # Errors
-    /// A file that cannot be read or repaired, a sheath that cannot be meant.
+    /// A file that cannot be read or repaired, or an impossible sheath.
     pub fn read(file: &SurfaceFile, store: &dyn WallStore) -> Result<Self> {
         let mesh = SurfaceMesh::read(&file.path, file.frame)?;
         let wall = store
@@ -72,7 +72,7 @@ impl Surface {
             .map_err(|e| Error::content(&file.path, e.to_string()))?;
         let aimed = Conditioning::default();
         let even = store.wall(&WallRecipe::Even { wall: &wall, options: aimed })?;
-        // As it is meshed now.
+        // Without remeshing.
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
         let size_mm = (high - low).amax();
@@ -96,7 +96,7 @@ impl Surface {
         };
         let thinnest_mm = wires.iter().map(|w| w.radius_mm).fold(f64::MAX, f64::min);
         let given = file.sidecar.sheath.as_ref().map(|sheath| sheath.place(&surface.wall)).transpose()?;
-        // Openings that not even the thinnest wire enters are cracks.
+        // Openings that not even the thinnest wire can enter are cracks.
         let open = given.is_some() || at_opening(&surface.wall, &query, thinnest_mm).is_some();
         for wire in wires {
             let radius_mm = wire.radius_mm;
@@ -104,7 +104,7 @@ impl Surface {
                 Some(sheath) => {
                     let room =
                         query.nearest(&sheath.position_mm, f64::MAX).map(|near| near.distance_mm.abs());
-                    // Whatever else is wrong with a given sheath, the insertion says so.
+                    // Other errors of a given sheath are reported by the insertion.
                     (room, room.is_none_or(|room| room > radius_mm).then_some((sheath, Found::Given)))
                 }
                 None if open => (None, at_opening(&surface.wall, &query, radius_mm)),

@@ -10,7 +10,7 @@ pub struct Wire {
     pub radius_mm: f64,
     /// Bending stiffness of the shaft, N·mm².
     pub shaft_nmm2: f64,
-    /// Bending stiffness of the floppy length behind the curve, N·mm².
+    /// Bending stiffness of the floppy part behind the curve, N·mm².
     pub floppy_nmm2: f64,
     /// Bending stiffness of the curved tip, N·mm².
     pub tip_nmm2: f64,
@@ -22,21 +22,22 @@ pub struct Wire {
 const CURVE_MM: f64 = 3.0;
 /// Length of the floppy part behind the curve, mm.
 const FLOPPY_MM: f64 = 25.0;
-/// The taper from floppy to stiff: its length, mm, …
+/// Length of the taper from floppy to stiff, mm.
 const TAPER_MM: f64 = 60.0;
-/// … in as many sections, each stiffer than the one before by the same factor.
+/// Number of its sections, each stiffer than the one before by the same factor.
 const TAPER_SECTIONS: usize = 6;
 
-/// A 0.014″ coronary or neurovascular wire: a solid steel shaft of 0.36 mm has EI = 158 N·mm² (E = 200 kN/mm², I = πr⁴/4), its tip a
-/// coil on a core drawn thin, a bend of 95° in it; and a 0.035″ J-wire: a coil on a core, its J of 135°.
+/// A 0.014″ coronary or neurovascular wire: a solid steel shaft of 0.36 mm has EI = 158 N·mm² (E = 200 kN/mm², I =
+/// πr⁴/4); its tip is a coil on a thin core with a bend of 95°; and a 0.035″ J-wire: a coil on a core with a J of
+/// 135°.
 pub const WIRES: [Wire; 2] = [
     Wire { radius_mm: 0.178, shaft_nmm2: 150.0, floppy_nmm2: 1.0, tip_nmm2: 0.3, curved_mm: 5.0 },
     Wire { radius_mm: 0.445, shaft_nmm2: 500.0, floppy_nmm2: 5.0, tip_nmm2: 5.0, curved_mm: 7.0 },
 ];
 
 impl Wire {
-    /// The wire of another radius: built like the one of [`WIRES`] nearest to it, its stiffness that of a solid wire, with the fourth
-    /// power of the radius.
+    /// A wire of another radius: built like the one of [`WIRES`] nearest to it, with the stiffness of a solid wire,
+    /// proportional to the fourth power of the radius.
     pub(crate) fn of_radius(radius_mm: f64) -> Self {
         let away = |w: &Self| (w.radius_mm / radius_mm).ln().abs();
         let [thin, thick] = WIRES;
@@ -56,7 +57,7 @@ impl Wire {
         format!("{:.3}", 2.0 * self.radius_mm / 25.4)
     }
 
-    /// The wire, `length_mm` and its soft end long.
+    /// The device with this total length, including its soft end.
     ///
     /// # Errors
     /// A length out of range.

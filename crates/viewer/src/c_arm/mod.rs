@@ -1,27 +1,28 @@
-//! Geometry of a C-arm: which ray a pixel sees.
+//! Geometry of a C-arm: the ray of each pixel.
 //!
 //! **Patient axes** as in DICOM (LPS): +x to the patient's left, +y posterior, +z towards the head. With both
 //! angles zero the source is posterior (under the table) and the detector anterior.
 //!
-//! **Angles** with the signs of DICOM: the primary angle α (0018,1510) is positive towards LAO and turns the
-//! detector to the patient's left; the secondary angle β (0018,1511) is positive towards cranial and tilts it
-//! to the head. From the isocentre the detector lies in direction
+//! **Angles** with the signs of DICOM: the primary angle α (0018,1510) is positive towards LAO and turns the detector
+//! to the patient's left; the secondary angle β (0018,1511) is positive towards cranial and tilts it to the head.
+//! From the isocentre the detector is in the direction
 //!
 //! ```text
 //! d = cos β (sin α, −cos α, 0) + sin β (0, 0, 1)
 //! ```
 //!
-//! **Picture.** Seen from the detector, head up, so the patient's left is on the right of the screen: columns
-//! run along e_u = (cos α, sin α, 0), rows along e_v = −d × e_u. The source is at isocentre − SOD·d, the
-//! detector plane SID from it and centred on the axis. A point at (a, b, c) along (e_u, e_v, d) from the
-//! isocentre is seen at
+//! **Image.** Seen from the detector, head up, so the patient's left is on the right of the screen: columns are along
+//! e_u = (cos α, sin α, 0), rows along e_v = −d × e_u. The source is at isocentre − SOD·d, the detector plane at a
+//! distance SID from it and centred on the axis. A point at (a, b, c) along (e_u, e_v, d) from the isocentre is
+//! projected to
 //!
 //! ```text
 //! u = W/2 + (SID/pitch) · a/(SOD + c),   v = H/2 + (SID/pitch) · b/(SOD + c)
 //! ```
 //!
-//! A rotation of the picture turns e_u and e_v about d, so that what is shown turns clockwise on the screen. All in pixels; the centre of the pixel in column i is at u = i + ½. A ray is (x, y, 1)·(SOD + c) with
-//! x = (u − W/2)·pitch/SID, and √(1 + x² + y²) millimetres long per millimetre of depth: its *obliquity*.
+//! A rotation of the image rotates e_u and e_v about d, so that its content turns clockwise on the screen. All in
+//! pixels; the centre of the pixel in column i is at u = i + ½. A ray is (x, y, 1)·(SOD + c) with x = (u −
+//! W/2)·pitch/SID, and √(1 + x² + y²) millimetres long per millimetre of depth: its *obliquity*.
 
 mod place;
 #[cfg(test)]
@@ -31,10 +32,10 @@ use endowire_core::Vec3;
 
 use crate::fingerprint::fingerprint;
 
-/// Least depth in front of the source, mm: anything nearer would project to the whole plane.
+/// Smallest depth in front of the source, mm: nearer points would project to the whole plane.
 const NEAREST_MM: f64 = 1.0;
 
-/// A C-arm in place: a pinhole camera with its source as the pinhole.
+/// A positioned C-arm: a pinhole camera with its source as the pinhole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CArm {
     isocentre_mm: Vec3,
@@ -46,12 +47,12 @@ pub struct CArm {
     size_px: [u32; 2],
     angles_deg: [f64; 2],
     rotation_deg: f64,
-    /// Half width and height between the blades, pixels.
+    /// Half width and height between the collimator blades, pixels.
     opening_px: Option<[f64; 2]>,
 }
 
 impl CArm {
-    /// Whether a point given by [`Self::in_beam`] is between source and detector.
+    /// Whether a point from [`Self::in_beam`] is between source and detector.
     pub(crate) fn is_between(&self, beam: &Vec3) -> bool {
         (NEAREST_MM..=self.sid_mm).contains(&(self.sod_mm + beam.z))
     }
@@ -67,7 +68,7 @@ impl CArm {
         Vec3::new(direction.dot(&self.axes[0]), direction.dot(&self.axes[1]), direction.dot(&self.axes[2]))
     }
 
-    /// Pixel coordinates of a point given by [`Self::in_beam`].
+    /// Pixel coordinates of a point from [`Self::in_beam`].
     pub(crate) fn pixel_of(&self, beam: &Vec3) -> [f64; 2] {
         let scale = self.focal_px() / (self.sod_mm + beam.z);
         let [w, h] = [f64::from(self.size_px[0]), f64::from(self.size_px[1])];
@@ -96,14 +97,14 @@ impl CArm {
             .map(|k| (0..self.size_px[k]).map(|i| self.slopes([f64::from(i) + 0.5; 2])[k].powi(2)).collect())
     }
 
-    /// Obliquity of the central ray of pixel number `index`, counted row by row.
+    /// Obliquity of the central ray of the pixel with this index, counted row by row.
     pub(crate) fn obliquity_at(&self, index: usize) -> f64 {
         let width = self.size_px[0] as usize;
         let [x, y] = self.slopes([(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]);
         (1.0 + x * x + y * y).sqrt()
     }
 
-    /// The same view with `factor` × `factor` pixels for each one.
+    /// The same view with `factor` × `factor` pixels for each pixel.
     pub(crate) fn refined(&self, factor: u32) -> Self {
         let factor_f = f64::from(factor);
         let opening_px = self.opening_px.map(|sides| sides.map(|n| n * factor_f));
@@ -115,7 +116,7 @@ impl CArm {
         }
     }
 
-    /// Share of pixel number `index` that the blades leave open.
+    /// Fraction of the pixel with this index left open by the blades.
     pub(crate) fn openness(&self, index: usize) -> f64 {
         let Some(opening) = self.opening_px else { return 1.0 };
         let width = self.size_px[0] as usize;
@@ -141,10 +142,9 @@ impl CArm {
         self.sid_mm / self.pixel_mm
     }
 
-    /// Where a point is seen: columns to the right, rows downwards, pixel centres at halves.
+    /// Projection of a point: columns to the right, rows downwards, pixel centres at halves.
     ///
-    /// Exactly the projection that draws the frames. A point beside or behind the source gives no finite
-    /// pixel.
+    /// Exactly the projection of the frames. A point beside or behind the source has no finite pixel.
     pub fn project(&self, point_mm: &Vec3) -> [f64; 2] {
         self.pixel_of(&self.in_beam(point_mm))
     }
@@ -161,7 +161,7 @@ impl CArm {
         self.isocentre_mm - self.axes[2] * self.sod_mm
     }
 
-    /// Corners of what the detector sees at a depth from the source, around.
+    /// Corners of the field of view at a depth from the source, in order around it.
     pub(crate) fn field_corners_mm(&self, depth_mm: f64) -> [Vec3; 4] {
         let [w, h] = self.size_px.map(f64::from);
         [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].map(|pixel| {
@@ -170,22 +170,22 @@ impl CArm {
         })
     }
 
-    /// Directions in patient axes that run to the right and upwards in the picture.
+    /// Directions in patient axes to the right and upwards in the image.
     pub(crate) fn right_and_up(&self) -> [Vec3; 2] {
         [self.axes[0], -self.axes[1]]
     }
 
-    /// A number of the geometry, blades apart: what they leave open stays as it is when they move.
+    /// A hash of the geometry without the blades: the image between them does not depend on them.
     pub(crate) fn fingerprint(&self) -> u128 {
         let axes = self.axes.iter().flatten();
         let places = axes.chain(&self.isocentre_mm).copied().chain([self.sid_mm, self.sod_mm, self.pixel_mm]);
-        // 0 and -0 are one place.
+        // 0 and -0 are equal.
         let bytes = places.flat_map(|x| (x + 0.0).to_bits().to_le_bytes());
         fingerprint(bytes.chain(self.size_px.into_iter().flat_map(u32::to_le_bytes)))
     }
 
-    /// The 3 × 4 matrix, row by row, that takes (x, y, z, 1) in mm to (u w, v w, w): pixel coordinates times the depth from the source in
-    /// mm.
+    /// The 3 × 4 matrix, row by row, from (x, y, z, 1) in mm to (u w, v w, w): pixel coordinates times the depth from
+    /// the source in mm.
     pub fn matrix(&self) -> [[f64; 4]; 3] {
         let [w, h] = self.size_px.map(f64::from);
         let [across, down, depth] = self.axes;
@@ -194,9 +194,9 @@ impl CArm {
         rows.map(|row| [row.x, row.y, row.z, -row.dot(&self.source_mm())])
     }
 
-    /// Where columns and rows run in the words of DICOM (L, R, A, P, H, F), the strongest first.
+    /// Directions of columns and rows in DICOM's letters (L, R, A, P, H, F), the dominant first.
     pub(crate) fn directions(&self) -> [String; 2] {
-        // Parts of less than the sine of about a degree are not told.
+        // Components smaller than the sine of about a degree are omitted.
         const LEAST: f64 = 0.02;
         [0, 1].map(|k| {
             let axis = &self.axes[k];
@@ -215,7 +215,7 @@ impl CArm {
         self.sod_mm + self.in_beam(point_mm).z
     }
 
-    /// The point that all rotations leave in place.
+    /// The point that is fixed under all rotations.
     pub fn isocentre_mm(&self) -> Vec3 {
         self.isocentre_mm
     }
@@ -225,7 +225,7 @@ impl CArm {
         self.angles_deg
     }
 
-    /// Clockwise turn of the picture.
+    /// Clockwise rotation of the image.
     pub fn rotation_deg(&self) -> f64 {
         self.rotation_deg
     }

@@ -1,4 +1,4 @@
-//! Where a C-arm is put, and how wide its pixels are.
+//! Position of a C-arm, and its pixel pitch.
 
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
@@ -6,13 +6,13 @@ use endowire_core::{Error, Result, Vec3};
 use super::CArm;
 use crate::spec::{CArmSpec, PITCH_MM};
 
-/// Part of the half frame that the vessel fills where the pixel pitch is left to us.
+/// Fraction of the half frame filled by the vessel if the pixel pitch is chosen automatically.
 pub(super) const FILL: f64 = 0.92;
 impl CArm {
-    /// Places a C-arm; what `spec` leaves open is chosen so that `wall` fills the frame.
+    /// Positions a C-arm; what `spec` leaves open is chosen so that `wall` fills the frame.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where the vessel does not lie between source and detector. `spec` must be valid.
+    /// [`Error::Parameter`] if the vessel is not between source and detector. `spec` must be valid.
     pub(crate) fn new(spec: &CArmSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Result<Self> {
         let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
         let angles_deg = spec.angles_deg();
@@ -47,7 +47,8 @@ impl CArm {
         Ok(arm)
     }
 
-    /// The pitch at which a ball about the isocentre that holds the vessel fills the frame: the same from every side.
+    /// The pitch at which a sphere about the isocentre that contains the vessel fills the frame: the same from every
+    /// side.
     fn fitting_pitch(&self, wall: &SurfaceMesh) -> Result<f64> {
         let squares = wall.vertices_mm.iter().map(|v| (v - self.isocentre_mm).norm_squared());
         let radius_mm = squares.fold(0.0, f64::max).sqrt();
@@ -60,13 +61,13 @@ impl CArm {
                 "the vessel reaches as far from the isocentre as the source is, so no field holds it from every side; give a pitch",
             );
         }
-        // Rays that touch the ball leave the axis by its radius over √(SOD² − r²).
+        // Rays tangent to the sphere diverge from the axis by its radius over √(SOD² − r²).
         let half_mm = self.sid_mm * radius_mm / (self.sod_mm.powi(2) - radius_mm.powi(2)).sqrt();
         let half_px = f64::from(self.size_px[0].min(self.size_px[1])) / 2.0 * FILL;
         Ok(half_mm / half_px)
     }
 
-    /// Refuses a point of the vessel that is not between source and detector.
+    /// Rejects a point of the vessel that is not between source and detector.
     fn check_between(&self, point_mm: &Vec3) -> Result<()> {
         let beam = self.in_beam(point_mm);
         if self.is_between(&beam) {
@@ -82,7 +83,7 @@ impl CArm {
     }
 }
 
-/// Refuses pixels beyond the range in which pictures can be computed, by the key that makes them so.
+/// Rejects pixels outside the computable range, naming the responsible key.
 fn check_pitch(spec: &CArmSpec, size_px: [u32; 2], pixel_mm: f64) -> Result<()> {
     let [low, high] = PITCH_MM;
     if (low..=high).contains(&pixel_mm) {

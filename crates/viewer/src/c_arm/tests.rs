@@ -30,10 +30,10 @@ fn lao_moves_the_detector_to_the_left_and_cranial_to_the_head() {
     assert!((arm(90.0, 0.0).source_mm() - Vec3::new(-750.0, 0.0, 0.0)).norm() < 1e-9);
     let source = arm(0.0, 30.0).source_mm();
     assert!(source.z < -370.0 && source.y > 0.0, "detector to the head, source to the feet: {source}");
-    // In LAO, what is anterior moves towards the patient's right, left on screen.
+    // In LAO, anterior points move towards the patient's right, left on screen.
     let [u, _] = arm(30.0, 0.0).project(&Vec3::new(0.0, -20.0, 0.0));
     assert!(u < 300.0, "{u}");
-    // Cranial view: what is anterior moves down.
+    // In a cranial view, anterior points move down.
     let [_, v] = arm(0.0, 30.0).project(&Vec3::new(0.0, -20.0, 0.0));
     assert!(v > 200.0, "{v}");
 }

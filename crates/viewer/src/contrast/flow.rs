@@ -1,7 +1,7 @@
-//! The vessel tree that contrast medium is carried through, directed from its inlet.
+//! The vessel tree that transports contrast medium, directed from its inlet.
 //!
-//! Blood enters the centre-line tree at its inlet and divides at bifurcations ([`flow_nodes`]). It comes as the heart pumps it: a part of the
-//! flow, the pulsatility, in systole, the rest all the time.
+//! Blood enters the centre-line tree at its inlet and divides at bifurcations ([`flow_nodes`]). The inflow is
+//! pulsatile: a fraction of it, the pulsatility, in systole, the rest steadily.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -16,25 +16,26 @@ use super::transport::Transport;
 use super::volumes::volumes_mm3;
 use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
-/// A cell has at least this part of the volume that the centre line gives it: one of which the picture shows nothing must not stop time.
+/// Smallest volume of a cell, relative to that of the centre line: one invisible in the image must not make the time
+/// step vanish.
 const LEAST_PART: f64 = 0.25;
-/// Part of a heartbeat that systole takes.
+/// Fraction of a heartbeat in systole.
 const SYSTOLE: f64 = 0.35;
 
-/// A point of the vessel, after those upstream of it.
+/// A point of the vessel; points upstream of it come before it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     pub(super) position_mm: Vec3,
     pub(super) radius_mm: f64,
     /// The point before it, towards the inlet.
     pub(super) upstream: Option<usize>,
-    /// Share of the inflow that passes here.
+    /// Local share of the inflow.
     pub(super) share: f64,
-    /// Lumen that is its own, mm³.
+    /// Volume of lumen of this point, mm³.
     pub(super) volume_mm3: f64,
     /// Distance from the point before, mm.
     length_mm: f64,
-    /// Whether the tree ends here.
+    /// Whether it is an end of the tree.
     pub(super) is_end: bool,
 }
 
@@ -42,22 +43,22 @@ pub(super) struct Node {
 #[derive(Debug)]
 pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
-    /// Whose blood is where in the lumen.
+    /// Mixing of blood in the lumen.
     pub(super) mixing: Arc<Mixing>,
     largest: OnceLock<Vec<f32>>,
     carried: OnceLock<Mutex<Carried>>,
     pub(super) injections: Vec<InjectionSpec>,
     pub(super) mean_inflow_mm3_per_s: f64,
-    /// Mean time that medium stays in the tissue behind an end, s.
+    /// Mean residence time of medium in the tissue behind an end, s.
     pub(super) tissue_s: f64,
-    /// Radius of that tissue, if it is drawn, mm.
+    /// Radius of that tissue, if drawn, mm.
     pub(super) tissue_mm: Option<f64>,
     beat_s: f64,
     pulsatility: f64,
     dispersion: f64,
 }
 
-/// The medium on its way, and where the tip was that injects.
+/// The transported medium, and the path of the injecting tip.
 #[derive(Debug)]
 pub(super) struct Carried {
     tip: TipWay,
@@ -65,13 +66,13 @@ pub(super) struct Carried {
 }
 
 impl Carried {
-    /// Notes where the tip is at a time, in the vessel at rest.
+    /// Records the tip position at a time, in the vessel at rest.
     fn follow(&mut self, flow: &Flow, time_s: f64, place_mm: Vec3) {
         let known_s = self.tip.follow(time_s, place_mm);
         self.transport.forget_after(flow, known_s);
     }
 
-    /// The medium at a time, with the tip there then.
+    /// The medium at a time, with the tip position then.
     pub(super) fn at(&mut self, flow: &Flow, time_s: f64, tip_mm: Option<Vec3>) -> &Transport {
         if let Some(place_mm) = tip_mm {
             self.follow(flow, time_s, place_mm);
@@ -82,10 +83,10 @@ impl Carried {
 }
 
 impl Flow {
-    /// The flow that the injections of `spec` go with, in the lumen that `filled` encloses; `None` where there are none.
+    /// The flow with the injections of `spec`, in the lumen enclosed by `filled`; `None` without injections.
     ///
     /// # Errors
-    /// [`Error::Parameter`] without a centre line or for one that cannot be followed; [`Error::Content`] for its file.
+    /// [`Error::Parameter`] without a centre line or for an unusable one; [`Error::Content`] for its file.
     pub(crate) fn of_view(spec: &ViewSpec, filled: &SurfaceMesh) -> Result<Option<Self>> {
         if spec.injection.is_empty() {
             return Ok(None);
@@ -129,7 +130,7 @@ impl Flow {
         }
     }
 
-    /// In a lumen that is that of the centre line to the bit.
+    /// In a lumen exactly that of the centre line.
     #[cfg(test)]
     pub(super) fn in_cones(
         tree: &CentrelineTree,
@@ -141,7 +142,7 @@ impl Flow {
         Ok(Self::of_nodes(nodes, mixing, spec, injections))
     }
 
-    /// The point nearest to a place.
+    /// The point nearest to a position.
     #[cfg(test)]
     pub(super) fn nearest(&self, place: &Vec3) -> usize {
         let distance = |i: &usize| (self.nodes[*i].position_mm - place).norm_squared();
@@ -160,36 +161,36 @@ impl Flow {
         }
     }
 
-    /// The same before anything has happened.
+    /// The same before anything has been injected.
     pub(crate) fn anew(&self) -> Self {
         self.injected(&self.injections)
     }
 
-    /// Whether an injection comes out of a tip: then its medium is that of one run.
+    /// Whether an injection comes out of a tip: then its medium belongs to one run.
     pub(crate) fn follows_tip(&self) -> bool {
         self.injections.iter().any(|one| one.at_tip)
     }
 
-    /// Notes where the tip is at a time, in the vessel at rest. Frames do so by themselves.
+    /// Records the tip position at a time, in the vessel at rest. Frames do so themselves.
     pub(crate) fn follow_tip(&self, time_s: f64, place_mm: Vec3) {
         if self.follows_tip() {
             self.carried().follow(self, time_s, place_mm);
         }
     }
 
-    /// The medium on its way, for all that show it: a moment is the same whoever asked for one before.
+    /// The transported medium, shared by all views: a moment does not depend on which were requested before.
     pub(super) fn carried(&self) -> MutexGuard<'_, Carried> {
         let anew =
             || Mutex::new(Carried { tip: TipWay::new(&self.injections), transport: Transport::new(self) });
         self.carried.get_or_init(anew).lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The largest fraction that each cell ever has.
+    /// The largest fraction that each cell ever reaches.
     pub(super) fn largest(&self) -> &[f32] {
         self.largest.get_or_init(|| Transport::largest(self))
     }
 
-    /// Inflow at a time over its mean: a raised cosine in systole over a steady part.
+    /// Inflow at a time relative to its mean: a raised cosine in systole over a steady part.
     pub(super) fn pulse(&self, time_s: f64) -> f64 {
         let part = (time_s / self.beat_s).rem_euclid(1.0) / SYSTOLE;
         let systole =
@@ -197,13 +198,13 @@ impl Flow {
         1.0 - self.pulsatility + self.pulsatility * systole
     }
 
-    /// The largest of [`Self::pulse`].
+    /// The maximum of [`Self::pulse`].
     pub(super) fn highest_pulse(&self) -> f64 {
         1.0 - self.pulsatility + self.pulsatility * 2.0 / SYSTOLE
     }
 
-    /// Volume that diffusion exchanges across the face upstream of a cell at a flow through it, mm³/s: what a bolus is wanted to spread
-    /// by, less what cells of this length spread it by themselves.
+    /// Volume exchanged by diffusion across the face upstream of a cell at a flow through it, mm³/s: the wanted
+    /// spreading of a bolus, minus the numerical one of cells of this length.
     pub(super) fn exchange_mm3_per_s(&self, cell: usize, flow_mm3_per_s: f64) -> f64 {
         let node = &self.nodes[cell];
         if node.length_mm <= 0.0 {
@@ -211,9 +212,9 @@ impl Flow {
         }
         let area = node.volume_mm3 / node.length_mm;
         let velocity = flow_mm3_per_s.abs() / area;
-        // Behind a transit time τ the front's deviation in time is k √τ: a diffusivity of k² v²/2.
+        // After a transit time τ the standard deviation of the front in time is k √τ: a diffusivity of k² v²/2.
         let wanted = (self.dispersion * velocity).powi(2) / 2.0;
-        // More than the flow itself would not be a front any more.
+        // With more than the flow itself there would be no front.
         let more = (wanted - velocity * node.length_mm / 2.0).clamp(0.0, velocity * node.length_mm);
         more * area / node.length_mm
     }
@@ -228,8 +229,8 @@ fn read(path: &Path) -> Result<CentrelineTree> {
     })
 }
 
-/// The tree's points and some between them, with the volumes of cones from the point before. A branch begins where it leaves its trunk:
-/// before that its blood is the trunk's.
+/// The tree's points with intermediate ones, and the volumes of cones from the point before. A branch starts where it
+/// leaves its trunk: before that its blood is the trunk's.
 fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     let found = flow_nodes(
         tree,
@@ -240,7 +241,7 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     let mut goes_on = vec![false; found.len()];
     found.iter().filter_map(|node| node.upstream).for_each(|up| goes_on[up] = true);
     let mut nodes: Vec<Node> = Vec::with_capacity(found.len());
-    // What became of each.
+    // New index of each.
     let mut becomes: Vec<usize> = Vec::with_capacity(found.len());
     for (node, goes_on) in found.iter().zip(goes_on) {
         let upstream = node.upstream.map(|up| becomes[up]);
@@ -252,7 +253,7 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
             }
         }
     }
-    // The inlet itself has the volume of the first stretch.
+    // The inlet itself gets the volume of the first stretch.
     if let Some(first) = nodes.get(1).map(|node| node.volume_mm3) {
         nodes[0].volume_mm3 = first;
     }
@@ -274,7 +275,7 @@ mod tests {
     use crate::contrast::transport::Transport;
     use endowire_core::vessel::CentrelineNode;
 
-    /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2.
+    /// A trunk of 100 mm and radius 5 with branches of radii 4 and 2.
     fn tree() -> CentrelineTree {
         let node = |x: f64, y: f64, radius_mm: f64, parent: Option<usize>| CentrelineNode {
             position_mm: Vec3::new(x, y, 0.0),
@@ -323,7 +324,8 @@ mod tests {
         };
         assert!(at(0.5) < 1e-3 && (at(1.0 + transit) - 0.1).abs() < 0.02, "half of the front has passed");
         assert!((at(2.0 + transit) - 0.2).abs() < 1e-3 && at(8.0) < 1e-3);
-        // What passes is what was injected: ∫ f F dt = q T, at 25 ml/s until the injection ends and at 20 ml/s then.
+        // What passes is what was injected: ∫ f F dt = q T, at 25 ml/s until the injection ends and at 20 ml/s after
+        // that.
         let passed: f64 = (0..3000)
             .map(|k| f64::from(k) * 0.002)
             .map(|t| at(t) * 0.002 * if t < 3.0 { 25.0 } else { 20.0 })
@@ -378,7 +380,7 @@ mod tests {
         let astray = FlowSpec { inlet_mm: Some([150.0, 300.0, 0.0]), ..spec };
         let refused = Flow::in_cones(&tree(), &astray, &[injection(None)]).unwrap_err().to_string();
         assert!(refused.starts_with("view.flow.inlet_mm = [150, 300, 0]: the nearest end"), "{refused}");
-        // At the bifurcation the trunk and the small branch are downstream now.
+        // At the bifurcation the trunk and the small branch are now downstream.
         let share = |x: f64, y: f64| flow.nodes[flow.nearest(&Vec3::new(x, y, 0.0))].share;
         assert!((share(0.0, 0.0) / share(140.0, -30.0) - 125.0 / 8.0).abs() < 1e-9);
     }

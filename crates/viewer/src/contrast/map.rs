@@ -1,7 +1,7 @@
-//! What of a bolus each pixel sees: its lumen's length, shared out to the nodes of the tree.
+//! Contrast medium seen by each pixel: the length of its lumen, distributed over the nodes of the tree.
 //!
-//! The stretches of a ray inside the wall are cut into short steps, and each step has the shares of its place ([`Mixing`]). A frame then
-//! needs one sparse product of the sums of these shares with the nodes' fractions.
+//! The stretches of a ray inside the wall are divided into short steps, each with the shares of its position
+//! ([`Mixing`]). A frame then needs one sparse product of the sums of these shares with the nodes' fractions.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use super::tissue::tissue;
 use crate::c_arm::CArm;
 use crate::cpu::wall_crossings;
 
-/// Contrast medium that a pixel sees.
+/// Contrast medium seen by a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Medium {
     pub(crate) pixel: u32,
@@ -26,12 +26,12 @@ pub(crate) struct Medium {
     pub(crate) tissue_mm: f32,
 }
 
-/// Fewest pixels worth handing to another thread.
+/// Smallest number of pixels per thread.
 const FEWEST_PIXELS: usize = 256;
-/// Shares of a pixel's lumen below this are given to the others.
+/// Shares of a pixel's lumen below this are redistributed to the others.
 const LEAST_SHARE: f32 = 1e-3;
 
-/// The medium that is seen from one place of the C-arm.
+/// The medium seen from one position of the C-arm.
 #[derive(Debug)]
 pub(crate) struct ContrastMap {
     flow: Arc<Flow>,
@@ -39,18 +39,19 @@ pub(crate) struct ContrastMap {
     displacement: Option<Displacement>,
 }
 
-/// The share of each node in the lumen of each pixel.
+/// The shares of the nodes in the lumen of each pixel.
 #[derive(Debug)]
 pub(crate) struct Shares {
-    /// Pixels inside the wall, rising, and where their shares end.
+    /// Pixels inside the wall, ascending, and the ends of their shares.
     pixels: Vec<(u32, u32)>,
     shares: Vec<(u32, f32)>,
-    /// Ends of the tree, with the pixels that see the tissue behind: how long, in mm, a mm³ of medium there is.
+    /// Ends of the tree, with the pixels that see the tissue behind: length, mm, per mm³ of medium.
     tissue: Vec<(usize, Vec<(u32, f32)>)>,
 }
 
 impl Shares {
-    /// The shares of `flow`, which is of the vessel at rest, in the lumen that `wall` encloses, displaced where the vessel has moved.
+    /// The shares of `flow`, defined in the vessel at rest, in the lumen enclosed by `wall`, with the vessel's
+    /// displacement.
     pub(crate) fn new(
         flow: &Flow,
         c_arm: &CArm,
@@ -88,18 +89,18 @@ impl Shares {
 }
 
 impl ContrastMap {
-    /// Medium of `flow`, shared out to pixels, in a vessel that may be displaced.
+    /// Medium of `flow` distributed to pixels, in a possibly displaced vessel.
     pub(crate) fn new(flow: &Arc<Flow>, shares: Arc<Shares>, displacement: Option<&Displacement>) -> Self {
         let displacement = displacement.cloned();
         Self { flow: Arc::clone(flow), shares, displacement }
     }
 
-    /// How the lumen of each pixel is shared out, which another injection does not change.
+    /// The shares of each pixel, which do not depend on the injection.
     pub(crate) fn into_shares(self) -> Arc<Shares> {
         self.shares
     }
 
-    /// What the pixels see that see any, rising, with the tip at `tip_mm`.
+    /// The medium of all pixels with any, ascending, with the tip at `tip_mm`.
     pub(crate) fn at(&self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
         let displacement = self.displacement.as_ref();
         let tip_mm = tip_mm.map(|tip| displacement.map_or(tip, |displacement| displacement.material(&tip)));
@@ -116,7 +117,7 @@ impl ContrastMap {
                 tissue_mm: length * volume,
             }));
         }
-        // Stable: the sums run in the order of the ends.
+        // Stable: the sums are in the order of the ends.
         seen.sort_by_key(|medium| medium.pixel);
         let join = |all: &[Medium]| {
             all[1..].iter().fold(all[0], |sum, one| Medium {
@@ -128,13 +129,13 @@ impl ContrastMap {
         seen.chunk_by(|a, b| a.pixel == b.pixel).map(join).collect()
     }
 
-    /// The largest fraction that a pixel's lumen ever has, each node at its own best moment.
+    /// The largest fraction that a pixel's lumen ever reaches, with each node at its own maximum.
     pub(crate) fn largest(&self) -> Vec<Medium> {
         self.shares.mixed(self.flow.largest())
     }
 }
 
-/// The shares of a ray's length in the lumen; `room` is to work in.
+/// The shares of a ray's length in the lumen; `room` is a work buffer.
 fn of_ray(
     mixing: &Mixing,
     c_arm: &CArm,

@@ -1,31 +1,31 @@
-//! Whose blood is at a place in the lumen: the points of the tree, with their shares of it.
+//! Mixing of blood: the shares of the tree's points at a position in the lumen.
 //!
-//! Blood is mixed across a vessel and from a trunk into its branches, so what a place holds is a mean over the points about it. How far
-//! a place is from a point of radius r is told by its power over the radius, p = (|x − c|² − r²)/r, which is least for the vessel that
-//! the place is in. Shares fall from that least p to nothing with its difference, so they are continuous everywhere: along a
-//! vessel, and from one into the other. Only points that blood can come from on a short way through the tree have any: a vessel that
-//! merely passes by has none.
+//! Blood is mixed across a vessel and from a trunk into its branches, so the composition at a position is a mean over
+//! nearby points. The closeness to a point of radius r is measured by its power over the radius, p = (|x − c|² −
+//! r²)/r, which is smallest for the vessel containing the position. Shares decrease from that smallest p to zero with
+//! the difference, so they are continuous everywhere: along a vessel, and from one into another. Only points
+//! connected by a short path through the tree have shares: a vessel that merely passes by has none.
 
 use endowire_core::Vec3;
 use rustc_hash::FxHashMap;
 
 use super::flow::Node;
 
-/// Difference of p over which shares fall to nothing, mm: what is let go at a place is mixed with the blood of a vessel of
-/// radius r over √(20 r) on either side.
+/// Difference of p over which shares decrease to zero, mm: medium released at a position is mixed with the blood of a
+/// vessel of radius r over √(20 r) on either side.
 const MIXED_MM: f64 = 20.0;
 /// Length over which medium fades beyond the ends of the tree, in their radii.
 const FADE_RADII: f64 = 2.0;
-/// Vessels thinner than this are mixed as if they had this radius: points are 2 mm apart.
+/// Smallest radius used in mixing, since points are 2 mm apart.
 const THINNEST_MM: f64 = 1.0;
-/// Longest step of whoever asks along a line, and side of the cells that remember their nearest point, mm.
+/// Longest step along a line of queries, and side of the cells that cache their nearest point, mm.
 pub(super) const STEP_MM: f64 = 1.25;
 
 /// The shares of a tree's points.
 #[derive(Debug)]
 pub(super) struct Mixing {
     points: Vec<Point>,
-    /// The nearest point of each cell that is remembered.
+    /// The nearest point of each cached cell.
     cells: FxHashMap<[i32; 3], u32>,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Mixing {
 struct Point {
     position_mm: Vec3,
     radius_mm: f64,
-    /// The way out of the tree where it ends, at the inlet too: beyond it medium fades.
+    /// Outward direction at an end of the tree, including the inlet: beyond it medium fades.
     outward: Option<Vec3>,
     /// Points that may have a share where this is nearest.
     about: Vec<u32>,
@@ -45,7 +45,7 @@ impl Point {
         squared / self.radius_mm.max(THINNEST_MM)
     }
 
-    /// One within the tree, and less beyond its end.
+    /// 1 within the tree, decreasing beyond its end.
     fn left(&self, place: &Vec3) -> f64 {
         let Some(outward) = self.outward else { return 1.0 };
         let beyond = (place - self.position_mm).dot(&outward) / (FADE_RADII * self.radius_mm);
@@ -74,7 +74,7 @@ impl Mixing {
         Self { points: (0..nodes.len()).map(point).collect(), cells: FxHashMap::default() }
     }
 
-    /// Puts the shares of a place into `shares`. They add up to one, and to less beyond the ends of the tree.
+    /// Sets `shares` to those of a position. Their sum is 1, or less beyond the ends of the tree.
     pub(super) fn shares(&self, place: &Vec3, shares: &mut Vec<(u32, f32)>) {
         let cell = cell(place);
         let nearest = self.cells.get(&cell).copied().unwrap_or_else(|| self.nearest(cell));
@@ -90,7 +90,7 @@ impl Mixing {
         shares.iter_mut().for_each(|share| share.1 *= each);
     }
 
-    /// Remembers the nearest point for all that is asked of the cell of a place.
+    /// Caches the nearest point for all queries in the cell of a position.
     pub(super) fn remember(&mut self, place: &Vec3) {
         let cell = cell(place);
         if !self.cells.contains_key(&cell) {
@@ -112,8 +112,8 @@ fn cell(place: &Vec3) -> [i32; 3] {
     [place.x, place.y, place.z].map(|x| (x / STEP_MM).floor() as i32)
 }
 
-/// The points on short ways from a point: as far as shares reach in the wider of both, and a radius more, since a branch begins in the
-/// middle of its trunk.
+/// The points on short paths from a point: within reach of shares in the wider of both, plus a radius, since a branch
+/// starts in the middle of its trunk.
 fn about(nodes: &[Node], neighbours: &[Vec<usize>], from: usize) -> Vec<u32> {
     let reach = |i: usize| {
         let radius = nodes[from].radius_mm.max(nodes[i].radius_mm).max(THINNEST_MM);

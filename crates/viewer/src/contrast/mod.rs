@@ -1,4 +1,4 @@
-//! Contrast medium: where the blood carries it, and what of it a ray meets.
+//! Contrast medium: its transport by blood, and its attenuation of rays.
 
 mod flow;
 mod map;

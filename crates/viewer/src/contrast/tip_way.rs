@@ -1,22 +1,22 @@
-//! Where the tip was that injects.
+//! The path of the injecting tip.
 //!
-//! Medium that comes out of a tip goes where the tip was meanwhile, whichever moments were drawn. So its way is kept: a place, in the
-//! vessel at rest, for each moment that was told, straight between them, and as at the first and the last beyond. Only what is needed
-//! is kept: while nothing is injected through the tip its way is of no account.
+//! Medium from a tip appears where the tip was at that time, whichever moments were drawn. So the path is stored: a
+//! position, in the vessel at rest, for each reported moment, linear in between, and constant before the first and
+//! after the last. Only what is needed is kept: without injection through the tip its path is irrelevant.
 
 use endowire_core::Vec3;
 
 use crate::spec::InjectionSpec;
 
-/// Places nearer to each other than this are the same, mm: the same curve told by other points.
+/// Positions closer than this are equal, mm: the same curve given by other points.
 const SAME_MM: f64 = 1e-6;
 
-/// The way of a tip.
+/// The path of a tip.
 #[derive(Debug, Clone)]
 pub(super) struct TipWay {
-    /// Beginnings and ends of the injections through it, s.
+    /// Start and end times of the injections through it, s.
     flowing_s: Vec<[f64; 2]>,
-    /// Times, rising, and places, mm.
+    /// Times, ascending, and positions, mm.
     places: Vec<(f64, Vec3)>,
 }
 
@@ -27,8 +27,8 @@ impl TipWay {
         Self { flowing_s, places: vec![] }
     }
 
-    /// Notes where the tip is. Where it was known to be elsewhere then, what was known from there on is of another run, and is forgotten.
-    /// Returns the time up to which the way is what it was before, s.
+    /// Records the tip position. If another one was known for that time, everything known from then on belongs to
+    /// another run, and is discarded. Returns the time up to which the path is unchanged, s.
     pub(super) fn follow(&mut self, time_s: f64, place_mm: Vec3) -> f64 {
         if self.flowing_s.is_empty() {
             return f64::INFINITY;
@@ -38,7 +38,7 @@ impl TipWay {
         let since_s = before_s(after);
         if let Some(&(known_s, known_mm)) = self.places.get(after) {
             let same = known_s == time_s && (known_mm - place_mm).norm() <= SAME_MM;
-            // The first is kept in any case.
+            // The first is always kept.
             let idle = after > 0 && known_s > time_s && !self.flows(since_s, known_s);
             if same || idle {
                 return f64::INFINITY;
@@ -51,7 +51,7 @@ impl TipWay {
         since_s
     }
 
-    /// Where the tip is at a time; `None` where nothing is known of it.
+    /// The tip position at a time; `None` if nothing is known.
     pub(super) fn at(&self, time_s: f64) -> Option<Vec3> {
         let after = self.places.partition_point(|known| known.0 < time_s);
         let Some(&(to_s, to_mm)) = self.places.get(after) else {
@@ -73,7 +73,7 @@ impl TipWay {
 mod tests {
     use super::*;
 
-    /// The way of a tip that injects from 1 to 2 s.
+    /// The path of a tip that injects from 1 to 2 s.
     fn way() -> TipWay {
         let injection =
             InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 1.0, at_mm: None, at_tip: true };
@@ -124,7 +124,7 @@ mod tests {
         assert!((500..508).contains(&kept), "{kept}");
         let place = way.at(1.5).unwrap();
         assert!((place - at(750.0)).norm() < 1e-9, "{place}");
-        // The same run once more, as another plane has it.
+        // The same run once more, as for another plane.
         told(&mut way);
         assert_eq!(way.places.len(), kept);
         let mut never = TipWay::new(&[]);

@@ -1,8 +1,8 @@
-//! Where medium is seen in the tissue behind the ends of the tree.
+//! Visible medium in the tissue behind the ends of the tree.
 //!
-//! An artery goes on into ever finer ones, which no centre line has: behind each end they are made up, branching by halves into the tissue
-//! that they feed. The medium is spread evenly over the last ones, each a small cloud, so that a blush has the shape of
-//! a territory and the grain of its arterioles.
+//! An artery continues into ever finer ones, which no centre line contains: behind each end they are generated,
+//! branching by halves into the tissue that they supply. The medium is distributed evenly over the last ones, each a
+//! small cloud, so that a blush has the shape of a territory and the grain of its arterioles.
 
 use std::collections::BTreeMap;
 
@@ -12,17 +12,19 @@ use endowire_core::{Vec3, random};
 use super::flow::Flow;
 use crate::c_arm::CArm;
 
-/// How often an end divides, and the length of the first branch over the radius of the tissue; each next one is shorter by this factor.
+/// Number of divisions of an end, and length of the first branch relative to the radius of the tissue; each next one
+/// is shorter by this factor.
 const DIVISIONS: u32 = 7;
 const FIRST: f64 = 0.3;
 const SHORTER: f64 = 0.85;
-/// Slope of a branch against the one before, at most.
+/// Largest slope of a branch relative to the one before.
 const ASIDE: f64 = 1.0;
-/// Standard deviation of the last ones' clouds over the radius of the tissue, and deviations beyond which nothing is seen.
+/// Standard deviation of the last ones' clouds relative to the radius of the tissue, and number of deviations beyond
+/// which nothing is visible.
 const CLOUD: f64 = 0.25;
 const REACH: f64 = 3.5;
 
-/// Ends of the tree, with the pixels that see the tissue behind: how long, in mm, a mm³ of medium there is.
+/// Ends of the tree, with the pixels that see the tissue behind: length, mm, per mm³ of medium.
 pub(super) fn tissue(
     flow: &Flow,
     c_arm: &CArm,
@@ -63,7 +65,7 @@ fn arterioles(end_mm: Vec3, onwards: Vec3, radius_mm: f64, seed: u64) -> Vec<Vec
     tips.into_iter().map(|tip| tip.0).collect()
 }
 
-/// Adds what a part of the medium in a Gaussian cloud is to the pixels that see it.
+/// Adds a part of the medium in a Gaussian cloud to the pixels that see it.
 fn add_cloud(c_arm: &CArm, middle: Vec3, deviation_mm: f64, part: f64, seen: &mut BTreeMap<u32, f32>) {
     let at = c_arm.in_beam(&middle);
     if !c_arm.is_between(&at) {

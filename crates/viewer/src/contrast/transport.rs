@@ -1,19 +1,19 @@
-//! Contrast medium on its way through a vessel tree: one-dimensional finite volumes.
+//! Transport of contrast medium through a vessel tree: one-dimensional finite volumes.
 //!
-//! The stretch from each point of the tree to the one before it is a cell. Blood comes in at the inlet as the heart pumps it, Q(t),
-//! and leaves through the ends; the resistances of what lies behind these divide it, so each end takes a fixed share s of all that
-//! comes in, injections too. An injection of q therefore pushes s q through every face and, on the way from the inlet to its place,
-//! takes q back:
+//! The stretch from each point of the tree to the one before it is a cell. Blood enters at the inlet as pumped by the
+//! heart, Q(t), and leaves through the ends; the resistances beyond them determine its division, so each end takes a
+//! fixed share s of everything that enters, injections included. An injection of q therefore drives s q through every
+//! face and, on the path from the inlet to its position, takes q back:
 //!
 //! ```text
 //! F = s (Q + Σ q) − Σ q over injections at or below the face
 //! ```
 //!
-//! F < 0 is reflux: medium injected faster than blood arrives goes against the stream up to where a branch carries it away. Every
-//! cell is mixed, faces carry the cell upstream of them, so the medium is conserved to rounding. That spreads fronts like a
-//! dispersion of v Δx/2; what the wanted one, k² v²/2, is more is added as diffusion.
+//! F < 0 is reflux: medium injected faster than blood arrives flows upstream to where a branch carries it away. Every
+//! cell is mixed, faces carry the fraction of the upstream cell, so the medium is conserved to rounding. That spreads
+//! fronts like a dispersion of v Δx/2; the excess of the wanted one, k² v²/2, is added as diffusion.
 //!
-//! Steps are those of one grid in time, so that a moment is the same whichever frames came before it.
+//! Steps are those of one time grid, so that a moment does not depend on which frames came before it.
 
 use endowire_core::Vec3;
 
@@ -21,13 +21,13 @@ use super::flow::Flow;
 use super::tip_way::TipWay;
 use crate::spec::InjectionSpec;
 
-/// Part of the step at which a cell would be emptied.
+/// Time step, as a fraction of that in which a cell would be emptied.
 const COURANT: f64 = 0.8;
 /// Longest step, s: a hundredth of a heartbeat.
 const LONGEST_S: f64 = 0.008;
-/// Most moments that are kept to go back to. Where there would be more, each second one is let go.
+/// Largest number of stored moments. Beyond it, every second one is dropped.
 const MOST_MARKS: usize = 64;
-/// Part of the injected medium that may be left where all has passed, and how long that is waited for, s.
+/// Fraction of the injected medium that may remain when all has passed, and how long to wait for that, s.
 const LEFT: f64 = 0.01;
 const WAITED_S: f64 = 20.0;
 
@@ -37,18 +37,18 @@ pub(super) struct Transport {
     step_s: f64,
     /// Steps since time zero.
     steps: i64,
-    /// Fraction of each cell, and one step before.
+    /// Fraction of each cell, now and one step before.
     fractions: Vec<f64>,
     before: Vec<f64>,
     /// Medium in the tissue behind each end, mm³.
     tissue_mm3: Vec<f64>,
-    /// Medium that has left through the ends and tissues, mm³.
+    /// Total medium that has left through the ends and tissues, mm³.
     left_mm3: f64,
     /// Flows through the faces upstream of cells, mm³/s.
     faces: Vec<f64>,
-    /// The cells that each injection goes into, with the part of it that each gets.
+    /// The cells of each injection, with their parts of it.
     places: Vec<Vec<(usize, f64)>>,
-    /// Moments on the way, rising, and the least steps between them.
+    /// Stored moments, ascending, and the smallest number of steps between them.
     marks: Vec<Self>,
     apart: i64,
 }
@@ -73,7 +73,8 @@ impl Transport {
         }
     }
 
-    /// Goes on to a time; to one that has passed, from a moment before it or from the first. `tip` is the way of the tip, if one injects.
+    /// Advances to a time; to an earlier one, starts from a stored moment before it or from the first. `tip` is the
+    /// path of the tip, if one injects.
     pub(super) fn advance(&mut self, flow: &Flow, time_s: f64, tip: &TipWay) {
         let wanted = (time_s / self.step_s).ceil() as i64;
         if wanted < self.steps {
@@ -88,9 +89,9 @@ impl Transport {
         }
     }
 
-    /// Forgets what hangs on where the tip was after a time.
+    /// Discards what depends on the tip after a time.
     pub(super) fn forget_after(&mut self, flow: &Flow, time_s: f64) {
-        // A step has the tip where it is at its beginning.
+        // A step uses the tip position at its start.
         let last = (time_s / self.step_s).floor().clamp(-1e18, 1e18) as i64 + 1;
         if last < self.steps {
             self.go_back(flow, last);
@@ -99,7 +100,7 @@ impl Transport {
         }
     }
 
-    /// To the last moment that is known not after a step.
+    /// Returns to the last stored moment not after a step.
     fn go_back(&mut self, flow: &Flow, step: i64) {
         let (marks, apart) = (std::mem::take(&mut self.marks), self.apart);
         let before = marks.partition_point(|mark| mark.steps <= step).checked_sub(1);
@@ -107,7 +108,7 @@ impl Transport {
         (self.marks, self.apart) = (marks, apart);
     }
 
-    /// Keeps this moment where none that is near is kept.
+    /// Stores this moment unless a near one is stored.
     fn mark(&mut self) {
         if self.marks.last().is_some_and(|mark| self.steps < mark.steps + self.apart) {
             return;
@@ -125,7 +126,7 @@ impl Transport {
         self.marks = marks;
     }
 
-    /// Where all has gone, goes on to the next injection or to a step: what has gone does not come back.
+    /// If all medium has gone, skips to the next injection or to a step: it does not return.
     fn wait(&mut self, flow: &Flow, wanted: i64) {
         let now_s = self.steps as f64 * self.step_s;
         let flows = |i: &InjectionSpec| i.start_s <= now_s && now_s <= i.start_s + i.duration_s;
@@ -153,7 +154,7 @@ impl Transport {
         &self.tissue_mm3
     }
 
-    /// The largest fraction that each cell ever has.
+    /// The largest fraction that each cell ever reaches.
     pub(super) fn largest(flow: &Flow) -> Vec<f32> {
         let (mut transport, nowhere) = (Self::new(flow), TipWay::new(&[]));
         let last = flow.injections.iter().map(|i| i.start_s + i.duration_s).fold(0.0, f64::max);
@@ -176,16 +177,16 @@ impl Transport {
         self.fractions.iter().zip(&flow.nodes).map(|(f, node)| f * node.volume_mm3).sum()
     }
 
-    /// Goes on by one step.
+    /// Advances by one step.
     fn step(&mut self, flow: &Flow, tip: &TipWay) {
         let [start, end] = [self.steps, self.steps + 1].map(|n| n as f64 * self.step_s);
         let blood = flow.mean_inflow_mm3_per_s * flow.pulse(f64::midpoint(start, end));
-        // Rates are means over the step: what is injected is injected to the end.
+        // Rates are means over the step, so injections are complete.
         let rates: Vec<f64> = flow
             .injections
             .iter()
             .map(|i| {
-                // Of a tip that is not in nothing comes.
+                // Nothing comes out of a tip that is not inserted.
                 if i.at_tip && tip.at(start).is_none() {
                     return 0.0;
                 }
@@ -247,7 +248,8 @@ impl Transport {
     }
 }
 
-/// The cells whose blood is at a point, the inlet's without one, with the parts of an injection there that they get: all of it.
+/// The cells with the blood at a point, or at the inlet without one, and their parts of an injection there, which sum
+/// to 1.
 fn parts(flow: &Flow, point_mm: Option<Vec3>) -> Vec<(usize, f64)> {
     let mut shares = Vec::new();
     flow.mixing.shares(&point_mm.unwrap_or(flow.nodes[0].position_mm), &mut shares);
@@ -258,7 +260,7 @@ fn parts(flow: &Flow, point_mm: Option<Vec3>) -> Vec<(usize, f64)> {
     shares.iter().map(|&(cell, share)| (cell as usize, f64::from(share) / all)).collect()
 }
 
-/// The step at which no cell gives more than a part of what it holds, whatever is injected wherever.
+/// The step in which no cell loses more than a fraction of its content, whatever is injected anywhere.
 fn step_s(flow: &Flow) -> f64 {
     let most: f64 = flow.injections.iter().map(|i| 1000.0 * i.rate_ml_per_s).sum();
     let all = flow.mean_inflow_mm3_per_s * flow.highest_pulse() + most;
@@ -281,7 +283,7 @@ mod tests {
     use super::*;
     use crate::spec::FlowSpec;
 
-    /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2, of 60 mm each.
+    /// A trunk of 100 mm and radius 5 with branches of radii 4 and 2, of 60 mm each.
     fn flow(spec: &FlowSpec, at_mm: Option<[f64; 3]>, rate_ml_per_s: f64) -> Flow {
         let node = |x: f64, y: f64, radius_mm: f64, parent: Option<usize>| CentrelineNode {
             position_mm: Vec3::new(x, y, 0.0),
@@ -345,7 +347,7 @@ mod tests {
             transport.advance(&flow, 1.5, &nowhere());
             let late = transport.at(1.5);
             let at = |x: f64, y: f64| late[flow.nearest(&Vec3::new(x, y, 0.0))];
-            // Before its place, in the other branch, at its end, in the trunk.
+            // Before its position, in the other branch, at its end, in the trunk.
             [at(118.0, -24.0), at(118.0, 24.0), at(136.0, -48.0), at(80.0, 0.0)]
         };
         // A ninth of 20 ml/s arrives there.
@@ -370,7 +372,7 @@ mod tests {
         once.advance(&flow, 1.777, &nowhere());
         assert_eq!(often.at(1.777), once.at(1.777));
         assert!(once.at(1.777).iter().any(|f| *f > 0.1));
-        // Back from a moment that is kept: few are, and a later one is none to go on from.
+        // Back from a stored moment: few are stored, and none after the requested time is used.
         assert!(often.marks.len() <= MOST_MARKS && often.apart > 1, "{}", often.apart);
         for time in [1.21, 2.4, 1.003, 1.777] {
             often.advance(&flow, time, &nowhere());

@@ -1,8 +1,8 @@
-//! How much of the lumen that is seen belongs to each point of the tree.
+//! The visible lumen of each point of the tree.
 //!
-//! The medium of a cell is its fraction times its volume. A picture shows that medium in the lumen whose shares are the cell's, so that is
-//! the volume which the cell must have: then what is seen is what was injected, wherever surface and centre line disagree, in
-//! branches' origins and in the ends that pictures add.
+//! The medium of a cell is its fraction times its volume. An image shows that medium in the lumen according to the
+//! cell's shares, so that is the volume which the cell must have: then the visible amount is the injected one,
+//! wherever surface and centre line disagree, at branches' origins and in the ends added for images.
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
@@ -10,9 +10,9 @@ use endowire_core::vessel::SurfaceMesh;
 use super::mixing::{Mixing, STEP_MM};
 use crate::cpu::ScreenTriangle;
 
-/// About so many places of the lumen are asked.
+/// Approximate number of sample positions in the lumen.
 const PLACES: f64 = 4e5;
-/// Lines through the lumen are at most this far apart, mm, and at most so many run beside each other.
+/// Largest distance of lines through the lumen, mm, and largest number of lines side by side.
 const APART_MM: f64 = 1.0;
 const MOST_ACROSS: f64 = 4000.0;
 
@@ -26,7 +26,7 @@ pub(super) fn volumes_mm3(mixing: &mut Mixing, cells: usize, wall: &SurfaceMesh)
         return volumes;
     }
     let size = [high.x - low.x, high.y - low.y].map(|length| (length / apart_mm).ceil() as u32 + 1);
-    // Where lines along z meet the wall: line, height, and whether they leave.
+    // Intersections of lines along z with the wall: line, height, and whether they leave.
     let mut meetings: Vec<(usize, f64, bool)> = Vec::new();
     for index in 0..wall.triangles.len() {
         let corners = wall.corners(index);

@@ -1,16 +1,16 @@
-//! Lengths inside devices, of the cells that pixels are cut into.
+//! Lengths inside devices in sub-pixel cells.
 //!
-//! A wire of 0.014″ is a fraction of a pixel wide: a few rays a pixel beat against it, and it seems to break where they pass it by. So
-//! the pixels that devices touch, which are few, are cut into 8 × 8 cells, and a cell has the *mean* length of its rays: along rows,
-//! or along columns where a device runs along the rows, it is integrated over the cell exactly. For a cylinder of radius r at a distance s
-//! from its axis, that is
+//! A wire of 0.014″ is a fraction of a pixel wide: a few rays per pixel alias with it, and it seems broken where they
+//! miss it. So the few pixels touched by devices are divided into 8 × 8 cells, and a cell has the *mean* length of
+//! its rays: along rows, or along columns where a device runs along the rows, it is integrated over the cell exactly.
+//! For a cylinder of radius r at a distance s from its axis, that is
 //!
 //! ```text
 //! ∫ 2 √(r² − s²) ds = s √(r² − s²) + r² asin(s/r)
 //! ```
 //!
-//! Of a piece that is cut by a mitre or tapers, the length in the middle of what it covers of the cell is taken, times what that integral
-//! says of a cylinder: the sum over a row is its area wherever the wire lies between pixels.
+//! For a mitred or tapering piece, the length in the middle of the covered part of the cell is used, scaled by that
+//! integral for a cylinder: the sum over a row is its area wherever the wire lies between pixels.
 
 use endowire_core::Vec3;
 
@@ -20,22 +20,23 @@ use crate::c_arm::CArm;
 use crate::device::Piece;
 use crate::material::Material;
 
-/// Cells across a pixel.
+/// Number of cells across a pixel.
 const ACROSS: u32 = 8;
-/// Cells of a pixel.
+/// Number of cells of a pixel.
 pub(crate) const CELLS: usize = (ACROSS * ACROSS) as usize;
-/// Where a cell is narrower than this part of a radius, the length at its middle is its mean within a thousandth.
+/// Ratio of a cell's width to the radius below which the length at its middle is its mean within a thousandth.
 const NARROW: f64 = 0.1;
-/// Sine of the least angle between ray and axis at which a piece is integrated across: end on it is as long as it is, not as wide.
+/// Sine of the smallest angle between ray and axis at which a piece is integrated across: end on, its length matters,
+/// not its width.
 const LEAST_SINE: f64 = 0.3;
 
-/// The cells of the pixels that devices touch, by material.
+/// The cells of the pixels touched by devices, by material.
 #[derive(Debug)]
 pub(crate) struct DeviceCells {
-    /// The view with one pixel a cell.
+    /// The view with one pixel per cell.
     view: CArm,
     width: usize,
-    /// One more than the place of a pixel's cells; zero without any.
+    /// One plus the position of a pixel's cells; zero without any.
     places: Vec<u32>,
     pixels: Vec<u32>,
     maps: Vec<(Material, Vec<[f32; CELLS]>)>,
@@ -53,7 +54,7 @@ impl DeviceCells {
         }
     }
 
-    /// Forgets all devices.
+    /// Removes all devices.
     pub(crate) fn clear(&mut self) {
         self.pixels.drain(..).for_each(|pixel| self.places[pixel as usize] = 0);
         self.maps.iter_mut().for_each(|map| map.1.clear());
@@ -84,17 +85,17 @@ impl DeviceCells {
         }
     }
 
-    /// The pixels that are touched, in the order in which they were.
+    /// The touched pixels, in the order in which they were touched.
     pub(crate) fn pixels(&self) -> &[u32] {
         &self.pixels
     }
 
-    /// Materials, with lengths by place.
+    /// Materials, with lengths by position.
     pub(crate) fn maps(&self) -> &[(Material, Vec<[f32; CELLS]>)] {
         &self.maps
     }
 
-    /// Where the cells of a pixel are, if a device touches it.
+    /// Position of the cells of a pixel, if a device touches it.
     pub(crate) fn place(&self, pixel: usize) -> Option<usize> {
         (self.places[pixel] as usize).checked_sub(1)
     }
@@ -112,22 +113,23 @@ impl DeviceCells {
     }
 }
 
-/// Which quarter of a pixel a cell is in, as its 2 × 2 rays are counted.
+/// The quarter of a pixel that contains a cell, in the order of the 2 × 2 rays.
 pub(crate) fn quarter(cell: usize) -> usize {
     let (across, half) = (ACROSS as usize, ACROSS as usize / 2);
     cell / across / half * 2 + cell % across / half
 }
 
-/// Calls `visit(cell, length_mm)` for every cell of `view` that `piece` is seen in.
+/// Calls `visit(cell, length_mm)` for every cell of `view` in which `piece` is visible.
 fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
     let size = view.size_px();
     let reach = piece.reach();
     let near = view.sod_mm() + piece.start.z.min(piece.end.z) - reach;
     let ends = [&piece.start, &piece.end].map(|at| view.pixel_of(at));
-    // Of a piece that reaches behind the source anything may be seen.
+    // A piece that reaches behind the source may be visible anywhere.
     let outer = if near > 0.0 { 1.05 * reach * view.focal_px() / near } else { f64::INFINITY };
     let run = [0, 1].map(|k| (ends[1][k] - ends[0][k]).abs());
-    // Lines are rows where the piece runs down the picture, else columns; cells of a line are counted along `u`.
+    // Lines are rows where the piece is vertical in the image, otherwise columns; cells of a line are counted along
+    // `u`.
     let (u, v) = if run[1] >= run[0] { (0, 1) } else { (1, 0) };
     let (low, high) = (ends[0][v].min(ends[1][v]), ends[0][v].max(ends[1][v]));
     let mean_radius = piece.radius + 0.5 * piece.slope * (piece.end - piece.start).norm();
@@ -135,7 +137,7 @@ fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
         let across = line as f64 + 0.5;
         let part = ((across - ends[0][v]) / (ends[1][v] - ends[0][v])).clamp(0.0, 1.0);
         let middle = if part.is_nan() { ends[0][u] } else { ends[0][u] + part * (ends[1][u] - ends[0][u]) };
-        // Lines meet the piece at 45° at least.
+        // Lines meet the piece at 45° or more.
         let reach = 1.5 * outer + 1.0;
         let cells = span(middle - reach, middle + reach, size[u]);
         if cells.is_empty() {
@@ -163,7 +165,8 @@ fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
     }
 }
 
-/// Mean length of the rays of a cell that lies between two distances from the axis; `length` is that at a part of the cell's width.
+/// Mean length of the rays of a cell between two distances from the axis; `length` gives it at a fraction of the
+/// cell's width.
 fn mean_length(radius: f64, [from, to]: [f64; 2], length: impl Fn(f64) -> f64) -> f64 {
     let within = [from, to].map(|s| (s / radius).clamp(-1.0, 1.0));
     let covered = (within[1] - within[0]) * radius / (to - from);

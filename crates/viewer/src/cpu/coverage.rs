@@ -1,10 +1,11 @@
-//! Which pixels a device covers, by 8 × 8 rays each.
+//! The pixels covered by a device, by 8 × 8 rays each.
 //!
-//! The rays of a pixel are the bits of a word. Most pixels near a piece are told by the distance of their centre from the projected
-//! axis: those well inside the silhouette are covered, those well outside are not, and only what is between asks all its rays.
+//! The rays of a pixel are the bits of a word. Most pixels near a piece are decided by the distance of their centre
+//! from the projected axis: those well inside the silhouette are covered, those well outside are not, and only those
+//! in between test all rays.
 //!
-//! A wire thinner than a pixel may cover half of none. It is a line there: the pixels that its axis runs through are in its mask too,
-//! so that a wire that is one piece has a mask of one piece.
+//! A wire thinner than a pixel may cover half of none. There it is treated as a line: the pixels crossed by its axis
+//! are in its mask too, so that the mask of one wire is connected.
 
 use std::ops::Range;
 
@@ -16,18 +17,18 @@ use crate::cpu::piece::chord;
 use crate::device::Piece;
 use crate::output::Mask;
 
-/// Rays across a pixel.
+/// Number of rays across a pixel.
 const RAYS: u32 = 8;
-/// Distance of a pixel's corner from its centre, and some more for what perspective does to a silhouette, pixels.
+/// Distance of a pixel's corner from its centre, plus a margin for perspective effects on the silhouette, pixels.
 const CORNER_PX: f64 = 0.9;
 
-/// Rays of pixels that meet something.
+/// Rays of pixels that hit something.
 #[derive(Debug)]
 pub(crate) struct Coverage {
     words: Vec<u64>,
-    /// Pixels with any.
+    /// Pixels with any such ray.
     touched: Vec<u32>,
-    /// Pixels that the axis runs through, some perhaps repeatedly.
+    /// Pixels crossed by the axis, possibly repeated.
     on_axis: Vec<u32>,
 }
 
@@ -37,7 +38,7 @@ impl Coverage {
         Self { words: vec![0; pixels], touched: vec![], on_axis: vec![] }
     }
 
-    /// Adds the rays that meet a piece in beam coordinates.
+    /// Adds the rays that hit a piece in beam coordinates.
     pub(crate) fn add(&mut self, c_arm: &CArm, piece: &Piece) {
         let [columns, rows] = pixels_of(c_arm, piece);
         let width = c_arm.size_px()[0] as usize;
@@ -63,7 +64,7 @@ impl Coverage {
         }
     }
 
-    /// Adds what another covers.
+    /// Adds the coverage of another.
     pub(crate) fn join(&mut self, other: &Self) {
         for &pixel in &other.touched {
             let word = &mut self.words[pixel as usize];
@@ -75,8 +76,8 @@ impl Coverage {
         self.on_axis.extend(&other.on_axis);
     }
 
-    /// The pixels of which half are covered, or that the axis runs through, and that the blades leave half open; nothing is covered
-    /// afterwards.
+    /// The pixels at least half covered, or crossed by the axis, and at least half open between the blades; clears
+    /// the coverage.
     pub(crate) fn take(&mut self, c_arm: &CArm) -> Mask {
         let words = &self.words;
         let half = |pixel: &u32| words[*pixel as usize].count_ones() >= RAYS * RAYS / 2;
@@ -90,8 +91,8 @@ impl Coverage {
     }
 }
 
-/// The rays of a pixel that meet a piece. A frustum is convex, and so is what it covers: of a row of rays a run, and all where the four
-/// corners are covered.
+/// The rays of a pixel that hit a piece. A frustum is convex, and so is its silhouette: in a row of rays it covers a
+/// run, and if the four corners are covered, all.
 fn rays_that_meet(c_arm: &CArm, piece: &Piece, silhouette: &Silhouette, [x, y]: [usize; 2]) -> u64 {
     let meets = |column: u32, row: u32| {
         let within = |k: u32| (f64::from(k) + 0.5) / f64::from(RAYS);
@@ -118,7 +119,7 @@ fn rays_that_meet(c_arm: &CArm, piece: &Piece, silhouette: &Silhouette, [x, y]: 
         };
         let run = match ends {
             [true, true] => ROW,
-            // The first ray that is not covered after ones that are, and the other way round.
+            // The first uncovered ray after covered ones, and vice versa.
             [true, false] => (1_u64 << first_in(1..LAST, |column| !meets(column, row))) - 1,
             [false, true] => ROW & !((1_u64 << first_in(1..LAST, |column| meets(column, row))) - 1),
             [false, false] => (1..LAST).filter(|&column| meets(column, row)).fold(0, |run, c| run | 1 << c),
@@ -138,14 +139,14 @@ fn first_in(range: Range<u32>, is: impl Fn(u32) -> bool) -> u32 {
     low
 }
 
-/// The projected axis of a piece, with what is surely covered and what surely not.
+/// The projected axis of a piece, with inner and outer bounds of its silhouette.
 struct Silhouette {
     start: [f64; 2],
     along: [f64; 2],
     length_px: f64,
-    /// A ray farther from the axis than this meets nothing.
+    /// Distance from the axis beyond which no ray hits.
     outer_px: f64,
-    /// A pixel whose centre is nearer to the axis and farther from both ends than these is covered.
+    /// A pixel whose centre is nearer to the axis than this, and farther from both ends, is covered.
     inner_px: f64,
     ends_px: f64,
 }
@@ -170,20 +171,20 @@ impl Silhouette {
         }
     }
 
-    /// Calls `visit` for each pixel that the projected axis runs through, from side to side (Amanatides and Woo, A Fast Voxel Traversal
-    /// Algorithm, Eurographics 1987).
+    /// Calls `visit` for each pixel crossed by the projected axis, from side to side (Amanatides and Woo, A Fast
+    /// Voxel Traversal Algorithm, Eurographics 1987).
     fn walk(&self, size_px: [u32; 2], mut visit: impl FnMut(u32)) {
         let [width, height] = size_px.map(i64::from);
         let end = [0, 1].map(|k| self.start[k] + self.along[k] * self.length_px);
         let [mut at, last] = [self.start, end].map(|at| at.map(|x| x.floor() as i64));
-        // Part of the way to the next side in each direction, and from one to the next.
+        // Fraction of the path to the next side in each direction, and from one to the next.
         let next = |k: usize, at: i64| {
             let run = end[k] - self.start[k];
             let side = if run > 0.0 { at + 1 } else { at };
             if run == 0.0 { f64::INFINITY } else { (side as f64 - self.start[k]) / run }
         };
         let steps = (last[0] - at[0]).unsigned_abs() + (last[1] - at[1]).unsigned_abs();
-        // A piece is a few millimetres long: what runs over more pixels passes by the source.
+        // A piece is a few millimetres long: one that covers more pixels passes close to the source.
         for step in 0..=steps.min(size_px.map(u64::from).iter().sum()) {
             if (0..width).contains(&at[0]) && (0..height).contains(&at[1]) {
                 visit((at[1] * width + at[0]) as u32);
@@ -195,20 +196,20 @@ impl Silhouette {
         }
     }
 
-    /// Place along the projected axis and distance across it.
+    /// Position along the projected axis and distance across it.
     fn place(&self, at: [f64; 2]) -> [f64; 2] {
         let [x, y] = [at[0] - self.start[0], at[1] - self.start[1]];
         [x * self.along[0] + y * self.along[1], (y * self.along[0] - x * self.along[1]).abs()]
     }
 
-    /// Whether a place is farther from the projection than some pixels.
+    /// Whether a position is farther from the projection than this number of pixels.
     fn is_beyond(&self, at: [f64; 2], more_px: f64) -> bool {
         let [along, across] = self.place(at);
         let beyond = (-along).max(along - self.length_px).max(0.0);
         across * across + beyond * beyond > (self.outer_px + more_px).powi(2)
     }
 
-    /// Whether all or none of a pixel is covered, where its centre tells.
+    /// Whether all or none of a pixel is covered, if its centre decides that.
     fn covers(&self, centre: [f64; 2]) -> Option<bool> {
         if self.is_beyond(centre, CORNER_PX) {
             return Some(false);

@@ -1,4 +1,4 @@
-//! Devices over a detector: their frusta in the beam, and which pixels one may touch.
+//! Devices in front of a detector: their frusta in the beam, and the pixels each may touch.
 
 use std::ops::Range;
 
@@ -9,8 +9,8 @@ use crate::cpu::raster::span;
 use crate::device::{DevicePoint, Layer, RefinedDevice};
 use crate::device::{Piece, pieces};
 
-/// The frusta of each layer of a device in beam coordinates (columns, rows, depth from the isocentre), with the signs of their
-/// lengths. Those that are not between source and detector throw no shadow: a device may go where the C-arm does not look.
+/// The frusta of each layer of a device in beam coordinates (columns, rows, depth from the isocentre), with the signs
+/// of their lengths. Those not between source and detector cast no shadow: a device may be outside the field of view.
 pub(crate) fn layers_in_beam<'a>(
     c_arm: &CArm,
     device: &'a RefinedDevice,
@@ -34,7 +34,7 @@ pub(crate) fn layers_in_beam<'a>(
     device.layers.iter().map(layer).collect()
 }
 
-/// Columns and rows of the pixels that `piece` may touch: those of the two spheres that enclose it.
+/// Columns and rows of the pixels that `piece` may touch: those of its two bounding spheres.
 pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
     let size = c_arm.size_px();
     let reach = piece.reach();
@@ -44,7 +44,7 @@ pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
         for end in ends {
             for side in [-reach, reach] {
                 for depth in [-reach, reach] {
-                    // A sphere that reaches behind the source may be seen anywhere.
+                    // A sphere that reaches behind the source may be visible anywhere.
                     if c_arm.sod_mm() + end.z + depth <= 0.0 {
                         return 0..size[k] as usize;
                     }

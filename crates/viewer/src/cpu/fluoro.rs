@@ -1,4 +1,4 @@
-//! Path lengths in plain Rust: the exact reference, and the fast path where there is no graphics processor.
+//! Path lengths in plain Rust: the exact reference, and the fast path without a graphics processor.
 
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;

@@ -1,4 +1,4 @@
-//! Which pixels a closed wall covers by half, by 8 × 8 rays each: those of a pixel are the bits of a word.
+//! The pixels at least half covered by a closed wall, by 8 × 8 rays each: the rays of a pixel are the bits of a word.
 
 use endowire_core::vessel::SurfaceMesh;
 
@@ -6,13 +6,13 @@ use super::raster::{ScreenTriangle, span};
 use super::wall::seen;
 use crate::c_arm::CArm;
 
-/// Rays across a pixel.
+/// Number of rays across a pixel.
 const RAYS: usize = 8;
-/// Stands for pixels that nobody asks for.
+/// Marks pixels that are not requested.
 const NOT_ASKED: u32 = u32::MAX;
 
-/// Those of the `asked` pixels of which half or more is covered. Pixels at the silhouette are few, and triangles elsewhere are left out, so this
-/// is far less work than rays through the whole picture.
+/// Those `asked` pixels that are at least half covered. Pixels at the silhouette are few, and triangles elsewhere are
+/// skipped, so this is far less work than rays through the whole image.
 pub(crate) fn covered_by_half(c_arm: &CArm, wall: &SurfaceMesh, asked: &[u32]) -> Vec<u32> {
     let [width, height] = c_arm.size_px().map(|n| n as usize);
     let mut places = vec![NOT_ASKED; width * height];
@@ -23,7 +23,7 @@ pub(crate) fn covered_by_half(c_arm: &CArm, wall: &SurfaceMesh, asked: &[u32]) -
     let seen = seen(&rays, wall);
     for corners in &wall.triangles {
         let corners = corners.map(|v| seen[v as usize].0);
-        // A ray that leaves has entered: triangles that face the source, clockwise on the screen, are all that is needed.
+        // A ray that leaves has entered: triangles that face the source, clockwise on the screen, are sufficient.
         let Some(triangle) = ScreenTriangle::on_grid(corners).filter(|t| t.area2() > 0.0) else { continue };
         let [xs, ys] = [(0, columns), (1, rows)].map(|(k, size)| {
             let [a, b, c] = corners.map(|corner| corner[k]);
@@ -117,12 +117,12 @@ mod tests {
             let exact: Vec<u32> = edge.iter().copied().filter(|&i| eight[i as usize] >= 32).collect();
             let off = covered.iter().filter(|i| !exact.contains(i)).count()
                 + exact.iter().filter(|i| !covered.contains(i)).count();
-            // Rays that graze are distinguished by rounding alone.
+            // For grazing rays rounding decides.
             assert!(edge.len() > 100 && off * 100 <= edge.len(), "{radius_mm}: {off} of {}", edge.len());
-            // The twin: what two of four rays told.
+            // Counter-check: with only four rays, of which two must hit.
             let rough = edge.iter().filter(|&&i| two[i as usize] >= 2).count();
             assert!(rough * 20 > exact.len() * 21, "{radius_mm}: {rough} {}", exact.len());
-            // Elsewhere four rays say the same.
+            // Elsewhere four rays give the same.
             let lost =
                 (0..160 * 160).filter(|&i| two[i] % 4 == 0 && (two[i] == 4) != (eight[i] >= 32)).count();
             assert!(lost * 50 <= edge.len(), "{radius_mm}: {lost}");

@@ -28,10 +28,10 @@ use crate::engine::{Engines, ThreeDEngine, process};
 use crate::three_d::Camera;
 use view3d::CpuView3d;
 
-/// What the CPU is called for people.
+/// Name of the CPU engine for display.
 pub(crate) const NAME: &str = "CPU reference";
 
-/// Prepares the fluoroscopic view where it is wanted; the 3D view is made with the first frame ([`three_d`]).
+/// Prepares the fluoroscopic view if wanted; the 3D view is created with the first frame ([`three_d`]).
 pub(crate) fn engines(fluoro: bool) -> Engines {
     let paths = fluoro.then(|| Box::new(CpuPaths) as _);
     Engines {

@@ -7,24 +7,23 @@
 //! A = D·D − (1 + g²)(D·a)²,   B = D·q − (D·a)(q·a) − g (D·a) R(q·a),   C = q·q − (q·a)² − R(q·a)²
 //! ```
 //!
-//! For A > 0 the inside is the interval between the roots. For A ≤ 0 the ray is steeper than the cone's
-//! flank: the inside is beyond the roots, and of these two parts the one with R > 0 counts. The interval is
-//! then clipped by the half-spaces of the two mitre planes.
+//! For A > 0 the inside is the interval between the roots. For A ≤ 0 the ray is steeper than the cone's flank: the
+//! inside is outside the roots, and of these two parts the one with R > 0 counts. The interval is then clipped by the
+//! half-spaces of the two mitre planes.
 
 use endowire_core::Vec3;
 
 use crate::device::Piece;
 
-/// Below this share of D·D, A is taken as zero: the ray runs along the flank.
+/// Share of D·D below which A counts as zero: the ray is along the flank.
 const ALONG: f64 = 1e-13;
 
 /// Length of the line through `origin` inside `piece`.
 ///
-/// All pieces of a device must be asked with the same `origin` for the same line: their common planes then
-/// cut it at the same place, rounding included, and a line that lies in such a plane belongs to one of them
-/// only.
+/// All pieces of a device must be evaluated with the same `origin` for the same line: their common planes then cut it
+/// at the same point, rounding included, and a line in such a plane belongs to one of them only.
 pub(crate) fn chord(piece: &Piece, origin: &Vec3, direction: &Vec3) -> f64 {
-    // Work from the point nearest to the first centre: the source is far away, and squares would cancel.
+    // Computed from the point nearest to the first centre: the source is far away, and squares would cancel.
     let dd = direction.norm_squared();
     let shift = (piece.start - origin).dot(direction) / dd;
     let q = origin - piece.start + direction * shift;
@@ -99,7 +98,7 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
         near(total(&rod, Vec3::new(3.0, 0.0, -9.0), Vec3::z()), 1.0);
         near(total(&rod, Vec3::new(3.0, 0.3, -9.0), Vec3::z() * 2.0), 0.8);
-        // A ray in the very plane where two pieces meet is counted once, not twice.
+        // A ray in the very plane where two pieces meet is counted once.
         near(total(&rod, Vec3::new(4.0, 0.0, -9.0), Vec3::z()), 1.0);
         near(total(&rod, Vec3::new(4.0 + 1e-16, 0.0, -750.0), Vec3::new(1e-17, 0.0, 1.0)), 1.0);
         near(total(&rod, Vec3::new(-7.0, 0.1, 0.2), Vec3::x()), 10.0);
@@ -122,7 +121,7 @@ mod tests {
         }
         let exact = std::f64::consts::PI * 0.25 * 6.0;
         assert!((volume / exact - 1.0).abs() < 1e-3, "{volume} {exact}");
-        // The twin: a flat end at the corner misses the outer wedge.
+        // Counter-check: a flat end at the corner misses the outer wedge.
         let mut flat = rod.clone();
         flat[0].planes[1] = flat[0].axis;
         let ray = (Vec3::new(0.2, -0.3, -5.0), Vec3::z());

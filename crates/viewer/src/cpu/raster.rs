@@ -1,8 +1,8 @@
 //! Watertight scan conversion of projected triangles.
 //!
-//! A pixel centre belongs to a triangle when it lies left of its three edges. Signed depth needs more than
-//! that: where triangles share edges and vertices, every centre must belong to exactly one of those facing
-//! the same way, also when it lies *on* an edge or vertex. Three rules give that:
+//! A pixel centre belongs to a triangle if it is left of its three edges. Signed depth needs more than that: where
+//! triangles share edges and vertices, every centre must belong to exactly one of those facing the same way, even if
+//! it is *on* an edge or vertex. Three rules ensure that:
 //!
 //! - An edge function is evaluated with its ends in lexicographic order and negated where the triangle runs
 //!   the other way. Both neighbours then compute the same number, rounding included.
@@ -22,7 +22,7 @@ pub(crate) struct ScreenTriangle {
     area2: f64,
 }
 
-/// A corner as triangles have it.
+/// A corner rounded to the grid.
 #[inline]
 pub(crate) fn on_grid([x, y]: [f64; 2]) -> [f64; 2] {
     [(x * GRID).round() / GRID, (y * GRID).round() / GRID]
@@ -34,7 +34,7 @@ impl ScreenTriangle {
         Self::on_grid([on_grid(a), on_grid(b), on_grid(c)])
     }
 
-    /// The same of corners by [`on_grid`].
+    /// As [`Self::new`], for corners from [`on_grid`].
     #[inline]
     pub(crate) fn on_grid(corners: [[f64; 2]; 3]) -> Option<Self> {
         let [a, b, c] = corners;
@@ -47,27 +47,27 @@ impl ScreenTriangle {
         self.area2
     }
 
-    /// Columns and rows of a picture whose centres it may cover.
+    /// Columns and rows of an image whose centres it may cover.
     #[inline]
     pub(crate) fn frame(&self, [width, height]: [u32; 2]) -> [std::ops::Range<usize>; 2] {
         let [a, b, c] = self.corners;
         [pixel_range([a[0], b[0], c[0]], width), pixel_range([a[1], b[1], c[1]], height)]
     }
 
-    /// Calls `visit(x, y, weights)` for every pixel of a `size` picture whose centre is covered. The weights
-    /// belong to the corners and are not negative; their sum, which is not zero, is left to those who need it.
+    /// Calls `visit(x, y, weights)` for every pixel of a `size` image whose centre is covered. The weights belong to
+    /// the corners and are not negative; they are not normalised, but their sum is not zero.
     pub(crate) fn scan(&self, size: [u32; 2], visit: impl FnMut(usize, usize, [f64; 3])) {
         self.scan_rows(size[0], 0..size[1], visit);
     }
 
-    /// The same for some rows of a picture of the given width.
+    /// The same for some rows of an image of the given width.
     pub(crate) fn scan_rows(
         &self,
         width: u32,
         rows: std::ops::Range<u32>,
         mut visit: impl FnMut(usize, usize, [f64; 3]),
     ) {
-        // Loops are inlined where maps of arrays are not: most triangles of a body cover a centre or none.
+        // Loops are inlined where maps of arrays are not: most triangles of a body cover one centre or none.
         let [a, b, c] = self.corners;
         let [xs, ys] = self.frame([width, rows.end]);
         let ys = ys.start.max(rows.start as usize)..ys.end;
@@ -110,7 +110,8 @@ impl ScreenTriangle {
         }
     }
 
-    /// Where the horizontal line at `y` enters and leaves, within rounding: a long slanting triangle fills little of its rectangle.
+    /// Where the horizontal line at `y` enters and leaves, within rounding: a long oblique triangle fills little of
+    /// its rectangle.
     pub(super) fn extent(&self, y: f64) -> (f64, f64) {
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         let [a, b, c] = self.corners;
@@ -133,9 +134,9 @@ fn pixel_range([a, b, c]: [f64; 3], size: u32) -> std::ops::Range<usize> {
     span(a.min(b).min(c), a.max(b).max(c), size)
 }
 
-/// Pixels whose centres lie in [low, high], clipped to a picture side.
+/// Pixels whose centres are in [low, high], clipped to the image.
 pub(crate) fn span(low: f64, high: f64, size: u32) -> std::ops::Range<usize> {
-    // Float-to-integer casts saturate, so what lies outside ends up at a border.
+    // Float-to-integer casts saturate, so values outside end up at the border.
     let first = (low - 0.5).ceil().max(0.0) as usize;
     let end = ((high - 0.5).floor() + 1.0).clamp(0.0, f64::from(size)) as usize;
     first.min(end)..end
@@ -190,7 +191,7 @@ mod tests {
 
     #[test]
     fn rounding_alone_would_double_or_miss_pixels() {
-        // The twin: without the tie rule (closed triangles) the same grid counts seams twice.
+        // Counter-check: without the tie rule (closed triangles) the same grid counts seams twice.
         let closed = |t: [[f64; 2]; 3], p: [f64; 2]| {
             (0..3).all(|i| {
                 let (a, b) = (t[i], t[(i + 1) % 3]);

@@ -1,7 +1,7 @@
 //! The 3D view in plain Rust: a supersampled rasteriser.
 //!
-//! The wall's fragments are made once and kept per sample. A frame draws the devices with a depth buffer and
-//! composes anew only where they are.
+//! The wall's fragments are computed once and stored per sample. A frame draws the devices with a depth buffer and
+//! recomposes only the pixels they touch.
 
 use std::ops::Range;
 
@@ -14,13 +14,13 @@ use crate::engine::ThreeDEngine;
 use crate::output::{Image, PixelFormat};
 use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
-/// Samples across a pixel: nine levels of edge smoothing.
+/// Number of samples across a pixel: nine levels of edge smoothing.
 const SAMPLES: u32 = 3;
-/// Most samples in all. They take about 25 bytes each; a larger frame, which shows its steps less, gets fewer
-/// for a pixel.
+/// Largest total number of samples. They take about 25 bytes each; a larger frame, in which steps are less visible,
+/// gets fewer per pixel.
 const MOST_SAMPLES: u64 = 40_000_000;
 
-/// A piece of wall on a sample.
+/// A piece of wall at a sample.
 #[derive(Debug, Clone, Copy, Default)]
 struct Fragment {
     distance: f32,
@@ -31,12 +31,12 @@ struct Fragment {
 pub(crate) struct CpuView3d {
     camera: Camera,
     style: Style,
-    /// Samples across a pixel.
+    /// Number of samples across a pixel.
     sub: u32,
-    /// Fragments of all samples, and where those of each sample end.
+    /// Fragments of all samples, and the ends of those of each sample.
     fragments: Vec<Fragment>,
     ends: Vec<u32>,
-    /// The picture without devices.
+    /// The image without devices.
     still: Vec<u8>,
     /// Distance and colour of the nearest device; infinite between frames.
     distance: Vec<f32>,
@@ -57,7 +57,7 @@ impl CpuView3d {
                 found.push((sample as u32, Fragment { distance: -position.z, rgba }));
             });
         }
-        // Sorted by sample by counting; within a sample the order of the mesh stays.
+        // Counting sort by sample, which keeps the order of the mesh within a sample.
         let mut ends = vec![0_u32; samples + 1];
         found.iter().for_each(|(sample, _)| ends[*sample as usize + 1] += 1);
         for i in 0..samples {
@@ -85,7 +85,7 @@ impl CpuView3d {
         view
     }
 
-    /// The picture without devices. Where there is no wall every pixel is the same.
+    /// The image without devices. Without a wall all pixels are equal.
     fn still(&self) -> Vec<u8> {
         let [width, height] = self.camera.size_px.map(|n| n as usize);
         let mut clear = None;
@@ -101,7 +101,7 @@ impl CpuView3d {
         still
     }
 
-    /// The finished pixel: the mean of its samples.
+    /// The final pixel: the mean of its samples.
     fn pixel(&self, pixel: usize) -> [u8; 4] {
         let mut sum = Vec3::ZERO;
         for sample in samples_of(pixel, self.camera.size_px[0] as usize, self.sub as usize) {
@@ -111,7 +111,7 @@ impl CpuView3d {
         [r, g, b, 255]
     }
 
-    /// Where the fragments of a sample begin, those of the one before end.
+    /// Start of the fragments of a sample, the end of those before.
     fn start(&self, sample: usize) -> usize {
         if sample == 0 { 0 } else { self.ends[sample - 1] as usize }
     }
@@ -178,16 +178,16 @@ fn samples_of(pixel: usize, width: usize, sub: usize) -> impl Iterator<Item = us
     rows_of(pixel, width, sub).flatten()
 }
 
-/// Which triangles are drawn.
+/// The triangles to draw.
 #[derive(Clone, Copy, PartialEq)]
 enum Faces {
     Both,
-    /// Those whose outside is seen; of an opaque closed surface these are all that can be.
+    /// Those with a visible outside; for an opaque closed surface these are all that can be visible.
     Front,
 }
 
-/// Calls `visit(sample, position, normal)` for each sample that a triangle covers; triangles that reach
-/// behind the near plane are left out.
+/// Calls `visit(sample, position, normal)` for each sample covered by a triangle; triangles that reach behind the
+/// near plane are skipped.
 fn draw(
     camera: &Camera,
     sub: u32,
@@ -207,7 +207,7 @@ fn draw(
         return;
     }
     triangle.scan(size, |x, y, weights| {
-        // Perspective: weights over distance are linear on the screen.
+        // Perspective: weights divided by distance are linear on the screen.
         let w: [f32; 3] = std::array::from_fn(|i| weights[i] as f32 / positions[i].z);
         let scale = 1.0 / (w[0] + w[1] + w[2]);
         let mix = |v: [Vec3; 3]| (v[0] * w[0] + v[1] * w[1] + v[2] * w[2]) * scale;
@@ -217,7 +217,7 @@ fn draw(
 
 fn to_byte(value: f32) -> u8 {
     let level = value.clamp(0.0, 1.0) * 255.0;
-    // Rounded half up without the call that `round` is on processors of old; what is left is exact.
+    // Rounded half up without the function call of `round` on old processors; the remainder is exact.
     let below = level as u8;
     below + u8::from(level - f32::from(below) >= 0.5)
 }

@@ -1,10 +1,10 @@
 //! Length of every ray inside a closed wall: signed depth.
 //!
-//! A ray enters a closed surface wherever it meets a triangle from outside and leaves it wherever it meets
-//! one from inside, so the length inside is Σ ±t, minus at entries and plus at exits. Along a ray, t = depth
-//! · obliquity, and on a plane 1/depth is linear over the screen: from the corners it is interpolated with
-//! the pixel's weights, which cannot overshoot even for a triangle seen almost edge-on. Neighbours agree on
-//! their shared edge, so a silhouette contributes nothing rather than a spike.
+//! A ray enters a closed surface where it meets a triangle from outside and leaves it where it meets one from inside,
+//! so the length inside is Σ ±t, minus at entries and plus at exits. Along a ray, t = depth · obliquity, and on a
+//! plane 1/depth is linear over the screen: it is interpolated from the corners with the pixel's weights, which
+//! cannot overshoot even for a triangle seen almost edge-on. Neighbours agree on their shared edge, so a silhouette
+//! contributes nothing rather than a spike.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -17,10 +17,10 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 use crate::c_arm::CArm;
 use crate::cpu::raster::{ScreenTriangle, on_grid};
 
-/// Rows of a band: what one thread sums up in double precision.
+/// Number of rows of a band, which one thread sums in double precision.
 const BAND_ROWS: u32 = 32;
 
-/// Pixel, as triangles have it, and inverse depth of each vertex.
+/// Pixel, rounded to the grid, and inverse depth of each vertex.
 pub(crate) fn seen(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<([f64; 2], f64)> {
     let vertex = |v: &Vec3| {
         let beam = c_arm.in_beam(v);
@@ -29,8 +29,8 @@ pub(crate) fn seen(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<([f64; 2], f64)> {
     wall.vertices_mm.par_iter().map(vertex).collect()
 }
 
-/// Calls `visit(pixel, sign, depth)` for each meeting of a pixel's central ray with `triangles` in some rows of the picture: −1 where it
-/// enters and +1 where it leaves, at a depth in front of the source.
+/// Calls `visit(pixel, sign, depth)` for each intersection of a pixel's central ray with `triangles` in some rows of
+/// the image: −1 where it enters and +1 where it leaves, at a depth in front of the source.
 fn meetings(
     width: u32,
     rows: Range<u32>,
@@ -41,8 +41,7 @@ fn meetings(
     for [a, b, c] in triangles {
         let ((a, i0), (b, i1), (c, i2)) = (seen[a as usize], seen[b as usize], seen[c as usize]);
         let Some(triangle) = ScreenTriangle::on_grid([a, b, c]) else { continue };
-        // Outward triangles turn clockwise on the screen (positive area, rows downwards) where they face the
-        // source.
+        // Outward triangles are clockwise on the screen (positive area, rows downwards) where they face the source.
         let sign = -triangle.area2().signum();
         triangle.scan_rows(width, rows.clone(), |x, y, [w0, w1, w2]| {
             visit(y * width as usize + x, sign, (w0 + w1 + w2) / (w0 * i0 + w1 * i1 + w2 * i2));
@@ -50,14 +49,15 @@ fn meetings(
     }
 }
 
-/// The triangles that each band of rows may show, rising: sums then run in one order whatever the threads.
+/// The triangles that may be visible in each band of rows, ascending: so sums have the same order for any number of
+/// threads.
 fn by_band(height: u32, wall: &SurfaceMesh, seen: &[([f64; 2], f64)]) -> Vec<Vec<u32>> {
     let mut bands = vec![vec![]; height.div_ceil(BAND_ROWS) as usize];
     for (index, corners) in (0..).zip(&wall.triangles) {
         let [a, b, c] = *corners;
         let [a, b, c] = [seen[a as usize].0[1], seen[b as usize].0[1], seen[c as usize].0[1]];
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        // Casts saturate; a row more on either side is for the rounding of corners.
+        // Casts saturate; one more row on either side allows for the rounding of corners.
         let first = (low - 1.0).max(0.0) as usize / BAND_ROWS as usize;
         let end = ((high + 1.0).max(0.0) as usize / BAND_ROWS as usize + 1).min(bands.len());
         bands[first.min(end)..end].iter_mut().for_each(|band| band.push(index));
@@ -93,7 +93,8 @@ pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f32> {
     path
 }
 
-/// Every meeting of a pixel's central ray with `wall`: the pixel, the distance from the source, and whether it enters.
+/// Every intersection of a pixel's central ray with `wall`: the pixel, the distance from the source, and whether it
+/// enters.
 pub(crate) fn wall_crossings(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<(u32, f32, bool)> {
     let mut crossings = Vec::new();
     let [width, height] = c_arm.size_px();
@@ -104,11 +105,10 @@ pub(crate) fn wall_crossings(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<(u32, f32,
     crossings
 }
 
-/// Checks that a wall can be drawn at all: it has triangles, they name vertices that exist, and these are
-/// finite.
+/// Checks that a wall can be drawn: it has triangles, their vertices exist, and these are finite.
 ///
 /// # Errors
-/// [`Error::Mesh`] saying what is wrong.
+/// [`Error::Mesh`] with the fault.
 pub(crate) fn check_drawable(wall: &SurfaceMesh) -> Result<()> {
     if wall.triangles.is_empty() {
         return Err(Error::Mesh("the wall has no triangles".into()));
@@ -124,10 +124,10 @@ pub(crate) fn check_drawable(wall: &SurfaceMesh) -> Result<()> {
     Ok(())
 }
 
-/// Checks that signed depth means anything: the wall is closed and outward.
+/// Checks that signed depth is meaningful: the wall is closed and outward.
 ///
 /// # Errors
-/// [`Error::Mesh`] saying what is wrong.
+/// [`Error::Mesh`] with the fault.
 pub(crate) fn check_closed(wall: &SurfaceMesh) -> Result<()> {
     let open = unbalanced_edges(wall);
     if open > 0 {
@@ -145,11 +145,11 @@ pub(crate) fn check_closed(wall: &SurfaceMesh) -> Result<()> {
     Ok(())
 }
 
-/// Edges along which the triangles of `wall` do not run equally often in both directions.
+/// Edges that the triangles of `wall` do not traverse equally often in both directions.
 fn unbalanced_edges(wall: &SurfaceMesh) -> usize {
     let welded = welded(&wall.vertices_mm);
-    // Edges by their ends, the smaller number first and in the higher half of one number: those of triangles that run from it to the larger
-    // and those of the others. Sorting takes a tenth of the time of a hash map.
+    // Edges encoded by their ends, the smaller index in the higher half of a number, separately for triangles
+    // traversing them upwards and downwards. Sorting takes a tenth of the time of a hash map.
     let [mut up, mut down] = [0, 1].map(|_| Vec::<u64>::with_capacity(wall.triangles.len() * 3 / 2));
     let edge = |from: u32, to: u32| u64::from(from) << 32 | u64::from(to);
     for t in &wall.triangles {
@@ -176,9 +176,9 @@ fn unbalanced_edges(wall: &SurfaceMesh) -> usize {
     unbalanced
 }
 
-/// For each vertex the first at the same place: files often repeat them for every triangle.
+/// For each vertex the first at the same position: files often repeat them for every triangle.
 fn welded(vertices_mm: &[Vec3]) -> Vec<u32> {
-    // Zeros of either sign are one place.
+    // Zeros of either sign are the same position.
     let place = |v: &Vec3| [v.x + 0.0, v.y + 0.0, v.z + 0.0].map(f64::to_bits);
     let mut first = FxHashMap::with_capacity_and_hasher(vertices_mm.len(), FxBuildHasher);
     vertices_mm.iter().map(place).zip(0..).map(|(place, v)| *first.entry(place).or_insert(v)).collect()

@@ -1,10 +1,9 @@
 //! Devices as the viewer sees them: a centre line with a radius, refined into short straight pieces.
 //!
-//! Between two points the centre line is the cubic Hermite curve through positions and tangents, the same
-//! curve the rod solver integrates. It is cut so finely that a piece's chord stays within [`SAGITTA`] radii
-//! of it: for curvature κ and length h, the sagitta is κh²/8. A chord offset by s from the axis of a round
-//! wire of radius r shortens the central ray from 2r to 2√(r² − s²) ≈ 2r(1 − s²/2r²), so 0.04 r costs less
-//! than 0.1 % of the diameter.
+//! Between two points the centre line is the cubic Hermite curve through positions and tangents, the same curve the
+//! rod solver integrates. It is divided so finely that a piece's chord stays within [`SAGITTA`] radii of it: for
+//! curvature κ and length h, the sagitta is κh²/8. A chord offset by s from the axis of a round wire of radius r
+//! shortens the central ray from 2r to 2√(r² − s²) ≈ 2r(1 − s²/2r²), so 0.04 r costs less than 0.1 % of the diameter.
 //!
 //! A device is made of *parts*, tubes of one material over a stretch of arc length: a hollow catheter is its outer frustum minus
 //! its inner one, a marker band a ring around it.
@@ -25,7 +24,8 @@ pub(crate) use piece::{Piece, pieces};
 const SAGITTA: f64 = 0.04;
 /// Longest piece, mm: keeps the screen rectangle of an oblique straight piece small.
 const LONGEST_MM: f64 = 4.0;
-/// Most pieces between two given points, and about how many in all, so that absurd input cannot exhaust memory.
+/// Largest number of pieces between two given points, and approximately in all, so that absurd input cannot exhaust
+/// memory.
 const MOST_PIECES: usize = 4096;
 const MOST_PIECES_IN_ALL: usize = 1 << 20;
 /// Largest radius of a part, mm.
@@ -34,7 +34,7 @@ const LARGEST_RADIUS_MM: f64 = 1e3;
 /// One point of a device's centre line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DevicePoint {
-    /// Where it is.
+    /// Its position.
     pub position_mm: Vec3,
     /// Direction of the centre line there, of any length above zero.
     pub tangent: Vec3,
@@ -45,9 +45,9 @@ pub struct DevicePoint {
 /// A device to draw: parts along a centre line.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DeviceView {
-    /// The centre line in order, the tip last; fewer than two points draw nothing.
+    /// The centre line in order, the tip last; with fewer than two points nothing is drawn.
     pub points: Vec<DevicePoint>,
-    /// What it is made of where a part does not say; `None`: the scene's `device_material`.
+    /// Material of parts without one; `None`: the scene's `device_material`.
     pub material: Option<Material>,
     /// Its parts, which must not overlap; none: one solid rod.
     pub parts: Vec<DevicePart>,
@@ -57,16 +57,16 @@ pub struct DeviceView {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DevicePart {
-    /// Where it begins and ends, in arc length from the tip in mm, 0 to 100,000; absent: the whole device.
+    /// Its start and end, in arc length from the tip in mm, 0 to 100,000; absent: the whole device.
     #[serde(default)]
     pub from_tip_mm: Option<[f64; 2]>,
-    /// What it is made of; absent: as the device.
+    /// Its material; absent: that of the device.
     #[serde(default)]
     pub material: Option<Material>,
     /// Outer radius, 0.000001 to 1000; absent: that of the device.
     #[serde(default)]
     pub outer_radius_mm: Option<f64>,
-    /// Radius of the bore, 0 to 1000 and less than the outer radius, also where that is the device's; 0 is solid.
+    /// Radius of the lumen, 0 to 1000 and less than the outer radius, also if that is the device's; 0 is solid.
     #[serde(default)]
     pub inner_radius_mm: f64,
 }
@@ -112,14 +112,14 @@ impl DeviceView {
         Self { points, ..Self::default() }
     }
 
-    /// A device where `shape` says, as thick as its sections, made of `parts`.
+    /// A device along `shape`, with the radii of its sections, made of `parts`.
     pub fn of_device(shape: &Shape, device: &Device, parts: &[DevicePart]) -> Self {
         let mut view = Self::from_shape(shape, |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
         view.parts.extend_from_slice(parts);
         view
     }
 
-    /// Refines the centre line; empty where there is nothing to draw.
+    /// Refines the centre line; empty if there is nothing to draw.
     pub(crate) fn refined(&self) -> Result<Vec<DevicePoint>> {
         for (i, p) in self.points.iter().enumerate() {
             let finite =
@@ -134,7 +134,7 @@ impl DeviceView {
         for pair in self.points.windows(2) {
             let chord = pair[1].position_mm - pair[0].position_mm;
             let length = chord.norm();
-            // Coinciding points carry no direction; the piece before or after them covers the place.
+            // Coincident points have no direction; the piece before or after them covers the position.
             let Some(along) = chord.try_normalize(f64::EPSILON * (1.0 + pair[0].position_mm.amax())) else {
                 continue;
             };
@@ -146,8 +146,8 @@ impl DeviceView {
             let radius = pair[0].radius_mm.max(pair[1].radius_mm).max(f64::MIN_POSITIVE);
             let by_bend = (length * turn / (8.0 * SAGITTA * radius)).sqrt();
             let pieces = by_bend.max(length / LONGEST_MM).ceil().clamp(1.0, most) as usize;
-            // Handles of this length make the curve match a circular arc through both ends to sixth order:
-            // chord / cos²(θ/4) with θ the angle between the end tangents.
+            // Handles of this length match a circular arc through both ends to sixth order: chord / cos²(θ/4) with θ
+            // the angle between the end tangents.
             let half_cos = ((1.0 + t0.dot(&t1).clamp(-1.0, 1.0)) / 2.0).sqrt();
             let handle = length * 2.0 / (1.0 + half_cos);
             for k in 1..pieces {
@@ -173,13 +173,13 @@ fn hermite(pair: &[DevicePoint], d: [Vec3; 2], w: f64) -> DevicePoint {
     }
 }
 
-/// A stretch of a refined centre line that is one material.
+/// A stretch of a refined centre line with one material.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layer {
     pub(crate) material: Option<Material>,
-    /// Number of the part that it is; `None` of a device without parts.
+    /// Index of its part; `None` for a device without parts.
     pub(crate) part: Option<usize>,
-    /// Stretch of that part, from the tip in mm, if it says one.
+    /// Extent of that part, from the tip in mm, if given.
     pub(crate) from_tip_mm: Option<[f64; 2]>,
     /// Pieces between consecutive points.
     pieces: Range<usize>,
@@ -187,18 +187,18 @@ pub(crate) struct Layer {
     inner_radius_mm: f64,
 }
 
-/// A device with its centre line refined and cut where its parts begin and end.
+/// A device with its centre line refined and divided where its parts start and end.
 #[derive(Debug, Clone)]
 pub(crate) struct RefinedDevice {
     pub(crate) points: Vec<DevicePoint>,
     pub(crate) layers: Vec<Layer>,
 }
 
-/// Cuts nearer to a point than this are made at the point.
+/// Distance from a point within which a division is made at the point.
 const SAME_PLACE_MM: f64 = 1e-6;
 
 impl RefinedDevice {
-    /// The devices that have something to draw.
+    /// The devices with something to draw.
     ///
     /// # Errors
     /// [`Error::Parameter`] for points or parts that are not finite or out of order.
@@ -278,7 +278,7 @@ impl RefinedDevice {
     }
 }
 
-/// A part that would leave nothing of its device.
+/// A part whose lumen leaves nothing of its device.
 pub(crate) fn bore_too_wide(name: &str, bore_mm: f64, outer_mm: f64) -> Error {
     let mend = format!(
         "the device is {outer_mm} mm thick there, and nothing is left of it: give a narrower bore, or leave out parts that were written for \
@@ -288,12 +288,12 @@ pub(crate) fn bore_too_wide(name: &str, bore_mm: f64, outer_mm: f64) -> Error {
 }
 
 impl RefinedDevice {
-    /// Whether medium can come through it.
+    /// Whether medium can flow through it.
     pub(crate) fn has_bore(&self) -> bool {
         self.layers.iter().any(|layer| layer.inner_radius_mm > 0.0)
     }
 
-    /// Material and outer radius that are seen on a piece: those of the last part there.
+    /// Visible material and outer radius of a piece: those of the last part there.
     pub(crate) fn looks(&self, piece: usize) -> (Option<Material>, Option<f64>) {
         let layer = self.layers.iter().rev().find(|layer| layer.pieces.contains(&piece));
         layer.map_or((None, None), |layer| (layer.material, layer.outer_radius_mm))
@@ -301,7 +301,7 @@ impl RefinedDevice {
 }
 
 impl Layer {
-    /// The frusta that make this layer out of all `pieces` of its device, each with the sign of its length.
+    /// The frusta that form this layer out of all `pieces` of its device, each with the sign of its length.
     pub(crate) fn signed(&self, pieces: &[Piece]) -> Vec<(Piece, f64)> {
         let mut signed = Vec::with_capacity(2 * self.pieces.len());
         for piece in &pieces[self.pieces.clone()] {

@@ -1,8 +1,8 @@
 //! Straight pieces of a centre line: frusta between mitres.
 //!
 //! Each piece is a cone frustum, cut at both ends by the plane that bisects it and its neighbour (a mitre).
-//! Neighbouring cylinders meet that plane in the same ellipse, so pieces neither overlap nor gape in bends.
-//! The two end planes are perpendicular to the axis: ends are flat.
+//! Neighbouring cylinders meet that plane in the same ellipse, so pieces neither overlap nor leave gaps in bends. The
+//! first and last planes are perpendicular to the axis: ends are flat.
 
 use endowire_core::Vec3;
 
@@ -17,21 +17,20 @@ pub(crate) struct Piece {
     pub(crate) axis: Vec3,
     /// Centre of the second end.
     pub(crate) end: Vec3,
-    /// Plane normals at both ends, pointing onwards.
+    /// Plane normals at both ends, pointing forwards.
     pub(crate) planes: [Vec3; 2],
-    /// Products of these normals with the centres. Neighbours hold the very same numbers for their common
-    /// plane.
+    /// Products of these normals with the centres. Neighbours store exactly the same numbers for their common plane.
     pub(crate) offsets: [f64; 2],
     pub(crate) radius: f64,
     /// Change of the radius per length.
     pub(crate) slope: f64,
-    /// Largest radius, and how much further than it a mitre reaches.
+    /// Largest radius, and the ratio by which a mitre extends beyond it.
     largest: f64,
     mitre: f64,
 }
 
 impl Piece {
-    /// Radius of a sphere about each end that, with the other, encloses the piece.
+    /// Radius of two spheres about the ends that together enclose the piece.
     pub(crate) fn reach(&self) -> f64 {
         self.largest * self.mitre
     }
@@ -42,8 +41,7 @@ impl Piece {
     }
 }
 
-/// Mitres are cut no sharper than at this cosine of half the turn (a turn of 150°); beyond it a corner is
-/// blunted.
+/// Smallest cosine of half the angle of a bend for mitres (a bend of 150°); sharper corners are blunted.
 const SHARPEST_MITRE: f64 = 0.26;
 
 /// The mitred pieces between consecutive points of a refined centre line.

@@ -1,4 +1,4 @@
-//! What stays in the beam: lengths of each ray in tissue, bone, lung and lumen.
+//! The static anatomy in the beam: lengths of each ray in tissue, bone, lung and lumen.
 
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
@@ -10,13 +10,13 @@ use crate::material::Material;
 use crate::patient::{Body, Patient};
 use crate::scene::Setup;
 
-/// Fewest rows worth handing to another thread.
+/// Smallest number of rows per thread.
 const FEWEST_ROWS: usize = 16;
 
-/// Lengths in mm on every ray. A map that would be zero everywhere is empty.
+/// Lengths in mm on every ray. A map that is zero everywhere is empty.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Anatomy {
-    /// Soft tissue and all that lies in it.
+    /// Soft tissue and everything within it.
     pub(crate) body: Vec<f32>,
     pub(crate) bone: Vec<f32>,
     pub(crate) lung: Vec<f32>,
@@ -24,8 +24,8 @@ pub(crate) struct Anatomy {
 }
 
 impl Anatomy {
-    /// Casts `rays` × `rays` rays for each pixel of `c_arm` through the scene. A generated body is cast with one ray a pixel and
-    /// interpolated: it is drawn, not measured, and its bones are the most of what rays meet.
+    /// Casts `rays` × `rays` rays for each pixel of `c_arm` through the scene. A generated body is cast with one ray
+    /// per pixel and interpolated: it only has to look right, and its bones are most of what rays meet.
     pub(crate) fn new(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Self> {
         let view = &c_arm.refined(rays);
         let lumen = if setup.lumen {
@@ -57,8 +57,8 @@ impl Anatomy {
         Ok(maps)
     }
 
-    /// The same with the vessel, and the air of a generated body or the soft tissue of a tomogram, where they have moved to; bones and the skin of
-    /// a generated body stay.
+    /// As [`Self::new`], with the displaced vessel, and the displaced air of a generated body or soft tissue of a
+    /// tomogram; bones and the skin of a generated body do not move.
     pub(crate) fn moved(
         &self,
         setup: &Setup,
@@ -84,7 +84,7 @@ impl Anatomy {
         Ok(moved)
     }
 
-    /// Whether a ray meets the body at all.
+    /// Whether a ray meets the body.
     pub(crate) fn is_body(&self, ray: usize) -> bool {
         self.body[ray] > 0.0
     }
@@ -97,8 +97,8 @@ impl Anatomy {
         [(self.body[ray] - bone - lung - lumen).max(0.0), bone, lung, lumen]
     }
 
-    /// Thickness of soft tissue that stands for the middle of the picture: the median over its middle ninth, where exposure
-    /// control looks.
+    /// Thickness of soft tissue equivalent to the middle of the image: the median over its middle ninth, where
+    /// exposure control measures.
     pub(crate) fn reference_mm(&self, view: &CArm) -> f64 {
         // Relative attenuation at the 58 keV of an average quantum.
         const KEV: f64 = 58.0;
@@ -122,7 +122,7 @@ impl Anatomy {
     }
 }
 
-/// Lengths in a mesh with one ray a pixel; none at all in one without triangles.
+/// Lengths in a mesh with one ray per pixel; empty for a mesh without triangles.
 fn cast(mesh: &SurfaceMesh, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
     match mesh.triangles.is_empty() {
         true => Ok(vec![]),
@@ -130,7 +130,7 @@ fn cast(mesh: &SurfaceMesh, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result
     }
 }
 
-/// Lengths in the air of a generated body, where it is.
+/// Lengths in the air of a generated body, at its displacement.
 fn air(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
     let Some(mesh) = setup.air_now() else { return Ok(vec![]) };
     let mut air = cast(mesh, c_arm, engine)?;
@@ -139,7 +139,7 @@ fn air(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> R
     Ok(finer(air, c_arm.size_px(), rays))
 }
 
-/// A map with `rays` × `rays` values for each one, bilinear between the middles of pixels.
+/// A map with `rays` × `rays` values per pixel, bilinear between pixel centres.
 fn finer(map: Vec<f32>, size_px: [u32; 2], rays: u32) -> Vec<f32> {
     if rays == 1 || map.is_empty() {
         return map;

@@ -1,7 +1,7 @@
 //! From signals to grey values.
 //!
-//! The display is the usual logarithmic one: v = −ln S is mapped linearly from white to black, so that a layer darkens by the same
-//! step wherever it lies. Subtracted pictures are differences of logarithms already.
+//! The display is logarithmic, as usual: v = −ln S is mapped linearly from white to black, so that a layer darkens by
+//! the same step wherever it is. Subtracted images are already differences of logarithms.
 
 use rayon::prelude::*;
 
@@ -9,16 +9,17 @@ use super::FEWEST_PIXELS;
 use crate::output::{Image, PixelFormat};
 use crate::xray::ln_lanes;
 
-/// Part of the window kept brighter than the most transparent place of the anatomy: the background stays grey rather than white.
+/// Part of the window brighter than the most transparent position of the anatomy: the background is grey rather than
+/// white.
 const WINDOW_BELOW: f32 = 0.12;
-/// Part of the window kept darker than the densest place of the anatomy: what 0.4 mm of steel or 0.55 mm of nitinol add shows
-/// as black.
+/// Part of the window darker than the densest position of the anatomy: 0.4 mm of steel or 0.55 mm of nitinol on top
+/// of it appear black.
 const WINDOW_ABOVE: f32 = 0.4;
-/// Shares of the pixels that may be brighter or darker than the anatomy's range.
+/// Fraction of the pixels that may be brighter or darker than the anatomy's range.
 const OUTLIERS: f64 = 0.01;
 /// The window is fitted to this part of the frame's width and height, around its middle.
 const FITTED: f64 = 0.8;
-/// Signals below this are distinguished no more.
+/// Lower bound of signals.
 const DARKEST: f32 = 1e-6;
 
 /// Values shown white and black.
@@ -34,7 +35,7 @@ pub(super) fn logarithm(mut signal: Vec<f32>) -> Vec<f32> {
     signal
 }
 
-/// The window that shows the middle of an anatomy where it is `shown`: blades that close on a part of it widen its contrast.
+/// The window for the middle of an anatomy where it is `shown`: collimation to a part of it increases contrast.
 pub(super) fn fitted(values: &[f32], shown: &[bool], size: [u32; 2]) -> Window {
     let width = size[0] as usize;
     let middle = |i: usize| {
@@ -53,14 +54,13 @@ pub(super) fn fitted(values: &[f32], shown: &[bool], size: [u32; 2]) -> Window {
     [low - WINDOW_BELOW, high + WINDOW_ABOVE]
 }
 
-/// Rounding offset in [0, 1) of a pixel: interleaved gradient noise (Jimenez, Next Generation Post Processing
-/// in Call of Duty, SIGGRAPH 2014). Rounding all pixels alike would draw contour lines into a smooth
-/// background.
+/// Rounding offset in [0, 1) of a pixel: interleaved gradient noise (Jimenez, Next Generation Post Processing in Call
+/// of Duty, SIGGRAPH 2014). Rounding all pixels equally would draw contour lines into a smooth background.
 fn dither(x: usize, y: usize) -> f32 {
     (52.982_918 * (0.067_110_56 * x as f32 + 0.005_837_15 * y as f32).fract()).fract()
 }
 
-/// The picture of values in a window; `dithered` where no noise hides the steps of eight bits.
+/// The image of values in a window; `dithered` if no noise hides the steps of eight bits.
 pub(super) fn picture(
     values: &[f32],
     [white, black]: Window,

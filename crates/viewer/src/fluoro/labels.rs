@@ -1,4 +1,4 @@
-//! What a view shows of devices and contacts.
+//! Labels of devices and contacts in a view.
 
 use endowire_core::{Result, Vec3};
 
@@ -9,7 +9,7 @@ use crate::material::Material;
 use crate::output::{ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat};
 use crate::xray::Exposure;
 
-/// Labels of a frame of `devices`; those without a material of their own are made of `material`.
+/// Labels of a frame of `devices`; `material` is that of devices without their own.
 ///
 /// # Errors
 /// [`endowire_core::Error::Parameter`] for a device with values that are not finite.
@@ -27,7 +27,7 @@ pub(crate) fn labels(
     };
     let [width, height] = c_arm.size_px();
     let mut mask = vec![0_u8; width as usize * height as usize];
-    // Of a whole device, and of a part.
+    // For a whole device, and for a part.
     let mut room = [Coverage::new(c_arm), Coverage::new(c_arm)];
     let mut labelled = Vec::with_capacity(devices.len());
     for (number, device) in (1_u8..=u8::MAX).zip(devices) {
@@ -46,7 +46,7 @@ pub(crate) fn labels(
     })
 }
 
-/// Where a point is seen, if it is between source and detector.
+/// Projection of a point, if it is between source and detector.
 fn seen(c_arm: &CArm, point: &Vec3) -> Option<[f64; 2]> {
     c_arm.is_between(&c_arm.in_beam(point)).then(|| c_arm.project(point))
 }
@@ -79,6 +79,7 @@ fn device_label(
     let tip = points.last().map(|p| p.position_mm);
     let tip_px = tip.and_then(|tip| seen(c_arm, &tip));
     Ok(DeviceLabel {
+        shown: None,
         centre_line_px,
         depth_mm: places.iter().map(|p| c_arm.depth_mm(p)).collect(),
         centre_line_mm: places.into_iter().map(Into::into).collect(),

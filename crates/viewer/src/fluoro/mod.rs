@@ -1,4 +1,4 @@
-//! The fluoroscopic view: what stays is computed once for a pose of the C-arm, what moves for each frame.
+//! The fluoroscopic view: static contributions are computed once per pose of the C-arm, moving ones for each frame.
 //!
 //! Materials nest by what they displace. With the geometric lengths B (body), O (bone), L (lungs), V (inside the wall) and Dⱼ
 //! (device j) along a ray,
@@ -7,12 +7,12 @@
 //! p = µ_tissue · max(B − O − L − V, 0) + µ_bone · O + µ_lung · L + µ_lumen · V + Σⱼ (µⱼ − µ_lumen) · Dⱼ
 //! ```
 //!
-//! with µ_lumen = (1 − f) µ_blood + f µ_contrast at the local fraction f of contrast medium. The max covers a vessel that
-//! reaches out of the body, and a phantom in air (B = 0). Devices are taken to lie inside the lumen: a part outside the wall
-//! displaces lumen filling all the same.
+//! with µ_lumen = (1 − f) µ_blood + f µ_contrast at the local fraction f of contrast medium. The max covers a vessel
+//! that protrudes from the body, and a phantom in air (B = 0). Devices are assumed to be inside the lumen: a part
+//! outside the wall displaces the lumen's content all the same.
 //!
-//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays a pixel, and over many more
-//! where there are devices ([`DeviceCells`]).
+//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays per
+//! pixel, and over many more at devices ([`DeviceCells`]).
 
 mod anatomy;
 mod display;
@@ -45,7 +45,7 @@ use crate::scene::Setup;
 use crate::spec::{ViewSpec, XRaySpec};
 use crate::xray::{Beam, Exposure, LANES, Lanes, PathLengths};
 
-/// Rays across a pixel in each direction. Two give four grey levels of edge smoothing, enough beside a real
+/// Number of rays across a pixel in each direction. Two give four grey levels of edge smoothing, enough given a real
 /// detector's blur, at four times the cost of one.
 pub(crate) const SUBRAYS: u32 = 2;
 
@@ -55,54 +55,55 @@ const LEAST_LUMEN_MM: f32 = 1e-3;
 /// Fractions of contrast medium below this are blood.
 const LEAST_FRACTION: f32 = 1e-4;
 
-/// Lengths of contrast medium in tissue below this are not seen, mm.
+/// Lengths of contrast medium in tissue below this are ignored, mm.
 const LEAST_MEDIUM_MM: f32 = 1e-4;
 
-/// Rays of a pixel.
+/// Number of rays of a pixel.
 const RAYS: usize = (SUBRAYS * SUBRAYS) as usize;
 
-/// Fewest pixels worth handing to another thread.
+/// Smallest number of pixels per thread.
 const FEWEST_PIXELS: usize = 1024;
 
-/// Signal of each pixel, and signal times energy of a quantum.
+/// Signal of each pixel, and signal times photon energy.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Signal {
     pub(crate) signal: Vec<f32>,
     pub(crate) energy: Vec<f32>,
 }
 
-/// What comes through the anatomy alone, without devices and injections.
+/// The signal of the anatomy alone, without devices and injections.
 #[derive(Debug, Clone)]
 pub(crate) struct Still {
     pub(crate) signal: Signal,
     scatter: Scatter,
 }
 
-/// Everything about a fluoroscopic view that stays from frame to frame, and the buffers of the next.
+/// Data of a fluoroscopic view that are constant between frames, and the buffers of the next one.
 #[derive(Debug)]
 pub(crate) struct Fluoroscope {
     pub(crate) c_arm: CArm,
     pub(crate) exposure: Exposure,
     pub(crate) beam: Beam,
     anatomy: Arc<Anatomy>,
-    /// Attenuation of tissue, bone, lung, blood and contrast medium less blood.
+    /// Attenuation of tissue, bone, lung, blood and contrast medium minus blood.
     lanes: [Lanes; 5],
-    /// Their means over the signal of the reference, 1/mm.
+    /// Their means over the reference signal, 1/mm.
     mu: [f32; 5],
     fraction: f32,
     contrast: Option<ContrastMap>,
-    /// Material of devices that name none.
+    /// Material of devices that specify none.
     default_material: Material,
     pub(crate) still: Still,
-    /// Pixels that show the vessel, once they were asked for.
+    /// Pixels that show the vessel, once requested.
     vessel: Option<Mask>,
     /// Lengths inside devices, none between frames.
     devices: DeviceCells,
-    /// Attenuation of their materials in the order of those, and its mean.
+    /// Attenuation of their materials in the same order, and its mean.
     device_lanes: Vec<(Material, Lanes, f32)>,
 }
 
-/// What another view of the same vessel and body needs too where it has the same rays: blades, modes, doses and injections do not change it.
+/// Data that another view of the same vessel and body can reuse if it has the same rays: blades, modes, doses and
+/// injections do not change them.
 #[derive(Debug, Clone)]
 pub(crate) struct Kept {
     rays: u128,
@@ -111,13 +112,13 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
-    /// What was cast through a scene.
+    /// The results of casting a scene.
     #[cfg(feature = "gpu")]
     pub(crate) fn of(c_arm: &CArm, anatomy: Anatomy) -> Self {
         Self { rays: c_arm.fingerprint(), anatomy: Arc::new(anatomy), shares: None }
     }
 
-    /// What of it serves a set-up `after` that before.
+    /// The part reusable for a set-up `after` the given one.
     pub(crate) fn between(mut self, before: &Setup, after: &Setup) -> Option<Self> {
         let rays = after.c_arm.as_ref().map(CArm::fingerprint);
         let alike = Arc::ptr_eq(&before.patient, &after.patient)
@@ -131,7 +132,7 @@ impl Kept {
 }
 
 impl Fluoroscope {
-    /// Computes what stays, but for what is `kept` of a view with the same rays.
+    /// Computes the constant data, except those `kept` from a view with the same rays.
     pub(crate) fn new(
         setup: &Setup,
         c_arm: &CArm,
@@ -181,7 +182,7 @@ impl Fluoroscope {
         Ok(fluoroscope)
     }
 
-    /// Computes the signals of what stays from its lengths.
+    /// Computes the constant signals from their lengths.
     fn look(&mut self, spec: &ViewSpec) {
         let whole = (0..self.pixels()).into_par_iter().with_min_len(FEWEST_PIXELS);
         let whole =
@@ -212,7 +213,7 @@ impl Fluoroscope {
         self.c_arm.size_px().map(|n| n as usize).iter().product()
     }
 
-    /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
+    /// Displaces the vessel. Exposure is unchanged, as an exposure control would hold it.
     pub(crate) fn move_vessel(&mut self, setup: &Setup, engine: &mut dyn PathEngine) -> Result<()> {
         self.anatomy = Arc::new(self.anatomy.moved(setup, &self.c_arm, SUBRAYS, engine)?);
         self.vessel = None;
@@ -224,14 +225,14 @@ impl Fluoroscope {
         Ok(())
     }
 
-    /// What another view may need too.
+    /// Data that another view may reuse.
     pub(crate) fn into_kept(self) -> Kept {
         let shares = self.contrast.map(ContrastMap::into_shares);
         Kept { rays: self.c_arm.fingerprint(), anatomy: self.anatomy, shares }
     }
 
-    /// Pixels of which half or more is of the vessel that `wall` closes, under no blade. What is filled may go on where its surface ends:
-    /// then lengths in it tell only where to look.
+    /// Pixels at least half covered by the vessel enclosed by `wall`, not behind a blade. The filled lumen may extend
+    /// beyond its surface: its lengths only indicate where to test.
     pub(crate) fn vessel(&mut self, wall: &SurfaceMesh, filled: &SurfaceMesh) -> Mask {
         if let Some(known) = &self.vessel {
             return known.clone();
@@ -255,7 +256,7 @@ impl Fluoroscope {
         self.vessel.insert(Mask::new(size_px, inside)).clone()
     }
 
-    /// Pixels near what is filled beyond the wall: triangles that the two do not have in common.
+    /// Pixels near the part of the filled lumen beyond the wall: triangles that the two do not share.
     fn beyond(&self, wall: &SurfaceMesh, filled: &SurfaceMesh) -> Vec<bool> {
         let mut near = vec![false; self.pixels()];
         let [width, height] = self.c_arm.size_px();
@@ -274,7 +275,8 @@ impl Fluoroscope {
         near
     }
 
-    /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
+    /// Signal with devices, averaged over the instants of a pulse, and the contrast medium at a time; without a time,
+    /// before any injection.
     pub(crate) fn signal(&mut self, pulse: &[Vec<RefinedDevice>], time_s: Option<f64>) -> Result<Signal> {
         let mut medium = match (&mut self.contrast, time_s) {
             (Some(contrast), Some(time)) => {
@@ -297,7 +299,7 @@ impl Fluoroscope {
         Ok(sum)
     }
 
-    /// Signal with devices where they are at one instant.
+    /// Signal with devices at one instant.
     fn instant(&mut self, devices: &[RefinedDevice], medium: &[Medium]) -> Result<Signal> {
         self.cast(devices)?;
         let mut pixels = self.devices.pixels().to_vec();
@@ -307,7 +309,7 @@ impl Fluoroscope {
         Ok(now)
     }
 
-    /// Takes the lengths inside devices.
+    /// Computes the lengths inside devices.
     fn cast(&mut self, devices: &[RefinedDevice]) -> Result<()> {
         self.devices.clear();
         for device in devices {
@@ -331,7 +333,8 @@ impl Fluoroscope {
         Ok(means)
     }
 
-    /// What every pixel has of the open beam behind devices and medium: the picture's own signal, unscattered and with the blades open.
+    /// Ratio of every pixel's signal to the open beam behind devices and medium: the image's own signal, without
+    /// scatter and blades.
     pub(crate) fn transmitted(&mut self, devices: &[RefinedDevice], medium: &[Medium]) -> Result<Vec<f32>> {
         self.cast(devices)?;
         let mut of_pixel = vec![[self.fraction, 0.0]; self.pixels()];
@@ -347,12 +350,13 @@ impl Fluoroscope {
         Ok(left)
     }
 
-    /// The medium injected by then, pixels rising.
+    /// The medium injected up to a time, pixels ascending.
     pub(crate) fn injected(&self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
         self.contrast.as_ref().map_or_else(Vec::new, |contrast| contrast.at(time_s, tip_mm))
     }
 
-    /// Signal behind path lengths over that of the open beam. Where they are those of `before`, its transmission is taken.
+    /// Ratio of the signal behind path lengths to that of the open beam. Where they equal those of `before`, its
+    /// transmission is reused.
     pub(crate) fn transmission(
         &self,
         paths: &PathLengths,
@@ -386,7 +390,8 @@ impl Fluoroscope {
         Ok(behind.collect())
     }
 
-    /// Largest fraction of contrast medium at any time and place shown together, over what is `still`: what a roadmap is made of.
+    /// Largest fraction of contrast medium over all times, shown everywhere at once, added to `still`: the source of
+    /// a roadmap.
     pub(crate) fn opacified(&self, still: &Still) -> Result<Signal> {
         let contrast = self.contrast.as_ref().ok_or_else(|| {
             let mend = "a roadmap shows an angiogram; give a [[view.injection]]";
@@ -395,7 +400,7 @@ impl Fluoroscope {
         Ok(self.draw(still, &[], &contrast.largest()))
     }
 
-    /// Draws pixels that devices touch and those with contrast medium, both rising, over what is still.
+    /// Adds pixels touched by devices and those with contrast medium, both ascending, to the static signal.
     fn draw(&self, still: &Still, pixels: &[u32], medium: &[Medium]) -> Signal {
         let mut now = still.signal.clone();
         let mut lost = Vec::with_capacity(medium.len());
@@ -430,12 +435,12 @@ impl Fluoroscope {
     }
 }
 
-/// Tip of the innermost device with a bore: where medium comes out.
+/// Tip of the innermost device with a lumen, from which medium flows.
 pub(crate) fn injecting_tip_mm(devices: &[RefinedDevice]) -> Option<Vec3> {
     devices.iter().find(|device| device.has_bore())?.points.last().map(|tip| tip.position_mm)
 }
 
-/// Pixels of both lists, each rising, with what the second says of them.
+/// Pixels of both lists, each ascending, with the medium of the second.
 fn merged(pixels: &[u32], medium: &[Medium]) -> Vec<(u32, Option<Medium>)> {
     let mut all = Vec::with_capacity(pixels.len() + medium.len());
     let (mut pixels, mut medium) = (pixels.iter().peekable(), medium.iter().peekable());

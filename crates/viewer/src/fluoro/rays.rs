@@ -1,22 +1,22 @@
-//! From the rays of a pixel, and the cells that devices cut it into, to its unscattered quanta.
+//! Unscattered photons of a pixel, from its rays and device cells.
 
 use super::{Fluoroscope, RAYS, SUBRAYS};
 use crate::cpu::{CELLS, quarter};
 use crate::xray::{LANES, Lanes};
 
-/// Line integrals of a pixel's rays that differ by less are averaged before the spectrum.
+/// Difference of line integrals of a pixel's rays below which lengths are averaged before the spectrum.
 const ALIKE: f32 = 3e-2;
-/// The same of cells: half of them are within an eighth, so what the variance leaves is below 10⁻⁴.
+/// The same for cells: half of them are within an eighth, so the neglected variance is below 10⁻⁴.
 const ALIKE_CELLS: f32 = 0.25;
 
-/// What to work in.
+/// Work buffers.
 #[derive(Debug, Default)]
 pub(super) struct Room {
     lanes: Lanes,
     alike: Vec<Alike>,
 }
 
-/// Cells of a pixel whose line integrals inside devices are alike.
+/// Cells of a pixel with similar line integrals inside devices.
 #[derive(Debug, Default)]
 struct Alike {
     step: i32,
@@ -28,20 +28,20 @@ struct Alike {
 }
 
 impl Fluoroscope {
-    /// First ray of a pixel, and rays a row.
+    /// First ray of a pixel, and number of rays per row.
     pub(super) fn first_ray(&self, pixel: usize) -> (usize, usize) {
         let (width, sub) = (self.c_arm.size_px()[0] as usize, SUBRAYS as usize);
         (pixel / width * sub * width * sub + pixel % width * sub, width * sub)
     }
 
-    /// Signal and energy of the unscattered quanta of a pixel without blades, with a fraction of contrast medium in its lumen and a
-    /// length of it in tissue.
+    /// Signal and energy of the unscattered photons of a pixel without blades, for a fraction of contrast medium in
+    /// its lumen and a length of it in tissue.
     pub(super) fn primary(&self, pixel: usize, medium: [f32; 2], room: &mut Room) -> [f32; 2] {
         let (first, stride) = self.first_ray(pixel);
         let rays: [usize; RAYS] =
             std::array::from_fn(|k| first + k / SUBRAYS as usize * stride + k % SUBRAYS as usize);
         let mut layers = [[0.0; 5]; RAYS];
-        // A loop is inlined where a map of the array is not, which is a tenth of the time of a picture.
+        // A loop is inlined where a map of the array is not, which saves a tenth of the time of an image.
         layers.iter_mut().zip(rays).for_each(|(layers, ray)| *layers = self.layers(ray, medium));
         match (self.alike(&layers), self.devices.place(pixel)) {
             (Some((mean, more)), None) => self.behind(mean, &[], &mut room.lanes).map(|v| more * v),
@@ -71,7 +71,7 @@ impl Fluoroscope {
         sum.map(|sum| sum / RAYS as f32)
     }
 
-    /// The mean over some cells at a place, of which the rays are the same but for devices: cells that are alike are one.
+    /// The mean over the cells at a position, whose rays are equal except for devices: similar cells are merged.
     fn of_cells(
         &self,
         (place, cells): (usize, impl Iterator<Item = usize>),
@@ -80,7 +80,7 @@ impl Fluoroscope {
         room: &mut Room,
     ) -> [f32; 2] {
         let maps = self.devices.maps();
-        // What a device takes the place of.
+        // Attenuation that a device displaces.
         let filling = self.mu[3] + fraction * self.mu[4];
         let mut used = 0;
         for cell in cells {
@@ -125,7 +125,7 @@ impl Fluoroscope {
         sum.map(|sum| sum / count)
     }
 
-    /// Signal and energy behind lengths in what stays and in the materials of devices.
+    /// Signal and energy behind lengths in the static anatomy and in the materials of devices.
     #[inline]
     fn behind(&self, lengths: [f32; 5], of_devices: &[f32], room: &mut Lanes) -> [f32; 2] {
         let mut sum = [[0.0; LANES]; 2];
@@ -135,15 +135,16 @@ impl Fluoroscope {
         sum.map(|sum| sum.iter().sum::<f32>())
     }
 
-    /// Lengths of a ray in what stays, as [`Beam::add`](crate::xray::Beam::add) wants them, as if there were no devices.
+    /// Lengths of a ray in the static anatomy without devices, as required by [`Beam::add`](crate::xray::Beam::add).
     #[inline]
     pub(super) fn layers(&self, ray: usize, [fraction, tissue_mm]: [f32; 2]) -> [f32; 5] {
         let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
         [tissue - self.beam.reference_mm(), bone, lung, lumen, lumen * fraction + tissue_mm]
     }
 
-    /// Where the rays of a pixel differ by little: their mean lengths, and what the mean of their signals is over the signal of these,
-    /// 1 + ½ var p at the mean energy. The rest, of third order and for the spectrum's width, is below 10⁻⁵: half a step of 16 bits.
+    /// If the rays of a pixel differ little: their mean lengths, and the ratio of their mean signal to the signal of
+    /// these, 1 + ½ var p at the mean energy. The neglected terms, of third order and due to the spectrum's width,
+    /// are below 10⁻⁵: half a step of 16 bits.
     #[inline]
     pub(super) fn alike(&self, layers: &[[f32; 5]; RAYS]) -> Option<([f32; 5], f32)> {
         let mut mean = layers[0];

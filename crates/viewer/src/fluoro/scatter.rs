@@ -1,36 +1,37 @@
-//! What is smooth over tens of millimetres: scattered quanta, and the shading that displays take out.
+//! Contributions smooth over tens of millimetres: scattered photons, and the shading that displays remove.
 //!
-//! What patients scatter reaches the detector tens of millimetres from where the primary beam would have, so it is the primary
-//! picture, spread widely, scaled to the wanted share of all quanta. It is computed for the anatomy; a device changes it by less
-//! than a part in a thousand, but contrast medium in a large vessel by a quarter: it is spread with what the medium takes away.
-//! Over opacified vessels scatter still fills the shadow, so a subtraction keeps edges of bones there, as real ones do.
+//! Photons scattered in patients reach the detector tens of millimetres from where the primary beam would have, so
+//! the scatter image is the primary one, blurred widely and scaled to the wanted fraction of all photons. It is
+//! computed for the anatomy; a device changes it by less than a thousandth, but contrast medium in a large vessel by
+//! a quarter: so the medium's absorption is blurred too. Over opacified vessels scatter still fills the shadow, so a
+//! subtraction keeps edges of bones there, as real ones do.
 
 use rayon::prelude::*;
 
 use super::{FEWEST_PIXELS, Signal};
 use crate::c_arm::CArm;
 
-/// Standard deviation of the spread at the detector, mm.
+/// Standard deviation of the scatter at the detector, mm.
 const SCATTER_MM: f64 = 35.0;
 /// The same for shading.
 const SHADING_MM: f64 = 25.0;
-/// Pixels are gathered into cells of a quarter of it.
+/// Size of the cells in which pixels are summed, as a fraction of it.
 const CELLS: f64 = 4.0;
-/// The Gaussian ends at this many deviations.
+/// Number of deviations at which the Gaussian is truncated.
 const REACH: f64 = 3.0;
 
-/// Scattered signal and signal times energy.
+/// Scattered signal and signal times photon energy.
 #[derive(Debug, Clone)]
 pub(super) struct Scatter {
     cells: Cells,
-    /// Scattered for each unit of primary.
+    /// Scatter per unit of primary signal.
     gain: f32,
-    /// That of the anatomy, by pixels; empty where nothing is scattered.
+    /// Scatter of the anatomy, by pixels; empty without scatter.
     still: Vec<[f32; 2]>,
 }
 
 impl Scatter {
-    /// What is scattered beside the anatomy's `primary` when it is on average `share` of all.
+    /// The scatter for the anatomy's `primary` that is on average a fraction `share` of the total.
     pub(super) fn new(primary: &Signal, c_arm: &CArm, share: f64) -> Self {
         let gain = (share / (1.0 - share)) as f32;
         let mut scatter = Self { cells: Cells::new(c_arm, SCATTER_MM), gain, still: vec![] };
@@ -41,24 +42,24 @@ impl Scatter {
         scatter
     }
 
-    /// What pixels scatter, by cells.
+    /// Scatter of pixels, by cells.
     fn spread(&self, primary: impl Iterator<Item = (usize, [f32; 2])>) -> Vec<[f32; 2]> {
         let mut cells = self.cells.blurred(&self.cells.gathered(primary));
         cells.iter_mut().for_each(|cell| *cell = cell.map(|v| v * self.gain));
         cells
     }
 
-    /// What the anatomy scatters to a pixel.
+    /// Scatter of the anatomy at a pixel.
     pub(super) fn still(&self, pixel: usize) -> [f32; 2] {
         self.still.get(pixel).copied().unwrap_or_default()
     }
 
-    /// Adds what the anatomy scatters.
+    /// Adds the scatter of the anatomy.
     pub(super) fn add_still(&self, to: &mut Signal) {
         add(&self.still, to);
     }
 
-    /// Adds what is scattered more, or less, where the primary of the given pixels differs from the anatomy's.
+    /// Adds the change of scatter where the primary signal of the given pixels differs from the anatomy's.
     pub(super) fn add_change(&self, primary: impl Iterator<Item = (usize, [f32; 2])>, to: &mut Signal) {
         if self.gain > 0.0 {
             add(&self.cells.spread_out(&self.spread(primary)), to);
@@ -73,8 +74,9 @@ fn add(scattered: &[[f32; 2]], to: &mut Signal) {
     }
 }
 
-/// The coarse part of logarithmic values where the body is `shown`, of those values alone. Elsewhere, in air and behind blades, it is the
-/// most of what it is there: what is before no body is then as bright as the brightest of it, and no skin is brighter than air.
+/// The low-frequency part of logarithmic values where the body is `shown`, from those values alone. Elsewhere, in air
+/// and behind blades, it is its maximum over the body: background beside the body is then as bright as its brightest
+/// part, and no skin is brighter than air.
 pub(super) fn shading(values: &[f32], shown: &[bool], c_arm: &CArm) -> Vec<f32> {
     let cells = Cells::new(c_arm, SHADING_MM);
     let weighted = values.iter().zip(shown).map(|(v, shown)| if *shown { [*v, 1.0] } else { [0.0; 2] });
@@ -86,7 +88,7 @@ pub(super) fn shading(values: &[f32], shown: &[bool], c_arm: &CArm) -> Vec<f32> 
     means.into_iter().map(|mean| mean.unwrap_or(most)).collect()
 }
 
-/// A picture in cells, a quarter of a deviation wide each.
+/// An image in cells, a quarter of a deviation wide each.
 #[derive(Debug, Clone)]
 struct Cells {
     size_px: [usize; 2],
@@ -127,7 +129,7 @@ impl Cells {
         (i, (i + 1).min(n - 1), v - i as f32)
     }
 
-    /// The value at each pixel, bilinear between the middles of cells.
+    /// The value at each pixel, bilinear between cell centres.
     fn spread_out<const N: usize>(&self, cells: &[[f32; N]]) -> Vec<[f32; N]> {
         let [width, height] = self.size_px;
         let columns: Vec<_> = (0..width).map(|x| self.place(x, 0)).collect();
@@ -146,7 +148,7 @@ impl Cells {
         out
     }
 
-    /// Blurs along rows, then along columns; borders repeat: the body goes on.
+    /// Blurs along rows, then along columns; borders are repeated, since the body continues.
     fn blurred<const N: usize>(&self, cells: &[[f32; N]]) -> Vec<[f32; N]> {
         let [width, height] = self.count.map(|n| n as isize);
         let reach = (REACH * CELLS) as isize;
@@ -195,14 +197,14 @@ mod tests {
         let scatter = scattered(&flat, 0.25);
         assert!(scatter.signal.iter().all(|s| (s / (s + 2.0) - 0.25).abs() < 1e-4));
         assert!((scatter.energy[777] - 100.0 / 3.0).abs() < 1e-2);
-        // A sharp edge in the primary is none in what is scattered, and the share is kept.
+        // A sharp edge in the primary signal is smooth in the scatter, and the fraction is preserved.
         let edge: Vec<f32> = (0..120_000).map(|i| if i % 400 < 200 { 1.0 } else { 3.0 }).collect();
         let edge = Signal { signal: edge.clone(), energy: edge };
         let scatter = scattered(&edge, 0.5).signal;
         assert!((scatter.iter().sum::<f32>() / edge.signal.iter().sum::<f32>() - 1.0).abs() < 0.02);
         let steepest = scatter.windows(2).take(399).map(|p| (p[1] - p[0]).abs()).fold(0.0, f32::max);
         assert!(steepest < 0.02, "{steepest}");
-        // A change of some pixels comes to the same as all pixels anew.
+        // Updating some pixels gives the same as recomputing all.
         let mut changed = flat.clone();
         let of = |x: usize| if (100..260).contains(&x) { -1.5 } else { 0.0 };
         (0..120_000).for_each(|i| changed.signal[i] += of(i % 400));

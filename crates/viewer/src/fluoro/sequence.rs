@@ -1,4 +1,4 @@
-//! Frames in time: what the detector, the mask, the roadmap and the last image hold remember.
+//! Frames in time: the memory of the detector, the mask, the roadmap and the last image hold.
 
 use endowire_core::Result;
 
@@ -10,21 +10,21 @@ use crate::output::Image;
 use crate::spec::{Mode, ViewSpec};
 use crate::xray::Detector;
 
-/// Frames that make a mask or a stored angiogram.
+/// Number of frames averaged for a mask or a stored angiogram.
 const MASK_FRAMES: u64 = 4;
-/// Numbers from here on belong to the noise of masks and angiograms, not of frames.
+/// Frame numbers from here on are used for the noise of masks and angiograms.
 const MASK_NUMBERS: u64 = 1 << 63;
 /// Weight of the newest frame in the last image hold.
 const HOLD_WEIGHT: f32 = 0.4;
-/// Subtracted values as parts of the vessels' strongest: what is shown white, and black.
+/// Subtracted values shown white and black, relative to the vessels' strongest.
 const DSA_SHARES: Window = [-0.15, 1.05];
-/// Share of the pixels with contrast medium that may be darker than black.
+/// Fraction of the pixels with contrast medium that may be darker than black.
 const DSA_OUTLIERS: f64 = 0.02;
-/// Opacities below this are no contrast medium.
+/// Smaller opacities do not count as contrast medium.
 const LEAST_OPACITY: f32 = 0.02;
-/// Strongest opacification that a window assumes where nothing is ever injected.
+/// Strongest opacification assumed for a window if nothing is injected.
 const FAINTEST: f32 = 0.3;
-/// Roadmap values shown white and black, around a grey background, and that of the strongest vessel.
+/// Roadmap values shown white and black, around a grey background, and the value of the strongest vessel.
 const ROADMAP_WINDOW: Window = [-0.55, 0.55];
 const ROADMAP_VESSEL: f32 = -0.4;
 
@@ -37,28 +37,28 @@ pub struct FrameTime {
     pub time_s: f64,
 }
 
-/// What a sequence of frames remembers.
+/// Memory of a sequence of frames.
 #[derive(Debug)]
 pub(crate) struct Sequence {
     detector: Detector,
     mode: Mode,
-    /// Absorbed energy of a pixel at a signal of one, keV.
+    /// Absorbed energy of a pixel at unit signal, keV.
     kev: f64,
     window: Window,
-    /// Pixels that are black whatever is read: those behind blades, where there is scatter and noise alone.
+    /// Pixels that are always black: those behind blades, with scatter and noise alone.
     shutter: Vec<u32>,
     bits: u32,
     noisy: bool,
-    /// What is subtracted from −ln of each frame: the stored mask or angiogram, or shading.
+    /// Subtracted from −ln of each frame: the stored mask or angiogram, or shading.
     mask: Option<Vec<f32>>,
-    /// Values of the last frames, the newest weighing most.
+    /// Weighted mean of the last frames, the newest weighing most.
     held: Vec<f32>,
-    /// Signal of the mask that was taken last, and of that where the C-arm was before.
+    /// Signal of the last mask, and of that at the previous position of the C-arm.
     mask_read: Vec<f32>,
     mask_before: Vec<f32>,
 }
 
-/// What a detector has of the frame before, and of the mask before, where the C-arm stood then.
+/// The detector's memory of the last frame, and of the last mask, at the previous position of the C-arm.
 #[derive(Debug, Clone)]
 pub(crate) struct Afterglow {
     frame: Vec<f32>,
@@ -74,12 +74,12 @@ impl Sequence {
         let share = spec.xray.harmonised as f32;
         let shown = fluoroscope.shows_body();
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
-            // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
+            // Relative to the reference, whose logarithm is zero: the middle keeps its grey level.
             let values = logarithm(fluoroscope.still.signal.signal.clone());
             shading(&values, &shown, c_arm).iter().map(|v| share * v).collect()
         });
         let window = match (mode, spec.xray.window) {
-            // Line integrals against the open beam, where signals are told against the reference.
+            // Line integrals refer to the open beam, signals to the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
             (Mode::Fluoro | Mode::Cine, None) => {
                 let mut values = logarithm(fluoroscope.still.signal.signal.clone());
@@ -102,7 +102,7 @@ impl Sequence {
             None => vec![],
         };
         let kev = fluoroscope.beam.kev(c_arm.pixel_mm(), dose);
-        // n quanta of the energy ε vary by √n ε.
+        // n photons of the energy ε have a standard deviation of √n ε.
         let electronic = fluoroscope.beam.kev(c_arm.pixel_mm(), spec.detector.electronic_ngy);
         let electronic_kev = (electronic * fluoroscope.beam.quantum_kev()).sqrt();
         Self {
@@ -120,18 +120,19 @@ impl Sequence {
         }
     }
 
-    /// What the detector holds of the last frame.
+    /// The detector's memory of the last frame.
     pub(crate) fn into_afterglow(mut self) -> Afterglow {
         Afterglow { frame: self.detector.take_stored(), mask: self.mask_read }
     }
 
-    /// Goes on with what a detector holds: the next mask is that of a run which came the same way.
+    /// Continues with a detector's memory: the next mask is that of a run with the same motion.
     pub(crate) fn go_on_from(&mut self, afterglow: Afterglow) {
         self.detector.store(afterglow.frame);
         self.mask_before = afterglow.mask;
     }
 
-    /// Reads the next frame and shows it in the scene's mode. The first one of a subtraction takes its mask itself.
+    /// Reads the next frame and displays it in the scene's mode. The first frame of a subtraction takes its mask
+    /// itself.
     pub(crate) fn next(
         &mut self,
         fluoroscope: &mut Fluoroscope,
@@ -171,7 +172,7 @@ impl Sequence {
         picture(&values, self.window, fluoroscope.c_arm.size_px(), self.bits, !self.noisy)
     }
 
-    /// Stores what is there now, without injections, as the mask.
+    /// Stores the current image, without injections, as the mask.
     pub(crate) fn take_mask(
         &mut self,
         fluoroscope: &mut Fluoroscope,
@@ -182,14 +183,14 @@ impl Sequence {
         Ok(())
     }
 
-    /// Stores the anatomy, with the vessels of the angiogram as bright as they are to be shown.
+    /// Stores the anatomy, with the vessels of the angiogram at their displayed brightness.
     fn store_roadmap(&mut self, fluoroscope: &Fluoroscope) -> Result<()> {
         let full = fluoroscope.opacified(&fluoroscope.still)?;
         let kev = self.kev * Mode::Dsa.dose_ngy() / self.mode.dose_ngy();
         let scale = ROADMAP_VESSEL / strongest(fluoroscope);
         let full = self.stored(&full, kev);
         let mut map = self.stored(&fluoroscope.still.signal, kev);
-        // A frame less this is −scale in the vessel.
+        // A frame minus this is −scale in the vessel.
         map.iter_mut().zip(full).for_each(|(map, full)| *map -= scale * (full - *map));
         self.mask = Some(map);
         Ok(())
@@ -198,7 +199,7 @@ impl Sequence {
     /// −ln of a signal's mean over a few frames.
     fn stored(&mut self, signal: &Signal, kev: f64) -> Vec<f32> {
         let mut mean = vec![0.0; signal.signal.len()];
-        // Of the last frame, which a mask has nothing of: it has its share of the mask before.
+        // The last frame's part, of which a mask has nothing: it has its share of the previous mask.
         let held = self.detector.take_stored();
         for k in 0..MASK_FRAMES {
             self.detector.store(self.mask_before.clone());
@@ -212,7 +213,8 @@ impl Sequence {
     }
 }
 
-/// Densest shown value where contrast medium ever comes, but for the darkest few pixels; a vessel full of it keeps its shades.
+/// Densest displayed value where contrast medium ever comes, without the darkest few pixels; a vessel full of it
+/// keeps its shades.
 fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
     let Some([still, full]) = opacified(fluoroscope) else { return f32::MIN };
     let filled = (0..full.len()).filter(|&i| full[i] - still[i] > LEAST_OPACITY);
@@ -220,21 +222,21 @@ fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
     but_for_outliers(values).unwrap_or(f32::MIN)
 }
 
-/// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
+/// Strongest subtracted value that contrast medium ever causes, without the darkest few pixels.
 fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     let Some([still, full]) = opacified(fluoroscope) else { return FAINTEST };
     let opacities = full.into_iter().zip(still).map(|(v, still)| v - still);
     but_for_outliers(opacities.filter(|v| *v > LEAST_OPACITY).collect()).map_or(FAINTEST, |v| v.max(FAINTEST))
 }
 
-/// Values without contrast medium and with all that ever comes, between the blades; none where nothing is injected.
+/// Values without contrast medium and with its maximum over time, between the blades; `None` without injections.
 fn opacified(fluoroscope: &Fluoroscope) -> Option<[Vec<f32>; 2]> {
     let still = &fluoroscope.still;
     let full = fluoroscope.opacified(still).ok()?;
     Some([logarithm(still.signal.signal.clone()), logarithm(full.signal)])
 }
 
-/// The largest value but for the outliers.
+/// The largest value, ignoring outliers.
 fn but_for_outliers(mut values: Vec<f32>) -> Option<f32> {
     let last = values.len().checked_sub(1)?;
     let place = (last as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
@@ -257,7 +259,8 @@ mod tests {
         crate::CArm::new(&spec, [128, 128], &wall).unwrap()
     }
 
-    /// What a frame of a trunk shows of each pixel, the mask of that display, where the blades leave all open, and the window.
+    /// The displayed values of a frame of a trunk, the mask of that display, where the blades leave all open, and the
+    /// window.
     fn shown(field_mm: f64, collimation_mm: Option<[f64; 2]>) -> (Vec<f32>, Vec<f32>, Vec<bool>, Window) {
         let wall = SurfaceMesh {
             vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
@@ -279,7 +282,7 @@ mod tests {
         (values, mask, open, sequence.window)
     }
 
-    /// Where a frame of a trunk in air shows the skin's edge, what air has there, and the window.
+    /// Displayed values of a frame of a trunk at the skin's edge and in air, and the window.
     #[test]
     fn air_is_never_darker_than_the_skin_and_blades_narrow_the_window_to_what_they_leave() {
         let (values, mask, open, window) = shown(700.0, None);
@@ -291,7 +294,7 @@ mod tests {
         assert!((0..values.len()).filter(|&i| air(i)).count() > 500 && open.iter().all(|open| *open));
         let skin = brightest(&|i| !air(i));
         assert!(darkest <= skin + 1e-3, "air {darkest}, skin {skin}");
-        // The twin: shading that takes air for a body leaves it darker than the skin beside it.
+        // Counter-check: shading that mistakes air for a body leaves it darker than the adjacent skin.
         let raw: Vec<f32> = values.iter().zip(&mask).map(|(v, m)| v + m).collect();
         let arm = arm(700.0);
         let leaking = shading(&raw, &vec![true; raw.len()], &arm);
@@ -299,7 +302,7 @@ mod tests {
         let far = (0..leaking.len()).filter(|&i| air(i)).map(|i| leaking[i]).fold(f32::MIN, f32::max);
         let rim = (0..leaking.len()).filter(|&i| !air(i)).map(|i| leaking[i]).fold(f32::MAX, f32::min);
         assert!(far > rim + 0.1, "{far} {rim}");
-        // Blades that leave a part of the trunk: less to show, and less scatter.
+        // With collimation to a part of the trunk there is less to show, and less scatter.
         let (wide, narrow) = (shown(200.0, None), shown(200.0, Some([60.0, 50.0])));
         let width = |window: Window| window[1] - window[0];
         assert!(width(narrow.3) < 0.95 * width(wide.3), "{:?} {:?}", narrow.3, wide.3);

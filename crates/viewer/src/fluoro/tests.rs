@@ -1,4 +1,4 @@
-//! Rays of a pixel that are alike.
+//! Similar rays of a pixel.
 
 use endowire_core::vessel::SurfaceMesh;
 

@@ -1,8 +1,7 @@
-//! An adapter, its device and queue, and a way back for pixels.
+//! An adapter, its device and queue, and reading back pixels.
 //!
-//! wgpu reports most failures outside the call that caused them and panics where nobody listens. Here a
-//! handler keeps the first report, and every read-back returns it as an error: a failing adapter costs a
-//! frame, never the program.
+//! wgpu reports most failures outside the call that caused them and panics without a handler. Here a handler stores
+//! the first report, and every read-back returns it as an error: a failing adapter costs a frame, never the program.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -15,14 +14,14 @@ use crate::gpu::view3d::Pipelines;
 /// The first failure an adapter has reported.
 type Failure = Arc<Mutex<Option<String>>>;
 
-/// Devices that are open: a driver takes a fifth of a second to open one, and each pose of a dataset asks for one.
+/// Open devices: opening one takes a driver a fifth of a second, and each pose of a dataset requests one.
 static OPENED: Pool = Pool(Mutex::new(Vec::new()));
 
-/// Devices, each for those who ask while no other has it: who waits for one waits for all that it was given.
+/// A pool of devices, each lent to one user at a time: waiting for a device waits for all of its work.
 struct Pool(Mutex<Vec<Gpu>>);
 
 impl Pool {
-    /// One that nobody has and that has not failed.
+    /// A device that is not in use and has not failed.
     fn free(&self, features: wgpu::Features, software: bool) -> Option<Gpu> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.retain(|gpu| gpu.check().is_ok());
@@ -33,7 +32,7 @@ impl Pool {
         all.iter().find(fits).cloned()
     }
 
-    /// Keeps one that was opened.
+    /// Adds an opened device.
     fn keep(&self, gpu: &Gpu) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(gpu.clone());
     }
@@ -44,9 +43,9 @@ impl Pool {
 pub(crate) struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    /// Most pixels a side that it draws.
+    /// Largest number of pixels per side that it supports.
     pub(crate) largest_side: u32,
-    /// Pipelines of fluoroscopy and of the 3D view, made with the first of each: a driver takes a while to compile them.
+    /// Pipelines of fluoroscopy and of the 3D view, created when first used: compiling them takes a driver some time.
     pub(crate) paths: Arc<OnceLock<wgpu::RenderPipeline>>,
     pub(crate) three_d: Arc<OnceLock<Pipelines>>,
     is_software: bool,
@@ -55,8 +54,8 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// The best adapter that has `features`: discrete before integrated before others; software adapters last, and only where
-    /// `software` allows them. One that is open, and that nobody has any more, comes first.
+    /// The best adapter that has `features`: discrete before integrated before others; software adapters last, and
+    /// only if `software` allows them. An open device that is not in use is preferred.
     ///
     /// # Errors
     /// Why there is none, as a clause.
@@ -73,7 +72,7 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Opens one where an answer is waited for.
+    /// Opens one asynchronously.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -108,7 +107,7 @@ impl Gpu {
             return Err(format!("no graphics adapter offers {features:?}"));
         };
         let info = adapter.get_info();
-        // What fluoroscopy needs, also where the 3D view alone asks: one device is for both.
+        // With the features for fluoroscopy, even if only the 3D view requests it: one device serves both.
         let features = features | (adapter.features() & wgpu::Features::FLOAT32_BLENDABLE);
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("endowire"),
@@ -129,7 +128,7 @@ impl Gpu {
         });
         let largest_side = device.limits().max_texture_dimension_2d;
         let name = match info.backend {
-            // A browser does not tell the adapter's name.
+            // A browser does not reveal the adapter's name.
             wgpu::Backend::BrowserWebGpu => "WebGPU".to_owned(),
             backend => format!("{backend:?} {}", info.name),
         };
@@ -143,7 +142,7 @@ impl Gpu {
         &self.name
     }
 
-    /// What the adapter has reported so far, as an error.
+    /// The adapter's first failure report, as an error.
     pub(crate) fn check(&self) -> Result<()> {
         match self.failure.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
             Some(text) => Err(Error::Computation(text.clone())),
@@ -151,8 +150,8 @@ impl Gpu {
         }
     }
 
-    /// A buffer of these bytes, a multiple of four of them. Written by the queue: one that is made with contents is mapped, which panics where
-    /// the device is lost.
+    /// A buffer of these bytes, a multiple of four. Written by the queue: a buffer created with contents is mapped,
+    /// which panics if the device is lost.
     pub(crate) fn buffer(&self, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("endowire"),
@@ -164,7 +163,7 @@ impl Gpu {
         buffer
     }
 
-    /// A texture that is drawn into, then sampled or copied.
+    /// A texture that is rendered to, then sampled or copied.
     pub(crate) fn target(&self, size: [u32; 2], format: wgpu::TextureFormat, samples: u32) -> wgpu::Texture {
         let mut usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
         if samples == 1 {
@@ -204,7 +203,7 @@ impl Gpu {
         self.device.create_bind_group(&descriptor)
     }
 
-    /// Submits `encoder`; what reads `texture` after it.
+    /// Submits `encoder`; returns the read-back of `texture` after it.
     pub(crate) fn submit(
         &self,
         mut encoder: wgpu::CommandEncoder,
@@ -232,10 +231,10 @@ impl Gpu {
     }
 }
 
-/// Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
+/// Drivers have threads and locks that a forked process lacks: waiting for them would never end.
 ///
 /// # Errors
-/// That this process was forked from one that has used graphics.
+/// If this process was forked from one that has used graphics.
 fn check_process() -> std::result::Result<(), String> {
     static PROCESS: OnceLock<u32> = OnceLock::new();
     if *PROCESS.get_or_init(process) == process() {
@@ -244,7 +243,7 @@ fn check_process() -> std::result::Result<(), String> {
     Err("graphics were in use before this process was forked".into())
 }
 
-/// A texture on its way back.
+/// A texture being read back.
 #[derive(Debug)]
 pub(crate) struct Reading {
     gpu: Gpu,
@@ -258,14 +257,14 @@ impl Reading {
     /// Its bytes, rows without padding.
     ///
     /// # Errors
-    /// What the adapter has reported.
+    /// The adapter's failure report.
     pub(crate) async fn bytes(self) -> Result<Vec<u8>> {
         let Self { gpu, buffer, row, padded } = self;
         let failed = |what: &str| Error::Computation(format!("reading a frame back: {what}"));
         let (sender, receiver) = oneshot::channel();
         // The receiver outlives the callback unless this has returned with an error; then nobody waits.
         buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
-        // A browser does it by itself.
+        // A browser polls by itself.
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e.to_string()))?;
         match receiver.await {
             Ok(Ok(())) => {}
@@ -280,7 +279,7 @@ impl Reading {
     }
 }
 
-/// A render pass over one texture that starts from `clear`, or from what is there.
+/// A render pass over one texture that starts from `clear`, or from the existing content.
 pub(crate) fn color_pass<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     view: &wgpu::TextureView,
@@ -307,7 +306,8 @@ pub(crate) fn attachment<'a>(
 pub(crate) mod tests {
     use super::*;
 
-    /// An adapter of its own. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
+    /// A separate adapter. Without one: a failure if ENDOWIRE_REQUIRE_GPU=1 demands it, otherwise `None` and a
+    /// message.
     pub(crate) fn opened() -> Option<Gpu> {
         match pollster::block_on(Gpu::request(wgpu::Features::FLOAT32_BLENDABLE, true)) {
             Ok(gpu) => Some(gpu),

@@ -1,15 +1,16 @@
 //! Fluoroscopic frames through wgpu: signed depth by rasterisation.
 //!
-//! Faces are added into a float target, minus their distance along the ray where they face the source and
-//! plus where they do not; what remains is the length inside (see `cpu/wall.rs`). Distances are taken from
-//! the plane through the isocentre across the beam: being constant along a ray, the shift cancels in the sum,
-//! and f32 keeps its digits for millimetres rather than for the 750 mm before them.
+//! Faces are added into a float target, minus their distance along the ray where they face the source and plus where
+//! they do not; the sum is the length inside (see `cpu/wall.rs`). Distances are measured from the plane through the
+//! isocentre across the beam: being constant along a ray, the shift cancels in the sum, and f32 has its digits for
+//! millimetres rather than for the 750 mm before them.
 //!
-//! **Which pixels a triangle covers is the shader's to say**, by the rules of `cpu/raster.rs` on the same corners. An adapter's own rasteriser
-//! rounds corners to 1/256 of a pixel or less finely, which moves silhouettes: a ray then meets a rib or does not. So the adapter draws
-//! rectangles of whole pixels, and each of their pixels asks the edge functions: in f32 where that tells their sign, else in integers, exactly.
+//! **The shader decides which pixels a triangle covers**, by the rules of `cpu/raster.rs` on the same corners. An
+//! adapter's own rasteriser rounds corners to 1/256 of a pixel or coarser, which moves silhouettes: a ray then hits a
+//! rib or does not. So the adapter draws rectangles of whole pixels, and each pixel evaluates the edge functions: in
+//! f32 where that determines their sign, otherwise exactly in integers.
 //!
-//! Devices are few pixels, and cast by the processor (`cpu/cells.rs`).
+//! Devices cover few pixels, and are cast by the processor (`cpu/cells.rs`).
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -25,25 +26,27 @@ use crate::engine::PathEngine;
 use crate::gpu::context::{Gpu, Reading, color_pass};
 
 const PATH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
-/// Corners farther from the picture's than this are drawn there, pixels: products of the shader's integers fit.
+/// Largest distance of corners from the image, pixels, to which farther ones are clamped: the shader's integer
+/// products must not overflow.
 const FARTHEST_PX: f64 = 32768.0;
 
-/// A triangle as its pixels need it, its corners from left to right, and those above each other downwards.
+/// A triangle in the shader's format, its corners from left to right, and those above each other downwards.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Facet {
-    /// First column and row that it may cover, and those behind the last.
+    /// First column and row that it may cover, and one past the last.
     frame: [u16; 4],
-    /// Column and row of each corner, and what is left of them in parts of the grid.
+    /// Column and row of each corner, and their fractions in units of the grid.
     corners: [[i32; 4]; 3],
     /// Inverse depth of each corner from the source.
     inverse: [f32; 3],
-    /// Depth of each corner from the isocentre, negative where rays enter; then the turn of the ordered corners.
+    /// Depth of each corner from the isocentre, negative where rays enter; then the orientation of the ordered
+    /// corners.
     depths: [f32; 4],
 }
 
 impl Facet {
-    /// None where it covers no pixel.
+    /// `None` if it covers no pixel.
     fn new(corners: [([f64; 2], f64); 3], view: &CArm) -> Option<Self> {
         let triangle = ScreenTriangle::on_grid(corners.map(|(pixel, _)| pixel))?;
         let [xs, ys] = triangle.frame(view.size_px());
@@ -68,7 +71,7 @@ impl Facet {
     }
 }
 
-/// The shader's view of a C-arm.
+/// The shader's uniform for a C-arm.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct ViewUniform {
@@ -87,7 +90,7 @@ impl ViewUniform {
     }
 }
 
-/// Pipeline, and a target for each size of picture.
+/// Pipeline, and a target for each image size.
 #[derive(Debug)]
 pub(crate) struct GpuPaths {
     gpu: Gpu,
@@ -101,7 +104,7 @@ impl GpuPaths {
         Self { gpu: gpu.clone(), draw_wall, targets: HashMap::new() }
     }
 
-    /// Draws a mesh into a target of the size of `view`; what reads the lengths in it.
+    /// Draws a mesh into a target of the size of `view`; returns the read-back of its lengths.
     pub(crate) fn submit(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Reading> {
         let facets = facets(view, mesh);
         let (gpu, pipeline) = (&self.gpu, &self.draw_wall);
@@ -138,7 +141,7 @@ impl PathEngine for GpuPaths {
     }
 }
 
-/// The triangles of a mesh that cover a pixel, in its order.
+/// The triangles of a mesh that cover a pixel, in order.
 fn facets(view: &CArm, mesh: &SurfaceMesh) -> Vec<Facet> {
     let seen = seen(view, mesh);
     let facet = |corners: &[u32; 3]| Facet::new(corners.map(|corner| seen[corner as usize]), view);

@@ -1,7 +1,8 @@
-//! A graphics processor that answers later, as that of a browser does: what stays in the beam is asked for in one go, and waited for.
+//! A graphics processor with asynchronous results, as in a browser: the static anatomy is requested at once, and
+//! awaited.
 //!
-//! What asks is the code that casts rays at once ([`Anatomy::new`]): once with an engine that submits all of it and gives nothing back, and again
-//! with one that has the answers.
+//! The requesting code is that which casts rays synchronously ([`Anatomy::new`]): run once with an engine that
+//! submits everything and returns nothing, and again with one that has the results.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -19,7 +20,7 @@ use crate::scene::Setup;
 use crate::spec::CameraSpec;
 use crate::three_d::{Camera, ContactView, annotate};
 
-/// An open graphics processor for those who wait for its answers ([`Renderer::prepare_on`](crate::Renderer::prepare_on)).
+/// An open graphics processor with asynchronous results ([`Renderer::prepare_on`](crate::Renderer::prepare_on)).
 #[derive(Debug)]
 pub struct Graphics {
     gpu: Gpu,
@@ -30,7 +31,7 @@ impl Graphics {
     /// Opens the best adapter.
     ///
     /// # Errors
-    /// [`Error::Computation`] with the reason why there is none that fits.
+    /// [`Error::Computation`] with the reason why there is no suitable one.
     pub async fn open() -> Result<Self> {
         let gpu = Gpu::request(wgpu::Features::FLOAT32_BLENDABLE, true).await.map_err(Error::Computation)?;
         let paths = Mutex::new(GpuPaths::new(&gpu));
@@ -43,7 +44,7 @@ impl Graphics {
         self.gpu.name()
     }
 
-    /// What stays in the beam of a set-up.
+    /// The static anatomy of a set-up.
     pub(crate) async fn anatomy(&self, setup: &Setup, c_arm: &CArm) -> Result<Anatomy> {
         self.check_size(c_arm.size_px().map(|n| n * SUBRAYS))?;
         let mut asking = Asking { graphics: self, readings: vec![] };
@@ -55,7 +56,7 @@ impl Graphics {
         Anatomy::new(setup, c_arm, SUBRAYS, &mut Answered(answers.into_iter()))
     }
 
-    /// What draws a set-up in 3D.
+    /// The 3D engine for a set-up.
     pub(crate) fn three_d(&self, camera: &Camera, wall: &SurfaceMesh) -> Result<Box<GpuView3d>> {
         self.check_size(camera.size_px)?;
         Ok(Box::new(GpuView3d::new(&self.gpu, camera, wall)))
@@ -70,7 +71,7 @@ impl Graphics {
     }
 }
 
-/// A 3D frame that is being drawn.
+/// A 3D frame being drawn.
 #[derive(Debug)]
 pub struct Drawing {
     pub(crate) reading: Reading,
@@ -83,7 +84,7 @@ impl Drawing {
     /// The frame.
     ///
     /// # Errors
-    /// [`Error::Computation`] with what the graphics processor has reported.
+    /// [`Error::Computation`] with the graphics processor's report.
     pub async fn image(self) -> Result<Image> {
         let mut image = GpuView3d::image(&self.camera, self.reading.bytes().await?);
         annotate(&mut image, &self.camera, &self.spec, &self.contacts);
@@ -91,7 +92,7 @@ impl Drawing {
     }
 }
 
-/// Submits what is asked for; nothing is known yet.
+/// Submits requests; no results yet.
 struct Asking<'a> {
     graphics: &'a Graphics,
     readings: Vec<Reading>,
@@ -105,7 +106,7 @@ impl PathEngine for Asking<'_> {
     }
 }
 
-/// Gives the answers in the order in which they were asked for.
+/// Returns the results in the order of the requests.
 struct Answered(std::vec::IntoIter<Vec<f32>>);
 
 impl PathEngine for Answered {
@@ -130,7 +131,7 @@ mod tests {
             size_px: [96; 2],
             bits: 8,
             backend: Backend::Cpu,
-            // A quantum more or less is no difference of the rays.
+            // Without noise, so that only rays can differ.
             detector: DetectorSpec { noise: false, ..DetectorSpec::default() },
             ..ViewSpec::default()
         };
@@ -155,7 +156,7 @@ mod tests {
             seen.data().iter().zip(other.data()).map(|(a, b)| a.abs_diff(*b)).max().unwrap()
         };
         assert!(apart(&mut renderer(1.0)) <= 2);
-        // The twin: another place differs.
+        // Counter-check: another position differs.
         assert!(apart(&mut renderer(1.2)) > 50);
     }
 

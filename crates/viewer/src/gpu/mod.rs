@@ -13,10 +13,10 @@ use fluoro::GpuPaths;
 pub use later::{Drawing, Graphics};
 pub(crate) use view3d::GpuView3d;
 
-/// Opens an adapter and prepares the views of `setup`; software adapters only where `software` allows them.
+/// Opens an adapter and prepares the views of `setup`; software adapters only if `software` allows them.
 ///
 /// # Errors
-/// Why there is no fitting adapter, as a clause.
+/// Why there is no suitable adapter, as a clause.
 pub(crate) fn engines(setup: &Setup, software: bool) -> Result<Engines, String> {
     let mut features = wgpu::Features::empty();
     if setup.c_arm.is_some() {
@@ -64,7 +64,7 @@ mod tests {
             prepared(&Setup::new(&spec, &wall).unwrap(), gpu).map(drop)
         };
         gpu.largest_side = 64;
-        // Fluoroscopy casts two rays a pixel in each direction.
+        // Fluoroscopy casts two rays per pixel in each direction.
         for (view, fits, too_large, needed) in [(View::Fluoro, 32, 33, 66), (View::ThreeD, 64, 65, 65)] {
             prepared(view, fits, &gpu).unwrap();
             let reason = prepared(view, too_large, &gpu).unwrap_err();

@@ -8,16 +8,16 @@ use crate::gpu::context::{Gpu, Reading, attachment, color_pass};
 use crate::output::{Image, PixelFormat};
 use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
-/// The only count every adapter has.
+/// The only sample count supported by every adapter.
 const SAMPLES: u32 = 4;
 const COLOUR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Weighted sum of colours and weights.
 const SUM: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Product of what fragments let through.
+/// Product of the fragments' transparencies.
 const THROUGH: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 
-/// What draws any wall from anywhere.
+/// Pipelines for any wall and camera.
 #[derive(Debug, Clone)]
 pub(crate) struct Pipelines {
     device: wgpu::RenderPipeline,
@@ -89,7 +89,7 @@ impl GpuView3d {
         }
     }
 
-    /// Draws a frame; what reads it.
+    /// Draws a frame; returns its read-back.
     pub(crate) fn submit(&self, solids: &Solids) -> Result<Reading> {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.draw_devices(&mut encoder, &solid_triangles(&self.camera, solids));
@@ -136,7 +136,7 @@ impl GpuView3d {
                 Some(attachment(sum, Some(resolved_sum), wgpu::Color::TRANSPARENT)),
                 Some(attachment(through, Some(resolved_through), wgpu::Color::WHITE)),
             ],
-            // Without operations the depth buffer is read, not written.
+            // Without operations the depth buffer is only read.
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: depth,
                 depth_ops: None,
@@ -150,7 +150,7 @@ impl GpuView3d {
         pass.draw(0..(self.wall.size() / size_of::<Vertex>() as u64) as u32, 0..1);
     }
 
-    /// The picture that was read.
+    /// The image that was read back.
     pub(crate) fn image(camera: &Camera, data: Vec<u8>) -> Image {
         Image::new(camera.size_px[0], camera.size_px[1], PixelFormat::Rgba8, data)
     }

@@ -1,6 +1,6 @@
-//! Linear attenuation coefficients of what can be in the way of the rays.
+//! Linear attenuation coefficients of materials in the beam.
 //!
-//! Values of xraylib 4.3 (see [`table`]) from 15 to 125 keV, K-edges included.
+//! Values of xraylib 4.3 (see [`table`]) from 15 to 125 keV, including K-edges.
 
 pub(crate) mod table;
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use table::ATTENUATION;
 
-/// What is in the way of the rays.
+/// Materials in the beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(try_from = "String", into = "&'static str")]
 #[non_exhaustive]
@@ -47,7 +47,7 @@ pub enum Material {
     CaesiumIodide,
 }
 
-/// Names in scene files, which are also the table's.
+/// Names in scene files, which are also those of the table.
 const NAMES: [(Material, &str); 14] = [
     (Material::SoftTissue, "soft_tissue"),
     (Material::Blood, "blood"),

@@ -1,7 +1,8 @@
-//! The tables of attenuation coefficients and anode spectra, read once from the files beside this one.
+//! The tables of attenuation coefficients and anode spectra, read once from the files in this folder.
 //!
-//! Attenuation between the entries follows power laws of the energy nearly, so ln μ is interpolated linearly in ln E. An
-//! energy that stands twice is a K-edge: the interval before it ends at the lower value, the one after it begins at the upper.
+//! Between the entries attenuation nearly follows power laws of the energy, so ln μ is interpolated linearly in ln E.
+//! A repeated energy is a K-edge: the interval before it ends at the lower value, the one after it begins at the
+//! upper.
 
 use std::sync::LazyLock;
 
@@ -20,7 +21,7 @@ impl Table {
         let names: Vec<&str> = lines.next().unwrap_or_default().split(',').skip(1).collect();
         let mut table = Self { energies_kev: vec![], values: vec![vec![]; names.len()], names };
         for line in lines {
-            // The files are part of the program; a test reads every number of them.
+            // The files are part of the program; a test reads all of their numbers.
             let mut numbers = line.split(',').map(|word| word.parse().unwrap_or(f64::NAN));
             table.energies_kev.extend(numbers.next());
             table.values.iter_mut().zip(numbers).for_each(|(column, value)| column.push(value));
@@ -28,7 +29,7 @@ impl Table {
         table
     }
 
-    /// The column of that name.
+    /// The column with this name.
     pub(crate) fn column(&self, name: &str) -> Option<&[f64]> {
         self.names.iter().position(|n| *n == name).map(|i| self.values[i].as_slice())
     }
@@ -53,7 +54,7 @@ impl Table {
         libm::exp(libm::log(column[i]) * (1.0 - w) + libm::log(column[i + 1]) * w)
     }
 
-    /// The K-edges: energies that stand twice.
+    /// The K-edges: repeated energies.
     pub(crate) fn edges_kev(&self) -> Vec<f64> {
         self.energies_kev.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
     }
@@ -63,7 +64,7 @@ impl Table {
 pub(crate) static ATTENUATION: LazyLock<Table> =
     LazyLock::new(|| Table::parse(include_str!("data/attenuation.csv")));
 
-/// Mass energy-absorption coefficient of dry air in cm²/g, by which dose is told in air kerma.
+/// Mass energy-absorption coefficient of dry air in cm²/g, which defines air kerma.
 pub(crate) static AIR: LazyLock<Table> = LazyLock::new(|| Table::parse(include_str!("data/air.csv")));
 
 /// Photons of a tungsten anode in bins that end at K-edges, by peak voltage, unfiltered.

@@ -1,4 +1,5 @@
-//! Moving pictures: animated PNG, lossless, 8 or 16 bits, read by browsers; GIF, 256 colours, read by everything; films with the feature `mp4`.
+//! Animations: animated PNG, lossless, 8 or 16 bits, supported by browsers; GIF, 256 colours, supported everywhere;
+//! films with the feature `mp4`.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -11,12 +12,13 @@ use endowire_core::{Error, Result};
 use super::film::Film;
 use super::{Image, Pace, PixelFormat};
 
-/// Of so many pixels one is looked at to choose 256 colours.
+/// One in this many pixels is sampled to choose 256 colours.
 const SAMPLED: i32 = 30;
-/// Bits of each colour by which pixels are distinguished when the nearest of the 256 is looked for: once for each, not for each pixel.
+/// Bits per colour component by which pixels are grouped in the search for the nearest of the 256: it is made once
+/// per group.
 const BITS: u32 = 6;
 
-/// Writes frames into one moving picture as they come.
+/// Writes frames into an animation as they come.
 pub struct Animation {
     path: PathBuf,
     writer: Writer,
@@ -25,7 +27,7 @@ pub struct Animation {
     pushed: usize,
 }
 
-/// What a picture is written with.
+/// The encoder.
 enum Writer {
     Png(png::Writer<BufWriter<File>>),
     Gif(gif::Encoder<BufWriter<File>>),
@@ -33,7 +35,7 @@ enum Writer {
     Film(Box<Film>),
 }
 
-/// What a file is by its extension.
+/// Kinds of files by extension.
 #[derive(Clone, Copy)]
 enum Kind {
     Png,
@@ -49,10 +51,11 @@ impl std::fmt::Debug for Animation {
 }
 
 impl Animation {
-    /// Whether a file of this name can be one, by its extension: `png`, `apng` or `gif`, and `mp4` with the feature of that name.
+    /// Checks that the extension of a file is that of an animation: `png`, `apng` or `gif`, and `mp4` with the
+    /// feature of that name.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming what can be.
+    /// [`Error::Parameter`] naming the supported ones.
     pub fn check_name(path: &Path) -> Result<()> {
         kind(path).map(drop)
     }
@@ -104,7 +107,7 @@ impl Animation {
         self.pushed += 1;
         let written = match &mut self.writer {
             Writer::Png(writer) => {
-                // In thousandths of a second.
+                // In milliseconds.
                 let delay = (1000.0 * stays_s).round().clamp(1.0, 65_535.0) as u16;
                 let delayed = writer.set_frame_delay(delay, 1000);
                 delayed.and_then(|()| writer.write_image_data(image.data())).map_err(std::io::Error::other)
@@ -120,10 +123,10 @@ impl Animation {
         written.map_err(|error| Error::file(&self.path, error))
     }
 
-    /// Ends the file; it must have all its frames.
+    /// Completes the file; it must have all its frames.
     ///
     /// # Errors
-    /// [`Error::File`] where that fails.
+    /// [`Error::File`] if that fails.
     pub fn finish(self) -> Result<()> {
         let Self { path, writer, .. } = self;
         let finished = match writer {
@@ -139,7 +142,7 @@ impl Animation {
     }
 }
 
-/// What a name stands for.
+/// The kind of file for a name.
 fn kind(path: &Path) -> Result<Kind> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match extension.as_str() {
@@ -151,7 +154,7 @@ fn kind(path: &Path) -> Result<Kind> {
     }
 }
 
-/// What to do about a name that stands for nothing that is written.
+/// A correction for an unsupported extension.
 fn unknown(extension: &str) -> &'static str {
     match extension {
         "mp4" => {

@@ -1,8 +1,9 @@
-//! X-ray angiographic images as DICOM: one multi-frame file a plane, with the geometry of the C-arm.
+//! X-ray angiographic images as DICOM: one multi-frame file per plane, with the geometry of the C-arm.
 //!
-//! The object follows the XA Image IOD (DICOM PS3.3, A.14), explicit VR little endian. Frames are as displayed, so their intensities
-//! have no physical meaning (`DISP`), and no modality LUT belongs to them; subtracted ones are derived. Identifiers are made from
-//! pixels and geometry, so the same frames give the same file and others never its name; a simulation has no date of study.
+//! The object follows the XA Image IOD (DICOM PS3.3, A.14), explicit VR little endian. Frames are as displayed, so
+//! their intensities have no physical meaning (`DISP`), and there is no modality LUT; subtracted ones are derived.
+//! Identifiers are hashes of pixels and geometry, so equal frames give equal files and different ones different
+//! identifiers; a simulation has no study date.
 
 use std::path::Path;
 
@@ -18,26 +19,26 @@ use crate::fingerprint::fingerprint;
 use crate::spec::Mode;
 use crate::xray::{Exposure, Pulse};
 
-/// What a file of angiographic frames tells beside the pixels.
+/// Metadata of a file of angiographic frames.
 #[derive(Debug, Clone)]
 pub struct Angiogram<'a> {
-    /// The geometry of all frames, or of the first where the C-arm turns.
+    /// The geometry of all frames, or of the first if the C-arm turns.
     pub c_arm: &'a CArm,
-    /// By how much it has turned towards LAO from one frame to the next.
+    /// Rotation towards LAO from one frame to the next.
     pub turn_deg: f64,
-    /// How frames are exposed, the first where the C-arm turns.
+    /// The exposure of the frames, or of the first if the C-arm turns.
     pub exposure: Exposure,
-    /// How frames follow each other.
+    /// The times of the frames.
     pub pace: Pace,
-    /// What is shown.
+    /// The display mode.
     pub mode: Mode,
     /// Whether contrast medium is injected.
     pub contrast: bool,
-    /// What the series is called.
+    /// Name of the series.
     pub description: &'a str,
 }
 
-/// Which plane of a pair a file is, with the number of the other's content.
+/// The plane of a pair in a file, with the hash of the other's content.
 #[derive(Debug, Clone, Copy)]
 enum Plane {
     Single,
@@ -85,7 +86,7 @@ impl Angiogram<'_> {
         file.write_to_file(path).map_err(|e| failed(&e))
     }
 
-    /// A number of pixels, geometry and what else is given.
+    /// A hash of pixels, geometry and other data.
     fn content(&self, frames: &[Image]) -> u128 {
         let opening = self.c_arm.opening_px().into_iter().flatten();
         let [current_ma, pulse_ms] = self.exposure.pulse.map_or([0.0; 2], |p| [p.current_ma, p.pulse_ms]);
@@ -182,7 +183,7 @@ impl Angiogram<'_> {
             put(object, tag, VR::DS, &value);
         }
         if self.turn_deg != 0.0 {
-            // One value: the same from each frame to the next.
+            // One value: the same between all frames.
             put(object, tags::POSITIONER_PRIMARY_ANGLE_INCREMENT, VR::DS, &decimal(self.turn_deg));
             put(object, tags::POSITIONER_SECONDARY_ANGLE_INCREMENT, VR::DS, "0");
         }
@@ -235,7 +236,7 @@ impl Angiogram<'_> {
     /// Cine and multi-frame.
     fn time(&self, object: &mut InMemDicomObject, frames: usize) {
         put(object, tags::NUMBER_OF_FRAMES, VR::IS, &frames.to_string());
-        // Whole numbers: less than one a second cannot be told.
+        // Whole numbers: rates below one per second cannot be represented.
         let rate = 1.0 / self.pace.mean_s();
         if rate >= 1.0 {
             let rate = rate.round().to_string();
@@ -281,7 +282,7 @@ fn identify(object: &mut InMemDicomObject, own: u128, plane: Plane) {
     }
 }
 
-/// Pixels, and the window that shows them as they are.
+/// Pixels, and the window that displays them unchanged.
 fn pixels(object: &mut InMemDicomObject, frames: &[Image], first: &Image) {
     let sixteen = first.format() == PixelFormat::Gray16;
     let bits: u16 = if sixteen { 16 } else { 8 };
@@ -326,7 +327,8 @@ fn uid(number: u128) -> String {
     format!("2.25.{number}")
 }
 
-/// Times of frames after those before, ms: the first is after none. None of frames that are even, or so many that the element has no room.
+/// Times of frames after the previous one, ms: 0 for the first. `None` for equally spaced frames, or if there are too
+/// many for the element.
 fn increments(intervals_s: &[f64]) -> Option<String> {
     // To the microsecond.
     let each = intervals_s.iter().map(|interval| decimal((1e6 * interval).round() / 1e3));

@@ -71,7 +71,7 @@ fn frames(format: PixelFormat) -> Vec<Image> {
     vec![frame(1), frame(2), frame(3)]
 }
 
-/// Errors that the validator of dicom3tools prints; `None` where it is not installed.
+/// Errors reported by the validator of dicom3tools; `None` if it is not installed.
 fn errors(path: &Path) -> Option<Vec<String>> {
     let output = std::process::Command::new("dciodvfy").arg(path).output().ok()?;
     let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
@@ -112,7 +112,7 @@ fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
     assert!(read.element(tags::FRAME_TIME_VECTOR).is_err() && float(tags::FRAME_TIME) == 80.0);
     assert_eq!((float(tags::X_RAY_TUBE_CURRENT), float(tags::EXPOSURE_INU_AS)), (123.0, 926.0));
     paths.push(turning);
-    // Frames that are not even, and less than one a second.
+    // Unequally spaced frames, and less than one per second.
     let uneven = folder.path().join("uneven.dcm");
     let pace = Pace::of(&[1.0, 2.2, 5.2], 15.0);
     Angiogram { pace, ..angiogram(&arm_a, Mode::Fluoro) }.write(&uneven, &pixels).unwrap();
@@ -133,7 +133,7 @@ fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
             }
         }
     }
-    // The twin: a file that does not say what image it is.
+    // Counter-check: a file that does not specify its image type.
     let mut object = planes[0].object(&pixels, &pixels[0], Plane::Single);
     object.remove_element(tags::IMAGE_TYPE);
     let meta = FileMetaTableBuilder::new()

@@ -10,12 +10,12 @@ use openh264::formats::{RgbSliceU8, YUVBuffer};
 
 use super::{Image, PixelFormat};
 
-/// Time units a second.
+/// Time units per second.
 const TIMESCALE: u32 = 90_000;
-/// Kinds of units of a stream: parameters of the sequence and of pictures.
+/// Types of units of a stream: parameters of the sequence and of pictures.
 const SPS: u8 = 7;
 const PPS: u8 = 8;
-/// Unity as numbers of 16 + 16 bits.
+/// One as a 16.16 fixed-point number.
 const ONE: u32 = 0x0001_0000;
 
 /// Writes frames into a film as they come.
@@ -23,7 +23,7 @@ pub(super) struct Film {
     file: BufWriter<File>,
     encoder: Encoder,
     size: [usize; 2],
-    /// Where the data begins, after what tells its length.
+    /// Start of the data, after their length field.
     begin: u64,
     sps: Vec<u8>,
     pps: Vec<u8>,
@@ -33,7 +33,7 @@ pub(super) struct Film {
 /// A frame.
 struct Sample {
     bytes: u32,
-    /// Whether it needs none before it.
+    /// Whether it is a key frame.
     alone: bool,
     ticks: u32,
 }
@@ -44,7 +44,7 @@ impl Film {
         let size = [like.width(), like.height()].map(|side| side.next_multiple_of(2) as usize);
         let config = EncoderConfig::new()
             .max_frame_rate(FrameRate::from_hz(frames_per_s as f32))
-            // All frames of one quality: the noise of quanta would use up any rate.
+            // Constant quality: the noise of photons would use up any bit rate.
             .rate_control_mode(RateControlMode::Off)
             .skip_frames(false)
             // The same film on every machine.
@@ -58,7 +58,7 @@ impl Film {
         Ok(Self { file, encoder, size, begin, sps: vec![], pps: vec![], samples: vec![] })
     }
 
-    /// Adds a frame that stays for a time.
+    /// Adds a frame with a duration.
     pub(super) fn push(&mut self, image: &Image, stays_s: f64) -> Result<()> {
         let rgb = even_rgb(image, self.size);
         let source = YUVBuffer::from_rgb8_source(RgbSliceU8::new(&rgb, (self.size[0], self.size[1])));
@@ -67,7 +67,7 @@ impl Film {
         let mut bytes = 0;
         for layer in (0..stream.num_layers()).filter_map(|k| stream.layer(k)) {
             for unit in (0..layer.nal_count()).filter_map(|k| layer.nal_unit(k)) {
-                // After the start code of three or four bytes; a file has lengths in its place.
+                // After the start code of three or four bytes; a file has lengths instead.
                 let unit = unit.iter().position(|byte| *byte == 1).map_or(unit, |k| &unit[k + 1..]);
                 match unit.first().map(|head| head & 31) {
                     Some(SPS) => self.sps = unit.to_vec(),
@@ -96,7 +96,7 @@ impl Film {
         self.file.flush()
     }
 
-    /// What the file tells of its data.
+    /// The description of the data in the file.
     fn movie(&self) -> Vec<u8> {
         let ticks = self.samples.iter().fold(0_u32, |sum, sample| sum.saturating_add(sample.ticks));
         let [width, height] = self.size.map(|side| side as u32);
@@ -120,7 +120,7 @@ impl Film {
         boxed(b"moov", &[&boxed(b"mvhd", &[&mvhd]), &trak])
     }
 
-    /// How the track is coded, and where its frames are: all of them in one chunk.
+    /// The coding of the track, and the positions of its frames: all of them in one chunk.
     fn samples_table(&self) -> Vec<u8> {
         let [width, height] = self.size.map(|side| side as u32);
         let profile = self.sps.get(1..4).unwrap_or(&[66, 192, 30]);
@@ -148,7 +148,7 @@ impl Film {
         let alone: Vec<u32> =
             (1..).zip(&self.samples).filter(|(_, sample)| sample.alone).map(|(number, _)| number).collect();
         let sizes: Vec<u32> = self.samples.iter().map(|sample| sample.bytes).collect();
-        // Frames that stay as long one after the other, and how long.
+        // Runs of consecutive frames with equal durations.
         let runs: Vec<[u32; 2]> = self
             .samples
             .chunk_by(|a, b| a.ticks == b.ticks)
@@ -166,18 +166,18 @@ impl Film {
     }
 }
 
-/// A part of a file: its length, its name, what is in it.
+/// A box of the file: its length, name and content.
 fn boxed(name: &[u8; 4], content: &[&[u8]]) -> Vec<u8> {
     let length = 8 + content.iter().map(|part| part.len()).sum::<usize>();
     [&(length as u32).to_be_bytes()[..], name, &content.concat()].concat()
 }
 
-/// Numbers as a file has them.
+/// Numbers in big-endian bytes.
 fn words(numbers: &[&[u32]]) -> Vec<u8> {
     numbers.iter().flat_map(|part| part.iter()).flat_map(|number| number.to_be_bytes()).collect()
 }
 
-/// Red, green and blue of a picture, with its last column and row once more where that makes them even.
+/// RGB values of an image, with its last column and row repeated if its size is odd.
 fn even_rgb(image: &Image, [width, height]: [usize; 2]) -> Vec<u8> {
     let mut rgb = Vec::with_capacity(3 * width * height);
     for y in 0..height as u32 {

@@ -1,4 +1,4 @@
-//! Finished frames: pictures, row by row from the top left.
+//! Finished frames: images, row by row from the top left.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter};
@@ -78,7 +78,7 @@ impl Image {
         self.data.get(start..start + self.format.bytes())
     }
 
-    /// Fills a rectangle, what of it is in the picture, from its upper left corner; grey pictures take the red.
+    /// Fills the visible part of a rectangle, given its upper left corner; grey images use the red value.
     pub(crate) fn fill(&mut self, [left, top]: [u32; 2], size_px: [u32; 2], rgba: [u8; 4]) {
         let bytes = self.format.bytes();
         let ink = if self.format == PixelFormat::Rgba8 { rgba } else { [rgba[0]; 4] };
@@ -90,7 +90,7 @@ impl Image {
         }
     }
 
-    /// Both pictures side by side as RGBA, the lower one filled up with white.
+    /// Both images side by side as RGBA, the lower one padded with white.
     pub fn beside(&self, right: &Self) -> Self {
         let (width, height) = (self.width + right.width, self.height.max(right.height));
         let mut data = Vec::with_capacity(4 * width as usize * height as usize);
@@ -109,10 +109,10 @@ impl Image {
         Self { width, height, format: PixelFormat::Rgba8, data }
     }
 
-    /// Writes the picture as a PNG file.
+    /// Writes the image as a PNG file.
     ///
     /// # Errors
-    /// [`Error::File`] naming `path` when the file cannot be written.
+    /// [`Error::File`] naming `path` if the file cannot be written.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
         let failed = |error| Error::file(path, std::io::Error::other(error));
@@ -121,10 +121,10 @@ impl Image {
         writer.finish().map_err(failed)
     }
 
-    /// Reads what [`Image::write_png`] has written.
+    /// Reads a file written by [`Image::write_png`].
     ///
     /// # Errors
-    /// [`Error::File`] naming `path` when it cannot be read, or is a PNG of another kind.
+    /// [`Error::File`] naming `path` if it cannot be read, or is a PNG of another kind.
     pub fn read_png(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let failed = |error: String| Error::file(path, std::io::Error::other(error));
@@ -143,7 +143,7 @@ impl Image {
         Ok(Self::new(info.width, info.height, format, data))
     }
 
-    /// An encoder for pictures like this one.
+    /// An encoder for images of this format.
     pub(super) fn png_encoder(&self, path: &Path) -> Result<png::Encoder<'static, BufWriter<File>>> {
         let file = File::create(path).map_err(|source| Error::file(path, source))?;
         let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
@@ -152,7 +152,7 @@ impl Image {
             PixelFormat::Gray16 => (png::ColorType::Grayscale, png::BitDepth::Sixteen),
             PixelFormat::Rgba8 => (png::ColorType::Rgba, png::BitDepth::Eight),
         };
-        // Noise hardly compresses: with the balanced mode a live frame and its file take twice the time.
+        // Noise hardly compresses: the balanced mode would double the time of a live frame and its file.
         encoder.set_compression(png::Compression::Fast);
         encoder.set_color(colour);
         encoder.set_depth(depth);

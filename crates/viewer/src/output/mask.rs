@@ -1,4 +1,4 @@
-//! Pixels of a frame that show one thing.
+//! The pixels of a frame that show one object.
 
 use super::{Image, PixelFormat};
 
@@ -10,7 +10,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// That of pixel numbers that rise, counted row by row.
+    /// From ascending pixel indices, counted row by row.
     pub(crate) fn new(size_px: [u32; 2], pixels: Vec<u32>) -> Self {
         Self { size_px, pixels }
     }
@@ -20,19 +20,19 @@ impl Mask {
         self.size_px
     }
 
-    /// Numbers of the pixels, counted row by row from the top left, rising.
+    /// Indices of the pixels, counted row by row from the top left, ascending.
     pub fn pixels(&self) -> &[u32] {
         &self.pixels
     }
 
-    /// As a picture of 8 bits: 255 where it is, 0 elsewhere.
+    /// As an image of 8 bits: 255 inside, 0 elsewhere.
     pub fn image(&self) -> Image {
         let mut data = vec![0; self.size_px.iter().map(|&n| n as usize).product()];
         self.pixels.iter().for_each(|&pixel| data[pixel as usize] = 255);
         Image::new(self.size_px[0], self.size_px[1], PixelFormat::Gray8, data)
     }
 
-    /// Left, top, width and height of the box around it, as of COCO; `None` of nothing.
+    /// Left, top, width and height of its bounding box, as in COCO; `None` if empty.
     pub fn bounds(&self) -> Option<[u32; 4]> {
         let width = self.size_px[0];
         let (first, last) = (self.pixels.first()? / width, self.pixels.last()? / width);
@@ -41,7 +41,8 @@ impl Mask {
         Some([left, first, right - left + 1, last - first + 1])
     }
 
-    /// Lengths of runs outside and inside in turn, down the columns from the left, as of COCO's uncompressed run lengths.
+    /// Alternating lengths of runs outside and inside, down the columns from the left, as in COCO's uncompressed run
+    /// lengths.
     pub fn run_lengths(&self) -> Vec<u32> {
         let [width, height] = self.size_px;
         let mut places: Vec<u32> = self.pixels.iter().map(|p| p % width * height + p / width).collect();

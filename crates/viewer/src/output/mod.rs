@@ -1,4 +1,4 @@
-//! What leaves the viewer: pictures, animations, DICOM files, labels for learning.
+//! Outputs of the viewer: images, animations, DICOM files, labels for machine learning.
 
 mod animation;
 mod dicom;

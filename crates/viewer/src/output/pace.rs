@@ -1,23 +1,23 @@
-//! How frames follow each other in time.
+//! The times of frames.
 
-/// Intervals that differ from their mean by less than this part of it are even.
+/// Relative deviation of intervals from their mean below which they count as equal.
 const EVEN: f64 = 1e-3;
 
 /// Times between frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pace {
     mean_s: f64,
-    /// From each frame to the next, where they differ.
+    /// Intervals between frames, if they differ.
     intervals_s: Vec<f64>,
 }
 
 impl Pace {
-    /// So many frames a second.
+    /// A constant number of frames per second.
     pub fn even(frames_per_s: f64) -> Self {
         Self { mean_s: 1.0 / frames_per_s, intervals_s: vec![] }
     }
 
-    /// That of frames at these moments; where they tell none, as one alone does, so many frames a second.
+    /// From the times of frames; for a single frame, this many frames per second.
     pub fn of(times_s: &[f64], frames_per_s: f64) -> Self {
         let intervals_s: Vec<f64> = times_s.windows(2).map(|pair| (pair[1] - pair[0]).max(0.0)).collect();
         let mean_s = intervals_s.iter().sum::<f64>() / intervals_s.len() as f64;
@@ -33,12 +33,12 @@ impl Pace {
         self.mean_s
     }
 
-    /// Times from each frame to the next; none where they are alike.
+    /// Intervals between frames; empty if they are equal.
     pub(super) fn intervals_s(&self) -> &[f64] {
         &self.intervals_s
     }
 
-    /// How long a frame stays: the last as long as frames do in the mean.
+    /// Duration of a frame: that of the last one is the mean.
     pub(super) fn stays_s(&self, frame: usize) -> f64 {
         self.intervals_s.get(frame).copied().unwrap_or(self.mean_s)
     }

@@ -1,8 +1,8 @@
-//! A generated body of closed surfaces: skin, bones and air. Drawn, not measured: it gives frames the background that eyes and
-//! networks expect, at adult sizes.
+//! A generated body of closed surfaces: skin, bones and air, at adult sizes. It is not anatomically exact: it gives
+//! frames the background that eyes and networks expect.
 //!
-//! Bone is a cortical shell around marrow in which a share is bone: its length on a ray is that of the outer surface less
-//! (1 − share) of the inner one.
+//! Bone is a cortical shell around marrow with a fraction of bone: its length on a ray is that of the outer surface
+//! minus (1 − fraction) of the inner one.
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
@@ -13,7 +13,7 @@ use crate::spec::TorsoSpec;
 
 /// Thickness of cortical shells, mm.
 const CORTEX_MM: f64 = 1.0;
-/// Share of bone in marrow: thoracic vertebrae have about 150 mg of mineral per cm³, a tenth of cortical bone.
+/// Fraction of bone in marrow: thoracic vertebrae have about 150 mg of mineral per cm³, a tenth of cortical bone.
 const MARROW_SHARE: f64 = 0.1;
 
 /// Closed surfaces of a body.
@@ -26,7 +26,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// Share of the marrow's length that is not bone.
+    /// Fraction of the marrow's length that is not bone.
     pub(crate) const NOT_BONE: f64 = 1.0 - MARROW_SHARE;
 
     /// A body around a vessel with the given lowest and highest coordinates.

@@ -10,17 +10,18 @@ use super::trunk::Trunk;
 const BRAIN_MM: [f64; 3] = [66.0, 84.0, 66.0];
 /// Thickness of the skull, mm.
 const SKULL_MM: f64 = 6.0;
-/// Height of the skull's middle above its base, mm.
+/// Height of the skull's centre above its base, mm.
 const ABOVE_BASE_MM: f64 = 52.0;
 
 impl Trunk {
-    /// The place at distances to the side, back and up from the middle of the skull's base, just above the first cervical vertebra.
+    /// The position at distances to the side, back and up from the middle of the skull's base, just above the first
+    /// cervical vertebra.
     fn cranial(&self, side: f64, back: f64, up: f64) -> Vec3 {
         let z = self.vertebra(-6) + 12.0;
         Vec3::new(self.spine[0] + side, self.spine_y(z) - 14.0 + back, z + up)
     }
 
-    /// Adds the bones of the head, all surfaces `inset` inside the bone's.
+    /// Adds the bones of the head, with all surfaces `inset` inside the bone's.
     pub(super) fn head(&self, mesh: &mut SurfaceMesh, inset: f64) {
         let brain = self.cranial(0.0, 0.0, ABOVE_BASE_MM + 8.0);
         let half = |more: f64| Vec3::from(BRAIN_MM.map(|half| half + more));
@@ -45,7 +46,7 @@ impl Trunk {
             for path in [&petrous[..], &cheek[..]] {
                 tube(mesh, &smooth(path, inset));
             }
-            // The rim of the eye.
+            // The rim of the orbit.
             let rim: Vec<(Vec3, f64)> = (0..=12)
                 .map(|k| {
                     let (s, c) = libm::sincos(std::f64::consts::TAU * f64::from(k) / 12.0);

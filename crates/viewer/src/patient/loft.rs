@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
-/// Corners of tubes.
+/// Number of corners of tubes.
 const TUBE_SIDES: usize = 14;
-/// Points between two given ones on a smooth curve.
+/// Number of points between two given ones on a smooth curve.
 const BETWEEN: usize = 6;
-/// Least radius of a tube: a tip.
+/// Smallest radius of a tube: a tip.
 const TIP_MM: f64 = 0.05;
 
-/// Adds a closed surface through rings of equally many points, counter-clockwise seen from the last ring.
+/// Adds a closed surface through rings with equal numbers of points, counter-clockwise seen from the last ring.
 pub(super) fn loft(mesh: &mut SurfaceMesh, rings: &[Vec<Vec3>]) {
     let first = mesh.vertices_mm.len() as u32;
     let sides = rings[0].len() as u32;
@@ -36,7 +36,7 @@ pub(super) fn loft(mesh: &mut SurfaceMesh, rings: &[Vec<Vec3>]) {
     }
 }
 
-/// Adds what `hollow` draws as a hollow: turned inside out.
+/// Adds the surfaces drawn by `draw` inside out, as a cavity.
 pub(super) fn hollow(mesh: &mut SurfaceMesh, draw: impl FnOnce(&mut SurfaceMesh)) {
     let first = mesh.triangles.len();
     draw(mesh);
@@ -79,11 +79,11 @@ pub(super) fn ellipsoid(mesh: &mut SurfaceMesh, centre: Vec3, half: Vec3) {
     loft(mesh, &(1..RINGS).map(ring).collect::<Vec<_>>());
 }
 
-/// A smooth curve through points with their radii (Catmull and Rom 1974), all made smaller by `inset`, with round ends.
+/// A smooth curve through points with their radii (Catmull and Rom 1974), all reduced by `inset`, with round ends.
 pub(super) fn smooth(points: &[(Vec3, f64)], inset: f64) -> Vec<(Vec3, f64)> {
     let last = points.len() as isize - 1;
     let at = |i: isize| points[i.clamp(0, last) as usize];
-    // Rings of a half ball beyond an end.
+    // Rings of a hemisphere beyond an end.
     let cap = |from: isize, to: isize| {
         let along = (at(to).0 - at(from).0).normalize();
         [0.5, 1.0, 1.45].map(|angle: f64| {

@@ -1,8 +1,9 @@
-//! Air in the body: lungs with their vessels, windpipe, and what stomach and colon hold.
+//! Air in the body: lungs with their vessels, trachea, stomach and colon.
 //!
-//! A lung is what is inside the chest's wall, outside heart, mediastinum and spine, above the diaphragm and below the dome of its
-//! tip. The limits are distances, blended where they meet, and the surface is found along rays from an axis inside; below, it turns
-//! inwards over the diaphragm, so that the lung ends in a thin edge behind and at the sides.
+//! A lung is the region inside the chest wall, outside heart, mediastinum and spine, above the diaphragm and below
+//! the dome of its apex. The limits are distances, blended where they meet, and the surface is found along rays from
+//! an axis inside; at the bottom it turns inwards over the diaphragm, so that the lung ends in a thin edge behind and
+//! at the sides.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,35 +17,35 @@ use super::trunk::{Trunk, step};
 const BLEND_MM: f64 = 9.0;
 /// Height of the diaphragm's dome over its edge at the side, mm.
 const DOME_MM: f64 = 42.0;
-/// Half axes of the heart and its middle from the middle of chest and diaphragm: left, forward, up, mm.
+/// Half axes of the heart, and its centre relative to the middle of chest and diaphragm: left, forward, up, mm.
 const HEART_MM: [[f64; 3]; 2] = [[58.0, 44.0, 50.0], [24.0, 24.0, 34.0]];
 /// Steps towards the surface from the axis, mm.
 const STRIDE_MM: f64 = 4.0;
-/// How often distances are averaged with their neighbours': what hides behind the heart ends smoothly.
+/// Number of times distances are averaged with their neighbours': the region behind the heart ends smoothly.
 const SMOOTHINGS: usize = 6;
-/// Corners of a ring, rings from the lung's edge to its tip, and rings over the diaphragm.
+/// Numbers of corners of a ring, of rings from the lung's edge to its apex, and of rings over the diaphragm.
 const SIDES: usize = 48;
 const RINGS: usize = 36;
 const DOME_RINGS: usize = 12;
-/// Generations of a lung's vessels, and the radii of the first and the thinnest, mm.
+/// Number of generations of a lung's vessels, and radii of the first and the thinnest, mm.
 const GENERATIONS: u32 = 6;
 const VESSELS_MM: [f64; 2] = [6.2, 0.8];
-/// Angle between a vessel and the two that it divides into.
+/// Angle between a vessel and its two branches.
 const FORK_RAD: f64 = 0.5;
-/// The golden angle: planes of forks turn by it.
+/// The golden angle, by which the planes of bifurcations are rotated.
 const TURN_RAD: f64 = 2.399_963;
 
-/// The larger of two distances, rounded where they are equal.
+/// The smooth maximum of two distances.
 fn blended(a: f64, b: f64) -> f64 {
     f64::midpoint(a + b, ((a - b).powi(2) + BLEND_MM * BLEND_MM).sqrt())
 }
 
-/// Distances averaged with those beside them in their ring and in the rings before and behind.
+/// Distances averaged with their neighbours in the ring and in the rings before and behind.
 fn smoothed(mut reaches: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     for _ in 0..SMOOTHINGS {
         let before = reaches.clone();
         let last = before.len() - 1;
-        // The tip stays where it is.
+        // The apex is fixed.
         for (i, ring) in reaches.iter_mut().enumerate().take(last - 1).skip(1) {
             for (k, reach) in ring.iter_mut().enumerate() {
                 let beside = before[i][(k + 1) % SIDES] + before[i][(k + SIDES - 1) % SIDES];
@@ -66,11 +67,11 @@ struct Lung<'a> {
 }
 
 impl Lung<'_> {
-    /// About how far a point is outside the lung's sides, mm; negative inside.
+    /// Approximate distance of a point outside the lung's sides, mm; negative inside.
     fn outside(&self, u: f64, y: f64, z: f64) -> f64 {
         let trunk = self.trunk;
         let ([wide, deep], middle) = trunk.chest_at(z);
-        // The tip is a dome below the ring of the first ribs.
+        // The apex is a dome below the ring of the first ribs.
         let tip = ((z - trunk.apex + 55.0) / 57.0).clamp(0.0, 0.999);
         let narrow = (1.0 - tip * tip).sqrt();
         let half = [(wide - 2.0) * narrow, (deep - 2.0) * narrow];
@@ -99,17 +100,17 @@ impl Lung<'_> {
         blended(blended(wall, between), blended(spine, heart))
     }
 
-    /// Height of the vessels' root.
+    /// Height of the hilum.
     fn hilum_z(&self) -> f64 {
         self.trunk.diaphragm + (0.53 + 0.03 * self.side) * self.trunk.chest()
     }
 
-    /// A point inside at a height: to the side and posterior.
+    /// An interior point at a height: to the side and posterior.
     fn axis(&self, z: f64) -> [f64; 2] {
         let ([wide, _], middle) = self.trunk.chest_at(z);
         let down = step(z, self.trunk.apex, self.trunk.diaphragm + 40.0);
         let inner = (self.mediastinum + 6.0).max(33.0);
-        // At the tip between mediastinum and wall; below behind the heart.
+        // At the apex between mediastinum and wall; below behind the heart.
         [inner + (0.42 + 0.1 * down) * (wide - inner), middle + 4.0 + 12.0 * down]
     }
 
@@ -123,8 +124,8 @@ impl Lung<'_> {
         steps.into_iter().find(|z| inside(*z)).unwrap_or(self.trunk.apex - 100.0)
     }
 
-    /// Distance of the surface from the axis at a height, in a direction (angle from the side towards the back): the first limit on
-    /// the way.
+    /// Distance of the surface from the axis at a height, in a direction (angle from the side towards the back): the
+    /// first limit on the ray.
     fn reach(&self, z: f64, angle: f64) -> f64 {
         let [u, y] = self.axis(z);
         let (s, c) = libm::sincos(angle);
@@ -146,11 +147,11 @@ impl Lung<'_> {
         self.dome - DOME_MM - 16.0 * s - 10.0 * c
     }
 
-    /// Rings over the diaphragm from the middle of its dome to the edge, then up to the tip.
+    /// Rings over the diaphragm from the middle of its dome to the edge, then up to the apex.
     fn rings(&self) -> Vec<Vec<Vec3>> {
         let top = self.top();
         let angle = |k: usize| TAU * k as f64 / SIDES as f64;
-        // Height and part of the distance from the axis of each point.
+        // Height, and fraction of the distance from the axis, of each point.
         let over = (1..=DOME_RINGS).map(|ring| ring as f64 / DOME_RINGS as f64).map(|part| {
             let at = |k: usize| {
                 let edge = self.edge(angle(k));
@@ -158,7 +159,7 @@ impl Lung<'_> {
             };
             (0..SIDES).map(at).collect::<Vec<_>>()
         });
-        // Closer together towards the tip, which is round.
+        // Closer together towards the apex, which is round.
         let up = (0..=RINGS).map(|ring| libm::sin(PI / 2.0 * ring as f64 / RINGS as f64)).map(|part| {
             let at = |k: usize| (self.edge(angle(k)) + (top - self.edge(angle(k))) * part, 1.0);
             (0..SIDES).map(at).collect::<Vec<_>>()
@@ -193,7 +194,7 @@ impl Lung<'_> {
         self.outside(u, point.y, point.z) < -5.0 && point.z > diaphragm + 6.0
     }
 
-    /// Adds the vessel that begins at a point, and those that it divides into, as long as they are inside.
+    /// Adds the vessel that starts at a point, and its branches, as long as they are inside.
     fn vessel(&self, mesh: &mut SurfaceMesh, start: Vec3, along: Vec3, normal: Vec3, generation: u32) {
         let part = f64::from(generation) / f64::from(GENERATIONS);
         let [thick, thin] = VESSELS_MM;
@@ -222,7 +223,7 @@ impl Lung<'_> {
 }
 
 impl Trunk {
-    /// Adds lungs, windpipe and the air below.
+    /// Adds lungs, trachea and the air below.
     pub(super) fn air(&self, mesh: &mut SurfaceMesh) {
         let carina = Vec3::new(self.spine[0], self.spine_y(self.apex) - 40.0, self.apex - 85.0);
         for (side, mediastinum) in [1.0, -1.0].into_iter().zip(self.mediastinum) {
@@ -240,7 +241,7 @@ impl Trunk {
                     lung.vessel(mesh, root, along, normal, 0);
                 }
             });
-            // Beside the lungs' own air, so only as far as these begin.
+            // Outside the lungs' own air, so only up to their surface.
             let bronchus = [(carina, 7.0), (carina + (root - carina) * 0.5, 6.0), (root - out * 14.0, 5.0)];
             tube(mesh, &smooth(&bronchus, 0.0));
         }

@@ -17,7 +17,7 @@ pub(crate) use tomogram::Volume;
 
 use crate::spec::ViewSpec;
 
-/// Who lies in the beam.
+/// Who is in the beam.
 #[derive(Debug)]
 pub(crate) enum Patient {
     /// A slab of soft tissue across the beam.
@@ -43,7 +43,7 @@ impl Patient {
         Ok(Self::Slab { tissue_mm: spec.xray.tissue_mm })
     }
 
-    /// Part of the vessel's surface that a tomogram holds, 0 to 1.
+    /// Fraction of the vessel's surface contained in the tomogram, 0 to 1.
     pub(crate) fn vessel_held(&self) -> Option<f64> {
         match self {
             Self::Tomogram(volume) => Some(volume.vessel_held()),

@@ -1,4 +1,4 @@
-//! Bones of the pelvis and the upper ends of the thighs'.
+//! Bones of the pelvis and the upper ends of the femurs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,17 +8,17 @@ use endowire_core::vessel::SurfaceMesh;
 use super::loft::{ellipsoid, hollow, loft, smooth, tube};
 use super::trunk::{Trunk, step};
 
-/// Middle of a hip joint from the middle of the fifth lumbar vertebra: to its side, forward, down, mm.
+/// Centre of a hip joint relative to the middle of the fifth lumbar vertebra: lateral, forward, down, mm.
 const HIP_MM: [f64; 3] = [90.0, 22.0, 112.0];
 
 impl Trunk {
-    /// The place at distances to the side, back and up from the middle of the last lumbar vertebra.
+    /// The position at distances to the side, back and up from the middle of the last lumbar vertebra.
     fn pelvic(&self, side: f64, back: f64, up: f64) -> Vec3 {
         let z = self.vertebra(17);
         Vec3::new(self.spine[0] + side, self.spine_y(z) + back, z + up)
     }
 
-    /// Adds sacrum, hip bones and the upper ends of the thigh bones, all surfaces `inset` inside the bone's.
+    /// Adds sacrum, hip bones and the upper ends of the femurs, with all surfaces `inset` inside the bone's.
     pub(super) fn pelvis(&self, mesh: &mut SurfaceMesh, inset: f64) {
         self.sacrum(mesh, inset);
         for side in [-1.0, 1.0] {
@@ -49,7 +49,7 @@ impl Trunk {
                 .collect()
         };
         loft(mesh, &profile.map(ring));
-        // The holes that nerves leave by; what is left of bone around them is that of the marrow.
+        // The foramina of the nerves; the remaining bone around them is that of the marrow.
         for (up, out) in [(-34.0, 23.0), (-54.0, 19.0), (-72.0, 15.0), (-88.0, 11.0)] {
             for side in [-1.0, 1.0] {
                 let back = 38.0 - 0.35 * (up + 76.0_f64).abs();
@@ -59,12 +59,12 @@ impl Trunk {
         }
     }
 
-    /// A bent plate from the crest to the hip joint, which it thickens to hold.
+    /// A bent plate from the crest to the hip joint, thickened towards it.
     fn iliac_wing(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
         const SIDES: usize = 24;
         let [hip_side, hip_front, hip_down] = HIP_MM;
-        // A point at a part of the height and of the way from the sacrum round the side to the front, on a face or between them. The
-        // wing is drawn in towards the joint; its crest is highest in the middle.
+        // A point at a fraction of the height and of the way from the sacrum round the side to the front, on a face
+        // or between them. The wing narrows towards the joint; its crest is highest in the middle.
         let point = |up: f64, part: f64, face: f64| {
             let flare = step(up, 0.0, 1.0);
             let [from, to] = [1.25 - 0.85 * flare, 1.75 + 0.35 * flare];
@@ -95,7 +95,7 @@ impl Trunk {
         tube(mesh, &smooth(&crest, inset));
     }
 
-    /// Pubic and sitting bone: a ring in front of and below the joint.
+    /// Pubis and ischium: a ring in front of and below the joint.
     fn pubic_arch(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
         let [hip_side, hip_front, hip_down] = HIP_MM;
         let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);

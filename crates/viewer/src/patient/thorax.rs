@@ -1,4 +1,4 @@
-//! Bones of the chest: spine, ribs with their cartilages, breastbone, collar bones and shoulder blades.
+//! Bones of the chest: spine, ribs with their cartilages, sternum, clavicles and scapulae.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,9 +12,9 @@ use super::trunk::{Trunk, step};
 const VERTEBRAE: std::ops::RangeInclusive<i32> = -6..=17;
 /// Half width and half depth of cervical, thoracic and lumbar bodies, mm.
 const BODIES_MM: [[f64; 2]; 3] = [[11.0, 8.5], [15.5, 13.5], [22.5, 16.0]];
-/// How far ribs lie outside the chest's inner surface, mm.
+/// Distance of ribs outside the chest's inner surface, mm.
 const RIB_OUT_MM: f64 = 6.0;
-/// Anterior end of each rib, as an angle from the back, and how far it has fallen there in distances of vertebrae.
+/// Anterior end of each rib, as an angle from the back, and its descent there in distances of vertebrae.
 const RIBS: [[f64; 2]; 12] = [
     [2.45, 1.3],
     [2.45, 2.1],
@@ -31,7 +31,7 @@ const RIBS: [[f64; 2]; 12] = [
 ];
 
 impl Trunk {
-    /// Adds the vertebrae, all surfaces `inset` inside the bone's.
+    /// Adds the vertebrae, with all surfaces `inset` inside the bone's.
     pub(super) fn spine(&self, mesh: &mut SurfaceMesh, inset: f64) {
         for number in VERTEBRAE {
             let z = self.vertebra(number);
@@ -49,7 +49,7 @@ impl Trunk {
 
     fn vertebral_body(&self, mesh: &mut SurfaceMesh, z: f64, [wide, deep]: [f64; 2], half: f64) {
         let [x, y] = [self.spine[0], self.spine_y(z)];
-        // Wider at the end plates than between them, and the plates hollow.
+        // Wider at the end plates than between them, and the plates concave.
         let profile: [(f64, f64); 10] = [
             (-0.82, 0.3),
             (-0.88, 0.7),
@@ -72,7 +72,7 @@ impl Trunk {
         loft(mesh, &profile.map(ring));
     }
 
-    /// Pedicles, transverse processes, those of a size and slimness, and the spinous process.
+    /// Pedicles, transverse processes, and the spinous process, scaled by size and slenderness.
     fn vertebral_arch(&self, mesh: &mut SurfaceMesh, z: f64, [size, slim]: [f64; 2], inset: f64) {
         let at = |side: f64, back: f64, up: f64| {
             Vec3::new(self.spine[0] + size * side, self.spine_y(z) + size * back, z + size * up)
@@ -95,13 +95,13 @@ impl Trunk {
         tube(mesh, &smooth(&spinous, inset));
     }
 
-    /// Where rib 1 to 12 is at a part of its length.
+    /// Position of rib 1 to 12 at a fraction of its length.
     fn rib(&self, number: usize, side: f64, part: f64) -> Vec3 {
         let [end, fall] = RIBS[number - 1];
         let z = self.vertebra(number as i32) + 0.3 * self.pitch();
         let from = 0.36;
         let angle = from + (end - from) * part;
-        // Out of the joint a little upwards, then down to the front.
+        // From the joint slightly upwards, then down to the front.
         let drop =
             fall * self.pitch() * (0.25 * part + 0.75 * step(part, -0.15, 1.0)) - 4.0 * libm::sin(PI * part);
         let free = self.chest_wall(side, z - drop, angle, RIB_OUT_MM);
@@ -117,7 +117,7 @@ impl Trunk {
                 let path: Vec<(Vec3, f64)> = (0..=40)
                     .map(|k| {
                         let part = f64::from(k) / 40.0;
-                        // What floats ends in a tip.
+                        // Floating ribs end in a tip.
                         let thin = if floats { (1.0 - part.powi(6)).sqrt() } else { 1.0 };
                         (self.rib(number, side, part), (3.9 + 1.3 * part) * thin - inset)
                     })
@@ -127,8 +127,8 @@ impl Trunk {
         }
     }
 
-    /// Adds the cartilages from the ribs to the breastbone and, of ribs 8 to 10, to the one above. They are the same in bone and in
-    /// marrow: a share of bone throughout.
+    /// Adds the cartilages from the ribs to the sternum and, for ribs 8 to 10, to the one above. They are the same in
+    /// bone and marrow, with a constant fraction of bone.
     pub(super) fn cartilages(&self, mesh: &mut SurfaceMesh) {
         for number in 1..=10_usize {
             for side in [-1.0, 1.0] {
@@ -154,18 +154,18 @@ impl Trunk {
         }
     }
 
-    /// Height on the breastbone where cartilage 1 to 7 joins it.
+    /// Height on the sternum where cartilage 1 to 7 joins it.
     fn sternum_z(&self, number: usize) -> f64 {
         let [top, length] = self.sternum();
         top - length * (0.1 + 0.75 * (number - 1) as f64 / 6.0)
     }
 
-    /// Upper end and length of the breastbone.
+    /// Upper end and length of the sternum.
     fn sternum(&self) -> [f64; 2] {
         [self.vertebra(3), 7.2 * self.pitch()]
     }
 
-    /// Adds breastbone, collar bones and shoulder blades.
+    /// Adds sternum, clavicles and scapulae.
     pub(super) fn girdle(&self, mesh: &mut SurfaceMesh, inset: f64) {
         let [top, length] = self.sternum();
         let profile = [
@@ -215,7 +215,7 @@ impl Trunk {
         let ring = |k: usize| -> Vec<Vec3> {
             let up = k as f64 / 14.0;
             let z = low + (high - low) * up;
-            // The medial edge is nearly straight, the other one goes out to the joint and back.
+            // The medial edge is nearly straight, the other one extends to the joint and back.
             let medial = 0.62 - 0.08 * up;
             let lateral = medial + 0.1 + 0.62 * step(up, 0.0, 0.9) - 0.3 * step(up, 0.88, 1.0);
             let mut points: Vec<Vec3> = (0..2 * SIDES)

@@ -1,7 +1,7 @@
-//! Measures of a generated body in patient axes (left, posterior, head), mm.
+//! Dimensions of a generated body in patient axes (left, posterior, head), mm.
 //!
-//! All heights are told from two that a scene knows: the domes of the diaphragm and the tips of the lungs. Between them are the
-//! twelve thoracic vertebrae; abdomen and pelvis follow below, neck and head above, at adult sizes.
+//! All heights follow from two given by a scene: the domes of the diaphragm and the apices of the lungs. Between them
+//! are the twelve thoracic vertebrae; abdomen and pelvis follow below, neck and head above, at adult sizes.
 
 use endowire_core::Vec3;
 
@@ -11,9 +11,9 @@ use crate::spec::TorsoSpec;
 const BACK_MM: f64 = 62.0;
 /// Distance of the spine's middle behind the vessel's rearmost point.
 const BEHIND_MM: f64 = 20.0;
-/// How far the body goes on below vessel and diaphragm: a cone beam from any usual angle stays inside.
+/// Extent of the body below vessel and diaphragm: a cone beam from any usual angle stays inside.
 const BELOW_MM: [f64; 2] = [260.0, 600.0];
-/// Least height from the diaphragm's domes to the tips of the lungs.
+/// Smallest height from the diaphragm's domes to the apices of the lungs.
 const LEAST_CHEST_MM: f64 = 190.0;
 /// Thickness of the chest's wall.
 const CHEST_WALL_MM: f64 = 22.0;
@@ -21,7 +21,7 @@ const CHEST_WALL_MM: f64 = 22.0;
 const FIRST_RIB_MM: [f64; 2] = [56.0, 44.0];
 /// Half width and half depth of the neck.
 const NECK_MM: [f64; 2] = [60.0, 64.0];
-/// Where the neck begins and ends above the tips of the lungs.
+/// Start and end of the neck above the apices of the lungs.
 const NECK_ABOVE_MM: [f64; 2] = [38.0, 105.0];
 /// Height of the head above the neck, and its half width and half depth.
 const HEAD_MM: [f64; 3] = [205.0, 78.0, 98.0];
@@ -38,11 +38,11 @@ pub(super) struct Trunk {
     bottom: f64,
     pub(super) diaphragm: f64,
     pub(super) apex: f64,
-    /// How far left and right of the spine the mediastinum reaches.
+    /// Extent of the mediastinum to the left and right of the spine.
     pub(super) mediastinum: [f64; 2],
 }
 
-/// From 0 to 1 as `x` goes from `a` to `b`, smoothly.
+/// Smooth step from 0 to 1 as `x` goes from `a` to `b`.
 pub(super) fn step(x: f64, a: f64, b: f64) -> f64 {
     let t = ((x - a) / (b - a)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -59,11 +59,11 @@ fn oval(half: [f64; 2], power: f64, angle: f64) -> [f64; 2] {
 }
 
 impl Trunk {
-    /// That around a vessel with the given lowest and highest coordinates.
+    /// For a vessel with the given lowest and highest coordinates.
     pub(super) fn new(spec: &TorsoSpec, low: Vec3, high: Vec3) -> Self {
         let spine = spec.spine_mm.unwrap_or([(low.x + high.x) / 2.0, high.y + BEHIND_MM]);
         let half_depth = spec.depth_mm / 2.0;
-        // The vessel stays outside the lungs, within reason.
+        // The vessel is kept outside the lungs, within reason.
         let side = |reach: f64| (reach + 8.0).clamp(34.0, 0.3 * spec.width_mm);
         let diaphragm = spec.diaphragm_mm.unwrap_or(low.z + (high.z - low.z) / 3.0);
         let apex = (high.z - 10.0).max(diaphragm + LEAST_CHEST_MM);
@@ -94,7 +94,7 @@ impl Trunk {
         (self.chest() + 20.0) / 11.0
     }
 
-    /// Height of the middle of thoracic vertebra 1 to 12; those of lumbar ones go on beyond 12, of cervical ones below 1.
+    /// Height of the middle of thoracic vertebra 1 to 12; lumbar ones continue beyond 12, cervical ones below 1.
     pub(super) fn vertebra(&self, number: i32) -> f64 {
         let (first, pitch) = (self.apex - 5.0, self.pitch());
         let lumbar = (1.32 * pitch).min(36.0);
@@ -112,7 +112,7 @@ impl Trunk {
         self.spine[1] + 8.0 * bent(s) - 4.0 * bent(-s / 1.1) - 9.0 * step(s, 1.0, 1.5)
     }
 
-    /// Half width and half depth of the skin at a height, its middle (posterior) and how square it is.
+    /// Half width and half depth of the skin at a height, its middle (posterior) and its squareness.
     fn skin_at(&self, z: f64) -> ([f64; 2], f64, f64) {
         let [neck, head] = NECK_ABOVE_MM.map(|above| self.apex + above);
         let waist = libm::exp(-((z - self.diaphragm + 120.0) / 70.0).powi(2));
@@ -168,8 +168,8 @@ impl Trunk {
         (half, mix(self.spine_y(z) - 30.0, self.middle_y, full))
     }
 
-    /// A point on the chest's wall, `out` outside its inner surface, at a height and an angle from the back towards a side (1 the
-    /// left, −1 the right).
+    /// A point on the chest wall, `out` outside its inner surface, at a height and an angle from the back towards a
+    /// side (1 the left, −1 the right).
     pub(super) fn chest_wall(&self, side: f64, z: f64, angle: f64, out: f64) -> Vec3 {
         let (half, y) = self.chest_at(z);
         // The upper ribs are round.

@@ -1,4 +1,4 @@
-//! A graphics processor whose answers are waited for, as those of a browser.
+//! A graphics processor with asynchronous results, as in a browser.
 
 use endowire_core::{Error, Result};
 
@@ -10,8 +10,8 @@ use crate::gpu::{Drawing, Graphics};
 use crate::three_d::Solids;
 
 impl Renderer {
-    /// The same as [`Self::prepare`] with the rays cast by a graphics processor whose answers are waited for; where it fails, by the processor.
-    /// What each frame needs is computed by the processor in any case.
+    /// As [`Self::prepare`], with the rays cast asynchronously by a graphics processor; if it fails, by the
+    /// processor. What each frame needs is computed by the processor in any case.
     ///
     /// # Errors
     /// As [`Self::render_at`].
@@ -28,11 +28,11 @@ impl Renderer {
         self.prepare()
     }
 
-    /// Has a graphics processor draw the 3D view of devices; what waits for the frame.
+    /// Lets a graphics processor draw the 3D view of devices; returns the pending frame.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a device with values that are not finite, or without the 3D view; [`Error::Computation`] where the graphics processor has
-    /// failed.
+    /// [`Error::Parameter`] for a device with values that are not finite, or without the 3D view;
+    /// [`Error::Computation`] if the graphics processor has failed.
     pub fn three_d_on(&mut self, graphics: &Graphics, devices: &[DeviceView]) -> Result<Drawing> {
         let Some(camera) = &self.setup.camera else {
             return Err(Error::parameter("view.views", "without 3d", "add \"3d\""));

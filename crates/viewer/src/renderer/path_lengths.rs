@@ -1,4 +1,4 @@
-//! Path lengths in every material, and what they let through: the picture's physics without its noise.
+//! Path lengths in every material, and their transmission: the image's physics without its noise.
 
 use endowire_core::Result;
 
@@ -11,15 +11,17 @@ use crate::spec::Mode;
 use crate::xray::PathLengths;
 
 impl Renderer {
-    /// Path lengths of the rays through the pixel centres, and inside devices the means of pixels, before any injection.
+    /// Path lengths of the rays through the pixel centres, and inside devices the means over pixels, before any
+    /// injection.
     ///
     /// # Errors
-    /// As [`Self::render_at`], and [`Error::Parameter`](endowire_core::Error::Parameter) where the fluoroscopic view was not asked for.
+    /// As [`Self::render_at`], and [`Error::Parameter`](endowire_core::Error::Parameter) without the fluoroscopic
+    /// view.
     pub fn path_lengths(&mut self, devices: &[DeviceView]) -> Result<PathLengths> {
         self.lengths(devices, None)
     }
 
-    /// The same with the contrast medium of a moment, in s.
+    /// As [`Self::path_lengths`], with the contrast medium at a time, s.
     ///
     /// # Errors
     /// As [`Self::path_lengths`].
@@ -66,8 +68,9 @@ impl Renderer {
         })
     }
 
-    /// Transmitted share of the absorbed energy, pixel by pixel as the picture of a moment has it before scatter, blades and the detector: the
-    /// mean over a pixel's rays, where [`Self::transmission`] of its mean lengths would be less behind a thin wire. −ln of it is the line integral.
+    /// Transmitted fraction of the absorbed energy, per pixel of the image at a time, before scatter, blades and the
+    /// detector: the mean over a pixel's rays, where [`Self::transmission`] of its mean lengths would be smaller
+    /// behind a thin wire. −ln of it is the line integral.
     ///
     /// # Errors
     /// As [`Self::path_lengths`].
@@ -80,11 +83,11 @@ impl Renderer {
         })
     }
 
-    /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum and detector: the signal
-    /// over that of the open beam. −ln of it is the line integral.
+    /// Transmitted fraction of the absorbed energy behind the given path lengths, with this scene's spectrum and
+    /// detector: the ratio of the signal to that of the open beam. −ln of it is the line integral.
     ///
     /// # Errors
-    /// [`Error::Parameter`](endowire_core::Error::Parameter) where the fluoroscopic view was not asked for.
+    /// [`Error::Parameter`](endowire_core::Error::Parameter) without the fluoroscopic view.
     pub fn transmission(&mut self, paths: &PathLengths) -> Result<Vec<f32>> {
         let before = self.transmitted.take();
         let left = self.with_fallback(|setup, engines, fluoro, kept| {
@@ -95,7 +98,7 @@ impl Renderer {
     }
 }
 
-/// The medium that is in by a time; none without one. A roadmap's injections are those of its angiogram.
+/// The medium injected up to a time; none without a time. A roadmap's injections are those of its angiogram.
 fn injected(
     setup: &Setup,
     scope: &Fluoroscope,

@@ -1,4 +1,4 @@
-//! `[view.patient]`, `[view.flow]`, `[[view.injection]]` and `[[view.device]]`: what else is in the beam.
+//! `[view.patient]`, `[view.flow]`, `[[view.injection]]` and `[[view.device]]`: other objects in the beam.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{COORDINATE_MM, finite_within};
 use crate::device::DevicePart;
 
-/// The `[view.patient]` table: who lies on the table. Without it the body is a slab ([`crate::XRaySpec::tissue_mm`]).
+/// The `[view.patient]` table: the patient. Without it the body is a slab ([`crate::XRaySpec::tissue_mm`]).
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PatientSpec {
@@ -30,14 +30,14 @@ pub struct TorsoSpec {
     pub depth_mm: f64,
     /// Middle of the vertebral bodies, left and posterior, -100,000 to 100,000; absent: behind the vessel's centre.
     pub spine_mm: Option<[f64; 2]>,
-    /// Height of the diaphragm's domes, -100,000 to 100,000; absent: a third of the way up the vessel. Chest, neck and head are above it,
-    /// abdomen and pelvis below.
+    /// Height of the diaphragm's domes, -100,000 to 100,000; absent: a third of the vessel's height. Chest, neck and
+    /// head are above it, abdomen and pelvis below.
     pub diaphragm_mm: Option<f64>,
     /// Vertebrae, pelvis and skull.
     pub spine: bool,
-    /// Ribs, breastbone, collar bones and shoulder blades.
+    /// Ribs, sternum, clavicles and scapulae.
     pub ribs: bool,
-    /// Lungs, windpipe and the air of stomach and colon.
+    /// Lungs, trachea and the air of stomach and colon.
     pub lungs: bool,
 }
 
@@ -59,10 +59,11 @@ impl Default for TorsoSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CtSpec {
-    /// Hounsfield units, at most 268 million voxels (512 × 512 × 1024): a NIfTI-1 or NIfTI-2 volume (.nii or .nii.gz), or a folder with the
-    /// slices of one CT series as DICOM files, uncompressed. Values that no body has are refused, and a volume that holds nothing of the vessel.
+    /// Hounsfield units, at most 268 million voxels (512 × 512 × 1024): a NIfTI-1 or NIfTI-2 volume (.nii or
+    /// .nii.gz), or a folder with the slices of one CT series as DICOM files, uncompressed. Impossible values are
+    /// rejected, and a volume without any part of the vessel.
     pub file: PathBuf,
-    /// Where the volume's origin lies in the scene's axes, each coordinate -100,000 to 100,000.
+    /// Position of the volume's origin in the scene's axes, each coordinate -100,000 to 100,000.
     #[serde(default)]
     pub offset_mm: [f64; 3],
 }
@@ -90,31 +91,33 @@ impl PatientSpec {
     }
 }
 
-/// The `[view.flow]` table: the blood that carries contrast medium.
+/// The `[view.flow]` table: the blood flow that transports contrast medium.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlowSpec {
-    /// Centre-line table of the vessel (x y z radius parent, mm), of at most 50,000 points 2 mm apart or nearer.
+    /// Centre-line table of the vessel (x y z radius parent, mm), of at most 50,000 points at most 2 mm apart.
     pub tree: Option<PathBuf>,
-    /// The vessel's centre line at hand, where `tree` names none.
+    /// A given centre line of the vessel, if `tree` names none.
     #[serde(skip)]
     pub centreline: Option<Arc<CentrelineTree>>,
-    /// A point near the end of the tree where the blood comes in, each coordinate -100,000 to 100,000; absent: the widest end, and of
-    /// those about as wide the one nearest to the head.
+    /// A point near the inlet end of the tree, each coordinate -100,000 to 100,000; absent: the widest end, or of
+    /// several about as wide the one nearest to the head.
     pub inlet_mm: Option<[f64; 3]>,
     /// Blood flow there, 0.001 to 100,000.
     pub inflow_ml_per_s: f64,
     /// At a bifurcation the flow divides as radiusⁿ: 2 for large arteries, 3 (Murray's law) for small ones; 0 to 10.
     pub split_exponent: f64,
-    /// Part of the flow that comes in systole, 0 (steady) to 0.95.
+    /// Fraction of the flow in systole, 0 (steady) to 0.95.
     pub pulsatility: f64,
-    /// Heartbeats, 10 to 300; one begins at time zero.
+    /// Heart rate, 10 to 300; a heartbeat begins at time zero.
     pub heart_rate_per_min: f64,
-    /// Mean time that contrast medium stays in the tissue behind an end of the tree, 0.01 to 1000: it washes out exponentially.
+    /// Mean residence time of contrast medium in the tissue behind an end of the tree, 0.01 to 1000: it washes out
+    /// exponentially.
     pub tissue_s: f64,
     /// Radius of that tissue, 1 to 200; absent: it is not drawn.
     pub tissue_mm: Option<f64>,
-    /// How fast a bolus spreads: its standard deviation in time grows as this times the square root of the transit time, s^½; 0 to 10.
+    /// Spreading of a bolus: its standard deviation in time is this times the square root of the transit time, s^½; 0
+    /// to 10.
     pub dispersion: f64,
 }
 
@@ -158,20 +161,20 @@ impl FlowSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct InjectionSpec {
-    /// When it begins, in the time of the frames, -10,000 to 10,000.
+    /// Start, in the time of the frames, -10,000 to 10,000.
     pub start_s: f64,
-    /// How long it takes, 0.001 to 200.
+    /// Duration, 0.001 to 200.
     pub duration_s: f64,
-    /// How fast, 0.001 to 10,000.
+    /// Rate, 0.001 to 10,000.
     pub rate_ml_per_s: f64,
-    /// Where: the nearest point of the centre line, each coordinate -100,000 to 100,000; absent: the inlet.
+    /// Position: the nearest point of the centre line, each coordinate -100,000 to 100,000; absent: the inlet.
     pub at_mm: Option<[f64; 3]>,
-    /// Whether it comes out of the tip of the innermost instrument that has a lumen, wherever that is; not with `at_mm`.
+    /// Whether it comes out of the tip of the innermost instrument with a lumen, wherever that is; not with `at_mm`.
     #[serde(default)]
     pub at_tip: bool,
 }
 
-/// Longest injection, s: medium is followed in hundredths of a second.
+/// Longest injection, s: transport of medium is computed in steps of hundredths of a second.
 const LONGEST_S: f64 = 200.0;
 
 impl InjectionSpec {

@@ -1,4 +1,4 @@
-//! `[view.c_arm]`: where the C-arm stands.
+//! `[view.c_arm]`: position of the C-arm.
 
 use std::str::FromStr;
 
@@ -11,7 +11,7 @@ use super::{COORDINATE_MM, finite_within};
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CArmSpec {
-    /// Angles as they are said: "LAO 40 CRA 20". In place of the two below.
+    /// Angles in clinical words: "LAO 40 CRA 20". Instead of the two below.
     pub pose: Option<Pose>,
     /// Positioner primary angle, LAO positive (DICOM 0018,1510); -360 to 360.
     pub primary_deg: f64,
@@ -19,23 +19,25 @@ pub struct CArmSpec {
     pub secondary_deg: f64,
     /// Source to detector, 10 to 100,000.
     pub sid_mm: f64,
-    /// Source to isocentre: the height of the table decides it. 1 to 100,000, and less than `sid_mm`.
+    /// Source to isocentre, determined by the table height. 1 to 100,000, and less than `sid_mm`.
     pub sod_mm: f64,
-    /// Pixel pitch at the detector, 0.0001 to 1000, after magnification too; absent: from `field_mm`, or else a ball
-    /// about the isocentre that holds the vessel fills the frame, the same from every side.
+    /// Pixel pitch at the detector, 0.0001 to 1000, including magnification; absent: from `field_mm`, or else such
+    /// that a sphere about the isocentre that contains the vessel fills the frame, the same from every side.
     pub pixel_mm: Option<f64>,
-    /// Longer side of the detector's field of view, 0.01 to 100,000. In place of `pixel_mm`, whose limits a pixel must keep.
+    /// Longer side of the detector's field of view, 0.01 to 100,000. Instead of `pixel_mm`, whose limits apply to the
+    /// pixels.
     pub field_mm: Option<f64>,
-    /// Magnification mode: the field of view is the detector's over this factor, 0.1 to 100.
+    /// Magnification mode: the field of view is the detector's divided by this factor, 0.1 to 100.
     pub magnification: f64,
-    /// Turn of the picture about its centre, clockwise on the screen; -360 to 360.
+    /// Rotation of the image about its centre, clockwise on the screen; -360 to 360.
     pub rotation_deg: f64,
-    /// Blades: width and height of what they leave open, at the detector, each 0.01 to 100,000. Absent: the whole field.
+    /// Collimation: width and height of the opening between the blades, at the detector, each 0.01 to 100,000.
+    /// Absent: the whole field.
     pub collimation_mm: Option<[f64; 2]>,
-    /// Whether letters at the borders of the picture tell directions: L left, R right, H head, F feet, A front, P back.
+    /// Whether letters at the borders of the image show directions: L left, R right, H head, F feet, A front, P back.
     pub markers: bool,
-    /// Centre of rotation, seen in the middle of the frame, each coordinate -100,000 to 100,000; absent: the centre of the vessel's
-    /// bounding box.
+    /// Centre of rotation, in the middle of the frame, each coordinate -100,000 to 100,000; absent: the centre of the
+    /// vessel's bounding box.
     pub isocentre_mm: Option<[f64; 3]>,
 }
 
@@ -142,18 +144,18 @@ impl From<Pose> for String {
     }
 }
 
-/// Pixel pitches between which geometry has digits left, mm.
+/// Pixel pitches for which the geometry is numerically accurate, mm.
 pub(crate) const PITCH_MM: [f64; 2] = [1e-4, 1e3];
 /// Fields of view and openings, mm.
 const FIELD_MM: [f64; 2] = [0.01, 1e5];
 
 impl CArmSpec {
-    /// Primary and secondary angle, from `pose` where that is given.
+    /// Primary and secondary angle, from `pose` if given.
     pub fn angles_deg(&self) -> [f64; 2] {
         self.pose.map_or([self.primary_deg, self.secondary_deg], |p| [p.primary_deg, p.secondary_deg])
     }
 
-    /// The same C-arm, turned by so much towards LAO.
+    /// The same C-arm, turned by this angle towards LAO.
     pub fn turned(&self, by_deg: f64) -> Self {
         let [primary_deg, secondary_deg] = self.angles_deg();
         Self { pose: None, primary_deg: primary_deg + by_deg, secondary_deg, ..self.clone() }

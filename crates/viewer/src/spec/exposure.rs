@@ -5,18 +5,18 @@ use serde::{Deserialize, Serialize};
 
 use super::finite_within;
 
-/// Most points of a curve.
+/// Largest number of points of a curve.
 const MOST_POINTS: usize = 100;
 
-/// The `[view.exposure]` table: voltage and current follow the patient. Without it the voltage is `xray.kvp`, and the tube gives whatever brings
-/// the wanted dose.
+/// The `[view.exposure]` table: voltage and current follow the patient. Without it the voltage is `xray.kvp`, and the
+/// current is whatever gives the wanted dose.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExposureSpec {
-    /// Voltages by thickness: pairs of soft tissue in mm, rising, 0 to 1000, and kV, 50 to 125; straight between them and level beyond. At
-    /// most 100.
+    /// Voltages by thickness: pairs of soft tissue in mm, ascending, 0 to 1000, and kV, 50 to 125; linear in between
+    /// and constant beyond. At most 100.
     pub curve: Vec<[f64; 2]>,
-    /// Least and largest current of the tube, 0.01 to 5000.
+    /// Smallest and largest tube current, 0.01 to 5000.
     pub current_ma: [f64; 2],
 }
 

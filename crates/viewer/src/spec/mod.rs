@@ -1,4 +1,4 @@
-//! What a scene file says about frames: its `[view]` table, with units in the names.
+//! The specification of frames in a scene file: its `[view]` table, with units in the names.
 
 mod anatomy;
 mod c_arm;
@@ -21,17 +21,17 @@ use crate::device::DevicePart;
 use crate::output::Animation;
 use crate::xray::check_exposure;
 
-/// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
-/// pixel this is the texture size that every adapter offers.
+/// Largest side of a frame. Flat detectors have up to about 3000 pixels per side, and with two rays across a pixel
+/// this is the texture size supported by every adapter.
 const LARGEST_SIDE_PX: u32 = 4096;
 
-/// Coordinates of places, mm: vessels are below ten metres, and digits are left for a pixel.
+/// Range of coordinates, mm: vessels are smaller than ten metres, and enough digits remain for a pixel.
 const COORDINATE_MM: [f64; 2] = [-1e5, 1e5];
 
 /// A hundred turns.
 const MOST_TURN_DEG: f64 = 36_000.0;
 
-/// Most tables of injections and of parts.
+/// Largest number of tables of injections and of parts.
 const MOST_TABLES: usize = 1000;
 
 /// One of the two kinds of frame.
@@ -45,15 +45,14 @@ pub enum View {
     Fluoro,
 }
 
-/// What computes the frames.
+/// The engine for the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
-    /// A graphics processor where there is one, else the plain Rust path, which is faster than a software
-    /// adapter.
+    /// A graphics processor if there is one, otherwise the plain Rust path, which is faster than a software adapter.
     #[default]
     Auto,
-    /// wgpu, a software adapter included; an error without any adapter.
+    /// wgpu, including a software adapter; an error without any adapter.
     Gpu,
     /// Plain Rust.
     Cpu,
@@ -72,41 +71,40 @@ pub enum Backend {
 pub struct ViewSpec {
     /// Width and height of every frame in pixels, each 1 to 4096.
     pub size_px: [u32; 2],
-    /// The frames wanted. Nothing is built for a view that is not named here.
+    /// The wanted frames. Nothing is prepared for other views.
     pub views: Vec<View>,
-    /// A frame each so many recorded steps; the last step always gets one. From 1. This is the recorder's to
-    /// obey.
+    /// One frame per this many recorded steps, from 1; the last step always gets one. Used by the recorder.
     pub every: u32,
-    /// A moving picture of all frames, the views side by side: `gif`, `png` or `apng`, and `mp4` with the feature of that name. It too is the
-    /// recorder's to obey.
+    /// An animation of all frames, the views side by side: `gif`, `png` or `apng`, and `mp4` with the feature of that
+    /// name. Used by the recorder.
     pub film: Option<String>,
-    /// What computes the frames.
+    /// The engine for the frames.
     pub backend: Backend,
     /// Position of the C-arm.
     pub c_arm: CArmSpec,
-    /// A second plane of fluoroscopy, turned by so much (towards LAO) from the first, -180 to 180. A [`crate::Renderer`] draws one plane:
-    /// [`Self::planes`] has the view of each.
+    /// A second plane of fluoroscopy, turned by this angle (towards LAO) from the first, -180 to 180. A
+    /// [`crate::Renderer`] draws one plane: [`Self::planes`] gives the view of each.
     pub biplane_deg: Option<f64>,
     /// X-ray physics.
     pub xray: XRaySpec,
-    /// Exposure control; absent: the voltage and the dose as they are given.
+    /// Exposure control; absent: voltage and dose as given.
     pub exposure: Option<ExposureSpec>,
     /// The detector.
     pub detector: DetectorSpec,
-    /// Who lies in the beam.
+    /// The patient.
     pub patient: PatientSpec,
     /// Blood flow.
     pub flow: FlowSpec,
-    /// Contrast medium, by script; at most 1000 tables.
+    /// Injections of contrast medium; at most 1000 tables.
     pub injection: Vec<InjectionSpec>,
-    /// What the device is made of, part by part; without any, it is a solid rod of `xray.device_material`. At most 1000
-    /// tables.
+    /// The parts of the device with their materials; without any, it is a solid rod of `xray.device_material`. At
+    /// most 1000 tables.
     pub device: Vec<DevicePart>,
-    /// Frames a second, 0.01 to 1000: recorded steps become moments by it.
+    /// Frames per second, 0.01 to 1000: it converts recorded steps to times.
     pub frames_per_s: f64,
-    /// Bits a pixel of the fluoroscopic frames, 8 or 16.
+    /// Bits per pixel of the fluoroscopic frames, 8 or 16.
     pub bits: u32,
-    /// Direction from which the 3D view looks.
+    /// Viewing direction of the 3D view.
     pub camera: CameraSpec,
 }
 
@@ -137,8 +135,8 @@ impl Default for ViewSpec {
     }
 }
 
-/// The `[view.camera]` table of the 3D view. With neither angle given, the camera looks from the front,
-/// slightly from the left and above, or across the plane of a vessel that lies in one.
+/// The `[view.camera]` table of the 3D view. Without either angle, the camera looks from the front, slightly from the
+/// left and above, or across the plane of a planar vessel.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSpec {
@@ -146,16 +144,18 @@ pub struct CameraSpec {
     pub azimuth_deg: Option<f64>,
     /// Above the transverse plane, towards the head; -360 to 360.
     pub elevation_deg: Option<f64>,
-    /// Turn about the long axis of the patient from the direction that the angles say, -36,000 to 36,000.
+    /// Rotation about the long axis of the patient from the direction of these angles, -36,000 to 36,000.
     pub turn_deg: f64,
-    /// The camera stands where it sees all through such a turn, -36,000 to 36,000; absent: where it sees all from its own direction.
+    /// If given, the camera is so far away that it sees everything during such a rotation, -36,000 to 36,000; absent:
+    /// from its own direction.
     pub orbit_deg: Option<f64>,
     /// Whether a scale bar is drawn.
     pub scale_bar: bool,
-    /// Whether letters at the borders tell directions (L left, R right, H head, F feet, A front, P back), and a legend the strongest force.
+    /// Whether letters at the borders show directions (L left, R right, H head, F feet, A front, P back), and a
+    /// legend the largest force.
     pub markers: bool,
-    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then steps back to show the field at the
-    /// isocentre.
+    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then moves back to show
+    /// the field at the isocentre.
     pub c_arm: bool,
 }
 
@@ -174,7 +174,7 @@ impl Default for CameraSpec {
 }
 
 impl ViewSpec {
-    /// Lets the files it names start from `folder`, that of the scene.
+    /// Makes the files it names relative to `folder`, that of the scene.
     pub fn in_folder(mut self, folder: &Path) -> Self {
         let named = [self.flow.tree.as_mut(), self.patient.ct.as_mut().map(|ct| &mut ct.file)];
         named.into_iter().flatten().for_each(|path| *path = folder.join(&*path));
@@ -186,12 +186,12 @@ impl ViewSpec {
         self.views.contains(&view)
     }
 
-    /// Whether medium comes out of the tip of an instrument.
+    /// Whether medium comes out of an instrument's tip.
     pub fn injects_at_tip(&self) -> bool {
         self.injection.iter().any(|one| one.at_tip)
     }
 
-    /// The view of each plane: this one, and with `biplane_deg` the fluoroscopy of the second.
+    /// The view of each plane: this one and, with `biplane_deg`, the fluoroscopy of the second.
     pub fn planes(&self) -> Vec<Self> {
         let first = Self { biplane_deg: None, ..self.clone() };
         let second = self.biplane_deg.filter(|_| self.wants(View::Fluoro)).map(|turn_deg| Self {
@@ -205,7 +205,7 @@ impl ViewSpec {
     /// The parts of the `[[view.device]]` tables, if there are any.
     ///
     /// # Errors
-    /// Tables where there are `several` instruments: they describe one.
+    /// If there are tables although there are `several` instruments: they describe one.
     pub fn own_parts(&self, several: bool) -> Result<Option<&[DevicePart]>> {
         let own = Some(&self.device[..]).filter(|parts| !parts.is_empty());
         if several && own.is_some() {
@@ -215,10 +215,10 @@ impl ViewSpec {
         Ok(own)
     }
 
-    /// Checks every value on its own and against the others.
+    /// Checks every value separately and against the others.
     ///
     /// # Errors
-    /// [`Error::Parameter`] with the key as the scene file has it, the value and the mend.
+    /// [`Error::Parameter`] with the key as in the scene file, the value and the correction.
     pub fn validate(&self) -> Result<()> {
         for side in self.size_px {
             if side == 0 || side > LARGEST_SIDE_PX {

@@ -1,4 +1,4 @@
-//! The `[view]` table of a scene file. The core reads the rest of it.
+//! The `[view]` table of a scene file. The core reads the rest.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 
 use super::ViewSpec;
 
-/// The part of a scene file that is the viewer's.
+/// The viewer's part of a scene file.
 #[derive(Deserialize)]
 struct ViewTable {
     #[serde(default)]
@@ -21,11 +21,11 @@ struct ViewTable {
 }
 
 impl ViewSpec {
-    /// The `[view]` table of a scene that was read from `path`: paths start from its folder, and contrast medium flows in the vessel's
-    /// own tree, or the centre line that is given beside its surface.
+    /// The `[view]` table of a scene read from `path`: paths are relative to its folder, and contrast medium flows in
+    /// the vessel's own tree, or the centre line given with its surface.
     ///
     /// # Errors
-    /// [`endowire_core::Error::Content`] for a table that does not fit, naming line and key.
+    /// [`endowire_core::Error::Content`] for an invalid table, naming line and key.
     pub fn of_scene<M: MethodChoice + DeserializeOwned + Default>(
         scene: &SceneOf<M>,
         path: &Path,
@@ -39,7 +39,7 @@ impl ViewSpec {
         Ok(view)
     }
 
-    /// Has contrast medium flow along the centre line that is found in the scene's surface, kept in `store`, where none is named.
+    /// Uses a centre line computed from the scene's surface, stored in `store`, for contrast medium if none is given.
     ///
     /// # Errors
     /// As [`SceneOf::centreline`].
@@ -54,10 +54,10 @@ impl ViewSpec {
         Ok(())
     }
 
-    /// The same where the surface alone is at hand, and kept nowhere.
+    /// The same with only the surface given, without a store.
     ///
     /// # Errors
-    /// A surface in which no centre line is found.
+    /// A surface from which no centre line can be computed.
     pub fn find_centreline(&mut self, wall: &Wall) -> Result<()> {
         if self.flow.tree.is_none() && self.flow.centreline.is_none() {
             let found = ExtractedCentreline::of(wall, None, &[]).map_err(|error| {

@@ -7,23 +7,23 @@ use super::finite_within;
 use crate::material::Material;
 use crate::xray::check_kvp;
 
-/// What the fluoroscopic view shows.
+/// Display modes of fluoroscopy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
-    /// Live fluoroscopy: little dose, the log-transformed signal.
+    /// Live fluoroscopy: low dose, the log-transformed signal.
     #[default]
     Fluoro,
     /// Cine: the same with ten times the dose.
     Cine,
-    /// Digital subtraction angiography, ln(mask) − ln(frame): what has come since the mask is dark.
+    /// Digital subtraction angiography, ln(mask) − ln(frame): additions since the mask are dark.
     Dsa,
     /// The device, dark, over the white vessels of a stored angiogram.
     Roadmap,
 }
 
 impl Mode {
-    /// Usual air kerma at the detector, nGy a frame.
+    /// Usual air kerma at the detector, nGy per frame.
     pub fn dose_ngy(self) -> f64 {
         match self {
             Self::Fluoro | Self::Roadmap => 30.0,
@@ -37,39 +37,39 @@ impl Mode {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct XRaySpec {
-    /// What is shown.
+    /// The display mode.
     pub mode: Mode,
-    /// Peak voltage of the tube in kV, 50 to 125 in steps of 5; `[view.exposure]` takes its place.
+    /// Peak voltage of the tube in kV, 50 to 125 in steps of 5; overridden by `[view.exposure]`.
     pub kvp: f64,
-    /// Length of a pulse: a frame shows what moves within it as long as it lasts, up to the frame's moment. From 0, at once, to the time between
-    /// two frames.
+    /// Length of a pulse: a frame shows motion over this time, up to the frame's time. From 0, instantaneous, to the
+    /// time between two frames.
     pub pulse_ms: f64,
     /// Filtration, aluminium; 0 to 20.
     pub aluminium_mm: f64,
     /// Filtration, copper; 0 to 5.
     pub copper_mm: f64,
-    /// Energies that stand for the spectrum. Absent: every line of its table, exact to a millionth. Eight are within a
-    /// ten-thousandth of it for most scenes, and an eighth of the work. 1 to 1000.
+    /// Number of energies that represent the spectrum. Absent: every line of its table, exact to a millionth. Eight
+    /// are within a ten-thousandth of it for most scenes, at an eighth of the work. 1 to 1000.
     pub energy_bins: Option<u32>,
-    /// One energy in place of the spectrum, 15 to 125 keV.
+    /// A single energy instead of the spectrum, 15 to 125 keV.
     pub energy_kev: Option<f64>,
-    /// Volume fraction of contrast medium (370 mg iodine per ml) that is in the blood all the time, 0 to 1.
+    /// Volume fraction of contrast medium (370 mg iodine per ml) constantly in the blood, 0 to 1.
     pub contrast_fraction: f64,
-    /// Thickness of soft tissue along the central ray. This body is a slab across the beam, as the 20 cm water phantom of
-    /// acceptance tests is: an even background from every angle, whose path lengths are known exactly. 0 is air, and 1000 the most. A
-    /// patient (`[view.patient]`) takes its place.
+    /// Thickness of soft tissue along the central ray. This body is a slab across the beam, like the 20 cm water
+    /// phantom of acceptance tests: a uniform background from every angle, with exactly known path lengths. 0 is air,
+    /// and 1000 the maximum. Overridden by a patient (`[view.patient]`).
     pub tissue_mm: f64,
     /// Scintillator: solid caesium iodide, 0.001 to 10.
     pub csi_mm: f64,
-    /// Focal spot, 0 to 3: 0.3 to 1.2 mm are usual, 0 is a point. Its penumbra is that of things at the isocentre.
+    /// Focal spot, 0 to 3: 0.3 to 1.2 mm are usual, 0 is a point. Its penumbra is that of objects at the isocentre.
     pub focal_spot_mm: f64,
     /// Material of devices that do not name their own.
     pub device_material: Material,
-    /// Share of the anatomy's coarse shading that the display takes out in fluoroscopy and cine, so that lungs and spine are both
-    /// seen; 0 shows the logarithm of the signal as it is, 1 takes out all of it.
+    /// Fraction of the anatomy's low-frequency shading removed in the display of fluoroscopy and cine, so that lungs
+    /// and spine are both visible; 0 shows the logarithm of the signal unchanged, 1 removes all of it.
     pub harmonised: f64,
-    /// Line integrals shown white and black in fluoroscopy and cine, -100 to 100 and the black one larger by 0.0001 at least; absent: fitted to the anatomy, the same for all frames of
-    /// a run.
+    /// Line integrals shown white and black in fluoroscopy and cine, -100 to 100 with the black one larger by at
+    /// least 0.0001; absent: fitted to the anatomy, equal for all frames of a run.
     pub window: Option<[f64; 2]>,
 }
 
@@ -122,26 +122,28 @@ impl XRaySpec {
     }
 }
 
-/// Widest blur in pixels: beyond it a frame would take minutes.
+/// Largest blur in pixels: beyond it a frame would take minutes.
 const MOST_BLUR_PX: f64 = 50.0;
 
 /// The `[view.detector]` table.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DetectorSpec {
-    /// Air kerma at the detector behind the patient, a frame, 0.001 to a million; absent: usual for the mode.
+    /// Air kerma at the detector behind the patient, per frame, 0.001 to a million; absent: usual for the mode.
     pub dose_ngy: Option<f64>,
-    /// Whether quanta are counted; without, frames are smooth.
+    /// Whether there is photon noise; without it, frames are smooth.
     pub noise: bool,
-    /// Seed of the noise, any whole number from 0: the same seed, the same frames. Another pose or plane has another noise.
+    /// Seed of the noise, any whole number from 0: equal seeds give equal frames. Another pose or plane has different
+    /// noise.
     pub seed: u64,
     /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector, 0 to 10 and no more than 50 pixels.
     pub blur_mm: f64,
-    /// Dose whose quanta are as noisy as the electronics that read a pixel, 0 to 10,000: flat detectors have 1 to 10 nGy, 0 is none.
+    /// Dose whose photon noise equals the electronic noise of reading a pixel, 0 to 10,000: flat detectors have 1 to
+    /// 10 nGy, 0 is none.
     pub electronic_ngy: f64,
-    /// Share of the last frame that is read again, 0 to 0.99.
+    /// Fraction of the last frame that is read again, 0 to 0.99.
     pub lag: f64,
-    /// Share of scattered quanta in all, behind the grid, 0 to 0.95.
+    /// Fraction of scattered photons behind the grid, 0 to 0.95.
     pub scatter_fraction: f64,
 }
 
@@ -160,7 +162,7 @@ impl Default for DetectorSpec {
 }
 
 impl DetectorSpec {
-    /// A detector that shows what it gets: no noise, blur, lag or scatter.
+    /// An ideal detector: no noise, blur, lag or scatter.
     pub fn ideal() -> Self {
         Self { noise: false, blur_mm: 0.0, lag: 0.0, scatter_fraction: 0.0, ..Self::default() }
     }
@@ -175,7 +177,7 @@ impl DetectorSpec {
         finite_within("view.detector.scatter_fraction", self.scatter_fraction, [0.0, 0.95])
     }
 
-    /// Checks the blur against the pixels: each takes three times as many neighbours in as it is pixels wide.
+    /// Checks the blur relative to the pixels: the kernel extends over three times its deviation.
     pub(crate) fn check_blur(&self, pixel_mm: f64) -> Result<()> {
         if self.blur_mm <= MOST_BLUR_PX * pixel_mm {
             return Ok(());

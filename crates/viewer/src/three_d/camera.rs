@@ -7,17 +7,17 @@ use crate::spec::CameraSpec;
 
 /// Half the opening angle along the longer side of the frame, degrees: a mild perspective.
 const HALF_ANGLE_DEG: f64 = 14.0;
-/// Part of the frame that the vessel may fill.
+/// Fraction of the frame that the vessel may fill.
 const FILL: f64 = 0.88;
-/// Where the camera looks from unless set: front, slightly from the left and above.
+/// Default direction of the camera: from the front, slightly from the left and above.
 const AZIMUTH_DEG: f64 = 25.0;
 const ELEVATION_DEG: f64 = 18.0;
-/// A view that shows less than this part of the largest possible spread of the vessel is exchanged for one
-/// across its plane.
+/// Visible spread of the vessel, relative to the largest possible, below which the view is replaced by one across its
+/// plane.
 const LEAST_SPREAD: f64 = 0.6;
-/// Places of an orbit from which the vessel is to fit.
+/// Number of positions of an orbit from which the vessel must fit.
 const ORBIT_PLACES: u32 = 36;
-/// Part of the distance to the vessel that is kept free in front of the camera.
+/// Fraction of the distance to the vessel that is kept free in front of the camera.
 const NEAR: f64 = 0.02;
 
 /// A perspective camera. View coordinates are rightwards, upwards and backwards from the eye.
@@ -35,7 +35,7 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// Fits a camera to a wall with at least one vertex, and to points beside it.
+    /// Fits a camera to a wall with at least one vertex, and to further points.
     pub(crate) fn new(spec: &CameraSpec, size_px: [u32; 2], wall: &SurfaceMesh, beside: &[Vec3]) -> Self {
         let first = match (spec.azimuth_deg, spec.elevation_deg) {
             (None, None) => natural_direction(wall),
@@ -48,9 +48,8 @@ impl Camera {
             return Self::orbiting(&first, axes, orbit_deg, (tangents, size_px), wall, beside);
         }
 
-        // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) when |x − cx| ≤ k (D − z): the
-        // extremes of x + kz and −x + kz give the tightest D and the centre that goes with it, for each
-        // direction alone.
+        // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) if |x − cx| ≤ k (D − z): the extremes of x +
+        // kz and −x + kz give the smallest D and the corresponding centre, for each direction separately.
         let local: Vec<[f64; 3]> = wall.vertices_mm.iter().map(|v| axes.map(|axis| v.dot(&axis))).collect();
         let all: Vec<[f64; 3]> =
             local.iter().copied().chain(beside.iter().map(|v| axes.map(|axis| v.dot(&axis)))).collect();
@@ -77,7 +76,7 @@ impl Camera {
         }
     }
 
-    /// A camera at the distance from which it sees all on every place of an orbit that begins at `first`.
+    /// A camera at a distance from which it sees everything on every position of an orbit that starts at `first`.
     fn orbiting(
         first: &Vec3,
         axes: [Vec3; 3],
@@ -112,7 +111,7 @@ impl Camera {
         }
     }
 
-    /// Directions that run to the right and upwards in the picture.
+    /// Directions to the right and upwards in the image.
     pub(crate) fn right_and_up(&self) -> [Vec3; 2] {
         [self.axes[0], self.axes[1]]
     }
@@ -128,7 +127,7 @@ impl Camera {
         self.axes.map(|axis| direction.dot(&axis))
     }
 
-    /// Pixel coordinates of a point in view coordinates, on a frame with `scale` pixels for each one.
+    /// Pixel coordinates of a point in view coordinates, on a frame with `scale` pixels per pixel.
     pub(crate) fn pixel_of(&self, view: [f64; 3], scale: u32) -> [f64; 2] {
         let [w, h] = self.size_px.map(|n| f64::from(n * scale) / 2.0);
         [
@@ -143,7 +142,7 @@ impl Camera {
     }
 }
 
-/// A direction turned about the long axis of the patient.
+/// A direction rotated about the long axis of the patient.
 fn turned(direction: &Vec3, degrees: f64) -> Vec3 {
     let (sin, cos) = libm::sincos(degrees.to_radians());
     Vec3::new(cos * direction.x - sin * direction.y, sin * direction.x + cos * direction.y, direction.z)
@@ -163,7 +162,7 @@ fn from_angles(azimuth_deg: f64, elevation_deg: f64) -> Vec3 {
     Vec3::new(libm::sin(a) * libm::cos(e), -libm::cos(a) * libm::cos(e), libm::sin(e))
 }
 
-/// The usual oblique front view; for a vessel that it shows edge-on, one across the vessel's plane instead.
+/// The usual oblique front view; for a vessel seen edge-on in it, one across the vessel's plane instead.
 fn natural_direction(wall: &SurfaceMesh) -> Vec3 {
     let usual = from_angles(AZIMUTH_DEG, ELEVATION_DEG);
     let n = wall.vertices_mm.len().max(1) as f64;
@@ -173,7 +172,7 @@ fn natural_direction(wall: &SurfaceMesh) -> Vec3 {
         covariance += (v - mean) * (v - mean).transpose();
     }
     let eigen = covariance.symmetric_eigen();
-    // Spread seen along d: √ of the determinant of the covariance projected along d, which is √(dᵀ adj(C) d).
+    // Spread visible along d: √ of the determinant of the covariance projected along d, which is √(dᵀ adj(C) d).
     let [l0, l1, l2] = [0, 1, 2].map(|i| eigen.eigenvalues[i].max(0.0));
     let adjugate = [l1 * l2, l0 * l2, l0 * l1];
     let spread = |d: &Vec3| -> f64 {
@@ -185,7 +184,7 @@ fn natural_direction(wall: &SurfaceMesh) -> Vec3 {
         return usual;
     }
     let facing = if across.dot(&usual) < 0.0 { -across } else { across };
-    // Not quite across, so that depth shows.
+    // Not quite perpendicular, so that depth is visible.
     (facing + usual * 0.35).normalize()
 }
 
@@ -253,7 +252,7 @@ mod tests {
         let step = |pair: &[Camera]| (pair[1].eye_mm - pair[0].eye_mm).norm();
         let steps: Vec<f64> = places.windows(2).map(step).collect();
         assert!(steps.iter().all(|s| (s / steps[0] - 1.0).abs() < 1e-9), "{steps:?}");
-        // The twin: fitted anew each time, the camera comes and goes.
+        // Counter-check: fitted anew each time, the camera's distance varies.
         let fitted: Vec<Camera> = (0..=9)
             .map(|k| CameraSpec { turn_deg: 10.0 * f64::from(k), ..CameraSpec::default() })
             .map(|spec| Camera::new(&spec, [320, 320], &wall, &[]))

@@ -1,4 +1,4 @@
-//! Letters that tell directions, a legend of forces, and all that is written on a 3D frame.
+//! Letters for directions, a legend of forces, and all text on a 3D frame.
 
 use endowire_core::Vec3;
 
@@ -11,19 +11,19 @@ use crate::three_d::text::{ROWS, columns, text};
 
 const WHITE: [u8; 4] = [255; 4];
 
-/// Pixels of a dot.
+/// Size of a dot, pixels.
 fn dot(image: &Image) -> u32 {
     (image.height() / 320).max(1)
 }
 
-/// The letter of the patient axis that a direction is nearest to.
+/// The letter of the patient axis nearest to a direction.
 fn letter(direction: &Vec3) -> &'static str {
     let names = [["L", "R"], ["P", "A"], ["H", "F"]];
     let most = direction.iamax();
     names[most][usize::from(direction[most] < 0.0)]
 }
 
-/// Letters in the middles of the borders of a picture whose columns and rows run along these directions.
+/// Letters in the middles of the borders of an image with these directions of columns and rows.
 pub(crate) fn draw(image: &mut Image, [right, up]: [Vec3; 2]) {
     let dot = 2 * dot(image);
     let ink = if image.format() == PixelFormat::Rgba8 { INK } else { WHITE };
@@ -41,7 +41,7 @@ pub(crate) fn draw(image: &mut Image, [right, up]: [Vec3; 2]) {
     }
 }
 
-/// Writes on a 3D frame what its camera is asked for: scale, directions, and the strongest of these contacts.
+/// Annotates a 3D frame as its camera specifies: scale, directions, and the largest of these contact forces.
 pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, contacts: &[ContactView]) {
     if spec.scale_bar {
         scale_bar::draw(image, camera);
@@ -52,7 +52,7 @@ pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, co
     }
 }
 
-/// An arrow as long as that of the strongest force, with its strength.
+/// An arrow as long as that of the largest force, with its magnitude.
 fn legend(image: &mut Image, contacts: &[ContactView]) {
     let strongest = contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max);
     if strongest == 0.0 {

@@ -5,8 +5,7 @@ use endowire_core::vessel::SurfaceMesh;
 
 use crate::three_d::Camera;
 
-/// Faces that meet at a sharper angle than the one with this cosine (40°) keep their edge: a cap on a tube
-/// stays flat.
+/// Cosine (40°) of the angle between faces above which their edge stays sharp: a cap on a tube stays flat.
 const CREASE: f64 = 0.766;
 
 /// A corner of a triangle.
@@ -16,13 +15,13 @@ const CREASE: f64 = 0.766;
 pub(crate) struct Vertex {
     pub(crate) position: [f32; 3],
     pub(crate) normal: [f32; 3],
-    /// Red, green, blue of a solid; the wall has its own.
+    /// Red, green, blue of a solid; the wall has its own colour.
     pub(crate) colour: [u8; 4],
 }
 
 /// The wall as a list of triangles with smooth normals.
 pub(crate) fn wall_triangles(camera: &Camera, wall: &SurfaceMesh) -> Vec<Vertex> {
-    // Twice the area times the normal: large faces count more.
+    // Twice the area times the normal: large faces weigh more.
     let faces: Vec<Vec3> = (0..wall.triangles.len())
         .map(|i| {
             let [a, b, c] = wall.corners(i);

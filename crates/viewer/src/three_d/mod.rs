@@ -1,4 +1,4 @@
-//! The 3D view: what both engines share, so that their frames look alike.
+//! The 3D view: code shared by both engines, so that their frames look alike.
 
 mod camera;
 mod markers;

@@ -1,14 +1,14 @@
 //! A scale bar in the lower left corner of the 3D view.
 //!
-//! The view is in perspective: the bar tells lengths at the depth of the vessel's middle.
+//! The view is in perspective: the bar is valid at the depth of the vessel's middle.
 
 use crate::output::Image;
 use crate::three_d::Camera;
 use crate::three_d::text::text;
 
-/// Lengths that a bar may have, mm.
+/// Possible lengths of a bar, mm.
 const LENGTHS_MM: [u32; 10] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
-/// Longest bar, as part of the width.
+/// Longest bar, as a fraction of the width.
 const LONGEST: f64 = 0.25;
 pub(super) const INK: [u8; 4] = [70, 78, 90, 255];
 

@@ -1,4 +1,5 @@
-//! Opaque things in the 3D view as triangles: devices in the colours of their materials, contacts with their forces, the C-arm.
+//! Opaque objects in the 3D view as triangles: devices in the colours of their materials, contacts with their forces,
+//! the C-arm.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -9,34 +10,33 @@ use crate::device::RefinedDevice;
 use crate::material::Material;
 use crate::three_d::{Camera, Vertex};
 
-/// Corners of a cross section.
+/// Number of corners of a cross section.
 const SIDES: usize = 14;
-/// Rings of each rounded end.
+/// Number of rings of each rounded end.
 const CAP_RINGS: usize = 4;
-/// Least width of a device on screen, pixels: half a millimetre of wire in a long scene would vanish
-/// otherwise.
+/// Smallest width of a device on screen, pixels: otherwise half a millimetre of wire in a long scene would vanish.
 const LEAST_WIDTH_PX: f64 = 2.4;
 /// Half a contact's dot, and half the shaft of an arrow, pixels.
 const DOT_PX: f64 = 3.2;
 const SHAFT_PX: f64 = 1.1;
-/// Length of the longest arrow, pixels of a frame of 640.
+/// Length of the longest arrow, pixels in a frame of 640.
 pub(crate) const ARROW_PX: f64 = 60.0;
-/// Pieces of an edge of the beam.
+/// Number of pieces of an edge of the beam.
 const BEAM_PIECES: u32 = 48;
 const CONTACT: [u8; 4] = [236, 132, 20, 255];
 pub(crate) const FORCE: [u8; 4] = [196, 30, 40, 255];
 const FRAME: [u8; 4] = [110, 124, 140, 255];
 
-/// A place where the wall holds a device.
+/// A contact of a device with the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactView {
-    /// On the axis of the device.
+    /// Position on the axis of the device.
     pub position_mm: Vec3,
-    /// Force of the wall on the device; its arrow is as long as it is strong beside the others.
+    /// Force of the wall on the device; the length of its arrow is proportional to it.
     pub force_n: Vec3,
 }
 
-/// What is drawn beside the wall.
+/// Objects drawn in addition to the wall.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Solids<'a> {
     pub(crate) devices: &'a [RefinedDevice],
@@ -76,7 +76,7 @@ pub(crate) fn solid_triangles(camera: &Camera, solids: &Solids) -> Vec<Vertex> {
     vertices
 }
 
-/// Millimetres that some pixels are at a place.
+/// Size in millimetres of some pixels at a position.
 fn px(camera: &Camera, at: &Vec3, pixels: f64) -> f64 {
     let distance = -camera.in_view(at)[2];
     camera.pixel_mm_at(distance.max(camera.near)) * pixels
@@ -97,7 +97,7 @@ fn device(camera: &Camera, device: &RefinedDevice, vertices: &mut Vec<Vertex>) {
     let mut sections: Vec<Section> = Vec::with_capacity(2 * points.len() + 2 * CAP_RINGS);
     cap(section(0, 0), -1.0, &mut sections);
     for piece in 0..last {
-        // Where one part ends and another begins there are two sections in one place.
+        // Where one part ends and another begins there are two sections at one position.
         if piece == 0 || device.looks(piece) != device.looks(piece - 1) {
             sections.push(section(piece, piece));
         }
@@ -107,7 +107,7 @@ fn device(camera: &Camera, device: &RefinedDevice, vertices: &mut Vec<Vertex>) {
     tube(camera, &sections, vertices);
 }
 
-/// Half a ball before or behind a section.
+/// A hemisphere before or behind a section.
 fn cap(end: Section, outwards: f64, sections: &mut Vec<Section>) {
     for ring in 0..CAP_RINGS {
         let step = if outwards < 0.0 { CAP_RINGS - ring } else { ring + 1 };
@@ -121,7 +121,7 @@ fn cap(end: Section, outwards: f64, sections: &mut Vec<Section>) {
     }
 }
 
-/// Dots where the wall holds devices, and arrows along its forces.
+/// Dots at contacts of devices with the wall, and arrows along their forces.
 fn contacts(camera: &Camera, contacts: &[ContactView], vertices: &mut Vec<Vertex>) {
     let strongest = contacts.iter().map(|c| c.force_n.norm()).fold(0.0, f64::max);
     let scale = f64::from(camera.size_px[0].max(camera.size_px[1])) / 640.0;
@@ -177,7 +177,7 @@ fn frustum(camera: &Camera, c_arm: &CArm, vertices: &mut Vec<Vertex>) {
         let next = (k + 1) % 4;
         for [a, b] in [[source, corners[k]], [corners[k], corners[next]], [field[k], field[next]]] {
             let along = (b - a).normalize();
-            // In pieces, so that only what is behind the camera is left out.
+            // In pieces, so that only those behind the camera are omitted.
             for piece in 0..BEAM_PIECES {
                 let [a, b] =
                     [piece, piece + 1].map(|i| a + (b - a) * (f64::from(i) / f64::from(BEAM_PIECES)));
@@ -200,7 +200,7 @@ fn tube(camera: &Camera, sections: &[Section], vertices: &mut Vec<Vertex>) {
     let mut before: Option<[Vertex; SIDES]> = None;
     for section in sections {
         let t = &section.along;
-        // The least rotation that keeps the frame across the tube.
+        // The smallest rotation that keeps the frame across the tube.
         side = (side - t * side.dot(t)).try_normalize(1e-6).unwrap_or_else(|| perpendicular(t));
         let other = t.cross(&side);
         let [sin, cos] = section.tilt;

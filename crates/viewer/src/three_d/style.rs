@@ -1,22 +1,21 @@
-//! How surfaces of the 3D view look. The WGSL shader holds the same formulas, and reads the same numbers as a
-//! uniform.
+//! Shading of the 3D view. The WGSL shader has the same formulas, and reads the same numbers from a uniform.
 //!
-//! **Wall.** A thin sheet lit from the upper left, more opaque where it is seen edge-on (a light path through
-//! a sheet grows as 1/cos), which draws the silhouettes that make a translucent tube readable. Farther parts
-//! fade to the background. **Order independence** is that of McGuire and Bavoil (Journal of Computer Graphics
-//! Techniques 2(2), 2013): the colours in front of the opaque scene are averaged with weights αw that fall
-//! with distance, and cover it by 1 − Π(1 − α).
+//! **Wall.** A thin sheet lit from the upper left, more opaque where it is seen edge-on (a light path through a sheet
+//! is proportional to 1/cos), which draws the silhouettes that make a translucent tube readable. Farther parts fade
+//! to the background. **Order independence** is that of McGuire and Bavoil (Journal of Computer Graphics Techniques
+//! 2(2), 2013): the colours in front of the opaque scene are averaged with weights αw that decrease with distance,
+//! and cover it by 1 − Π(1 − α).
 //!
-//! Colours are display values, blended as they are.
+//! Colours are display values, blended without conversion.
 
 use glam::{Vec3, Vec4};
 
 use crate::three_d::Camera;
 
-/// All constants of the look.
+/// All constants of the shading.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Style {
-    /// rgb of what is behind everything; w: how far the farthest wall fades to it.
+    /// rgb of the background; w: how far the farthest wall fades to it.
     background: Vec4,
     /// rgb of the wall; w: how much darker its silhouettes are.
     wall: Vec4,
@@ -28,7 +27,7 @@ pub(crate) struct Style {
     sheet: Vec4,
     /// Tangents of half the opening angles; nearest and farthest distance of the wall.
     frustum: Vec4,
-    /// Near and far plane, for the shader alone.
+    /// Near and far plane, only for the shader.
     #[cfg(feature = "gpu")]
     planes: Vec4,
 }
@@ -49,7 +48,7 @@ impl Style {
         }
     }
 
-    /// The members in order, as the shader's uniform has them.
+    /// The members in the order of the shader's uniform.
     #[cfg(feature = "gpu")]
     pub(crate) fn uniform(&self) -> [[f32; 4]; 7] {
         [self.background, self.wall, self.device, self.lamp, self.sheet, self.frustum, self.planes]

@@ -1,4 +1,4 @@
-//! Words in pictures: a font of 3 × 5 dots.
+//! Text in images: a font of 3 × 5 dots.
 
 use crate::output::Image;
 
@@ -28,10 +28,10 @@ const LETTERS: [(char, [u8; 5]); 7] = [
 const M: [u8; 5] = [0, 0b11010, 0b10101, 0b10101, 0b10101];
 const N: [u8; 5] = [0b10001, 0b11001, 0b10101, 0b10011, 0b10001];
 
-/// Rows of dots.
+/// Number of rows of dots.
 pub(super) const ROWS: u32 = 5;
 
-/// Rows and columns of a character; nothing of one that the font does not have.
+/// Rows and columns of a character; empty if the font lacks it.
 fn glyph(letter: char) -> ([u8; 5], u32) {
     match letter {
         'm' => (M, 5),
@@ -41,12 +41,12 @@ fn glyph(letter: char) -> ([u8; 5], u32) {
     }
 }
 
-/// Columns of dots that a text takes.
+/// Number of columns of dots of a text.
 pub(super) fn columns(text: &str) -> u32 {
     text.chars().map(|letter| glyph(letter).1 + 1).sum()
 }
 
-/// Writes a text with its upper left corner at a pixel, in dots of some pixels.
+/// Writes a text with its upper left corner at a pixel, with a given size of dots.
 pub(super) fn text(image: &mut Image, [mut x, top]: [u32; 2], dot: u32, text: &str, ink: [u8; 4]) {
     for letter in text.chars() {
         let (rows, columns) = glyph(letter);

@@ -1,21 +1,22 @@
-//! From path lengths to what the detector absorbs.
+//! From path lengths to the energy absorbed by the detector.
 //!
-//! **Beer–Lambert, with many energies.** Behind materials of lengths Lₘ a photon of energy E is left with probability
-//! exp(−p), p = Σ μₘ(E) Lₘ. A flat detector adds up energy, so its signal is S = ∫ N(E) η(E) E e^{−p} dE with the photons N of
-//! the tube and the share η that caesium iodide absorbs.
+//! **Beer–Lambert, with many energies.** Behind materials of lengths Lₘ a photon of energy E is transmitted with
+//! probability exp(−p), p = Σ μₘ(E) Lₘ. A flat detector integrates energy, so its signal is S = ∫ N(E) η(E) E e^{−p}
+//! dE with the photons N of the tube and the fraction η absorbed by caesium iodide.
 //!
-//! **Single precision.** Everything is told relative to a *reference*, a thickness of soft tissue such as the scene's, behind which
-//! S = 1. Its length is taken off that of the tissue before µ comes in, so p is small where signals are not, and sums run over
-//! eight lanes: over every line of the table the signal is the tabulated integral within 10⁻⁶, relatively, down to 5·10⁻⁷ of
-//! the open beam.
+//! **Single precision.** Everything is relative to a *reference*, a thickness of soft tissue such as the scene's,
+//! behind which S = 1. Its length is subtracted from that of the tissue before multiplication by µ, so p is small
+//! where signals are not, and sums run over eight lanes: over every line of the table the signal is the tabulated
+//! integral within 10⁻⁶, relatively, down to 5·10⁻⁷ of the open beam.
 //!
-//! **Fewer energies**, where [`XRaySpec::energy_bins`] asks for them: with the weights of the spectrum behind the reference the
-//! integrand is e^{−(p − p_ref)}, smooth in E between K-edges and near one, and a Gauss rule, separate between the edges of iodine,
-//! tungsten and platinum, replaces the table. None of far fewer nodes reaches 10⁻⁶: the table is kinked at its entries, and the transmissions
-//! of the [`Material`]s span 34 dimensions of 65 to that accuracy (80 kV).
+//! **Fewer energies**, if [`XRaySpec::energy_bins`] requests them: with the weights of the spectrum behind the
+//! reference the integrand is e^{−(p − p_ref)}, smooth in E between K-edges and near one, and a Gauss rule, separate
+//! between the edges of iodine, tungsten and platinum, replaces the table. No rule with far fewer nodes reaches 10⁻⁶:
+//! the table has kinks at its entries, and the transmissions of the [`Material`]s span 34 dimensions of 65 to that
+//! accuracy (80 kV).
 //!
-//! **Quanta.** Each absorbed photon gives its energy, so var S ∝ ∫ N η E² e^{−p}: as if S/ε quanta of the energy
-//! ε = ∫NηE² / ∫NηE had been counted.
+//! **Photon noise.** Each absorbed photon contributes its energy, so var S ∝ ∫ N η E² e^{−p}: as if S/ε photons of
+//! the energy ε = ∫NηE² / ∫NηE had been counted.
 
 use endowire_core::Result;
 
@@ -25,33 +26,33 @@ use super::spectrum::Spectrum;
 use crate::material::{Material, table::ATTENUATION};
 use crate::spec::XRaySpec;
 
-/// Least share of the signal that a stretch between edges must carry to get nodes of its own.
+/// Smallest fraction of the signal in an interval between edges that gets nodes of its own.
 const LEAST_SHARE: f64 = 1e-6;
-/// Lines with less of the open beam's signal are left out. They are those of the lowest energies, and whatever comes into the
-/// beam takes more of them than of the others.
+/// Fraction of the open beam's signal below which lines are omitted. They are those of the lowest energies, and any
+/// material attenuates them more than the others.
 const LEAST_LINE: f64 = 1e-8;
 
-/// A spectrum behind a reference, reduced to nodes, with what the materials do to it.
+/// A spectrum behind a reference, reduced to nodes, with the attenuation of materials.
 #[derive(Debug, Clone)]
 pub(crate) struct Beam {
-    /// Energy and share of the reference signal of each node.
+    /// Energy and fraction of the reference signal of each node.
     nodes: Vec<(f64, f64)>,
     /// Soft tissue of the reference; exact in single precision.
     reference_mm: f64,
-    /// Signal without anything in the way, by the whole table.
+    /// Signal of the open beam, from the whole table.
     open: f64,
-    /// Absorbed energy at the reference for each mm² and nGy, keV.
+    /// Absorbed energy at the reference per mm² and nGy, keV.
     kev_per_mm2_ngy: f64,
-    /// Weights and weights times energies by lanes, the rest of the last lane zero.
+    /// Weights and weights times energies by lanes, zero in the unused part of the last lane.
     weights: Vec<[[f32; LANES]; 2]>,
-    /// Widest instructions there are. Sums are of the same numbers in the same order with any.
+    /// Widest vector instructions available. Sums have the same order with any.
     arch: pulp::Arch,
 }
 
 /// Attenuation of one material, by lanes of nodes, 1/mm.
 pub(crate) type Lanes = Vec<[f32; LANES]>;
 
-/// Share of photons of an energy that the scintillator absorbs.
+/// Fraction of photons of an energy absorbed by the scintillator.
 fn absorbed(energy_kev: f64, csi_mm: f64) -> Result<f64> {
     Ok(1.0 - libm::exp(-Material::CaesiumIodide.attenuation_per_mm(energy_kev)? * csi_mm))
 }
@@ -116,7 +117,7 @@ impl Beam {
         self.nodes.iter().map(|&(energy, _)| material.attenuation_per_mm(energy)).collect()
     }
 
-    /// What a millimetre of `material` adds in place of `displaced`, by lanes.
+    /// Attenuation of a millimetre of `material` replacing `displaced`, by lanes.
     pub(crate) fn excess(&self, material: Material, displaced: Option<Material>) -> Result<Lanes> {
         let mut mu = self.mu(material)?;
         if let Some(displaced) = displaced {
@@ -131,13 +132,13 @@ impl Beam {
         lines.map(|(weight, mu)| weight * mu).sum()
     }
 
-    /// Soft tissue of the reference, whose length [`Self::add`] wants taken off.
+    /// Soft tissue of the reference, which must be subtracted for [`Self::add`].
     pub(crate) fn reference_mm(&self) -> f32 {
         self.reference_mm as f32
     }
 
-    /// Adds to (signal, signal times energy in keV), by lanes, what is left behind layers: their attenuation and length, that of soft
-    /// tissue less [`Self::reference_mm`]. `line_integrals` is room to work in.
+    /// Adds the signal (and signal times energy in keV) behind layers, by lanes: given their attenuation and length,
+    /// that of soft tissue minus [`Self::reference_mm`]. `line_integrals` is a work buffer.
     #[inline]
     pub(crate) fn add<'a>(
         &self,
@@ -153,7 +154,7 @@ impl Beam {
         -libm::log(self.open)
     }
 
-    /// Energy in keV of the quanta that vary as the signal at the reference does: ∫NηE² / ∫NηE.
+    /// Energy in keV of photons with the noise of the signal at the reference: ∫NηE² / ∫NηE.
     pub(crate) fn quantum_kev(&self) -> f64 {
         self.nodes.iter().map(|node| node.0 * node.1).sum::<f64>()
             / self.nodes.iter().map(|node| node.1).sum::<f64>()
@@ -165,7 +166,7 @@ impl Beam {
     }
 }
 
-/// What is left behind layers, to be added to a sum. A struct: what it does is inlined where a closure is not.
+/// Adds the signal behind layers to a sum. A struct, because its code is inlined where a closure's is not.
 struct Left<'a, Layers> {
     weights: &'a [[[f32; LANES]; 2]],
     layers: Layers,
@@ -190,7 +191,7 @@ impl<'a, Layers: Iterator<Item = (&'a Lanes, f32)>> pulp::WithSimd for Left<'_, 
                 *p = left;
             }
         }
-        // On their own, sums stay in registers.
+        // As local variables, sums stay in registers.
         let [mut signal, mut energy] = *sum;
         for ([weights, energies], p) in weights.iter().zip(line_integrals) {
             let left = exp_lanes(*p);
@@ -205,12 +206,12 @@ impl<'a, Layers: Iterator<Item = (&'a Lanes, f32)>> pulp::WithSimd for Left<'_, 
     }
 }
 
-/// Replaces a table by Gauss rules between the K-edges, `count` nodes in all where the table has more.
+/// Replaces a table by Gauss rules between the K-edges, with `count` nodes in all if the table has more.
 fn reduced(lines: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
     if lines.len() <= count {
         return lines.to_vec();
     }
-    // Caesium and barium have edges beside iodine's; telling them apart is worth no node.
+    // Caesium and barium have edges near iodine's; separating them is not worth a node.
     let edges: Vec<f64> = ATTENUATION.edges_kev().into_iter().filter(|e| !(34.0..60.0).contains(e)).collect();
     let mut parts: Vec<Vec<(f64, f64)>> = vec![vec![]; edges.len() + 1];
     for &line in lines {
@@ -218,7 +219,7 @@ fn reduced(lines: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
     }
     let share = |part: &[(f64, f64)]| part.iter().map(|line| line.1).sum::<f64>();
     parts.retain(|part| share(part) > LEAST_SHARE);
-    // One node each, the others where most is left for a node to stand for.
+    // One node each, the others where a node represents most.
     let mut nodes = vec![1_usize; parts.len()];
     for _ in parts.len()..count {
         let most = (0..parts.len()).filter(|&i| nodes[i] < parts[i].len()).max_by(|&a, &b| {
@@ -238,7 +239,7 @@ mod tests {
     use super::*;
 
     impl Beam {
-        /// Signal behind the given materials over that of the open beam: the transmitted fraction.
+        /// Ratio of the signal behind the given materials to that of the open beam: the transmitted fraction.
         fn transmission(&self, lengths: impl Iterator<Item = (Material, f64)>) -> Result<f64> {
             let mut p = self.mu(Material::SoftTissue)?;
             p.iter_mut().for_each(|p| *p *= -self.reference_mm);
@@ -249,7 +250,7 @@ mod tests {
         }
     }
 
-    /// Direct sum over the table, written without the code above.
+    /// Direct sum over the table, independent of the code above.
     fn tabulated(kvp: f64, lengths: &[(Material, f64)]) -> f64 {
         let tube = Spectrum::tube(kvp, 2.5, 0.2).unwrap();
         let (mut left, mut open) = (0.0, 0.0);
@@ -262,7 +263,7 @@ mod tests {
         left / open
     }
 
-    /// 0 to 40 cm of tissue, alone and with each of what bodies and devices are made of, thin and thick.
+    /// 0 to 40 cm of tissue, alone and with each material of bodies and devices, thin and thick.
     fn slabs() -> Vec<Vec<(Material, f64)>> {
         use Material::*;
         let within: [&[(Material, f64)]; 16] = [
@@ -287,7 +288,7 @@ mod tests {
         tissue.flat_map(|t| within.map(|more| [&[(SoftTissue, t)], more].concat())).collect()
     }
 
-    /// What pictures are made from: the signal in single precision over that of the open beam.
+    /// As in images: the ratio of the signal in single precision to that of the open beam.
     fn drawn(beam: &Beam, slab: &[(Material, f64)]) -> f64 {
         let layers: Vec<(Lanes, f32)> = slab
             .iter()
@@ -303,7 +304,7 @@ mod tests {
 
     /// Largest relative error of `signal` over the slabs.
     fn worst(kvp: f64, signal: impl Fn(&[(Material, f64)]) -> f64) -> f64 {
-        // What the table is asked for is what single precision can hold.
+        // The table is evaluated at lengths representable in single precision.
         let held = |slab: &Vec<(Material, f64)>| -> Vec<(Material, f64)> {
             slab.iter().map(|&(m, l)| (m, f64::from(l as f32))).collect()
         };
@@ -328,7 +329,7 @@ mod tests {
                 assert!(single <= 1e-6 && double <= 1e-6, "{kvp} kV, {reference} mm: {single} {double}");
             }
         }
-        // The twins: a micrometre of tissue more is seen, and so is what a Gauss rule leaves out.
+        // Counter-checks: an additional micrometre of tissue is detected, and so is the error of a Gauss rule.
         let beam = Beam::new(&XRaySpec::default(), 200.0).unwrap();
         let more = worst(80.0, |slab| {
             drawn(&beam, slab) * (-1e-3 * Material::SoftTissue.attenuation_per_mm(60.0).unwrap()).exp()
@@ -357,7 +358,7 @@ mod tests {
             eprintln!("{error:+.1e} {slab:?}");
             assert!(error.abs() < 1e-3, "{slab:?}: {error}");
         }
-        // The twin: one energy is not enough.
+        // Counter-check: one energy is not enough.
         let one = Beam::new(&XRaySpec { energy_kev: Some(58.0), ..spec }, 200.0).unwrap();
         let slab = [(SoftTissue, 180.0), (Contrast370, 3.0)];
         assert!((one.transmission(slab.into_iter()).unwrap() / tabulated(80.0, &slab) - 1.0).abs() > 0.01);

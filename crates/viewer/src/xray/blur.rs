@@ -1,16 +1,16 @@
-//! Blurs by a Gaussian, along rows and then along columns.
+//! Gaussian blurs, along rows and then along columns.
 
 use rayon::prelude::*;
 
-/// The kernel ends at this many deviations.
+/// Number of deviations at which the kernel is truncated.
 const KERNEL_REACH: f64 = 3.0;
-/// Deviations below this many pixels change nothing visible.
+/// Deviation below which a blur is invisible, pixels.
 const LEAST_PX: f64 = 0.05;
 
-/// Fewest rows worth handing to another thread.
+/// Smallest number of rows per thread.
 const FEWEST_ROWS: usize = 16;
 
-/// A Gaussian over pixels of one size of picture.
+/// A Gaussian kernel for one image size.
 #[derive(Debug)]
 pub(super) struct Blur {
     size_px: [usize; 2],
@@ -20,10 +20,10 @@ pub(super) struct Blur {
 }
 
 impl Blur {
-    /// That of a deviation in pixels.
+    /// For a deviation in pixels.
     pub(super) fn new(deviation_px: f64, size_px: [u32; 2]) -> Self {
         let reach = if deviation_px < LEAST_PX { 0 } else { (KERNEL_REACH * deviation_px).ceil() as usize };
-        // Integrals of the Gaussian over pixels tend to samples of it; a slim one is summed over parts of pixels.
+        // Integrals of the Gaussian over pixels tend to its samples; a narrow one is summed over sub-pixels.
         const PARTS: i32 = 16;
         let weight = |k: usize| -> f64 {
             (0..PARTS)
@@ -47,7 +47,7 @@ impl Blur {
         self.kernel.len() > 1
     }
 
-    /// Spreads a picture; borders repeat.
+    /// Blurs an image; borders are repeated.
     pub(super) fn spread(&mut self, image: &mut [f32]) {
         if !self.is_visible() {
             return;

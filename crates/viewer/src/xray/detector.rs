@@ -1,12 +1,13 @@
-//! A flat detector: focal spot, quanta, light spread, electronics and lag.
+//! A flat detector: focal spot, photon noise, light spread, electronics and lag.
 //!
-//! The signal of a pixel is the energy absorbed in it, one at the reference dose. A focal spot of width f throws a penumbra of
-//! f (SID − SOD)/SOD behind the isocentre; it is a Gaussian of the same variance here, for all depths that of the isocentre. Of the
-//! signal, n = Poisson(λ) quanta of the local mean energy arrive; the scintillator's light spreads over the neighbours, signal and
-//! noise alike (a Gaussian of deviation `blur_mm`); reading adds the noise of electronics, as strong as that of the quanta of
-//! `electronic_ngy`, pixel by pixel; and a share `lag` of what was stored before is read again.
+//! The signal of a pixel is the energy absorbed in it, one at the reference dose. A focal spot of width f causes a
+//! penumbra of f (SID − SOD)/SOD for the isocentre; here it is a Gaussian of the same variance, for all depths that
+//! of the isocentre. Of the signal, n = Poisson(λ) photons of the local mean energy arrive; the scintillator's light
+//! spreads over the neighbours, signal and noise alike (a Gaussian of deviation `blur_mm`); reading adds electronic
+//! noise, as strong as that of the photons of `electronic_ngy`, per pixel; and a fraction `lag` of the last stored
+//! signal is read again.
 //!
-//! Random words belong to (seed, geometry, frame, pixel): every pose and plane has a noise of its own.
+//! Random words depend on (seed, geometry, frame, pixel): every pose and plane has independent noise.
 
 use rayon::prelude::*;
 
@@ -20,30 +21,30 @@ use crate::spec::{DetectorSpec, XRaySpec};
 const QUANTA: u32 = 0;
 const ELECTRONS: u32 = 1;
 
-/// Pixels whose random words are made side by side.
+/// Number of pixels whose random words are computed together.
 const BLOCK: usize = 4 * LANES;
-/// Pixels that one thread takes at a time: whole blocks.
+/// Number of pixels per task of a thread: whole blocks.
 const RUN: usize = 256 * BLOCK;
 
-/// Turns signals into noisy, blurred and lagging ones.
+/// Adds noise, blur and lag to signals.
 #[derive(Debug)]
 pub(crate) struct Detector {
-    /// Of the random words.
+    /// Key of the random words.
     key: [u32; 2],
     noisy: bool,
     focal_spot: Blur,
     light: Blur,
-    /// Standard deviation of what reading a pixel adds, keV.
+    /// Standard deviation of the electronic noise of a pixel, keV.
     electronic_kev: f32,
     lag: f32,
     /// The last signal read; empty before the first.
     stored: Vec<f32>,
-    /// Widest instructions there are: the same operations with any.
+    /// Widest vector instructions available: the operations are the same with any.
     arch: pulp::Arch,
 }
 
 impl Detector {
-    /// That of a view; `electronic_kev` is the standard deviation of what reading a pixel adds.
+    /// For a view; `electronic_kev` is the standard deviation of the electronic noise of a pixel.
     pub(crate) fn new(spec: &DetectorSpec, xray: &XRaySpec, c_arm: &CArm, electronic_kev: f64) -> Self {
         let key = u128::from(spec.seed) ^ c_arm.fingerprint();
         let key = (key ^ (key >> 64)) as u64;
@@ -61,18 +62,18 @@ impl Detector {
         }
     }
 
-    /// Takes what is stored of the last frame; the next one has nothing of it.
+    /// Removes the stored last frame, so that the next one has no lag from it.
     pub(crate) fn take_stored(&mut self) -> Vec<f32> {
         std::mem::take(&mut self.stored)
     }
 
-    /// Stores what the next frame is to have its share of.
+    /// Stores the signal of which the next frame has its share.
     pub(crate) fn store(&mut self, signal: Vec<f32>) {
         self.stored = signal;
     }
 
-    /// Reads one frame. `signal` and `energy` (signal times keV a quantum) are those of the pixels; `kev` is the energy that a
-    /// signal of one stands for; `frame` numbers the noise.
+    /// Reads one frame. `signal` and `energy` (signal times keV per photon) are those of the pixels; `kev` is the
+    /// energy of a unit signal; `frame` numbers the noise.
     pub(crate) fn read(
         &mut self,
         mut signal: Vec<f32>,
@@ -101,7 +102,7 @@ impl Detector {
         image
     }
 
-    /// Counts quanta: signals become those of numbers of quanta.
+    /// Photon counting: replaces signals by those of random numbers of photons.
     fn count(&self, image: &mut [f32], energy: &[f32], kev: f64, frame: u64) {
         let runs = image.par_chunks_mut(RUN).zip(energy.par_chunks(RUN)).enumerate();
         runs.for_each(|(run, (signal, energy))| {
@@ -110,7 +111,7 @@ impl Detector {
         });
     }
 
-    /// Adds the noise of electronics.
+    /// Adds electronic noise.
     fn add_electronic(&self, image: &mut [f32], kev: f64, frame: u64) {
         let deviation = self.electronic_kev / kev as f32;
         image.par_chunks_mut(RUN).enumerate().for_each(|(run, signal)| {
@@ -120,18 +121,18 @@ impl Detector {
     }
 }
 
-/// Where the random words of a run of pixels come from: four pixels have the words of one counter.
+/// Source of the random words of a run of pixels: four pixels share the words of one counter.
 #[derive(Clone, Copy)]
 struct Words {
     key: [u32; 2],
-    /// Number of the first pixel.
+    /// Index of the first pixel.
     first: usize,
     stream: u32,
     frame: u64,
 }
 
 impl Words {
-    /// Those of a block of the run.
+    /// The words of a block of the run.
     #[inline(always)]
     fn of(&self, block: usize) -> [u32; BLOCK] {
         let mut groups = [(self.first / 4 + block * LANES) as u32; LANES];
@@ -150,8 +151,8 @@ impl Words {
     }
 }
 
-/// Signals that are to become those of numbers of quanta. Structs, and loops in place of maps: what they do is inlined where closures
-/// are not, and has the widest instructions there are.
+/// Signals to be replaced by those of numbers of photons. Structs, and loops instead of maps, are inlined where
+/// closures are not, and use the widest instructions available.
 struct Counted<'a> {
     words: Words,
     signal: &'a mut [f32],
@@ -168,12 +169,12 @@ impl pulp::WithSimd for Counted<'_> {
         let Self { words, signal, energy, kev, each } = self;
         let table = normal_table();
         for (block, (signal, energy)) in signal.chunks_mut(BLOCK).zip(energy.chunks(BLOCK)).enumerate() {
-            // The last block of a picture may be a part of one.
+            // The last block of an image may be incomplete.
             let (mut s, mut quanta, mut means) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
             s[..signal.len()].copy_from_slice(signal);
             quanta[..energy.len()].copy_from_slice(energy);
             for i in 0..BLOCK {
-                // An energy of e/s each: s·kev/(e/s) quanta.
+                // Photons of energy e/s each: s·kev/(e/s) photons.
                 quanta[i] /= s[i].max(f32::MIN_POSITIVE);
                 means[i] = s[i] * kev / quanta[i].max(1.0);
             }
@@ -186,7 +187,7 @@ impl pulp::WithSimd for Counted<'_> {
     }
 }
 
-/// Signals that get the noise of electronics.
+/// Signals to which electronic noise is added.
 struct Disturbed<'a> {
     words: Words,
     signal: &'a mut [f32],
@@ -243,7 +244,7 @@ mod tests {
         let energy: Vec<f32> = signal.iter().map(|s| s * 60.0).collect();
         let (mut sum, mut squares) = (vec![0.0; 256], vec![0.0; 256]);
         for frame in 0..frames {
-            // 100 quanta of 60 keV at a signal of one.
+            // 100 photons of 60 keV at unit signal.
             for (i, v) in detector.read(signal.clone(), energy.clone(), 6000.0, frame).into_iter().enumerate()
             {
                 sum[i] += f64::from(v);
@@ -258,7 +259,8 @@ mod tests {
     #[test]
     fn over_a_thousand_frames_the_variance_is_that_of_the_quanta() {
         let (mean, variance) = moments(1000, 0.0);
-        // A signal s has 100 s quanta: variance s/100. One pixel's variance is known to 4.5 %, that of 256 to 0.3 %.
+        // A signal s has 100 s photons: variance s/100. The error of one pixel's variance is 4.5 %, that of 256 0.3
+        // %.
         let ratio: f64 = mean.iter().zip(&variance).map(|(m, v)| v / (m / 100.0)).sum::<f64>() / 256.0;
         assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
         // A line through variance against mean has the slope 1/100 and passes through the origin.
@@ -270,7 +272,7 @@ mod tests {
         for (m, s) in mean.iter().zip(ramp()) {
             assert!((m - f64::from(s)).abs() < 5.0 * (f64::from(s) / 1e5).sqrt(), "{m} {s}");
         }
-        // The twin: spread light has less variance than quanta.
+        // Counter-check: spread light has a smaller variance than photons.
         let (mean, variance) = moments(300, 0.2);
         let ratio: f64 = mean.iter().zip(&variance).map(|(m, v)| v / (m / 100.0)).sum::<f64>() / 256.0;
         assert!(ratio < 0.7, "{ratio}");
@@ -294,7 +296,7 @@ mod tests {
         };
         let one = read(1, 4, 0.0);
         assert_eq!(one, read(1, 4, 0.0));
-        // Of 512 × 512 pixels, independent noise correlates by 0.002.
+        // Over 512 × 512 pixels, independent noise has a correlation of 0.002.
         for other in [read(2, 4, 0.0), read(1, 5, 0.0), read(1, 4, 1e-6), read(1, 4, -30.0)] {
             assert!(correlation(&one, &other).abs() < 0.01, "{}", correlation(&one, &other));
         }
@@ -303,7 +305,7 @@ mod tests {
 
     #[test]
     fn electronics_are_as_noisy_as_the_quanta_of_their_dose() {
-        // 100 quanta of 60 keV, and electronics as noisy as 100 more: √(100) · 60 keV.
+        // 100 photons of 60 keV, and electronics with the noise of 100 more: √(100) · 60 keV.
         let spec = DetectorSpec { blur_mm: 0.0, lag: 0.0, ..DetectorSpec::default() };
         let variance = |electronic_kev: f64| {
             let size = [256, 256];
@@ -329,7 +331,7 @@ mod tests {
         // 1.2 mm · 350/750 are 1.87 pixels: a variance of 1.87²/12, and the width of a pixel.
         let expected = 1.8667_f64.powi(2) / 12.0 + 1.0 / 12.0;
         assert!((second / sum / expected - 1.0).abs() < 0.05, "{} {expected}", second / sum);
-        // Quanta behind it are independent from pixel to pixel.
+        // Photon noise after it is independent from pixel to pixel.
         let noisy = DetectorSpec { noise: true, ..spec };
         let mut detector = Detector::new(&noisy, &xray, &arm(0.0, [256, 256]), 0.0);
         let image = detector.read(vec![1.0; 65_536], vec![60.0; 65_536], 6000.0, 0);

@@ -1,6 +1,6 @@
-//! e^x and ln x for many numbers at once, in a form that compilers turn into vector instructions.
+//! e^x and ln x for many numbers at once, in a form that compilers vectorise.
 
-/// Numbers in a lane.
+/// Numbers per lane group.
 pub(crate) const LANES: usize = 8;
 
 /// e^x within 2e-7 of its value for |x| ≤ 87, saturating beyond.
@@ -8,7 +8,7 @@ pub(crate) const LANES: usize = 8;
 /// e^x = 2ⁿ e^r with n = ⌊x log₂e + ½⌋ and |r| ≤ ln 2/2, and the Taylor series to r⁷/7!, whose next term is below 6e-9.
 #[inline(always)]
 pub(crate) fn exp_lanes(x: [f32; LANES]) -> [f32; LANES] {
-    // Added to a small number this leaves its nearest integer in the low bits.
+    // Adding this to a small number leaves its nearest integer in the low bits.
     const ROUND: f32 = 12_582_912.0;
     // ln 2 in two parts, so that n times the first is exact.
     const LN2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
@@ -28,7 +28,7 @@ pub(crate) fn exp_lanes(x: [f32; LANES]) -> [f32; LANES] {
     y
 }
 
-/// Replaces positive normal numbers by their natural logarithms, within 2e-7 absolutely or relatively.
+/// Replaces positive normal numbers by their natural logarithms, within 2e-7 absolute or relative.
 ///
 /// x = 2ⁿ m with √½ ≤ m < √2, and ln m = 2 artanh t with t = (m − 1)/(m + 1), |t| < 0.172; the series' first omitted term,
 /// 2t¹¹/11, is below 7e-10.

@@ -1,19 +1,20 @@
-//! Exposure control: which voltage and current bring the wanted dose to the detector.
+//! Exposure control: voltage and current that give the wanted dose at the detector.
 //!
-//! The *thickness* T of a patient is that of the soft tissue which attenuates as much in the measuring field, the middle ninth of the picture
-//! (`Anatomy::reference_mm`). A tube that gives N₀ photons per mm² and mAs at 1 m, of which a share n(E) has the energy E behind its filters, brings
-//! the air kerma
+//! The *thickness* T of a patient is that of soft tissue with the same attenuation in the measuring field, the middle
+//! ninth of the image (`Anatomy::reference_mm`). A tube that emits N₀ photons per mm² and mAs at 1 m, of which a
+//! fraction n(E) has the energy E behind its filters, gives the air kerma
 //!
 //! ```text
 //! k(U, T) = N₀(U) (1 m / SID)² ∫ n(E) e^{−µ_tissue(E) T} E µ_en(E)/ρ dE     for each mAs
 //! ```
 //!
-//! to the detector; the grid's and the table's losses are left out. The voltage U is that of the curve at T, in the steps of 5 kV of the spectra; the
-//! current I = D / (k τ) then brings the dose D in a pulse of τ. Where I is above what the tube can do, the voltage rises by steps until it is not, and
-//! falls where I is below its least; at the last voltage the current stays at its limit and the dose is what comes of it. So within the limits the
-//! dose is exact behind T of tissue, and in the measuring field as near as its median stands for the mean.
+//! at the detector; losses in grid and table are neglected. The voltage U is that of the curve at T, in the steps of
+//! 5 kV of the spectra; the current I = D / (k τ) then gives the dose D in a pulse of τ. If I exceeds the tube's
+//! maximum, the voltage is raised stepwise until it does not, and lowered if I is below its minimum; at the last
+//! voltage the current stays at its limit and the dose follows from it. So within the limits the dose is exact behind
+//! T of tissue, and in the measuring field as accurate as its median represents the mean.
 //!
-//! N₀ is that of the anode table: SpekPy 2.5, model casim, 12 degrees, photons from 15 keV on.
+//! N₀ is that of the anode table: SpekPy 2.5, model casim, 12 degrees, photons from 15 keV upwards.
 
 use endowire_core::{Error, Result};
 use serde::Serialize;
@@ -30,20 +31,20 @@ const OUTPUT: [f64; 16] = [
 const FIRST_KVP: f64 = 50.0;
 const STEP_KVP: f64 = 5.0;
 
-/// How a picture is exposed.
+/// The exposure of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Exposure {
     /// Peak voltage, kV.
     pub kvp: f64,
-    /// Air kerma at the detector behind the thickness, a frame.
+    /// Air kerma at the detector behind the thickness, per frame.
     pub dose_ngy: f64,
-    /// Soft tissue that attenuates as much as the patient in the measuring field.
+    /// Thickness of soft tissue with the patient's attenuation in the measuring field.
     pub tissue_mm: f64,
     /// Current and length of the pulse; absent without exposure control.
     pub pulse: Option<Pulse>,
 }
 
-/// What the tube does in a frame.
+/// Operation of the tube in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pulse {
     /// Current.
@@ -53,7 +54,7 @@ pub struct Pulse {
 }
 
 impl Exposure {
-    /// That of a view behind so much tissue.
+    /// For a view behind this thickness of tissue.
     ///
     /// # Errors
     /// Values outside the tables.
@@ -91,7 +92,7 @@ fn kvp(step: usize) -> f64 {
     FIRST_KVP + STEP_KVP * step as f64
 }
 
-/// Straight between the points, level beyond; they are checked.
+/// Linear between the points, constant beyond; they have been checked.
 fn on_curve(curve: &[[f64; 2]], at: f64) -> f64 {
     let after = curve.partition_point(|point| point[0] <= at);
     match (after.checked_sub(1).map(|before| curve[before]), curve.get(after)) {
@@ -101,7 +102,7 @@ fn on_curve(curve: &[[f64; 2]], at: f64) -> f64 {
     }
 }
 
-/// Air kerma at the detector for each mAs of a voltage.
+/// Air kerma at the detector per mAs for a voltage.
 fn ngy_per_mas(spec: &ViewSpec, step: usize, tissue_mm: f64) -> Result<f64> {
     let (tube, through) = Spectrum::filtered(kvp(step), spec.xray.aluminium_mm, spec.xray.copper_mm)?;
     let tissue = |e| Material::SoftTissue.attenuation_per_mm(e).unwrap_or(0.0) * tissue_mm;
@@ -111,7 +112,7 @@ fn ngy_per_mas(spec: &ViewSpec, step: usize, tissue_mm: f64) -> Result<f64> {
     Ok(at_detector / behind.photons_per_mm2_ngy())
 }
 
-/// What exposure control cannot do without.
+/// Checks what exposure control requires.
 pub(crate) fn check(spec: &ViewSpec) -> Result<()> {
     if spec.exposure.is_none() {
         return Ok(());
@@ -138,14 +139,15 @@ mod tests {
         view
     }
 
-    /// Reference: SpekPy 2.5 in bins of 0.1 keV with the air of NIST, 2.5 mm of aluminium and 0.2 mm of copper at 1 m: 25.10 µGy/mAs at 80 kV.
+    /// Reference: SpekPy 2.5 in bins of 0.1 keV with NIST's air, 2.5 mm of aluminium and 0.2 mm of copper at 1 m:
+    /// 25.10 µGy/mAs at 80 kV.
     #[test]
     fn a_tube_gives_as_much_as_another_program_says() {
         let mut view = view(Mode::Fluoro);
         view.c_arm.sid_mm = 1000.0;
         let ugy = |view: &ViewSpec| ngy_per_mas(view, 6, 0.0).unwrap() / 1000.0;
         assert!((ugy(&view) / 25.10 - 1.0).abs() < 0.01, "{}", ugy(&view));
-        // The twin: ten centimetres farther away.
+        // Counter-check: ten centimetres farther away.
         view.c_arm.sid_mm = 1100.0;
         assert!((ugy(&view) * 1.21 / 25.10 - 1.0).abs() < 0.01 && (ugy(&view) / 25.10 - 1.0).abs() > 0.1);
     }
@@ -166,7 +168,7 @@ mod tests {
             assert!(pulse.current_ma > before, "more of it for more tissue: {exposure:?}");
             before = pulse.current_ma;
         }
-        // Without control all is as it was.
+        // Without control nothing changes.
         let fixed = ViewSpec { exposure: None, ..view(Mode::Cine) };
         let expected = Exposure { kvp: 80.0, dose_ngy: 300.0, tissue_mm: 300.0, pulse: None };
         assert_eq!(Exposure::new(&fixed, 300.0).unwrap(), expected);

@@ -1,4 +1,4 @@
-//! X-ray physics: what attenuates how much, what the detector absorbs, and how noisy that is.
+//! X-ray physics: attenuation, absorption in the detector, and noise.
 
 mod beam;
 mod blur;

@@ -1,21 +1,21 @@
-//! Counted quanta: Poisson numbers from a counter-based generator.
+//! Photon noise: Poisson numbers from a counter-based generator.
 //!
-//! Random words are a function of (key, frame, pixel) alone: no order of computation, number of threads or backend can change
-//! them, and a frame can be drawn again without those before it. The generator is Philox4x32-10 (Salmon et al., Parallel Random
-//! Numbers: As Easy as 1, 2, 3, SC 2011).
+//! Random words are a function of (key, frame, pixel) alone: they do not depend on the order of computation, number
+//! of threads or backend, and a frame can be redrawn without those before it. The generator is Philox4x32-10 (Salmon
+//! et al., Parallel Random Numbers: As Easy as 1, 2, 3, SC 2011).
 //!
-//! A Poisson number is a *quantile*, so that a small change of its mean changes it little. Below [`FEW`] quanta it is the exact
-//! one. Above, the Cornish–Fisher expansion with skewness λ^−½ and excess kurtosis 1/λ gives λ + √λ·z + (z² − 1)/6 from a
-//! normal z (the next term, (z − z³)/(72 √λ), is below 1/20 of a quantum for |z| < 3).
+//! A Poisson number is a *quantile*, so that a small change of its mean changes it little. Below [`FEW`] photons it
+//! is the exact one. Above, the Cornish–Fisher expansion with skewness λ^−½ and excess kurtosis 1/λ gives λ + √λ·z +
+//! (z² − 1)/6 from a normal z (the next term, (z − z³)/(72 √λ), is below 1/20 of a photon for |z| < 3).
 
 use std::sync::LazyLock;
 
-/// Means below this are drawn exactly.
+/// Mean below which numbers are drawn exactly.
 const FEW: f32 = 12.0;
-/// Entries of the table of normal quantiles.
+/// Number of entries of the table of normal quantiles.
 const QUANTILES: usize = 1 << 12;
 
-/// Philox4x32-10 of as many counters side by side: word by word, a counter in each lane.
+/// Philox4x32-10 of several counters at once: word by word, one counter per lane.
 #[inline(always)]
 pub(super) fn philox<const N: usize>(counters: [[u32; N]; 4], key: [u32; 2]) -> [[u32; N]; 4] {
     let [mut c0, mut c1, mut c2, mut c3] = counters;
@@ -62,21 +62,21 @@ static NORMAL: LazyLock<Vec<f32>> = LazyLock::new(|| {
     lower.chain(upper.iter().map(|z| z * scale)).map(|z| z as f32).collect()
 });
 
-/// The table that [`normal`] and [`poisson`] want.
+/// The table for [`normal`] and [`poisson`].
 pub(super) fn normal_table() -> &'static [f32; QUANTILES] {
     static ZERO: [f32; QUANTILES] = [0.0; QUANTILES];
     // The length is right by construction.
     NORMAL.as_slice().try_into().unwrap_or(&ZERO)
 }
 
-/// A standard normal number from a random word: the sum of two independent quantiles reaches further into the tails than one of so
-/// few.
+/// A standard normal number from a random word: the sum of two independent quantiles has longer tails than one from
+/// so small a table.
 #[inline(always)]
 pub(super) fn normal(word: u32, table: &[f32; QUANTILES]) -> f32 {
     (table[(word >> 20) as usize] + table[(word & 0xFFF) as usize]) * std::f32::consts::FRAC_1_SQRT_2
 }
 
-/// Poisson numbers of some means, each from a random word; not whole for large means.
+/// Poisson numbers with given means, each from a random word; not integers for large means.
 #[inline(always)]
 pub(super) fn poisson<const N: usize>(
     means: [f32; N],
@@ -84,7 +84,7 @@ pub(super) fn poisson<const N: usize>(
     table: &[f32; QUANTILES],
 ) -> [f32; N] {
     let mut counts = [0.0; N];
-    // Look-ups on their own: what follows is vector instructions.
+    // Look-ups separately, so that the rest is vectorised.
     for i in 0..N {
         counts[i] = normal(words[i], table);
     }
@@ -104,7 +104,7 @@ pub(super) fn poisson<const N: usize>(
     counts
 }
 
-/// The quantile by adding up probabilities.
+/// The quantile by summing probabilities.
 #[cold]
 fn few(mean: f32, word: u32) -> f32 {
     let u = (f64::from(word) + 0.5) / 4_294_967_296.0;
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn philox_gives_the_published_words() {
-        // Known answers of the authors' library.
+        // Known outputs of the authors' library.
         let philox = |counter: [u32; 4], key| philox(counter.map(|word| [word]), key).map(|[word]| word);
         assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
         assert_eq!(
@@ -146,7 +146,7 @@ mod tests {
             std::array::from_fn(|i| 0x9E37_79B9_u32.wrapping_mul((8 * k + i) as u32))
         });
         let words = philox(counters, [3, 4]);
-        // Few quanta in some lanes, many in others.
+        // Few photons in some lanes, many in others.
         let means: [f32; 8] = std::array::from_fn(|i| if i % 3 == 0 { 2.5 } else { 40.0 * i as f32 });
         let table = normal_table();
         let counts = poisson(means, words[0], table);

@@ -2,25 +2,26 @@
 
 use crate::material::Material;
 
-/// Length of each pixel's central ray inside each thing, in millimetres, row by row from the top left.
+/// Length of each pixel's central ray inside each object, in millimetres, row by row from the top left.
 ///
-/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall whatever device lies there. A device
-/// displaces what fills the lumen, so the length through blood is `lumen_mm` minus those of the devices.
+/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall including devices. A device
+/// displaces the content of the lumen, so the length through blood is `lumen_mm` minus those of the devices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathLengths {
-    /// Pixels a row.
+    /// Pixels per row.
     pub width: u32,
     /// Number of rows.
     pub height: u32,
-    /// Length inside the body: soft tissue and all that lies in it; for a CT volume, its equivalent of soft tissue and bone.
+    /// Length inside the body: soft tissue and everything within it; for a CT volume, its equivalent of soft tissue
+    /// and bone.
     pub body_mm: Vec<f32>,
-    /// Length inside bone, in cortical bone of the same mass; empty where the patient has none.
+    /// Length inside bone, as cortical bone of the same mass; empty if the patient has none.
     pub bone_mm: Vec<f32>,
-    /// Length inside the lungs; empty where the patient has none.
+    /// Length inside the lungs; empty if the patient has none.
     pub lung_mm: Vec<f32>,
     /// Length inside the closed wall.
     pub lumen_mm: Vec<f32>,
-    /// Length of undiluted contrast medium in the lumen, beside devices; empty where there is none.
+    /// Length of undiluted contrast medium in the lumen, outside devices; empty if there is none.
     pub contrast_mm: Vec<f32>,
     /// Length inside devices, one map per material, in order of first appearance.
     pub devices_mm: Vec<(Material, Vec<f32>)>,
@@ -39,7 +40,7 @@ impl PathLengths {
         materials(self) == materials(other) && sizes(self) == sizes(other)
     }
 
-    /// Whether the lengths on a ray are those of another that is like it.
+    /// Whether the lengths on a ray equal those of another with the same maps.
     pub(crate) fn is_same_at(&self, other: &Self, i: usize) -> bool {
         self.maps().zip(other.maps()).all(|(a, b)| a.get(i) == b.get(i))
     }

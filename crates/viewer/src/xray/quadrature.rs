@@ -1,13 +1,14 @@
-//! Few energies for many: Gauss quadrature of a tabulated spectrum.
+//! Few energies instead of many: Gauss quadrature of a tabulated spectrum.
 //!
-//! A frame cannot afford a hundred energies a ray. For a discrete measure Σ wᵢ δ(xᵢ) the n-point Gauss rule has positive
-//! weights and integrates polynomials up to degree 2n − 1 exactly; its nodes are the eigenvalues of the Jacobi matrix of the
-//! orthogonal polynomials, its weights the squared first components of the eigenvectors (Golub and Welsch, Mathematics of
-//! Computation 23, 1969), and the matrix comes from Lanczos' recurrence on the measure.
+//! A frame cannot afford a hundred energies per ray. For a discrete measure Σ wᵢ δ(xᵢ) the n-point Gauss rule has
+//! positive weights and integrates polynomials up to degree 2n − 1 exactly; its nodes are the eigenvalues of the
+//! Jacobi matrix of the orthogonal polynomials, its weights the squared first components of the eigenvectors (Golub
+//! and Welsch, Mathematics of Computation 23, 1969), and the matrix is computed by Lanczos' recurrence on the
+//! measure.
 
 use endowire_core::nalgebra::DMatrix;
 
-/// Gauss rule with at most `count` nodes: (node, weight) in rising order. Fewer points than that are their own rule.
+/// Gauss rule with at most `count` nodes: (node, weight), ascending. Fewer points than that are their own rule.
 pub(super) fn gauss(points: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = points.iter().copied().filter(|p| p.1 > 0.0).collect();
     if points.len() <= count {

@@ -8,11 +8,11 @@ use crate::material::table::{AIR, ANODE};
 /// Photons by energy, normalised to one photon.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spectrum {
-    /// (energy in keV, share of the photons), energies rising.
+    /// (energy in keV, fraction of the photons), energies ascending.
     pub(crate) lines: Vec<(f64, f64)>,
 }
 
-/// Refuses a voltage that no spectrum is known of.
+/// Rejects a voltage without a known spectrum.
 pub(crate) fn check_kvp(kvp: f64) -> Result<()> {
     anode(kvp).map(drop)
 }
@@ -39,7 +39,7 @@ impl Spectrum {
         Ok(Self::filtered(kvp, aluminium_mm, copper_mm)?.0)
     }
 
-    /// The same, and what share of the anode's photons the filters let through.
+    /// As [`Self::tube`], with the fraction of the anode's photons transmitted by the filters.
     pub(crate) fn filtered(kvp: f64, aluminium_mm: f64, copper_mm: f64) -> Result<(Self, f64)> {
         let anode = anode(kvp)?;
         let mut lines = Vec::new();
@@ -55,7 +55,7 @@ impl Spectrum {
         Ok((Self { lines }, total))
     }
 
-    /// The spectrum behind something with the given line integral at each energy, not normalised.
+    /// The spectrum behind a material with the given line integral at each energy, not normalised.
     pub(crate) fn behind(&self, line_integral: impl Fn(f64) -> f64) -> Self {
         Self { lines: self.lines.iter().map(|&(e, n)| (e, n * libm::exp(-line_integral(e)))).collect() }
     }
@@ -66,7 +66,7 @@ impl Spectrum {
         self.lines.iter().map(|&(e, n)| n * of(e)).sum::<f64>() / total
     }
 
-    /// Photons per mm² that bring an air kerma of one nanogray.
+    /// Photons per mm² for an air kerma of one nanogray.
     pub(crate) fn photons_per_mm2_ngy(&self) -> f64 {
         // 1 keV = 1.602e-16 J; µ_en/ρ is in cm²/g, so 1/mm² · keV · cm²/g = 100 · 1.602e-16 · 1000 Gy.
         const NGY: f64 = 1.602_177e-16 * 1e5 * 1e9;
@@ -99,8 +99,8 @@ mod tests {
         low
     }
 
-    /// The reference is SpekPy 2.5 (casim, 12 degrees, bins of 0.1 keV) with the air of NIST: 26,141 photons/mm²/µGy. The half-value
-    /// layer is that of such a spectrum in the aluminium of xraylib.
+    /// The reference is SpekPy 2.5 (casim, 12 degrees, bins of 0.1 keV) with NIST's air: 26,141 photons/mm²/µGy. The
+    /// half-value layer is that of such a spectrum in xraylib's aluminium.
     #[test]
     fn a_beam_is_as_hard_and_a_dose_has_as_many_quanta_as_another_program_says() {
         let tube = Spectrum::tube(80.0, 2.5, 0.2).unwrap();
@@ -108,7 +108,7 @@ mod tests {
         assert!((half_value / 5.49 - 1.0).abs() < 5e-3, "{half_value} mm");
         let photons = photons_per_mm2_ugy(&tube, 0.0);
         assert!((photons / 26_141.0 - 1.0).abs() < 0.01, "{photons}");
-        // The twin: a half a millimetre of aluminium more is told by both.
+        // Counter-check: both detect an additional half millimetre of aluminium.
         let harder = Spectrum::tube(80.0, 3.0, 0.2).unwrap();
         assert!((half_value_mm(&harder) / 5.49 - 1.0).abs() > 5e-3, "{}", half_value_mm(&harder));
         assert!((photons_per_mm2_ugy(&tube, 0.5) / 26_141.0 - 1.0).abs() > 0.01);
@@ -128,8 +128,8 @@ mod tests {
         assert!(tube.mean(|e| e) < mean - 3.0, "the patient hardens the beam");
     }
 
-    /// Transmitted energy that 0.6 mm of caesium iodide absorbs, behind 0.2 and 0.4 mm alone and behind 20 cm of tissue: spectra of
-    /// SpekPy 2.5 in bins of 0.1 keV.
+    /// Transmitted energy absorbed by 0.6 mm of caesium iodide, behind 0.2 and 0.4 mm alone and behind 20 cm of
+    /// tissue: spectra of SpekPy 2.5 in bins of 0.1 keV.
     #[test]
     fn bins_that_end_at_edges_are_as_good_as_ten_times_finer_ones() {
         use Material::{Platinum, Tungsten};
@@ -165,7 +165,7 @@ mod tests {
         };
         let split = worst(&|tube| tube);
         assert!(split < 0.01, "{split}");
-        // The twin: whole bins of 1 keV.
+        // Counter-check: whole bins of 1 keV.
         let whole = worst(&|tube| {
             let mut lines: Vec<(f64, f64)> = Vec::new();
             for (energy, photons) in tube.lines {

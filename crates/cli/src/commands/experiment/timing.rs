@@ -107,6 +107,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         motion: None,
         flow: None,
         fields: [&[], &[]],
+        stop: None,
         time_s: [0.0; 2],
     };
 

@@ -55,6 +55,12 @@ impl SoFar<'_> {
         }
     }
 
+    /// Notes that the next step was not done since it was to end.
+    fn interrupt(&mut self, reason: &str) {
+        let (step, reason) = (self.course.steps + 1, reason.to_owned());
+        self.failure = Some(StepFailure { step, reason, kind: EndedBy::Interrupted });
+    }
+
     /// Notes that the step after so many was not done.
     fn fail(&mut self, after: usize, error: &endowire_core::Error) {
         self.failure = Some(StepFailure::new(after + 1, error));
@@ -115,8 +121,7 @@ impl Going<'_> {
     ) {
         while let Some(step) = next.take() {
             if interrupted.load(Ordering::Relaxed) {
-                let (step, reason) = (self.so_far.course.steps + 1, "interrupted before it".to_owned());
-                self.so_far.failure = Some(StepFailure { step, reason, kind: EndedBy::Interrupted });
+                self.so_far.interrupt("interrupted before it");
                 break;
             }
             let recorded = self.times_s.len();
@@ -132,7 +137,10 @@ impl Going<'_> {
     fn step(&mut self, step: &Step<'_>) -> Option<Step<'static>> {
         let before = self.so_far.course.steps;
         if let Err(error) = self.so_far.simulate(step) {
-            self.so_far.fail(before, &error);
+            match error {
+                endowire_core::Error::Stopped => self.so_far.interrupt("interrupted in it"),
+                error => self.so_far.fail(before, &error),
+            }
             return None;
         }
         let time_s = step.time_s.unwrap_or_else(|| self.so_far.frames.time_s(before + 1));

@@ -90,8 +90,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         course,
         failure: None,
     };
-    let mut going = Going { so_far, recorder, saver, times_s, ahead: false };
     let interrupted = interrupts();
+    let mut going = Going { so_far, recorder, saver, times_s, ahead: false };
+    going.so_far.simulation.stop_when(|| interrupted.load(Ordering::Relaxed));
     let bar = if args.quiet { progress::hidden() } else { progress::bar(script.len(), "step") };
     bar.inc(going.so_far.course.steps as u64);
     going.begin()?;

@@ -298,7 +298,9 @@ impl<'a> Studio<'a> {
         let ending = self.planes[plane].ending;
         if self.plan.args.labels {
             let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
-            let labels = self.planes[plane].renderer.labels(views, &contacts)?;
+            let mut labels = self.planes[plane].renderer.labels(views, &contacts)?;
+            let shown = self.plan.pushed.shown(still.inserted_mm);
+            labels.devices.iter_mut().zip(shown).for_each(|(label, shown)| label.shown = Some(shown));
             let path = self.file(&format!("{}_mask{ending}.png", still.name))?;
             labels.mask.write_png(&path)?;
             for (name, mask) in masks(&labels) {

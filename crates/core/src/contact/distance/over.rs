@@ -1,7 +1,7 @@
-//! Which vertices may reach a point over a triangle.
+//! The vertices that may reach a point over a triangle.
 //!
-//! On a mesh of many triangles a list is made when it is first asked for: a device comes near few of them, and the finer the mesh and
-//! the thicker the device the longer are the lists.
+//! On a large mesh a list is made when first needed: a device comes near few triangles, and lists grow with finer
+//! meshes and thicker devices.
 
 use std::sync::OnceLock;
 
@@ -13,7 +13,7 @@ use crate::{Vec3, parallel};
 
 /// Height above the surface up to which lists are complete, in radii of the thickest device and in supports.
 const HEIGHT: (f64, f64) = (1.5, 0.5);
-/// Most triangles whose lists are all made at once.
+/// Largest number of triangles for which all lists are made in advance.
 const AT_ONCE: usize = 400_000;
 
 /// For every triangle, the vertices whose support may reach a point over it.
@@ -21,7 +21,7 @@ const AT_ONCE: usize = 400_000;
 pub(super) struct Lists {
     pub(super) triangles: Vec<[u32; 3]>,
     neighbours: Neighbours,
-    /// Up to here they are complete on any mesh, mm.
+    /// Height up to which they are complete on any mesh, mm.
     height_mm: f64,
     known: Vec<OnceLock<Box<[u32]>>>,
 }
@@ -32,7 +32,7 @@ impl Lists {
         Self { triangles, neighbours, height_mm: HEIGHT.0 * thickest_mm, known }
     }
 
-    /// Makes all lists of a mesh that is small enough, so that steps allocate nothing.
+    /// Makes all lists of a small mesh, so that steps do not allocate.
     pub(super) fn prepare(&self, quadrics: &[Quadric]) {
         if self.known.len() > AT_ONCE {
             return;
@@ -51,7 +51,7 @@ impl Lists {
     #[inline]
     pub(super) fn of(&self, quadrics: &[Quadric], triangle: usize) -> &[u32] {
         self.known[triangle].get_or_init(|| {
-            // Only asked, never iterated: its order cannot reach the result.
+            // Only used for lookups, never iterated: its order cannot affect the result.
             let mut seen = FxHashSet::default();
             let mut list = Vec::new();
             self.gather(quadrics, triangle, |q| self.reach_mm(q), |v| seen.insert(v), &mut list);
@@ -59,13 +59,13 @@ impl Lists {
         })
     }
 
-    /// How far from a triangle a vertex may be that reaches points over it, mm.
+    /// Largest distance from a triangle of a vertex that reaches points over it, mm.
     fn reach_mm(&self, q: &Quadric) -> f64 {
         q.half_axes_mm.1 + self.height_mm.max(HEIGHT.1 * q.half_axes_mm.0)
     }
 
-    /// Puts into `list` the vertices that reach points of a triangle itself in front of the surface, for triangle after triangle: `seen`
-    /// keeps for every vertex the last of them that met it, from [`u32::MAX`] on.
+    /// Adds to `list` the vertices that reach points of a triangle itself in front of the surface, for triangle after
+    /// triangle: `seen` stores for every vertex the last triangle that met it, initially [`u32::MAX`].
     pub(super) fn touching(
         &self,
         quadrics: &[Quadric],
@@ -76,8 +76,8 @@ impl Lists {
         self.gather(quadrics, triangle, |q| q.farthest_mm, marking(seen, triangle), list);
     }
 
-    /// The vertices within their `reach` of a triangle, over the surface and not through space: the other side of a thin septum is
-    /// another wall.
+    /// The vertices within their `reach` of a triangle along the surface, not through space: the other side of a thin
+    /// septum is another wall.
     fn gather(
         &self,
         quadrics: &[Quadric],

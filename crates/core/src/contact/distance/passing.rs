@@ -1,24 +1,26 @@
-//! From what is felt in front of the surface to what is felt behind it.
+//! Blending of the distance in front of the surface into that behind it.
 //!
-//! In front of the surface windows tell the other side of a lumen and the back of a septum from the wall that is meant; behind it depth has
-//! no bound, and the sheet that faces the same way is meant. The two differ where a surface is rough. A soft wall lets a device
-//! through from one to the other, so on the depth t behind the surface the first, f, passes into the second, g:
+//! In front of the surface windows exclude the other side of a lumen and the back of a septum; behind it depth is
+//! unlimited, and the sheet that faces the same way is meant. The two distances differ where a surface is rough. A
+//! device can pass from one to the other through a soft wall, so over the depth t behind the surface the first, f,
+//! blends into the second, g:
 //!
 //! ```text
 //! F = f + s (g − f),    s = S(−f/t),    S(x) = x³(10 − 15x + 6x²) from 0 to 1.
 //! ```
 //!
-//! F is twice continuously differentiable. In front of the surface it is f: there the other side would be felt beyond sharp crests.
+//! F is twice continuously differentiable. In front of the surface it is f alone: there g would extend beyond sharp
+//! crests.
 
 use super::{Behind, Distance, Nearness, Reached, SmoothWall};
 use crate::Vec3;
 
-/// t over the radius of the thickest device.
+/// t, in radii of the thickest device.
 pub(super) const PASSING: f64 = 0.2;
 
 impl SmoothWall {
-    /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs. Beside it
-    /// the coverage: how well the vertices reach.
+    /// As [`SmoothWall::distance`], with derivatives, the costly part, only where the distance is less than
+    /// `limit_mm`. Also returns the coverage: how well the vertices reach.
     pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<(Nearness, f64)> {
         let list = self.list(triangle as usize);
         let front = self.reach_from(x, list, None);
@@ -30,7 +32,7 @@ impl SmoothWall {
             return Some((told(front.value_mm, &|| derived(front)), front.coverage));
         }
         let behind = self.behind(list);
-        // What no vertex reaches in front of the surface is not behind it for that.
+        // A point that no vertex reaches in front of the surface need not be behind it.
         let corner = list.first().map(|v| self.quadrics[*v as usize].position);
         if front.is_none() && corner.is_none_or(|corner| behind.facing.dot(&(x - corner)) > 0.0) {
             return None;
@@ -61,7 +63,7 @@ impl SmoothWall {
                 hessian: hessian + turned + turned.transpose() + bend * apart,
             }
         };
-        // Triangles take part as in front until all is as behind.
+        // The triangles' share is as in front until the blending is complete.
         let [deep, ..] = self.share(front.value_mm + self.passing_mm);
         let coverage = front.coverage + deep * (back.coverage - front.coverage);
         Some((told(value_mm, &passing), coverage))
@@ -93,7 +95,7 @@ impl SmoothWall {
         Some((distance, coverage, slope))
     }
 
-    /// What a point behind that triangle is behind of.
+    /// The sheet of that triangle, for a point behind it.
     pub(super) fn behind(&self, list: &[u32]) -> Behind {
         // The list begins with the corners.
         let corners = list.iter().take(3).map(|v| self.quadrics[*v as usize].normal);

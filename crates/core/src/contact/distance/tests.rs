@@ -39,7 +39,7 @@ fn derivatives_are_those_of_the_value() {
     }
 }
 
-/// Of the tube, at a height over the wall that may be negative.
+/// A position in the tube, at a height over the wall that may be negative.
 fn from_inside(wall: &(SmoothWall, WallQuery), i: i32, height_mm: f64) -> (Vec3, Distance) {
     let angle = 2.399 * f64::from(i);
     let on = |r: f64| Vec3::new(r * angle.cos(), r * angle.sin(), 30.0 + 0.1 * f64::from(i));
@@ -52,7 +52,7 @@ fn from_inside(wall: &(SmoothWall, WallQuery), i: i32, height_mm: f64) -> (Vec3,
 fn behind_the_surface_the_distance_goes_on_as_in_front() {
     let wall = tube(1.0);
     for i in 0..200 {
-        // Across the surface, …
+        // Across the surface.
         let (x, front) = from_inside(&wall, i, 0.0);
         let n = front.normal();
         let x = x - n * front.value_mm;
@@ -63,7 +63,7 @@ fn behind_the_surface_the_distance_goes_on_as_in_front() {
         assert!(front.value_mm > 0.0 && back.value_mm < 0.0);
         assert!((front.value_mm - back.value_mm - 2e-6).abs() < 1e-8, "{front:?} {back:?}");
         assert!((front.gradient - back.gradient).norm() < 1e-5);
-        // … and deep behind it.
+        // Deep behind it.
         for height in [-0.3, -2.0, -20.0] {
             let (x, here) = from_inside(&wall, i, height);
             assert!((here.value_mm - height).abs() < 2e-3 * (1.0 - height), "{height}: {here:?}");
@@ -107,7 +107,7 @@ fn error(wall: &(SmoothWall, WallQuery), height: f64) -> f64 {
 fn a_tube_is_met_far_better_than_by_its_triangles() {
     let (coarse, fine) = (error(&tube(1.0), 0.1), error(&tube(0.5), 0.1));
     assert!(coarse / fine > 8.0, "{coarse:e} {fine:e}");
-    // The flat triangles stand off by edge²/8R.
+    // The flat triangles deviate by edge²/8R.
     assert!(fine < 0.5 * 0.5 / (8.0 * 4.0) / 60.0, "{fine:e}");
 }
 

@@ -1,17 +1,17 @@
-//! Coulomb friction between instruments that lie in one another, as an incremental potential.
+//! Coulomb friction between coaxial instruments, as an incremental potential.
 //!
-//! Instruments keep their lengths and share the line, so that in a step one slips in another along the line by the difference Δ of what
-//! their hands do, everywhere, whatever is solved for. Around the line it slips by its radius times what the two have turned against each
-//! other. Both angles of a node are counted from the same triad, which parallel transport carries along the line, so that their difference is
-//! that of the instruments, however the line moves, and
+//! Instruments are inextensible and share the line, so in a step one slips in another along the line by the
+//! difference Δ of their hands' advances, everywhere, whatever the solution. Around the line it slips by its radius
+//! times the relative rotation of the two. Both angles of a node are measured from the same triad, which is parallel
+//! transported along the line, so their difference is that of the instruments, however the line moves, and
 //!
 //! ```text
 //! u = (Δ, r (ϑ − ϑₐ)),    ϑ = θ_inner − θ_outer
 //! D = Σ μ Nᵢ φ(|uᵢ|)
 //! ```
 //!
-//! over the nodes, with φ of [`super`], the force N across the line that one exerts on the other there, and ϑₐ that of the same pieces of
-//! both before the step: what slides along the line without turning about it keeps its angle. With a(y) = φ′/y
+//! over the nodes, with φ of [`super`], the force N across the line between the two at the node, and ϑₐ the ϑ of the
+//! same pieces of both before the step: sliding along the line without rotation keeps the angle. With a(y) = φ′/y
 //!
 //! ```text
 //! ∂D/∂Δ = μ N a Δ             friction along the line, against the slip; felt by the hands, bends nothing
@@ -19,27 +19,29 @@
 //! ∂²D/∂ϑ² = μ N r² (a + (φ″ − a) r² (ϑ − ϑₐ)²/y²) ≥ 0
 //! ```
 //!
-//! The two together are μN (1 − what sticks), so that an instrument that is turned slides more easily. N is lagged, as on the wall: it is renewed between
-//! solutions until the couples no longer change. An instrument without angles of its own (a straight one in a list of more than three) takes no couple: for
-//! it u = (Δ, 0), and it turns freely.
+//! The squares of both components sum to (μN)² where one slips, and to less where it sticks, so an instrument that is
+//! turned slides more easily. N is lagged, as on the wall: it is renewed between solutions until the couples no
+//! longer change. An instrument without angles of its own (a straight one in a list of more than three) takes no
+//! couple: for it u = (Δ, 0), and it turns freely.
 
 use serde::{Deserialize, Serialize};
 
 use super::{LEAST_STICK_MM, STICK, STICK_AT_REST, phi, rates};
 use crate::rod::{RodState, Stencils};
 
-/// What one instrument does to the next one outside it at a node, as the last step has left it.
+/// Friction of one instrument on the next one outside it at a node, at the end of the last step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InnerFriction {
-    /// Part of the friction that may act which acts along the line, against the slip …
+    /// Component along the line, against the slip, as a fraction of the largest friction.
     pub along: f64,
-    /// … and around it: Coulomb's law is that the squares of both are 1 where one slips, and less where it sticks.
+    /// Component around the line: by Coulomb's law the squares of both sum to 1 where one slips, and to less where it
+    /// sticks.
     pub around: f64,
-    /// Force across the line over the length that the node stands for, N/mm.
+    /// Force across the line per length, N/mm, over the length that the node represents.
     pub pressure_n_per_mm: f64,
 }
 
-/// A node at which one instrument may rub in another.
+/// A node with friction between two instruments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// The node.
@@ -56,11 +58,11 @@ pub struct Place {
     pub radius_mm: f64,
     /// Δ, mm.
     pub advance_mm: f64,
-    /// What the hand of the inner one turns by, less that of the outer one, rad.
+    /// Rotation of the inner instrument's hand minus that of the outer one, rad.
     pub turn_rad: f64,
     /// ϑₐ.
     pub from_rad: f64,
-    /// Length that the node stands for, mm.
+    /// Length that the node represents, mm.
     pub length_mm: f64,
     /// N.
     pub force_n: f64,
@@ -69,7 +71,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// A node of two instruments at which nothing is known yet of their slip and of what presses.
+    /// A node of two instruments, with slip and normal force still unknown.
     pub fn new((node, inner, outer): (usize, usize, usize), coefficient: f64, radius_mm: f64) -> Self {
         Self {
             node,
@@ -87,18 +89,18 @@ impl Place {
         }
     }
 
-    /// ϑ at a state; 0 of instruments that turn freely.
+    /// ϑ at a state; 0 for instruments that turn freely.
     pub fn turned_rad(&self, state: &RodState) -> f64 {
         self.sets.map_or(0.0, |(inner, outer)| state.angle(self.node, inner) - state.angle(self.node, outer))
     }
 
-    /// Slip around the line, and its size along and around it, mm.
+    /// Slip around the line, and total slip, mm.
     fn slip_mm(&self, state: &RodState) -> (f64, f64) {
         let around = self.radius_mm * (self.turned_rad(state) - self.from_rad);
         (around, libm::hypot(self.advance_mm, around))
     }
 
-    /// Parts of the largest friction along and around the line.
+    /// Components of friction along and around the line, as fractions of the largest friction.
     pub fn parts(&self, state: &RodState) -> [f64; 2] {
         let (around, slip) = self.slip_mm(state);
         let over = rates(slip, self.stick_mm).0;
@@ -130,12 +132,12 @@ pub struct Between {
 }
 
 impl Between {
-    /// No friction.
+    /// Removes all friction.
     pub(crate) fn clear(&mut self) {
         self.places.clear();
     }
 
-    /// Adds a node. `ways_mm` is the farthest way of a hand: what goes together sticks within a part of that.
+    /// Adds a node. `ways_mm` is the largest motion of a hand: ε is a fraction of that.
     pub(crate) fn push(&mut self, place: Place, ways_mm: f64) {
         let own_mm = place.advance_mm.abs() + place.radius_mm * place.turn_rad.abs();
         let stick_mm = (STICK * own_mm.max(STICK_AT_REST * ways_mm)).max(LEAST_STICK_MM);
@@ -147,7 +149,8 @@ impl Between {
         &self.places
     }
 
-    /// Forces across the line of each node and the length that it stands for, N and mm; returns by what part of the largest couples those that act change with them.
+    /// Renews the force across the line of each node and the length it represents, N and mm; returns the change of
+    /// couples relative to the largest.
     pub(crate) fn renew(&mut self, state: &RodState, forces: impl Fn(&Place) -> (f64, f64)) -> f64 {
         let (mut change, mut sum) = (0.0, 0.0);
         for place in &mut self.places {
@@ -162,12 +165,12 @@ impl Between {
         if sum > 0.0 { change / sum } else { 0.0 }
     }
 
-    /// Energy that was taken, mJ.
+    /// Dissipated energy, mJ.
     pub(crate) fn taken_mj(&self, state: &RodState) -> f64 {
         self.places.iter().map(|place| place.value(state)).sum()
     }
 
-    /// Adds what moves angles.
+    /// Adds the terms in the angles.
     pub(crate) fn add(&self, state: &RodState, into: &mut dyn Stencils) {
         for place in self.places.iter().filter(|place| place.force_n > 0.0) {
             into.add_value(place.value(state));
@@ -184,7 +187,7 @@ mod tests {
     use crate::Vec3;
     use crate::rod::Frame;
 
-    /// Two sets of angles at two nodes, the second turned by these, and friction there.
+    /// Two sets of angles at two nodes, the second rotated by these, with friction there.
     fn turned(advance_mm: f64, angles: [f64; 2]) -> (Place, RodState) {
         let frames = vec![Frame::new(Vec3::z(), None); 2];
         let state = RodState { frames, angles: vec![0.0, 0.0, angles[0], angles[1]], ..RodState::default() };

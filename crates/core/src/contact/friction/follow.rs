@@ -1,25 +1,27 @@
-//! The normal forces of friction follow those of contacts.
+//! Updating the normal forces of friction from the contact forces.
 //!
-//! In a step of Newton's method they are those of its base, so that friction has a potential. They are renewed at every base until they
-//! are what presses there and hardly change, and after the equilibrium with them if they turn out not to be what presses in that.
+//! Within a Newton step they are those of its base, so that friction has a potential. They are renewed at every base
+//! until they match the contact forces and hardly change, and again after an equilibrium at which they turn out to
+//! differ.
 
 use super::{Friction, NormalForce};
 use crate::Vec3;
 
-/// Normal forces are settled once they change, and differ from what presses, by less than this part.
+/// Normal forces are settled once their relative change, and their relative difference from the contact forces, is
+/// below this.
 pub const SETTLED: f64 = 1e-4;
 
 /// Whether normal forces are renewed at the next base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(in crate::contact) enum Renewal {
-    /// They are, for the first time: whether they settle shows from the second base on.
+    /// Renewed for the first time: whether they settle shows from the second base on.
     #[default]
     Begins,
-    /// They are.
+    /// Renewed at every base.
     Follows,
-    /// They are not, until an equilibrium shows that they are not what presses.
+    /// Not renewed, until an equilibrium shows that they differ from the contact forces.
     Settled,
-    /// They are not.
+    /// Not renewed.
     Held,
 }
 
@@ -29,7 +31,7 @@ impl Renewal {
         matches!(self, Self::Begins | Self::Follows)
     }
 
-    /// How it goes on from a base at which they were steady or not.
+    /// The mode after a base at which they were steady or not.
     pub(in crate::contact) fn after(self, steady: bool) -> Self {
         match self {
             Self::Begins => Self::Follows,
@@ -38,7 +40,8 @@ impl Renewal {
         }
     }
 
-    /// Whether an equilibrium at which they are what presses, or not, is one; otherwise they follow again.
+    /// Whether normal forces are valid at an equilibrium, given whether they match the contact forces; otherwise they
+    /// are renewed again.
     pub(in crate::contact) fn settles(&mut self, settled: bool) -> bool {
         if *self == Self::Held || settled {
             return true;
@@ -49,9 +52,9 @@ impl Renewal {
 }
 
 impl Friction {
-    /// Takes the forces of contacts as normal forces, unless they are settled or held, and looks at what presses at the base: the numbers of
-    /// the points that are active, ascending, each with a normal, its force, and that with which it presses, N. `least_n` is a force not
-    /// worth settling.
+    /// Renews the normal forces, unless they are settled or held, and records the contact forces at the base.
+    /// `active` gives the ascending indices of the active points, each with its normal, its force unknown, and the
+    /// force of its depth, N. `least_n` is a negligible force.
     pub fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
         let mut active = active.peekable();
         let follows = self.renewal.follows();
@@ -71,13 +74,14 @@ impl Friction {
         self.renewal = self.renewal.after(steady);
     }
 
-    /// Whether normal forces at an equilibrium are what presses there, or are held; otherwise they follow again.
+    /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
+    /// again.
     pub fn settles(&mut self, least_n: f64) -> bool {
         let settled = self.unsettled(least_n) < SETTLED;
         self.renewal.settles(settled)
     }
 
-    /// Part by which normal forces differ from what pressed at the last base.
+    /// Relative difference of normal forces from the contact forces at the last base.
     pub fn unsettled(&self, least_n: f64) -> f64 {
         let (mut change_n, mut sum_n) = (0.0, least_n);
         for slider in self.sliders.iter().filter(|slider| slider.force_n != 0.0 || slider.seen.1 > 0.0) {
@@ -87,23 +91,23 @@ impl Friction {
         change_n / sum_n
     }
 
-    /// Normal forces are renewed no more.
+    /// Stops renewing normal forces.
     pub fn hold(&mut self) {
         self.renewal = Renewal::Held;
     }
 
-    /// Normal forces follow from here on.
+    /// Resumes renewing normal forces.
     pub fn release(&mut self) {
         self.renewal = Renewal::Begins;
     }
 
-    /// Normal forces are those that a solution has come to, one for each point, and follow from there.
+    /// Sets the normal forces to those of a solution, one per point, and renews them from there.
     pub fn resume<'a>(&mut self, forces: impl IntoIterator<Item = &'a NormalForce>) {
         self.release();
         self.sliders.iter_mut().zip(forces).for_each(|(s, f)| (s.normal, s.force_n) = (f.normal, f.force_n));
     }
 
-    /// Normal forces are again those with which the step began, and are held.
+    /// Resets and holds the normal forces of the start of the step.
     pub fn rewind(&mut self) {
         self.hold();
         self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.begun);

@@ -1,21 +1,21 @@
 //! Friction on a wall that moves.
 //!
-//! A point slips from where the material point of the vessel has gone that it was on: a becomes χ(a), with χ from the vessel before the step to
-//! the one after. With G = ∂χ/∂x its direction becomes that of G t and the normal of the wall that of G⁻ᵀn; a wall that turns
-//! about the device by α takes the angle along from which the device's spin is counted,
+//! A point slips from where the material point of the vessel under it has moved: a becomes χ(a), with χ from the
+//! vessel before the step to the one after. With G = ∂χ/∂x its direction becomes that of G t and the normal of the
+//! wall that of G⁻ᵀn; a wall that turns about the device by α shifts the reference angle of the device's spin,
 //!
 //! ```text
 //! α = atan2(½ (G − Gᵀ)^∨·t, ½ (tr G − t·G t))
 //! ```
 //!
-//! which is the angle of G where it is a turn about t; (A)^∨ is the vector with (A)^∨ × v = A v.
+//! which is the rotation angle of G if G is a rotation about t; (A)^∨ is the vector with (A)^∨ × v = A v.
 
 use super::Slider;
 use crate::Vec3;
 use crate::vessel::Displacement;
 
 impl Slider {
-    /// Goes along with the wall; how far that is, mm.
+    /// Moves the reference with the wall; returns how far, mm.
     pub(super) fn carry(&mut self, before: &Displacement, after: &Displacement) -> f64 {
         let material = before.material(&self.from_mm);
         let local = before.local(&material);

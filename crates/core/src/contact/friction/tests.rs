@@ -55,7 +55,8 @@ fn a_slipping_point_is_held_by_mu_times_its_normal_force_and_a_stuck_one_by_less
     assert!(stuck.derivatives(0, &x, 0.7, RADIUS_MM).unwrap().gradient.norm() < 0.4);
 }
 
-/// A point at the end of a rod that has slipped to where `state` has its end, after a step in which it stuck within `stick_mm`.
+/// A point at the end of a rod that has slipped to the end of `state`, after a step in which it stuck within
+/// `stick_mm`.
 struct Slipped {
     friction: Friction,
     elements: Vec<ElementData>,
@@ -79,7 +80,7 @@ fn slipped(slip: Vec3, stick_mm: f64) -> Slipped {
         weight_mm: 1.0,
         potential,
     };
-    // It has turned too, within what sticks and beyond.
+    // It has also rotated, within sticking and beyond.
     friction.sliders[0].from_rad = -0.2 * stick_mm / RADIUS_MM;
     Slipped { friction, elements, state, points: [point] }
 }
@@ -98,7 +99,7 @@ impl Slipped {
         self.friction.anchor(&self.elements, &self.state, &self.points);
     }
 
-    /// Moves the rod as a whole.
+    /// Translates the rod.
     fn shift(&mut self, way: Vec3) {
         self.state.positions.iter_mut().for_each(|x| *x += way);
     }
@@ -154,7 +155,7 @@ fn what_goes_back_the_way_it_came_is_held_by_less_only_once_anchored() {
     }
 }
 
-/// The forces that act from then on are those seen last, and what was taken before stays taken.
+/// From then on the last recorded forces act, and the dissipated energy is kept.
 #[test]
 fn other_normal_forces_change_what_holds_and_not_what_was_taken() {
     let mut point = slipped(SLIPS[0], 0.01);

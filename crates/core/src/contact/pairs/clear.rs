@@ -1,23 +1,24 @@
-//! Rods that cannot touch themselves where they are, and those that are clear of themselves.
+//! Fast tests for rods that cannot touch themselves.
 //!
-//! A curve whose tangent turns by less than K < π between two points has a chord of at least cos(K/2) of the arc between them (A. Schur, Math. Ann. 83 (1921)).
-//! Two pieces that touch are at least half a turn of the rod's radius apart along it; a rod that turns by less than two radians in all would have to lie within
-//! its own thickness between them. So most devices are asked for their tangents alone.
+//! A curve whose tangent turns by less than K < π between two points has a chord of at least cos(K/2) of the arc
+//! between them (A. Schur, Math. Ann. 83 (1921)). Two pieces in contact are at least half a turn of the rod's radius
+//! apart along it; a rod that turns by less than two radians in all would have to lie within its own thickness
+//! between them. So for most devices the tangents are enough.
 //!
-//! Where no two pieces are nearer than 8 D, and no point has moved since by more than 3/4 D, none are nearer than 6½ D, and no step among such places brings two nearer
-//! by more than half of that.
+//! If no two pieces are nearer than 8 D, and no point has moved since by more than 3/4 D, none are nearer than 6½ D,
+//! and no step between such states brings two nearer by more than half of that.
 
 use super::{CLEAR, SelfContact, tree};
 use crate::Vec3;
 use crate::rod::quadrature::largest_motion;
 use crate::rod::{ElementData, RodState};
 
-/// Turn of a rod, rad, up to which nothing of it touches itself.
+/// Total rotation of a rod's tangent, rad, up to which it cannot touch itself.
 const TURN: f64 = 2.0;
-/// Part of the distance of touch by which points may move where nothing was near.
+/// Distance by which points may move since nothing was near, as a fraction of the touching distance.
 const FREE: f64 = 0.75;
 
-/// Places and tangents of nodes where nothing was near.
+/// Positions and tangents of nodes at a state where nothing was near.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clear {
     nodes: Vec<(Vec3, Vec3)>,
@@ -28,14 +29,14 @@ impl Clear {
         Self { nodes: nodes(state).collect() }
     }
 
-    /// Whether no point of a rod has moved by more than this to another state, mm.
+    /// Whether no point of a rod is farther than this from its position in another state, mm.
     fn holds(&self, elements: &[ElementData], state: &RodState, most_mm: f64) -> bool {
         self.nodes.len() == state.positions.len()
             && motions_mm(elements, self.nodes.iter().copied(), state).all(|mm| mm <= most_mm)
     }
 }
 
-/// Of each element, by how much its points move at most from nodes with these places and tangents to a state, mm.
+/// For each element, a bound of the motion of its points from nodes with these positions and tangents to a state, mm.
 pub(super) fn motions_mm(
     elements: &[ElementData],
     nodes: impl Iterator<Item = (Vec3, Vec3)>,
@@ -51,7 +52,7 @@ pub(super) fn motions_mm(
     })
 }
 
-/// Places and tangents of the nodes of a state.
+/// Positions and tangents of the nodes of a state.
 pub(super) fn nodes(state: &RodState) -> impl Iterator<Item = (Vec3, Vec3)> {
     state.positions.iter().zip(&state.frames).map(|(x, frame)| (*x, frame.t))
 }
@@ -62,17 +63,17 @@ fn is_open(state: &RodState) -> bool {
         let along = chord / chord.norm();
         (along - ends[0].t).norm() + (ends[1].t - along).norm()
     });
-    // The chord of a turn is no longer than it, and shorter by a twentieth at most where it is a radian.
+    // The chord of a rotation is at most the rotation, and at most a twentieth shorter up to a radian.
     1.05 * turns.sum::<f64>() < TURN
 }
 
 impl SelfContact {
-    /// Whether there is one rod alone, which cannot touch itself.
+    /// Whether there is a single rod, which cannot touch itself.
     fn is_alone_and_open(&self, elements: &[ElementData], state: &RodState) -> bool {
         is_open(state) && !elements.iter().any(ElementData::is_break)
     }
 
-    /// Whether nothing is near, at the base and at a state, and no step between them leads by anything.
+    /// Whether nothing is near, at the base and at a state, and no step between them passes anything.
     pub(super) fn stays_clear(&self, elements: &[ElementData], state: &RodState) -> bool {
         let most_mm = FREE * 2.0 * self.largest_radius_mm;
         self.pairs.is_empty()
@@ -82,7 +83,7 @@ impl SelfContact {
             })
     }
 
-    /// Looks whether anything is near at a base. Returns whether nothing is.
+    /// Tests whether nothing is near at a base.
     pub(super) fn look_whether_clear(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         if self.closed {
             return false;
@@ -106,7 +107,8 @@ impl SelfContact {
         self.near.is_empty()
     }
 
-    /// Whether the last `advance_mm` of the rod, pushed straight ahead, would run into the rest of it: come nearer to an axis than half of the distance of touch.
+    /// Whether the last `advance_mm` of the rod, pushed straight ahead, would run into the rest of it: come nearer to
+    /// its axis than half the touching distance.
     pub(crate) fn blocks_its_tip(
         &mut self,
         elements: &[ElementData],
@@ -116,7 +118,7 @@ impl SelfContact {
         if advance_mm <= 0.0 || self.skins.is_empty() || self.is_alone_and_open(elements, state) {
             return false;
         }
-        // The tip is that of the first rod.
+        // The tip belongs to the first rod.
         let Some(last) = elements.iter().take_while(|data| !data.is_break()).count().checked_sub(1) else {
             return false;
         };
@@ -128,7 +130,7 @@ impl SelfContact {
         self.tree.is_near_segment((&from, &tip), advance_mm + self.apart_mm(), reach_mm)
     }
 
-    /// Whether the way from one state to another leads through the rod itself.
+    /// Whether the rod passes through itself between two states.
     pub(crate) fn crosses(&mut self, elements: &[ElementData], from: &RodState, to: &RodState) -> bool {
         if self.skins.is_empty() || (self.is_alone_and_open(elements, from) && is_open(to)) {
             return false;

@@ -1,14 +1,14 @@
-//! The centre line as a curve: places on it, and its derivatives there.
+//! The centre line as a curve: points on it, and its derivatives there.
 //!
-//! On an element of length h it is the cubic of [`hermite`], in the parameter s = h ξ. Neighbouring elements share place and tangent, so that it
-//! is continuously differentiable in s, from one end of a rod to the other. Where several rods are solved for together there are gaps between them, which are no
-//! elements of either.
+//! On an element of length h it is the cubic of [`hermite`], in the parameter s = h ξ. Neighbouring elements share
+//! position and tangent, so it is continuously differentiable in s, from one end of a rod to the other. Where several
+//! rods are solved together there are gaps between them, which are not elements of either.
 
 use crate::Vec3;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
 
-/// A place on the centre line.
+/// A point on the centre line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::contact) struct Place {
     /// Element.
@@ -30,7 +30,7 @@ pub(super) struct Jet {
 pub(super) struct Curve<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) state: &'a RodState,
-    /// Whether the rod's end is its start.
+    /// Whether the rod is a ring: its end is its start.
     pub(super) closed: bool,
 }
 
@@ -44,7 +44,7 @@ impl Curve<'_> {
         Jet { at: x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * h, first, second: second / h }
     }
 
-    /// Whether there is a gap between two rods in the place of an element.
+    /// Whether an element is the gap between two rods.
     pub(super) fn is_break(&self, e: usize) -> bool {
         self.elements[e].is_break()
     }
@@ -54,9 +54,9 @@ impl Curve<'_> {
         self.elements[e].length
     }
 
-    /// Places and tangents of the nodes of an element.
+    /// Positions and tangents of the nodes of an element.
     fn nodes(&self, e: usize) -> [(Vec3, Vec3); 2] {
-        // Asked for a million times a step: arrays of closures cost twice as much.
+        // Called a million times per step: arrays of closures cost twice as much.
         let (x, frames) = (&self.state.positions, &self.state.frames);
         [(x[e], frames[e].t), (x[e + 1], frames[e + 1].t)]
     }
@@ -78,7 +78,7 @@ impl Curve<'_> {
         (!self.is_break(next)).then_some(next)
     }
 
-    /// The place so far along the centre line from another, or the end on the way there; and how far that is.
+    /// The point at a distance along the centre line from another, or the end if that comes first; and its distance.
     pub(super) fn walk(&self, from: Place, by: f64) -> (Place, f64) {
         let Place { mut element, xi } = from;
         let mut s = xi * self.length_mm(element) + by;
@@ -98,7 +98,7 @@ impl Curve<'_> {
         (Place { element, xi: (s / self.length_mm(element)).clamp(0.0, 1.0) }, by + (inside - s))
     }
 
-    /// Whether a place is the end of the rod in this direction, 1 or −1.
+    /// Whether a point is the end of the rod in this direction, 1 or −1.
     pub(super) fn ends(&self, place: Place, direction: f64) -> bool {
         if direction > 0.0 {
             place.xi == 1.0 && self.after(place.element).is_none()
@@ -107,7 +107,7 @@ impl Curve<'_> {
         }
     }
 
-    /// The four control points of an element: it lies in their hull.
+    /// The four control points of an element, which lies in their convex hull.
     pub(super) fn controls(&self, e: usize) -> [Vec3; 4] {
         let third = self.length_mm(e) / 3.0;
         let [(x0, t0), (x1, t1)] = self.nodes(e);

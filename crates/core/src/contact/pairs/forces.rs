@@ -1,4 +1,4 @@
-//! What pairs exert: on the system of a step, in the merit along it, and in reports.
+//! Forces of pairs: in the system of a step, in the merit along it, and in reports.
 
 use super::clear::{motions_mm, nodes};
 use super::curve::{Curve, Place};
@@ -9,44 +9,44 @@ use crate::contact::force::merit;
 use crate::rod::{Couple, ElementData, RodState, Stencils};
 use crate::solve::{ContactMerit, Moved};
 
-/// Roundings of a coordinate by which a distance is off.
+/// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;
 
-/// Where a rod presses on itself or on another one.
+/// A contact of a rod with itself or with another one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touching {
     /// Arc lengths of the two points from the first node of their rod, mm.
     pub arcs_mm: [f64; 2],
-    /// Numbers of the rods on which they are: 0 of the device, and from 1 on of the coils that were detached, in their order.
+    /// Indices of the rods of both points: 0 for the device, and from 1 on for detached coils, in order.
     pub rods: [usize; 2],
-    /// Where they are, mm.
+    /// Their positions, mm.
     pub positions_mm: [Vec3; 2],
     /// From the second to the first, unit length.
     pub normal: Vec3,
-    /// Force by which the first is pushed along it, and the second against it, N.
+    /// Force on the first along the normal, and on the second against it, N.
     pub force_n: f64,
-    /// Depth of the surfaces in each other, mm.
+    /// Penetration of the surfaces, mm.
     pub penetration_mm: f64,
 }
 
 /// Element and ξ.
 pub(crate) type RodPlace = (usize, f64);
 
-/// Two places that press on each other, as elements have them.
+/// A pair of points in contact, in terms of elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pressing {
-    /// Element and ξ of both.
+    /// Element and ξ of both points.
     pub(crate) places: [RodPlace; 2],
     /// Force on the first; on the second it is the opposite, N.
     pub(crate) force_n: Vec3,
-    /// Element of the site that feels it, by the length of which it counts, …
+    /// Element of the site that feels the contact, whose length weights it.
     pub(crate) site: usize,
-    /// … and what is stored there, mJ.
+    /// Contact energy there, mJ.
     pub(crate) energy_mj: f64,
 }
 
 impl SelfContact {
-    /// What presses at the base: at the last state of a solution.
+    /// The pairs in contact at the base, the last state of a solution.
     pub(crate) fn pressing(&self) -> impl Iterator<Item = Pressing> + '_ {
         let pressed = self.pairs.iter().filter(|pair| pair.depth_mm() > 0.0);
         pressed.map(|pair| Pressing {
@@ -57,7 +57,7 @@ impl SelfContact {
         })
     }
 
-    /// Adds what presses at the base.
+    /// Adds the active pairs at the base.
     pub(super) fn press(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         let mut rounding_n: f64 = 0.0;
         let curve = self.curve(elements, state);
@@ -80,10 +80,10 @@ impl SelfContact {
         self.rounding_n = rounding_n;
     }
 
-    /// Merit of all pairs at a state, or what they store there if no forces are aimed at, mJ.
+    /// Merit of all pairs at a state, or their energy if forces have no target, mJ.
     pub(super) fn stored_or_merit_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
         let curve = self.curve(elements, state);
-        // The distance of two stretches changes by no more than both move.
+        // The distance of two stretches changes by at most the sum of their motions.
         let motion_mm = 2.0 * motions_mm(elements, nodes(&self.base), state).fold(0.0, f64::max);
         let of = |pair: &Pair| {
             if -pair.depth_mm() > motion_mm && !(self.aimed && pair.foreseen && pair.aim_n > 0.0) {
@@ -109,7 +109,8 @@ impl SelfContact {
         let mut sum = ContactMerit::default();
         for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
             pair.change_mm = pair.change(moved);
-            // What the rod's own stiffness is in balance with, which is κ (p − ∇G·δx) where the contacts at the end are found.
+            // The force that balances the rod's own stiffness, which is κ (p − ∇G·δx) once the contacts at the end
+            // are found.
             pair.aim_n = (-pair.carried_n).max(0.0);
             let (kappa, rho, depth_mm) = (pair.spring_n_per_mm, pair.penalty_n_per_mm, pair.depth_mm());
             let (value_mj, force_n, _) = merit(kappa, rho, pair.aim_n, depth_mm);
@@ -126,7 +127,8 @@ impl SelfContact {
         sum
     }
 
-    /// Lets pairs go that pull by more than this part of what the others press with. Returns whether there are none.
+    /// Releases pairs that pull by more than this fraction of the largest pressing force. Returns whether there were
+    /// none.
     pub(super) fn let_go_of_pulling(&mut self, tolerance: f64) -> bool {
         let (mut pull_n, mut press_n) = (0.0, 0.0);
         for pair in self.pairs.iter().filter(|pair| pair.at_base) {
@@ -143,19 +145,19 @@ impl SelfContact {
         false
     }
 
-    /// What is stored at the base, mJ.
+    /// Contact energy at the base, mJ.
     pub(crate) fn stored_mj(&self) -> f64 {
         let of = |pair: &Pair| 0.5 * pair.spring_n_per_mm * pair.depth_mm().max(0.0).powi(2);
         self.pairs.iter().map(of).sum()
     }
 
-    /// Where the rod presses on itself at a state that nothing is known of.
+    /// Contacts of the rod with itself at a state about which nothing is known.
     pub fn touching_at(&mut self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         self.look_at_base(elements, state);
         self.touching(elements, state)
     }
 
-    /// Where the rod presses on itself at the base: at the last state of a solution.
+    /// Contacts of the rod with itself at the base, the last state of a solution.
     pub fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         let curve = self.curve(elements, state);
         let gaps: Vec<usize> = (0..elements.len()).filter(|e| curve.is_break(*e)).collect();
@@ -177,7 +179,8 @@ impl SelfContact {
 }
 
 impl Pair {
-    /// Derivatives of an energy whose first and second in the gap are `first` and `second`, with the curvature of the gap under a force.
+    /// Derivatives of an energy with first and second derivative `first` and `second` in the gap, including the
+    /// curvature of the gap under a force.
     pub(super) fn couple(&self, curve: &Curve<'_>, first: f64, force_n: f64, second: f64) -> Couple {
         let mut of = self.gap.derivatives(curve);
         for k in 0..of.gradient.len() {

@@ -1,16 +1,18 @@
-//! How far a site is from another stretch of the rod.
+//! The distance of a site from another stretch of the rod.
 //!
-//! A site is a quadrature point sᵢ of the rod. Its distance G from a stretch B is that from B's nearest point, the site itself being free to slide along its own
-//! centre line A against a weak spring,
+//! A site is a quadrature point sᵢ of the rod. Its distance G from a stretch B is that from B's nearest point, where
+//! the site itself may slide along its own centre line A against a weak spring,
 //!
 //! ```text
 //! ½ G² = min Φ,    Φ(s, t) = ½ |A(s) − B(t)|² + ½ ε (s − sᵢ)²
 //! ```
 //!
-//! (the Moreau envelope of the squared distance along A: J.-J. Moreau, Bull. Soc. Math. France 93 (1965)). Where the two are parallel, Φ
-//! has one minimum for each site, at s = sᵢ, and sites add up to the integral of a line contact. Where they cross at an angle α, the sites near the crossing find the crossing itself, their forces act there, and
-//! G² = d² + ε sin²α (sᵢ − s)²/(ε + sin²α) hardly depends on where sites lie: what are two formulations elsewhere, for lines and for points
-//! (C. Meier, W. A. Wall, A. Popp, *A unified approach for beam-to-beam contact*, CMAME 315 (2017)), is one.
+//! (the Moreau envelope of the squared distance along A: J.-J. Moreau, Bull. Soc. Math. France 93 (1965)). Where the
+//! two are parallel, Φ has one minimum for each site, at s = sᵢ, and sites sum to the integral of a line contact.
+//! Where they cross at an angle α, the sites near the crossing slide to the crossing itself, their forces act there,
+//! and G² = d² + ε sin²α (sᵢ − s)²/(ε + sin²α) hardly depends on the positions of sites: this unifies what are two
+//! formulations elsewhere, for lines and for points (C. Meier, W. A. Wall, A. Popp, *A unified approach for
+//! beam-to-beam contact*, CMAME 315 (2017)).
 //!
 //! With r = A − B and q the eight vectors that both points depend on, r = Σ cₖ qₖ, the minimum depends on q by
 //!
@@ -19,7 +21,7 @@
 //! ∂²(½G²)/∂qₖ∂qₗ = cₖ cₗ I − Σ Φ_ka (Φ_ab)⁻¹ Φ_lb,    Φ_ks = cₖ′ r + cₖ A′,  Φ_kt = cₖ′ r − cₖ B′
 //! ```
 //!
-//! with a, b among s and t as far as they are free: not at an end of the rod, and s within a window about sᵢ.
+//! with a, b those of s and t that are free: not at an end of the rod, and s within a window about sᵢ.
 
 use nalgebra::Matrix3;
 
@@ -28,16 +30,16 @@ use crate::Vec3;
 use crate::rod::couples::PLACES;
 use crate::rod::quadrature::hermite;
 
-/// ε. Sites at a crossing differ in depth by ε/4 of their distance squared over that of the axes; arcs that are bent away from each other by more than ε over
-/// that distance are felt at their ends alone.
+/// ε. Sites at a crossing differ in depth by ε/4 of their distance squared over that of the axes; arcs bent away from
+/// each other by more than ε over that distance touch at their ends alone.
 const SLIDE: f64 = 0.1;
-/// Most of a site's slide, over the distance at which surfaces touch.
+/// Largest slide of a site, in touching distances.
 const WINDOW: f64 = 2.0;
-/// Steps to the minimum.
+/// Largest number of steps to the minimum.
 const STEPS: usize = 40;
-/// A step this short, over the distance of touch, is the last: the next would be its square.
+/// Length of a step, in touching distances, after which the descent ends: the next would be its square.
 const SHORT: f64 = 1e-9;
-/// A Hessian with less than this part of the stiffness of straight lines is none of a minimum.
+/// Smallest Hessian of a minimum, as a fraction of the stiffness of straight lines.
 const CONVEX: f64 = 1e-3;
 
 /// Second derivatives of Φ in s and t.
@@ -46,7 +48,7 @@ type Stiffness = [f64; 3];
 /// The nearest points of a site and of another stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::contact) struct Gap {
-    /// Where both are.
+    /// Both points.
     pub(super) at: [Place; 2],
     /// s − sᵢ.
     pub(super) slide: f64,
@@ -99,7 +101,8 @@ fn inverse([ss, st, tt]: Stiffness, free: [bool; 2]) -> Option<Stiffness> {
 }
 
 impl Gap {
-    /// That of a site from the stretch about a place, as near as a descent from a slide and that place leads. `touch` is the distance at which surfaces touch.
+    /// The gap of a site from the stretch about a point, by descent from an initial slide and that point. `touch` is
+    /// the distance at which surfaces touch.
     pub(super) fn find(curve: &Curve<'_>, site: Place, slide: f64, to: Place, touch: f64) -> Self {
         let window = WINDOW * touch;
         let at = |slide: f64| curve.walk(site, slide.clamp(-window, window));
@@ -150,7 +153,7 @@ impl Gap {
         [a[0], a[1], a[2], a[3], -b[0], -b[1], -b[2], -b[3]]
     }
 
-    /// r/G: along it the two are pushed apart.
+    /// r/G: the direction in which the first point is pushed from the second.
     pub(super) fn direction(&self) -> Vec3 {
         self.between / self.distance
     }

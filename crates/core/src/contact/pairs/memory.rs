@@ -1,4 +1,4 @@
-//! Which pairs there are at a base, and what is kept of those before.
+//! Finding the pairs at a base, and keeping those of the base before.
 
 use super::curve::{Curve, Place};
 use super::gap::Gap;
@@ -7,13 +7,14 @@ use super::{KNOWN, LOOKED_AT, Pair, SelfContact};
 use crate::contact::force::PENALTY;
 use crate::rod::{ElementData, RodState};
 
-/// A pair is that of the base before if its stretch is touched within this distance of where it was, over the distance of touch.
+/// Two pairs of successive bases are the same if the nearest points of the stretch are within this distance, in
+/// touching distances.
 const SAME: f64 = 2.0;
-/// Two finds this near to each other along the rod, over the distance of touch, are one.
+/// Two minima this close along the rod, in touching distances, are one.
 const TWICE: f64 = 1e-3;
 
 impl SelfContact {
-    /// Has a state be the base, and finds the pairs there.
+    /// Makes a state the base, and finds the pairs there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.aimed = false;
         self.slips_known = false;
@@ -46,7 +47,7 @@ impl SelfContact {
         self.remember();
     }
 
-    /// Finds the pairs of the sites of element `a` with element `b`: where the distance from a site to `b` has a minimum in it.
+    /// Finds the pairs of the sites of element `a` with element `b`: minima within `b` of the distance from a site.
     fn find_between(&mut self, curve: &Curve<'_>, a: usize, b: usize, reach_mm: f64) {
         let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
         for site in self.first_sites[a]..self.first_sites[a + 1] {
@@ -71,7 +72,7 @@ impl SelfContact {
         }
     }
 
-    /// The pair of a site with this gap, unless that is of its own stretch.
+    /// The pair of a site with this gap, unless the gap is to its own stretch.
     fn pair(&self, curve: &Curve<'_>, site: usize, gap: Gap, touch_mm: f64) -> Option<Pair> {
         let [a, b] = gap.at.map(|place| place.element);
         let [here_mm, arc_mm] = gap.at.map(|place| self.tree.arc(place.element, place.xi));
@@ -80,7 +81,7 @@ impl SelfContact {
         }
         let [one, other] = [a, b].map(|e| self.skins[e]);
         let softer = 2.0 / (1.0 / one.modulus_n_per_mm2 + 1.0 / other.modulus_n_per_mm2);
-        // Of two stretches each has sites that feel the other.
+        // Both stretches have sites that feel the other.
         let weight_mm = 0.5 * self.sites[site].weight_mm;
         let element = &curve.elements[a];
         Some(Pair {
@@ -102,7 +103,7 @@ impl SelfContact {
         })
     }
 
-    /// Gives pairs the forces that they had at the base before, and has those press that do.
+    /// Transfers forces from the pairs of the previous base, and activates those that press.
     fn remember(&mut self) {
         for pair in &mut self.pairs {
             let first = self.before.partition_point(|old| old.site < pair.site);
@@ -120,14 +121,14 @@ impl SelfContact {
         }
     }
 
-    /// Has the hierarchy be that of the base.
+    /// Places the hierarchy at the base, if it is not there yet.
     pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
         if !std::mem::replace(&mut self.is_placed, true) {
             self.tree.place(&Curve { elements, state: &self.base, closed: self.closed });
         }
     }
 
-    /// Part of the straight way from the base to a state in which no two stretches come too near to crossing.
+    /// Fraction of the straight way from the base to a state on which no two stretches come close to crossing.
     pub(super) fn safe_part(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let (known, part) = &self.checked;
         if !part.is_nan() && known.positions == to.positions && known.frames == to.frames {

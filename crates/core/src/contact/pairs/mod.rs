@@ -1,4 +1,4 @@
-//! A rod that touches itself.
+//! Self-contact of rods, and contact between rods.
 //!
 //! Sites are quadrature points of the rod, in the middle of pieces about half a radius long. Each has a gap Gᵢ (`gap.rs`) from every other
 //! stretch of the rod that is near, and with D the sum of both radii and p = D − G the depth,
@@ -7,19 +7,22 @@
 //! U = Σ ½ wᵢ ½ k p²  for p > 0
 //! ```
 //!
-//! the wall's law ([`super::potential`]), where the half stands since each of two stretches has sites that feel the other. Stretches are other ones where they are
-//! at least half a turn of the least radius apart along the rod: a rod cannot be bent to a smaller one than its own. Stretches of other rods, where several are solved
-//! for together, are other ones too.
+//! the wall's law ([`super::potential`]); the factor one half is there because both stretches have sites that feel
+//! the other. Two stretches are distinct if they are at least half a turn of the smallest radius apart along the rod:
+//! a rod cannot be bent to a radius smaller than its own. Stretches of different rods that are solved together are
+//! always distinct.
 //!
-//! Forces of pairs are unknowns of their own, as those of the wall are: derived in [`super::wall`] (`wall/forces.rs`), with G in the place of d,
+//! Forces of pairs are unknowns, like those of the wall: derived in [`super::wall`] (`wall/forces.rs`), with G in
+//! place of d,
 //!
 //! ```text
 //! (∇∇E − Σ f ∇∇G + Σ κ ∇G ∇Gᵀ) δx = −(∇E − Σ κ p ∇G),    f⁺ = κ (p − ∇G·δx),    κ = ½ w k
 //! ```
 //!
-//! **Which pairs there are** is asked anew at every base (`tree.rs`). **No crossing**: along a step no two points of different stretches come nearer to each other by more
-//! than half their distance, by a bound on all pairs of elements, so that axes stay apart at any step, and what touches at a trial was nearer than 2 D at the base, where it is a pair.
-//! A state that is not reached like that has an infinite energy.
+//! **Pairs** are sought anew at every base (`tree.rs`). **No crossing**: along a step no two points of different
+//! stretches come nearer to each other by more than half their distance, by a bound on all pairs of elements, so axes
+//! never cross, and anything touching at a trial was nearer than 2 D at the base, where it is a pair. A state that
+//! cannot be reached in this way has an infinite energy.
 
 mod clear;
 mod curve;
@@ -46,15 +49,15 @@ pub(crate) use rubbing::Rubs;
 use rubbing::{Rub, Rubbing};
 use tree::Tree;
 
-/// Most distance of sites, in radii.
+/// Largest distance between sites, in radii.
 const SPACING_RADII: f64 = 0.5;
-/// Pairs are known up to this many times the distance of touch: a step brings none nearer by more than half.
+/// Pairs are sought up to this many touching distances: a step approaches by at most half.
 const KNOWN: f64 = 2.0;
-/// Elements are looked at up to this many times that distance: a site may slide by as much as it is near.
+/// Elements are tested up to this many times that distance: a site may slide as far as its distance.
 const LOOKED_AT: f64 = 4.0;
-/// Where nothing is nearer than that, motions of up to `FREE` of the distance of touch change nothing.
+/// If nothing is nearer than this many touching distances, motions of up to `FREE` of one need no new search.
 const CLEAR: f64 = 8.0;
-/// Rounding by which a trial may go beyond what is safe.
+/// Tolerance, for rounding, by which a trial may exceed the safe fraction.
 const BEYOND: f64 = 0.1;
 
 /// The surface of an element.
@@ -62,19 +65,20 @@ const BEYOND: f64 = 0.1;
 pub struct Skin {
     /// Radius of the rod, mm.
     pub radius_mm: f64,
-    /// k: force per length per depth, N/mm².
+    /// k: force per length and depth, N/mm².
     pub modulus_n_per_mm2: f64,
 }
 
 impl Skin {
-    /// Modulus of the contact of a rod without one of its own, over EI/r⁴. A solid round wire has E = 4/π EI/r⁴, and two of them in contact give
-    /// way by about what their own material says; ten times as hard they are rigid: a plectoneme under T r²/EI = 10⁻³ sinks in by 10⁻⁴ of its radius.
+    /// Default contact modulus of a rod, over EI/r⁴. A solid round wire has E = 4/π EI/r⁴, and two of them in contact
+    /// yield by about as much as their material does; ten times as hard they are practically rigid: a plectoneme
+    /// under T r²/EI = 10⁻³ sinks in by 10⁻⁴ of its radius.
     pub const RIGID: f64 = 10.0;
 
-    /// That of a gap between two rods.
+    /// The surface of a gap between two rods.
     pub(crate) const NONE: Self = Self { radius_mm: 0.0, modulus_n_per_mm2: 0.0 };
 
-    /// That of a rod of this radius, mm, and bending stiffness, N·mm², as hard as a rod can tell.
+    /// A practically rigid surface of a rod of this radius, mm, and bending stiffness, N·mm².
     pub fn rigid(radius_mm: f64, bending_nmm2: f64) -> Self {
         Self { radius_mm, modulus_n_per_mm2: Self::RIGID * bending_nmm2 / radius_mm.powi(4) }
     }
@@ -91,9 +95,9 @@ struct Site {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pair {
     site: usize,
-    /// At the base.
+    /// The gap at the base.
     gap: Gap,
-    /// D, mm.
+    /// D, the touching distance, mm.
     touch_mm: f64,
     /// κ, N/mm.
     spring_n_per_mm: f64,
@@ -101,21 +105,21 @@ struct Pair {
     penalty_n_per_mm: f64,
     /// Arc length of the nearest point of the stretch, mm.
     arc_mm: f64,
-    /// Force of its own, N.
+    /// Its force unknown, N.
     force_n: f64,
-    /// Whether it presses in the system at the base, …
+    /// Whether it is active in the system at the base.
     at_base: bool,
-    /// … and whether it does now.
+    /// Whether it is active now.
     presses: bool,
-    /// Whether a step may have it press.
+    /// Whether a step may activate it.
     foreseen: bool,
-    /// Change of the gap by a whole step, to first order, mm, …
+    /// Change of the gap in the full step, to first order, mm.
     change_mm: f64,
-    /// … and by another one.
+    /// Change of the gap in the other step, mm.
     end_mm: f64,
-    /// The force that the rod's own stiffness is in balance with, N, less than 0 where it presses.
+    /// The force that balances the rod's own stiffness, N; negative where it presses.
     carried_n: f64,
-    /// f⁺: the force that the step leads to, N.
+    /// f⁺: the force at the end of the step, N.
     aim_n: f64,
     rub: Rub,
 }
@@ -127,59 +131,59 @@ impl Pair {
     }
 }
 
-/// How much was asked, and found.
+/// Counts of searches and their results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PairCounters {
     /// Bases at which pairs were looked for.
     pub searches: u64,
-    /// Pairs of elements that were near.
+    /// Pairs of near elements.
     pub elements: u64,
-    /// Pairs of a site and a stretch that were kept.
+    /// Pairs of a site and a stretch.
     pub pairs: u64,
 }
 
-/// The energy of a rod that touches itself, with what is known from one question to the next.
+/// Contact energy of rods with themselves and each other, with knowledge kept between calls.
 #[derive(Debug, Clone, Default)]
 pub struct SelfContact {
     skins: Vec<Skin>,
     sites: Vec<Site>,
     /// First site of each element, and one past the last.
     first_sites: Vec<usize>,
-    /// Where they are at the base.
+    /// Site positions at the base.
     site_positions: Vec<Vec3>,
     largest_radius_mm: f64,
     /// Whether the rod's end is its start.
     closed: bool,
     tree: Tree,
-    /// Whether the hierarchy is that of the base.
+    /// Whether the hierarchy is placed at the base.
     is_placed: bool,
     base: RodState,
     near: Vec<(usize, usize)>,
     pairs: Vec<Pair>,
-    /// Those of the base before, for their forces.
+    /// Pairs of the previous base, for their forces.
     before: Vec<Pair>,
-    /// Whether forces are aimed at.
+    /// Whether forces have a target.
     aimed: bool,
-    /// Where nothing was near, if that was so where it was looked last.
+    /// The last state tested at which nothing was near, if so.
     clear: Option<clear::Clear>,
-    /// The trial that was found safe last, and the part of its way that is.
+    /// The last safe trial, and the safe fraction of its way.
     checked: (RodState, f64),
     rubbing: Rubbing,
-    /// Whether friction at the base is known in a step.
+    /// Whether friction at the base has been prepared in this step.
     slips_known: bool,
     rounding_n: f64,
     counters: PairCounters,
 }
 
 impl SelfContact {
-    /// That of a rod with these elements and their surfaces.
+    /// For a rod with these elements and their surfaces.
     pub fn new(elements: &[ElementData], skins: Vec<Skin>) -> Self {
         let mut contact = Self::default();
         contact.renew(elements, skins);
         contact
     }
 
-    /// Is that of another rod from here on: nothing is known of it.
+    /// Resets to another rod, about which nothing is known.
     pub(crate) fn renew(&mut self, elements: &[ElementData], skins: impl IntoIterator<Item = Skin>) {
         let Self { skins: known, sites, first_sites, .. } = self;
         known.clear();
@@ -205,7 +209,7 @@ impl SelfContact {
         self.clear = None;
     }
 
-    /// The same of a rod that is a ring: its last node is held where its first one is.
+    /// The same for a ring, whose last node coincides with its first.
     #[must_use]
     pub fn closed(self) -> Self {
         Self { closed: true, ..self }
@@ -215,12 +219,12 @@ impl SelfContact {
         Curve { elements, state, closed: self.closed }
     }
 
-    /// What was asked so far.
+    /// Counts so far.
     pub fn counters(&self) -> PairCounters {
         self.counters
     }
 
-    /// Arc length that elements which may touch are apart along the rod at least, mm.
+    /// Smallest arc length between elements that may touch, mm.
     fn apart_mm(&self) -> f64 {
         tree::half_turn(self.largest_radius_mm)
     }

@@ -1,4 +1,4 @@
-//! The model of a step: gaps to first order, and springs where they close. See `wall/model.rs`, of which this is the other one.
+//! The model of a step: gaps to first order, and springs where they close; the counterpart of `wall/model.rs`.
 
 use super::curve::Curve;
 use super::{Pair, SelfContact};
@@ -8,7 +8,7 @@ use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::Moved;
 
 impl Pair {
-    /// Change of its gap by a step, to first order, mm.
+    /// Change of its gap in a step, to first order, mm.
     pub(super) fn change(&self, moved: &Moved<'_>) -> f64 {
         if !self.foreseen {
             return 0.0;
@@ -16,18 +16,18 @@ impl Pair {
         self.gap.direction().dot(&self.way(moved))
     }
 
-    /// By how much a step moves its places apart, mm.
+    /// Relative displacement of its points in a step, mm.
     pub(super) fn way(&self, moved: &Moved<'_>) -> Vec3 {
         let [a, b] = self.gap.at.map(|place| moved((place.element, place.xi, 0)).0);
         a - b
     }
 
-    /// Force of its spring in the system after a step that changes its gap so much, N.
+    /// Force of its spring in the system after a step with this change of its gap, N.
     pub(super) fn linear_n(&self, change_mm: f64) -> f64 {
         if self.presses { self.spring_n_per_mm * (change_mm - self.depth_mm()) } else { 0.0 }
     }
 
-    /// Slope of the model at a part of the way to the step looked at.
+    /// Slope of the model at a fraction of the way to the other step.
     pub(super) fn slope_towards(&self, part: f64) -> f64 {
         let way = self.end_mm - self.change_mm;
         let there = self.change_mm - self.depth_mm() + part * way;
@@ -62,7 +62,7 @@ impl SelfContact {
             if presses != pair.presses {
                 (pair.presses, changed) = (presses, changed + 1);
                 let spring = if presses { pair.spring_n_per_mm } else { -pair.spring_n_per_mm };
-                // A plane: the gap has no curvature, and tangents turn under no force.
+                // A plane: the gap has no curvature, and no force acts on the rotation of tangents.
                 into.add_couple(elements, base, &pair.couple(&curve, -spring * pair.depth_mm(), 0.0, spring));
             }
         }

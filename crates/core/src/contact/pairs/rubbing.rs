@@ -1,15 +1,17 @@
-//! Friction where rods touch themselves and each other, as an incremental potential like that of the wall ([`crate::contact::friction`]).
+//! Friction of rods on themselves and each other, as an incremental potential like that of the wall
+//! ([`crate::contact::friction`]).
 //!
-//! In a part of a command the two places of a pair, material points of the base, slip on each other by
+//! In a part of a command the two points of a pair, material points of the base, slip on each other by
 //!
 //! ```text
 //! u = P [(A − a) − (B − b)],    P = I − n nᵀ,    a = Ā − Δ t̄
 //! ```
 //!
-//! where Ā and t̄ are place and direction of the first after its device has slid by the advance Δ of its hand along its own curve, and b is the same of the second. With μ, and
-//! the φ of the wall, friction takes Σ μ N φ(|u|). N and n are those of the base, and follow from base to base until they are settled.
+//! where Ā and t̄ are position and direction of the first after its device has slid by the advance Δ of its hand
+//! along its own curve, and b is the same for the second. With μ, and the φ of the wall, friction dissipates Σ μ N
+//! φ(|u|). N and n are those of the base, and are renewed from base to base until they settle.
 //!
-//! Surfaces that turn about their own axis do not rub: a wire is spun freely in its loops.
+//! Rotation of surfaces about their own axis causes no friction: a wire spins freely in its loops.
 
 use nalgebra::Matrix3;
 
@@ -26,25 +28,25 @@ use crate::solve::Moved;
 /// Friction of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Rub {
-    /// n, from the second place to the first, and N.
+    /// n, from the second point to the first, and N.
     normal: Vec3,
     force_n: f64,
-    /// The same as they are at the base.
+    /// The same at the base.
     seen: (Vec3, f64),
     /// a − b, mm.
     from_mm: Vec3,
-    /// What it had slipped where slip began anew, mm.
+    /// Its slip when slip was reset, mm.
     kept_mm: Vec3,
-    /// Slip at the base, mm, …
+    /// Slip at the base, mm.
     slip_mm: Vec3,
-    /// … and by how much the step moves the two apart, mm.
+    /// Relative displacement of the two points in the step, mm.
     way_mm: Vec3,
-    /// Force of friction at the end of the step where it is linear: in the system, without a motion, N; its derivative there, N/mm.
+    /// Linearised friction force in the system at zero displacement, N; its derivative there, N/mm.
     at_rest_n: Vec3,
     stiffness: Matrix3<f64>,
-    /// What the stiffness of the rods is in balance with, N.
+    /// The friction that balances the stiffness of the rods, N.
     carried_n: Vec3,
-    /// By how much a round moves the two apart, mm, and what is carried then, N.
+    /// Relative displacement of the two points in a round, mm, and the balanced force after it, N.
     end_mm: Vec3,
     end_n: Vec3,
 }
@@ -54,28 +56,28 @@ pub(super) struct Rub {
 pub(super) struct Rubbing {
     /// μ.
     coefficient: f64,
-    /// ε, mm, and what it does not shrink below while hands hold still.
+    /// ε, mm, and its lower bound while hands hold still.
     stick_mm: f64,
     least_stick_mm: f64,
-    /// A force not worth settling, N.
+    /// A negligible force, N.
     least_n: f64,
     renewal: Renewal,
-    /// Where rods were when the part began, after devices have slid along their own curves, …
+    /// State of the rods at the start of the part, after devices have slid along their own curves.
     begun: RodState,
-    /// … and by how much each element has, mm.
+    /// Advance of each element, mm.
     advances_mm: Vec<f64>,
-    /// Energy that was taken before slip began anew, mJ.
+    /// Energy dissipated before slip was reset, mJ.
     taken_mj: f64,
 }
 
-/// How a part of a command begins for friction.
+/// Parameters of friction in a part of a command.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rubs {
-    /// μ, …
+    /// Coefficient of friction μ.
     pub(crate) coefficient: f64,
-    /// … the slip below which places stick, and the least one while hands hold still, mm, …
+    /// Slip below which points stick, and its lower bound while hands hold still, mm.
     pub(crate) stick_mm: [f64; 2],
-    /// … and a force not worth settling, N.
+    /// A negligible force, N.
     pub(crate) least_n: f64,
 }
 
@@ -99,13 +101,13 @@ impl Pair {
         self.rub.force_n > 0.0
     }
 
-    /// A − B, mm, of the material points that are its places.
+    /// A − B, mm, of its material points.
     fn apart_mm(&self, curve: &Curve<'_>) -> Vec3 {
         let [a, b] = self.gap.at.map(|place| curve.jet(place).at);
         a - b
     }
 
-    /// Adds a force of friction as a gradient, and its derivative, to what the pair does.
+    /// Adds a friction force as a gradient, and its derivative, to the pair's contribution.
     fn add_friction(&self, to: &mut Couple, force_n: &Vec3, stiffness: &Matrix3<f64>, carried: f64) {
         let c = self.gap.weights();
         for k in 0..c.len() {
@@ -119,7 +121,8 @@ impl Pair {
 }
 
 impl SelfContact {
-    /// Begins a part of a command: rods are at a state after devices have slid along their own curves, those of each element by so much, mm.
+    /// Begins a part of a command: rods are at a state after devices have slid along their own curves, each element
+    /// by its advance, mm.
     pub(crate) fn begin_friction(
         &mut self,
         state: &RodState,
@@ -138,12 +141,12 @@ impl SelfContact {
         rubbing.advances_mm.extend(advances_mm);
     }
 
-    /// Whether there is any.
+    /// Whether there is friction.
     fn rubs(&self) -> bool {
         self.rubbing.coefficient > 0.0
     }
 
-    /// Has friction be of what presses at the base, unless it is settled or held.
+    /// Renews friction from the pairs active at the base, unless it is settled or held.
     pub(super) fn rub_with_pairs(&mut self, elements: &[ElementData], state: &RodState) {
         if !self.rubs() {
             return;
@@ -181,13 +184,14 @@ impl SelfContact {
         self.rubbing.renewal = self.rubbing.renewal.after(steady);
     }
 
-    /// Whether normal forces at an equilibrium are what presses there, or are held; otherwise they follow again.
+    /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
+    /// again.
     pub(super) fn friction_settles(&mut self) -> bool {
         let settled = self.unsettled() < SETTLED;
         !self.rubs() || self.rubbing.renewal.settles(settled)
     }
 
-    /// Part by which normal forces of friction differ from what pressed at the last base.
+    /// Relative difference of the normal forces of friction from the contact forces at the last base.
     pub(crate) fn unsettled(&self) -> f64 {
         if !self.rubs() {
             return 0.0;
@@ -200,23 +204,24 @@ impl SelfContact {
         change_n / sum_n
     }
 
-    /// Normal forces are renewed no more.
+    /// Stops renewing normal forces.
     pub(crate) fn hold_friction(&mut self) {
         self.rubbing.renewal = Renewal::Held;
     }
 
-    /// Normal forces follow from here on.
+    /// Resumes renewing normal forces.
     pub(crate) fn release_friction(&mut self) {
         self.rubbing.renewal = Renewal::Begins;
     }
 
-    /// Normal forces are those with which the part began, none, and are held.
+    /// Resets normal forces to those of the start of the part, zero, and holds them.
     pub(crate) fn rewind_friction(&mut self) {
         self.hold_friction();
         self.pairs.iter_mut().for_each(|pair| pair.rub.force_n = 0.0);
     }
 
-    /// Slip begins anew at the base, with the normal forces seen there, which are held: see [`Friction::anchor`](crate::contact::Friction::anchor).
+    /// Resets slip at the base and holds the normal forces there: see
+    /// [`Friction::anchor`](crate::contact::Friction::anchor).
     pub(crate) fn anchor_friction(&mut self) {
         if !self.rubs() {
             return;
@@ -241,7 +246,8 @@ impl SelfContact {
         rubbing.advances_mm.fill(0.0);
     }
 
-    /// The least and the most that friction has taken in the part, mJ: with no normal forces, as at its beginning, and with those of its end.
+    /// Lower and upper estimate of the energy dissipated in the part, mJ: with zero normal forces, as at its start,
+    /// and with those of its end.
     pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
         let Rubbing { coefficient, stick_mm, taken_mj, .. } = self.rubbing;
         let each = self
@@ -253,7 +259,7 @@ impl SelfContact {
         (if taken_mj == 0.0 { 0.0 } else { most_mj }, most_mj)
     }
 
-    /// Force of friction on the first place of a pair at the base, N.
+    /// Friction force on the first point of a pair at the base, N.
     pub(super) fn friction_n(&self, pair: &Pair) -> Vec3 {
         if !pair.rubs() {
             return Vec3::zeros();
@@ -262,7 +268,7 @@ impl SelfContact {
         -pair.rub.slip_mm * resistance(coefficient * pair.rub.force_n, &pair.rub.slip_mm, stick_mm)
     }
 
-    /// Adds friction at the base to what a pair does, and returns what it takes, mJ.
+    /// Adds friction at the base to a pair's contribution, and returns its energy, mJ.
     pub(super) fn add_friction(&self, pair: &Pair, to: &mut Couple) -> f64 {
         let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
         let largest_n = coefficient * pair.rub.force_n;
@@ -271,7 +277,7 @@ impl SelfContact {
         largest_n * phi(pair.rub.slip_mm.norm(), stick_mm)
     }
 
-    /// What friction takes from a pair on the way to a state, mJ.
+    /// Friction energy of a pair on the way to a state, mJ.
     pub(super) fn friction_mj(&self, pair: &Pair, curve: &Curve<'_>) -> f64 {
         if !pair.rubs() {
             return 0.0;
@@ -281,7 +287,8 @@ impl SelfContact {
         coefficient * pair.rub.force_n * phi(slip_mm.norm(), stick_mm)
     }
 
-    /// Takes note of the friction in a step from the base that answers the system as it is: see [`crate::contact::wall`] (`wall/slipping.rs`), of which this is the other one.
+    /// Stores the friction in a step from the base that solves the current system; the counterpart of
+    /// [`crate::contact::wall`] (`wall/slipping.rs`).
     pub(super) fn foresee_slipping(&mut self, moved: &Moved<'_>) {
         let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
         let begins = !std::mem::replace(&mut self.slips_known, true);
@@ -297,7 +304,7 @@ impl SelfContact {
         }
     }
 
-    /// Has friction be that at the end of the step; returns at how many pairs that changes it.
+    /// Updates friction to the end of the step; returns at how many pairs it changes.
     pub(super) fn slip_on(
         &mut self,
         elements: &[ElementData],
@@ -321,7 +328,7 @@ impl SelfContact {
                 let (more_n, stiffer) = (at_rest_n - rub.at_rest_n, stiffness - rub.stiffness);
                 (rub.at_rest_n, rub.stiffness) = (at_rest_n, stiffness);
                 let mut couple = Couple::none(pair.gap.at.map(|place| place.element));
-                // Linear: tangents turn under no force.
+                // Linear: no force acts on the rotation of tangents.
                 pair.add_friction(&mut couple, &more_n, &stiffer, 0.0);
                 into.add_couple(elements, base, &couple);
             }
@@ -329,7 +336,7 @@ impl SelfContact {
         changed
     }
 
-    /// What a round does to pairs with friction.
+    /// Computes the slips of pairs with friction in a round.
     pub(super) fn look_towards_slips(&mut self, moved: &Moved<'_>) {
         for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
             let end_mm = pair.way(moved);
@@ -338,7 +345,7 @@ impl SelfContact {
         }
     }
 
-    /// Slope of what friction takes at a `part` of a round, less what is carried there.
+    /// Slope of the friction energy at a `part` of a round, minus the work of the balanced forces.
     pub(super) fn slipping_slope(&self, part: f64) -> f64 {
         let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
         let each = self.pairs.iter().filter(|pair| pair.rubs()).map(|Pair { rub, .. }| {
@@ -350,7 +357,7 @@ impl SelfContact {
         each.sum()
     }
 
-    /// What the stiffness of rods is in balance with after that part of the round.
+    /// Updates the balanced forces after that part of the round.
     pub(super) fn carry_slipping(&mut self, part: f64) {
         for Pair { rub, .. } in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
             rub.carried_n += (rub.end_n - rub.carried_n) * part;

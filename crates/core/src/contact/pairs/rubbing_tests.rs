@@ -8,14 +8,15 @@ use crate::solve::{Newton, NewtonOptions, Together};
 const N: usize = 12;
 const RADIUS: f64 = 0.02;
 
-/// A cantilever along x that is pressed down on a rod along y, which springs hold, and pulled along that. Returns the force between them on that rod: down, and along it.
+/// A cantilever along x is pressed down on a rod along y, held by springs, and pulled along it. Returns the
+/// components of the contact force on that rod: down, and along it.
 fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
     let elements = vec![ElementData::plain(1.0 / N as f64, 1.0); N];
     let frame = |along: Vec3| Frame::new(along, None);
     let mut rods = RodState::straight(&elements, Vec3::zeros(), frame(Vec3::x()));
     let below = RodState::straight(&elements, Vec3::new(0.77, -0.513, -2.0 * RADIUS), frame(Vec3::y()));
     rods.join(&below);
-    // Stiff, so that it does not lean where it is pressed.
+    // Stiff, so that it does not bend much where it is pressed.
     let stiff = vec![ElementData::plain(1.0 / N as f64, 100.0); N];
     let all = [&elements[..], &[ElementData::BREAK], &stiff[..]].concat();
     let springs = (0..=N).map(|i| (N + 1 + i, below.positions[i])).collect();
@@ -41,7 +42,8 @@ fn rods_that_cross_slip_at_coulombs_force_and_stick_below_it() {
     assert!(smooth_n > 0.05 && none_n.abs() < 5e-3 * smooth_n, "{smooth_n} {none_n}");
     for coefficient in [0.1, 0.3] {
         let (down, along) = pressed_across(coefficient, 0.1, 0.1);
-        // Across it no force acts but friction, along the surfaces that touch; the upper rod leans by the way.
+        // Across the cantilever only friction acts, along the touching surfaces; the tolerance covers the upper rod's
+        // inclination.
         assert!((along / (coefficient * down) - 1.0).abs() < 0.02, "{coefficient}: {along} of {down}");
         let (down, along) = pressed_across(coefficient, 0.1, 0.002);
         assert!(along > 0.0 && along < 0.5 * coefficient * down, "{coefficient}: {along} of {down}");

@@ -27,7 +27,7 @@ fn coil(wide: f64, pitch: f64) -> impl Fn(f64) -> Vec3 {
     move |a: f64| Vec3::new(wide * a.cos(), wide * a.sin(), pitch * a / std::f64::consts::TAU)
 }
 
-/// A rod that goes over itself at an angle, `high` above.
+/// A rod that crosses over itself at an angle, `high` above.
 fn loop_over(high: f64) -> impl Fn(f64) -> Vec3 {
     move |a: f64| {
         let b = a - 2.5;
@@ -46,7 +46,7 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
     friction: f64,
 ) {
     let mut touching = contact(elements, radius);
-    // Slips are of the size of ε, so that some stick and some do not.
+    // Slips are of the magnitude of ε, so that some points stick and some do not.
     let mut begun = state.clone();
     for (i, x) in begun.positions.iter_mut().enumerate() {
         *x += Vec3::new((0.7 * i as f64).sin(), (1.1 * i as f64).cos(), 0.3) * 0.01;
@@ -55,7 +55,7 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
     touching.begin_friction(&begun, elements.iter().map(|_| 0.005), rubs);
     let mut assembly = Assembly::<C>::new(elements.len());
     touching.look_at_base(elements, state);
-    // Under the forces that the energy itself exerts.
+    // With the forces of the energy itself.
     for pair in &mut touching.pairs {
         pair.force_n = if pair.at_base { pair.spring_n_per_mm * pair.depth_mm() } else { 0.0 };
     }
@@ -112,7 +112,7 @@ fn derivatives_are_those_of_the_energy_along_lines_and_at_crossings() {
 
 #[test]
 fn a_crossing_is_felt_the_same_wherever_sites_lie() {
-    // The same crossing, cut into elements in other ways: the energy of a depth of a hundredth of the radius.
+    // The same crossing with different meshes: the energy of a depth of a hundredth of the radius.
     let energy = |elements: usize| {
         let (elements, state) = along(loop_over(0.0826), 5.0, elements);
         let mut touching = contact(&elements, 0.1);
@@ -127,7 +127,7 @@ fn a_crossing_is_felt_the_same_wherever_sites_lie() {
 
 #[test]
 fn ends_that_meet_head_on_are_felt_as_near_as_they_are() {
-    // A ring that is open by so much, whose ends lie in front of each other, and one whose ends are aside of each other.
+    // Open rings with this gap whose ends face each other, or are offset.
     for (apart, aside) in [(0.19, 0.0), (0.15, 0.5), (0.0, 0.9), (0.12, 0.7)] {
         let radius = 1.5;
         let turn = std::f64::consts::TAU - apart / radius;
@@ -136,7 +136,7 @@ fn ends_that_meet_head_on_are_felt_as_near_as_they_are() {
         let mut touching = contact(&elements, 0.1);
         let ends = (state.positions[20] - state.positions[0]).norm();
         touching.look_at_base(&elements, &state);
-        // Those of the sites next to the ends.
+        // The depths of the sites next to the ends.
         let deepest = touching.pairs.iter().map(Pair::depth_mm).fold(0.0, f64::max);
         assert!((deepest - (0.2 - ends)).abs() < 5e-4, "{apart} {aside}: {deepest} of {}", 0.2 - ends);
     }

@@ -1,15 +1,16 @@
 //! A hierarchy of boxes about the elements of a rod, in their order along it.
 //!
-//! Neighbours along the rod are neighbours in space, so halves of halves of it are as good a hierarchy as any. An element lies in the hull of its control points and, while these
-//! move along straight lines, so does its motion in the hull of theirs.
+//! Neighbours along the rod are neighbours in space, so repeated halving of the rod is a good hierarchy. An element
+//! lies in the convex hull of its control points; while these move along straight lines, its motion lies in the hull
+//! of their motions.
 
 use super::curve::Curve;
 use crate::Vec3;
 
-/// An element, or what it is moved by: four control points.
+/// An element, or its displacement: four control points.
 pub(super) type Controls = [Vec3; 4];
 
-/// A box with its sides along the axes.
+/// An axis-aligned box.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
     low: Vec3,
@@ -30,12 +31,12 @@ impl Extent {
         Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
     }
 
-    /// Distance of the nearest points of two.
+    /// Smallest distance of points of two boxes.
     fn distance(&self, other: &Self) -> f64 {
         (self.low - other.high).sup(&(other.low - self.high)).sup(&Vec3::zeros()).norm()
     }
 
-    /// Distance of the farthest points of two.
+    /// Largest distance of points of two boxes.
     fn span(&self, other: &Self) -> f64 {
         (self.high - other.low).sup(&(other.high - self.low)).norm()
     }
@@ -46,19 +47,19 @@ impl Extent {
 pub(super) struct Tree {
     controls: Vec<Controls>,
     motions: Vec<Controls>,
-    /// Of each half: places and motions. The children of `i` are 2i + 1 and 2i + 2.
+    /// Boxes of positions and of motions for each half. The children of `i` are 2i + 1 and 2i + 2.
     boxes: Vec<[Extent; 2]>,
-    /// Arc lengths at the ends of each element; a rod follows far behind the one before it.
+    /// Arc lengths at the ends of each element; each rod starts far behind the one before it.
     arcs: Vec<[f64; 2]>,
-    /// Whether there is none, but a gap between two rods.
+    /// Whether it is not an element but a gap between two rods.
     breaks: Vec<bool>,
     closed: bool,
 }
 
-/// Arc length between the end of a rod and the begin of the next, mm: more than any reach.
+/// Arc length between the end of a rod and the start of the next, mm: more than any reach.
 const APART_MM: f64 = 1e3;
 
-/// A stretch of elements, and the number of its box.
+/// A stretch of elements, and the index of its box.
 type Stretch = (usize, std::ops::Range<usize>);
 
 fn halves((at, range): &Stretch) -> [Stretch; 2] {
@@ -67,7 +68,7 @@ fn halves((at, range): &Stretch) -> [Stretch; 2] {
 }
 
 impl Tree {
-    /// That of rods where they are, without a motion.
+    /// Places the hierarchy at the rods, without a motion.
     pub(super) fn place(&mut self, curve: &Curve<'_>) {
         let n = curve.elements.len();
         self.closed = curve.closed;
@@ -89,7 +90,7 @@ impl Tree {
         self.enclose(&(0, 0..n));
     }
 
-    /// Gives it the motion to where the rod is in another state.
+    /// Sets the motion to the rods' positions in another state.
     pub(super) fn move_to(&mut self, curve: &Curve<'_>) {
         for (e, motion) in self.motions.iter_mut().enumerate() {
             let (to, from) = (curve.controls(e), &self.controls[e]);
@@ -118,7 +119,7 @@ impl Tree {
         begin + xi * (end - begin)
     }
 
-    /// Whether two elements, the first before the second, are so far apart along the rod that they can touch.
+    /// Whether two elements, the first before the second, are far enough apart along the rod to touch.
     fn may_touch(&self, a: usize, b: usize, apart: f64) -> bool {
         let around = self.arcs[a][0] + self.length() - self.arcs[b][1];
         a + 1 < b
@@ -126,18 +127,19 @@ impl Tree {
             && !(self.closed && (a + self.arcs.len() == b + 1 || around < apart))
     }
 
-    /// Length of all that there is.
+    /// Total length.
     fn length(&self) -> f64 {
         self.arcs.last().map_or(0.0, |last| last[1])
     }
 
-    /// Arc length between two places, the shorter way round of a closed rod.
+    /// Arc length between two points, the shorter way round for a closed rod.
     pub(super) fn between(&self, a: f64, b: f64) -> f64 {
         let apart = (a - b).abs();
         if self.closed { apart.min(self.length() - apart) } else { apart }
     }
 
-    /// Elements (a, b), a before b, that may be nearer to each other than `reach`, and are at least `apart` from each other along the rod.
+    /// Adds elements (a, b), a before b, that may be nearer to each other than `reach`, and are at least `apart` from
+    /// each other along the rod.
     pub(super) fn near(&self, reach: f64, apart: f64, into: &mut Vec<(usize, usize)>) {
         into.clear();
         let is_near = |a: &Stretch, b: &Stretch| self.boxes[a.0][0].distance(&self.boxes[b.0][0]) < reach;
@@ -149,7 +151,8 @@ impl Tree {
         self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
     }
 
-    /// Whether an element, but for those of the first rod that are less than `behind` from its end, comes nearer to a segment than its `reach`.
+    /// Whether an element, except those of the first rod less than `behind` from its end, comes nearer to a segment
+    /// than its `reach`.
     pub(super) fn is_near_segment(
         &self,
         (from, to): (&Vec3, &Vec3),
@@ -164,8 +167,8 @@ impl Tree {
         others.any(|e| is_near(&self.controls[e], &segment, reach(e), SPLITS))
     }
 
-    /// Part, at most all, of the motion in which no two points of elements at least `apart` along the rod come nearer to each other by more than half
-    /// their distance.
+    /// Fraction of the motion, at most 1, on which no two points of elements at least `apart` along the rod come
+    /// nearer to each other by more than half their distance.
     pub(super) fn safe_part(&self, apart: f64) -> f64 {
         let part = std::cell::Cell::new(1.0f64);
         let is_near = |a: &Stretch, b: &Stretch| {
@@ -219,10 +222,12 @@ fn visit_between(
     }
 }
 
-/// How often an element is halved before its bound is taken as it is: what is left of its bulge is less than 10⁻⁴ of it.
+/// Largest number of halvings of an element before its bound is accepted: its remaining bulge is below 10⁻⁴ of the
+/// original.
 const SPLITS: usize = 7;
 
-/// Part of a motion that brings no two points of two curves nearer by more than half their distance; at most `part`.
+/// Fraction of a motion that brings no two points of two curves nearer by more than half their distance; at most
+/// `part`.
 fn safe_part(a: &(Controls, Controls), b: &(Controls, Controls), part: f64, splits: usize) -> f64 {
     let span = Extent::of(&a.1).span(&Extent::of(&b.1));
     let distance = lower_distance(&a.0, &b.0);
@@ -250,7 +255,7 @@ fn safe_part(a: &(Controls, Controls), b: &(Controls, Controls), part: f64, spli
     part
 }
 
-/// Whether a curve comes nearer to a segment than `reach`, but for what is left of its bulge.
+/// Whether a curve comes nearer to a segment than `reach`, up to its remaining bulge.
 fn is_near(curve: &Controls, segment: &Controls, reach: f64, splits: usize) -> bool {
     if lower_distance(curve, segment) >= reach {
         return false;
@@ -267,7 +272,7 @@ fn split([a, b, c, d]: &Controls) -> [Controls; 2] {
     [[*a, ab, abc, middle], [middle, bcd, cd, *d]]
 }
 
-/// Most distance of a curve from its chord.
+/// Upper bound of the distance of a curve from its chord.
 fn bulge([a, b, c, d]: &Controls) -> f64 {
     let chord = d - a;
     let square = chord.norm_squared();
@@ -278,7 +283,7 @@ fn bulge([a, b, c, d]: &Controls) -> f64 {
     off(b).max(off(c))
 }
 
-/// A bound on the distance of two curves from below.
+/// A lower bound of the distance of two curves.
 fn lower_distance(a: &Controls, b: &Controls) -> f64 {
     segments(&a[0], &a[3], &b[0], &b[3]) - bulge(a) - bulge(b)
 }
@@ -298,7 +303,7 @@ fn segments(a0: &Vec3, a1: &Vec3, b0: &Vec3, b1: &Vec3) -> f64 {
     (w + u * s - v * t).norm()
 }
 
-/// Arc length that two touching pieces of a rod are apart along it at least: half a turn of its least radius.
+/// Smallest arc length between two touching pieces of a rod: half a turn of its smallest radius.
 pub(super) fn half_turn(radius: f64) -> f64 {
     std::f64::consts::PI * radius
 }

@@ -1,9 +1,10 @@
-//! How far the wall that is felt is from the surface it is made from.
+//! Deviation of the felt wall from the surface it is made from.
 //!
-//! A device feels the smooth wall and not the triangles that this is made from: where these are cut across a crest the smooth wall stands a
-//! little farther out, and in tubes by the sag edge²/8R. So what is measured is the smooth wall, both ways, at sample points: how far
-//! points of the given surface are from it, and feet on it from the given surface. At a point x next to the smooth wall it is |f|/|∇f| away,
-//! to first order, and its foot is x − f ∇f/|∇f|².
+//! The wall that acts on a device is the smooth one, not the triangles it is made from: where these cut across a
+//! crest the smooth wall lies slightly outside them, and in tubes by the sag edge²/8R. So the deviation is measured
+//! from the smooth wall, both ways, at sample points: of points of the given surface, and of feet on the smooth wall
+//! from the given surface. A point x near the smooth wall is at the distance |f|/|∇f|, to first order, and its foot
+//! is x − f ∇f/|∇f|².
 
 use std::ops::Range;
 
@@ -11,38 +12,39 @@ use super::FeltMesh;
 use crate::vessel::{SurfaceMesh, Wall, WallQuery};
 use crate::{Result, Vec3, parallel};
 
-/// Sample points from each side, about, beside two in every triangle.
+/// Approximate number of sample points on each side, in addition to two per triangle.
 const SAMPLES: f64 = 120_000.0;
-/// Triangles with a distance of this part of the largest are looked at with …
+/// Triangles with a distance of at least this fraction of the largest are sampled more finely.
 const NEARLY: f64 = 0.85;
-/// … so many times the points, …
+/// Factor of the number of points in these triangles.
 const CLOSER: usize = 30;
-/// … those with the largest, of so many places.
+/// Largest number of triangles sampled more finely, those with the largest distances.
 const LOOKED_AT: usize = 500;
 
-/// A gradient, which is nearly 1, is not taken for less: there the foot is nowhere near.
+/// Lower bound of the gradient, which is nearly 1, for computing feet: below it the foot is nowhere near.
 const FLAT: f64 = 0.1;
-/// Beyond an opening's plane and within so many of its radii of its axis there is its extension.
+/// Radius about an opening's axis, in radii of the opening, within which everything beyond its plane belongs to its
+/// extension.
 const BESIDE_RADII: f64 = 2.0;
 
 /// Distances of two surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// In the mean of the places that were looked at, mm.
+    /// Mean over the sample points, mm.
     pub mean_mm: f64,
-    /// What 99 of 100 of them are below, mm.
+    /// 99th percentile, mm.
     pub usual_mm: f64,
-    /// The largest, mm, …
+    /// The maximum, mm.
     pub most_mm: f64,
-    /// … and the place of the given surface, or of the felt one, where that is.
+    /// Position of the maximum on the given surface or on the felt one.
     pub worst_at_mm: Vec3,
 }
 
 impl FeltMesh {
-    /// How far this wall and `given` are from each other, its extensions beyond openings left out.
+    /// The deviation of this wall from `given`, except its extensions beyond openings.
     ///
     /// # Errors
-    /// A given wall that has no triangles.
+    /// If the given wall has no triangles.
     pub fn deviation(&self, given: &Wall) -> Result<Deviation> {
         let query = WallQuery::new(given)?;
         let from_given = |x: &Vec3| {
@@ -69,7 +71,7 @@ impl FeltMesh {
             let foot =
                 x - surface.gradient * (surface.value_mm / surface.gradient.norm_squared().max(FLAT * FLAT));
             let near = query.nearest(&foot, f64::MAX)?;
-            // Beyond a rim of the given surface there is what closes a hole.
+            // Beyond a rim of the given surface lies the cap of a hole.
             (!near.rim).then_some(near.distance_mm.abs())
         };
         let sides = [measured(given.mesh(), from_given), measured(self.query.mesh(), from_felt)];
@@ -86,13 +88,13 @@ impl FeltMesh {
     }
 }
 
-/// What was found on one side.
+/// The measurements on one side.
 struct Measured {
     distances_mm: Vec<f64>,
     most: (f64, Vec3),
 }
 
-/// What `distance` says at points spread evenly over the triangles of a mesh; the largest is looked for more closely.
+/// `distance` at points spread evenly over the triangles of a mesh, with finer sampling near the largest.
 fn measured(mesh: &SurfaceMesh, distance: impl Fn(&Vec3) -> Option<f64> + Sync) -> Measured {
     let area = |index: usize| {
         let [a, b, c] = mesh.corners(index);
@@ -123,8 +125,8 @@ fn measured(mesh: &SurfaceMesh, distance: impl Fn(&Vec3) -> Option<f64> + Sync) 
     Measured { distances_mm: all.into_iter().map(|(mm, ..)| mm).collect(), most }
 }
 
-/// A point of a triangle: a corner, the middle, and then where the sequence of Roberts, *The unreasonable effectiveness of quasirandom
-/// sequences*, 2018, says.
+/// Sample points of a triangle: its corners, its middle, then the sequence of Roberts, *The unreasonable
+/// effectiveness of quasirandom sequences*, 2018.
 fn point([a, b, c]: [Vec3; 3], number: usize) -> Vec3 {
     match number {
         0 => a,
@@ -156,11 +158,11 @@ mod tests {
         let given = tube(4.0);
         let surface = FeltMesh::new(&given, 0.2, &properties, &NoStore).unwrap();
         let own = surface.deviation(&given).unwrap();
-        // The middle of a chord of 1 mm, and a little more in the middle of a triangle.
+        // The middle of a chord of 1 mm, and slightly more in the middle of a triangle.
         let sag_mm = 1.0 / 32.0;
         assert!((0.8..1.6).contains(&(own.most_mm / sag_mm)), "{own:?}");
         assert!(own.mean_mm < own.usual_mm && own.usual_mm <= own.most_mm, "{own:?}");
-        // Caps and extensions are no part of it: nothing is 4 mm away.
+        // Caps and extensions are excluded: nothing is 4 mm away.
         for by_mm in [-0.3, 0.3] {
             let other = surface.deviation(&tube(4.0 + by_mm)).unwrap();
             assert!((other.mean_mm - 0.3_f64).abs() < sag_mm, "{other:?}");

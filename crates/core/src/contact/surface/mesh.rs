@@ -1,4 +1,4 @@
-//! The felt wall of a surface: evenly meshed, extended beyond its openings, smooth, and ready for queries.
+//! The felt wall of a surface: remeshed uniformly, extended beyond its openings, smoothed, and ready for queries.
 
 use std::borrow::Cow;
 
@@ -22,19 +22,19 @@ pub struct FeltMesh {
     pub query: WallQuery,
     /// Modulus and friction, where they are not the same everywhere.
     pub regions: Option<RegionMap>,
-    /// How far a point of the device must see, mm.
+    /// Reach of the queries of the device's points, mm.
     pub(in crate::contact) reach_mm: f64,
 }
 
-/// What lies inside by more than this part of the thickest radius is looked at above the triangles, …
+/// Inset, as a fraction of the thickest radius, above which points over the triangles are sampled too.
 const CREST: f64 = 0.3;
-/// … at so many heights, so many radii apart.
+/// Number of heights sampled there, and their distance in radii.
 const OVER: (u32, f64) = (6, 0.5);
 
-/// Coverage below which the flat triangles take part.
+/// Coverage below which the flat triangles contribute.
 const COVERED: f64 = 0.15;
 
-/// `wall` as an even mesh, or as it is where it is felt as it is meshed.
+/// `wall` as a uniform mesh, or unchanged if it is to be felt as it is meshed.
 fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
     if properties.deviation_mm == 0.0 {
         return Ok(Cow::Borrowed(wall));
@@ -44,10 +44,10 @@ fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) 
 }
 
 impl FeltMesh {
-    /// Prepares `wall` for devices up to this radius, mm, with its even mesh from `store`.
+    /// Prepares `wall` for devices up to this radius, mm, with its uniform mesh from `store`.
     ///
     /// # Errors
-    /// A wall that has no triangles left to query.
+    /// If the wall has no triangles left to query.
     pub fn new(
         wall: &Wall,
         thickest_mm: f64,
@@ -60,7 +60,7 @@ impl FeltMesh {
         let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };
         let reach_mm = |smooth: &SmoothWall| reach_mm(thickest_mm, smooth.deepest_inset_mm());
         let query = WallQuery::new(&surface)?;
-        // The first step would wait for it.
+        // Otherwise the first step would wait for it.
         query.prepare();
         let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions };
         let crests = surface.over_crests(thickest_mm);
@@ -69,8 +69,8 @@ impl FeltMesh {
         Ok(surface)
     }
 
-    /// How far the smooth wall lies inside the flat one over triangles where that is much, mm: beside a crest it ends farther above them than it
-    /// does on them, and a point that is taken for free there would press from one place to the next.
+    /// Insets of the smooth wall over triangles where they are large, mm: beside a crest the smooth wall lies farther
+    /// above the triangles than on them, and a point counted as free there would suddenly be in contact.
     fn over_crests(&self, thickest_mm: f64) -> Vec<Vec<(u32, f64)>> {
         let crests = self.smooth.inside_of(CREST * thickest_mm);
         let step_mm = OVER.1 * thickest_mm;
@@ -91,10 +91,10 @@ impl FeltMesh {
         })
     }
 
-    /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
+    /// Distance of `x`, given a triangle at or near the nearest; with derivatives below `limit_mm`.
     ///
-    /// Where quadrics hardly reach, the flat triangles take their place bit by bit: with their coverage C, F = f + λ(C) (d − f) goes
-    /// from the smooth distance f to that of the triangles, d.
+    /// Where quadrics hardly reach, the flat triangles replace them gradually: with their coverage C, F = f + λ(C) (d
+    /// − f) blends the smooth distance f into that of the triangles, d.
     pub(in crate::contact) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
         if let Some((nearness, coverage)) = self.smooth.within(x, triangle, limit_mm)
             && coverage >= COVERED
@@ -113,15 +113,15 @@ impl FeltMesh {
             found = Distance {
                 value_mm: smooth.value_mm + share * apart,
                 gradient: smooth.gradient + away * share + turn * apart,
-                // Without the second derivatives of C: Newton's method is a little slower there.
+                // Without the second derivatives of C, which makes Newton's method slightly slower there.
                 hessian: smooth.hessian * (1.0 - share) + turn * away.transpose() + away * turn.transpose(),
             };
         }
         if found.value_mm < limit_mm { Nearness::Within(found) } else { Nearness::Beyond(found.value_mm) }
     }
 
-    /// Distance of `x` from the piece of wall that is next to it seen from `triangle`, mm: negative behind that piece, whatever wall is
-    /// nearest.
+    /// Distance of `x` from the wall next to it, following from `triangle`, mm: negative behind it, even if another
+    /// wall is nearer.
     pub(in crate::contact) fn distance_from(&self, triangle: u32, x: &Vec3) -> f64 {
         self.nearness(x, self.smooth.walk(triangle, x), f64::NEG_INFINITY).value_mm()
     }
@@ -142,7 +142,7 @@ mod tests {
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(6.0)).unwrap().wall;
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let surface = FeltMesh::new(&wall, RADIUS_MM, &properties, &NoStore).unwrap();
-        // With insets as they are on the triangles alone.
+        // With insets measured on the triangles alone.
         let on_them = SmoothWall::new(&Wall::welded(&extended(&wall, RADIUS_MM)).unwrap(), RADIUS_MM);
         let mut pressing = [0, 0];
         for triangle in surface.smooth.inside_of(0.1) {

@@ -1,12 +1,13 @@
 //! Elements of the rod that are clear of the wall.
 //!
-//! All of a device is looked at several times in every iteration, and most of it is nowhere near a wall. Where none of the points of an
-//! element can touch, whatever the direction, as long as it moves by less than s, its points are not looked at again until it has. By how
-//! much they move is bounded by how its nodes do ([`largest_motion`]).
+//! All of a device is visited several times in every iteration, and most of it is far from the wall. If no point of
+//! an element can touch as long as it moves by less than s in any direction, its points are skipped until it has
+//! moved farther. The motion of its nodes bounds that of its points ([`largest_motion`]).
 //!
-//! What its points would read is what they have read: they are free by s, their [`Room`], whatever the direction. So nothing that is felt hangs
-//! on what is left out. Only where they are at the base is not noted, and they are looked at there before they are at any trial. Of two places
-//! where a point has looked for the wall, both near, it may then know the other: distances that it is told hang on that by rounding.
+//! The points of a skipped element would read what they have read before: they are free within s, their [`Room`], in
+//! any direction. So skipping does not change the forces. Only their positions at the base are not recorded; they are
+//! evaluated there before any trial. A point that has queried the wall at two near positions may then use the other
+//! result, which changes distances by rounding.
 
 use std::ops::Range;
 
@@ -20,22 +21,22 @@ use crate::rod::{ElementData, RodState};
 /// Places and tangents of the two nodes of an element.
 type Nodes = [Vec3; 4];
 
-/// How far points are from touching anything.
+/// Distance of points from touching anything.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
-    /// s: none touches the wall while they move by less than this, mm; 0 where they may.
+    /// s: none touches the wall while they move by less than this, mm; 0 where they may touch.
     free_mm: f64,
-    /// No wall is nearer than this to any of them, mm.
+    /// Lower bound of their distances to the wall, mm.
     clearance_mm: f64,
 }
 
 impl Room {
-    /// That of no points.
+    /// Room without any points.
     pub(super) const UNLIMITED: Self = Self { free_mm: f64::INFINITY, clearance_mm: f64::INFINITY };
-    /// That of points of which nothing is known.
+    /// Room of points about which nothing is known.
     const NONE: Self = Self { free_mm: 0.0, clearance_mm: 0.0 };
 
-    /// The room that these and others have.
+    /// Reduces the room to the smaller of both.
     pub(super) fn take(&mut self, other: Self) {
         self.free_mm = self.free_mm.min(other.free_mm);
         self.clearance_mm = self.clearance_mm.min(other.clearance_mm);
@@ -49,16 +50,16 @@ pub(in crate::contact) struct Span {
     pub(super) points: Range<usize>,
     /// Number of the element.
     pub(super) element: usize,
-    /// Its nodes where all of its points were looked at last, and at the base.
+    /// Its nodes when all of its points were last evaluated, and at the base.
     looked_at: Nodes,
     base: Nodes,
     room: Room,
-    /// Whether its points are known where they are at the base. Those that a step begins with are: at the last equilibrium.
+    /// Whether the positions of its points at the base are known. A step begins with those of the last equilibrium.
     pub(super) at_base: bool,
 }
 
 impl Span {
-    /// Those of `points`, of which nothing is known.
+    /// The spans of `points`, about which nothing is known.
     pub(in crate::contact) fn all(points: &[ContactPoint]) -> impl Iterator<Item = Self> {
         let mut begin = 0;
         points.chunk_by(|a, b| a.element == b.element).map(move |group| {
@@ -75,13 +76,13 @@ impl Span {
         })
     }
 
-    /// Notes how far its points, which have been looked at at a state, are from touching anything.
+    /// Records the room of its points, which have been evaluated at a state.
     pub(super) fn look(&mut self, state: &RodState, room: Room) {
         (self.looked_at, self.room) = (nodes(self.element, state), room);
     }
 }
 
-/// Where nodes are that nobody has looked at.
+/// Nodes of elements that have not been evaluated.
 const UNKNOWN: Nodes = [Vec3::new(f64::NAN, f64::NAN, f64::NAN); 4];
 
 fn nodes(element: usize, state: &RodState) -> Nodes {
@@ -98,13 +99,14 @@ impl WallContact<'_> {
         }
     }
 
-    /// How far a material point of the vessel at which a point of an element is moves at most, mm.
+    /// Upper bound of the motion of a material point of the vessel under a point of an element, mm.
     fn motion_mm(&self, from: &Nodes, to: &Nodes, length_mm: f64) -> f64 {
         let [x0, x1, t0, t1] = [0, 1, 2, 3].map(|k| (to[k] - from[k]).norm());
         largest_motion(length_mm, [(x0, t0), (x1, t1)]) * self.surface.stretch()
     }
 
-    /// The points of a span, unless none can touch the wall at a state; those returned are known where they are at the base.
+    /// The points of a span, unless none can touch the wall at a state; their positions at the base are known
+    /// afterwards.
     pub(super) fn near(
         &mut self,
         span: usize,
@@ -118,8 +120,8 @@ impl WallContact<'_> {
         Some(self.know_base(span, elements))
     }
 
-    /// The points of a span, unless all can go `part` of the straight way from the base to a state without coming near a wall; those that
-    /// are told are known where they are at the base.
+    /// The points of a span, unless all can go `part` of the straight way from the base to a state without coming
+    /// near a wall; the positions of the returned points at the base are known afterwards.
     pub(super) fn near_way(
         &mut self,
         span: usize,
@@ -139,7 +141,7 @@ impl WallContact<'_> {
         Some(self.know_base(span, elements))
     }
 
-    /// The points of a span, which are known where they are at the base from here on.
+    /// The points of a span, after recording their positions at the base.
     fn know_base(&mut self, span: usize, elements: &[ElementData]) -> Range<usize> {
         let known = &mut self.cache.spans[span];
         let (points, base, length_mm) = (known.points.clone(), known.base, elements[known.element].length);
@@ -152,34 +154,35 @@ impl WallContact<'_> {
         points
     }
 
-    /// All points are known where they are at the base: what is kept of them must be, and what is looked at elsewhere.
+    /// Records the positions of all points at the base, which must be known before they are stored or evaluated
+    /// elsewhere.
     pub fn know_whole_base(&mut self, elements: &[ElementData]) {
         for span in 0..self.cache.spans.len() {
             self.know_base(span, elements);
         }
     }
 
-    /// The room that each node of a device has at a state, mm: how far it can move without coming near a wall, as far as is known of the
-    /// points on the element before it, or their radius where that is more.
+    /// The room of each node of a device at a state, mm: how far it can move without coming near a wall, as known
+    /// from the points on the element before it, or their radius if that is larger.
     pub fn rooms(&self, elements: &[ElementData], state: &RodState, room_mm: &mut Vec<f64>) {
         room_mm.clear();
         room_mm.resize(elements.len() + 1, f64::INFINITY);
         for span in &self.cache.spans {
             let e = span.element;
             let motion_mm = self.motion_mm(&span.looked_at, &nodes(e, state), elements[e].length);
-            // Where nothing is known it is no number.
+            // NaN where nothing is known.
             let clearance_mm = (span.room.clearance_mm - motion_mm).max(0.0);
             let radius_mm = self.points[span.points.start].potential.radius_mm;
             room_mm[e + 1] = clearance_mm.max(radius_mm);
         }
-        // The first node of a rod has that of its second.
+        // The first node of a rod gets the room of its second.
         room_mm[0] = room_mm[1];
         for e in (0..elements.len()).filter(|e| elements[*e].is_break()) {
             room_mm[e + 1] = room_mm[e + 2];
         }
     }
 
-    /// Has a state be the base, and looks at the points that may touch there.
+    /// Makes a state the base, and evaluates the points that may touch there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.cache.pressing.clear();
         self.cache.foreseen.clear();
@@ -208,12 +211,12 @@ impl WallContact<'_> {
         }
     }
 
-    /// How far point `index`, which is at `x` and has this reading, is from touching anything.
+    /// Distance of point `index`, at `x` with this reading, from touching anything.
     pub(super) fn room(&self, index: usize, x: &Vec3, reading: &Reading) -> Room {
         let known = &self.cache.points[index];
         let moved_mm = (x - known.looked_at).norm();
-        // A look from within the room must change nothing that is known, so no triangle is; what has pressed in the last equilibrium may
-        // be held to the wall; and what is no number has no room.
+        // A reading within the room must not change what is known, so a point with a triangle has no room; neither
+        // has one that pressed at the last equilibrium and may be held to the wall, nor one with NaN.
         let free = matches!(reading, Reading::Free(_))
             && known.piece.is_none()
             && known.side.is_none()
@@ -224,7 +227,7 @@ impl WallContact<'_> {
         Room { free_mm, clearance_mm: known.clearance_mm - moved_mm }
     }
 
-    /// Notes of a point that it is at `x` at the base, and what it reads there: also off the wall while it has a force.
+    /// Records the position `x` of a point at the base and its reading there, also off the wall while it has a force.
     fn read_base(&mut self, index: usize, elements: &[ElementData], x: &Vec3) -> Reading {
         let radius_mm = self.points[index].potential.radius_mm;
         let force_n = self.cache.points[index].force_n;

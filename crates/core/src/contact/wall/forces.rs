@@ -1,14 +1,15 @@
 //! Contact forces as unknowns beside the device's shape.
 //!
-//! With p = r − d the depth of a point, κ = w k and a force f ≥ 0 of its own, equilibrium is ∇E − Σ f ∇d = 0 and f = κ p₊. A thread presses on a hard
-//! wall by nanometres, and a step along a curved wall is off it by more: depths say little of what presses, and forces much. So a point is
-//! active while
+//! With p = r − d the depth of a point, κ = w k and a force unknown f ≥ 0, equilibrium is ∇E − Σ f ∇d = 0 and f = κ
+//! p₊. A thread presses on a hard wall by nanometres, and the error of a step along a curved wall is larger: forces
+//! indicate contact much better than depths. So a point is active while
 //!
 //! ```text
 //! f + ρ p > 0,    ρ = c w EI/h⁴
 //! ```
 //!
-//! with a penalty ρ of the size of the element's own stiffness. Newton's method for x and f, with f eliminated, is
+//! with a penalty ρ of the magnitude of the element's own stiffness. Newton's method for x and f, with f eliminated,
+//! is
 //!
 //! ```text
 //! (∇∇E − Σ f ∇∇d + Σ κ ∇d ∇dᵀ) δx = −(∇E − Σ κ p ∇d),    f⁺ = κ (p − ∇d·δx)
@@ -23,16 +24,17 @@
 //! E(x) + Σ [κ t²/(2 ρ (κ + ρ)) − f⁺²/(2 ρ)],    t = (f⁺ + ρ p)₊,    force κ t/(κ + ρ)
 //! ```
 //!
-//! which is as soft as the rod: what is of second order in a step costs nothing there.
+//! which is as soft as the rod, so second-order errors of a step cost nothing there.
 //!
-//! Where the modulus changes from place to place, κ = κ₀ eˢ, the merit pulls towards where it is softer, too: with ½ κ p² ∇s where f = κ p, as the energy
-//! does, and beside that with
+//! Where the modulus varies, κ = κ₀ eˢ, the merit also has a gradient towards the softer side: ½ κ p² ∇s where f = κ
+//! p, like the energy, plus
 //!
 //! ```text
 //! κ t²/(2 (κ + ρ)²) ∇s
 //! ```
 //!
-//! The Hessian has what that adds to the energy's ([`Stiffness::graded`]); planes of points that come to touch have not.
+//! The Hessian includes the energy's contribution ([`Stiffness::graded`]); the planes of points that become active do
+//! not.
 
 use super::model::straighten;
 use super::{ROUNDING, WallContact};
@@ -51,13 +53,13 @@ impl WallContact<'_> {
         PENALTY * point.weight_mm * element.bending[1] / element.length.powi(4)
     }
 
-    /// The wall's modulus where a point is at the base.
+    /// The wall's modulus at the base position of a point.
     fn stiffness_at_base(&self, index: usize) -> Stiffness {
         let known = &self.cache.points[index];
         self.surface.stiffness(&known.base, known.base_piece)
     }
 
-    /// κ of a point where the wall has this modulus, N/mm.
+    /// κ of a point for this modulus of the wall, N/mm.
     fn spring_with(&self, index: usize, stiffness: &Stiffness) -> f64 {
         let point = &self.points[index];
         stiffness.factor * point.weight_mm * point.potential.modulus_n_per_mm2
@@ -69,7 +71,7 @@ impl WallContact<'_> {
         (self.spring_with(index, &stiffness), stiffness.slope.map_or_else(Vec3::zeros, |(slope, _)| slope))
     }
 
-    /// What the wall does to point `index`, active at its base, as gradient, N, and Hessian, N/mm.
+    /// Contribution of point `index`, active at its base, as gradient, N, and Hessian, N/mm.
     pub(super) fn press(
         &mut self,
         (elements, state): (&[ElementData], &RodState),
@@ -104,7 +106,8 @@ impl WallContact<'_> {
             let mut contact = self.cache.foreseen[k];
             let way = moved(self.points[contact.index].place()).0;
             contact.change_mm = way.dot(&contact.gradient);
-            // What the rod's own stiffness is in balance with, which is κ (p − ∇d·δx) where the contacts at the end are found.
+            // The force that balances the rod's own stiffness, which is κ (p − ∇d·δx) once the contacts at the end
+            // are found.
             contact.aim_n = (-contact.carried_n).max(0.0);
             self.cache.foreseen[k] = contact;
             let (kappa, depth_mm) = (contact.spring_n_per_mm, -contact.gap_mm);
@@ -121,8 +124,8 @@ impl WallContact<'_> {
         sum
     }
 
-    /// Merit of a point at a state, or what the wall stores there if no forces are aimed at, mJ. Points are asked for in ascending order; `next` is
-    /// the first of those foreseen that is not yet.
+    /// Merit of a point at a state, or the wall's energy there if forces have no target, mJ. Points are visited in
+    /// ascending order; `next` is the first of `foreseen` not yet visited.
     pub(super) fn contact_mj(
         &mut self,
         elements: &[ElementData],
@@ -136,7 +139,7 @@ impl WallContact<'_> {
         *next += foreseen[*next..].partition_point(|contact| contact.index < index);
         let contact = foreseen.get(*next).filter(|contact| self.cache.aimed && contact.index == index);
         let force_n = contact.map_or(0.0, |contact| contact.aim_n);
-        // Where a force is aimed at, how far off the wall it is counts as well.
+        // Where a force has a target, its distance off the wall counts as well.
         let limit_mm = if force_n > 0.0 { (1.0 + FOLLOW) * radius_mm } else { self.asked_mm(radius_mm) };
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
         if force_n == 0.0 && depth_mm <= 0.0 {
@@ -158,7 +161,8 @@ impl WallContact<'_> {
         }
     }
 
-    /// Lets points go that pull by more than this part of what the others press with. Returns whether there are none.
+    /// Releases points that pull by more than this fraction of the largest pressing force. Returns whether there were
+    /// none.
     pub(super) fn let_go_of_pulling(&mut self, tolerance: f64) -> bool {
         let (mut pull_n, mut press_n) = (0.0, self.least_force_n());
         for (index, d) in self.cache.all_pressed() {

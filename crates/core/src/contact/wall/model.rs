@@ -1,7 +1,8 @@
-//! The model of a step that Newton's method asks contacts for: gaps to first order, and springs where they close.
+//! The contacts' part of the model of a Newton step: gaps to first order, and springs where they close.
 //!
-//! Point i has the gap gᵢ = dᵢ − r at the base and gᵢ + ∇dᵢ·δx at the end of a step, and presses there with κᵢ times that where it is negative. Planes are
-//! known of all points that a step may lead there, whether they touch at the base or not: planes of others change nothing. See [`crate::solve`] for what the model is for, and
+//! Point i has the gap gᵢ = dᵢ − r at the base and gᵢ + ∇dᵢ·δx at the end of a step, and presses there with κᵢ times
+//! that if it is negative. Planes are needed for all points that a step may bring into contact, whether they touch at
+//! the base or not; the others' planes have no effect. See [`crate::solve`] for the purpose of the model, and
 //! [`super::forces`] for the merit along the step to its minimum.
 
 use nalgebra::Matrix3;
@@ -13,17 +14,17 @@ use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
 
-/// Steepest gradient of a distance that is foreseen: the smooth wall of a mesh is steeper than 1 near crests.
+/// Assumed bound of the distance's gradient: the smooth wall of a mesh is steeper than 1 near crests.
 const STEEPEST: f64 = 2.0;
 
-/// A contact in a step, and what that does to it.
+/// A contact in a step.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::contact) struct Foreseen {
     /// Number of the point.
     pub(super) index: usize,
-    /// g at the base, mm, …
+    /// g at the base, mm.
     pub(super) gap_mm: f64,
-    /// … and its change by the whole step, to first order.
+    /// Its change in the full step, to first order, mm.
     pub(super) change_mm: f64,
     /// ∇d at the base.
     pub(super) gradient: Vec3,
@@ -33,36 +34,36 @@ pub(in crate::contact) struct Foreseen {
     pub(super) slope_per_mm: Vec3,
     /// ρ, N/mm.
     pub(super) penalty_n_per_mm: f64,
-    /// The force that the rod's own stiffness is in balance with, N, less than 0 where it presses.
+    /// The force that balances the rod's own stiffness, N; negative where it presses.
     pub(super) carried_n: f64,
-    /// Whether it presses in the system at the base, …
+    /// Whether it is active in the system at the base.
     pub(super) at_base: bool,
-    /// … and whether it does now.
+    /// Whether it is active now.
     presses: bool,
-    /// f⁺: the force that the step leads to, N.
+    /// f⁺: the force at the end of the step, N.
     pub(super) aim_n: f64,
 }
 
-/// A point near the wall that no step has led there.
+/// A point near the wall that no step has brought into contact.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::contact) struct Aside {
     /// Number of the point.
     index: usize,
-    /// No more than g at the base, mm.
+    /// Lower bound of g at the base, mm.
     clear_mm: f64,
     /// ρ, N/mm.
     penalty_n_per_mm: f64,
-    /// How the step moves it, mm.
+    /// Its displacement in the step, mm.
     way: Vec3,
 }
 
 impl Foreseen {
-    /// Force of its spring in the system after a step that changes its gap so much, N.
+    /// Force of its spring in the system after a step with this change of its gap, N.
     fn linear_n(&self, change_mm: f64) -> f64 {
         if self.presses { self.spring_n_per_mm * (self.gap_mm + change_mm) } else { 0.0 }
     }
 
-    /// Adds its spring to a system, or takes it away.
+    /// Adds its spring to a system, or removes it.
     fn switch(
         &self,
         point: &ContactPoint,
@@ -81,8 +82,8 @@ impl Foreseen {
     }
 }
 
-/// Takes away what a force on a point that is added to a system, as a gradient, does to the tangents as they turn: those of springs that
-/// are not under that force, or of friction that is linear, are none under which they do.
+/// Removes the effect of a point force, added as a gradient, on the rotation of tangents: springs not under that
+/// force, or linearised friction, have no such effect.
 pub(super) fn straighten(
     point: &ContactPoint,
     element: &ElementData,
@@ -114,7 +115,7 @@ impl WallContact<'_> {
         }
     }
 
-    /// Notes a point that presses at the base, or is near the wall there.
+    /// Records a point that is active at the base, or near the wall there.
     fn note(&mut self, index: usize, elements: &[ElementData]) {
         let penalty_n_per_mm = self.penalty_n_per_mm(index, elements);
         let (known, radius_mm) = (&self.cache.points[index], self.points[index].potential.radius_mm);
@@ -127,7 +128,8 @@ impl WallContact<'_> {
         }
     }
 
-    /// Foresees the points aside that a step may lead to the wall. What the others have of a plane it does not reach.
+    /// Moves to `foreseen` the points aside that a step may bring into contact. The planes of the others are out of
+    /// its reach.
     fn take_note_of_ways(&mut self, moved: &Moved<'_>) {
         let mut aside = std::mem::take(&mut self.cache.aside);
         let before = self.cache.foreseen.len();
@@ -146,7 +148,7 @@ impl WallContact<'_> {
         }
     }
 
-    /// What is known at the base of a point that may come to touch.
+    /// The linearised contact at the base of a point that may touch.
     fn at_base(&mut self, index: usize, penalty_n_per_mm: f64) -> Option<Foreseen> {
         let radius_mm = self.points[index].potential.radius_mm;
         let at_base = self.cache.points[index].presses;

@@ -1,4 +1,4 @@
-//! Whether a device has gone through the wall.
+//! Detects a device that has gone through the wall.
 
 use super::clear::Room;
 use super::{SAFE, SUNK, WallContact};
@@ -6,12 +6,13 @@ use crate::Vec3;
 use crate::rod::{ElementData, RodState};
 use crate::solve::External;
 
-/// A guess is none if it sinks deeper than the last equilibrium by this part of the radius.
+/// Increase of depth over the last equilibrium, as a fraction of the radius, from which a guess is rejected.
 const DEEPER: f64 = 0.3;
 
 impl WallContact<'_> {
-    /// Whether the device has passed through the wall to where it is: followed from the sheath, a piece of it between two points in
-    /// the lumen meets the wall, or comes out of the wall on its other side. Of a point that has sunk in the side is known.
+    /// Whether the device has passed through the wall at this state: followed from the sheath, a piece of it between
+    /// two points in the lumen crosses the wall, or emerges on its other side. The side of a point that has sunk in
+    /// is known.
     pub fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let mut last: Option<(Vec3, f64)> = None;
         let mut sunk = false;
@@ -31,7 +32,8 @@ impl WallContact<'_> {
                 && (x - from).norm() > SAFE * clearance_mm.max(distance_mm) / self.surface.stretch()
             {
                 self.counters.queries += 1;
-                // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
+                // A flat triangle may stand into the smooth lumen: a point that has gone through is behind the piece
+                // of wall next to it.
                 let beside = self.cache.points[index + 1].piece;
                 let behind = |triangle| self.surface.distance_from(triangle, &x) < 0.0;
                 if self.surface.crossing(&from, &x, 1.0).is_some() && (beside.is_none_or(behind) || beyond())
@@ -44,7 +46,8 @@ impl WallContact<'_> {
         false
     }
 
-    /// Whether a guess is none: a point sinks much deeper than where it comes from, or passes through the wall on its way from there.
+    /// Whether a guess must be rejected: a point sinks much deeper than at its origin, or passes through the wall on
+    /// its way from there.
     pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let deep = (0..self.cache.spans.len()).any(|span| {
             let Some(points) = self.near(span, elements, state) else { return false };

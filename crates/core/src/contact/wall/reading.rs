@@ -1,10 +1,11 @@
-//! How near a point of a device stands to the wall, from what is known of its surroundings.
+//! The distance of a device's point from the wall, using what is known of its surroundings.
 //!
-//! Places here are material points of the vessel, which is not where the device is while the vessel is displaced ([`crate::contact::MovedWall`]).
-//! So are lengths between them, and clearances that are remembered; a reading is a distance in space.
+//! Positions here are material points of the vessel, which differ from the device's positions while the vessel is
+//! displaced ([`crate::contact::MovedWall`]). So are lengths between them, and stored clearances; a reading is a
+//! distance in space.
 //!
-//! On the way from a base what a point reads hangs on where it is alone, not on other steps that were tried: within half its radius of
-//! where the wall was looked for at the base, it is read about the piece of wall that was found there.
+//! Between bases a point's reading depends on its position alone, not on earlier trials: within half its radius of
+//! the query at the base, it uses the piece of wall found there.
 
 use super::{SUNK, WallContact};
 use crate::Vec3;
@@ -13,17 +14,17 @@ use crate::contact::distance::{Distance, Nearness};
 use crate::contact::point::{FOLLOW, LOOK_AGAIN};
 use crate::contact::surface::Hint;
 
-/// How near a point stands.
+/// The distance of a point from the wall.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Reading {
-    /// No wall is nearer than this, mm; or, where derivatives are not wanted, it is as near as this.
+    /// Lower bound of the distance, mm; or the distance, if derivatives are not wanted.
     Free(f64),
-    /// It presses, or is as near as was asked.
+    /// In contact, or closer than the limit, with derivatives.
     Pressed(Distance),
 }
 
 impl Reading {
-    /// A distance with derivatives may have been asked for from farther away than `limit_mm` before.
+    /// A distance with derivatives may have been computed before for a larger limit than `limit_mm`.
     pub(super) fn of(nearness: Nearness, limit_mm: f64) -> Self {
         match nearness {
             Nearness::Within(d) if d.value_mm < limit_mm => Self::Pressed(d),
@@ -31,7 +32,7 @@ impl Reading {
         }
     }
 
-    /// Distance, mm, or less.
+    /// The distance or a lower bound, mm.
     pub(super) fn distance_mm(&self) -> f64 {
         match self {
             Self::Free(value_mm) | Self::Pressed(Distance { value_mm, .. }) => *value_mm,
@@ -40,16 +41,16 @@ impl Reading {
 }
 
 impl WallContact<'_> {
-    /// How near the wall point `index` would be at the material point `x`.
+    /// The reading of point `index` at the material point `x`.
     pub(super) fn read(&mut self, index: usize, x: &Vec3) -> Reading {
         self.read_within(index, x, self.points[index].potential.radius_mm)
     }
 
-    /// The same, with derivatives nearer than `limit_mm`.
+    /// As [`Self::read`], with derivatives nearer than `limit_mm`.
     pub(super) fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         if let Some(side) = self.cache.points[index].side {
             let reading = self.read_from_side(index, x, side, limit_mm);
-            // What has come back out has no side any more: what it is near to may be the other one.
+            // A point that has come back out has no side any more: the nearest wall may be the other one.
             if reading.distance_mm() < SUNK * self.points[index].potential.radius_mm {
                 return reading;
             }
@@ -58,20 +59,20 @@ impl WallContact<'_> {
         self.read_known(index, x, limit_mm).unwrap_or_else(|| self.read_anew(index, x, limit_mm))
     }
 
-    /// Below which distance a trial asks for derivatives: they serve the assembly that follows where friction acts; otherwise that
-    /// was tried first.
+    /// Distance below which a trial computes derivatives: with friction, for the assembly that follows; otherwise it
+    /// would be evaluated twice.
     pub(super) fn asked_mm(&self, radius_mm: f64) -> f64 {
         if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY }
     }
 
-    /// The reading that was taken at `x` with that hint, if it says enough.
+    /// The reading taken at `x` with that hint, if it is sufficient.
     pub(super) fn read_there(&self, index: usize, x: &Vec3, hint: Hint, limit_mm: f64) -> Option<Reading> {
         let TakenReading { at_mm, hint: taken, nearness } = self.cache.readings[index];
         let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
         (at_mm == *x && taken == hint && told).then(|| Reading::of(nearness, limit_mm))
     }
 
-    /// Of a point that has sunk into the wall: followed from there along the surface.
+    /// Reading of a point that has sunk into the wall: follows the surface from there.
     pub(super) fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
         let point = &self.points[index];
         let known = &mut self.cache.points[index];
@@ -98,7 +99,7 @@ impl WallContact<'_> {
         Reading::of(nearness, limit_mm)
     }
 
-    /// What clearances and the last piece say without a query.
+    /// What clearances and the last piece yield without a query.
     pub(super) fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
         let radius = self.points[index].potential.radius_mm;
         let stretch = self.surface.stretch();
@@ -123,7 +124,7 @@ impl WallContact<'_> {
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
         }
         let (hint, looked_at) = (Hint::Near(known.piece?), known.looked_at);
-        // A ball that holds no wall holds none where the point has moved within it.
+        // A point within a ball that contains no wall is free.
         if let TakenReading { at_mm, nearness: Nearness::Clear(ball_mm), .. } = self.cache.readings[index] {
             let left_mm = ball_mm - (x - at_mm).norm() * stretch;
             if left_mm >= limit_mm.max(radius) {
@@ -147,7 +148,7 @@ impl WallContact<'_> {
         Some(Reading::of(nearness, limit_mm))
     }
 
-    /// From the piece that is nearest through space.
+    /// Reading from the nearest piece through space.
     pub(super) fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let radius = self.points[index].potential.radius_mm;
         let stretch = self.surface.stretch();

@@ -1,10 +1,10 @@
-//! Friction of the device on the wall: of which forces it is, and what it does at a point.
+//! Friction of the device on the wall: its normal forces, and its contribution at a point.
 
 use super::{ROUNDING, WallContact};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 impl WallContact<'_> {
-    /// Has friction be of the forces of contacts at the base, unless it is held.
+    /// Renews the normal forces of friction from the contact forces at the base, unless held.
     pub(super) fn rub_with_contacts(&mut self) {
         if !self.friction.acts() {
             return;
@@ -20,32 +20,32 @@ impl WallContact<'_> {
         self.friction.follow(pressed, least_n);
     }
 
-    /// Normal forces of friction stay as they are.
+    /// Holds the normal forces of friction.
     pub fn hold_friction(&mut self) {
         self.friction.hold();
     }
 
-    /// Normal forces of friction follow those of contacts again.
+    /// Normal forces of friction follow the contact forces again.
     pub fn release_friction(&mut self) {
         self.friction.release();
     }
 
-    /// Normal forces of friction are again those with which the step began, and are held.
+    /// Resets and holds the normal forces of the start of the step.
     pub fn rewind_friction(&mut self) {
         self.friction.rewind();
     }
 
-    /// Slip begins anew at `state`, the state assembled last, with the normal forces there, which are held.
+    /// Resets slip at `state`, the state assembled last, and holds the normal forces there.
     pub fn anchor_friction(&mut self, elements: &[ElementData], state: &RodState) {
         self.friction.anchor(elements, state, self.points);
     }
 
-    /// Part by which the normal forces of friction differ from those of the state assembled last.
+    /// Relative difference of the normal forces of friction from those of the state assembled last.
     pub fn unsettled(&self) -> f64 {
         self.friction.unsettled(self.least_force_n())
     }
 
-    /// Friction of point `index` at its base.
+    /// Adds friction of point `index` at its base.
     pub(super) fn add_friction(
         &mut self,
         elements: &[ElementData],
@@ -64,7 +64,7 @@ impl WallContact<'_> {
         into.add_spin(state, &elements[e], (e, point.xi, point.set), &f.mixed, (f.turn, f.turn2));
     }
 
-    /// Energy that friction takes from point `index` on its way to a state, mJ.
+    /// Energy dissipated by friction at point `index` on its way to a state, mJ.
     pub(super) fn friction_mj(&self, elements: &[ElementData], state: &RodState, index: usize) -> f64 {
         if !self.friction.holds(index) {
             return 0.0;

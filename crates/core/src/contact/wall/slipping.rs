@@ -1,15 +1,16 @@
-//! Friction within a step of Newton's method.
+//! Friction within a Newton step.
 //!
-//! A step knows of the friction where it begins: a point that sticks there holds like a spring, however far the step takes it, and one
-//! that slips drives the step on, also where it is led back and would be held. What friction takes, μ N φ(|u|), is convex in the slip,
-//! and the slip u is linear in the step. So where a step is found anew with the contacts that it leads to ([`super::model`]), it is found
-//! with this too, in every round with the force and the stiffness at the slip that the last one led to,
+//! The linearised system contains the friction of the base: a point that sticks there acts as a spring, however far
+//! the step moves it, and one that slips drives the step on, even where it would stick or slip back. The friction
+//! energy, μ N φ(|u|), is convex in the slip, and the slip u is linear in the step. So where a step is recomputed
+//! with the contacts at its end ([`super::model`]), friction is included, in every round with the force and the
+//! stiffness at the slip of the previous round,
 //!
 //! ```text
 //! f(u) + H(u) (u′ − u),    f = μ N φ′ û,    H = ∂f/∂u
 //! ```
 //!
-//! and as far along the round as the model falls.
+//! and as far along the round as the model decreases.
 
 use nalgebra::Matrix3;
 
@@ -20,7 +21,7 @@ use crate::contact::point::ContactPoint;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
 
-/// How far a step moves a point, mm, and turns it, rad.
+/// Displacement, mm, and rotation, rad, of a point in a step.
 pub(super) type Motion = (Vec3, f64);
 
 /// A force on a point, N, and a moment, N·mm.
@@ -31,28 +32,28 @@ type Wrench = (Vec3, f64);
 pub(in crate::contact) struct Slipping {
     /// Number of the point.
     index: usize,
-    /// Its place, mm, and material angle, rad, at the base.
+    /// Its position, mm, and material angle, rad, at the base.
     base: (Vec3, f64),
-    /// What the step does to it.
+    /// Its motion in the step.
     way: Motion,
-    /// Force and moment of friction at the end of the step where they are linear: in the system, without a motion.
+    /// Linearised force and moment of friction in the system at zero motion.
     at_rest: Wrench,
     /// Their derivatives in the system.
     stiffness: (Matrix3<f64>, Vec3, f64),
-    /// What the rod's own stiffness is in balance with.
+    /// The friction that balances the rod's own stiffness.
     carried: Wrench,
 }
 
-/// What a round does to a point with friction.
+/// Motion of a point with friction in a round.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::contact) struct Slip {
-    /// Its slip where the round begins, mm.
+    /// Its slip at the start of the round, mm.
     begin_mm: Vec3,
     /// Change of its slip, mm.
     change_mm: Vec3,
-    /// Change of what is carried, by a whole round.
+    /// Change of the balanced force in a full round.
     carried: Wrench,
-    /// Work, on the way, of what is carried where it begins, and of that change, mJ.
+    /// Work of the initial balanced force, and of its change, over the motion, mJ.
     work_mj: [f64; 2],
 }
 
@@ -74,7 +75,7 @@ impl Slipping {
         plus(&self.at_rest, 1.0, &times(&self.stiffness, way))
     }
 
-    /// Changes the system to friction as it is at the end of the step.
+    /// Changes the system to the friction at the end of the step.
     fn switch(
         &mut self,
         f: &FrictionDerivatives,
@@ -94,13 +95,13 @@ impl Slipping {
     }
 }
 
-/// Stiffness of friction in a point's place and angle.
+/// Stiffness of friction in a point's position and angle.
 fn stiffness(f: &FrictionDerivatives) -> (Matrix3<f64>, Vec3, f64) {
     (f.hessian, f.mixed, f.turn2)
 }
 
 impl WallContact<'_> {
-    /// Takes note of the friction in a step from the base that answers the system as it is.
+    /// Stores the friction in a step from the base that solves the current system.
     pub(super) fn foresee_slipping(&mut self, base: &RodState, moved: &Moved<'_>) {
         let mut slipping = std::mem::take(&mut self.cache.slipping);
         if slipping.is_empty() && self.friction.acts() {
@@ -126,7 +127,7 @@ impl WallContact<'_> {
         self.cache.slipping = slipping;
     }
 
-    /// Has friction be that at the end of the step; returns at how many points that changes it.
+    /// Updates friction to the end of the step; returns at how many points it changes.
     pub(super) fn slip_on(
         &mut self,
         elements: &[ElementData],
@@ -152,7 +153,7 @@ impl WallContact<'_> {
         changed
     }
 
-    /// What a round does to the points with friction.
+    /// Computes the slips of the points with friction in a round.
     pub(super) fn slips_to(&self, moved: &Moved<'_>, slips: &mut Vec<Slip>) {
         let slip = |slipping: &Slipping, way: &Motion| {
             let (x, angle) = plus(&slipping.base, 1.0, way);
@@ -176,7 +177,7 @@ impl WallContact<'_> {
         slips.extend(self.cache.slipping.iter().map(of));
     }
 
-    /// Slope of what friction takes at a `part` of a round, less what is carried there.
+    /// Slope of the friction energy at a `part` of a round, minus the work of the balanced forces.
     pub(super) fn slipping_slope(&self, slips: &[Slip], part: f64) -> f64 {
         let each = self.cache.slipping.iter().zip(slips).map(|(slipping, slip)| {
             let there = slip.begin_mm + slip.change_mm * part;
@@ -186,7 +187,7 @@ impl WallContact<'_> {
         each.sum()
     }
 
-    /// What the rod's stiffness is in balance with after that part of the round.
+    /// Updates the balanced forces after that part of the round.
     pub(super) fn carry_slipping(&mut self, slips: &[Slip], part: f64) {
         for (slipping, slip) in self.cache.slipping.iter_mut().zip(slips) {
             slipping.carried = plus(&slipping.carried, part, &slip.carried);

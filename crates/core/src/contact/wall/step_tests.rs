@@ -1,4 +1,4 @@
-//! Steps of Newton's method on a wall: what they do to contacts and to friction.
+//! Newton steps on a wall: their effect on contacts and friction.
 
 use super::tests::{RADIUS_MM, rod, straight};
 use super::*;
@@ -7,7 +7,8 @@ use crate::rod::{Assembly, PLAIN, Supports};
 use crate::solve::contacts::falls_until;
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
-/// A wall and a force on the tip; where it is not `foreseeing`, Newton's method is told nothing of the contacts at the end of a step.
+/// A wall and a force on the tip; unless `foreseeing`, the contacts at the end of a step are hidden from Newton's
+/// method.
 struct Pushed<'a> {
     wall: WallContact<'a>,
     force_n: Vec3,
@@ -68,7 +69,7 @@ impl Contacts for Pushed<'_> {
     }
 }
 
-/// Presses the tip of a rod of 20 mm on the wall of a tube, hard as a rigid one, and lets the force turn about it.
+/// Presses the tip of a rod of 20 mm on the practically rigid wall of a tube, and rotates the force about the axis.
 fn turned(surface: &ContactSurface, foreseeing: bool) -> (NewtonReport, RodState) {
     let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
@@ -93,8 +94,8 @@ fn a_rod_slides_around_a_hard_wall_in_few_steps() {
     assert!(few <= 12 && many > few, "{few} iterations, {many} without contacts foreseen");
 }
 
-/// Pushes the tip of a rod along the wall of a tube on which it rubs, and lets the push go; returns the iterations of both, and how far the tip
-/// went and came back, mm.
+/// Pushes the tip of a rod along the wall of a tube with friction, and releases it; returns the iterations of both,
+/// and how far the tip went and came back, mm.
 fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
     let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     rod.friction = Friction::new(0.3);
@@ -113,7 +114,7 @@ fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) 
         (report.iterations, state.positions[20].y)
     };
     solve(&mut pushed, down);
-    // With normal forces that stay, iterations are those for slip alone.
+    // With held normal forces, iterations are those for slip alone.
     pushed.wall.hold_friction();
     let (there, went_mm) = solve(&mut pushed, down + Vec3::y() * 0.3);
     let (back, left_mm) = solve(&mut pushed, down);
@@ -124,10 +125,10 @@ fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) 
 fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
     let surface = straight();
     let ((few, with), (many, without)) = (rubbed(&surface, true), rubbed(&surface, false));
-    // As exactly as both know the normal forces that stay.
+    // Equal to the accuracy of the held normal forces.
     let apart = |k: usize| (with[k] - without[k]).abs() < 0.01;
     assert!(apart(0) && apart(1), "{with:?} {without:?}");
-    // It comes back to within what it sticks by, as it is held by less than it is bent.
+    // It returns to within the sticking distance, because friction is weaker than the bent rod.
     assert!(with[0] > 0.8 && with[1].abs() < 0.01, "{with:?}");
     assert!(few[0] + few[1] <= 30 && many[0] + many[1] > 2 * (few[0] + few[1]), "{few:?} {many:?}");
 }
@@ -138,7 +139,7 @@ fn a_search_ends_where_a_convex_function_falls_no_more() {
     let slope = |x: f64| x - 3.0 + 4.0 * (x - 0.2f64).max(0.0) + 40.0 * (x - 0.5f64).max(0.0);
     let part = falls_until(slope);
     assert!(slope(part).abs() < 1e-2 && (part - 23.8 / 45.0).abs() < 1e-3, "{part}");
-    // Without them it falls all the way, and where it rises from the beginning there is nothing to search.
+    // Without springs it decreases all the way; if it increases from the start there is nothing to search.
     assert_eq!(falls_until(|x| x - 3.0), 1.0);
     assert_eq!(falls_until(|x| x + 3.0), 1.0);
 }
@@ -148,7 +149,7 @@ fn a_point_is_active_by_its_depth_and_by_its_force() {
     let surface = straight();
     let mut rod = rod(&surface, 1, &[1.0], 1e4);
     let elements = rod.elements.clone();
-    // A tip off the wall by a micrometre; the tube has a radius of 2 mm.
+    // A tip a micrometre off the wall; the tube has a radius of 2 mm.
     let off = rod.at(Vec3::new(2.0 - RADIUS_MM - 1e-3, 0.0, 20.0));
     let mut contact = rod.contact();
     let mut at = |force_n: f64| {
@@ -157,10 +158,10 @@ fn a_point_is_active_by_its_depth_and_by_its_force() {
         let active = contact.cache.pressing.len();
         (active, contact.settled(1e-9), contact.cache.points[0].force_n)
     };
-    // ρ is 1 N/mm: a force of 0.1 N presses at the end of 0.1 mm.
+    // ρ is 1 N/mm: a force of 0.1 N is active up to a gap of 0.1 mm.
     assert_eq!(at(0.0), (0, true, 0.0));
     assert_eq!(at(0.5e-3).0, 0);
-    // What pulls at an equilibrium is let go.
+    // A point that pulls at an equilibrium is released.
     assert_eq!(at(2e-3), (1, false, 0.0));
     let sunk = rod.at(Vec3::new(2.0 - RADIUS_MM + 1e-3, 0.0, 20.0));
     let mut contact = rod.contact();
@@ -190,6 +191,6 @@ fn forces_go_where_the_step_leads_as_far_as_it_is_taken() {
     let (none, whole_n) = after(2.0 * sunk_mm, 1.0);
     assert!(none == 0 && (whole_n / (3.0 * sunk_mm * spring) - 1.0).abs() < 0.05, "{whole_n}");
     assert!((after(2.0 * sunk_mm, 0.5).1 / whole_n - 0.5).abs() < 1e-9);
-    // One that would pull is let go.
+    // A force that would pull is released.
     assert_eq!(after(-5.0 * sunk_mm, 1.0), (1, 0.0));
 }

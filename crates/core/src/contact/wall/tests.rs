@@ -1,4 +1,4 @@
-//! The wall's energy as Newton's method asks for it, in small pieces of vessel.
+//! The wall's energy in Newton's method, in small pieces of vessel.
 
 use std::f64::consts::PI;
 
@@ -7,8 +7,8 @@ use crate::contact::{ContactSurface, Hint, WallPotential, WallProperties};
 use crate::rod::Frame;
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
-/// A closed outline that is swept along: `place` gives the k-th of `rings` its middle, the direction of the outline's first axis and its
-/// size; the second axis is y.
+/// A closed outline swept along a line: `place` gives the k-th of `rings` its middle, the direction of the outline's
+/// first axis and its size; the second axis is y.
 pub(super) fn swept(
     outline: &[(f64, f64)],
     rings: u32,
@@ -34,7 +34,7 @@ fn sweep(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3,
     mesh
 }
 
-/// The wall as it is meshed.
+/// The wall felt as it is meshed.
 fn surface(mesh: &SurfaceMesh) -> ContactSurface {
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
     ContactSurface::new(&Wall::welded(mesh).unwrap(), (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap()
@@ -63,7 +63,7 @@ fn slit() -> ContactSurface {
 
 pub(super) const RADIUS_MM: f64 = 0.45;
 
-/// A rod in a wall, and what it knows.
+/// A rod in a wall, and its contact cache.
 pub(super) struct Rod<'a> {
     pub(super) surface: &'a ContactSurface,
     pub(super) elements: Vec<ElementData>,
@@ -72,7 +72,7 @@ pub(super) struct Rod<'a> {
     pub(super) friction: Friction,
 }
 
-/// A rod of elements of 1 mm with points at these ξ of each, which must fall.
+/// A rod of elements of 1 mm with points at these decreasing ξ of each.
 pub(super) fn rod<'a>(
     surface: &'a ContactSurface,
     elements: usize,
@@ -102,7 +102,7 @@ impl Rod<'_> {
         WallContact::new(self.surface, &self.points, &mut self.cache, &mut self.friction, 10.0)
     }
 
-    /// Straight, from a place.
+    /// Straight, from a position.
     pub(super) fn at(&self, start: Vec3) -> RodState {
         RodState::straight(&self.elements, start, Frame::new(Vec3::z(), Some(Vec3::x())))
     }
@@ -129,7 +129,7 @@ fn a_place_has_a_reading_for_each_triangle() {
     }
     let counted = contact.count();
     assert_eq!((counted.near, counted.avoided), (4, 1));
-    // What was read about one and is taken for the other is wrong.
+    // What was read from one piece must not be used for the other.
     contact.cache.readings[0].hint = Hint::Near(near);
     assert_eq!(ask(&mut contact, near), direct(far));
 }
@@ -148,7 +148,7 @@ fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
         known.side = Some(side);
         contact.read_within(0, &place(y), 1.0).distance_mm()
     };
-    // Sunk in at one side it stays with that, also behind it; across the lumen it presses on the other.
+    // Sunk in at one side it stays with that, also behind it; across the lumen it is in contact with the other.
     for (y, side) in [(0.3, near), (0.42, near), (-0.3, far), (-0.42, far)] {
         assert_eq!(ask(y, side), surface.nearness(&place(y), Hint::Side(side), 1.0).value_mm(), "{y}");
     }
@@ -162,7 +162,8 @@ fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
     }
 }
 
-/// What a point reads after a move of some hundredths of a millimetre, and what it would read if nothing were known of where it was.
+/// The reading of a point after a motion of some hundredths of a millimetre, and its reading without any knowledge of
+/// its earlier position.
 fn on_the_way(contact: &mut WallContact<'_>, from: Vec3, to: Vec3) -> [f64; 2] {
     let (triangle, _) = contact.surface.nearest_piece(&from, 5.0).unwrap();
     let radius_mm = contact.points[0].potential.radius_mm;
@@ -181,7 +182,7 @@ fn what_a_point_reads_hangs_on_where_it_is_not_on_where_it_was() {
     let mut rod = rod(&surface, 1, &[1.0], 1e3);
     rod.points[0].potential.radius_mm = 0.2;
     let mut contact = rod.contact();
-    // Over the crest what is felt changes by up to ten times the way.
+    // Over the crest the distance changes by up to ten times the motion.
     let (mut presses, mut steep) = (0, 0);
     for (k, from) in crate::contact::ridge_tests::points().enumerate() {
         let k = k as f64;

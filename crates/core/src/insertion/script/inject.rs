@@ -1,4 +1,4 @@
-//! Contrast medium that a line of a script injects: told, for those who draw; no force depends on it.
+//! Contrast medium injected by a line of a script: recorded for rendering; forces do not depend on it.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,54 +6,56 @@ use super::motion::Lengths;
 use crate::device::Stack;
 use crate::{Error, Result};
 
-/// Contrast medium through an instrument, from the moment at which the line begins on; the line's hand does not wait for its end.
+/// Injection of contrast medium through an instrument, starting with the line; the line's hand does not wait for its
+/// end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Inject {
     /// Volume, 0.1 to 100 ml.
     pub ml: f64,
-    /// How fast, 0.01 to 100 ml/s.
+    /// Rate, 0.01 to 100 ml/s.
     pub ml_per_s: f64,
     /// Name of the instrument; the line's own if absent.
     pub through: Option<String>,
 }
 
-/// An injection that has begun.
+/// An injection that has started.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Injection {
-    /// Number of the instrument that it goes through.
+    /// Index of the instrument through which it flows.
     pub instrument: usize,
     /// Volume, ml.
     pub ml: f64,
-    /// How fast, ml/s.
+    /// Rate, ml/s.
     pub ml_per_s: f64,
     /// Steps carried out before it.
     pub after_step: usize,
-    /// When, since the start of the script, s; none where the script has no speeds.
+    /// Its start, s after the start of the script; `None` if the script has no speeds.
     pub time_s: Option<f64>,
 }
 
 /// [`Inject`] with its instrument looked up.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bolus {
-    /// What messages call it.
+    /// Its name in messages.
     name: String,
     pub(super) instrument: usize,
     pub(super) ml: f64,
     pub(super) ml_per_s: f64,
 }
 
-/// Least and most of a volume, ml, and of a rate, ml/s.
+/// Smallest and largest volume, ml, and rate, ml/s.
 const ML: [f64; 2] = [0.1, 100.0];
 const ML_PER_S: [f64; 2] = [0.01, 100.0];
-/// Longest injection, s. Those of angiography take seconds, of perfusion a minute; medium is followed in hundredths of a second.
+/// Longest injection, s. Those of angiography take seconds, of perfusion a minute; the flow of medium is computed in
+/// steps of hundredths of a second.
 const LONGEST_S: f64 = 200.0;
 
 impl Bolus {
-    /// `own` is the number of the line's instrument.
+    /// `own` is the index of the line's instrument.
     ///
     /// # Errors
-    /// Values out of range; an instrument without a lumen, of several.
+    /// Values out of range; with several instruments, one without a lumen.
     pub(super) fn new(name: String, inject: &Inject, own: usize, stack: &Stack) -> Result<Self> {
         for (key, value, [least, most]) in [("ml", inject.ml, ML), ("ml_per_s", inject.ml_per_s, ML_PER_S)] {
             if !(least..=most).contains(&value) {
@@ -72,7 +74,7 @@ impl Bolus {
             None => own,
         };
         let one = &stack.instruments()[instrument];
-        // A device alone fits into nothing, and may leave its lumen to the pictures.
+        // A single device contains no other instrument, so its lumen may be given for rendering only.
         if stack.is_several() && one.device.sections().iter().any(|s| s.inner_radius_mm.is_none()) {
             let mend = "has no lumen: inject through another, or give inner_radius_mm in all of its sections";
             return Err(Error::parameter(through, format!("{:?}", one.name), mend));
@@ -80,7 +82,7 @@ impl Bolus {
         Ok(Self { name, instrument, ml: inject.ml, ml_per_s: inject.ml_per_s })
     }
 
-    /// Refuses it where its instrument is not in.
+    /// Rejects it if its instrument is not inserted.
     pub(super) fn check_in(&self, lengths: &Lengths) -> Result<()> {
         if lengths.now_mm[self.instrument] > 0.0 {
             return Ok(());

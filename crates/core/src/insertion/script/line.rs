@@ -1,4 +1,4 @@
-//! Lines of a script as they are written, and the motions that they mean.
+//! Lines of a script as written, and the corresponding motions.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,66 +10,68 @@ use crate::error::in_range;
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
 
-/// Increment of time in which hands rest, s: ten pictures a second.
+/// Time step while hands rest, s: ten images per second.
 const STEP_S: f64 = 0.1;
 /// Longest rest, s.
 const LONGEST_S: f64 = 1e6;
 
-/// One line of a script: a motion and the increments it is cut into.
+/// One line of a script: a motion, and the increments into which it is divided.
 ///
-/// `advance_mm`, `retract_mm` or `withdraw`, with or without `rotate_deg`; given together they happen together. `exchange` is two motions.
-/// `detach` stands alone: a coil is left behind. `inject` may stand alone: nothing moves then, and no time goes by. With `wait_s`, alone or beside it, hands rest and time goes by.
+/// `advance_mm`, `retract_mm` or `withdraw`, with or without `rotate_deg`, which happens at the same time. `exchange`
+/// is two motions. `detach` stands alone: it detaches a coil. `inject` may stand alone: then nothing moves, and no
+/// time passes. With `wait_s`, alone or beside it, hands rest and time passes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScriptLine {
-    /// Name of the instrument that moves; a device alone need not be named.
+    /// Name of the instrument that moves; optional for a single device.
     pub instrument: Option<String>,
     /// Length to push in, mm.
     pub advance_mm: Option<f64>,
     /// Length to pull back, mm.
     pub retract_mm: Option<f64>,
-    /// Whether all that is in is pulled back.
+    /// Whether the whole inserted length is pulled back.
     pub withdraw: bool,
-    /// Turn of the tail, degrees, of either sign.
+    /// Rotation of the tail, degrees, of either sign.
     pub rotate_deg: Option<f64>,
     /// Largest increment of length, mm; 1 if absent.
     pub step_mm: Option<f64>,
-    /// Largest increment of turn, degrees; 5 if absent.
+    /// Largest increment of rotation, degrees; 5 if absent.
     pub step_deg: Option<f64>,
-    /// Name of the instrument that takes the place of this one, which is withdrawn first: over a catheter that stays. It goes in by
-    /// `advance_mm`, or as far as this one was.
+    /// Name of the instrument that replaces this one, which is withdrawn first, over a catheter that stays. It is
+    /// inserted by `advance_mm`, or as far as this one was.
     pub exchange: Option<String>,
-    /// Speed of pushing and pulling, mm/s; where it is given steps have times.
+    /// Speed of pushing and pulling, mm/s; with speeds, steps have times.
     pub speed_mm_per_s: Option<f64>,
-    /// Speed of turning, degrees/s.
+    /// Speed of rotation, degrees/s.
     pub speed_deg_per_s: Option<f64>,
-    /// What ends the line before it has gone all of its way, which is the most that it goes then.
+    /// Condition that ends the line early; its full motion is then the maximum.
     pub until: Option<Until>,
-    /// Time in which the hands rest, s; what else moves goes on.
+    /// Time for which the hands rest, s; other motion continues.
     pub wait_s: Option<f64>,
     /// Largest increment of that time, s; 0.1 if absent.
     pub step_s: Option<f64>,
-    /// Linear solves of each step, which is a tick then ([`Simulation::tick`](crate::insertion::Simulation::tick)): what the device has not followed in it
-    /// goes on in the next.
+    /// Linear solves per step, which is then a tick ([`Simulation::tick`](crate::insertion::Simulation::tick)):
+    /// motion that the device has not followed is left to the next.
     pub solves: Option<usize>,
-    /// Whether the coil of the instrument, which is out, is left behind; its pusher is taken out.
+    /// Whether the coil of the instrument, which must be out, is detached; its pusher is withdrawn.
     pub detach: bool,
-    /// Contrast medium that is injected from the start of the line on.
+    /// Contrast medium injected from the start of the line.
     pub inject: Option<Inject>,
-    /// Lines of other instruments, which move at the same time; increments are as many as the one that needs most of them has.
+    /// Lines of other instruments, which move at the same time; the number of increments is the largest that any of
+    /// them needs.
     pub with: Vec<ScriptLine>,
 }
 
 impl ScriptLine {
-    /// Whether it ends at a target of the vessel's centre line.
+    /// Whether its condition refers to a target of the vessel's centre line.
     pub(crate) fn has_target(&self) -> bool {
         self.until.as_ref().is_some_and(|until| until.target.is_some())
     }
 
-    /// The motions that the line means, one after another; `name` is what messages call it.
+    /// The motions of the line, one after another; `name` is its name in messages.
     ///
     /// # Errors
-    /// Names the key of what is not finite, contradictory or not there.
+    /// Names the key of a value that is not finite, contradictory or unknown.
     pub(super) fn motions(
         &self,
         name: &str,
@@ -121,7 +123,7 @@ impl ScriptLine {
             let name = name.to_owned();
             return Ok(vec![Motion { parts, until, inject, solves, ..Motion::resting(name) }]);
         };
-        // The line's own part is that of the instrument which comes in: its keys are those of the way in.
+        // The line's own motion is that of the incoming instrument: its keys apply to the insertion.
         let key = format!("{name}.exchange");
         let instrument = find(stack, other, &key)?;
         if parts.len() > 1 || instrument == lead {
@@ -144,7 +146,7 @@ impl ScriptLine {
         ])
     }
 
-    /// The step that leaves a coil behind.
+    /// The step that detaches a coil.
     fn detachment(&self, name: &str, stack: &Stack) -> Result<Motion> {
         let alone = Self { instrument: self.instrument.clone(), detach: true, ..Self::default() };
         if *self != alone {
@@ -163,19 +165,19 @@ impl ScriptLine {
         Ok(Motion { detach: Some(instrument), ..Motion::resting(name.to_owned()) })
     }
 
-    /// Whether nothing moves in it.
+    /// Whether it only injects.
     fn only_injects(&self) -> bool {
         self.inject.is_some() && self.rests()
     }
 
-    /// Whether it says nothing of a motion.
+    /// Whether it specifies no motion.
     fn rests(&self) -> bool {
         let lengths = self.advance_mm.is_some() || self.retract_mm.is_some() || self.withdraw;
         let moves = lengths || self.rotate_deg.is_some() || self.exchange.is_some();
         !moves && self.until.is_none() && self.with.is_empty()
     }
 
-    /// How long hands rest in it, if they do.
+    /// The time for which hands rest in it, if they do.
     fn wait(&self, name: &str) -> Result<Option<Wait>> {
         let Some(wait_s) = self.wait_s else {
             return match self.step_s {
@@ -197,7 +199,7 @@ impl ScriptLine {
         Ok(Some(Wait { wait_s, step_s }))
     }
 
-    /// What the hand of this line's instrument does.
+    /// The motion of this line's instrument.
     fn part(&self, name: String, stack: &Stack) -> Result<Part> {
         for (field, value) in [("advance_mm", self.advance_mm), ("retract_mm", self.retract_mm)] {
             if let Some(v) = value.filter(|v| !(v.is_finite() && *v >= 0.0)) {
@@ -230,7 +232,7 @@ impl ScriptLine {
         })
     }
 
-    /// How far it goes.
+    /// Its motion along the device.
     fn travel(&self, name: &str) -> Result<Travel> {
         match (self.advance_mm, self.retract_mm, self.withdraw) {
             (Some(a), Some(_), _) => {
@@ -255,7 +257,7 @@ impl ScriptLine {
         }
     }
 
-    /// Number of the instrument.
+    /// Index of the instrument.
     fn number(&self, name: &str, stack: &Stack) -> Result<usize> {
         match &self.instrument {
             Some(instrument) => find(stack, instrument, &format!("{name}.instrument")),
@@ -268,7 +270,7 @@ impl ScriptLine {
         }
     }
 
-    /// This line and those with it, each with its name in messages.
+    /// This line and its `with` lines, each with its name in messages.
     fn together(&self, name: &str) -> Result<Vec<(String, &Self)>> {
         let mut lines = vec![(name.to_owned(), self)];
         for (index, line) in self.with.iter().enumerate() {
@@ -298,7 +300,7 @@ impl ScriptLine {
     }
 }
 
-/// Number of an instrument that a key names.
+/// Index of the instrument that a key names.
 pub(super) fn find(stack: &Stack, instrument: &str, key: &str) -> Result<usize> {
     stack.find(instrument).map_err(|error| match error {
         Error::Parameter { value, mend, .. } => Error::Parameter { name: key.to_owned(), value, mend },

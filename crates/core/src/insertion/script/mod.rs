@@ -1,8 +1,8 @@
-//! Scripts: lines of motion that are cut into steps.
+//! Scripts: lines of motion that are divided into steps.
 //!
-//! Where a line ends is known beforehand unless it has a condition ([`Until`]). So a script is carried out step by step ([`ScriptRun`]):
-//! what it has come to is told by the steps of each line begun ([`ScriptCourse`]), and from those and the script alone all moves so far, and
-//! lengths and times, are had again to the bit.
+//! The end of a line is known in advance unless it has a condition ([`Until`]). So a script is carried out step by
+//! step ([`ScriptRun`]): its progress is the number of steps of each line begun ([`ScriptCourse`]), from which, with
+//! the script, all moves so far, lengths and times can be reconstructed to the bit.
 
 mod inject;
 mod line;
@@ -24,27 +24,27 @@ use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
 use motion::{Lengths, Motion, Part, STEP_LIMIT, Steps, Travel};
 
-/// What hands do, one motion after another.
+/// Motions of hands, one after another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Script {
     motions: Vec<Motion>,
-    /// What is in of each instrument at the start, mm.
+    /// Initial inserted length of each instrument, mm.
     start_mm: Vec<f64>,
-    /// Steps if no condition is met.
+    /// Number of steps if no condition is met.
     most_steps: usize,
 }
 
 impl Script {
-    /// The script of these lines, checked before the first step as far as it is known by then; `inserted_mm` is what is in of each
-    /// instrument at the start, and targets are those of `centreline`.
+    /// The script of these lines, checked as far as possible before the first step; `inserted_mm` are the initial
+    /// inserted lengths of the instruments, and targets are those of `centreline`.
     ///
-    /// Lengths after a line with a condition are known within bounds, and what is beyond the ends of an instrument for all of them is refused
-    /// too; what is left is found when its step is carried out.
+    /// After a line with a condition, lengths are known within bounds; a motion beyond the ends of an instrument for
+    /// all of them is rejected here, others when the step is carried out.
     ///
     /// # Errors
-    /// Names the line and key of what is not finite, contradictory or absurd, moves an instrument beyond its ends, or leads to where
-    /// instruments cannot be together; targets and instruments that are not there, with the nearest name; speeds in some lines and not in
-    /// others.
+    /// Names the line and key of a value that is not finite, contradictory or absurd, moves an instrument beyond its
+    /// ends, or leads to impossible combinations of lengths; targets and instruments that do not exist, with the most
+    /// similar name; speeds in some lines only.
     pub fn new(
         lines: &[ScriptLine],
         stack: &Stack,
@@ -67,7 +67,7 @@ impl Script {
         Ok(script)
     }
 
-    /// Number of steps; of a script with conditions that if none of them is met.
+    /// Number of steps; with conditions, if none of them is met.
     pub fn len(&self) -> usize {
         self.most_steps
     }
@@ -82,15 +82,16 @@ impl Script {
         self.motions.iter().any(Motion::is_timed)
     }
 
-    /// The first line with a condition, as messages call it; none where all steps are known beforehand.
+    /// The name in messages of the first line with a condition; `None` if all steps are known in advance.
     pub fn conditional(&self) -> Option<&str> {
         self.motions.iter().find(|motion| motion.until.is_some()).map(|motion| motion.name.as_str())
     }
 
-    /// The moves of all steps, where they are known beforehand.
+    /// The moves of all steps, if they are known in advance.
     ///
     /// # Errors
-    /// A line with a condition: where it ends is known only when it is carried out. One that leaves a coil behind, or has ticks for steps.
+    /// A line with a condition, whose end is known only when it is carried out; one that detaches a coil, or whose
+    /// steps are ticks.
     pub fn moves(&self) -> Result<Vec<Vec<Move>>> {
         if let Some(line) = self.conditional() {
             let mend = "where the line ends is not known beforehand: carry the script out step by step";
@@ -131,11 +132,11 @@ impl Script {
     }
 }
 
-/// What is known beforehand of lengths, mm.
+/// Bounds of lengths known in advance, mm.
 struct Bounds {
     low: Lengths,
     high: Lengths,
-    /// The instruments whose coils were left behind.
+    /// The instruments whose coils are detached.
     detached: Vec<bool>,
 }
 
@@ -145,7 +146,7 @@ impl Bounds {
         Self { low: lengths.clone(), high: lengths, detached: vec![false; inserted_mm.len()] }
     }
 
-    /// Leaves a coil behind: once, and nothing of it goes in again.
+    /// Detaches a coil: only once, and it cannot be inserted again.
     fn detach(&mut self, motion: &Motion, instrument: usize, stack: &Stack) -> Result<usize> {
         let one = &stack.instruments()[instrument];
         let refused = |mend: String| {
@@ -154,9 +155,9 @@ impl Bounds {
         if std::mem::replace(&mut self.detached[instrument], true) {
             return refused("is detached already: push the next coil".into());
         }
-        let (high_mm, coil_mm) = (self.high.now_mm[instrument], one.device.coil_mm());
-        if high_mm < coil_mm {
-            return refused(format!("{high_mm} of {coil_mm} mm of the coil are in: advance it before"));
+        let left_mm = stack.out_mm(instrument, &self.low.now_mm) - self.high.now_mm[instrument];
+        if left_mm > LENGTH_SLACK_MM {
+            return refused(format!("is not out by then: advance it by {left_mm:.3} mm more before"));
         }
         for lengths in [&mut self.low, &mut self.high] {
             lengths.before_mm.clone_from(&lengths.now_mm);
@@ -165,7 +166,7 @@ impl Bounds {
         Ok(1)
     }
 
-    /// Goes through a motion; the number of its steps at most.
+    /// Applies a motion; returns its largest number of steps.
     fn go(&mut self, motion: &Motion, stack: &Stack) -> Result<usize> {
         if let Some(part) = motion.parts.iter().find(|part| self.detached[part.instrument]) {
             let name = &stack.instruments()[part.instrument].name;
@@ -214,17 +215,17 @@ impl Bounds {
 }
 
 impl Part {
-    /// What is in when it is done, mm.
+    /// Inserted length at its end, mm.
     fn end_mm(&self, lengths: &Lengths) -> f64 {
         match self.travel {
-            // Not by a difference, of which rounding would be left.
+            // Exactly zero, not a difference with rounding.
             Travel::Out => 0.0,
             _ => lengths.now_mm[self.instrument] + self.travel_mm(lengths),
         }
     }
 }
 
-/// Refuses a motion that ends beyond an end of its instrument wherever between these lengths it does.
+/// Rejects a motion that ends beyond an end of its instrument for all initial lengths within these bounds.
 fn check_ends(part: &Part, [low_mm, high_mm]: [f64; 2], device_mm: f64) -> Result<()> {
     let Travel::By(mm) = part.travel else { return Ok(()) };
     if low_mm > device_mm + LENGTH_SLACK_MM {
@@ -241,7 +242,7 @@ fn check_ends(part: &Part, [low_mm, high_mm]: [f64; 2], device_mm: f64) -> Resul
     Ok(())
 }
 
-/// Adds a step to what is in, if it can be carried out.
+/// Adds a step to the inserted lengths, if it can be carried out.
 fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, step: usize) -> Result<()> {
     for (one, part) in steps.moves.iter().zip(&motion.parts) {
         let device = &stack.instruments()[one.instrument].device;
@@ -249,7 +250,7 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
         check_command(one.command, *inserted, device.length_mm()).map_err(|error| match error {
             Error::Parameter { name: key, mend, .. } => {
                 let (key, value) = match part.travel {
-                    // Without the last digits of a change of units.
+                    // Rounded, to hide the error of unit conversion.
                     _ if key == "rotate_rad" => {
                         ("rotate_deg", (part.turn_rad.to_degrees() * 1e6).round() / 1e6)
                     }
@@ -270,10 +271,10 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
     })
 }
 
-/// The commands of a script of a device alone, checked before the first is carried out.
+/// The commands of a script of a single device, checked before the first is carried out.
 ///
 /// # Errors
-/// As [`Script::new`], and a line with a condition: where it ends is known only when it is carried out.
+/// As [`Script::new`], and a line with a condition, whose end is known only when it is carried out.
 pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Command>> {
     let moves = Script::new(script, &Stack::from(device.clone()), &[0.0], None)?.moves()?;
     Ok(moves.into_iter().flatten().map(|one| one.command).collect())

@@ -1,4 +1,4 @@
-//! A motion of one or several hands at the same time, and the steps it is cut into.
+//! A simultaneous motion of hands, and the steps into which it is divided.
 
 use super::inject::Bolus;
 use super::until::Condition;
@@ -6,24 +6,24 @@ use crate::device::LENGTH_SLACK_MM;
 use crate::insertion::{Command, Move};
 use crate::{Error, Result};
 
-/// Most steps of one script: at one kilohertz, over 2 hours of manipulation.
+/// Largest number of steps of a script: at one kilohertz, over 2 hours of manipulation.
 pub(super) const STEP_LIMIT: f64 = 1e7;
 
-/// How far a hand goes.
+/// The motion of a hand along the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Travel {
-    /// By so much, mm; negative pulls back.
+    /// By this length, mm; negative pulls back.
     By(f64),
-    /// Back by all that is in.
+    /// Back by the whole inserted length.
     Out,
-    /// In as far as this instrument was before the motion before.
+    /// In, as far as this instrument was before the previous motion.
     AsFarAs(usize),
 }
 
-/// What one hand does.
+/// The motion of one hand.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Part {
-    /// What messages call its line.
+    /// Its line's name in messages.
     pub(super) name: String,
     pub(super) instrument: usize,
     pub(super) travel: Travel,
@@ -34,7 +34,7 @@ pub(super) struct Part {
     pub(super) speed_deg_per_s: Option<f64>,
 }
 
-/// Time in which hands rest.
+/// Time for which hands rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Wait {
     pub(super) wait_s: f64,
@@ -42,27 +42,27 @@ pub(super) struct Wait {
     pub(super) step_s: f64,
 }
 
-/// What hands do at the same time.
+/// Simultaneous motions of hands.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
-    /// What messages call its line.
+    /// Its line's name in messages.
     pub(super) name: String,
-    /// The line's own instrument first; none where hands rest, which takes no step unless they wait.
+    /// The line's own instrument first; empty while hands rest, which takes no step unless they wait.
     pub(super) parts: Vec<Part>,
-    /// How long hands rest; then there are no parts.
+    /// Time for which hands rest; then there are no parts.
     pub(super) wait: Option<Wait>,
     pub(super) until: Option<Condition>,
-    /// What is injected as it begins.
+    /// Injection at its start.
     pub(super) inject: Option<Bolus>,
-    /// The instrument that comes in by the next motion, where one leaves for it.
+    /// The instrument inserted by the next motion, if this one is withdrawn for it.
     pub(super) exchange: Option<Incoming>,
-    /// The instrument whose coil is left behind; then it is one step, and there are no parts.
+    /// The instrument whose coil is detached, in a single step without parts.
     pub(super) detach: Option<usize>,
-    /// Linear solves of each step, where it is a tick.
+    /// Linear solves per step, if it is a tick.
     pub(super) solves: Option<usize>,
 }
 
-/// An instrument that takes the place of another.
+/// An instrument that replaces another.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Incoming {
     /// The key that names it.
@@ -72,7 +72,7 @@ pub(super) struct Incoming {
 }
 
 impl Incoming {
-    /// Refuses it where it is in.
+    /// Rejects it if it is already inserted.
     pub(super) fn check_out(&self, lengths: &Lengths) -> Result<()> {
         let now_mm = lengths.now_mm[self.instrument];
         if now_mm <= LENGTH_SLACK_MM {
@@ -84,27 +84,27 @@ impl Incoming {
     }
 }
 
-/// A motion cut into equal steps.
+/// A motion divided into equal steps.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Steps {
-    /// The moves of each.
+    /// The moves of each step.
     pub(super) moves: Vec<Move>,
-    /// How many there are.
+    /// Number of steps.
     pub(super) count: usize,
-    /// How long each takes, s; 0 where no speed is given.
+    /// Duration of each step, s; 0 without a speed.
     pub(super) step_s: f64,
 }
 
-/// Lengths in of all instruments, mm: at the start of a motion, and at that of the one before.
+/// Inserted lengths of all instruments, mm: at the start of a motion, and of the one before.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Lengths {
     pub(super) now_mm: Vec<f64>,
     pub(super) before_mm: Vec<f64>,
 }
 
-/// Number of equal increments of a way of so many, of a line of this name.
+/// Number of equal increments, rounded up from `steps`, for a line of this name.
 fn increments(name: &str, steps: f64) -> Result<usize> {
-    // The tolerance keeps 0.3 mm in steps of 0.1 mm at three increments, not four.
+    // The tolerance makes 0.3 mm in steps of 0.1 mm three increments, not four.
     let count = (steps - 1e-9).ceil().max(1.0);
     if count > STEP_LIMIT {
         let steps = format!("{} steps", crate::error::number(count));
@@ -115,7 +115,7 @@ fn increments(name: &str, steps: f64) -> Result<usize> {
 }
 
 impl Part {
-    /// How far it goes from there, mm.
+    /// Signed motion along the device from there, mm.
     pub(super) fn travel_mm(&self, lengths: &Lengths) -> f64 {
         match self.travel {
             Travel::By(mm) => mm,
@@ -133,7 +133,7 @@ impl Part {
         increments(&self.name, count)
     }
 
-    /// How long it takes, s.
+    /// Its duration, s.
     fn duration_s(&self, mm: f64) -> f64 {
         let length_s = self.speed_mm_per_s.map_or(0.0, |speed| mm.abs() / speed);
         length_s.max(self.speed_deg_per_s.map_or(0.0, |speed| self.turn_rad.to_degrees().abs() / speed))
@@ -141,7 +141,7 @@ impl Part {
 }
 
 impl Motion {
-    /// One in which nothing is done.
+    /// A motion of nothing.
     pub(super) fn resting(name: String) -> Self {
         Self {
             name,
@@ -155,13 +155,13 @@ impl Motion {
         }
     }
 
-    /// Whether it takes time that is known.
+    /// Whether its duration is known.
     pub(super) fn is_timed(&self) -> bool {
         let has_speed = |part: &Part| part.speed_mm_per_s.is_some() || part.speed_deg_per_s.is_some();
         self.wait.is_some() || self.parts.iter().any(has_speed)
     }
 
-    /// The steps of the whole motion from there.
+    /// The steps of the whole motion from these lengths.
     ///
     /// # Errors
     /// More steps than a script may have.

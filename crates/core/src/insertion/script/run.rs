@@ -1,4 +1,4 @@
-//! A script that is carried out.
+//! Execution of a script.
 
 use std::borrow::Cow;
 
@@ -10,44 +10,44 @@ use super::{Injection, Met, Script};
 use crate::insertion::{Move, Simulation, StepReport};
 use crate::{Error, Result};
 
-/// What a script has come to: all that is needed, beside the script, to go on.
+/// Progress of a script: together with the script, all that is needed to continue.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ScriptCourse {
-    /// The motions begun so far, in their order; an exchange is two.
+    /// The motions begun so far, in order; an exchange is two.
     pub motions: Vec<LineCourse>,
 }
 
-/// What a motion of a script has come to.
+/// Progress of a motion of a script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LineCourse {
     /// Steps carried out.
     pub steps: usize,
-    /// What of its condition has ended it.
+    /// The part of its condition that has ended it.
     pub met: Option<Met>,
 }
 
 /// A step of a script.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step<'a> {
-    /// What moves.
+    /// The moves.
     pub moves: Cow<'a, [Move]>,
-    /// The instrument whose coil is left behind; then nothing moves.
+    /// The instrument whose coil is detached; then nothing moves.
     pub detach: Option<usize>,
-    /// Linear solves, where it is a tick.
+    /// Linear solves, if it is a tick.
     pub solves: Option<usize>,
-    /// Time at its end since the start of the script, s; none where the script has no speeds.
+    /// Time at its end since the start of the script, s; `None` if the script has no speeds.
     pub time_s: Option<f64>,
-    /// How long it takes, s; 0 where the script has no speeds.
+    /// Its duration, s; 0 if the script has no speeds.
     pub duration_s: f64,
 }
 
-/// A script that is carried out step by step.
+/// A script in execution, step by step.
 #[derive(Debug, Clone)]
 pub struct ScriptRun<'a> {
     script: Cow<'a, Script>,
     course: ScriptCourse,
     lengths: Lengths,
-    /// Of the motion that goes on.
+    /// Steps of the current motion.
     steps: Option<Steps>,
     time_s: f64,
     /// Steps carried out.
@@ -56,12 +56,13 @@ pub struct ScriptRun<'a> {
 }
 
 impl Step<'_> {
-    /// The same on its own.
+    /// The step with owned moves.
     pub fn into_owned(self) -> Step<'static> {
         Step { moves: Cow::Owned(self.moves.into_owned()), ..self }
     }
 
-    /// Carries it out. In a tick the wall may stop hands that earlier ones have moved: that is what the tick has come to, and no failure.
+    /// Carries it out. In a tick the wall may stop hands that earlier ones have moved: that is a result of the tick,
+    /// not a failure.
     ///
     /// # Errors
     /// As [`Simulation::step_until`], [`Simulation::tick`] and [`Simulation::detach`].
@@ -81,20 +82,20 @@ impl Step<'_> {
 }
 
 impl Script {
-    /// The script at its start.
+    /// Starts the script.
     pub fn begin(&self) -> ScriptRun<'_> {
         ScriptRun::of(Cow::Borrowed(self))
     }
 
-    /// The script at its start, which the run takes along.
+    /// Starts the script, which the run then owns.
     pub fn into_run(self) -> ScriptRun<'static> {
         ScriptRun::of(Cow::Owned(self))
     }
 
-    /// The script where it has come to; `seen` is given each step so far.
+    /// Continues the script from its progress; `seen` is called with each step so far.
     ///
     /// # Errors
-    /// A course that this script cannot have taken.
+    /// Progress that is impossible for this script.
     pub fn go_on(&self, course: &ScriptCourse, mut seen: impl FnMut(Step<'_>)) -> Result<ScriptRun<'_>> {
         let mut run = self.begin();
         for (index, line) in course.motions.iter().enumerate() {
@@ -109,11 +110,12 @@ impl Script {
                 }
                 run.carried_out();
             }
-            // One that has ended without a step, by its condition, has not been begun yet.
+            // A line ended by its condition without a step has not been started yet.
             if line.steps == 0 && run.course.motions.len() <= index && !run.begin_motion()? {
                 return Err(other("none".to_owned()));
             }
-            // Without a condition a line ends where all of it is done: a later script may have a longer one.
+            // Without a condition a line ends when it is complete: a later version of the script may have a longer
+            // one.
             if line.met.is_some() {
                 run.end_motion(line.met);
             }
@@ -136,7 +138,7 @@ impl<'a> ScriptRun<'a> {
         }
     }
 
-    /// The next step; none at the end of the script. Conditions are looked at in `simulation`.
+    /// The next step; `None` at the end of the script. Conditions are evaluated in `simulation`.
     ///
     /// # Errors
     /// More steps than a script may have.
@@ -144,7 +146,7 @@ impl<'a> ScriptRun<'a> {
         self.next_where(|condition| condition.met(simulation))
     }
 
-    /// The next step, with conditions looked at by `met`.
+    /// The next step, with conditions evaluated by `met`.
     pub(super) fn next_where(&mut self, met: impl Fn(&Condition) -> Option<Met>) -> Result<Option<Step<'_>>> {
         loop {
             if self.steps.is_none() && !self.begin_motion()? {
@@ -170,7 +172,7 @@ impl<'a> ScriptRun<'a> {
         }))
     }
 
-    /// Says that the step that was told last has been carried out.
+    /// Reports that the last step returned has been carried out.
     pub fn carried_out(&mut self) {
         let (Some(steps), Some(line)) = (&self.steps, self.course.motions.last_mut()) else { return };
         line.steps += 1;
@@ -189,25 +191,26 @@ impl<'a> ScriptRun<'a> {
         self.steps.is_none() && self.course.motions.len() >= self.script.motions.len()
     }
 
-    /// The injections that have begun, the next step's included where it is the first of its line.
+    /// The injections that have started, including that of the next step if it is the first of its line.
     pub fn injections(&self) -> &[Injection] {
         &self.injections
     }
 
-    /// What the script has come to.
+    /// Progress of the script.
     pub fn course(&self) -> &ScriptCourse {
         &self.course
     }
 
-    /// The conditions that have been looked at and have decided what was done: those of motions that have steps or have been ended, by the
-    /// numbers of these.
+    /// The conditions evaluated so far that have affected the run, with the indices of their motions: those of
+    /// motions that have steps or have been ended.
     pub fn decided(&self) -> impl Iterator<Item = (usize, &Condition)> {
         let begun = self.script.motions.iter().zip(&self.course.motions).enumerate();
         let decided = begun.filter(|(_, (_, line))| line.steps > 0 || line.met.is_some());
         decided.filter_map(|(index, (motion, _))| Some((index, motion.until.as_ref()?)))
     }
 
-    /// Lines with a condition that have ended: how messages call each, what it has come to, and the step of the script after which it ended.
+    /// Lines with a condition that have ended: the name of each in messages, its progress, and the step of the script
+    /// after which it ended.
     pub fn conditions(&self) -> impl Iterator<Item = (&str, LineCourse, usize)> {
         let steps = self.course.motions.iter().scan(0, |steps, line| {
             *steps += line.steps;
@@ -219,7 +222,7 @@ impl<'a> ScriptRun<'a> {
         ended.map(|((motion, line), after)| (motion.name.as_str(), *line, after))
     }
 
-    /// Begins the next motion; whether there is one.
+    /// Starts the next motion; returns whether there is one.
     fn begin_motion(&mut self) -> Result<bool> {
         let Some(motion) = self.script.motions.get(self.course.motions.len()) else { return Ok(false) };
         if let Some(incoming) = &motion.exchange {

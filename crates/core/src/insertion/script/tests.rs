@@ -1,4 +1,4 @@
-//! Scripts: what is refused, and what they are cut into.
+//! Scripts: invalid ones, and their division into steps.
 
 use super::*;
 use crate::device::{Instrument, Section};
@@ -50,7 +50,7 @@ fn a_bad_line_is_named_with_its_key() {
     }
 }
 
-/// The moves of every step, where no condition is met.
+/// The moves of every step if no condition is met.
 fn steps(script: &Script) -> Vec<Vec<Move>> {
     let (mut run, mut steps) = (script.begin(), Vec::new());
     while let Some(step) = run.next_where(|_| None).unwrap() {
@@ -175,11 +175,11 @@ fn a_wire_is_exchanged_for_one_that_is_out() {
     let told = "script[0].exchange = \"catheter\": 10.000 mm of it are in already: withdraw it before";
     let error = Script::new(std::slice::from_ref(&exchange), &stack(), &[30.0, 0.0, 10.0], None).unwrap_err();
     assert!(error.to_string().starts_with(told), "{error}");
-    // Pulled back to where rounding is left of it.
+    // Pulled back to the level of rounding.
     let back = ScriptLine { retract_mm: Some(0.3), step_mm: Some(0.1), ..line("catheter") };
     let lines = [back.clone(), back.clone(), back, exchange.clone()];
     assert!(Script::new(&lines, &stack(), &[30.0, 0.0, 0.9], None).is_ok());
-    // Where a condition decides it is told where the line begins.
+    // After a condition this is reported when the line starts.
     let until = Some(Until { push_force_n: Some(0.5), ..Until::default() });
     let first = ScriptLine { advance_mm: Some(10.0), until, ..line("catheter") };
     let script = Script::new(&[first, exchange], &stack(), &[30.0, 0.0, 0.0], None).unwrap();
@@ -332,7 +332,7 @@ fn a_script_goes_on_from_its_course_in_the_middle_of_a_line_with_a_condition() {
     let lines = [ScriptLine { until: Some(force), ..advance(40.0, 0.3) }, back, advance(10.0, 0.7)];
     let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
     let script = Script::new(&lines, &stack, &[0.0], None).unwrap();
-    // The condition is met after so many steps.
+    // The condition is met after this number of steps.
     for met_after in [0, 1, 50, 134] {
         let (mut run, mut seen, mut k) = (script.begin(), Vec::new(), 0);
         while let Some(step) = run.next_where(|_| (k >= met_after).then_some(Met::PushForceN)).unwrap() {
@@ -424,7 +424,7 @@ fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_lin
     let lines = [go(inject(1.0, 1.0, Some("catheter")))];
     let out = Script::new(&lines, &stack(), &[9.0, 0.0, 0.0], None).unwrap_err().to_string();
     assert!(out.starts_with("script[0].inject = 1 ml: the instrument is not in"), "{out}");
-    // Whether it is in hangs on where the line before ends.
+    // Whether it is inserted depends on where the previous line ends.
     let force = Until { push_force_n: Some(0.5), ..Until::default() };
     let first = ScriptLine { advance_mm: Some(4.0), until: Some(force), ..line("catheter") };
     let lines = [first, lines[0].clone()];
@@ -469,7 +469,7 @@ fn a_coil_is_detached_by_a_line_of_its_own_and_the_next_one_follows() {
     for (lines, expected) in [
         (&[by("framing", 26.0), detach("framing"), detach("framing")][..], "script[2].detach = \"framing\""),
         (&[by("framing", 26.0), detach("framing"), by("framing", 1.0)], "script[2].instrument = \"framing\""),
-        (&[by("framing", 10.0), detach("framing")], "10 of 20 mm of the coil are in"),
+        (&[by("framing", 10.0), detach("framing")], "is not out by then: advance it by 15.400 mm more"),
         (&[detach("catheter")], "is no coil"),
         (&[by("framing", 26.0), by("filling", 1.0)], "has no lumen"),
         (&[ScriptLine { detach: true, ..by("framing", 26.0) }], "stands alone"),

@@ -1,4 +1,4 @@
-//! What ends a line of a script before it has gone all of its way.
+//! Conditions that end a line of a script early.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,45 +7,45 @@ use crate::insertion::Simulation;
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result, Vec3};
 
-/// Ends a line as soon as one of these is so; looked at before each of its steps, and after the last.
+/// Ends a line as soon as one of these holds; evaluated before each of its steps, and after the last.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Until {
-    /// The tip of the line's instrument is so near to the target, mm.
+    /// Distance of the instrument's tip from the target, mm, or less.
     pub tip_within_mm: Option<f64>,
     /// Name of a point of the vessel's centre line.
     pub target: Option<String>,
-    /// The hand of the line's instrument must push with so much, N.
+    /// Push force of the hand of the line's instrument, N, or more.
     pub push_force_n: Option<f64>,
 }
 
-/// What has ended a line.
+/// The condition that has ended a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Met {
-    /// The tip is near to the target.
+    /// The tip is near the target.
     TipWithinMm,
-    /// The hand pushes as hard as was said.
+    /// The push force has been reached.
     PushForceN,
 }
 
 /// [`Until`] with its target looked up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Condition {
-    /// The instrument that is looked at.
+    /// The instrument to which it refers.
     pub instrument: usize,
     /// Target and distance, mm.
     pub near: Option<(Vec3, f64)>,
-    /// The least push, N.
+    /// The smallest push force, N.
     pub push_force_n: Option<f64>,
 }
 
-/// Largest distance, mm, and force, N, that can be meant.
+/// Largest distance, mm, and force, N, accepted.
 const LARGEST: f64 = 1e6;
 
 impl Condition {
     /// # Errors
-    /// Values out of range, a distance without a target or the other way round, a target that the vessel does not name.
+    /// Values out of range, a distance without a target or vice versa, an unknown target.
     pub(super) fn new(
         name: &str,
         until: &Until,
@@ -75,11 +75,11 @@ impl Condition {
         Ok(Self { instrument, near, push_force_n: until.push_force_n })
     }
 
-    /// What of it is so, if anything is.
+    /// The part of it that holds, if any.
     pub(super) fn met(&self, simulation: &Simulation) -> Option<Met> {
         let report = simulation.report();
         let tip = || simulation.tip_of_mm(self.instrument);
-        // A target goes with the vessel.
+        // A target moves with the vessel.
         let now = |target: Vec3| {
             simulation.displacement().map_or(target, |displacement| displacement.place(&target))
         };
@@ -95,7 +95,7 @@ impl Condition {
     }
 }
 
-/// Where a target is.
+/// Position of a target.
 fn place(key: &str, target: &str, centreline: Option<&CentrelineTree>) -> Result<Vec3> {
     let Some(tree) = centreline else {
         let mend = "is a name of the vessel's centre line, and none is given";

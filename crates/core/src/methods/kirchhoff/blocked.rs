@@ -1,8 +1,8 @@
-//! Where a vessel is narrower than the device that is pushed into it.
+//! Detects a vessel narrower than the device that is pushed into it.
 //!
-//! A device is blocked where no sphere of its radius passes on from its front (`contact/passage.rs`). Anything else that finds no
-//! equilibrium is a computation that failed, and says so. A wall that yields lets a device through a vessel somewhat narrower than
-//! itself, and then there is nothing to tell.
+//! A device is blocked if no sphere of its radius can pass ahead of its front (`contact/passage.rs`). Any other
+//! missing equilibrium is reported as a failed computation. A yielding wall lets a device through a vessel somewhat
+//! narrower than itself; this is not an error.
 
 use super::Environment;
 use super::configuration::Start;
@@ -14,16 +14,15 @@ use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// A device is wedged that has sunk into the wall by this part of its radius.
+/// Penetration, as a fraction of its radius, from which a device counts as wedged.
 const WEDGED: f64 = 0.5;
-/// Length of the device in which its front is looked for, in radii: a hooked tip that is folded back is as long.
+/// Length of the device searched for its front, in radii: a hooked tip that is folded back is as long.
 const FRONT: usize = 60;
 
-/// Refuses to push on from where the way ahead of an instrument that advances is narrower than that, for commands of the hands that have
-/// found no equilibrium.
+/// After no equilibrium was found: rejects commands that advance an instrument where its passage is too narrow.
 ///
 /// # Errors
-/// [`PhysicalEnd::Blocked`] with the narrowest place.
+/// [`PhysicalEnd::Blocked`] with the narrowest position.
 pub(super) fn refuse_narrow(
     environment: &Environment<'_>,
     from: Start<'_>,
@@ -42,8 +41,8 @@ pub(super) fn refuse_narrow(
     Ok(())
 }
 
-/// The same where the device is wedged, for one that would be let go from a fold: where a wall hardly yields it folds behind its held tip, as in the
-/// paper's third experiment.
+/// As [`refuse_narrow`], for a wedged device about to be relaxed from a fold: against a nearly rigid wall it would
+/// fold behind its held tip, as in the paper's third experiment.
 ///
 /// # Errors
 /// As [`refuse_narrow`].
@@ -59,7 +58,7 @@ pub(super) fn refuse_wedged(
     refuse_narrow(environment, from, commands)
 }
 
-/// What the way ahead of an instrument is, where it is narrower than that, and its radius there.
+/// The narrow passage ahead of an instrument, if any, and the instrument's radius there.
 fn narrow(
     environment: &Environment<'_>,
     Start { mesh, state }: Start<'_>,
@@ -68,7 +67,7 @@ fn narrow(
 ) -> Option<(Narrow, f64)> {
     let stack = environment.surroundings.stack;
     let (line_mm, inserted_mm) = (line_mm(lengths_mm.iter().copied()), lengths_mm[instrument]);
-    // What is inside another one feels no wall.
+    // Inside another instrument it does not touch the wall.
     if lengths_mm[instrument + 1..].iter().any(|outer_mm| *outer_mm >= inserted_mm) {
         return None;
     }
@@ -81,7 +80,7 @@ fn narrow(
     Some((narrow, radius_mm))
 }
 
-/// A place on the axis, so far from the tip of the line, less than it is long, mm.
+/// A position on the axis at this distance from the tip of the line, within its length, mm.
 fn place(mesh: &Mesh, rod: &RodState, from_tip_mm: f64) -> Vec3 {
     let after = mesh.from_tip_mm.partition_point(|mm| *mm > from_tip_mm).clamp(1, mesh.elements.len());
     let (e, length_mm) = (after - 1, mesh.elements[after - 1].length);
@@ -100,7 +99,7 @@ mod tests {
     use crate::methods::kirchhoff::{Kirchhoff, KirchhoffOptions};
     use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution};
 
-    /// What is said of a wire of radius 0.4 mm that is pushed into a tube which narrows from 3 mm to `end_mm`.
+    /// The result for a wire of radius 0.4 mm pushed into a tube that narrows from 3 mm to `end_mm`.
     fn pushed_into(end_mm: f64) -> Option<PhysicalEnd> {
         let nodes = (0..40).map(|i| CentrelineNode {
             position_mm: Vec3::z() * f64::from(i),
@@ -122,6 +121,7 @@ mod tests {
             motion: None,
             flow: None,
             fields: [&[], &[]],
+            stop: None,
             time_s: [0.0; 2],
         };
         let options = KirchhoffOptions::default();

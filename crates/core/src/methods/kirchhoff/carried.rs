@@ -1,15 +1,16 @@
-//! A device that a moving vessel takes along: where a sub-step starts in which the wall goes on.
+//! A device displaced by a moving vessel: the start of a sub-step in which the wall moves.
 //!
-//! Every point of the device's curve goes with the material point of the vessel that it is at, c(s) = χ(r(s)) with χ from the vessel before to
-//! the vessel after. That curve is longer or shorter than the device: with G = ∂χ/∂x, |c′| = |G t|, and the device lies on it from the
-//! sheath on, tangents being
+//! Every point of the device's curve moves with the material point of the vessel at its position, c(s) = χ(r(s)) with
+//! χ from the vessel before to the vessel after. That curve is longer or shorter than the device: with G = ∂χ/∂x,
+//! |c′| = |G t|, and the device lies on it from the sheath on, with the tangents
 //!
 //! ```text
 //! t(σ) = G t/|G t|  at the s with  σ = ∫ |G t| ds
 //! ```
 //!
-//! and at its tip goes on straight where the curve has become too short. The sheath stays where it is. From there the sub-step goes on as in a
-//! vessel that rests; friction counts slip from the material points themselves ([`Friction::carry`](crate::contact::Friction::carry)).
+//! and continues straight at its tip where the curve is too short. The sheath does not move. From there the sub-step
+//! proceeds as in a vessel at rest; slip is measured from the material points themselves
+//! ([`Friction::carry`](crate::contact::Friction::carry)).
 
 use super::mesh::Mesh;
 use super::transport::lay;
@@ -23,7 +24,7 @@ use crate::vessel::Displacement;
 /// A vessel before and after a sub-step.
 pub(super) type Passage<'a> = (&'a Displacement, &'a Displacement);
 
-/// The curve of a device, taken along: arc lengths and unit tangents at nodes and in the middles between them.
+/// The displaced curve of a device: arc lengths and unit tangents at nodes and element midpoints.
 struct Curve {
     ends_mm: Vec<f64>,
     tangents: Vec<Vec3>,
@@ -55,7 +56,7 @@ impl Curve {
         curve
     }
 
-    /// Unit tangent at an arc length. `element` is where to start looking: calls go from the sheath to the tip.
+    /// Unit tangent at an arc length. `element` is where the search starts: calls go from the sheath to the tip.
     fn tangent(&self, from_sheath_mm: f64, element: &mut usize) -> Vec3 {
         let last = self.ends_mm.len() - 1;
         while *element < last && self.ends_mm[*element + 1] <= from_sheath_mm {
@@ -74,7 +75,7 @@ impl Curve {
     }
 }
 
-/// Sets `out` to the device that was in `state`, taken along.
+/// Sets `out` to the displaced device that was in `state`.
 pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: &mut RodState) {
     let curve = Curve::new(mesh, state, passage);
     let mut element = 0;
@@ -83,7 +84,7 @@ pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: 
     lay((&state.frames[0], &state.positions[0]), mesh, direction, out);
     out.tensions.clone_from(&state.tensions);
     out.bubbles.clone_from(&state.bubbles);
-    // Angles are counted from triads carried along the rod without twist now.
+    // Angles are now measured from triads carried along the rod without twist.
     out.angles.clone_from(&state.angles);
     let sets = state.sets();
     let mut twist = 0.0;
@@ -93,17 +94,17 @@ pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: 
     }
 }
 
-/// Work that what moves about a device, wall and blood, does on it from one state to the next, mJ.
+/// Work of the moving wall and blood on a device between two states, mJ.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct WallWork {
-    /// The least of what the forces before and those after do.
+    /// The lower bound from the forces before and after.
     pub(super) least_mj: f64,
-    /// The most that they may do.
+    /// The upper bound.
     pub(super) most_mj: f64,
 }
 
 impl WallWork {
-    /// None where the wall rests.
+    /// Zero if the wall rests.
     pub(super) fn new(passage: Option<Passage<'_>>, reports: (&StepReport, &StepReport)) -> Self {
         let Some((before, after)) = passage else { return Self::default() };
         let there = |x: &Vec3| after.place(&before.material(x)) - x;
@@ -124,7 +125,7 @@ impl WallWork {
     }
 }
 
-/// What forces at contacts do on the way of the wall there, mJ: with their signs, and without.
+/// Work of contact forces over the motion of the wall there, mJ: signed, and by magnitude.
 fn done(contacts: &[Contact], way_mm: impl Fn(&Vec3) -> Vec3) -> (f64, f64) {
     let each = contacts.iter().map(|contact| contact.total_n().dot(&way_mm(&contact.position_mm)));
     each.fold((0.0, 0.0), |(sum, most), work| (sum + work, most + work.abs()))

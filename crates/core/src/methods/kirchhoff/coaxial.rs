@@ -1,12 +1,12 @@
-//! The mesh on several instruments that lie in one another.
+//! The mesh on several coaxial instruments.
 //!
-//! The line is as long as the instrument that is farthest in, and its nodes are marks at whole element lengths from its
-//! tip. Where another instrument or a section ends, stiffness jumps, and a node goes with that end; a mark within half an
-//! element of it gives way, so that no sliver arises while an end slides by. Two ends that are nearer to each other than
-//! [`NEAR`] share a node, and what ends beside it counts by its share of the element.
+//! The line is as long as the instrument inserted farthest, and its nodes are marks at whole element lengths from its
+//! tip. Where another instrument or a section ends, stiffness jumps, and a node moves with that end; a mark within
+//! half an element of it is removed, so that no sliver arises while an end slides by. Two ends closer than [`NEAR`]
+//! share a node, and material ending inside an element counts by its share of the element.
 //!
-//! The wall is felt by the outermost instrument at a place, at the points that it would have alone: they are marks on it, and their
-//! weights end where it begins to be covered. So energies change without a jump as ends pass nodes.
+//! The outermost instrument at a position touches the wall, at the contact points that it would have alone: they are
+//! marks on it, and their weights end where it becomes covered. So energies are continuous as ends pass nodes.
 
 use super::mesh::{Fineness, Mesh, NEAR, section_ends};
 use crate::contact::ContactPoint;
@@ -14,18 +14,18 @@ use crate::device::{Device, Section, Stack, line_mm};
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material, shares};
 
-/// What a node goes with.
+/// What a node moves with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Anchor {
     /// The sheath's mouth.
     Mouth,
-    /// A mark so many elements from the tip of the line.
+    /// A mark this many elements from the tip of the line.
     Mark(usize),
-    /// A place on an instrument, by its distance from the tip, mm.
+    /// A position on an instrument, by its distance from the tip, mm.
     Break(usize, f64),
 }
 
-/// The nodes of a line, sheath first, and what each goes with.
+/// The nodes of a line, sheath first, and what each moves with.
 #[derive(Debug, Clone)]
 pub(super) struct Nodes {
     anchors: Vec<Anchor>,
@@ -33,12 +33,19 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// Nodes of these lengths inserted of the instruments, one of them above 0.
+    /// Nodes for these inserted lengths of the instruments, at least one above 0.
     pub(super) fn new(stack: &Stack, inserted_mm: &[f64], fineness: Fineness) -> Self {
         let element_mm = fineness.element_mm;
         let line = line_mm(inserted_mm.iter().copied());
         let near = NEAR * element_mm;
         let mut breaks: Vec<(f64, Anchor)> = Vec::new();
+        // What is too near to another one goes; ends of coils, where they are detached, stay.
+        for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
+            let at = line - inserted + device.coil_mm();
+            if device.coil_mm() > 0.0 && at > near && at < line - near {
+                breaks.push((at, Anchor::Break(index, device.coil_mm())));
+            }
+        }
         for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
             let begins = std::iter::once(0.0).chain(section_ends(device, element_mm));
             for begin in begins.take_while(|begin| begin < inserted) {
@@ -59,7 +66,7 @@ impl Nodes {
         Self { anchors, fineness }
     }
 
-    /// Meshes the line, with the same nodes also where other lengths are inserted than they were made for.
+    /// Meshes the line, with the same nodes even for other inserted lengths than they were made for.
     pub(super) fn mesh(&self, stack: &Stack, inserted_mm: &[f64], modulus_n_per_mm2: f64, mesh: &mut Mesh) {
         self.place(inserted_mm, mesh);
         mesh.elements.clear();
@@ -69,8 +76,9 @@ impl Nodes {
         self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
     }
 
-    /// The same from the mesh of lengths that differ by less than `within_mm`; returns the elements that are others. These have an end that moves along
-    /// the line, or one of an instrument or section near by; in all others there is what was there.
+    /// As [`Self::mesh`], from the mesh of lengths that differ by less than `within_mm`; returns the elements that
+    /// change. These have an end that moves along the line, or are near the end of an instrument or section; all
+    /// others are unchanged.
     pub(super) fn mesh_beside(
         &self,
         (stack, inserted_mm): (&Stack, &[f64]),
@@ -97,7 +105,7 @@ impl Nodes {
         others
     }
 
-    /// Sets the places of the nodes.
+    /// Sets the arc lengths of the nodes.
     fn place(&self, inserted_mm: &[f64], mesh: &mut Mesh) {
         let line = line_mm(inserted_mm.iter().copied());
         mesh.from_tip_mm.clear();
@@ -135,7 +143,7 @@ impl Nodes {
     }
 }
 
-/// Where the sections of a device begin, from its tip.
+/// Starts of the sections of a device, measured from its tip.
 fn begins(device: &Device) -> impl Iterator<Item = f64> {
     device.sections().iter().scan(0.0, |end, section| {
         let begin = *end;
@@ -144,7 +152,8 @@ fn begins(device: &Device) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Leaves the points of an instrument that are beyond what is `covered` of the line by those outside it, and one where it comes out.
+/// Keeps the contact points of an instrument up to where it is `covered` by those outside it, and adds one where it
+/// comes out.
 fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<ContactPoint>) {
     if covered_mm == 0.0 {
         return;
@@ -154,7 +163,7 @@ fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<Co
     let next = points.get(kept).map_or(inserted_mm, |p| p.from_tip_mm);
     points.truncate(kept);
     let Some(last) = points.last_mut() else { return };
-    // Half of the interval to the next point becomes half of that to the end.
+    // Half of the interval to the next point becomes half of the interval to the end.
     let step = bare - last.from_tip_mm;
     last.weight_mm -= 0.5 * (next - bare);
     let mut end = ContactPoint { from_tip_mm: bare, weight_mm: 0.5 * step, ..*last };
@@ -162,7 +171,8 @@ fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<Co
     points.push(end);
 }
 
-/// An element between two distances from the tip of the line, of those of the `inner` instruments whose tips are in it or beyond.
+/// An element between two distances from the tip of the line, of those `inner` instruments whose tips are in it or
+/// beyond.
 pub(super) fn element(
     stack: &Stack,
     inserted_mm: &[f64],
@@ -187,7 +197,7 @@ pub(super) fn element(
     data
 }
 
-/// An element of an instrument by itself between two distances from its tip, with its set of angles if it has one.
+/// An element of a single instrument between two distances from its tip, with its set of angles, if any.
 pub(super) fn alone(device: &Device, set: Option<usize>, (near, far): (f64, f64)) -> ElementData {
     let part = between(device, near, far);
     let mut data = ElementData { length: near - far, bending: part.bending, ..ElementData::EMPTY };
@@ -197,7 +207,7 @@ pub(super) fn alone(device: &Device, set: Option<usize>, (near, far): (f64, f64)
     data
 }
 
-/// What lies between two distances from the tip of a device, of each section the part that is there.
+/// The material between two distances from the tip of a device, with each section's share.
 fn between(device: &Device, near: f64, far: f64) -> Material {
     let h = near - far;
     let mut sum = Material::NONE;

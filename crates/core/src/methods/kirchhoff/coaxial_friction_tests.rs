@@ -1,4 +1,4 @@
-//! Insertions of several instruments that rub on the wall.
+//! Insertions of several instruments with friction on the wall.
 
 use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing, wire_in_catheter};
 use crate::Vec3;
@@ -14,7 +14,7 @@ fn one(name: &str, section: Section) -> Instrument {
     Instrument { name: name.to_owned(), device, may_lead: true }
 }
 
-/// The catheter 80 mm in, the wire 14 mm farther.
+/// The catheter inserted by 80 mm, the wire by 14 mm more.
 fn both_in() -> Simulation {
     let mut simulation = rubbing(bend(), 4.0, wire_in_catheter(), FRICTION);
     push(&mut simulation, &[(WIRE, 14.0)]).unwrap();
@@ -24,7 +24,7 @@ fn both_in() -> Simulation {
     simulation
 }
 
-/// Whether all friction is within the cone of Coulomb's law, and how much of it slips.
+/// Whether all friction is within Coulomb's cone, and the fraction that slips.
 fn slipping(simulation: &Simulation) -> f64 {
     let (mut slips, mut all) = (0.0, 0.0);
     for contact in &simulation.report().contacts {
@@ -36,7 +36,7 @@ fn slipping(simulation: &Simulation) -> f64 {
     slips / all
 }
 
-/// Of instruments of one length that go together the outer one rubs, and is twisted by that alone.
+/// With two instruments of one length that move together, friction acts on the outer one, and twists only that.
 #[test]
 fn a_catheter_over_a_soft_wire_is_a_catheter() {
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
@@ -63,7 +63,8 @@ fn a_catheter_over_a_soft_wire_is_a_catheter() {
         taken_mj += told.dissipated_mj;
         expected_mj += alone.dissipated_mj;
     }
-    // With friction an equilibrium depends on the parts that a command is cut into, and rounding may cut the one and not the other.
+    // With friction an equilibrium depends on the sub-steps, and rounding may subdivide one command and not the
+    // other.
     assert!(
         apart_mm < 2e-3
             && torque_off_nmm < 0.02 * most_nmm
@@ -75,14 +76,14 @@ fn a_catheter_over_a_soft_wire_is_a_catheter() {
 #[test]
 fn hands_put_in_what_is_stored_and_rubbed_away_and_no_force_leaves_its_cone() {
     let mut simulation = both_in();
-    // Of a tip that is pushed along the wall slip is told from the way that is traced in front of it, and a part of the work with it.
+    // For a tip pushed along the wall, slip is measured from its straight continuation, which affects the work.
     for moves in [&[(WIRE, -0.1)][..], &[(CATHETER, -0.1)], &[(WIRE, -0.1), (CATHETER, -0.05)]] {
         let (mut work, mut taken) = (0.0, 0.0);
         let surface = |simulation: &Simulation| {
             let told = &simulation.report().instruments;
             moves.iter().map(|(i, mm)| told[*i].push_force_n.unwrap() * mm).sum::<f64>()
         };
-        // The first steps turn friction around.
+        // The first steps reverse friction.
         for _ in 0..10 {
             push(&mut simulation, moves).unwrap();
         }
@@ -131,8 +132,8 @@ fn more_than_three_instruments_that_rub_are_refused() {
     assert!(error.starts_with("instrument = 4: friction twists every instrument"), "{error}");
 }
 
-/// A wire curved everywhere in a straight catheter, in free space: both make an arc of 90°, in which the wire is pulled by
-/// N₁ = ½EI₁(κ₁² − κ²) where it comes out.
+/// A wire curved everywhere in a straight catheter, in free space: together they form an arc of 90°, in which the
+/// wire is pulled by N₁ = ½EI₁(κ₁² − κ²) where it comes out.
 fn arc(friction: f64) -> Simulation {
     let wire = Section { rest_curvature_per_mm: [ARC_REST, 0.0], ..Section::straight(165.0, 0.2, 20.0) };
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
@@ -148,7 +149,7 @@ fn arc(friction: f64) -> Simulation {
 
 const ARC_REST: f64 = 4.0 * std::f64::consts::FRAC_PI_2 / 80.0;
 
-/// Case D5: pulled through an arc of 90° the axial force grows by e^{μφ}, and the catheter is held by as much.
+/// Case D5: pulled through an arc of 90° the axial force grows by e^{μφ}, and the catheter is held by the difference.
 #[test]
 fn a_wire_that_is_pulled_through_a_bend_obeys_the_capstan_law() {
     let friction = 0.15;
@@ -189,7 +190,7 @@ fn a_coefficient_that_is_none_is_refused() {
     }
 }
 
-/// A catheter alone in a bend, pushed and turned through this sheath.
+/// A single catheter in a bend, pushed and rotated through this sheath.
 fn through(friction_n: f64, friction: f64) -> Vec<(f64, f64, f64)> {
     let tree = bend().enumerate().map(|(i, position_mm)| CentrelineNode {
         position_mm,

@@ -36,12 +36,12 @@ fn in_tube(stack: impl Into<Stack>, radius_mm: f64) -> Simulation {
     along((0..16).map(|i| Vec3::z() * (20.0 * f64::from(i))), radius_mm, stack)
 }
 
-/// Instruments at the mouth of a tube about these points.
+/// Instruments at the mouth of a tube along these points.
 fn along(axis: impl Iterator<Item = Vec3>, radius_mm: f64, stack: impl Into<Stack>) -> Simulation {
     rubbing(axis, radius_mm, stack, 0.0)
 }
 
-/// The same, of a wall with this coefficient of friction.
+/// As [`along`], for a wall with this coefficient of friction.
 pub(super) fn rubbing(
     axis: impl Iterator<Item = Vec3>,
     radius_mm: f64,
@@ -76,7 +76,7 @@ pub(super) fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Resul
     simulation.step_together(&each.collect::<Vec<_>>()).map(|report| report.energy.total())
 }
 
-/// The catheter 80 mm in and turned, the wire 1 mm farther.
+/// The catheter inserted by 80 mm and rotated, the wire by 1 mm more.
 fn both_in(radius_mm: f64) -> Simulation {
     let mut simulation = in_tube(wire_in_catheter(), radius_mm);
     push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
@@ -88,7 +88,7 @@ fn both_in(radius_mm: f64) -> Simulation {
     simulation
 }
 
-/// Slope of the energy by its differences.
+/// Derivative of the energy by finite differences.
 fn slope(energies: &[f64], step_mm: f64) -> f64 {
     let [a, b, _, d, e] = energies else { panic!("{energies:?}") };
     (8.0 * (d - b) - (e - a)) / (12.0 * step_mm)
@@ -104,7 +104,8 @@ fn advanced(simulation: &mut Simulation, step_mm: f64, count: usize) -> (Vec<f64
     (0..count).map(step).unzip()
 }
 
-/// Largest jump of five energies over their smooth trend: it is there three times in fourth differences, and what is smooth hardly at all.
+/// Largest jump of five energies over their smooth trend: fourth differences contain it three times, and the trend
+/// hardly at all.
 fn jump(w: &[f64]) -> f64 {
     (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0
 }
@@ -116,7 +117,7 @@ fn an_end_passes_through_the_mesh_without_a_jump_and_hands_feel_the_slope() {
     let (energies, forces) = advanced(&mut simulation, step_mm, count);
     let largest = energies.iter().copied().fold(0.0, f64::max);
     let strongest = forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
-    // Where the hook's end leaves the catheter the force jumps, and the energy has a kink.
+    // Where the end of the hook leaves the catheter the force jumps, and the energy has a kink.
     let kink = |k: usize| (1.0 + step_mm * (k + 1) as f64 - 15.0).abs() < 1.01 * step_mm;
     for k in (0..count - 4).filter(|first| !(*first..first + 5).any(kink)) {
         let window = &energies[k..k + 5];
@@ -151,8 +152,9 @@ fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
     );
 }
 
-/// What is outermost feels the wall: the line of both is that of one device with their stiffness and the catheter's radius.
-/// A hook of 7 mm and a radius of 3 mm: what the sheath stores of it less is what is stored outside, and nothing there is to be pushed.
+/// The outermost instrument touches the wall: the line is that of one device with the sum of both stiffnesses and the
+/// catheter's radius. A hook of 7 mm and a radius of 3 mm: energy released by the sheath is stored outside, so no
+/// push force is needed.
 #[test]
 fn a_hook_goes_out_and_in_freely_and_no_jump_is_told() {
     let wire = Section::straight(200.0, 0.4, 5.0);
@@ -171,7 +173,7 @@ fn a_hook_goes_out_and_in_freely_and_no_jump_is_told() {
             let report = simulation.step(Command { advance_mm, rotate_rad: 0.0 }).unwrap();
             let what = format!("{element_mm} mm elements, {} mm in: {report:?}", report.inserted_mm);
             assert!(report.converged && !report.jumped && report.relaxations == 0, "{what}");
-            // Where the tip comes to the wall a step may be cut twice.
+            // Where the tip reaches the wall a step may be subdivided twice.
             assert!(report.substeps <= 4, "{what}");
         }
     }
@@ -180,7 +182,7 @@ fn a_hook_goes_out_and_in_freely_and_no_jump_is_told() {
 #[test]
 fn a_mesh_beside_another_is_the_one_made_anew() {
     let (stack, modulus, by_mm) = (wire_in_catheter(), 1.0, 0.005);
-    // Lengths before and after, what was made from the mesh before and what anew, and the elements said to be others.
+    // Lengths before and after; compares the updated mesh with a new one, and checks the list of changed elements.
     let both = |lengths: [f64; 2], moved: [f64; 2], within_mm: f64| {
         let nodes = Nodes::new(&stack, &lengths, Fineness::of_elements(2.0));
         let [mut known, mut anew, mut beside] = [(); 3].map(|()| Mesh::default());
@@ -189,7 +191,7 @@ fn a_mesh_beside_another_is_the_one_made_anew() {
         let others = nodes.mesh_beside((&stack, &moved), (&known, within_mm), modulus, &mut beside);
         (known, anew, beside, others)
     };
-    // Ends apart, at marks, of one length, and of the catheter beside that of the wire's tip on either side.
+    // Ends apart, at marks, at equal lengths, and the catheter's end next to the wire's tip on either side.
     for lengths in [[90.3, 71.1], [80.0, 60.0], [95.0, 95.0], [95.0, 80.002], [95.0, 79.998]] {
         for (index, by_mm) in [(WIRE, by_mm), (WIRE, -by_mm), (CATHETER, by_mm), (CATHETER, -by_mm)] {
             let mut moved = lengths;
@@ -202,7 +204,7 @@ fn a_mesh_beside_another_is_the_one_made_anew() {
                 assert_eq!(beside.elements[e], known.elements[e], "{moved:?}, element {e}");
             }
             assert!(others.len() < known.elements.len() / 2 && !others.is_empty(), "{moved:?}: {others:?}");
-            // Without those it is another mesh.
+            // Without the changed elements it is another mesh.
             assert!(others.iter().any(|e| anew.elements[*e] != known.elements[*e]), "{moved:?}");
         }
     }
@@ -273,8 +275,8 @@ fn surface(simulation: &Simulation) -> (f64, f64) {
     (report.energy.total(), report.instruments[WIRE].push_force_n.unwrap())
 }
 
-/// Largest change of the energy on the wire's way that its force does not account for, mJ. Where that is more than `bar_mj` the way is
-/// cut: what is smooth becomes less by squares, and a jump stays.
+/// Largest change of the energy along the wire's motion that its force does not explain, mJ. If that exceeds `bar_mj`
+/// the motion is subdivided: smooth parts decrease quadratically, a jump remains.
 fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> f64 {
     let start = simulation.clone();
     let (before, pushed) = surface(simulation);
@@ -289,14 +291,15 @@ fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> f64 {
     first.max(unaccounted(simulation, 0.5 * way_mm, bar_mj))
 }
 
-/// Pushes the wire on by 0.1 mm at a time: its energy has no jumps, and now and then all hands feel slopes of it.
+/// Pushes the wire on in steps of 0.1 mm: its energy has no jumps, and at times all hands' forces are compared with
+/// its slopes.
 fn feels_slopes(simulation: &mut Simulation, steps: usize) {
     let bar_mj = 1e-6 * surface(simulation).0;
     for k in 0..steps {
         let off = unaccounted(simulation, 0.1, bar_mj);
         assert!(off <= bar_mj, "{off} of {bar_mj} mJ in step {k}");
-        // Marks change at whole millimetres, which an odd number of steps does not come to: there the energy has a jump, if a small one, and
-        // no slope.
+        // Marks change at whole millimetres, which an odd number of steps avoids: there the energy has a small jump
+        // and no slope.
         for instrument in [WIRE, CATHETER].into_iter().filter(|_| k % 8 == 0) {
             let step_mm = 0.01;
             let at = |k: i32| push(&mut simulation.clone(), &[(instrument, step_mm * f64::from(k))]).unwrap();
@@ -333,7 +336,7 @@ fn in_the_arch_no_energy_jumps_and_hands_feel_its_slope() {
     feels_slopes(&mut simulation, 400);
 }
 
-/// Two instruments in free space, the inner one curved everywhere, each 80 or more mm in.
+/// Two instruments in free space, the inner one curved everywhere, each inserted by 80 mm or more.
 fn curved_in_straight([wire_mm, catheter_mm]: [f64; 2]) -> Simulation {
     let wire = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(165.0, 0.2, 20.0) };
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
@@ -345,8 +348,9 @@ fn curved_in_straight([wire_mm, catheter_mm]: [f64; 2]) -> Simulation {
     simulation
 }
 
-/// Case D3: the outer bends the inner from κ₁ to κ = κ₁ EI₁/(EI₁ + EI₂), and the force across the line is −N₁κ a length. N₁ is that of a rod
-/// that slides without friction, N₁ + ½EI₁(κ² − κ₁²) = H along the line, with H = −F₁ − ½EI₁κ₁² of the force F₁ by which it is pushed.
+/// Case D3: the outer instrument bends the inner one from κ₁ to κ = κ₁ EI₁/(EI₁ + EI₂), and the force across the line
+/// is −N₁κ per length. N₁ is that of a rod that slides without friction, N₁ + ½EI₁(κ² − κ₁²) = H along the line, with
+/// H = −F₁ − ½EI₁κ₁² from its push force F₁.
 #[test]
 fn the_force_between_two_on_an_arc_is_that_of_the_rods() {
     let (stiffness, rest, curvature) = (20.0, 0.02, 0.005);
@@ -388,7 +392,7 @@ fn instruments_with_flush_tips_push_together_as_one_does() {
     let alone_n = one.report().push_force_n;
     assert!(alone_n > 0.01, "{alone_n}");
     assert!((told.push_force_n - alone_n).abs() < 1e-3 * alone_n, "{} {alone_n}", told.push_force_n);
-    // The twin: with tips apart each hand feels its part.
+    // Counter-check: with tips apart each hand feels its share.
     push(&mut pair, &[(WIRE, 0.3)]).unwrap();
     let apart = pair.report();
     let sum: f64 = apart.instruments.iter().map(|each| each.push_force_n.unwrap()).sum();

@@ -1,5 +1,5 @@
-//! One command: in one sub-step where that will do, in several where it will not, and to where the device comes to rest as it can where
-//! the way is lost.
+//! One command: solved in one sub-step if possible, else in several, and by relaxation to rest where the path of
+//! equilibria ends.
 
 use std::sync::Arc;
 
@@ -17,23 +17,24 @@ use crate::device::line_mm;
 use crate::methods::{Jump, Move, StepReport, Surroundings};
 use crate::{Error, Result};
 
-/// Most sub-steps that one command may be cut into.
+/// Largest number of sub-steps of one command.
 const SUBSTEP_LIMIT: usize = 4096;
-/// Newton iterations that a command may take in all its sub-steps for every millimetre and every [`WORK_RAD`], those in vain
-/// included, before it comes to rest as it can: its cost is bounded.
+/// Newton iterations allowed for a command per millimetre and per [`WORK_RAD`], including failed attempts, before it
+/// is relaxed: this bounds its cost.
 const WORK: f64 = 280.0;
-/// See [`WORK`], rad.
+/// Rotation that counts like a millimetre in [`WORK`], rad.
 pub(super) const WORK_RAD: f64 = 0.1;
-/// … and never more than so many times what one solution may take.
+/// Upper limit of these iterations, as a multiple of those of one solution.
 const WORK_OF_ONE: usize = 10;
-/// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
+/// Number of further relaxations, with the hands held still, of a device that rests at the end of its command but not
+/// in equilibrium.
 const AGAIN: usize = 4;
-/// What moved by less than this in another last resort, in its least radii, is at rest.
+/// Motion in a further relaxation, in the smallest radius of the device, below which it is at rest.
 pub(super) const REST_RADII: f64 = 1e-3;
-/// Residual over force scale above which what has stopped is not at rest.
+/// Residual, relative to the force scale, above which a device that does not move is not at rest.
 pub(super) const AT_REST: f64 = 0.05;
 
-/// What the sub-steps of a command, or the parts of a tick, come to.
+/// Accumulated results of the sub-steps of a command or a tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sum {
     pub(super) substeps: usize,
@@ -41,18 +42,21 @@ pub(super) struct Sum {
     slides: u32,
     imbalance: f64,
     dissipated_mj: f64,
+    borrowed_mj: f64,
     jump: Option<Jump>,
     largest_mj: f64,
 }
 
 impl Sum {
-    /// Adds a part.
+    /// Adds the results of a sub-step.
     pub(super) fn add(&mut self, found: &Found) {
+        self.imbalance = 0.0;
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
+        self.borrowed_mj += found.borrowed_mj;
         if let Some(jump) = found.jump {
             let so_far = self.jump.get_or_insert(Jump { released_mj: 0.0, ..jump });
-            // The place is that of the largest.
+            // The position is that of the largest jump.
             if jump.released_mj > self.largest_mj {
                 (self.largest_mj, so_far.position_mm) = (jump.released_mj, jump.position_mm);
             }
@@ -60,20 +64,22 @@ impl Sum {
         }
     }
 
-    /// Adds what a device that was let go from a fold lacks to an equilibrium.
-    pub(super) fn add_imbalance(&mut self, found: &Found) {
-        self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
+    /// Records the imbalance of a device that was relaxed from a fold.
+    pub(super) fn note_imbalance(&mut self, found: &Found) {
+        self.imbalance = found.residual.max(found.unsettled);
     }
 
     pub(super) fn write(&self, report: &mut StepReport) {
         report.substeps = self.substeps as u32;
         (report.relaxations, report.slides) = (self.relaxations, self.slides);
         (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
-        (report.jump, report.jumped) = (self.jump, self.jump.is_some());
+        let released =
+            |jump: Jump| Jump { released_mj: (jump.released_mj - self.borrowed_mj).max(0.0), ..jump };
+        (report.jump, report.jumped) = (self.jump.map(released), self.jump.is_some());
     }
 }
 
-/// How a command from a state begins whose hands go so far, mm.
+/// Initial step control for a command from a state, whose hands move by up to `travel_mm`.
 fn control(environment: &Environment<'_>, from: &KirchhoffState, travel_mm: f64) -> StepControl {
     let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
     let work = (WORK * travel_mm.max(1.0)) as usize;
@@ -84,10 +90,10 @@ fn control(environment: &Environment<'_>, from: &KirchhoffState, travel_mm: f64)
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Begins with moves, and what ticks have left over, from the state `from`.
+    /// Begins with moves, and motion left over by ticks, from the state `from`.
     ///
     /// # Errors
-    /// [`PhysicalEnd`](crate::PhysicalEnd) of a tip that has left the vessel and would be pushed on.
+    /// [`PhysicalEnd`](crate::PhysicalEnd) if the tip has left the vessel and would be pushed on.
     pub(super) fn begin(
         &mut self,
         environment: &Environment<'_>,
@@ -97,7 +103,7 @@ impl<const C: usize> Workspace<C> {
         let Self { tools, now, next, most: (elements, points), way, .. } = self;
         now.own(*elements, *points);
         next.own(*elements, *points);
-        // Where nothing is solved for they stay where they are.
+        // If nothing is solved, the coils do not move.
         now.parts().1.coils = Arc::clone(&from.coils);
         let Surroundings { stack, properties, .. } = environment.surroundings;
         let fineness = environment.options.fineness();
@@ -114,7 +120,7 @@ impl<const C: usize> Workspace<C> {
         Ok(())
     }
 
-    /// Carries out a command from the state `from`, and leaves the new state in `now`.
+    /// Carries out a command from the state `from`; the new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::step`](crate::methods::Method::step).
@@ -133,16 +139,20 @@ impl<const C: usize> Workspace<C> {
         let (mut sum, mut balanced) = (Sum::default(), true);
         let travel = way.travel_mm(WORK_RAD);
         let mut control = control(environment, from, travel);
-        // Where no hand moves the vessel or a field does, time goes by, or something was set free.
+        // Without hand motion the vessel or a field changes, time passes, or something was released.
         let travel = if travel > 0.0 { travel } else { 1.0 };
         let mut moved = false;
-        // Progress of the command, 0 to 1: advance and turn go together.
+        // Progress of the command, 0 to 1: advance and rotation are proportional.
         let mut done = 0.0f64;
         let mut again = AGAIN;
         let thinnest_mm = surroundings.device.min_radius_mm();
         while done < 1.0 || (!balanced && again > 0) {
-            // What has come to rest without an equilibrium at the end of its way goes on from there.
+            // A device that rests at the end of the command, but not in equilibrium, continues from there.
             again -= usize::from(done >= 1.0);
+            // A step of a single part takes milliseconds and is not interrupted.
+            if sum.substeps > 0 {
+                surroundings.check_stop()?;
+            }
             let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
             let (effort, part_mm) = control.next(rest * travel);
@@ -151,7 +161,7 @@ impl<const C: usize> Workspace<C> {
             if effort == Effort::Flight {
                 refuse_wedged(&at_start, was, &way.commands)?;
             }
-            // A rest that is rounding is none.
+            // A remainder at the level of rounding is ignored.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             way.at(to, hands);
             let then = displacement(to);
@@ -176,15 +186,15 @@ impl<const C: usize> Workspace<C> {
             let tried = tools.try_step(&there, here, attempt, next);
             control.took(tools.work.since(&before));
             match tried {
-                // Where the device has come to rest with energy that nobody put in, it was too far from where it was.
+                // The device came to rest with energy that nobody put in, so the equilibrium was too far away.
                 Ok(found) if found.lacks && control.can_shorten(part_mm) => control.shorten(part_mm),
                 Ok(found) => {
                     sum.add(&found);
                     if effort == Effort::Flight {
                         sum.relaxations += 1;
-                        sum.add_imbalance(&found);
+                        sum.note_imbalance(&found);
                     }
-                    // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
+                    // At a crease of the wall forces switch between both sides and never balance; if nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0
                         && found.residual <= AT_REST
@@ -201,7 +211,7 @@ impl<const C: usize> Workspace<C> {
                     done = to;
                     control.succeeded(part_mm, &found);
                 }
-                // From the same place the same comes of it.
+                // A retry from the same state would give the same result.
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
                     // No equilibrium: if the vessel is too narrow to go on, the error says so, here and below.

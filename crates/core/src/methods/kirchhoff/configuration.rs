@@ -1,4 +1,4 @@
-//! A device where it is: its state, and the mesh that belongs to it.
+//! The configuration of a device: its state, and the corresponding mesh.
 
 use std::sync::Arc;
 
@@ -8,11 +8,11 @@ use super::state::KirchhoffState;
 use crate::device::Stack;
 use crate::methods::Surroundings;
 
-/// What a sub-step ends with.
+/// The result of a sub-step.
 #[derive(Debug, Clone)]
 pub(super) struct Configuration {
     pub(super) mesh: Mesh,
-    /// Written to before anyone else has it; from then on it is shared and never changed.
+    /// Written before it is shared; after that it is never changed.
     pub(super) state: Arc<KirchhoffState>,
 }
 
@@ -31,12 +31,12 @@ impl Configuration {
         Self { mesh, state: Arc::new(KirchhoffState::at(surroundings)) }
     }
 
-    /// Where the next sub-step starts.
+    /// The start of the next sub-step.
     pub(super) fn start(&self) -> Start<'_> {
         Start { mesh: &self.mesh, state: &self.state }
     }
 
-    /// Makes sure that the state is shared with nobody, and takes memory for up to `elements` elements and `points` contact points.
+    /// Ensures that the state is not shared, and allocates for up to `elements` elements and `points` contact points.
     pub(super) fn own(&mut self, elements: usize, points: usize) {
         self.mesh.reserve(elements, points);
         Arc::make_mut(&mut self.state).reserve(elements, points);
@@ -47,7 +47,7 @@ impl Configuration {
         (&mut self.mesh, Arc::make_mut(&mut self.state))
     }
 
-    /// Everything is pulled back to the sheath's mouth, where the hands are.
+    /// All instruments are pulled back to the sheath's mouth; sets the hands.
     pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
         let (mesh, state) = self.parts();
         mesh.clear();
@@ -55,7 +55,7 @@ impl Configuration {
     }
 }
 
-/// Elements and contact points of whole devices: most that a step works on.
+/// Numbers of elements and contact points of fully inserted devices: the maximum in a step.
 pub(super) fn largest(stack: &Stack, fineness: Fineness) -> (usize, usize) {
     let (mut elements, mut points) = (0, 0);
     let mut mesh = Mesh::default();

@@ -1,7 +1,7 @@
-//! A coil is left behind.
+//! Detachment of a coil.
 //!
-//! What was the first part of the line becomes a rod of its own, without a hand ([`super::joined`]). The pusher is taken out, and what is left comes to rest as
-//! after any command.
+//! The front part of the line becomes a rod of its own, without a hand ([`super::joined`]). The pusher is withdrawn,
+//! and the rest of the line comes to rest as after any command.
 
 use std::sync::Arc;
 
@@ -13,15 +13,12 @@ use super::state::KirchhoffState;
 use super::transport::transport_together;
 use super::workspace::Workspace;
 use super::{Environment, meshed};
-use crate::device::line_mm;
+use crate::device::{LENGTH_SLACK_MM, line_mm};
 use crate::methods::InstrumentReport;
 use crate::{Error, Result};
 
-/// A coil that is in a catheter by less than this, mm, is out of it.
-const OUT_MM: f64 = 1e-6;
-
-/// Refuses a coil that cannot be detached.
-fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize) -> Result<f64> {
+/// Refuses a coil that cannot be detached; returns the length of one that can, mm.
+pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize) -> Result<f64> {
     let stack = environment.surroundings.stack;
     let refused = |mend: String| {
         let name = stack.instruments().get(instrument).map_or_else(String::new, |one| one.name.clone());
@@ -40,21 +37,15 @@ fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize
         return refused("what follows would pass through it: set method.self_contact = true".into());
     }
     let inserted_mm = from.report.lengths_mm();
-    // Its end comes free of what it lay in where it no longer touches that.
-    let device = &stack.instruments()[instrument].device;
-    let outside = stack.devices().zip(&inserted_mm).skip(instrument + 1).filter(|(_, mm)| **mm > 0.0);
-    let free_mm = outside
-        .map(|(outer, mm)| mm + outer.section_at(0.0).radius_mm + device.section_at(coil_mm).radius_mm)
-        .fold(0.0, f64::max);
-    let left_mm = coil_mm + free_mm - inserted_mm[instrument];
-    if left_mm > OUT_MM {
+    let left_mm = stack.out_mm(instrument, &inserted_mm) - inserted_mm[instrument];
+    if left_mm > LENGTH_SLACK_MM {
         return refused(format!("is not out yet: advance it by {left_mm:.3} mm"));
     }
     Ok(coil_mm)
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Detaches the coil of an instrument from the state `from`, and leaves the new state in `now`.
+    /// Detaches the coil of an instrument from the state `from`; the new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::detach`](crate::methods::Method::detach).
@@ -69,7 +60,7 @@ impl<const C: usize> Workspace<C> {
         let mut hands = Vec::new();
         read(&from.report, &mut hands);
         hands[instrument] = Hand::default();
-        // What is left, where it lies before it comes to rest.
+        // The remaining line, before it comes to rest.
         let mut left = Configuration { mesh: Mesh::default(), state: Arc::new(from.clone()) };
         meshed(environment, &hands, &mut left.mesh);
         let (mesh, state) = left.parts();
@@ -87,7 +78,8 @@ impl<const C: usize> Workspace<C> {
         } else {
             transport_together((&self.mesh, &from.rod), mesh, stack.sets(), &mut state.rod);
             state.turn_tails(stack, &hands);
-            // Nothing pushes at its end any more: a straight catheter stores too little for that to be found by going downhill.
+            // The axial force of the coil is gone: in a straight catheter its energy is too small for descent to find
+            // that.
             state.rod.tensions.fill(0.0);
         }
         let coil = FreeCoil::from_line(&self.mesh, from, (instrument, self.mesh.nearest_node(coil_mm)));
@@ -96,7 +88,7 @@ impl<const C: usize> Workspace<C> {
         let was = std::mem::replace(&mut self.mesh, mesh);
         let done = self.carry_out(environment, &state, &[]);
         self.mesh = was;
-        // What is set free stays in the coil.
+        // The released energy stays in the coil.
         let report = &mut self.now.parts().1.report;
         (report.jump, report.jumped) = (None, false);
         done

@@ -1,4 +1,4 @@
-//! Coils that are left behind.
+//! Detached coils.
 
 use super::KirchhoffOptions;
 use super::loops_tests::{axis, parts};
@@ -7,7 +7,7 @@ use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, DetachedCoil, Move, Sheath, Simulation, State, WallProperties};
 
 const COIL_MM: f64 = 30.0;
-/// What must be out for it to be free: its end has the distance of touch from the catheter's.
+/// Length that must be out for it to be free: its end is at the touching distance from the catheter's.
 const OUT_MM: f64 = COIL_MM + 0.5;
 const RADIUS_MM: f64 = 0.15;
 const CATHETER: usize = 2;
@@ -22,7 +22,7 @@ fn coil() -> Device {
     Device::new(vec![wound, Section::straight(150.0, RADIUS_MM, 0.5)]).unwrap().with_coil(COIL_MM).unwrap()
 }
 
-/// Two coils, and a catheter that stands 3 mm out of the sheath.
+/// Two coils, and a catheter that protrudes by 3 mm from the sheath.
 fn two_coils(friction: f64, self_contact: bool) -> Simulation {
     let (made, _, sheath) = parts(4.0);
     let catheter = Section { inner_radius_mm: Some(0.2), ..Section::straight(100.0, 0.3, 0.5) };
@@ -38,7 +38,7 @@ fn two_coils(friction: f64, self_contact: bool) -> Simulation {
     simulation
 }
 
-/// Advances instruments by 0.5 mm a step.
+/// Advances instruments by 0.5 mm per step.
 fn advance(simulation: &mut Simulation, instruments: &[usize], mm: f64) -> crate::Result<()> {
     let moves: Vec<Move> = instruments
         .iter()
@@ -51,7 +51,7 @@ fn advance(simulation: &mut Simulation, instruments: &[usize], mm: f64) -> crate
     Ok(())
 }
 
-/// Least distance of a coil from what is in, mm.
+/// Smallest distance of a coil from the inserted devices, mm.
 fn clearance_mm(simulation: &Simulation, coil: &DetachedCoil) -> f64 {
     let (coil, line) = (axis(&coil.shape), axis(simulation.shape()));
     let each = coil.iter().flat_map(|a| line.iter().map(move |b| (a - b).norm()));
@@ -68,7 +68,7 @@ fn a_coil_that_is_detached_yields_to_the_next_one_which_does_not_pass_it() {
         assert!(report.converged && !report.jumped && report.inserted_mm == 3.0, "{report:?}");
         let coil = simulation.coils()[0].clone();
         assert_eq!((coil.instrument, coil.shape.from_tip_mm[0]), (0, COIL_MM));
-        // It springs back where the pusher had held it, and stays near where it was.
+        // It springs back where the pusher had held it, and stays near its position.
         let moved_mm = (coil.shape.tip_mm().unwrap() - was[was.len() - 1]).norm();
         assert!(moved_mm < 1.0, "{moved_mm}");
         let (mut least_mm, mut touched) = (f64::INFINITY, false);
@@ -80,14 +80,14 @@ fn a_coil_that_is_detached_yields_to_the_next_one_which_does_not_pass_it() {
             touched |= simulation.touching().iter().any(|touch| touch.rods == [0, 1]);
         }
         assert!(touched && least_mm < 2.01 * RADIUS_MM, "they do not touch: {least_mm}");
-        // It has been pushed aside, and is as long as it was.
+        // It has been pushed aside, and keeps its length.
         let now = &simulation.coils()[0];
         let farthest_mm = farthest_mm(now, &coil);
         assert!(farthest_mm > 0.1 * RADIUS_MM, "{farthest_mm}");
         let length_mm =
             |coil: &DetachedCoil| axis(&coil.shape).windows(2).map(|p| (p[1] - p[0]).norm()).sum::<f64>();
         assert!((length_mm(now) - length_mm(&coil)).abs() < 1e-3 * COIL_MM, "{} mm", length_mm(now));
-        // A state knows it.
+        // It is part of the state.
         let saved = serde_json::to_string(&simulation.state()).unwrap();
         let mut again = two_coils(friction, true);
         again.restore(&serde_json::from_str::<State>(&saved).unwrap()).unwrap();
@@ -100,7 +100,7 @@ fn a_coil_that_is_detached_yields_to_the_next_one_which_does_not_pass_it() {
     }
 }
 
-/// How far a node of a coil is from where it was, mm.
+/// Largest distance of a coil's node from its earlier position, mm.
 fn farthest_mm(coil: &DetachedCoil, was: &DetachedCoil) -> f64 {
     let nodes = coil.shape.positions_mm.iter().zip(&was.shape.positions_mm);
     nodes.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
@@ -114,7 +114,7 @@ fn what_presses_on_a_coil_is_what_holds_it() {
     for _ in 0..20 {
         simulation.step_together(&[Move { instrument: 1, command: Command::advance(0.5) }]).unwrap();
     }
-    // Time goes by, until the resistance to its motion is gone.
+    // Time passes until the resistance to its motion has vanished.
     for _ in 0..10 {
         let nudge = |mm: f64| [Move { instrument: 1, command: Command::advance(mm) }];
         simulation.step_together(&nudge(1e-6)).unwrap();
@@ -150,7 +150,7 @@ fn a_catheter_that_is_pushed_into_a_coil_shoves_it_along() {
     let now = simulation.coils()[0].clone();
     assert!(farthest_mm(&now, &was) > 0.5, "{}", farthest_mm(&now, &was));
     assert!(clearance_mm(&simulation, &now) > 1.9 * RADIUS_MM);
-    // And all is taken out: the coil stays, and no hand feels it.
+    // Everything is withdrawn: the coil stays, and no hand feels it.
     while simulation.report().lengths_mm()[CATHETER] > 0.0 {
         simulation.step_together(&[Move { instrument: CATHETER, command: Command::advance(-0.5) }]).unwrap();
     }
@@ -177,7 +177,7 @@ fn what_cannot_be_detached_is_refused_and_nothing_is_lost() {
     assert!(told(&mut simulation, 0).contains("detached already"));
     let again = advance(&mut simulation, &[0], 0.5).unwrap_err().to_string();
     assert!(again.contains("its coil is detached"), "{again}");
-    // Where nothing would feel it.
+    // Counter-check: without self-contact.
     let mut blind = two_coils(0.0, false);
     advance(&mut blind, &[0], OUT_MM).unwrap();
     assert!(told(&mut blind, 0).contains("self_contact"));

@@ -1,4 +1,4 @@
-//! Blood that drags at devices.
+//! Drag of blood on devices.
 
 use crate::Vec3;
 use crate::device::{Device, Instrument, Stack};
@@ -59,7 +59,7 @@ fn a_wire_on_the_axis_is_held_against_what_poiseuille_flow_drags() {
         assert!((report.push_force_n + sign * expected).abs() < 1e-6 * expected, "{}", report.push_force_n);
         assert!(report.contacts.is_empty() && report.converged && !report.jumped);
     }
-    // Its twin: where nothing flows nothing is felt.
+    // Counter-check: without flow there is no drag.
     let mut wire = simulation(wire(), (Vec3::z() * 5.0, Vec3::z()), None);
     wire.step(Command::advance(50.0)).unwrap();
     assert_eq!((wire.report().drag_n, wire.report().push_force_n), (Vec3::zeros(), 0.0));
@@ -105,12 +105,12 @@ fn of_two_instruments_the_outer_is_dragged_where_it_is_and_the_hands_hold_both()
     both.step_together(&[advance(0, 80.0), advance(1, 30.0)]).unwrap();
     let report = both.report();
     let per_mm = |a: f64| drag_n_per_mm(GRADIENT, RADIUS_MM, a, 0.0);
-    // A place half-way between the last point of one and the first of the other divides them.
+    // The midpoint between the last point of one and the first of the other divides them.
     let (wire, catheter) = (50.0 * per_mm(THREAD_MM), 30.0 * per_mm(0.6));
     let found = |index: usize| -report.instruments[index].push_force_n.unwrap();
     assert!((found(0) / wire - 1.0).abs() < 0.01 && (found(1) / catheter - 1.0).abs() < 0.02, "{report:?}");
     assert!((found(0) + found(1) - report.drag_n.z).abs() < 1e-6 * report.drag_n.z);
-    // Over a wire that rests the catheter goes with the flow or against it without a jump.
+    // Over a wire at rest the catheter moves with the flow or against it without a jump.
     for mm in [10.0, -10.0] {
         let report = both.step_together(&[advance(1, mm)]).unwrap();
         assert!(report.converged && !report.jumped, "{report:?}");

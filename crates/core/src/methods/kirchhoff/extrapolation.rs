@@ -1,10 +1,11 @@
-//! The guess that learns from the last step: where the same motion of the hand follows, the device departs from its own curve as it
-//! did before.
+//! A predictor that learns from the last step: if the hand repeats its motion, the device is assumed to depart from
+//! its own curve as before.
 //!
-//! A tip that slides along a wall bends in every step by as much as in the step before, seen from the tip. Added to the
-//! slid device, that leaves the next equilibrium at second order in the step instead of first: contacts of a hard wall stay closed
-//! on the way there, and Newton's method takes half the iterations. Nodes of several instruments are other marks where one has moved in
-//! another; what was learnt is read between them, at the same distance from the line's tip.
+//! A tip that slides along a wall bends in every step by as much as in the one before, relative to the tip. Added to
+//! the slid device, this predicts the next equilibrium with an error of second order in the step instead of first:
+//! contacts of a hard wall stay closed, and Newton's method takes half the iterations. With several instruments nodes
+//! change as one moves in another; the correction is interpolated between them, at the same distance from the line's
+//! tip.
 
 use std::ops::{Add, Mul};
 
@@ -17,16 +18,16 @@ use crate::contact::HandMotion;
 use crate::rod::element::mid_slope;
 use crate::rod::{ElementData, Frame, RodState};
 
-/// How an equilibrium differed from the slid device in an element and its second node.
+/// Difference of an equilibrium from the slid device in an element and its second node.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Departure {
     /// Change of the node's tangent, in the triad of the slid device.
     tangent: Vec3,
-    /// Change of the direction in the middle of the element, in the triad of its first node.
+    /// Change of the direction at the middle of the element, in the triad of its first node.
     middle: Vec3,
 }
 
-/// How the angles of an instrument differed there.
+/// Difference of an instrument's angles there.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Turn {
     /// Change of the node's material angle against triads carried without twist, rad.
@@ -35,18 +36,18 @@ struct Turn {
     bubble: f64,
 }
 
-/// What the last step changed on the slid device.
+/// Difference of the last equilibrium from the slid device.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Correction {
-    /// Advance, mm, and turn, rad, of each hand in the step.
+    /// Advance, mm, and rotation, rad, of each hand in the step.
     motions: Vec<[f64; 2]>,
-    /// From the tip.
+    /// In order from the tip.
     departures: Vec<Departure>,
-    /// Of every set of angles in each of these.
+    /// For every set of angles in each of these.
     turns: Vec<Turn>,
 }
 
-/// Motions are the same, but for a factor, if their parts differ by less than this part of them.
+/// Relative difference of the components up to which motions are the same, except for a factor.
 const SAME: f64 = 1e-6;
 
 fn axes(f: &Frame) -> Matrix3<f64> {
@@ -61,8 +62,8 @@ fn size(motions: impl Iterator<Item = f64>) -> f64 {
     motions.fold(0.0, libm::hypot)
 }
 
-/// What `value` is at `x`, linear between ascending places `0..=last`, and beyond them that at the last. `k` is where to start looking:
-/// calls go on.
+/// `value` at `x`, linear between ascending positions `0..=last`, and constant beyond the last. `k` is where the
+/// search starts: calls ascend.
 fn read<T: Mul<f64, Output = T> + Add<Output = T>>(
     x: f64,
     (k, last): (&mut usize, usize),
@@ -82,32 +83,32 @@ fn read<T: Mul<f64, Output = T> + Add<Output = T>>(
 }
 
 impl Correction {
-    /// Takes memory for `elements` elements.
+    /// Allocates for `elements` elements.
     pub(super) fn reserve(&mut self, elements: usize) {
         self.motions.reserve(1);
         self.departures.reserve(elements);
         self.turns.reserve(elements);
     }
 
-    /// Forgets all. Keeps the memory.
+    /// Clears everything. Keeps the memory.
     pub(super) fn clear(&mut self) {
         self.motions.clear();
         self.departures.clear();
         self.turns.clear();
     }
 
-    /// Elements that have learnt.
+    /// Number of elements with a correction.
     pub(super) fn len(&self) -> usize {
         self.departures.len()
     }
 
-    /// Whether all of `elements` elements with so many sets of angles have learnt, or none.
+    /// Whether there is a correction for `elements` elements with this number of sets of angles, or none.
     pub(super) fn fits(&self, elements: usize, sets: usize) -> bool {
         let n = self.len();
         (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
-    /// Remembers the way from the slid device to the equilibrium that was found; behind the slid one others may follow.
+    /// Stores the difference of the equilibrium found from the slid device; further rods may follow the slid one.
     pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
@@ -128,7 +129,7 @@ impl Correction {
         }
     }
 
-    /// How many of the last motions of the hands these are; `None` if they are others.
+    /// The ratio of these motions to the hands' last ones; `None` if they are not proportional.
     pub(super) fn repeats(&self, motions: &[HandMotion]) -> Option<f64> {
         let (now, last) = (motions.iter().flat_map(HandMotion::parts), self.motions.iter().flatten());
         let way = size(now.clone());
@@ -138,7 +139,8 @@ impl Correction {
         (known && off <= SAME * way).then_some(factor)
     }
 
-    /// Sets `out` to what was learnt on the nodes `from`, on the nodes `to`. What was not in then is left alone.
+    /// Interpolates the correction from the nodes `from` to the nodes `to`, into `out`. Parts not inserted then are
+    /// not changed.
     pub(super) fn transfer(&self, from: &Mesh, to: &Mesh, out: &mut Self) {
         out.clear();
         let n = self.departures.len();
@@ -163,7 +165,7 @@ impl Correction {
         }
     }
 
-    /// Changes the slid device, whose elements are the first in `state`, by `factor` times what was learnt.
+    /// Adds `factor` times the correction to the slid device, whose elements are the first in `state`.
     pub(super) fn apply(&self, factor: f64, elements: &[ElementData], state: &mut RodState) {
         let n = elements.len();
         let first = n - n.min(self.departures.len());
@@ -232,12 +234,12 @@ mod tests {
         assert!((factor(1.0, 0.2).unwrap() - 1.0).abs() < 1e-12);
         assert!((factor(0.5, 0.1).unwrap() - 0.5).abs() < 1e-12);
         assert!((factor(10.0, 2.0).unwrap() - 10.0).abs() < 1e-12);
-        // Back, turned the other way, turned more, and not at all.
+        // Back, rotated the other way, rotated more, and not at all.
         for (mm, rad) in [(-1.0, -0.2), (1.0, -0.2), (1.0, 0.21), (0.0, 0.0)] {
             assert_eq!(factor(mm, rad), None, "{mm} mm, {rad} rad");
         }
         assert_eq!(Correction::default().repeats(&[advance(1.0, 0.2)]), None);
-        // Of two hands each must repeat its own.
+        // With two hands each must repeat its own motion.
         let both = learnt(&[advance(1.0, 0.0), advance(0.5, 0.0)], &slid, &found);
         assert!((both.repeats(&[advance(2.0, 0.0), advance(1.0, 0.0)]).unwrap() - 2.0).abs() < 1e-12);
         assert_eq!(both.repeats(&[advance(1.0, 0.0), advance(1.0, 0.0)]), None);
@@ -247,7 +249,7 @@ mod tests {
     fn a_change_that_goes_on_is_foreseen_to_second_order_at_least() {
         let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
         let motions = [advance(1.0, 0.0)];
-        // A hook that gets longer by as much in each step.
+        // A hook that lengthens by the same amount in each step.
         let off = |by_mm: f64| {
             let [before, now, next] = [0.0, 1.0, 2.0].map(|k| hooked(&elements, 6.0 + k * by_mm));
             let mut guess = now.clone();

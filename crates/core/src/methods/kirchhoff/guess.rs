@@ -1,7 +1,7 @@
-//! Where a sub-step looks for the next equilibrium first.
+//! The prediction of the next equilibrium in a sub-step.
 //!
-//! The device slid along its own curve is the plain guess. Where the hand repeats its motion, what the last step changed on it is
-//! repeated too ([`Correction`]).
+//! The simple prediction is the device slid along its own curve. If the hand repeats its motion, the correction of
+//! the last step is added ([`Correction`]).
 
 use super::configuration::Start;
 use super::extrapolation::Correction;
@@ -9,29 +9,29 @@ use super::mesh::Mesh;
 use crate::contact::{HandMotion, SelfContact, WallContact};
 use crate::rod::RodState;
 
-/// The candidates.
+/// The candidates for the prediction.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Guess {
     /// What each hand does in the sub-step.
     pub(super) motions: Vec<HandMotion>,
-    /// What was learnt, on the nodes of the sub-step.
+    /// The correction, on the nodes of the sub-step.
     learnt: Correction,
     slid: RodState,
     pub(super) other: RodState,
-    /// The room that each node has where the device is predicted, mm.
+    /// The room of each node at the prediction, mm.
     pub(super) room_mm: Vec<f64>,
 }
 
 impl Guess {
-    /// Takes memory for `elements` elements.
+    /// Allocates for `elements` elements.
     pub(super) fn reserve(&mut self, elements: usize) {
         self.slid.reserve(elements);
         self.other.reserve(elements);
         self.room_mm.reserve((elements + 1).saturating_sub(self.room_mm.len()));
     }
 
-    /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall or has gone through itself. Returns whether what it is
-    /// now is not.
+    /// Adds the correction to the slid device in `state`, unless the result is beyond the wall or passes through
+    /// itself. Returns whether the prediction is valid.
     pub(super) fn choose(
         &mut self,
         contact: &mut WallContact<'_>,
@@ -43,7 +43,7 @@ impl Guess {
         let line = &elements[..mesh.line()];
         let correction = &start.state.correction;
         if let Some(factor) = correction.repeats(&self.motions) {
-            // Nodes of a device alone are the same marks in every step.
+            // Nodes of a single device are the same marks in every step.
             if mesh.inserted_mm.is_empty() {
                 correction.apply(factor, line, state);
             } else {
@@ -60,13 +60,13 @@ impl Guess {
         !contact.is_outside(elements, state)
     }
 
-    /// Goes on from where a solution has come to: `state`, which is the slid device, becomes that.
+    /// Continues from an unfinished solution: replaces `state`, the slid device, by that.
     pub(super) fn resume(&mut self, under_way: &RodState, state: &mut RodState) {
         self.slid.copy_from(state);
         state.copy_from(under_way);
     }
 
-    /// What an equilibrium that was found teaches.
+    /// Stores the correction of an equilibrium.
     pub(super) fn teach(&self, found: &RodState, correction: &mut Correction) {
         correction.learn(&self.motions, &self.slid, found);
     }

@@ -1,4 +1,4 @@
-//! Where the hands are: of a device alone one, of several instruments one each.
+//! Positions of the hands: one for a single device, one for each of several instruments.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,20 +7,20 @@ use crate::contact::HandMotion;
 use crate::device::Stack;
 use crate::methods::{Command, Move, StepReport};
 
-/// Retracting to within this of the sheath, mm, is retracting to it.
+/// Retracting to within this distance of the sheath, mm, counts as retracting completely.
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
-/// What a hand has done since the start.
+/// Position of a hand relative to the start.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Hand {
     /// Length inserted, mm.
     pub(super) inserted_mm: f64,
-    /// Turn, rad.
+    /// Rotation, rad.
     pub(super) turn_rad: f64,
 }
 
 impl Hand {
-    /// What takes it to another place.
+    /// The motion to another position.
     fn to(&self, target: &Self) -> Command {
         Command {
             advance_mm: target.inserted_mm - self.inserted_mm,
@@ -29,7 +29,7 @@ impl Hand {
     }
 }
 
-/// Sets `motions` to what takes the hands of a state to `hands`.
+/// Sets `motions` to those from the hands of a state to `hands`.
 pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<HandMotion>) {
     motions.clear();
     motions.extend(hands.iter().enumerate().map(|(index, hand)| {
@@ -39,7 +39,7 @@ pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<Han
     }));
 }
 
-/// Sets `hands` to where those of a state are.
+/// Sets `hands` to those of a state.
 pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
     hands.clear();
     hands.extend((0..report.instruments.len().max(1)).map(|index| {
@@ -53,19 +53,19 @@ pub(super) fn lengths(hands: &[Hand]) -> impl Iterator<Item = f64> {
     hands.iter().map(|hand| hand.inserted_mm)
 }
 
-/// The way of all hands in a command, which they go together.
+/// The simultaneous motion of all hands in a command.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Way {
-    /// Where it starts.
+    /// Positions at its start.
     pub(super) start: Vec<Hand>,
-    /// Where it ends.
+    /// Positions at its end.
     pub(super) target: Vec<Hand>,
-    /// What each hand does.
+    /// The motion of each hand.
     pub(super) commands: Vec<Command>,
 }
 
 impl Way {
-    /// Sets the way of these moves from a state, with what ticks have left over.
+    /// Sets the motion from a state, with what ticks have left over.
     pub(super) fn begin(&mut self, stack: &Stack, report: &StepReport, moves: &[Move]) {
         read(report, &mut self.start);
         self.commands.clear();
@@ -84,7 +84,7 @@ impl Way {
         }
     }
 
-    /// Sets `hands` to where they are at this part of the way, 0 to 1.
+    /// Sets `hands` to the positions at this fraction of the motion, 0 to 1.
     pub(super) fn at(&self, part: f64, hands: &mut Vec<Hand>) {
         if part == 1.0 {
             hands.clone_from(&self.target);
@@ -99,7 +99,7 @@ impl Way {
         ));
     }
 
-    /// What is left of the way from `hands` on is the way now.
+    /// Continues from `hands`: keeps only the remaining motion.
     pub(super) fn go_on_from(&mut self, hands: &[Hand]) {
         self.start.clear();
         self.start.extend_from_slice(hands);
@@ -107,7 +107,7 @@ impl Way {
         self.commands.extend(hands.iter().zip(&self.target).map(|(hand, target)| hand.to(target)));
     }
 
-    /// Whether nothing is left of it.
+    /// Whether no motion remains.
     pub(super) fn is_done(&self) -> bool {
         self.start == self.target
     }
@@ -120,7 +120,7 @@ impl Way {
         self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)).collect()
     }
 
-    /// Longest way of a hand, mm, a turn of `turn_rad` counting as one.
+    /// Largest motion of a hand, mm; a rotation of `turn_rad` counts as one.
     pub(super) fn travel_mm(&self, turn_rad: f64) -> f64 {
         let each =
             self.start.iter().zip(&self.target).zip(&self.commands).map(|((start, target), command)| {

@@ -1,8 +1,9 @@
-//! Friction between instruments in a sub-step: where it acts, and what presses there.
+//! Friction between instruments in a sub-step: where it acts, and its normal forces.
 //!
-//! The force across the line follows from the equilibrium ([`super::lateral`]), and the couples of friction move the line; they are lagged. A solution takes
-//! the forces of the last one: at first those of the last equilibrium at the same distance from the sheath, and then its own, until the couples
-//! change by less than 10⁻⁴ of what they may be. Where nothing turns there is nothing to renew, whatever presses: friction along the line is read off.
+//! The force across the line follows from the equilibrium ([`super::lateral`]), and the couples of friction move the
+//! line; so both are lagged. A solution uses the forces of the previous one: first those of the last equilibrium at
+//! the same distance from the sheath, then its own, until the couples change by less than 10⁻⁴ of their bound.
+//! Without rotation nothing has to be renewed: friction along the line is evaluated afterwards.
 
 use super::configuration::Start;
 use super::lateral::{Line, comes_out, lateral_forces};
@@ -14,12 +15,12 @@ use crate::methods::LateralForce;
 use crate::rod::RodState;
 use crate::solve::NewtonReport;
 
-/// Most renewals of what presses; two or three are the rule.
+/// Largest number of renewals of normal forces; two or three are typical.
 const RENEWALS: usize = 20;
-/// Least slip, mm: less is the rounding of lengths.
+/// Smallest slip, mm; less is rounding of lengths.
 pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
 
-/// The instrument that rubs on another just behind a node, of those in `instrument` and itself, and that other.
+/// The instrument with friction just behind a node, which is `instrument` or one inside it, and the one around it.
 pub(super) fn pair(mesh: &Mesh, (i, instrument): (usize, usize)) -> Option<(usize, usize)> {
     let place = mesh.from_tip_mm[0] - 0.5 * (mesh.from_tip_mm[i - 1] + mesh.from_tip_mm[i]);
     let there = |k: &usize| mesh.inserted_mm[*k] > place;
@@ -33,8 +34,8 @@ pub(super) fn radius_mm(stack: &Stack, mesh: &Mesh, (i, instrument): (usize, usi
     stack.instruments()[instrument].device.section_at(from_tip_mm).radius_mm
 }
 
-/// Sets the places where instruments may rub in each other in a step from `start` to the mesh `mesh`, on which `slid` is the line that has slid along
-/// its curve.
+/// Sets the places with friction between instruments in a step from `start` to the mesh `mesh`, on which `slid` is
+/// the line slid along its curve.
 pub(super) fn begin(
     stack: &Stack,
     start: Start<'_>,
@@ -75,8 +76,8 @@ pub(super) fn begin(
     }
 }
 
-/// What pressed on an instrument in the last equilibrium, N/mm, so far from the sheath. `known` is where to start looking: calls go from the sheath
-/// to the tip.
+/// Normal force on an instrument in the last equilibrium, N/mm, at this distance from the sheath. `known` is where
+/// the search starts: calls go from the sheath to the tip.
 fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usize) -> f64 {
     let (mesh, inner_friction) = (start.mesh, &start.state.inner_friction);
     let most = mesh.inserted_mm.len().saturating_sub(1);
@@ -89,14 +90,14 @@ fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usi
     }
     let share = (from_sheath_mm - place(*known)) / (place(*known + 1) - place(*known));
     let at = |i: usize| inner_friction[most * i + inner].pressure_n_per_mm;
-    // In the sheath's mouth nothing is reported.
+    // At the sheath's mouth nothing is reported.
     let near = if *known == 0 { at(1) } else { at(*known) };
     near + (at(*known + 1) - near) * share.clamp(0.0, 1.0)
 }
 
 impl<const C: usize> Search<'_, '_, C> {
-    /// From an equilibrium with what pressed between instruments in another to one with its own. Returns it with the part by which the couples of friction differ
-    /// from what they were solved for with.
+    /// Iterates from an equilibrium with the normal forces of another to one with its own. Returns it with the
+    /// relative difference of the couples of friction from those used in its solution.
     pub(super) fn rubbed(
         &mut self,
         mut found: NewtonReport,
@@ -119,11 +120,11 @@ impl<const C: usize> Search<'_, '_, C> {
         (found, change)
     }
 
-    /// Renews what presses between instruments; returns by what part the couples change.
+    /// Renews the normal forces between instruments; returns the relative change of the couples.
     fn press(&mut self, stack: &Stack, mesh: &Mesh, inner_friction: &mut Vec<InnerFriction>) -> f64 {
         let state = &*self.state;
         keep(self.contact.between(), state, mesh, inner_friction);
-        // The wall is asked where an instrument comes out of another alone.
+        // The wall matters only where an instrument comes out of another.
         let ends: Vec<usize> = (0..mesh.inserted_mm.len()).filter_map(|k| comes_out(mesh, k)).collect();
         let beside = |e: usize| ends.iter().any(|node| e == *node || e + 1 == *node);
         let near = (0..mesh.points.len()).filter(|index| beside(mesh.points[*index].element));
@@ -147,7 +148,7 @@ impl<const C: usize> Search<'_, '_, C> {
     }
 }
 
-/// Writes what friction between instruments does at the nodes of the line, for the next step and for those who ask.
+/// Stores friction between instruments at the nodes of the line, for the next step and for reports.
 pub(super) fn keep(between: &Between, rod: &RodState, mesh: &Mesh, inner_friction: &mut Vec<InnerFriction>) {
     inner_friction.clear();
     if between.places().is_empty() {

@@ -1,4 +1,4 @@
-//! Instruments that turn in one another, and rub.
+//! Instruments with friction that rotate in one another.
 
 use super::coaxial_tests::{CATHETER, WIRE, push, rubbing};
 use crate::Vec3;
@@ -9,17 +9,18 @@ const FRICTION: f64 = 0.2;
 /// A straight wire: bending stiffness, N·mm², and radius, mm.
 const WIRE_NMM2: f64 = 200.0;
 const RADIUS_MM: f64 = 0.4;
-/// Length of both in the body, mm, and what half of an element next to the sheath is of it, where nothing is told of friction.
+/// Length of both in the body, mm, and the half of the element next to the sheath, where friction is not reported.
 const LENGTH_MM: f64 = 60.0;
 const MISSING: f64 = 1.0 / LENGTH_MM;
 /// Curvature of the line with the wire in it, 1/mm.
 const CURVATURE: f64 = 0.03;
-/// A torsional stiffness of the wire with which it is twisted by a part of a turn, N·mm² …
+/// A low torsional stiffness of the wire, N·mm²: it is twisted by a fraction of a turn.
 const SOFT_NMM2: f64 = 0.5;
-/// … and one with which it hardly is.
+/// A high one: it is hardly twisted.
 const STIFF_NMM2: f64 = 100.0;
 
-/// A straight wire of this torsional stiffness, N·mm², in a catheter that is curved everywhere and does not twist; `first` is 2 mm ahead, and others are not in.
+/// A straight wire of this torsional stiffness, N·mm², in a catheter that is curved everywhere and does not twist;
+/// `first` is 2 mm ahead, other instruments are not inserted.
 fn straight_in_arc(torsion_nmm2: f64, friction: f64, (first, others): (usize, usize)) -> Simulation {
     let catheter_nmm2 = 600.0;
     let rest = CURVATURE * (WIRE_NMM2 + catheter_nmm2) / catheter_nmm2;
@@ -51,7 +52,7 @@ fn straight_in_arc(torsion_nmm2: f64, friction: f64, (first, others): (usize, us
     simulation
 }
 
-/// What both hands feel after these moves.
+/// Forces and torques of both hands after these moves.
 fn go(simulation: &mut Simulation, moves: &[(usize, f64, f64)]) -> [InstrumentReport; 2] {
     let each = moves.iter().map(|(instrument, advance_mm, rotate_rad)| Move {
         instrument: *instrument,
@@ -62,7 +63,8 @@ fn go(simulation: &mut Simulation, moves: &[(usize, f64, f64)]) -> [InstrumentRe
     [WIRE, CATHETER].map(|index| told.instruments[index])
 }
 
-/// The wire is straight at rest, and slides freely along the line at first: N₁ + ½EI₁κ² = 0, and it presses with n = −N₁κ a length.
+/// The wire is straight at rest, and first slides freely along the line: N₁ + ½EI₁κ² = 0, and it presses with n =
+/// −N₁κ per length.
 fn pressure_n_per_mm() -> f64 {
     0.5 * WIRE_NMM2 * CURVATURE.powi(3)
 }
@@ -71,7 +73,8 @@ fn near(found: f64, expected: f64, part: f64) {
     assert!((found - expected).abs() <= part * expected.abs(), "{found} and {expected}");
 }
 
-/// dM/ds = −μ r n where the wire turns in the catheter. From the hand on that is as far as ℓ, with θ = μ r n ℓ²/2GJ there; beyond it sticks.
+/// dM/ds = −μ r n where the wire rotates in the catheter: from the hand over a length ℓ, with θ = μ r n ℓ²/2GJ there;
+/// beyond it sticks.
 #[test]
 fn a_turned_wire_is_held_by_what_presses_and_sticks_where_its_turn_does_not_come() {
     let couple = FRICTION * RADIUS_MM * pressure_n_per_mm();
@@ -92,13 +95,13 @@ fn a_turned_wire_is_held_by_what_presses_and_sticks_where_its_turn_does_not_come
             near(wire.tip_rotation_rad, turned_rad - lag_rad, 0.01);
         }
         near(-catheter.torque_nmm, wire.torque_nmm, 1e-4);
-        // Once all of it turns, friction takes what the hand gives.
+        // Once all of it rotates, friction dissipates the work of the hand.
         if k > 5 {
             near(simulation.report().dissipated_mj, wire.torque_nmm * turn_rad, 1e-5);
         }
         assert!(go(&mut free, &[(WIRE, 0.0, turn_rad)])[WIRE].torque_nmm.abs() < 1e-9);
     }
-    // Together they go on as they are: friction holds the twist, but for what a stuck node creeps.
+    // Moving together they do not change: friction holds the twist, except for the creep of stuck nodes.
     let [before, _] = [WIRE, CATHETER].map(|index| simulation.report().instruments[index]);
     for _ in 0..5 {
         go(&mut simulation, &[(WIRE, 0.0, 0.1), (CATHETER, 0.0, 0.1)]);
@@ -106,8 +109,8 @@ fn a_turned_wire_is_held_by_what_presses_and_sticks_where_its_turn_does_not_come
     near(simulation.report().instruments[WIRE].torque_nmm, before.torque_nmm, 0.01);
 }
 
-/// Steadily pushed and turned, the wire slips by u = (Δ, r θ): μn is shared in that ratio, so that the force along it builds up by
-/// e^{μφ cos α} where it would by e^{μφ}, and the torque is r tan α times what is added to the push.
+/// Steadily pushed and rotated, the wire slips by u = (Δ, r θ): μn is divided in that ratio, so the force along it
+/// grows by e^{μφ cos α} instead of e^{μφ}, and the torque is r tan α times the increase of the push force.
 #[test]
 fn a_wire_that_is_turned_is_pushed_more_easily() {
     let loose = straight_in_arc(STIFF_NMM2, 0.0, (WIRE, 0)).report().instruments[WIRE].push_force_n.unwrap();
@@ -131,10 +134,10 @@ fn a_wire_that_is_turned_is_pushed_more_easily() {
     }
 }
 
-/// A hand that moves what is twisted moves its twist along what it rubs on, and feels that.
+/// A hand that moves a twisted instrument moves the twist along the friction, and feels that.
 #[test]
 fn hands_put_in_what_is_stored_and_taken_while_a_twisted_wire_slides() {
-    // Nodes are marks on what is first: the wire, or the catheter in which it is twisted.
+    // Nodes are marks on the first instrument: the wire, or the catheter in which it is twisted.
     for (first, wire_mm, catheter_mm) in
         [(WIRE, 0.05, 0.0), (WIRE, 0.0, -0.05), (CATHETER, -0.05, 0.0), (CATHETER, 0.0, 0.05)]
     {
@@ -157,7 +160,7 @@ fn hands_put_in_what_is_stored_and_taken_while_a_twisted_wire_slides() {
             taken += simulation.report().dissipated_mj;
             was = is;
         }
-        // The sheath straightens what is pulled into it, and the hand pays.
+        // The sheath straightens what is pulled into it, at the expense of the hand.
         let drawn_mm = inserted_mm - simulation.report().instruments[CATHETER].inserted_mm;
         let rest = CURVATURE * 800.0 / 600.0;
         let stored = simulation.report().energy.total() - before + 0.5 * 600.0 * rest * rest * drawn_mm;
@@ -197,7 +200,7 @@ fn a_step_that_turns_can_be_taken_again() {
     assert_eq!(couples(&other), told);
     go(&mut other, &[(WIRE, 0.2, 0.1)]);
     assert_eq!(bytes(&other), after);
-    // A state that says more of friction than there are nodes is refused.
+    // A state with more friction entries than nodes is rejected.
     let mut wrong: serde_json::Value = serde_json::from_slice(&before).unwrap();
     wrong["content"]["Kirchhoff"]["inner_friction"].as_array_mut().unwrap().pop();
     let error = other.restore(&serde_json::from_value(wrong).unwrap()).unwrap_err().to_string();

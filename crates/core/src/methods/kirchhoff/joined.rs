@@ -1,12 +1,13 @@
-//! Coils that were detached are solved for together with the line: rods of their own behind its tip, after a gap each.
+//! Detached coils are solved for together with the line: as rods of their own behind its tip, each after a gap.
 //!
-//! Nothing holds a rod that is free. Where it touches nothing it moves against a little resistance
+//! Nothing holds a free rod. A small resistance to its motion,
 //!
 //! ```text
 //! V = Σ ½ c wᵢ |xᵢ − x̄ᵢ|²,    c = RESISTANCE · EI / mm⁴
 //! ```
 //!
-//! from where it was when the part of the command began. It makes the solution unique, and holds nothing for long: the next part begins where this one has ended.
+//! from its position at the start of the part of the command, makes the solution unique. It holds nothing for long:
+//! the next part starts where this one ends.
 
 use std::sync::Arc;
 
@@ -25,27 +26,28 @@ use crate::shape::Shape;
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
-/// c: a coil of 60 mm that moves by 1 mm meets a thousandth of the force that bends it to a radius of 1 mm.
+/// c: the resistance to a motion of 1 mm of a coil of 60 mm is a thousandth of the force that bends it to a radius of
+/// 1 mm.
 const RESISTANCE_PER_MM4: f64 = 1e-5;
 
-/// A coil that was detached, as it lies.
+/// The configuration of a detached coil.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct FreeCoil {
-    /// Number of the instrument whose coil it was.
+    /// Index of the instrument whose coil it was.
     pub(super) instrument: usize,
-    /// Arc lengths of its nodes from its tip, mm; the end that was detached first.
+    /// Arc lengths of its nodes from its tip, mm; the detached end first.
     pub(super) from_tip_mm: Vec<f64>,
     pub(super) rod: RodState,
-    /// What presses at each of its contact points, tip first; empty without friction.
+    /// Normal forces at its contact points, tip first; empty without friction.
     pub(super) forces: Vec<NormalForce>,
     pub(super) known: KnownPoints,
 }
 
-/// All coils of a state, in the order in which they were detached; shared, since most states have none.
+/// All coils of a state, in the order of detachment; shared, since most states have none.
 pub(super) type Coils = Arc<Vec<FreeCoil>>;
 
 impl FreeCoil {
-    /// The coil that is the first part of a line, up to a node of it.
+    /// The coil that is the front part of a line, up to one of its nodes.
     pub(super) fn from_line(mesh: &Mesh, state: &KirchhoffState, (instrument, node): (usize, usize)) -> Self {
         let from_tip_mm = mesh.from_tip_mm[node..].to_vec();
         // Contact points are in order from the tip.
@@ -59,7 +61,7 @@ impl FreeCoil {
         }
     }
 
-    /// Its centre line.
+    /// Its reported centre line.
     pub(super) fn told(&self) -> DetachedCoil {
         DetachedCoil {
             instrument: self.instrument,
@@ -71,12 +73,12 @@ impl FreeCoil {
         }
     }
 
-    /// Its elements and contact points; the elements are counted from its first one on.
+    /// Its elements and contact points; elements are counted from its first one.
     fn mesh(&self, stack: &Stack, fineness: Fineness, modulus_n_per_mm2: f64) -> Mesh {
         let device = &stack.instruments()[self.instrument].device;
         let set = stack.sets()[self.instrument].or((!stack.is_several()).then_some(0));
         let mut mesh = Mesh::default();
-        // The points that the whole instrument has there.
+        // The contact points are those of the whole instrument there.
         mesh.build_points(device, device.length_mm(), fineness, modulus_n_per_mm2);
         mesh.points.retain(|point| point.from_tip_mm < self.from_tip_mm[0]);
         let ends = self.from_tip_mm.windows(2).map(|ends| (ends[0], ends[1]));
@@ -92,7 +94,7 @@ impl FreeCoil {
         Mesh { points, ..mesh }
     }
 
-    /// Checks that a coil that is restored may be one of these instruments: what is read from a file may be anything.
+    /// Checks that a restored coil is possible for these instruments, since a file may contain anything.
     pub(super) fn check(
         &self,
         stack: &Stack,
@@ -116,23 +118,23 @@ impl FreeCoil {
     }
 }
 
-/// What coils are made of beside their states.
+/// Data of the coils beside their states.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Joined {
-    /// Of each coil.
+    /// Instrument of each coil.
     instruments: Vec<usize>,
-    /// A gap and the elements of a coil, one coil after the other, …
+    /// For each coil a gap and its elements.
     elements: Vec<ElementData>,
-    /// … their surfaces, …
+    /// The surfaces of these elements.
     skins: Vec<Skin>,
-    /// … and the contact points of all; their elements are counted from the first gap on.
+    /// The contact points of all coils; their elements are counted from the first gap.
     points: Vec<ContactPoint>,
-    /// Contact points of each coil.
+    /// Number of contact points of each coil.
     counts: Vec<usize>,
 }
 
 impl Joined {
-    /// Is that of these coils.
+    /// Sets the data for these coils.
     pub(super) fn renew(
         &mut self,
         coils: &[FreeCoil],
@@ -182,7 +184,8 @@ impl Joined {
         mesh.points.extend(self.points.iter().map(moved));
     }
 
-    /// Takes coils that were somewhere off a mesh and off the rod on it; returns them where they lie there, with what presses and what is known.
+    /// Removes coils from a mesh and its rod; returns them at their positions there, with normal forces and knowledge
+    /// of the wall.
     pub(super) fn take_off(
         &self,
         were: &[FreeCoil],
@@ -222,16 +225,16 @@ pub(super) fn join(line: &mut RodState, coils: &[FreeCoil]) {
     }
 }
 
-/// The resistance of rods that are free.
+/// The resistance to motion of free rods.
 pub(super) struct Resistance {
-    /// Number of the first node that feels it.
+    /// Index of the first node with resistance.
     first: usize,
-    /// Where nodes were, and what resists there, N/mm.
+    /// Initial positions of the nodes, and stiffness of the resistance, N/mm.
     nodes: Vec<(Vec3, f64)>,
 }
 
 impl Resistance {
-    /// That of rods from an element on, where they are.
+    /// For the rods from element `first` on, at their positions.
     pub(super) fn of(elements: &[ElementData], rod: &RodState, from: usize) -> Self {
         let mut nodes: Vec<_> = rod.positions[from..].iter().map(|x| (*x, 0.0)).collect();
         for (e, element) in elements[from..].iter().enumerate().filter(|(_, data)| !data.is_break()) {

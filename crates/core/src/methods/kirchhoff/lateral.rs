@@ -1,19 +1,22 @@
-//! What instruments that lie in one another exert on each other across the line.
+//! Forces across the line between coaxial instruments.
 //!
-//! An instrument, with all that lies in it, is a rod of its own on the same line. What its elements lack at a node is what the instruments
-//! outside it give: its own bending moment, differentiated twice, with its own axial force, as the mesh has them,
+//! An instrument, with all inside it, is a rod of its own on the same line. The imbalance of its elements at a node
+//! is the force of the instruments outside it: from its own bending moment, differentiated twice, and its own axial
+//! force, as discretised,
 //!
 //! ```text
 //! fᵢ = ∂U_inner/∂xᵢ + ∂(N_e c_e)/∂xᵢ,    across the line
 //! ```
 //!
-//! The line knows its axial force and not that of each instrument. But moved along the line by the virtual displacement δxᵢ = tᵢ,
-//! δtᵢ = κᵢ at one node, an instrument does work against friction alone. From its tip on that tells the axial force of one element after the
-//! other; where its tip is not covered it is that of the line. At ends of instruments, where stiffness jumps, the others exert a couple too,
-//! as the play between them is none, and forces there stand for less length than elsewhere.
+//! Only the total axial force of the line is known, not that of each instrument. But in the virtual displacement
+//! along the line δxᵢ = tᵢ, δtᵢ = κᵢ at one node, an instrument does work against friction alone. From its tip on
+//! this yields the axial force element by element; where its tip is not covered it is that of the line. At ends of
+//! instruments, where stiffness jumps, the others also exert a couple, since there is no clearance, and forces there
+//! represent a smaller length than elsewhere.
 //!
-//! Friction along the line ([`crate::contact::Between`]) is a force within the line, and bends nothing. It is felt by both hands, and builds up in
-//! the axial force: around a bend by e^{μφ}, the capstan's law, of all that slips along. What presses at a node is found with it, from the tip on.
+//! Friction along the line ([`crate::contact::Between`]) is internal to the line, and does not bend it. Both hands
+//! feel it, and it changes the axial force: around a bend by e^{μφ}, the capstan equation, where everything slips.
+//! Normal forces at a node are found together with it, from the tip on.
 
 use super::coaxial::element;
 use super::inner_friction::{pair, radius_mm};
@@ -25,9 +28,10 @@ use crate::methods::LateralForce;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, Layout, Material, RodState, element_gradients};
 
-/// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
+/// Number of iterations for the axial force behind a node and the friction there: each reduces the error by μ times
+/// half the angle of an element.
 const ROUNDS: usize = 12;
-/// A force at a node, and that in the turn of its tangent.
+/// A force at a node, and that in the rotation of its tangent.
 #[derive(Debug, Clone, Copy, Default)]
 struct NodeForce {
     force: Vec3,
@@ -40,32 +44,33 @@ impl NodeForce {
         Self { force, turn: [gradient[tangent], gradient[tangent + 1]] }
     }
 
-    /// `self` and `factor` times another.
+    /// `self` plus `factor` times another.
     fn plus(&self, other: &Self, factor: f64) -> Self {
         let turn = [0, 1].map(|a| self.turn[a] + factor * other.turn[a]);
         Self { force: self.force + other.force * factor, turn }
     }
 
-    /// Work on a unit displacement along the line.
+    /// Work in a unit displacement along the line.
     fn along(&self, tangent: &Vec3, curvature: &[f64; 2]) -> f64 {
         self.force.dot(tangent) + self.turn[0] * curvature[0] + self.turn[1] * curvature[1]
     }
 }
 
-/// The line as it is, with what is known of it.
+/// The line at a state, with known forces.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line<'a> {
     pub(super) stack: &'a Stack,
     pub(super) mesh: &'a Mesh,
     pub(super) rod: &'a RodState,
-    /// Contact points that press on the wall, and the force of it.
+    /// Contact points in contact with the wall, and its force.
     pub(super) pressing: &'a [(usize, Vec3)],
-    /// Friction between instruments, node by node, the innermost first; empty without.
+    /// Friction between instruments, node by node, the innermost first; empty without friction.
     pub(super) inner_friction: &'a [InnerFriction],
 }
 
 impl Line<'_> {
-    /// Friction along the line on what is inside at a node, and the couple around it there, mm, both over the force across it.
+    /// Friction along the line on the inner instruments at a node, and the couple about it, mm, both relative to the
+    /// force across the line.
     fn drag(&self, at: (usize, usize)) -> [f64; 2] {
         let pair = pair(self.mesh, at).filter(|(inner, _)| self.stack.friction(*inner) > 0.0);
         let Some((inner, _)) = pair.filter(|_| !self.inner_friction.is_empty()) else { return [0.0; 2] };
@@ -75,7 +80,7 @@ impl Line<'_> {
     }
 }
 
-/// Contact points that press among those of a mesh, which are in the same order.
+/// Contact points of a mesh that are in contact, in the same order.
 pub(super) fn pressing(mesh: &Mesh, rod: &RodState, contacts: &[Contact]) -> Vec<(usize, Vec3)> {
     let mut contacts = contacts.iter().peekable();
     let at = |(index, point): (usize, &ContactPoint)| {
@@ -85,14 +90,14 @@ pub(super) fn pressing(mesh: &Mesh, rod: &RodState, contacts: &[Contact]) -> Vec
     mesh.points.iter().enumerate().filter_map(at).collect()
 }
 
-/// The node where an instrument, or one in it, comes out of those outside it; `None` where none does.
+/// The node where an instrument, or one inside it, comes out of those outside it; `None` if none does.
 pub(super) fn comes_out(mesh: &Mesh, instrument: usize) -> Option<usize> {
     let (own, outside) = mesh.inserted_mm.split_at_checked(instrument + 1)?;
     let [inside_mm, outside_mm] = [own, outside].map(|all| line_mm(all.iter().copied()));
     (inside_mm > outside_mm).then(|| mesh.nearest_node(mesh.from_tip_mm[0] - outside_mm))
 }
 
-/// Forces on an instrument and all that lies in it by those outside it, at every node of the line, sheath first.
+/// Forces on an instrument and all inside it by those outside it, at every node of the line, sheath first.
 pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize) -> Vec<LateralForce> {
     let Line { stack, mesh, rod, .. } = *line;
     let mut told = vec![LateralForce::default(); mesh.from_tip_mm.len()];
@@ -124,7 +129,7 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
             let force = known.plus(&far_pull, tension).force;
             force - t * t.dot(&force)
         };
-        // What presses depends on the axial force behind the node, by the angle that the line turns there.
+        // The normal force depends on the axial force behind the node, through the angle of the line there.
         for _ in 0..if drag == 0.0 { 0 } else { ROUNDS } {
             let next = (drag * across(tension).norm() - along) / rate;
             if next == tension {
@@ -144,8 +149,8 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
     told
 }
 
-/// What each of the first elements of an instrument and those in it exerts at its near and its far node without axial force, and there with
-/// a unit of it.
+/// Forces of each of the first elements of an instrument and those inside it at its near and far node without axial
+/// force, and per unit of axial force.
 fn parts<const C: usize>(
     stack: &Stack,
     mesh: &Mesh,
@@ -163,7 +168,7 @@ fn parts<const C: usize>(
     all
 }
 
-/// Element `e` of an instrument and those in it. Where all of them have angles, the mesh knows each by itself.
+/// Element `e` of an instrument and those inside it. If all of them have angles, the mesh stores each separately.
 fn inside(stack: &Stack, mesh: &Mesh, (e, instrument): (usize, usize)) -> ElementData {
     let sets = &stack.sets()[..=instrument];
     if sets.contains(&None) {
@@ -182,7 +187,7 @@ fn inside(stack: &Stack, mesh: &Mesh, (e, instrument): (usize, usize)) -> Elemen
     data
 }
 
-/// Curvature of the line at a node along u and v of its triad: the mean of the elements beside it.
+/// Curvature of the line at a node along u and v of its triad: the mean of the adjacent elements.
 fn curvature(mesh: &Mesh, rod: &RodState, i: usize) -> [f64; 2] {
     let (mut sum, mut count) = (Vec3::zeros(), 0.0);
     for (e, xi) in [(i.wrapping_sub(1), 1.0), (i, 0.0)] {
@@ -194,7 +199,7 @@ fn curvature(mesh: &Mesh, rod: &RodState, i: usize) -> [f64; 2] {
     [rod.frames[i].u, rod.frames[i].v].map(|axis| axis.dot(&sum) / count)
 }
 
-/// What the wall exerts at a node on an instrument and those in it, where it comes out of the others.
+/// Force of the wall at a node on an instrument and those inside it, where it comes out of the others.
 fn wall_force(line: &Line<'_>, (i, instrument): (usize, usize)) -> NodeForce {
     let mut sum = NodeForce::default();
     for (index, force) in line.pressing {

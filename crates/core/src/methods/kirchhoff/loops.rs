@@ -1,11 +1,12 @@
-//! Loops of the device that touch each other.
+//! Contact between loops of the device.
 
 use super::mesh::Mesh;
 use crate::contact::{HandMotion, Skin};
 use crate::device::{Device, Stack};
 use crate::rod::ElementData;
 
-/// The surface of each element of what is in: as thick as its outermost instrument in the middle, and as hard as a rod can tell.
+/// The surface of each element of the line: with the radius of its outermost instrument in the middle, practically
+/// rigid.
 pub(super) fn skins<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item = Skin> + 'a {
     let alone = [mesh.from_tip_mm[0]];
     middles(mesh).zip(&mesh.elements).map(move |(middle_mm, element)| {
@@ -14,12 +15,12 @@ pub(super) fn skins<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item 
     })
 }
 
-/// That of an element of a device by itself, in the middle of which is this distance from its tip, mm.
+/// The surface of an element of a single device whose middle is at this distance from the tip, mm.
 pub(super) fn skin(device: &Device, middle_mm: f64, element: &ElementData) -> Skin {
     Skin::rigid(device.section_at(middle_mm).radius_mm, element.bending[1])
 }
 
-/// By how much the outermost instrument in each element has advanced along the line, mm; coils, of which elements follow, have not.
+/// Advance of the outermost instrument in each element along the line, mm; 0 for coils, whose elements follow.
 pub(super) fn advances_mm<'a>(
     mesh: &'a Mesh,
     stack: &'a Stack,
@@ -30,7 +31,7 @@ pub(super) fn advances_mm<'a>(
     on_line.chain(std::iter::repeat(0.0)).take(mesh.elements.len())
 }
 
-/// How far the middles of elements are from the tip, mm.
+/// Distances of the middles of elements from the tip, mm.
 fn middles(mesh: &Mesh) -> impl Iterator<Item = f64> + '_ {
     mesh.from_tip_mm.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]))
 }

@@ -1,4 +1,4 @@
-//! Devices that come back to themselves.
+//! Self-contact of devices.
 
 use super::{Kirchhoff, KirchhoffOptions};
 use crate::Vec3;
@@ -43,7 +43,7 @@ fn curling(tube_mm: f64, self_contact: bool) -> Simulation {
     builder.method(&method(self_contact)).build().unwrap()
 }
 
-/// Points of the device's axis, a twentieth of a millimetre apart or less.
+/// Points of the device's axis, at most a twentieth of a millimetre apart.
 pub(super) fn axis(shape: &Shape) -> Vec<Vec3> {
     let mut points = Vec::new();
     for e in 0..shape.len() - 1 {
@@ -58,7 +58,7 @@ pub(super) fn axis(shape: &Shape) -> Vec<Vec3> {
     points
 }
 
-/// Least distance of two pieces of the device's axis that are not next to each other, mm.
+/// Smallest distance of two pieces of the device's axis that are not adjacent, mm.
 fn least_distance_mm(shape: &Shape) -> f64 {
     let points = axis(shape);
     let apart = 40;
@@ -89,7 +89,7 @@ fn loops_lie_on_each_other_and_do_not_pass() {
     let (least_mm, deepest_mm, touching) = run(true);
     assert!(touching > 10 && deepest_mm < 0.01 * RADIUS_MM, "{touching} {deepest_mm}");
     assert!(least_mm > 1.98 * RADIUS_MM, "{least_mm}");
-    // The twin: without it they pass through each other.
+    // Counter-check: without self-contact they pass through each other.
     let (least_mm, _, touching) = run(false);
     assert!(touching == 0 && least_mm < RADIUS_MM, "{least_mm}");
 }
@@ -108,6 +108,7 @@ fn nothing_is_built_where_nothing_can_touch() {
         motion: None,
         flow: None,
         fields: [&[], &[]],
+        stop: None,
         time_s: [0.0; 2],
     };
     let searches = |to_mm: f64| {
@@ -122,8 +123,8 @@ fn nothing_is_built_where_nothing_can_touch() {
     assert!(searches(40.0).pairs > 0);
 }
 
-/// Whether pieces of the axis that are near each other have changed sides between two shapes: a test that knows nothing of gaps and forces. Points
-/// are read at the same arc lengths from the sheath.
+/// Whether near pieces of the axis have changed sides between two shapes: a test independent of gaps and forces.
+/// Points are taken at equal arc lengths from the sheath.
 fn has_passed(before: &[Vec3], after: &[Vec3]) -> bool {
     let apart = 40;
     let side = |points: &[Vec3], i: usize, j: usize| {
@@ -147,8 +148,8 @@ fn has_passed(before: &[Vec3], after: &[Vec3]) -> bool {
     })
 }
 
-/// Pushes and turns a wire of a random shape at random. Returns the least distance of its axis from itself, mm, how many commands were carried out, and whether it passed
-/// through itself.
+/// Pushes and rotates a wire of random shape at random. Returns the smallest distance of its axis from itself, mm,
+/// the number of commands carried out, and whether it passed through itself.
 fn at_random(seed: u64, self_contact: bool) -> (f64, usize, bool) {
     let mut index = 0;
     let mut draw = |low: f64, high: f64| {
@@ -193,7 +194,7 @@ fn wires_pushed_and_turned_at_random_do_not_pass_through_themselves() {
     assert!(twins > 3, "{twins}");
 }
 
-/// A wire that curls, in a catheter that stands 6 mm out of the sheath.
+/// A wire that curls, in a catheter that protrudes by 6 mm from the sheath.
 fn through_catheter(self_contact: bool) -> Simulation {
     let (made, wire, sheath) = parts(4.0);
     let catheter = Section { inner_radius_mm: Some(0.3), ..Section::straight(100.0, 0.5, 0.5) };
@@ -222,7 +223,7 @@ fn hands_of_several_instruments_feel_what_loops_do() {
     };
     let (simulation, least_mm) = run(true);
     assert!(!simulation.touching().is_empty() && least_mm > 1.98 * RADIUS_MM, "{least_mm}");
-    // A slope of the energy is what the hand puts in, beside what comes out of the sheath.
+    // The slope of the energy is the push force, besides the energy released by the sheath.
     let straightened_n = [simulation.device().section_at(50.0).straightening_n(), 0.0];
     for instrument in [0, 1] {
         let energy = |mm: f64| {
@@ -239,7 +240,7 @@ fn hands_of_several_instruments_feel_what_loops_do() {
             "{instrument}: {felt_n} {slope_n}"
         );
     }
-    // The twin: without it the wire passes through itself.
+    // Counter-check: without self-contact the wire passes through itself.
     let (twin, least_mm) = run(false);
     assert!(twin.touching().is_empty() && least_mm < RADIUS_MM, "{least_mm}");
 }

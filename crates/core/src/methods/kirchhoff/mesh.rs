@@ -1,44 +1,46 @@
-//! The rod's mesh on an inserted device: elements, their sections, and the points where the wall is felt.
+//! The rod's mesh on an inserted device: elements, their sections, and the contact points.
 
 use crate::contact::{ContactPoint, WallPotential};
 use crate::device::Device;
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material};
 
-/// At the tip they begin this close, in radii, and double: a tip that touches the wall at an angle leaves it within a
-/// tenth of its radius.
+/// Spacing of contact points at the tip, in radii, from which it doubles: a tip that touches the wall at an angle
+/// leaves it within a tenth of its radius.
 const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
-/// Fewest intervals between contact points in an element: a wire that is thick for its elements is felt in their midst as well.
+/// Smallest number of intervals between contact points in an element: a wire that is thick relative to its elements
+/// needs points within them too.
 const FEWEST_INTERVALS: f64 = 2.0;
-/// Ends of sections nearer to each other than this part of an element share a node: over an element that is shorter, differences of unit
-/// vectors have lost the digits that curvature is made of.
+/// Ends of sections closer than this fraction of an element share a node: in shorter elements, differences of unit
+/// vectors lose the digits that determine curvature.
 pub(super) const NEAR: f64 = 1e-3;
-/// Most that the rest shape turns by over an element, rad.
+/// Largest angle by which the rest shape bends in an element, rad.
 const LARGEST_TURN: f64 = 0.75;
-/// An element at the tip has no more contact points beside those that are evenly spaced: they double from 4·10⁻⁹ mm up to half of the longest
-/// element, ten metres, 42 times at most.
+/// Largest number of contact points that an element at the tip has beside the evenly spaced ones: their spacing
+/// doubles from 4·10⁻⁹ mm to at most half of the longest element, ten metres, in at most 42 steps.
 pub(super) const MOST_POINTS: usize = 64;
 
-/// How finely a device is meshed.
+/// Resolution of a device's mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fineness {
     /// Length of elements, mm.
     pub element_mm: f64,
-    /// Most distance of contact points, in radii of the device.
+    /// Largest spacing of contact points, in radii of the device.
     pub contact_spacing_radii: f64,
 }
 
 impl Fineness {
-    /// A sharp crest between two contact points is felt when it is two thirds of a radius from the axis. At 2 radii it would reach it.
+    /// With this spacing a sharp crest between two contact points comes to within two thirds of a radius of the axis
+    /// before contact; with 2 radii it would reach the axis.
     pub const CONTACT_SPACING_RADII: f64 = 1.5;
 
-    /// About how many contact points a device has.
+    /// Approximate number of contact points of a device.
     pub(super) fn points(&self, device: &Device) -> usize {
         let each = device.sections().iter().map(|section| section.length_mm / section.radius_mm);
         (each.sum::<f64>() / self.contact_spacing_radii) as usize
     }
 
-    /// Elements of this length, with contact points that feel any crest.
+    /// Elements of this length, with contact points dense enough for any crest.
     pub fn of_elements(element_mm: f64) -> Self {
         Self { element_mm, contact_spacing_radii: Self::CONTACT_SPACING_RADII }
     }
@@ -53,11 +55,11 @@ pub struct Mesh {
     pub elements: Vec<ElementData>,
     /// Contact points, tip first.
     pub points: Vec<ContactPoint>,
-    /// Lengths inserted of several instruments; empty for a device alone.
+    /// Inserted lengths of several instruments; empty for a single device.
     pub(super) inserted_mm: Vec<f64>,
 }
 
-/// A length of device between ends of sections.
+/// A stretch of device between ends of sections.
 struct Stretch {
     /// Its end, from the device's tip, mm.
     end_mm: f64,
@@ -65,8 +67,8 @@ struct Stretch {
     curvature_per_mm: f64,
 }
 
-/// The stretches of a device from its tip on, none shorter than half an element but the last: tapers of many short sections need no node
-/// for each.
+/// The stretches of a device from its tip on, none shorter than half an element but the last and that at the end of a coil: tapers of many short sections
+/// need no node for each, and a coil is detached at a node.
 fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> {
     let mut left = device.sections().iter();
     let (mut begin, mut end) = (0.0, 0.0);
@@ -76,7 +78,7 @@ fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> 
             end += section.length_mm;
             let [u, v] = section.rest_curvature_per_mm;
             curvature_per_mm = curvature_per_mm.max(libm::hypot(u, v));
-            if end - begin >= 0.5 * element_mm {
+            if end - begin >= 0.5 * element_mm || device.is_coil_end(end) {
                 break;
             }
         }
@@ -86,7 +88,7 @@ fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> 
     })
 }
 
-/// Where stretches of a device begin behind its tip, mm.
+/// Starts of the stretches of a device behind its tip, mm.
 pub(super) fn section_ends(device: &Device, element_mm: f64) -> impl Iterator<Item = f64> {
     let ends = stretches(device, element_mm).map(|stretch| stretch.end_mm);
     ends.take_while(|end| *end < device.length_mm())
@@ -94,11 +96,12 @@ pub(super) fn section_ends(device: &Device, element_mm: f64) -> impl Iterator<It
 
 /// Writes the arc lengths from the tip of the nodes of `inserted_mm` (above 0) of `device`, sheath first, tip (0) last.
 ///
-/// Nodes are marks on the device and enter with it: the ends of its sections, and between them marks that are one element apart, or as
-/// near to that as even pieces allow; nearer where a rest shape turns by more than [`LARGEST_TURN`] over an element. Over an element that
-/// held the end of a section stiffness and rest curvature would jump, and one that is too long for its shape stores energy where the
-/// device stores none: both hang on how far the element is out of the sheath, and a hook on its way out had to be pushed. The first
-/// element is no shorter than half of one where a mark enters, and as short as [`NEAR`] where the end of a section does.
+/// Nodes are marks on the device and enter with it: the ends of its sections, and between them equally spaced marks
+/// about one element apart; closer where the rest shape bends by more than [`LARGEST_TURN`] in an element. In an
+/// element that contained the end of a section, stiffness and rest curvature would jump, and an element too long for
+/// its shape stores energy where the device stores none: both would depend on how far the element is out of the
+/// sheath, and would cause a spurious push force on a hook. The first element is at least half an element long where
+/// a mark enters, and may be as short as [`NEAR`] where the end of a section does.
 fn nodes_from_tip(device: &Device, inserted_mm: f64, element_mm: f64, from_tip_mm: &mut Vec<f64>) {
     from_tip_mm.clear();
     from_tip_mm.push(0.0);
@@ -109,7 +112,7 @@ fn nodes_from_tip(device: &Device, inserted_mm: f64, element_mm: f64, from_tip_m
         let length_mm = end_mm - from;
         let bends = (length_mm * curvature_per_mm / LARGEST_TURN - 1e-9).ceil();
         let pieces = (length_mm / element_mm).round().max(bends).max(1.0);
-        // Where nothing follows elements are as long as they are asked for.
+        // In the last stretch elements have the requested length.
         let piece_mm = if is_last { longest_mm } else { length_mm / pieces };
         let marks = (1..).map(|k| (k as f64, from + k as f64 * piece_mm));
         let inner =
@@ -126,7 +129,7 @@ fn nodes_from_tip(device: &Device, inserted_mm: f64, element_mm: f64, from_tip_m
 }
 
 impl Mesh {
-    /// Nothing inserted: one node. Keeps the memory.
+    /// Resets to nothing inserted: one node. Keeps the memory.
     pub(super) fn clear(&mut self) {
         self.from_tip_mm.clear();
         self.from_tip_mm.push(0.0);
@@ -135,12 +138,13 @@ impl Mesh {
         self.inserted_mm.clear();
     }
 
-    /// Number of elements of the line; those of coils follow where they are solved for together.
+    /// Number of elements of the line; those of coils follow when they are solved together.
     pub(super) fn line(&self) -> usize {
         self.from_tip_mm.len() - 1
     }
 
-    /// Element and ξ of a place so far from the tip, mm. `e` is where to start looking: calls go from the tip to the sheath.
+    /// Element and ξ at this distance from the tip, mm. `e` is where the search starts: calls go from the tip to the
+    /// sheath.
     pub(super) fn place(&self, from_tip_mm: f64, e: &mut usize) -> (usize, f64) {
         while *e > 0 && from_tip_mm >= self.from_tip_mm[*e] {
             *e -= 1;
@@ -149,13 +153,13 @@ impl Mesh {
         (*e, xi.clamp(0.0, 1.0))
     }
 
-    /// The node nearest to a place so far from the tip, mm.
+    /// The node nearest to this distance from the tip, mm.
     pub(super) fn nearest_node(&self, from_tip_mm: f64) -> usize {
         let off = |i: &usize| (self.from_tip_mm[*i] - from_tip_mm).abs();
         (0..self.from_tip_mm.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
     }
 
-    /// Takes memory for up to `elements` elements and `points` contact points.
+    /// Allocates for up to `elements` elements and `points` contact points.
     pub(super) fn reserve(&mut self, elements: usize, points: usize) {
         self.from_tip_mm.reserve((elements + 1).saturating_sub(self.from_tip_mm.len()));
         self.elements.reserve(elements.saturating_sub(self.elements.len()));
@@ -164,10 +168,10 @@ impl Mesh {
 
     /// Meshes `inserted_mm` (above 0) of `device`.
     ///
-    /// Nodes are the ends of its sections, and even marks between them.
+    /// Nodes are the ends of its sections, and equally spaced marks between them.
     pub fn build(&mut self, device: &Device, inserted_mm: f64, fineness: Fineness, modulus_n_per_mm2: f64) {
         self.build_points(device, inserted_mm, fineness, modulus_n_per_mm2);
-        // Only what one device needs is written: of elements that were here before the rest is empty.
+        // Only fields for a single device are written: the rest of earlier elements is empty.
         self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
         for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {
             let length = ends[0] - ends[1];
@@ -184,7 +188,7 @@ impl Mesh {
         }
     }
 
-    /// Sets nodes and contact points as [`Mesh::build`] does, and leaves the elements alone.
+    /// Sets nodes and contact points like [`Mesh::build`], without changing the elements.
     pub(super) fn build_points(
         &mut self,
         device: &Device,
@@ -196,13 +200,14 @@ impl Mesh {
         nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
         self.points.clear();
         let most = 1.0 + fineness.points(device) as f64;
-        // Half of the interval beyond the point at hand; beyond the tip there is its cap.
+        // Half of the interval beyond the current point; beyond the tip this is its cap.
         let mut half_beyond = device.section_at(0.0).radius_mm;
         let last = self.from_tip_mm.len() - 2;
         for (e, ends) in self.from_tip_mm.windows(2).enumerate().rev() {
             let length = ends[0] - ends[1];
             let radius_mm = device.section_at(ends[1]).radius_mm;
-            // A thin tip that is too short for an element of its own gives that its radius, and asks for no more points than the whole device does.
+            // A thin tip too short for an element of its own determines the element's radius, without requiring more
+            // points than the device has in all.
             let intervals = (length / (contact_spacing_radii * radius_mm)).ceil();
             let intervals = intervals.min(most).max(FEWEST_INTERVALS);
             let spacing = length / intervals;
@@ -212,7 +217,7 @@ impl Mesh {
             while at < (1.0 - 1e-9) * length {
                 let left = length - at;
                 let step = fine.min(spacing);
-                // The intervals that are left are made equal where the fine ones end.
+                // Where the fine intervals end, the remaining ones are made equal.
                 let step =
                     if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
                 self.points.push(ContactPoint {
@@ -259,7 +264,7 @@ mod tests {
             let gaps = mesh.points.windows(2).map(|pair| pair[1].from_tip_mm - pair[0].from_tip_mm);
             (points[k], widest[k]) = (mesh.points.len(), gaps.fold(0.0, f64::max) / 0.445);
             assert!(widest[k] <= contact_spacing_radii && widest[k] > 0.9 * contact_spacing_radii);
-            // Together they stand for all of the device and its cap.
+            // Their weights sum to the whole device and its cap.
             let all_mm: f64 = mesh.points.iter().map(|point| point.weight_mm).sum();
             assert!((all_mm - 50.0 - 0.445).abs() < 0.5 * contact_spacing_radii * 0.445 + 1e-9, "{all_mm}");
         }
@@ -306,7 +311,7 @@ mod tests {
                 let asked = Fineness::of_elements(element_mm).points(&device);
                 let most = 2 * asked + MOST_POINTS + 2 * mesh.elements.len();
                 assert!(mesh.points.len() <= most, "{} points, {element_mm} mm", mesh.points.len());
-                // A section that is too short for an element of its own is felt as its neighbour is.
+                // A section too short for an element of its own has the contact points of its neighbour.
                 let all = element_mm > 1.0 || mesh.points.len() >= asked;
                 assert!(all, "{} points, {element_mm} mm", mesh.points.len());
             }

@@ -1,17 +1,18 @@
-//! Our method: the exact rod in equilibrium with the wall, after every command.
+//! This crate's method: the exact rod in equilibrium with the wall, after every command.
 //!
 //! The inserted length is a Kirchhoff rod ([`crate::rod`]) clamped in the sheath's mouth and free at its tip, in the
-//! energy of the wall ([`crate::contact`]). A command changes the inserted length and turns the tail; the rod slides
-//! along its own curve and Newton's method takes it from there to the next minimum of the potential energy. What
-//! the hand feels follows from the equilibrium: with n and m the internal force and moment in the sheath's mouth,
+//! energy of the wall ([`crate::contact`]). A command changes the inserted length and rotates the tail; the rod
+//! slides along its own curve and Newton's method takes it from there to the nearest minimum of the potential energy.
+//! The hand's force and torque follow from the equilibrium: with n and m the internal force and moment in the
+//! sheath's mouth,
 //!
 //! ```text
 //! F = −n·t − ½ EI |κ|² − ½ GJ τ²,    M = m·t
 //! ```
 //!
-//! of which the terms after the first are configurational: the energy that the next piece takes up as it leaves the
-//! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect
-//! to the inserted length.
+//! of which the terms after the first are configurational: the energy that the next piece stores as it leaves the
+//! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with
+//! respect to the inserted length.
 
 mod balance;
 mod blocked;
@@ -93,7 +94,7 @@ impl MethodChoice for KirchhoffOptions {
         if surroundings.stack.is_several() {
             return several(*self, surroundings, store);
         }
-        // A shape turns with the device, and friction twists it.
+        // A rest shape rotates with the device, and friction twists it.
         let twists = surroundings.device.is_shaped() || surroundings.properties.has_friction();
         Ok(if twists {
             Box::new(Kirchhoff::<TWISTED>::new(*self, surroundings, store)?)
@@ -107,7 +108,7 @@ impl MethodChoice for KirchhoffOptions {
     }
 }
 
-/// The method for several instruments, with the sets of angles that they have.
+/// The method for several instruments, given the number of their sets of angles.
 fn several(
     options: KirchhoffOptions,
     surroundings: &Surroundings<'_>,
@@ -121,13 +122,13 @@ fn several(
     })
 }
 
-/// A residual above this says nothing about an equilibrium.
+/// Largest tolerance: a larger residual does not indicate an equilibrium.
 const LARGEST_TOLERANCE: f64 = 1e-2;
-/// Contact points farther apart than this leave most of a device unfelt.
+/// Largest spacing of contact points: beyond it most of a device would have no contact.
 const LARGEST_CONTACT_SPACING_RADII: f64 = 10.0;
-/// Most contact points of all instruments: hundreds of bytes each.
+/// Largest number of contact points of all instruments: hundreds of bytes each.
 const POINT_LIMIT: usize = 1_000_000;
-/// Most elements of a device: some kilobytes each.
+/// Largest number of elements of a device: some kilobytes each.
 const ELEMENT_LIMIT: f64 = 100_000.0;
 
 /// The exact rod as an insertion method, with or without material angles.
@@ -135,29 +136,29 @@ pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
     surface: Arc<ContactSurface>,
     state: Arc<KirchhoffState>,
-    /// That of the state, for those who ask, …
+    /// The centre line of the state, for reports.
     shape: Shape,
-    /// … and the coils that were detached.
+    /// The detached coils.
     coils: Vec<DetachedCoil>,
     counters: Counters,
-    /// Made when the first command comes.
+    /// Created with the first command.
     workspace: Option<Box<Workspace<C>>>,
 }
 
-/// What a step reads and does not change.
+/// Inputs of a step that it does not change.
 #[derive(Clone, Copy)]
 struct Environment<'a> {
     surroundings: Surroundings<'a>,
     surface: &'a ContactSurface,
     options: &'a KirchhoffOptions,
-    /// Where the vessel is; none where it never moves.
+    /// Displacement of the vessel; `None` if it never moves.
     displacement: Option<&'a Displacement>,
     /// How far the step has gone into the fields after it, 0 to 1.
     fields_part: f64,
 }
 
 impl<'a> Environment<'a> {
-    /// Of a vessel at rest.
+    /// For a vessel at rest.
     fn new(
         surroundings: &Surroundings<'a>,
         surface: &'a ContactSurface,
@@ -166,7 +167,7 @@ impl<'a> Environment<'a> {
         Self { surroundings: *surroundings, surface, options, displacement: None, fields_part: 1.0 }
     }
 
-    /// The same where the vessel is displaced.
+    /// The same environment with the vessel displaced.
     fn displaced<'b>(&self, displacement: Option<&'b Displacement>) -> Environment<'b>
     where
         'a: 'b,
@@ -196,17 +197,17 @@ impl<'a> Environment<'a> {
         self.surroundings.properties.has_friction() || self.options.self_friction > 0.0
     }
 
-    /// The wall where it is.
+    /// The wall at its displacement.
     fn wall(&self) -> MovedWall<'a> {
         MovedWall::new(self.surface, self.displacement)
     }
 }
 
 impl<const C: usize> Kirchhoff<C> {
-    /// The method with nothing inserted; the even mesh of the wall comes from `store`.
+    /// The method with nothing inserted; the uniform mesh of the wall comes from `store`.
     ///
     /// # Errors
-    /// An element length that is not positive or cuts the device into too many elements.
+    /// An element length that is not positive or leads to too many elements.
     pub fn new(
         options: KirchhoffOptions,
         surroundings: &Surroundings<'_>,
@@ -266,7 +267,7 @@ impl<const C: usize> Kirchhoff<C> {
         Ok(method)
     }
 
-    /// Whether nothing is left to do: hands and vessel rest, and so does the device; its report then says so.
+    /// Whether nothing remains to be done: hands, vessel and device are at rest; its report then says so.
     fn rests(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
         let still = moves.iter().all(|one| one.command == Command::default());
         let rests = still
@@ -279,7 +280,8 @@ impl<const C: usize> Kirchhoff<C> {
         rests
     }
 
-    /// Has the workspace work on, and goes on to the state that it leaves if it says that there is a new one; where that fails, to none.
+    /// Runs `work` in the workspace, and moves to its new state if it reports one; on an error the state is
+    /// unchanged.
     fn work_on<T>(
         &mut self,
         surroundings: &Surroundings<'_>,
@@ -305,7 +307,7 @@ impl<const C: usize> Kirchhoff<C> {
         done.map(|(_, told)| told)
     }
 
-    /// Checks that a state may be one of this simulation where the hands are at `hands`, and returns the mesh that it has then.
+    /// Checks that a state is possible for this simulation with the hands at `hands`, and returns its mesh.
     fn check(&self, surroundings: &Surroundings<'_>, state: &KirchhoffState, hands: &[Hand]) -> Result<Mesh> {
         let devices = surroundings.stack.devices();
         if hands.len() != devices.len() {
@@ -333,7 +335,7 @@ impl<const C: usize> Kirchhoff<C> {
         Ok(mesh)
     }
 
-    /// The centre lines of the state, that of the device with nodes at these arc lengths from the tip.
+    /// Stores the centre lines of the state; the device's nodes are at these arc lengths from the tip.
     fn write_shape(&mut self, from_tip_mm: &[f64]) {
         let rod = &self.state.rod;
         self.shape.positions_mm.clone_from(&rod.positions);
@@ -347,7 +349,7 @@ impl<const C: usize> Kirchhoff<C> {
 }
 
 impl<const C: usize> Clone for Kirchhoff<C> {
-    /// Shares the wall and the state, and makes a workspace of its own with its first command.
+    /// Shares the wall and the state; its workspace is created with its first command.
     fn clone(&self) -> Self {
         Self {
             options: self.options,
@@ -385,7 +387,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         });
         match ticked {
             Ok(Ticked::Moved) => Ok(()),
-            // Time goes on: what the vessel does to the device cannot wait.
+            // Time proceeds, so the motion of the vessel cannot be postponed.
             Ok(Ticked::Overtaken) => self.step_together(surroundings, moves),
             Ok(Ticked::Rests(longest_mm, begun)) => {
                 let state = Arc::make_mut(&mut self.state);
@@ -416,6 +418,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.work_on(surroundings, |workspace, environment, state| {
             workspace.detach(environment, state, instrument).map(|()| (true, ()))
         })
+    }
+
+    fn check_detach(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        detach::check(&environment, &self.state, instrument).map(drop)
     }
 
     fn coils(&self) -> &[DetachedCoil] {
@@ -501,7 +508,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
 /// The name of the method in scenes and states.
 const NAME: &str = "kirchhoff";
 
-/// Meshes what is inserted.
+/// Meshes the inserted length.
 fn meshed(environment: &Environment<'_>, hands: &[Hand], mesh: &mut Mesh) {
     let Surroundings { device, stack, properties, .. } = environment.surroundings;
     let (fineness, modulus) = (environment.options.fineness(), properties.modulus_n_per_mm2);

@@ -8,7 +8,7 @@ use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use crate::{Result, Vec3};
 use nalgebra::{Rotation3, Unit};
 
-/// What is pushed into what.
+/// Parameters of the device and the wall.
 #[derive(Clone, Copy)]
 struct Setting {
     modulus_n_per_mm2: f64,
@@ -16,12 +16,12 @@ struct Setting {
     hook: bool,
 }
 
-/// What equilibria leave of forces: that of the default leaves 10⁻⁷ mm of a place, by which two ways to one equilibrium differ.
+/// Tolerance of equilibria: the default leaves errors of 10⁻⁷ mm, by which two paths to one equilibrium differ.
 const TOLERANCE: f64 = 1e-12;
 
 const SOFT: Setting = Setting { modulus_n_per_mm2: 1.0, friction: 0.0, hook: false };
 
-/// A tube of radius 4 mm that is straight for 100 mm and bends then.
+/// A tube of radius 4 mm, straight for 100 mm and then bent.
 fn tube() -> Wall {
     GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap().wall
 }
@@ -50,14 +50,14 @@ fn wire(setting: Setting, motion: &[MotionMode]) -> Simulation {
     wire_in(tube(), Vec3::z(), setting, motion)
 }
 
-/// The same in the tube as a field has displaced it.
+/// As [`wire`], in the tube displaced by a field.
 fn wire_in_moved(setting: Setting, displacement: &Displacement) -> Simulation {
     let mut mesh = tube().mesh().clone();
     mesh.vertices_mm.iter_mut().for_each(|v| *v = displacement.place(v));
     wire_in(Wall::welded(&mesh).unwrap(), Vec3::z(), setting, &[])
 }
 
-/// A displacement of all of the vessel.
+/// A uniform displacement of the vessel.
 fn displaced(waveform: Waveform) -> MotionMode {
     MotionMode {
         waveform,
@@ -70,7 +70,7 @@ fn displaced(waveform: Waveform) -> MotionMode {
     }
 }
 
-/// A turn of all of it about the sheath's mouth.
+/// A rotation of the vessel about the sheath's mouth.
 fn turned(waveform: Waveform) -> MotionMode {
     let turn = Some(Turn { centre_mm: [0.0, 0.0, 6.0], axis: AXIS, angle_deg: ANGLE_DEG });
     MotionMode { displacement_mm: [0.0; 3], turn, ..displaced(waveform) }
@@ -96,7 +96,7 @@ fn push(simulation: &mut Simulation, length_mm: f64) -> Result<()> {
     Ok(())
 }
 
-/// Goes on to a time in steps of a tenth of a second, hands at rest.
+/// Waits until a time in steps of a tenth of a second, hands at rest.
 fn wait(simulation: &mut Simulation, until_s: f64) -> Result<()> {
     let start_s = simulation.time_s();
     let count = ((until_s - start_s) / 0.1).round();
@@ -136,7 +136,7 @@ fn in_a_vessel_that_is_displaced_the_rod_is_that_of_the_moved_scene() {
             assert!(off_mm < 1e-8, "{off_mm} mm in step {step}");
         }
         assert!(!moving.report().contacts.is_empty());
-        // What would be felt without the motion.
+        // The difference the motion makes.
         assert!(apart_mm(&resting, &moved) > 0.5);
         let (one, other) = (moving.report(), moved.report());
         assert!((one.push_force_n - other.push_force_n).abs() < 1e-7 * other.push_force_n.abs().max(0.01));
@@ -145,7 +145,7 @@ fn in_a_vessel_that_is_displaced_the_rod_is_that_of_the_moved_scene() {
 
 #[test]
 fn in_a_vessel_that_is_turned_the_rod_is_that_of_the_moved_scene() {
-    // Seen from the vessel, the sheath is turned the other way.
+    // Relative to the vessel, the sheath is rotated the other way.
     let mode = turned(Waveform::Steady);
     let rotation = Rotation3::from_axis_angle(&Unit::new_normalize(Vec3::from(AXIS)), ANGLE_DEG.to_radians());
     let mouth = Vec3::z() * 6.0;
@@ -162,7 +162,7 @@ fn in_a_vessel_that_is_turned_the_rod_is_that_of_the_moved_scene() {
         assert!(!moving.report().contacts.is_empty());
         assert!(apart_mm(&moving, &seen) > 5.0);
     }
-    // And against a mesh that is turned.
+    // And compared with a rotated mesh.
     let there = VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0);
     for setting in &SETTINGS[..3] {
         let (mut moving, mut moved) = (wire(*setting, &[mode]), wire_in_moved(*setting, &there));
@@ -215,7 +215,7 @@ fn what_a_breath_stores_is_the_work_of_the_wall() {
         let before = (simulation.report().contacts.clone(), simulation.displacement().unwrap());
         simulation.step_until(&[], Some(0.02 * f64::from(k))).unwrap();
         let after = (simulation.report().contacts.clone(), simulation.displacement().unwrap());
-        // Half of it by the forces before, half by those after: the hand rests, and the sheath does not move.
+        // Mean of the work of the forces before and after: the hand rests, and the sheath does not move.
         for (contacts, here) in [&before, &after] {
             for contact in contacts {
                 let material = here.material(&contact.position_mm);
@@ -266,7 +266,7 @@ fn friction_slips_along_the_material_points_of_the_wall() {
     push(&mut simulation, 180.0).unwrap();
     let begun = simulation.clone();
     wait(&mut simulation, 4.0).unwrap();
-    // A breath does work against friction, and what it was led to is not what it came from.
+    // A breath does work against friction, and the device ends at another state than it started from.
     assert!(apart_mm(&simulation, &begun) > 1e-3);
     let mut again = begun.clone();
     let mut taken_mj = 0.0;
@@ -278,13 +278,14 @@ fn friction_slips_along_the_material_points_of_the_wall() {
 
 #[test]
 fn a_wall_that_goes_along_with_the_device_does_not_rub() {
-    // Along the straight piece, in which the wire lies on the wall: what the wall does is what the hand does with the other sign.
+    // Along the straight piece, in which the wire lies on the wall: a motion of the wall equals the opposite motion
+    // of the hand.
     let along = MotionMode { displacement_mm: [0.0, 0.0, 1.0], turn: None, ..displaced(Waveform::Breathing) };
     let setting = Setting { friction: 0.3, ..SOFT };
     let surface = |motion: &[MotionMode], advance_mm: f64| {
         let mut simulation = wire(setting, motion);
         push(&mut simulation, 150.0).unwrap();
-        // The hand goes as a breath does, 1 mm in 2 s: what they differ by on the way would rub.
+        // The hand moves like a breath, 1 mm in 2 s: any difference between them on the way would cause friction.
         let breath = VesselMotion::new(&[along]).unwrap().unwrap();
         let at_mm = |k: u32| advance_mm * breath.at(0.1 * f64::from(k)).place(&Vec3::zeros()).z;
         let mut step = |k: u32| {

@@ -1,19 +1,21 @@
-//! Settings of the exact rod, one by one or together.
+//! Options of the exact rod, set one by one or together.
 
 use serde::{Deserialize, Serialize};
 
 use super::mesh::Fineness;
 
-/// How exact equilibria are: `method.accuracy` sets length of elements, distance of contact points and tolerance together.
+/// Accuracy of equilibria: `method.accuracy` sets element length, spacing of contact points and tolerance together.
 ///
-/// Errors are those of the device's line against elements of 1 mm with points a quarter of a radius apart, at nine of ten commands, in the worst
-/// of eight scenes with wires of 0.5 to 0.9 mm in arteries of 2 to 12 mm radius; times are means over these, in those of `Balanced`
-/// (`cargo run --release -p endowire-benches --bin precision`). Elements give little of the error up to 4 mm and points most of it;
-/// the tolerance gives none, but every tenth of it takes another iteration or less.
+/// Errors are those of the device's line against elements of 1 mm with points a quarter of a radius apart, at nine of
+/// ten commands, in the worst of eight scenes with wires of 0.5 to 0.9 mm in arteries of 2 to 12 mm radius; times are
+/// means over these, relative to `Balanced` (`cargo run --release -p endowire-benches --bin precision`). Most of the
+/// error is due to the spacing of points, little to elements up to 4 mm, and none to the tolerance, but each factor
+/// of ten costs at most one more iteration.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Accuracy {
-    /// Elements of 6 mm, points 1.5 radii apart, tolerance 10⁻⁴: 0.05 mm in 0.7 of the time, for learning and by hand.
+    /// Elements of 6 mm, points 1.5 radii apart, tolerance 10⁻⁴: 0.05 mm in 0.7 of the time, for learning and manual
+    /// play.
     Fast,
     /// Elements of 4 mm, points a radius apart, tolerance 10⁻⁵: 0.02 mm.
     #[default]
@@ -22,7 +24,7 @@ pub enum Accuracy {
     Fine,
 }
 
-/// Options as they are written: what is left out is that of the accuracy, if one is given.
+/// Options as written in a scene: absent ones are those of the accuracy, if given.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -55,22 +57,24 @@ impl From<Written> for KirchhoffOptions {
 pub struct KirchhoffOptions {
     /// Element length, mm.
     pub element_mm: f64,
-    /// Force or moment that an equilibrium leaves at a node, over the largest in the device, its wall and its supports.
+    /// Largest unbalanced force or moment at a node, relative to the largest in the device, its wall and its
+    /// supports.
     pub tolerance: f64,
-    /// Most Newton iterations of one solution; a command may take ten times as many.
+    /// Largest number of Newton iterations of one solution; a command may take ten times as many.
     pub max_iterations: usize,
-    /// Most distance of contact points, in radii of the device. At 1.5 a sharp crest between two of them is felt when it is two thirds of a
-    /// radius from the axis, above 2 it may not be felt at all. On walls without sharp crests a few radii save time for little.
+    /// Largest spacing of contact points, in radii of the device. At 1.5 a sharp crest between two of them comes to
+    /// within two thirds of a radius of the axis before contact, above 2 it may be missed. On walls without sharp
+    /// crests a few radii save time at little loss.
     pub contact_spacing_radii: f64,
-    /// Whether loops of the device touch each other. Off: most vessels are too narrow for a device to come back to itself in them, and
-    /// where it cannot, nothing is gained by looking; on wherever a loop has room.
+    /// Contact between loops of the device. Off by default, since most vessels are too narrow for loops; switch it on
+    /// where a loop has room.
     pub self_contact: bool,
-    /// Coefficient of friction where loops, and coils that were detached, touch each other; platinum on platinum in blood has about 0.2.
+    /// Coefficient of friction between loops, and with detached coils; about 0.2 for platinum on platinum in blood.
     pub self_friction: f64,
 }
 
 impl KirchhoffOptions {
-    /// Those of an accuracy.
+    /// The options for an accuracy.
     pub fn of(accuracy: Accuracy) -> Self {
         let (element_mm, contact_spacing_radii, tolerance) = match accuracy {
             Accuracy::Fast => (6.0, 1.5, 1e-4),
@@ -87,7 +91,7 @@ impl KirchhoffOptions {
         }
     }
 
-    /// How finely it meshes.
+    /// The resolution of the mesh.
     pub(super) fn fineness(&self) -> Fineness {
         Fineness { element_mm: self.element_mm, contact_spacing_radii: self.contact_spacing_radii }
     }

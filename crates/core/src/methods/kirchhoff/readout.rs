@@ -1,4 +1,4 @@
-//! The report of a step: energies, contacts, and what the hand feels.
+//! The report of a step: energies, contacts, and the hand's forces.
 
 use super::Environment;
 use super::configuration::Configuration;
@@ -14,7 +14,8 @@ use crate::methods::{Energy, Surroundings};
 use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Tools<C> {
-    /// Read-outs at a configuration, that of the last sub-step. Returns the energy that friction in hubs and in the sheath took, mJ.
+    /// Writes the report of a configuration, that of the last sub-step. Returns the energy dissipated by friction in
+    /// hubs and in the sheath, mJ.
     pub(super) fn write_report(
         &mut self,
         environment: &Environment<'_>,
@@ -61,7 +62,7 @@ impl<const C: usize> Tools<C> {
                 true => self.loops.pressing().collect(),
                 false => Vec::new(),
             };
-            // Those of coils come last.
+            // Contacts of coils come last.
             let on_line = self.touches.partition_point(|(point, _)| *point < mesh.points.len());
             let acting = Acting { wall: &self.touches[..on_line], between, loops: &loops, drag };
             write_instruments::<C>(environment, hands, Some(&clamp), acting, at);
@@ -80,7 +81,7 @@ impl<const C: usize> Tools<C> {
         self.rub_in_sheath(surroundings, &clamp, at)
     }
 
-    /// The same where nothing is inserted: hands feel nothing.
+    /// The report with nothing inserted: the hands feel no force.
     fn write_withdrawn(&self, environment: &Environment<'_>, hands: &[Hand], at: &mut Configuration) -> f64 {
         let report = &mut at.parts().1.report;
         (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
@@ -90,8 +91,8 @@ impl<const C: usize> Tools<C> {
         0.0
     }
 
-    /// What a hand feels of friction in the sheath, that of the outermost instrument in it, is added to the report; returns the energy that
-    /// it took, mJ.
+    /// Adds friction in the sheath, on the outermost instrument in it, to the hand's forces in the report; returns
+    /// the dissipated energy, mJ.
     fn rub_in_sheath(&self, surroundings: &Surroundings<'_>, clamp: &Clamp, at: &mut Configuration) -> f64 {
         let sheath = surroundings.sheath;
         if !sheath.has_friction() {
@@ -120,10 +121,11 @@ impl<const C: usize> Tools<C> {
         friction_n * slip_mm
     }
 
-    /// What hands feel of valves on the hubs of instruments is added to the report; returns the energy that it took, mJ.
+    /// Adds friction of valves on the hubs of instruments to the hands' forces in the report; returns the dissipated
+    /// energy, mJ.
     ///
-    /// An instrument is held by the valve of the next one outside it that is in, F₀ against its slip u = (Δ, r θ) in that one, and holds the
-    /// other with as much: outside of the body both are straight, and nothing inside moves.
+    /// The valve of the next inserted instrument outside it holds an instrument by F₀ against its slip u = (Δ, r θ)
+    /// in that one, with the opposite reaction: outside the body both are straight, and nothing inside moves.
     fn rub_in_valves(&self, stack: &Stack, at: &mut Configuration) -> f64 {
         let (mesh, state) = at.parts();
         let report = &mut state.report;
@@ -152,7 +154,8 @@ impl<const C: usize> Tools<C> {
         taken_mj
     }
 
-    /// What hands feel of friction along the line between instruments is added to the report; couples about it they feel anyway.
+    /// Adds friction along the line between instruments to the hands' forces in the report; couples about it already
+    /// act through the rod.
     fn rub(&self, at: &mut Configuration) {
         let state = at.parts().1;
         for place in self.friction.between.places() {

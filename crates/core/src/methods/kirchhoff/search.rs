@@ -1,20 +1,22 @@
-//! From a prediction to the equilibrium next to it, or to where the device comes to rest.
+//! From a prediction to the nearest equilibrium, or to where the device comes to rest.
 //!
-//! Newton's method goes from the prediction to a minimum, friction following the forces of contacts on the way. What that does not find
-//! is not near, and the part of the command is cut.
+//! Newton's method goes from the prediction to a minimum, with friction following the contact forces. If no
+//! equilibrium is found, it is not near, and the part of the command is shortened.
 //!
-//! Where nothing is near however short the part, friction is held to the normal forces that it began with: the energy then is bounded, every
-//! step of Newton's method lowers it, and it ends at a minimum. If friction that follows from there finds nothing near by, the hand holds still
-//! and the device slides on: slip begins anew where it is, with the normal forces that are felt there, until they no longer change. Each slide begins all but at rest,
-//! so that it ends lower than it began by what friction took,
+//! If none is near however short the part, friction is held at the normal forces of its start: then the energy is
+//! bounded below, every Newton step lowers it, and the iteration ends at a minimum. If friction that follows from
+//! there finds no equilibrium nearby, the hand holds still and the device relaxes: slip is repeatedly reset, with the
+//! current normal forces, until they no longer change. Each relaxation starts almost at rest, so it ends lower than
+//! it began by the dissipation,
 //!
 //! ```text
 //! E(xₖ₊₁) + Dₖ(xₖ₊₁) ≤ E(xₖ) + Dₖ(xₖ),    Dₖ(x) = Σ μ Nᵢ(xₖ) φ(|uᵢ(x; xₖ)|),    Dₖ(xₖ) ≤ Σ μ Nᵢ εₖ
 //! ```
 //!
-//! with the slip that is kept within εₖ, which shrinks to three tenths from slide to slide, down to a hundredth of that of the step; and as E
-//! is bounded below what friction takes comes to an end, and with it all slip beyond that. The limit is in equilibrium with forces within
-//! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest.
+//! with slip up to εₖ kept; εₖ shrinks by a factor of three tenths per relaxation, down to a hundredth of that of the
+//! step. As E is bounded below, the total dissipation is finite, and so is all slip beyond εₖ. The limit is an
+//! equilibrium with friction within the Coulomb cones of its own normal forces: the state in which a slow motion with
+//! friction comes to rest.
 
 use super::guess::Guess;
 use super::substep::Effort;
@@ -23,19 +25,19 @@ use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 
-/// Newton iterations of a solution near its prediction: from another one, nearer by, it is found in fewer.
+/// Largest number of Newton iterations of a solution near its prediction: shortening the part takes fewer.
 pub(super) const MOST_NEAR: usize = 60;
-/// Newton iterations of a solution while the device moves, …
+/// Largest number of Newton iterations of a solution in a relaxation.
 const MOST_MOVING: usize = 300;
-/// … and of all of them.
+/// Largest number of Newton iterations of all solutions in a relaxation.
 pub(super) const LONGEST: usize = 2000;
-/// Newton iterations from an equilibrium with friction held to one where it follows.
+/// Largest number of Newton iterations from an equilibrium with held friction to one with friction that follows.
 const FOLLOWING: usize = 20;
-/// Most slides with the hand held still. Two or three are the rule.
+/// Largest number of slides with the hand held still; two or three are typical.
 const SLIDES: u32 = 400;
-/// Drag that changes by less than this part on the way to an equilibrium is taken as it is; …
+/// Relative change of the drag up to which it is not renewed at an equilibrium.
 const DRAG_CHANGED: f64 = 1e-4;
-/// … it is renewed at most so often.
+/// Largest number of renewals of the drag.
 const DRAG_RENEWALS: usize = 5;
 
 /// A search for an equilibrium.
@@ -43,33 +45,33 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) newton: &'a mut Newton<C>,
     pub(super) guess: &'a mut Guess,
     pub(super) contact: &'a mut WallContact<'b>,
-    /// What its loops and coils do to each other, if they touch.
+    /// Contacts of loops and coils, if modelled.
     pub(super) loops: Option<&'a mut SelfContact>,
     /// What acts beside them.
     pub(super) beside: Vec<&'a mut dyn External>,
     pub(super) supports: &'a mut Supports,
     pub(super) elements: &'a [ElementData],
-    /// The prediction, and then what was found.
+    /// The prediction, then the result.
     pub(super) state: &'a mut RodState,
     /// Whether there is friction.
     pub(super) has_friction: bool,
-    /// Residual over force scale of an equilibrium.
+    /// Residual of an equilibrium, relative to the force scale.
     pub(super) tolerance: f64,
     pub(super) effort: Effort,
-    /// Most Newton iterations, …
+    /// Largest number of Newton iterations.
     pub(super) most: usize,
-    /// … and linear solves.
+    /// Largest number of linear solves.
     pub(super) most_solves: usize,
-    /// Newton iterations that were taken, …
+    /// Newton iterations taken.
     pub(super) iterations: usize,
-    /// … and linear solves.
+    /// Linear solves taken.
     pub(super) solves: usize,
-    /// How often the device slid on while the hand held still.
+    /// Number of slides with the hand held still.
     pub(super) slides: u32,
 }
 
 impl<const C: usize> Search<'_, '_, C> {
-    /// Finds it. What is returned is not converged where nothing was found, and with friction it has settled or not.
+    /// Searches. The report is not converged if nothing was found; with friction it may be unsettled.
     pub(super) fn run(&mut self) -> NewtonReport {
         if self.effort == Effort::Flight {
             self.most = LONGEST;
@@ -81,7 +83,7 @@ impl<const C: usize> Search<'_, '_, C> {
         self.on()
     }
 
-    /// From an equilibrium under the drag of where it was looked for to one under its own, where blood flows.
+    /// Iterates from an equilibrium with the drag at its start to one with its own, if blood flows.
     pub(super) fn dragged(&mut self, mut found: NewtonReport, flow: Option<&BloodFlow>) -> NewtonReport {
         let Some(flow) = flow else { return found };
         for _ in 0..DRAG_RENEWALS {
@@ -93,13 +95,13 @@ impl<const C: usize> Search<'_, '_, C> {
         found
     }
 
-    /// From a state to the equilibrium that follows.
+    /// From the state to the nearest equilibrium.
     pub(super) fn on(&mut self) -> NewtonReport {
         let found = self.newton();
         if self.effort == Effort::Near || !found.converged || self.is_settled() {
             return found;
         }
-        // To follow in vain may take all solves of a tick.
+        // Following friction in vain might take all solves of a tick.
         if self.effort == Effort::Moving {
             return self.slide(found);
         }
@@ -120,7 +122,7 @@ impl<const C: usize> Search<'_, '_, C> {
         self.slide(found)
     }
 
-    /// Newton's method from the state on.
+    /// Newton's method from the state.
     fn newton(&mut self) -> NewtonReport {
         let most = if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR };
         let options = NewtonOptions {
@@ -143,12 +145,12 @@ impl<const C: usize> Search<'_, '_, C> {
         found
     }
 
-    /// Has loops do something, if they touch.
+    /// Calls `what` on the self-contact, if modelled.
     fn with_loops(&mut self, what: impl FnMut(&mut SelfContact)) {
         self.loops.as_deref_mut().into_iter().for_each(what);
     }
 
-    /// Part by which the normal forces of friction differ from what presses in what was found.
+    /// Relative difference of the normal forces of friction from the contact forces at the result.
     pub(super) fn unsettled(&self) -> f64 {
         if !self.has_friction {
             return 0.0;
@@ -156,12 +158,13 @@ impl<const C: usize> Search<'_, '_, C> {
         self.contact.unsettled().max(self.loops.as_deref().map_or(0.0, SelfContact::unsettled))
     }
 
-    /// Whether friction knows the normal forces of what was found.
+    /// Whether friction has the normal forces of the result.
     fn is_settled(&self) -> bool {
         self.unsettled() < SETTLED
     }
 
-    /// With the hand held still, from an equilibrium with the normal forces of another to where the device comes to rest.
+    /// With the hand held still, relaxes an equilibrium with the normal forces of another state to where the device
+    /// rests.
     fn slide(&mut self, mut found: NewtonReport) -> NewtonReport {
         while found.converged && !self.is_settled() && self.slides < SLIDES {
             self.contact.anchor_friction(self.elements, self.state);

@@ -1,10 +1,12 @@
-//! What the hand of each of several instruments feels: slopes of the energy with respect to its own insertion and turn.
+//! Hand forces of several instruments: derivatives of the energy in the insertion and rotation of each.
 //!
-//! By the envelope theorem the derivative of the discrete energy with respect to an inserted length is that in the mesh alone, while
-//! tangents, chords over lengths and angles stay as they are: ends of the instrument and of its sections take their nodes along, and so do
-//! its contact points. It is exact for the mesh. Few elements change with it, of which differences of energies are taken; contact points
-//! and places where loops press on each other move, and do the work of the forces that they have. Where an instrument is twisted, what comes to lie at a node has another angle than what was there:
-//! unless the node goes with it, it turns on the way by τ a length, against the couples of friction between instruments. What the sheath no longer stores, ½EI|κ⁰|² a length, is part of it.
+//! By the envelope theorem the derivative of the discrete energy in an inserted length is that in the mesh alone, at
+//! fixed tangents, chords per length and angles: ends of the instrument and of its sections move with their nodes,
+//! and so do its contact points. It is exact for the mesh. Only a few elements change, whose energies are
+//! differenced; contact points and contacts between loops move, and do the work of their forces. Where an instrument
+//! is twisted, the material arriving at a node has another angle than that before: unless the node moves with it, it
+//! rotates by τ per length, against the couples of friction between instruments. The energy released by the sheath,
+//! ½EI|κ⁰|² per length, is part of it.
 
 use super::Environment;
 use super::coaxial::Nodes;
@@ -18,26 +20,26 @@ use crate::methods::InstrumentReport;
 use crate::rod::quadrature::hermite;
 use crate::rod::{Clamp, ElementData, RodState, element_energy};
 
-/// Step of the differences, as a part of the shortest element.
+/// Step of finite differences, as a fraction of the shortest element.
 const STEP: f64 = 1e-5;
-/// Steps within which ends meet, and by which a contact point or its weight changes at most.
+/// Number of steps within which ends count as flush, and by which a contact point or its weight changes at most.
 const MEET: f64 = 4.0;
 
-/// A contact point that presses on the wall, by its number.
+/// A contact point in contact with the wall, by its index.
 pub(super) type Pressed = (usize, Touch);
 
-/// What acts on instruments from outside their line, and between them.
+/// External forces on the instruments, and friction between them.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Acting<'a> {
     pub(super) wall: &'a [Pressed],
     /// Friction between instruments.
     pub(super) between: &'a [Place],
-    /// Loops that press on each other.
+    /// Contacts between loops.
     pub(super) loops: &'a [Pressing],
     pub(super) drag: Option<&'a Drag>,
 }
 
-/// Sets the reports of several instruments whose hands are there.
+/// Writes the reports of several instruments with these hands.
 pub(super) fn write_instruments<const C: usize>(
     environment: &Environment<'_>,
     hands: &[Hand],
@@ -66,7 +68,7 @@ pub(super) fn write_instruments<const C: usize>(
             torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
         });
     }
-    // Where ends are flush a hand alone feels a jump; what all of them feel together has a slope.
+    // Where ends are flush the force of a single hand jumps; that of all flush instruments together has a value.
     let flush: Vec<usize> = (0..told.len())
         .filter(|index| told[*index].push_force_n.is_none() && inserted[*index] > 0.0)
         .collect();
@@ -83,7 +85,8 @@ pub(super) fn write_instruments<const C: usize>(
     report.instruments = told;
 }
 
-/// Force with which the hands of those that move `together` push, with ends at one place if they are several; none where it jumps.
+/// Push force of the hands of instruments that move `together`, with flush ends if they are several; `None` where it
+/// jumps.
 fn push_force<const C: usize>(
     environment: &Environment<'_>,
     nodes: &Nodes,
@@ -104,7 +107,7 @@ fn push_force<const C: usize>(
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
-    // Where a point that presses comes or goes on one side, the other side's is taken.
+    // If an active point appears or vanishes on one side, the other side's slope is used.
     let wall = match (on.wall_slope(acting.wall, at, step), back.wall_slope(acting.wall, at, -step)) {
         (Some(on), Some(back)) => 0.5 * (on + back),
         (one, other) => one.or(other)?,
@@ -113,7 +116,7 @@ fn push_force<const C: usize>(
     let field = (on.field_mj(environment) - back.field_mj(environment)) / (2.0 * step);
     let turned = (on.turning_against(turning, at) - back.turning_against(turning, at)) / (2.0 * step);
     let dragged = acting.drag.map_or(0.0, |drag| {
-        // Where a point comes or goes on one side, the other side's is taken.
+        // If a point appears or vanishes on one side, the other side's is used.
         let each = at.mesh.points.iter().enumerate().filter_map(|(index, point)| {
             let way = match (on.moved_mm(point, at, step), back.moved_mm(point, at, step)) {
                 (Some(on), Some(back)) => (on - back) / (2.0 * step),
@@ -128,12 +131,13 @@ fn push_force<const C: usize>(
     Some(stored + wall + loops + field + turned - dragged - straightened_n.sum::<f64>())
 }
 
-/// Step of the differences, mm.
+/// Step of finite differences, mm.
 fn difference_mm(at: Start<'_>) -> f64 {
     STEP * at.mesh.elements.iter().map(|e| e.length).fold(f64::INFINITY, f64::min)
 }
 
-/// Twist of the instrument in a `set` of angles at node `i`, towards the tip: the mean of the elements beside it that it is in.
+/// Twist of the instrument in a `set` of angles at node `i`, towards the tip: the mean of the adjacent elements that
+/// contain it.
 fn twist_per_mm(at: Start<'_>, i: usize, set: usize) -> f64 {
     let is_in = |e: &usize| at.mesh.elements.get(*e).is_some_and(|data| data.materials[set].is_present());
     let (mut sum, mut count) = (0.0, 0.0);
@@ -146,14 +150,14 @@ fn twist_per_mm(at: Start<'_>, i: usize, set: usize) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// Where ξ of an element is.
+/// Position at ξ of an element.
 fn place_mm(elements: &[ElementData], rod: &RodState, (e, xi): RodPlace) -> Vec3 {
     let [w0, s0, w1, s1] = hermite(xi);
     let (x, frames) = (&rod.positions, &rod.frames);
     x[e] * w0 + x[e + 1] * w1 + (frames[e].t * s0 + frames[e + 1].t * s1) * elements[e].length
 }
 
-/// A node at which friction between two instruments, the inner one first, holds what is twisted.
+/// A node at which friction between two instruments, the inner one first, holds twist.
 struct Turning {
     node: usize,
     instruments: [usize; 2],
@@ -161,7 +165,7 @@ struct Turning {
     twists_per_mm: [f64; 2],
 }
 
-/// Those of the places where instruments rub.
+/// These nodes, from the places with friction between instruments.
 fn turning(between: &[Place], at: Start<'_>) -> Vec<Turning> {
     let each = between.iter().filter_map(|place| {
         let sets = place.sets?;
@@ -176,10 +180,10 @@ fn turning(between: &[Place], at: Start<'_>) -> Vec<Turning> {
     each.collect()
 }
 
-/// Instruments with other lengths inserted, near by, and the unknowns as they are.
+/// The configuration with slightly different inserted lengths, and unchanged unknowns.
 struct Beside {
     mesh: Mesh,
-    /// Elements that are not those of the lengths as they are.
+    /// Elements that differ from those of the current lengths.
     others: Vec<usize>,
     rod: RodState,
 }
@@ -201,9 +205,9 @@ impl Beside {
         Self { mesh, others, rod }
     }
 
-    /// By how much more energy the rod stores than on the other side, mJ.
+    /// Difference of the rod's stored energy from the other side, mJ.
     fn stored_more_than<const C: usize>(&self, other: &Self, at: Start<'_>) -> f64 {
-        // An element is another one on both sides, or on neither.
+        // An element differs on both sides, or on neither.
         let pairs = self.others.iter().map(|&e| (e, &self.mesh.elements[e], &other.mesh.elements[e]));
         let changed = pairs.filter(|(_, here, there)| here != there);
         let more = changed.map(|(e, here, there)| {
@@ -221,7 +225,7 @@ impl Beside {
     /// Work against the couples of friction between instruments on the way here, on which what lies at a node turns with its twist, mJ.
     fn turning_against(&self, between: &[Turning], at: Start<'_>) -> f64 {
         let each = between.iter().map(|place| {
-            // By how much farther from its tip is what lies there now.
+            // Change of the distance from its tip of the material there.
             let label = |mesh: &Mesh, k: usize| {
                 mesh.from_tip_mm[place.node] - (mesh.from_tip_mm[0] - mesh.inserted_mm[k])
             };
@@ -232,14 +236,15 @@ impl Beside {
         each.sum()
     }
 
-    /// By how much more loops store that press on each other, whose places move against their forces and stand for more or less length, mJ.
+    /// Change of the energy of contacts between loops, mJ: their points move against the forces and represent more or
+    /// less length.
     fn pressing_mj(&self, loops: &[Pressing], at: Start<'_>) -> f64 {
         let each = loops.iter().map(|pair| {
             let moved_mm = |place: RodPlace| {
                 place_mm(&self.mesh.elements, &self.rod, place)
                     - place_mm(&at.mesh.elements, &at.state.rod, place)
             };
-            // Coils are no part of it.
+            // Coils are not part of it.
             let on_line = |e: usize| e < at.mesh.elements.len();
             let [a, b] =
                 pair.places.map(|place| if on_line(place.0) { moved_mm(place) } else { Vec3::zeros() });
@@ -250,7 +255,7 @@ impl Beside {
         each.sum()
     }
 
-    /// The contact point that is another one `at` the place.
+    /// The contact point that differs `at` the current lengths.
     fn same_point(&self, was: &ContactPoint, step_mm: f64) -> Option<&ContactPoint> {
         let within = MEET * step_mm;
         let first = self.mesh.points.partition_point(|p| p.from_tip_mm < was.from_tip_mm - within);
@@ -259,8 +264,8 @@ impl Beside {
         near.find(|p| p.instrument == was.instrument && (p.weight_mm - was.weight_mm).abs() <= within)
     }
 
-    /// How far what lies at a contact point comes on the way here, if the point is still there. Points next to the mouth lag behind: what
-    /// comes in is met by elements that grow.
+    /// Motion of the material at a contact point in this change of lengths, if the point still exists. Points next to
+    /// the mouth lag behind: the first elements grow as material enters.
     fn moved_mm(&self, was: &ContactPoint, at: Start<'_>, step_mm: f64) -> Option<Vec3> {
         let is = self.same_point(was, step_mm.abs())?;
         let from_tip_mm = |p: &ContactPoint, mesh: &Mesh| {
@@ -272,8 +277,8 @@ impl Beside {
         Some(moved + self.rod.frames[is.element].t * lag_mm)
     }
 
-    /// Slope of the wall's energy towards here, N: points that press move against their forces, and stand for more or less length. `None`
-    /// where one of them is not here.
+    /// Slope of the wall's energy towards these lengths, N: active points move against their forces, and represent
+    /// more or less length. `None` if one of them does not exist here.
     fn wall_slope(&self, pressed: &[Pressed], at: Start<'_>, step_mm: f64) -> Option<f64> {
         let each = pressed.iter().map(|(index, touch)| {
             let was = &at.mesh.points[*index];

@@ -1,4 +1,4 @@
-//! All that the next step of the exact rod depends on.
+//! The complete state of the exact rod between steps.
 
 use std::fmt::Display;
 
@@ -16,67 +16,68 @@ use crate::rod::{Frame, RodState};
 use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
 
-/// The state of the exact rod: where it lies and with which forces, what the predictor has learnt, what its contact points know of the
-/// wall, and the report of the last step.
+/// The state of the exact rod: configuration and forces, the predictor's correction, what its contact points know of
+/// the wall, and the report of the last step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct KirchhoffState {
     pub(super) rod: RodState,
-    /// What presses at each contact point, tip first; empty without friction.
+    /// Normal forces at the contact points, tip first; empty without friction.
     pub(super) forces: Vec<NormalForce>,
-    /// Friction between instruments: for each node those that have one outside them, the innermost first; empty without.
+    /// Friction between instruments: for each node those that have one outside them, the innermost first; empty
+    /// without friction.
     pub(super) inner_friction: Vec<InnerFriction>,
     pub(super) known: KnownPoints,
     pub(super) correction: Correction,
-    /// How the next part of a command goes.
+    /// Step size of the next part of a command.
     pub(super) stride: Stride,
-    /// What ticks have begun.
+    /// Unfinished work of ticks.
     pub(super) tick: Ticking,
-    /// Coils that were detached.
+    /// Detached coils.
     #[serde(with = "crate::methods::state::shared")]
     pub(super) coils: Coils,
     pub(super) report: StepReport,
 }
 
-/// Where ticks have come to.
+/// Progress of ticks.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) enum Ticking {
     /// The device is at rest, and nothing has begun.
     #[default]
     Rest,
-    /// It is at rest, and a part to another place is being solved for.
+    /// It is at rest, and a part of the motion is being solved for.
     Solving(Box<UnderWay>),
-    /// It is on its way to where it comes to rest, for so many Newton iterations.
+    /// It is relaxing to where it comes to rest; number of Newton iterations so far.
     Moving(usize),
 }
 
-/// A part of a command that ticks have begun to solve for.
+/// A part of a command whose solution ticks have begun.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct UnderWay {
-    /// Where the hands are after it, …
+    /// Positions of the hands after it.
     pub(super) hands: Vec<Hand>,
-    /// … and the longest way of one there, mm.
+    /// The largest motion of a hand in it, mm.
     pub(super) part_mm: f64,
-    /// Where the device is in the solution, and what it presses with.
+    /// The device's state in the unfinished solution, with its normal forces.
     pub(super) state: KirchhoffState,
-    /// Where it was predicted.
+    /// The neighbourhood of its prediction.
     pub(super) neighbourhood: Neighbourhood,
-    /// Newton iterations that were taken.
+    /// Newton iterations taken.
     pub(super) iterations: usize,
 }
 
-/// What a mesh says of the states that belong to it.
+/// Sizes, given by a mesh, that its states must have.
 pub(super) struct Belongs<'a> {
     pub(super) stack: &'a Stack,
     pub(super) surface: &'a ContactSurface,
     pub(super) sheath: &'a Sheath,
     pub(super) fineness: Fineness,
-    /// Elements and contact points of the inserted length.
+    /// Numbers of elements and contact points of the inserted length.
     pub(super) elements: usize,
     pub(super) points: usize,
-    /// Sets of angles.
+    /// Number of sets of angles.
     pub(super) sets: usize,
     pub(super) inner_friction: bool,
-    /// Instruments that have one outside them, if any of them rubs in that.
+    /// Number of instruments with one outside them, if there is friction between any.
     pub(super) inner: usize,
 }
 
@@ -106,7 +107,7 @@ impl KirchhoffState {
         }
     }
 
-    /// The report of the step that led here.
+    /// The report of the step that led to this state.
     pub fn report(&self) -> &StepReport {
         &self.report
     }
@@ -116,7 +117,7 @@ impl KirchhoffState {
         self.rod.positions[self.rod.elements()]
     }
 
-    /// Takes memory for up to `elements` elements and `points` contact points.
+    /// Allocates for up to `elements` elements and `points` contact points.
     pub(super) fn reserve(&mut self, elements: usize, points: usize) {
         self.rod.reserve(elements);
         self.forces.reserve(points.saturating_sub(self.forces.len()));
@@ -126,7 +127,7 @@ impl KirchhoffState {
         contacts.reserve(points.saturating_sub(contacts.len()));
     }
 
-    /// Nothing is inserted any more: what is left are the angles of the tails.
+    /// Resets to nothing inserted: only the angles of the tails remain.
     pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
         self.rod.truncate(1);
         self.turn_tails(stack, hands);
@@ -136,13 +137,13 @@ impl KirchhoffState {
         self.correction.clear();
     }
 
-    /// Gives the tails the angles that their hands have.
+    /// Sets the angles of the tails to those of the hands.
     pub(super) fn turn_tails(&mut self, stack: &Stack, hands: &[Hand]) {
         if !stack.is_several() {
             self.rod.angles[0] = hands[0].turn_rad;
             return;
         }
-        // Where coils share angles those are that of the one which is in.
+        // Where coils share a set of angles, it is that of the inserted one.
         for is_in in [false, true] {
             for (set, hand) in stack.sets().iter().zip(hands) {
                 if let Some(set) = set.filter(|_| is_in == (hand.inserted_mm > 0.0)) {
@@ -152,7 +153,7 @@ impl KirchhoffState {
         }
     }
 
-    /// Checks that this is a state of a simulation with such a mesh: one that was read from a file may be any.
+    /// Checks that this is a state of a simulation with such a mesh: a file may contain anything.
     pub(super) fn check(&self, belongs: &Belongs<'_>) -> Result<()> {
         let n = belongs.elements;
         let elements = self.rod.elements();
@@ -221,7 +222,7 @@ impl KirchhoffState {
     }
 }
 
-/// Rounding of the length of a direction.
+/// Rounding of the length of a unit vector.
 const SAME_DIRECTION: f64 = 1e-12;
 
 fn show(v: &Vec3) -> String {

@@ -1,71 +1,72 @@
-//! How far the next part of a command goes.
+//! Step size control: the length of the next part of a command.
 //!
-//! An equilibrium far from its prediction is none of this path: half the part. One much nearer is followed by twice as much. Where friction
-//! that follows the wall's forces finds nothing near by, it is held, and the device slides to where it rests. Where parts
-//! become shorter than a stated length the path has come to its end, a fold: the device moves, and comes to rest elsewhere.
+//! An equilibrium far from its prediction may not be on this path: the part is halved. After one much nearer, the
+//! next part is doubled. If friction that follows the contact forces finds nothing nearby, it is held, and the device
+//! slides to rest. When parts become shorter than a given length the path has ended, at a fold: the device moves, and
+//! comes to rest elsewhere.
 
 use serde::{Deserialize, Serialize};
 
 use super::substep::{Effort, Found};
 
-/// Longest way of the hands in which the device moves from a fold, mm: how exactly the place of a fold is known.
+/// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
 pub(super) const FOLD_MM: f64 = 0.05;
-/// Longest part in which friction is held for the first time, mm: longer ones mostly fail since they are too long.
+/// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.
 pub(super) const HELD_MM: f64 = 0.5;
-/// Shortest way of the hands in which it moves, mm.
+/// Smallest motion of the hands in a part with relaxation, mm.
 const LEAST_MM: f64 = 1e-3;
-/// An equilibrium nearer to its prediction than this part of what is far is followed by a part twice as long. Predictions of first order are
-/// twice as far then, those of second order four times.
+/// Distance from the prediction, as a fraction of the allowed one, below which the next part is doubled. Errors of
+/// first-order predictions then double, those of second order quadruple.
 pub(super) const NEARER: f64 = 0.2;
 
-/// How parts go, as the last ones went: what one command hands on to the next.
+/// Step size passed from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stride {
-    /// Longest way of the hands in the next part, mm.
+    /// Largest motion of the hands in the next part, mm.
     pub(super) part_mm: f64,
     /// Whether friction is held in it.
     pub(super) held: bool,
 }
 
-/// What a command has come to.
+/// Step size control within a command.
 #[derive(Debug)]
 pub(super) struct StepControl {
-    /// Newton iterations that are left.
+    /// Newton iterations left.
     budget: usize,
-    /// How the next part goes.
+    /// Step size of the next part.
     stride: Stride,
     /// Whether there is friction that can be held.
     has_friction: bool,
-    /// Longest way of the hands in the next part, mm, where the device moves in it.
+    /// Largest motion of the hands in the next part, mm, if the device relaxes in it.
     flight_mm: Option<f64>,
 }
 
 impl StepControl {
-    /// With a budget of so many Newton iterations, where the command before went like this.
+    /// With a budget of Newton iterations, and the step size of the command before.
     pub(super) fn new(budget: usize, stride: Stride, has_friction: bool) -> Self {
         Self { budget, stride, has_friction, flight_mm: None }
     }
 
-    /// The same, of what was set free and no hand moves: it goes to where it comes to rest at once.
+    /// For something that was released without hand motion: relaxes at once.
     pub(super) fn set_free(self) -> Self {
         Self { flight_mm: Some(f64::INFINITY), ..self }
     }
 
-    /// How the next command begins.
+    /// Step size for the next command.
     pub(super) fn stride(&self) -> Stride {
         self.stride
     }
 
-    /// Newton iterations that are left.
+    /// Newton iterations left.
     pub(super) fn budget(&self) -> usize {
         self.budget
     }
 
-    /// How the next part is gone, and how long it is where this `rest_mm` of the command is left.
+    /// Effort and length of the next part, given the remaining `rest_mm` of the command.
     pub(super) fn next(&self, rest_mm: f64) -> (Effort, f64) {
         match self.flight_mm {
             Some(most_mm) => (Effort::Flight, rest_mm.min(most_mm)),
-            // In equal parts, so that none is a small rest.
+            // Equal parts, so that no small remainder is left.
             None => {
                 let effort = if self.stride.held { Effort::Held } else { Effort::Near };
                 (effort, rest_mm / (rest_mm / self.stride.part_mm).ceil().max(1.0))
@@ -73,22 +74,22 @@ impl StepControl {
         }
     }
 
-    /// A part took so many Newton iterations.
+    /// Subtracts the Newton iterations of a part.
     pub(super) fn took(&mut self, iterations: usize) {
         self.budget = self.budget.saturating_sub(iterations);
     }
 
-    /// A part of this length has come to an equilibrium, or to rest.
+    /// A part of this length reached an equilibrium, or came to rest.
     pub(super) fn succeeded(&mut self, part_mm: f64, found: &Found) {
         let nearer = found.off < NEARER;
         match self.flight_mm {
-            // A budget that is used up is that of a jam.
+            // The budget is used up in a jam.
             Some(_) if self.budget == 0 => {
                 self.flight_mm = Some(if nearer { 2.0 * part_mm } else { FOLD_MM });
             }
             Some(_) => self.flight_mm = None,
             None => {
-                // What settles without sliding is found with friction that follows as well.
+                // If friction settles without slides, a part with friction that follows would succeed as well.
                 self.stride.held &= found.slides > 0;
                 if nearer {
                     self.stride.part_mm = self.stride.part_mm.max(2.0 * part_mm);
@@ -97,7 +98,7 @@ impl StepControl {
         }
     }
 
-    /// A part of this length has come to nothing. Returns whether that is all.
+    /// A part of this length failed. Returns whether there is nothing else to try.
     pub(super) fn failed(&mut self, part_mm: f64) -> bool {
         if self.flight_mm.is_some() {
             return true;
@@ -113,12 +114,12 @@ impl StepControl {
         false
     }
 
-    /// Whether a part of this length, in which the device has moved, can be shorter.
+    /// Whether a part of this length, in which the device relaxed, can be shortened.
     pub(super) fn can_shorten(&self, part_mm: f64) -> bool {
         part_mm > LEAST_MM && self.budget > 0
     }
 
-    /// Goes on with parts of half that length, and looks for an equilibrium near by again.
+    /// Continues with parts of half that length, seeking a nearby equilibrium again.
     pub(super) fn shorten(&mut self, part_mm: f64) {
         (self.stride.part_mm, self.flight_mm) = (0.5 * part_mm, None);
     }
@@ -136,6 +137,7 @@ mod tests {
         Found {
             slides: 0,
             dissipated_mj: 0.0,
+            borrowed_mj: 0.0,
             residual: 0.0,
             unsettled: 0.0,
             balanced: true,
@@ -170,7 +172,7 @@ mod tests {
         assert_eq!(control.next(1.0), (Effort::Held, 1.0));
         control.succeeded(1.0, &found(0.5));
         assert_eq!(control.next(1.0), (Effort::Near, 1.0));
-        // What it does not find either is a fold.
+        // If that fails too, it is a fold.
         assert!(!control.failed(FOLD_MM) && !control.failed(FOLD_MM));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
     }
@@ -182,7 +184,7 @@ mod tests {
         assert_eq!(control.next(1.0).0, Effort::Near);
         assert!(!control.failed(0.03));
         assert_eq!(control.next(1.0), (Effort::Flight, 0.03));
-        // With energy that nobody put in it goes less far.
+        // With energy that nobody put in the part is shortened.
         assert!(control.can_shorten(0.03) && !control.can_shorten(LEAST_MM));
         control.shorten(0.03);
         assert!(matches!(control.next(1.0), (Effort::Near, part_mm) if part_mm <= 0.015));

@@ -1,9 +1,10 @@
-//! One sub-step: a guess of where the device will be, and Newton's method from there.
+//! One sub-step: a prediction of the device's configuration, and Newton's method from there.
 
 use std::sync::Arc;
 
 use super::balance::Balance;
 use super::carried::{Passage, WallWork};
+use super::command::AT_REST;
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
 use super::joined::{Resistance, join};
@@ -19,57 +20,59 @@ use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
 
-/// How a part of a command is gone.
+/// How a part of a command is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
-    /// To the equilibrium near the prediction, friction following the wall's forces.
+    /// For the equilibrium near the prediction, with friction following the contact forces.
     Near,
-    /// The same, friction held to the wall's forces where the part begins; then the device slides to where it rests.
+    /// As `Near`, with friction held at the normal forces of the start of the part; then the device slides to rest.
     Held,
-    /// To where the device comes to rest, however far away.
+    /// By relaxation to where the device comes to rest, however far away.
     Flight,
-    /// As far to where it comes to rest as a tick goes.
+    /// By relaxation as far as a tick allows.
     Moving,
 }
 
-/// What a part of a command has come to.
+/// Result of a part of a command.
 pub(super) struct Found {
-    /// How often the device slid on while the hand held still.
+    /// Number of slides with the hand held still.
     pub(super) slides: u32,
-    /// Energy that friction took, mJ.
+    /// Energy dissipated by friction, mJ.
     pub(super) dissipated_mj: f64,
-    /// Residual over force scale.
+    /// Energy by which an intermediate state of a relaxation exceeds what was put in, mJ: the rest of the relaxation gives it back.
+    pub(super) borrowed_mj: f64,
+    /// Residual, relative to the force scale.
     pub(super) residual: f64,
-    /// Part by which the normal forces that friction follows differ from those of the wall.
+    /// Relative difference of the normal forces of friction from the contact forces.
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
-    /// Whether more energy is stored and taken by friction than was put in: it is none that a motion of this part leads to.
+    /// Whether more energy is stored and dissipated than was put in: then the motion of this part cannot lead there.
     pub(super) lacks: bool,
-    /// How far it is from the prediction, over how far is near.
+    /// Distance from the prediction, as a fraction of the allowed one.
     pub(super) off: f64,
-    /// The jump, if it is one.
+    /// The jump, if any.
     pub(super) jump: Option<Jump>,
 }
 
-/// Why a part came to nothing.
+/// Why a part failed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Lost {
-    /// The prediction is on the other side of the wall, or of the device itself.
+    /// The prediction is beyond the wall, or has passed through the device itself.
     Beyond,
-    /// What was found is.
+    /// The solution is.
     Passed,
-    /// Energy came from nowhere.
+    /// Energy appeared from nowhere.
     Unbalanced,
-    /// No equilibrium was found, and that residual over force scale is left.
+    /// No equilibrium was found; with the residual relative to the force scale.
     Unsolved(StopReason, f64),
-    /// The linear solves of a tick were used up first.
+    /// The linear solves of a tick were used up.
     UnderWay,
 }
 
 impl Lost {
-    /// What is wrong with a solution that is so far `off` its prediction, which it is to be `near` or not, and which may have `used_up` its
-    /// linear solves.
+    /// The failure of a solution, if it is one. `off` is its distance from the prediction, `near` whether it must be
+    /// near, and `used_up` whether its linear solves are.
     fn of(found: &NewtonReport, (near, used_up): (bool, bool), balanced: bool, off: f64) -> Option<Self> {
         let folded = !found.residual.is_finite() || found.reason == StopReason::Folded;
         let reason = match (near, found.converged) {
@@ -96,26 +99,27 @@ impl std::fmt::Display for Lost {
     }
 }
 
-/// How far a part goes, and how.
+/// A part to be solved.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Attempt<'a> {
-    /// Where the hands are after it.
+    /// Positions of the hands after it.
     pub(super) hands: &'a [Hand],
-    /// How it is gone.
+    /// How it is solved.
     pub(super) effort: Effort,
-    /// Most Newton iterations.
+    /// Largest number of Newton iterations.
     pub(super) most: usize,
-    /// Most linear solves: those of a tick, as many as it takes in a step.
+    /// Largest number of linear solves, unlimited except in ticks.
     pub(super) solves: usize,
-    /// How far ticks have come with this part already.
+    /// Earlier ticks' progress in this part.
     pub(super) resumed: Option<&'a UnderWay>,
-    /// Where the vessel moves: what was before it did, and how it does. The part then starts with the device taken along.
+    /// If the vessel moves: the start before its motion, and the motion. The part then starts with the displaced
+    /// device.
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
 }
 
 impl<const C: usize> Tools<C> {
-    /// Slides the device at `start` to where the hands are, on the mesh of what is in then, with its friction and what is known of the wall;
-    /// coils stay where they are.
+    /// Slides the device at `start` to the positions of the hands, on the mesh of the length then inserted, with its
+    /// friction and knowledge of the wall; coils do not move.
     fn transport_to(
         &mut self,
         environment: &Environment<'_>,
@@ -139,7 +143,7 @@ impl<const C: usize> Tools<C> {
         };
         motions(&start.state.report, hands, &mut self.guess.motions);
         if self.friction.acts() {
-            // What slips is counted from where the device lay before the vessel moved.
+            // Slip is measured from where the device was before the vessel moved.
             transport_from(left.map_or(start, |(was, _)| was), &mut after.rod);
             let before = (&start.mesh.points[..], &start.state.forces[..]);
             self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
@@ -147,7 +151,7 @@ impl<const C: usize> Tools<C> {
                 self.friction.carry(passage, &self.guess.motions);
             }
         }
-        // Where the vessel did not move it lies there already.
+        // Unless the vessel moved, it is already there.
         if !self.friction.acts() || left.is_some() {
             transport_from(start, &mut after.rod);
         }
@@ -177,7 +181,7 @@ impl<const C: usize> Tools<C> {
         }
     }
 
-    /// Begins a part for loops and coils, with its friction; returns whether the tip would be pushed through one.
+    /// Begins a part for loops and coils, with their friction; returns whether the tip would be pushed through one.
     fn begin_loops(
         &mut self,
         environment: &Environment<'_>,
@@ -197,7 +201,7 @@ impl<const C: usize> Tools<C> {
         self.loops.blocks_its_tip(&mesh.elements, rod, advance_mm)
     }
 
-    /// Gives the state what the next sub-step starts with, and takes the coils off the line.
+    /// Stores what the next sub-step starts with, and removes the coils from the line.
     fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
         self.cache.keep(&mut after.known);
@@ -209,7 +213,7 @@ impl<const C: usize> Tools<C> {
         inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
     }
 
-    /// One part from `start`: slides and solves on `next`, which is worth nothing if that fails.
+    /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
     pub(super) fn try_step(
         &mut self,
         environment: &Environment<'_>,
@@ -275,7 +279,7 @@ impl<const C: usize> Tools<C> {
         let unsettled = search.unsettled().max(lagging);
         let (taken, slides) = ((search.iterations, search.solves), search.slides);
         let off = self.newton.neighbourhood.off(rod);
-        // What has come to rest is in equilibrium as exactly as friction is with the wall elsewhere.
+        // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let used_up = found.reason == StopReason::MaxIterations && taken.1 >= attempt.solves;
         let wrong = Lost::of(&found, (near, used_up), balanced, off).or_else(|| {
@@ -285,7 +289,7 @@ impl<const C: usize> Tools<C> {
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut self.touches);
             if effort == Effort::Moving && !balanced {
-                // The next tick slides on from here, with what presses here.
+                // The next tick continues from here, with these normal forces.
                 contact.anchor_friction(&mesh.elements, rod);
             }
         }
@@ -305,6 +309,9 @@ impl<const C: usize> Tools<C> {
         let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
         let elsewhere_mj = between_mj + self.write_report(environment, hands, next);
+        if found.residual > AT_REST {
+            hold_hands(&start.state.report, &mut next.parts().1.report);
+        }
         let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
         let by_fields = work_of_fields(environment, start, next.start());
         let after = next.parts().1;
@@ -317,14 +324,25 @@ impl<const C: usize> Tools<C> {
             return Err(Lost::Unbalanced);
         }
         let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
-        let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
+        let lost_mj = balance.lost_mj(jumps);
+        let (dissipated_mj, released_mj) = lost_mj;
+        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(lost_mj) };
         let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
-        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
+        let residual = found.residual;
+        Ok(Found { slides, dissipated_mj, borrowed_mj, residual, unsettled, balanced, lacks, off, jump })
     }
 }
 
-/// Work of fields that change, mJ: by what they add to the energy of the device where it was, and of the device where it is now.
+/// Keeps the hand forces of the last equilibrium: those of a state that is not at rest are arbitrary, and would count as work.
+fn hold_hands(before: &StepReport, after: &mut StepReport) {
+    (after.push_force_n, after.torque_nmm) = (before.push_force_n, before.torque_nmm);
+    for (was, is) in before.instruments.iter().zip(&mut after.instruments) {
+        (is.push_force_n, is.torque_nmm) = (was.push_force_n, was.torque_nmm);
+    }
+}
+
+/// Work of changing fields, mJ: the change of the field energy at the old and at the new configuration.
 fn work_of_fields(environment: &Environment<'_>, was: Start<'_>, is: Start<'_>) -> [f64; 2] {
     let at_first = environment.field_mj(was.mesh, &was.state.rod) - was.state.report.energy.field;
     if !environment.surroundings.fields_change() {
@@ -334,7 +352,7 @@ fn work_of_fields(environment: &Environment<'_>, was: Start<'_>, is: Start<'_>) 
     [at_first, is.state.report.energy.field - before.field_mj(is.mesh, &is.state.rod)]
 }
 
-/// The farthest way of a hand, mm.
+/// The largest motion of a hand, mm.
 fn longest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
     let way = |index: usize| (after.hand(index).inserted_mm - before.hand(index).inserted_mm).abs();
     (0..after.instruments.len().max(1)).map(way).fold(0.0, f64::max)

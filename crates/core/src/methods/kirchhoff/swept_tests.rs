@@ -1,4 +1,4 @@
-//! Vessels that are felt by their centre lines.
+//! Vessels whose walls are given by centre lines.
 
 use crate::Vec3;
 use crate::contact::ContactSurface;
@@ -42,7 +42,7 @@ fn a_wire_goes_the_way_that_it_goes_in_a_fine_mesh() {
             let felt = pushed(lumen.clone(), lumen.inlet().unwrap().index, friction, steps);
             let off_mm = farthest_mm(&felt, &in_mesh(least_mm / 4.0));
             assert!(off_mm < 0.02, "{name}, friction {friction}: {off_mm}");
-            // Triangles half as large as the vessel are another one.
+            // With triangles half as large as the vessel the result differs.
             let coarse_mm = farthest_mm(&felt, &in_mesh(0.6 * least_mm));
             assert!(coarse_mm > 0.02, "{name}, friction {friction}: {coarse_mm}");
         }

@@ -1,13 +1,14 @@
-//! A tick of fixed cost: for those who must have an answer in time.
+//! Steps of bounded cost, for real time.
 //!
-//! A step ends in the equilibrium that its command leads to, however long that takes. A tick goes part after part of the hands' way, and ends when its
-//! linear solves are used up. What it has begun to solve for then stays with the state, which is the last equilibrium, and the next tick goes on with
-//! it; what hands do meanwhile waits. So ticks follow the path of equilibria that steps follow. Where the path has come to a fold the device is seen
-//! on its way to where it comes to rest: as far in each tick as its solves go.
+//! A step ends in the equilibrium after its command, however long that takes. A tick solves part after part of the
+//! hands' motion, and ends when its linear solves are used up. An unfinished solution is stored with the state, which
+//! stays the last equilibrium, and the next tick continues it; further hand motion is queued. So ticks follow the
+//! same path of equilibria as steps. After a fold the device is seen on its way to rest: in each tick as far as its
+//! solves permit.
 //!
-//! What would be an error after a part that went well waits too: the next tick begins with it.
+//! An error after a successful part is postponed to the next tick, which repeats it.
 //!
-//! A vessel that moves cannot wait. There the device goes as far in each tick as its solves go, at a fold or not.
+//! A moving vessel cannot wait. There the device moves in each tick as far as its solves permit, at a fold or not.
 
 use super::Environment;
 use super::blocked::refuse_wedged;
@@ -26,35 +27,35 @@ use crate::device::line_mm;
 use crate::methods::{Move, StepReport};
 use crate::{Error, Result};
 
-/// Linear solves that a part of the way counts beside its own, as it makes a mesh and asks all of the wall once.
+/// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall once.
 const OF_A_PART: usize = 2;
 
-/// What a tick has come to.
+/// Result of a tick.
 #[derive(Debug)]
 pub(super) enum Ticked {
     /// A new state.
     Moved,
-    /// The device is where it was; this is the longest way of the hands in its next part, mm, and what has begun.
+    /// The device has not moved; with the largest motion of the hands in its next part, mm, and the unfinished work.
     Rests(f64, Ticking),
-    /// It cannot follow the vessel in so many solves.
+    /// The solves do not suffice to follow the vessel.
     Overtaken,
 }
 
-/// A part of the hands' way, as a tick tries it.
+/// A part of the hands' motion attempted by a tick.
 struct Part<'a> {
     effort: Effort,
-    /// How far ticks have come with it.
+    /// Earlier ticks' progress in it.
     resumed: Option<&'a UnderWay>,
-    /// The longest way of a hand, mm.
+    /// The largest motion of a hand, mm.
     part_mm: f64,
-    /// Whether hands hold still while the device moves.
+    /// Whether hands hold still while the device relaxes.
     holds_still: bool,
-    /// Newton iterations for which it has moved.
+    /// Newton iterations of the relaxation so far.
     moving: usize,
 }
 
 impl<'a> Part<'a> {
-    /// Sets `hands` to where they are after the part that follows on what has begun: a part of `longest_mm` at most, or what is under way.
+    /// Sets `hands` to the positions after the next part: the unfinished one, or one of at most `longest_mm`.
     fn next(
         begun: &'a Ticking,
         (way, longest_mm): (&Way, f64),
@@ -87,43 +88,43 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Whether what was found is none of it: a device that is let go before a fold stays near.
+    /// Whether the result must be rejected: a device relaxed before a fold stays near.
     fn strays(&self, found: &Found) -> bool {
         self.effort == Effort::Moving && !self.holds_still && self.part_mm > FOLD_MM && found.off > 1.0
     }
 }
 
-/// How the parts of a tick have gone.
+/// Progress of a tick.
 struct Course {
-    /// Longest way of the hands in the next part, mm.
+    /// Largest motion of the hands in the next part, mm.
     longest_mm: f64,
-    /// What they have come to.
+    /// Accumulated results.
     sum: Sum,
-    /// Whether there is a new state, …
+    /// Whether there is a new state.
     moved: bool,
-    /// … and whether the device rests there.
+    /// Whether the device rests there.
     rests: bool,
 }
 
 impl Course {
-    /// Takes a part that was found in so many Newton iterations, and in which the device `lies` still or not. Returns how it goes on.
+    /// Accepts the result of a part; `lies` tells whether the device hardly moved in it. Returns how to continue.
     fn take(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) -> Ticking {
         self.moved = true;
         self.rests = found.balanced || (part.holds_still && lies && found.residual <= AT_REST);
         self.sum.add(found);
         self.sum.relaxations += u32::from(part.effort == Effort::Moving && !part.holds_still);
         if !self.rests {
-            self.sum.add_imbalance(found);
+            self.sum.note_imbalance(found);
         }
         if part.effort == Effort::Near && found.off < NEARER {
             self.longest_mm = self.longest_mm.max(2.0 * part.part_mm);
         }
-        // What does not come to rest is left where it is, and said to be in no equilibrium.
+        // A device that does not come to rest is left where it is, and reported as not in equilibrium.
         let goes_on = part.effort == Effort::Moving && !self.rests && part.moving + iterations <= LONGEST;
         if goes_on { Ticking::Moving(part.moving + iterations) } else { Ticking::Rest }
     }
 
-    /// Tells the state to which they have led of them, and of what is left of the hands' way.
+    /// Writes the results, and the remaining motion of the hands, into the new state.
     fn write(&self, way: &Way, state: &mut KirchhoffState) {
         state.stride.part_mm = self.longest_mm;
         let report = &mut state.report;
@@ -134,7 +135,8 @@ impl Course {
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Carries out moves, and what earlier ticks left over, from the state `from` in about `solves` linear solves. A new state is left in `now`.
+    /// Carries out moves, and motion left over by earlier ticks, from the state `from` in about `solves` linear
+    /// solves. A new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::tick`](crate::methods::Method::tick).
@@ -157,17 +159,17 @@ impl<const C: usize> Workspace<C> {
             taken
         });
         let there = environment.displaced(at_last.as_ref());
-        // The first part goes with the vessel, the others where it is then.
+        // The first part includes the vessel's motion, the others start after it.
         let mut left = passage.map(|passage| (was, passage));
         let mut at_start = environment.displaced(at_first.as_ref());
-        // What a device with friction does from a part of this length on it may do near by.
+        // With friction, relaxation over a part up to this length may end nearby.
         let let_go_mm = if environment.has_friction() { HELD_MM } else { FOLD_MM };
         let mut course =
             Course { longest_mm: from.stride.part_mm, sum: Sum::default(), moved: false, rests: true };
         let (rest, fold, mut moving);
         (rest, fold) = (Ticking::Rest, Ticking::Moving(0));
         let mut begun = if passage.is_some() { &rest } else { &from.tick };
-        // What is left to do, or the error that nothing more can be done for.
+        // Remaining work, or the error that ends the tick.
         let ends = loop {
             let parts = course.sum.substeps;
             if parts > 0 && tools.work.solves + OF_A_PART * parts >= solves {
@@ -218,7 +220,7 @@ impl<const C: usize> Workspace<C> {
                     break Ok(Ticking::Solving(Box::new(under_way)));
                 }
                 Err(_) if left.is_some() => return Ok(Ticked::Overtaken),
-                // It stays where it has come to.
+                // It stays where it is.
                 Err(_) if part.holds_still => break Ok(Ticking::Rest),
                 Err(lost) if effort == Effort::Moving && part_mm <= FOLD_MM => {
                     let inserted_mm = line_mm(lengths(&way.start));
@@ -248,7 +250,8 @@ impl<const C: usize> Workspace<C> {
 }
 
 impl<const C: usize> Tools<C> {
-    /// Notes what is begun of a part, as far as solves go, on the way `to` a state; of a tick from a state, with what it had taken before the part.
+    /// Stores an unfinished part, with the state `to` of its solution; `before` is the work of the tick before the
+    /// part.
     fn under_way(
         &mut self,
         part: &Part<'_>,
@@ -257,9 +260,9 @@ impl<const C: usize> Tools<C> {
         (from, before): (&KirchhoffState, Work),
     ) -> UnderWay {
         let iterations = self.work.since(&before) + part.resumed.map_or(0, |resumed| resumed.iterations);
-        // Counted once, with the state that it leads to.
+        // They are counted once, with the state that the part leads to.
         self.work.nodes_solved = before.nodes_solved;
-        // Beside where it has come to and what is known of the wall there it is nothing yet.
+        // Only its configuration and knowledge of the wall matter.
         let report = StepReport { angles: from.report.angles, ..StepReport::default() };
         let (correction, stride, tick) = (Correction::default(), from.stride, Ticking::Rest);
         UnderWay {

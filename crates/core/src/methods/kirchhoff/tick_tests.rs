@@ -8,15 +8,15 @@ use crate::random::{splitmix64, unit};
 use crate::vessel::motion::{MotionMode, VesselMotion, Waveform};
 use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 
-/// Linear solves of a tick: fewer than most parts take, so that most ticks leave something over.
+/// Linear solves of a tick: fewer than most parts need, so that most ticks leave work over.
 const SOLVES: usize = 3;
 
-/// A tube of radius 4 mm that is straight for 100 mm and bends then.
+/// A tube of radius 4 mm, straight for 100 mm and then bent.
 fn tube() -> Wall {
     GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap().wall
 }
 
-/// A bent wire in a bent catheter in the tube, 110 and 90 mm far.
+/// A bent wire in a bent catheter in the tube, inserted by 110 and 90 mm.
 fn two(motion: &[MotionMode]) -> Simulation {
     let bent = |length_mm: f64, radius_mm: f64, bending: f64, inner_radius_mm: Option<f64>| {
         let shaft = Section { inner_radius_mm, ..Section::straight(length_mm, radius_mm, bending) };
@@ -51,7 +51,7 @@ fn pushed(wire: [f64; 2], catheter: [f64; 2]) -> [Move; 2] {
     })
 }
 
-/// Hands that go to and fro at 1 kHz, with new speeds every 50 ms, and rest for 20 ms before that.
+/// Hands moving back and forth at 1 kHz, with new speeds every 50 ms, after a rest of 20 ms.
 fn hands(seed: u64, tick: u64) -> [Move; 2] {
     let speed = |k: u64, most: f64| most * (2.0 * unit(splitmix64(seed, 4 * (tick / 50) + k)) - 1.0);
     if tick % 50 >= 30 {
@@ -87,11 +87,11 @@ fn ticks_are_where_steps_are_once_hands_rest() {
         }
     }
     assert!(farthest_mm < 0.02, "{farthest_mm}");
-    // Ticks end in the midst of a part, …
+    // Ticks end within a part.
     assert!(behind > 100, "{behind}");
-    // … at most an iteration after their solves are used up.
+    // They exceed their solves by at most one iteration.
     assert!(most < 25, "{most}");
-    // The twin: on its way a device is behind its hands, and elsewhere.
+    // Counter-check: on its way a device lags behind its hands, and is elsewhere.
     for tick in 0..10 {
         stepping.step_together(&hands(2, tick)).unwrap();
         ticking.tick(&hands(2, tick), 1, None).unwrap();
@@ -107,7 +107,7 @@ fn what_a_tick_leaves_over_the_next_step_does() {
     let behind = ticking.report().behind.clone();
     assert_eq!(behind.len(), 2);
     assert!((behind[0].advance_mm - 0.4).abs() < 1e-12 && (behind[1].advance_mm - 0.2).abs() < 1e-12);
-    // Hands that wait have gone as far as they have.
+    // The hands' motion, including what is queued, is complete.
     let room_mm = 300.0 - ticking.report().lengths_mm()[0];
     let refused = ticking.tick(&pushed([room_mm - 0.3, 0.0], [0.0; 2]), 1, None).unwrap_err().to_string();
     assert!(refused.contains("wire.advance_mm"), "{refused}");
@@ -139,7 +139,7 @@ fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
     let [a, b, c] = [&ticking, &clone, &restored].map(|each| bytes(&each.state()));
     assert!(a == b, "the clone");
     assert!(a == c, "the restored one");
-    // A state whose part under way is none of this scene is refused.
+    // A state with an unfinished part of another scene is rejected.
     let text = String::from_utf8(saved).unwrap();
     let hands = text.rfind("\"inserted_mm\"").unwrap();
     let wrong = format!("{}\"inserted_mm\":99.0,\"was\"{}", &text[..hands], &text[hands + 13..]);
@@ -148,7 +148,7 @@ fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
 
 #[test]
 fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
-    // A bent wire in a bent tube whips when it is turned.
+    // A bent wire in a bent tube whips when rotated.
     let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(60.0, 0.4, 10.0) };
     let wire = Device::new(vec![bent, Section::straight(190.0, 0.4, 10.0)]).unwrap();
     let sheath = Sheath::new(crate::Vec3::z() * 6.0, crate::Vec3::z()).unwrap();
@@ -176,7 +176,7 @@ fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
     assert!(jumps == 1 && moving > 5 && ticks < 200, "{jumps} {moving} {ticks}");
     let [a, b] = [&ticking, &stepping].map(|each| each.shape().tip_mm().unwrap());
     assert!((a - b).norm() < 1e-3, "{a} {b}");
-    // On its way its axis stays in the lumen, but for what the wall that is felt stands off its triangles.
+    // On its way its axis stays in the lumen, up to the distance of the felt wall from its triangles.
     assert!(deepest_mm < 0.4 + 0.01, "{deepest_mm}");
 }
 
@@ -198,7 +198,7 @@ fn a_vessel_that_moves_takes_the_device_along_in_every_tick() {
         assert!(report.max_penetration_mm < 0.1, "{}", report.max_penetration_mm);
         assert_eq!(ticking.time_s(), time_s);
     }
-    // With time at rest ticks come to an equilibrium of where the vessel is.
+    // Once the hands rest, ticks reach an equilibrium at the vessel's position.
     let mut ticks = 0;
     while !ticking.report().behind.is_empty() && ticks < 100 {
         ticking.tick(&[], 6, None).unwrap();

@@ -1,4 +1,4 @@
-//! Tips that touch a wall with friction: they stick, buckle and slide, whatever the step.
+//! Tips that touch a wall with friction: they stick, buckle and slide, for any step length.
 
 use crate::Vec3;
 use crate::device::{Device, Section};
@@ -36,7 +36,7 @@ fn upright(friction: f64) -> Simulation {
     simulation
 }
 
-/// Pushes it in as far as that; returns the last report.
+/// Pushes it in up to this length; returns the last report.
 fn go_on(simulation: &mut Simulation, to_mm: f64, step_mm: f64) -> StepReport {
     while simulation.report().inserted_mm < to_mm - 1e-9 {
         let report = simulation.step(Command::advance(step_mm)).unwrap();
@@ -54,13 +54,14 @@ fn aside_mm(simulation: &Simulation) -> f64 {
 fn a_tip_that_first_touches_in_a_long_step_sticks_as_in_short_ones() {
     let [mut long, mut short] = [upright(0.3), upright(0.3)];
     let forces = [go_on(&mut long, 40.0, 1.0), go_on(&mut short, 40.0, 0.1)].map(|r| r.push_force_n);
-    // Where it comes to stick hangs on the step by a millimetre or two, and with that the force by a few per cent.
+    // The position where it sticks depends on the step by a millimetre or two, and with it the force by a few per
+    // cent.
     assert!((forces[0] / forces[1] - 1.0).abs() < 0.07, "{forces:?}");
-    // A column clamped at one end and pinned at the other, of 37.6 mm: 20.19 EI/L², and less the more it is bent.
+    // A column of 37.6 mm, clamped at one end and pinned at the other: 20.19 EI/L², and less the more it is bent.
     let euler_n = 20.19 * 0.2 / (37.6 * 37.6);
     assert!(forces[0] < euler_n && forces[0] > 0.7 * euler_n, "{forces:?} {euler_n}");
     assert!(aside_mm(&long) < 3.0 && aside_mm(&short) < 3.0, "{} {}", aside_mm(&long), aside_mm(&short));
-    // The twin: without friction it slides away.
+    // Counter-check: without friction it slides away.
     let mut free = upright(0.0);
     let slid = go_on(&mut free, 40.0, 1.0);
     assert!(aside_mm(&free) > 8.0 && slid.push_force_n < 0.7 * forces[0]);
@@ -90,7 +91,7 @@ fn a_hook_that_slides_takes_what_the_hand_gives() {
         given += 0.25 * (before.push_force_n + report.push_force_n);
         left += report.energy.total() - before.energy.total();
         taken += report.dissipated_mj;
-        // Coulomb's law: all of it slides along, and presses less from step to step.
+        // Coulomb's law: all of it slides along, with forces decreasing from step to step.
         let rub: f64 = report.contacts.iter().map(|c| c.friction_n.norm()).sum();
         let off = report.dissipated_mj / (0.5 * rub) - 1.0;
         assert!(off.abs() < 0.04, "{}: {off}", report.inserted_mm);

@@ -1,4 +1,4 @@
-//! The warm start: the rod slides along its own curve, and beyond its tip goes on straight.
+//! The simple predictor: the rod slides along its own curve, and straight ahead beyond its tip.
 
 use crate::Vec3;
 use crate::rod::quadrature::Point;
@@ -8,7 +8,7 @@ use super::mesh::Mesh;
 
 /// Unit tangent at an arc length from the sheath on the curve of `state`.
 ///
-/// `element` is where to start looking, updated to where it was found: calls go from the sheath to the tip.
+/// `element` is where the search starts, updated to where it was found: calls go from the sheath to the tip.
 fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut usize) -> Vec3 {
     let inserted = mesh.from_tip_mm[0];
     let last = state.elements();
@@ -36,8 +36,8 @@ fn slide_curve(from: &Mesh, state: &RodState, to: &Mesh, out: &mut RodState) {
     lay((&state.frames[0], &state.positions[0]), to, direction, out);
 }
 
-/// Triads, chords and positions of a rod that begins with a triad at a place, and whose tangents are these by the distance from its tip.
-/// They are asked for from the sheath on; the triads are carried without twist.
+/// Triads, chords and positions of a rod with this triad and position at its start, and these tangents as a function
+/// of the distance from its tip. Calls go from the sheath to the tip; the triads are carried without twist.
 pub(super) fn lay(
     (first, start): (&Frame, &Vec3),
     to: &Mesh,
@@ -64,7 +64,7 @@ pub(super) fn lay(
 
 /// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
 ///
-/// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
+/// Material angles move with the device; material that enters from the sheath has the angle that the tail had.
 pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut RodState) {
     slide_curve(from, state, to, out);
     let n = to.elements.len();
@@ -79,7 +79,7 @@ pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut 
         out.tensions.push(known.map_or(0.0, |k| state.tensions[k]));
         out.bubbles.push(known.filter(|k| *k > 0).map_or(0.0, |k| state.bubbles[k]));
     }
-    // Against triads carried along the rod without twist, which is what the new ones are.
+    // Relative to triads carried along the rod without twist, like the new ones.
     let tail = state.angles[0];
     let mut carried = 0.0;
     let mut k = 1;
@@ -98,8 +98,8 @@ pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut 
     out.angles[0] = tail;
 }
 
-/// As [`transport`], of several instruments, each with its set of angles if it has one: nodes are other marks than before, so that angles are
-/// read between them.
+/// As [`transport`], for several instruments, each with its set of angles, if any: the nodes are different marks, so
+/// angles are interpolated.
 pub(super) fn transport_together(
     (from, state): (&Mesh, &RodState),
     to: &Mesh,
@@ -108,7 +108,7 @@ pub(super) fn transport_together(
 ) {
     slide_curve(from, state, to, out);
     let (n, old) = (to.elements.len(), state.elements());
-    // The first element whose far end is not before a place; elements are in order, sheath first.
+    // The first element whose far end is not before a position; elements are in order, sheath first.
     let holding = |from_tip: f64| from.from_tip_mm[1..].partition_point(|end| *end > from_tip);
     out.tensions.clear();
     for ends in to.from_tip_mm.windows(2) {
@@ -117,7 +117,7 @@ pub(super) fn transport_together(
         let is_in = known < old && middle <= from.from_tip_mm[known];
         out.tensions.push(if is_in { state.tensions[known] } else { 0.0 });
     }
-    // Triads carried without twist are those that angles are counted from.
+    // Angles are measured from triads carried without twist.
     let carried: Vec<f64> = state.carried_twists().collect();
     let count = state.sets();
     out.angles.clear();
@@ -126,7 +126,7 @@ pub(super) fn transport_together(
     out.bubbles.resize(count * n, 0.0);
     for (index, set) in sets.iter().enumerate() {
         let Some(set) = *set else { continue };
-        // One that is out leaves the angles to a coil in its place.
+        // An instrument that is not inserted leaves the angles to a coil in its place.
         let is_in = |index: usize| to.inserted_mm[index] > 0.0;
         if !is_in(index) && (0..sets.len()).any(|other| sets[other] == Some(set) && is_in(other)) {
             continue;

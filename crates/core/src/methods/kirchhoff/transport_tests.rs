@@ -1,4 +1,4 @@
-//! Guesses against the curves that they follow.
+//! Predictions, compared with the curves that they follow.
 
 use super::mesh::{Fineness, Mesh};
 use super::transport::{transport, transport_together};
@@ -19,7 +19,7 @@ fn mesh(inserted_mm: f64) -> Mesh {
     mesh
 }
 
-/// A device in a plane whose tangent has turned by `angle` so far from the sheath.
+/// A device in a plane whose tangent has turned by `angle` at this distance from the sheath.
 fn bent(mesh: &Mesh, angle: impl Fn(f64) -> f64) -> RodState {
     let tangent = |from_tip_mm: f64| {
         let turned = angle(mesh.from_tip_mm[0] - from_tip_mm);
@@ -54,11 +54,11 @@ fn a_device_that_slides_stays_on_its_arc_and_goes_on_straight() {
             } else {
                 on_arc(40.0) + state.frames[state.elements()].t * (s - 40.0)
             };
-            // The element in which the arc ends bends on all of its length: κh²/24.
+            // The element in which the arc ends bends over all of its length: κh²/24.
             let bound = if s <= 40.0 { 1e-3 } else { 1.01 * ELEMENT_MM * ELEMENT_MM / (24.0 * RADIUS_MM) };
             assert!((x - there).norm() < bound, "{inserted_mm} mm, {s} mm: {x} and not {there}");
         }
-        // The tip that stays where its marks are has moved on by 3 mm: the arc is not carried along.
+        // The tip, whose marks are fixed to it, has moved on by 3 mm: the arc does not move with it.
         let off = out.frames[out.elements()].t.angle(&state.frames[state.elements()].t);
         assert!((off - (40.0 - inserted_mm).max(0.0) / RADIUS_MM).abs() < 1e-4, "{off}");
     }

@@ -1,4 +1,4 @@
-//! What a step works with. None of it reaches the next step: it can be dropped and made anew at any moment.
+//! The memory of a step. Nothing in it affects the next step: it can be dropped and rebuilt at any time.
 
 use super::configuration::{Configuration, largest};
 use super::guess::Guess;
@@ -14,65 +14,65 @@ use crate::solve::Newton;
 /// The workspace of a simulation.
 pub(super) struct Workspace<const C: usize> {
     pub(super) tools: Tools<C>,
-    /// Mesh of the state that commands start from.
+    /// Mesh of the state at the start of commands.
     pub(super) mesh: Mesh,
-    /// Where the command under way has come to, once its first sub-step is taken.
+    /// Configuration within the current command, after its first sub-step.
     pub(super) now: Configuration,
-    /// The sub-step under way.
+    /// Configuration of the current sub-step.
     pub(super) next: Configuration,
-    /// Most elements and contact points.
+    /// Largest numbers of elements and contact points.
     pub(super) most: (usize, usize),
-    /// Where the hands go in the command under way.
+    /// Motion of the hands in the current command.
     pub(super) way: Way,
-    /// Where they are in the sub-step under way.
+    /// Their positions in the current sub-step.
     pub(super) hands: Vec<Hand>,
 }
 
-/// What a sub-step works with.
+/// The tools of a sub-step.
 pub(super) struct Tools<const C: usize> {
     pub(super) newton: Newton<C>,
     pub(super) guess: Guess,
     pub(super) friction: Friction,
     pub(super) cache: ContactCache,
-    /// What the flow does along the device.
+    /// Drag of the flow on the device.
     pub(super) drag: Drag,
-    /// What its loops do to each other; nothing is known of them where they do not touch.
+    /// Self-contact; empty if loops do not touch.
     pub(super) loops: SelfContact,
-    /// Coils that were detached, which are solved for together with the line.
+    /// Detached coils, solved together with the line.
     pub(super) joined: Joined,
-    /// Points that press in the equilibrium found last, and what happens there.
+    /// Points in contact at the last equilibrium, and their forces.
     pub(super) touches: Vec<(usize, Touch)>,
-    /// What the sub-steps of the command took.
+    /// Work of the command's sub-steps.
     pub(super) work: Work,
-    /// Questions about the wall.
+    /// Wall queries.
     pub(super) counters: Counters,
 }
 
-/// What sub-steps take, those in vain included.
+/// Work of sub-steps, including failed ones.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Work {
-    /// Newton iterations, …
+    /// Newton iterations.
     pub(super) iterations: usize,
-    /// … and linear solves.
+    /// Linear solves.
     pub(super) solves: usize,
     /// Nodes of the sub-steps in which the device moved.
     pub(super) nodes_solved: u64,
 }
 
 impl Work {
-    /// Adds the iterations and linear solves of a sub-step of so many elements.
+    /// Adds the iterations and linear solves of a sub-step with this number of elements.
     pub(super) fn add(&mut self, (iterations, solves): (usize, usize), elements: usize) {
         self.iterations += iterations;
         self.solves += solves;
         self.nodes_solved += if iterations > 0 { elements as u64 + 1 } else { 0 };
     }
 
-    /// Newton iterations since then; what is given up before its first one has its price as well.
+    /// Newton iterations since then; an attempt that fails before its first one costs something as well.
     pub(super) fn since(&self, before: &Self) -> usize {
         (self.iterations - before.iterations).max(1)
     }
 
-    /// Tells what it took beside the nodes that were solved for before.
+    /// Writes the work into the report; nodes are added to those solved before.
     pub(super) fn write(&self, report: &mut StepReport, nodes_solved: u64) {
         (report.iterations, report.solves) = (self.iterations as u32, self.solves as u32);
         report.nodes_solved = nodes_solved + self.nodes_solved;
@@ -80,7 +80,7 @@ impl Work {
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Memory for the whole device, so that steps take none.
+    /// Allocates for the whole device, so that steps do not allocate.
     pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
         let surroundings = environment.surroundings;
         let (elements, points) = largest(surroundings.stack, environment.options.fineness());

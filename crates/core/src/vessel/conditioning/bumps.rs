@@ -1,47 +1,51 @@
-//! How far every vertex stands off the quadric through the vertices around it.
+//! Height of every vertex above the quadric through the vertices around it.
 //!
-//! The neighbours of vertex v, and theirs, lie at yⱼ = pⱼ − pᵥ: at (uⱼ, vⱼ) in its tangent plane, zⱼ above it. The surface
+//! The neighbours of vertex v, and their neighbours, are at yⱼ = pⱼ − pᵥ: at (uⱼ, vⱼ) in its tangent plane, zⱼ above
+//! it. The surface
 //!
 //! ```text
 //! z = c₀ + c₁u + c₂v + c₃u² + c₄uv + c₅v² + c₆z²
 //! ```
 //!
-//! is fitted to them by weighted least squares. Spheres and cylinders are such surfaces, however few vertices are around them; without the last term
-//! a circle of eight would bump at each of them by 0.02 of its edges, as much as noise of a sixteenth. The fit is linear in the zⱼ on the left, with weights
-//! aⱼ that hang on places alone, c₀ = Σ aⱼzⱼ, and
+//! is fitted to them by weighted least squares. Spheres and cylinders are such surfaces, however few vertices they
+//! have; without the last term each vertex of a circle of eight would have a bump of 0.02 of its edges, as much as
+//! noise of a sixteenth. The fit is linear in the zⱼ on the left, with weights aⱼ that depend only on positions, c₀ =
+//! Σ aⱼzⱼ, and
 //!
 //! ```text
 //! rᵥ = −c₀ = −Σ aⱼ nᵥ·yⱼ
 //! ```
 //!
-//! is how far v stands out. It vanishes on a quadric however the triangles lie, which powers of an umbrella operator do only on regular
-//! meshes: on the even but irregular ones that remeshing makes, a smooth aorta faired by the fourth power of that had normals 0.006 off,
-//! in place of 0.0006 without fairing.
+//! is the height by which v stands out. It vanishes on a quadric for any triangulation, unlike powers of an umbrella
+//! operator, which vanish only on regular meshes: on the uniform but irregular meshes that remeshing produces,
+//! fairing a smooth aorta by the fourth power of that operator changed normals by 0.006, instead of 0.0006 without
+//! fairing.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::corners::{Corners, Kind, Vertex};
 use crate::{Vec3, parallel};
 
-/// Coefficients of that surface.
+/// Number of coefficients of that surface.
 const COEFFICIENTS: usize = 7;
-/// Fewest neighbours that tell of a bump: two more than there are coefficients.
+/// Smallest number of neighbours that determine a bump: two more than there are coefficients.
 const LEAST_NEIGHBOURS: usize = 9;
-/// A neighbour counts e times less so many mean edges away.
+/// Distance, in mean edges, at which the weight of a neighbour has decreased e times.
 const WIDTH: f64 = 1.5;
-/// What holds the coefficient of z² where a surface is flat: heights of a sixth of an edge tell it.
+/// Regularisation of the coefficient of z² for flat surfaces: heights of a sixth of an edge determine it.
 const LEAST_HEIGHT: f64 = 1e-3;
-/// Largest sum of sizes of the weights: at a rim a quadric would be drawn out beyond what it was fitted to.
+/// Largest sum of absolute weights: near a rim a quadric would be extrapolated.
 const LARGEST_SUM: f64 = 4.0;
 
-/// The bumps of a surface as a linear function of heights hⱼ of its vertices along their normals: rᵥ + hᵥ − Σ aⱼ (nᵥ·nⱼ) hⱼ.
+/// The bumps of a surface as a linear function of heights hⱼ of its vertices along their normals: rᵥ + hᵥ − Σ aⱼ
+/// (nᵥ·nⱼ) hⱼ.
 #[derive(Default)]
 pub(super) struct Bumps {
-    /// Where the row of each vertex begins, and where the last one ends.
+    /// Start of the row of each vertex, and the end of the last one.
     starts: Vec<u32>,
     /// Vertices around each, and −aⱼ nᵥ·nⱼ.
     columns: Vec<(u32, f64)>,
-    /// rᵥ, mm; 0 where nothing can be said.
+    /// rᵥ, mm; 0 where undetermined.
     at_rest_mm: Vec<f64>,
 }
 
@@ -67,7 +71,7 @@ impl Bumps {
         all
     }
 
-    /// Adds the columns of vertex `v` and returns its bump at rest, mm, if its surroundings tell of one.
+    /// Adds the columns of vertex `v` and returns its bump at zero heights, mm, if its surroundings determine it.
     fn add(&mut self, corners: &Corners, v: u32, around: &mut Around) -> Option<f64> {
         let vertex = &corners.vertices[v as usize];
         let normal = vertex.normal;
@@ -79,7 +83,7 @@ impl Bumps {
             return None;
         }
         let equations = around.fit(corners, vertex).cholesky()?;
-        // The first row of the inverse times what neighbours add is what the height at v itself comes to.
+        // The first row of the inverse times the neighbours' contributions is the height at v itself.
         let mut height = Terms::zeros();
         height[0] = 1.0;
         equations.solve_mut(&mut height);
@@ -102,13 +106,13 @@ impl Bumps {
         &self.columns[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
 
-    /// Bumps at rest, mm, of the vertices that have any.
+    /// Bumps at zero heights, mm, of the vertices that have any.
     pub(super) fn at_rest_mm(&self) -> impl Iterator<Item = (usize, f64)> {
         let told = |(v, _): &(usize, f64)| !self.row(*v).is_empty();
         self.at_rest_mm.iter().copied().enumerate().filter(told)
     }
 
-    /// Largest eigenvalue of the square of the operator, or more.
+    /// An upper bound of the largest eigenvalue of the square of the operator.
     pub(super) fn largest(&self) -> f64 {
         // ‖B‖₂² ≤ ‖B‖₁ ‖B‖_∞.
         let mut down = vec![0.0f64; self.at_rest_mm.len()];
@@ -139,7 +143,7 @@ impl Bumps {
         }
     }
 
-    /// The slope of half the sum of their squares.
+    /// The gradient of half the sum of their squares.
     pub(super) fn slope(&self, bumps: &[f64], slope: &mut [f64]) {
         slope.fill(0.0);
         for (v, bump) in bumps.iter().enumerate() {
@@ -155,20 +159,20 @@ impl Bumps {
 /// 1, u, v, u², uv, v², z² of a vertex.
 type Terms = SVector<f64, COEFFICIENTS>;
 
-/// What lies around a vertex.
+/// The surroundings of a vertex.
 #[derive(Default)]
 struct Around {
     spokes: Vec<u32>,
     ring: Vec<u32>,
     next: Vec<u32>,
-    /// Neighbours, and theirs.
+    /// Neighbours, and their neighbours.
     all: Vec<u32>,
     /// Terms and weights of `all`.
     terms: Vec<(Terms, f64)>,
 }
 
 impl Around {
-    /// Sets `all` to the neighbours of `v`, those first, and theirs.
+    /// Sets `all` to the neighbours of `v`, then their neighbours.
     fn gather(&mut self, corners: &Corners, v: u32) {
         let Self { spokes, ring, next, all, .. } = self;
         corners.spokes(v, spokes);
@@ -186,7 +190,7 @@ impl Around {
         }
     }
 
-    /// Sets the terms of all, in edges so that the equations have one scale; returns those.
+    /// Computes and returns the normal matrix, with terms in units of edges for equal scales.
     fn fit(&mut self, corners: &Corners, vertex: &Vertex) -> SMatrix<f64, COEFFICIENTS, COEFFICIENTS> {
         let normal = vertex.normal;
         let offset = |w: u32| corners.at(w) - vertex.at;

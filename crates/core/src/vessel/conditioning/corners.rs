@@ -1,42 +1,43 @@
-//! A triangle mesh that can be edited: a corner table.
+//! An editable triangle mesh: a corner table.
 //!
-//! Half-edge `3t + k` runs from corner k of triangle t to the next; `twin` is the one that runs back along it, or [`NONE`] where the
-//! surface is open or not a manifold. Split, collapse and flip change a handful of entries and leave everything else in place.
+//! Half-edge `3t + k` runs from corner k of triangle t to the next; `twin` is the opposite one, or [`NONE`] where the
+//! surface is open or not a manifold. Split, collapse and flip change a few entries and leave everything else
+//! unchanged.
 
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::{EdgeTable, NONE};
 
-/// What may be done to a vertex.
+/// Permitted changes of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Inside the surface: anything.
+    /// Inside the surface: any.
     Free,
-    /// On the rim of an opening: it may go if the rim is straight there.
+    /// On the rim of an opening: it may be removed if the rim is straight there.
     Rim,
-    /// On an edge of more than two triangles, or where two sheets touch: nothing.
+    /// On an edge of more than two triangles, or where two sheets touch: none.
     Locked,
 }
 
-/// What is known of a vertex.
+/// Properties of a vertex.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vertex {
-    /// Where it is, on the given surface, mm.
+    /// Its position on the given surface, mm.
     pub(super) at: Vec3,
     /// Outward unit normal of the mesh.
     pub(super) normal: Vec3,
     /// The triangle of the given surface it lies on.
     pub(super) place: u32,
     pub(super) kind: Kind,
-    /// Wanted length of its edges, mm.
+    /// Target length of its edges, mm.
     pub(super) target_mm: f64,
-    /// Radius of the lumen there, mm.
+    /// Local radius of the lumen, mm.
     pub(super) radius_mm: f64,
-    /// How far the conditioned surface may be from the given one, mm.
+    /// Largest distance of the conditioned surface from the given one, mm.
     pub(super) limit_mm: f64,
 }
 
-/// The mesh being edited. Triangles that are gone have corners [`NONE`], vertices that are gone no half-edge.
+/// The mesh being edited. Removed triangles have corners [`NONE`], removed vertices no half-edge.
 #[derive(Debug, Clone)]
 pub(super) struct Corners {
     pub(super) vertices: Vec<Vertex>,
@@ -58,7 +59,7 @@ pub(super) fn previous(e: u32) -> u32 {
 }
 
 impl Corners {
-    /// The table of `mesh`. Triangles with a repeated vertex are left out.
+    /// The table of `mesh`. Triangles with a repeated vertex are omitted.
     pub(super) fn new(mesh: &SurfaceMesh, deviation_mm: f64) -> Self {
         let sound = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
         let places: Vec<u32> =
@@ -103,7 +104,7 @@ impl Corners {
         };
         let vertices = (0..count).map(vertex).collect();
         let mut made = Self { vertices, triangles, twin, out };
-        // Where a walk around a vertex does not meet all its triangles, sheets touch.
+        // If a walk around a vertex does not visit all its triangles, sheets touch.
         let mut spokes = Vec::new();
         for v in 0..count {
             made.spokes(v as u32, &mut spokes);
@@ -114,7 +115,7 @@ impl Corners {
         made
     }
 
-    /// The mesh alone, without what is gone; `at` says where vertices are.
+    /// The mesh without removed parts; `at` gives the positions of vertices.
     pub(super) fn surface(&self, at: impl Fn(u32) -> Vec3) -> SurfaceMesh {
         let mut number = vec![NONE; self.vertices.len()];
         let mut mesh = SurfaceMesh::default();
@@ -130,7 +131,7 @@ impl Corners {
         mesh
     }
 
-    /// Drops what is gone, so that passes over all triangles stay short.
+    /// Drops removed parts, so that passes over all triangles stay short.
     pub(super) fn compact(&mut self) {
         let mut number = vec![NONE; self.vertices.len()];
         let mut vertices = Vec::new();
@@ -162,13 +163,13 @@ impl Corners {
         self.twin.len() as u32
     }
 
-    /// Whether the triangle of a half-edge is still there.
+    /// Whether the triangle of a half-edge still exists.
     #[inline]
     pub(super) fn lives(&self, e: u32) -> bool {
         self.triangles[e as usize / 3][0] != NONE
     }
 
-    /// Whether `e` stands for its edge: of two twins the first does.
+    /// Whether `e` represents its edge: the first of two twins does.
     #[inline]
     pub(super) fn leads(&self, e: u32) -> bool {
         self.lives(e) && (self.twin[e as usize] == NONE || e < self.twin[e as usize])
@@ -204,7 +205,7 @@ impl Corners {
         (self.at(self.to(e)) - self.at(self.from(e))).norm()
     }
 
-    /// Mean of the lengths wanted at the two ends of an edge, mm.
+    /// Mean of the target lengths at the two ends of an edge, mm.
     pub(super) fn target_mm(&self, e: u32) -> f64 {
         0.5 * (self.vertices[self.from(e) as usize].target_mm + self.vertices[self.to(e) as usize].target_mm)
     }
@@ -218,7 +219,7 @@ impl Corners {
         self.triangles[t as usize].map(|v| self.at(v))
     }
 
-    /// Half-edges that leave `v`, one of each triangle around it (of one sheet, where sheets touch).
+    /// Half-edges that start at `v`, one for each triangle around it (of one sheet, where sheets touch).
     pub(super) fn spokes(&self, v: u32, list: &mut Vec<u32>) {
         list.clear();
         let start = self.out[v as usize];
@@ -270,7 +271,7 @@ impl Corners {
         3 * (self.triangles.len() as u32 - 1)
     }
 
-    /// Puts `vertex` on an edge.
+    /// Splits an edge at `vertex`.
     pub(super) fn split(&mut self, e: u32, vertex: Vertex) -> u32 {
         let m = self.vertices.len() as u32;
         self.vertices.push(vertex);
@@ -285,7 +286,7 @@ impl Corners {
         m
     }
 
-    /// Cuts the triangle of `e` in two at `m`, which lies on `e`; returns the half-edge from `m` to the old end of `e`.
+    /// Splits the triangle of `e` at `m`, which lies on `e`; returns the half-edge from `m` to the old end of `e`.
     fn halve(&mut self, e: u32, m: u32) -> u32 {
         let (a, b, c) = (self.from(e), self.to(e), self.apex(e));
         let beyond = self.twin[next(e) as usize];
@@ -329,8 +330,8 @@ impl Corners {
         }
     }
 
-    /// Whether collapsing `e` keeps the surface what it is: its ends have only those neighbours in common that lie across it, and
-    /// nothing is left hanging. `a` and `b` are the neighbours of its ends.
+    /// Whether collapsing `e` preserves the topology: its ends have only those neighbours in common that lie across
+    /// it, and no triangle degenerates. `a` and `b` are the neighbours of its ends.
     pub(super) fn may_collapse(&self, e: u32, a: &[u32], b: &[u32]) -> bool {
         let back = self.twin[e as usize];
         let sides = if back == NONE { 1 } else { 2 };
@@ -341,7 +342,7 @@ impl Corners {
         [e, back].into_iter().filter(|&s| s != NONE).all(|s| {
             let (x, y) = (self.twin[next(s) as usize], self.twin[previous(s) as usize]);
             let apex = self.apex(s);
-            // A corner of three triangles would be left with two on the same vertices.
+            // A corner of three triangles would have two left on the same vertices.
             let mut spokes = Vec::new();
             self.spokes(apex, &mut spokes);
             (x != NONE || y != NONE)
@@ -350,7 +351,7 @@ impl Corners {
         })
     }
 
-    /// Turns the edge inside its two triangles.
+    /// Flips the edge within its two triangles.
     pub(super) fn flip(&mut self, e: u32) {
         let back = self.twin[e as usize];
         let (a, b, c, d) = (self.from(e), self.to(e), self.apex(e), self.apex(back));
@@ -368,12 +369,12 @@ impl Corners {
         }
     }
 
-    /// Vertices of the surface that is left.
+    /// Vertices of the remaining surface.
     pub(super) fn live_vertices(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.out.len() as u32).filter(|&v| self.out[v as usize] != NONE)
     }
 
-    /// Sets all normals: means over the triangles around, by angle and area, which a sliver hardly turns.
+    /// Sets all normals: means over the adjacent triangles, by angle and area, hardly affected by slivers.
     pub(super) fn set_normals(&mut self) {
         let at: Vec<Vec3> = self.vertices.iter().map(|v| v.at).collect();
         let normals = vertex_normals(&self.triangles, &at);
@@ -383,9 +384,9 @@ impl Corners {
     }
 }
 
-/// Outward unit normals at vertices of a mesh that is being changed: those of the triangles around that are
-/// left, weighted by angle and, other than those of [`SurfaceMesh::vertex_normals`](crate::vessel::SurfaceMesh::vertex_normals), by area; zero
-/// where there is none.
+/// Outward unit normals at vertices of a mesh under change: those of the remaining adjacent triangles, weighted by
+/// angle and, unlike [`SurfaceMesh::vertex_normals`](crate::vessel::SurfaceMesh::vertex_normals), by area; zero
+/// without triangles.
 pub(super) fn vertex_normals(triangles: &[[u32; 3]], at: &[Vec3]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::zeros(); at.len()];
     for t in triangles.iter().filter(|t| t[0] != NONE) {

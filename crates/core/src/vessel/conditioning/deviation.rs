@@ -1,4 +1,4 @@
-//! Where two surfaces are far from each other, at sample points, both ways.
+//! Where two surfaces are far apart, at sample points, both ways.
 
 use std::ops::Range;
 
@@ -8,20 +8,21 @@ use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::NONE;
 use crate::{Vec3, parallel};
 
-/// Sample points of the given surface, about.
+/// Approximate number of sample points of the given surface.
 const SAMPLES: usize = 40_000;
 
-/// Square of the distance, in limits, from which on shorter edges are worth their number.
+/// Square of the distance, in limits, from which shorter edges are worth their number.
 const FAR: f64 = 1.44;
 
-/// Notes the corners of a triangle that is too far off.
+/// Records the corners of a triangle that is too far off.
 fn note(far: &mut Vec<u32>, square: f64, limit_mm: f64, ends: &[u32; 3]) {
     if square > FAR * limit_mm * limit_mm {
         far.extend(ends);
     }
 }
 
-/// Vertices of the conditioned mesh, `at`, near which it and the given one are much farther apart than the limit, ascending.
+/// Vertices of the conditioned mesh, `at`, near which it and the given one are farther apart than the limit,
+/// ascending.
 pub(super) fn far(corners: &Corners, at: &[Vec3], reference: &Reference) -> Vec<u32> {
     let live: Vec<[u32; 3]> = corners.triangles.iter().copied().filter(|t| t[0] != NONE).collect();
     let limit_of =
@@ -37,7 +38,7 @@ pub(super) fn far(corners: &Corners, at: &[Vec3], reference: &Reference) -> Vec<
                     .iter()
                     .map(|&v| reference.walk(&x, corners.vertices[v as usize].place).square)
                     .fold(f64::MAX, f64::min);
-                // A walk may end in a fold of the surface; the hierarchy knows better, and is asked rarely.
+                // A walk may end in a fold of the surface; the hierarchy is exact, and used rarely.
                 let square = if square > 0.25 * limit * limit {
                     let nearest = reference.nearest(&x, &(b - a).cross(&(c - a)));
                     nearest.map_or(square, |nearest| nearest.min(square))
@@ -58,7 +59,7 @@ pub(super) fn far(corners: &Corners, at: &[Vec3], reference: &Reference) -> Vec<
         let mut found = Vec::new();
         for t in part.map(|k| k * stride) {
             let [a, b, c] = given.corners(t);
-            // Of a triangle that is folded over only the place counts.
+            // For a triangle that is folded over only the position counts.
             let normal = (b - a).cross(&(c - a)) * f64::from(u8::from(!reference.is_folded(t)));
             for x in [a, b, c, (a + b + c) / 3.0] {
                 if let Some((triangle, square)) = nearest(&mesh, &tree, &x, &normal) {

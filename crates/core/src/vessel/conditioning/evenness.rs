@@ -1,19 +1,19 @@
-//! Whether a mesh is fine as it is, and how even it is.
+//! Whether a mesh is good enough as it is, and how uniform it is.
 
 use super::corners::{Corners, Kind};
 use crate::vessel::topology::NONE;
 
-/// Longest over shortest edge around a vertex: a regular grid three times as long as wide has √10.
+/// Largest ratio of longest to shortest edge around a vertex: a regular grid three times as long as wide has √10.
 const LARGEST_RATIO: f64 = 4.0;
-/// Smallest angle, radians: that grid has 18°.
+/// Smallest angle, rad: that grid has 18°.
 const LEAST_ANGLE: f64 = 0.2;
-/// Largest angle between neighbouring triangles, radians: where branches part even a fine mesh has a few such edges.
+/// Largest angle between neighbouring triangles, rad: at bifurcations even a fine mesh has a few such edges.
 const LARGEST_TURN: f64 = 1.5;
-/// Largest angle between all but one in a hundred neighbours: nine edges around a tube have 40°.
+/// Largest 99th percentile of angles between neighbours, rad: nine edges around a tube have 40°.
 const USUAL_TURN: f64 = 0.75;
-/// Longest edge over the local radius.
+/// Largest ratio of an edge to the local radius.
 const LONGEST: f64 = 1.6;
-/// Sine of a difference of angles that is rounding.
+/// Sine of a difference of angles that counts as rounding.
 const DOUBT: f64 = 1e-9;
 
 /// Angles and edges of a mesh.
@@ -24,17 +24,17 @@ pub(super) struct Evenness {
     pub(super) edge_max_mm: f64,
     pub(super) least_angle: f64,
     pub(super) largest_turn: f64,
-    /// Angle between neighbouring triangles that one edge in a hundred exceeds, radians.
+    /// 99th percentile of angles between neighbouring triangles, rad.
     pub(super) usual_turn: f64,
     pub(super) largest_ratio: f64,
 }
 
 impl Evenness {
-    /// Of the mesh as `at` has it.
+    /// For the mesh with vertices at `at`.
     pub(super) fn of(corners: &Corners, at: impl Fn(u32) -> crate::Vec3) -> Self {
         let mut edges = Vec::new();
         let mut extremes = vec![(f64::MAX, 0.0f64); corners.vertices.len()];
-        // The least angle, and its sine and cosine times any length.
+        // The smallest angle, and its sine and cosine times an arbitrary length.
         let (mut least_angle, mut least) = (f64::MAX, (0.0, -1.0));
         let mut cosines = Vec::new();
         let normal = |t: u32| {
@@ -45,7 +45,7 @@ impl Evenness {
             let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
             let (x, y) = (at(b) - at(a), at(c) - at(a));
             let (sine, cosine) = (x.cross(&y).norm(), x.dot(&y));
-            // The sine of what it is larger by distinguishes nearly all, and takes no arc tangent.
+            // The sine of the difference excludes nearly all, without an arc tangent.
             let beyond = sine * least.1 - cosine * least.0;
             if beyond.is_nan() || beyond <= DOUBT * (sine + cosine.abs()) * (least.0 + least.1.abs()) {
                 let angle = libm::atan2(sine, cosine);
@@ -90,7 +90,7 @@ impl Evenness {
         }
     }
 
-    /// Whether angles are good everywhere and edges do not differ much from their neighbours.
+    /// Whether angles are good everywhere and edges resemble their neighbours.
     pub(super) fn is_even(&self) -> bool {
         self.largest_ratio <= LARGEST_RATIO
             && self.least_angle >= LEAST_ANGLE
@@ -99,7 +99,7 @@ impl Evenness {
     }
 }
 
-/// Whether all edges are short against the vessel, whose sizes are set.
+/// Whether all edges are short relative to the vessel, whose sizes are set.
 pub(super) fn is_fine_enough(corners: &Corners) -> bool {
     (0..corners.half_edges()).filter(|&e| corners.leads(e)).all(|e| {
         let radius = |v: u32| corners.vertices[v as usize].radius_mm;
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn the_least_angle_is_that_of_all_angles_to_the_bit() {
         for seed in 0..50 {
-            // Triangles that share nothing, some of them nearly alike and some without an area.
+            // Unconnected triangles, some nearly equal and some without an area.
             let mut mesh = SurfaceMesh::default();
             for k in 0..20_u32 {
                 let like = if k % 3 == 0 { 0 } else { k };

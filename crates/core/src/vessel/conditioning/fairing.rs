@@ -1,16 +1,17 @@
-//! Rounds kinks and takes out noise as far as the limit allows.
+//! Smooths kinks and noise as far as the limit allows.
 //!
-//! Vertices aᵢ on the given surface are moved along their normals to pᵢ = aᵢ + hᵢnᵢ. With rᵢ the height by which a vertex stands off the
-//! quadric through those around it ([`super::bumps`]), the heights minimise
+//! Vertices aᵢ on the given surface are moved along their normals to pᵢ = aᵢ + hᵢnᵢ. With rᵢ the height of a vertex
+//! above the quadric through those around it ([`super::bumps`]), the heights minimise
 //!
 //! ```text
 //! ½ Σ (hᵢ − ηᵢ)² + ½ α Σ rᵢ²,      |hᵢ| ≤ 0.8 tᵢ
 //! ```
 //!
-//! from the smooth reconstruction ηᵢ of coarse facets ([`super::reference`]). Without bounds that is a filter 1/(1 + αb²), where bumps b
-//! of waves 4, 6 and 10 edges long are 0.26, 0.06 and 0.009 of their amplitude on a regular mesh: with α = 150 a wave of 5.5 edges is halved, and one of 10
-//! keeps 99 of 100. It is of the family of Desbrun et al., "Implicit fairing", SIGGRAPH 1999, with a bump in place of the square of an umbrella
-//! operator, which takes the unevenness of a mesh for one of the surface. The bounds are kept by projection in an accelerated
+//! about the smooth reconstruction ηᵢ of coarse facets ([`super::reference`]). Without bounds that is a filter 1/(1 +
+//! αb²), where bumps b of waves 4, 6 and 10 edges long are 0.26, 0.06 and 0.009 of their amplitude on a regular mesh:
+//! with α = 150 a wave of 5.5 edges is halved, and one of 10 keeps 99 of 100. It belongs to the family of Desbrun et
+//! al., "Implicit fairing", SIGGRAPH 1999, with a bump instead of the square of an umbrella operator, which mistakes
+//! the irregularity of a mesh for one of the surface. The bounds are enforced by projection in an accelerated
 //! gradient method (Beck and Teboulle, *SIAM J. Imaging Sci.* 2, 2009).
 
 use super::bumps::Bumps;
@@ -19,14 +20,14 @@ use super::reference::Reference;
 use crate::Vec3;
 use crate::vessel::topology::NONE;
 
-/// Part of the limit that heights may take: chords of the new triangles take some of it too.
+/// Fraction of the limit available to heights: chords of the new triangles take some of it too.
 const REACH: f64 = 0.8;
 /// α.
 const STIFFNESS: f64 = 150.0;
-/// Cosine by which a triangle may turn against where it was.
+/// Smallest cosine of the angle by which a triangle may rotate.
 const LEAST_COSINE: f64 = 0.5;
 
-/// Where the vertices come to lie, mm.
+/// The new positions of the vertices, mm.
 pub(super) fn fair(corners: &Corners, reference: &Reference, iterations: usize) -> Vec<Vec3> {
     let count = corners.vertices.len();
     let free =
@@ -70,7 +71,7 @@ pub(super) fn fair(corners: &Corners, reference: &Reference, iterations: usize) 
     corners.vertices.iter().zip(&heights).map(|(x, h)| x.at + x.normal * *h).collect()
 }
 
-/// Mean bump over the edges there: nothing where a surface is smooth on the scale of its edges.
+/// Mean bump relative to the local edges: zero where a surface is smooth on the scale of its edges.
 pub(super) fn roughness(corners: &Corners) -> f64 {
     let (mut spokes, mut sum, mut count) = (Vec::new(), 0.0, 0);
     for (v, bump_mm) in Bumps::new(corners).at_rest_mm() {
@@ -106,7 +107,7 @@ fn draw_back(corners: &Corners, heights: &mut [f64]) {
     }
 }
 
-/// Largest turn of the normal per length along an edge of each vertex, 1/mm.
+/// Largest rotation of the normal per length along an edge of each vertex, 1/mm.
 pub(super) fn curvature(corners: &Corners, at: &[Vec3]) -> Vec<f64> {
     let normals = vertex_normals(&corners.triangles, at);
     let mut found = vec![0.0f64; at.len()];

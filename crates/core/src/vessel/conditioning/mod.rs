@@ -1,8 +1,8 @@
-//! An even mesh of the same surface.
+//! Uniform remeshing of a surface.
 //!
-//! The wall that devices feel blends quadrics fitted at the vertices of a mesh. That is good where a mesh is even, and bad where it has
-//! slivers, fans, facets much longer than the vessel is wide, or noise; and surfaces of real vessels have all of these. Here such a
-//! surface gets vertices that depend on its geometry and not on how it was meshed:
+//! The felt wall blends quadrics fitted at the vertices of a mesh. That works where a mesh is uniform, and fails
+//! where it has slivers, fans, facets much longer than the vessel is wide, or noise; surfaces of real vessels have
+//! all of these. Here such a surface gets vertices that depend on its geometry and not on its triangulation:
 //!
 //! 1. A mesh that is even and smooth already is returned as it is (`evenness`).
 //! 2. The lumen's radius and the curvature say how long edges should be (`sizes`).
@@ -37,25 +37,25 @@ use reference::Reference;
 use remesh::Remesher;
 use sizes::Wanted;
 
-/// Mean bump over the edges above which an even mesh is faired all the same. Generated walls have up to 0.004, with eight edges around a
-/// tube; noise of a fiftieth of the edges has 0.0065.
+/// Mean bump, in edges, above which even a uniform mesh is faired. Generated walls have up to 0.004, with eight edges
+/// around a tube; noise of a fiftieth of the edges has 0.0065.
 const ROUGH: f64 = 0.005;
-/// Rounds of sizes, triangles and fairing; in each, edges are fitted to what the last one left.
+/// Number of rounds of sizes, triangles and fairing; in each, edges are adapted to the result of the last one.
 const ROUNDS: usize = 2;
-/// Rounds of remeshing in the first of these and in later ones.
+/// Number of remeshing rounds in the first of these and in later ones.
 const REMESHINGS: (usize, usize) = (3, 1);
-/// Iterations of fairing in the last round and in the others.
+/// Number of fairing iterations in the last round and in the others.
 const ITERATIONS: (usize, usize) = (40, 15);
-/// How often edges are made shorter where the surfaces are farther apart than the limit.
+/// Number of times edges are shortened where the surfaces are farther apart than the limit.
 const CORRECTIONS: usize = 1;
 
-/// What [`condition`] may do.
+/// Limits of [`condition`].
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Conditioning {
-    /// How far the conditioned surface may be from the given one, mm; where the lumen's radius is less than twenty times this, a
-    /// twentieth of the radius.
+    /// Largest distance of the conditioned surface from the given one, mm; at most a twentieth of the lumen's local
+    /// radius.
     pub deviation_mm: f64,
-    /// Most triangles that are aimed at; edges get longer instead.
+    /// Target for the largest number of triangles; edges get longer instead.
     pub most_triangles: usize,
 }
 
@@ -82,12 +82,13 @@ impl Conditioning {
     }
 }
 
-/// A conditioned surface. How far the wall that is made of it is from the given one says [`ContactSurface::deviation`](crate::contact::FeltMesh::deviation).
+/// A conditioned surface. The distance of the wall made of it from the given one is measured by
+/// [`ContactSurface::deviation`](crate::contact::FeltMesh::deviation).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditioned<'a> {
-    /// The mesh, counter-clockwise from outside as the given one; that one itself if it is even already.
+    /// The mesh, counter-clockwise from outside like the given one; the given one itself if already uniform.
     pub mesh: Cow<'a, SurfaceMesh>,
-    /// Whether it is another than the given one.
+    /// Whether it differs from the given one.
     pub changed: bool,
     /// Shortest edge, mm.
     pub edge_min_mm: f64,
@@ -99,7 +100,7 @@ pub struct Conditioned<'a> {
     pub least_angle: f64,
     /// Largest angle between two neighbouring triangles, radians.
     pub largest_turn: f64,
-    /// Whether edges are longer than the surface asks for, because there would have been too many.
+    /// Whether edges are longer than the surface requires, to limit their number.
     pub too_many: bool,
 }
 
@@ -118,8 +119,8 @@ impl<'a> Conditioned<'a> {
     }
 }
 
-/// An even mesh of `surface`, whose triangles must be counter-clockwise seen from outside the lumen. If it is even already, it is
-/// returned bit for bit.
+/// A uniform mesh of `surface`, whose triangles must be counter-clockwise seen from outside the lumen. If it is
+/// already uniform, it is returned bit for bit.
 ///
 /// # Errors
 /// [`Error::Mesh`] if there are no triangles, an index is out of range or a coordinate is not finite; [`Error::Parameter`] for an

@@ -14,14 +14,14 @@ use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::{EdgeTable, NONE};
 
-/// Longest walk, in triangles. On the densest meshes a step of one wanted edge crosses some hundred.
+/// Longest walk, in triangles. On the densest meshes a step of one target edge crosses about a hundred.
 const WALK: usize = 4000;
-/// Cosine between a chord and the normal where it ends, at least; where it is less the chord says nothing.
+/// Smallest cosine between a chord and the normal at its end; below it the chord is meaningless.
 const ACROSS: f64 = 0.6;
-/// A corner normal that leans away from its triangle by more than this (41°) is of a crease or of noise.
+/// Largest deviation of a corner normal from its triangle's (41°): beyond it there is a crease or noise.
 const LEANING: f64 = 0.75;
 
-/// A sheet whose normal leans away farther than this cosine is another one.
+/// Cosine between normals below which a triangle belongs to another sheet.
 const OTHER_SHEET: f64 = -0.2;
 
 /// Part of a triangle that is closest to a point.
@@ -40,7 +40,7 @@ pub(super) struct Foot {
     pub(super) triangle: u32,
     /// Barycentric coordinates.
     pub(super) weights: [f64; 3],
-    /// Square of the distance from what was asked, mm².
+    /// Square of the distance from the query point, mm².
     pub(super) square: f64,
     feature: Feature,
 }
@@ -91,7 +91,7 @@ impl<'a> Reference<'a> {
         Foot { at, triangle, weights, square: (x - at).norm_squared(), feature }
     }
 
-    /// The point of the surface nearest to `x` that a walk from a triangle comes to.
+    /// The point of the surface nearest to `x` that a walk from a triangle reaches.
     pub(super) fn walk(&self, x: &Vec3, triangle: u32) -> Foot {
         let mut best = self.on(x, triangle);
         for _ in 0..WALK {
@@ -117,20 +117,20 @@ impl<'a> Reference<'a> {
         best
     }
 
-    /// Whether a triangle faces against the surface around it.
+    /// Whether a triangle faces against the surrounding surface.
     pub(super) fn is_folded(&self, triangle: usize) -> bool {
         let [a, b, c] = self.mesh.corners(triangle);
         let normal = (b - a).cross(&(c - a));
         self.mesh.triangles[triangle].iter().any(|&v| self.normals[v as usize].dot(&normal) < 0.0)
     }
 
-    /// Square of the distance from the nearest triangle that faces along `normal`, mm².
+    /// Square of the distance from the nearest triangle that faces like `normal`, mm².
     pub(super) fn nearest(&self, x: &Vec3, normal: &Vec3) -> Option<f64> {
         nearest(self.mesh, &self.tree, x, normal).map(|found| found.1)
     }
 
-    /// Where a ray from inside (`outward` = 1) leaves the lumen, or one from outside (−1) enters one, mm along the unit vector
-    /// `way`. What is nearer than `skip_mm` is the surface it starts from.
+    /// Where a ray from inside (`outward` = 1) leaves the lumen, or one from outside (−1) enters one, mm along the
+    /// unit vector `way`. Hits within `skip_mm` belong to the surface it starts from.
     pub(super) fn cast(
         &self,
         from: &Vec3,
@@ -148,7 +148,7 @@ impl<'a> Reference<'a> {
         let (triangle, distance) = self.tree.cast_ray(&ray, reach_mm, hit)?;
         let [a, b, c] = self.mesh.corners(triangle as usize);
         let normal = (b - a).cross(&(c - a));
-        // Beside a ridge a ray meets its other flank, however wide the lumen is.
+        // Next to a ridge a ray hits its other flank, however wide the lumen is.
         let across = normal.dot(way) * outward > ACROSS * normal.norm();
         (across && distance.is_finite() && distance < reach_mm).then_some(distance)
     }
@@ -160,7 +160,7 @@ impl<'a> Reference<'a> {
     /// η = ½ Σ λᵢ nᵢ·(vᵢ − c)
     /// ```
     ///
-    /// A corner whose normal leans away from the triangle adds nothing.
+    /// A corner whose normal is inclined to the triangle's contributes nothing.
     pub(super) fn bulge_mm(&self, foot: &Foot) -> f64 {
         let corners = self.mesh.corners(foot.triangle as usize);
         let [a, b, c] = corners;
@@ -251,7 +251,7 @@ pub(super) fn square_to(x: &Vec3, corners: &[Vec3; 3]) -> f64 {
     (x - corners[0] * w[0] - corners[1] * w[1] - corners[2] * w[2]).norm_squared()
 }
 
-/// The nearest triangle that faces the same way, and the square of its distance; a needle's normal says nothing.
+/// The nearest triangle that faces the same way, and the square of its distance; a needle's normal is meaningless.
 pub(super) fn nearest(mesh: &SurfaceMesh, tree: &Bvh, x: &Vec3, normal: &Vec3) -> Option<(u32, f64)> {
     let size = normal.norm();
     let aside = |node: &BvhNode, _: f64| {

@@ -1,50 +1,53 @@
-//! Even triangles of wanted size on the given surface.
+//! Uniform triangles of target size on the given surface.
 //!
-//! Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004: edges longer than 4/3 of what is wanted are
-//! split, those shorter than 4/5 collapsed, edges flipped towards six neighbours (four on a rim), and vertices moved over the
-//! surface to the centroids of what surrounds them, weighted by area over the fourth power of the wanted length (Du, Faber,
-//! Gunzburger, *SIAM Review* 41, 1999). Vertices always lie on the given surface. All orders are fixed.
+//! Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004: edges longer than 4/3 of the
+//! target are split, those shorter than 4/5 collapsed, edges flipped towards six neighbours (four on a rim), and
+//! vertices moved over the surface to the centroids of their surroundings, weighted by area over the fourth power of
+//! the target length (Du, Faber, Gunzburger, *SIAM Review* 41, 1999). Vertices are always on the given surface. All
+//! orders are fixed.
 
 use super::corners::{Corners, Kind, Vertex, next, previous};
 use super::reference::{Reference, square_to};
 use crate::Vec3;
 use crate::vessel::topology::NONE;
 
-/// Edges longer than this part of what is wanted are split, …
+/// Edges longer than this fraction of the target are split.
 const LONG: f64 = 4.0 / 3.0;
-/// … shorter ones collapsed, the shortest first, …
+/// Edges shorter than these fractions of the target are collapsed, the shortest first.
 const SHORT: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// … unless that leaves edges longer than this.
+/// Longest edge, as a fraction of the target, that may result from a collapse.
 const TOO_LONG: f64 = 1.4;
-/// Where a spike is cut off, edges shorter than this part of what is wanted are collapsed.
+/// Where a spike is cut off, edges shorter than this fraction of the target are collapsed.
 const TOGETHER: f64 = 0.5;
-/// Halvings of one edge: from a metre to a micrometre.
+/// Largest number of halvings of one edge: from a metre to a micrometre.
 const HALVINGS: usize = 20;
-/// Passes of collapses with one bound; each finds less.
+/// Number of passes of collapses with one bound; each finds less.
 const PASSES: usize = 6;
-/// Cosine by which a triangle may turn when a neighbour is collapsed or an edge flipped.
+/// Smallest cosine of the angle by which a triangle may rotate when a neighbour is collapsed or an edge flipped.
 const LEAST_COSINE: f64 = 0.7;
-/// Height over longest edge below which a triangle's normal is noise.
+/// Ratio of height to longest edge below which a triangle's normal is noise.
 const NEEDLE: f64 = 0.02;
-/// A vertex that is this near to where it should be, in wanted lengths, stays.
+/// Distance from its destination, in target lengths, within which a vertex is not moved.
 const AT_REST: f64 = 0.05;
-/// How far from the surface a vertex may be left behind when it is collapsed or moved, in limits: ridges and tips stay.
+/// Largest distance from the surface at which a collapsed and a moved vertex may leave a point behind, in limits:
+/// this preserves ridges and tips.
 const LEFT: (f64, f64) = (0.8, 0.5);
-/// Cosine between a vertex's normal and those of its triangles below which it is the tip of a fold, which need not stay.
+/// Cosine between a vertex's normal and those of its triangles below which it is the tip of a fold, which need not be
+/// preserved.
 const FOLDED: f64 = 0.2;
-/// How far a vertex of a rim that is left out may be from the rim that remains, in limits.
+/// Largest distance of a removed vertex of a rim from the remaining rim, in limits.
 const RIM: f64 = 0.25;
-/// How far from its old triangles a flipped edge may pass, in limits.
+/// Largest distance of a flipped edge from its old triangles, in limits.
 const FLIP: f64 = 0.5;
 
-/// One editing of a mesh on a surface.
+/// Editing of a mesh on a surface.
 pub(super) struct Remesher<'a, 'b> {
     pub(super) reference: &'a Reference<'b>,
     pub(super) most_triangles: usize,
 }
 
 impl Remesher<'_, '_> {
-    /// Splits, collapses, flips and evens out, so many times.
+    /// Runs this many rounds of splits, collapses, flips and smoothing.
     pub(super) fn run(&self, corners: &mut Corners, rounds: usize) {
         for _ in 0..rounds {
             self.split(corners);
@@ -77,7 +80,7 @@ impl Remesher<'_, '_> {
             }
             long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
             for (ratio, e) in long {
-                // Splits next to it have left it as it was, or halved it.
+                // Splits next to it have left it unchanged, or halved it.
                 if corners.length_mm(e) / corners.target_mm(e) > 0.75 * ratio {
                     let middle = self.middle(corners, e);
                     corners.split(e, middle);
@@ -86,14 +89,14 @@ impl Remesher<'_, '_> {
         }
     }
 
-    /// The vertex to be put on an edge.
+    /// The vertex to be inserted on an edge.
     fn middle(&self, corners: &Corners, e: u32) -> Vertex {
         let (a, b) = (&corners.vertices[corners.from(e) as usize], &corners.vertices[corners.to(e) as usize]);
         let open = corners.twin(e) == NONE;
         let x = 0.5 * (a.at + b.at);
         let (one, other) = (self.reference.walk(&x, a.place), self.reference.walk(&x, b.place));
         let foot = if other.square < one.square { other } else { one };
-        // A foot farther away than a quarter of the edge is that of another place.
+        // A foot farther away than a quarter of the edge belongs elsewhere.
         let near = foot.square < 0.0625 * (b.at - a.at).norm_squared();
         Vertex {
             at: if near { foot.at } else { x },
@@ -131,7 +134,7 @@ impl Remesher<'_, '_> {
             }
             let way = sum / total - vertex.at;
             let way = way - vertex.normal * vertex.normal.dot(&way);
-            // Nothing to gain, or no number.
+            // Nothing to gain, or NaN.
             let square = way.norm_squared();
             if !square.is_finite() || square <= (AT_REST * vertex.target_mm).powi(2) {
                 continue;
@@ -150,7 +153,7 @@ impl Remesher<'_, '_> {
 }
 
 fn may_split(corners: &Corners, e: u32) -> bool {
-    // What is open between locked vertices is an edge of many triangles, which must stay one edge for all of them.
+    // An open edge between locked vertices belongs to many triangles, and must stay one edge for all of them.
     corners.twin(e) != NONE
         || (corners.kind(corners.from(e)) == Kind::Rim || corners.kind(corners.to(e)) == Kind::Rim)
 }
@@ -161,13 +164,14 @@ fn shape([a, b, c]: &[Vec3; 3]) -> (Vec3, f64) {
     ((b - a).cross(&(c - a)), longest)
 }
 
-/// Whether a triangle may become another: it keeps its direction, or that of the surface if it was a needle; no new needles.
+/// Whether a triangle may become another: it keeps its direction, or that of the surface if it was a needle; no new
+/// needles.
 fn may_become(before: &[Vec3; 3], after: &[Vec3; 3], normal: &Vec3) -> bool {
     let ((old, old_square), (new, new_square)) = (shape(before), shape(after));
     let (old_area, new_area) = (old.norm(), new.norm());
     let was_needle = old_area <= NEEDLE * old_square;
     if new_area <= NEEDLE * new_square {
-        // From bad to less bad.
+        // An improvement of a bad triangle.
         return was_needle && new_area * old_square > old_area * new_square;
     }
     if was_needle {
@@ -176,7 +180,7 @@ fn may_become(before: &[Vec3; 3], after: &[Vec3; 3], normal: &Vec3) -> bool {
     old.dot(&new) > LEAST_COSINE * old_area * new_area
 }
 
-/// Whether the triangles around a vertex stay as they should when it moves.
+/// Whether the triangles around a vertex stay valid when it moves.
 fn stays_sound(corners: &Corners, spokes: &[u32], to: &Vec3) -> bool {
     spokes.iter().all(|&e| {
         let before = corners.positions(e / 3);
@@ -186,8 +190,8 @@ fn stays_sound(corners: &Corners, spokes: &[u32], to: &Vec3) -> bool {
     })
 }
 
-/// Whether the place of the vertex whose spokes these are stays near the surface when it goes to another, onto a neighbour if that is
-/// given: within so many limits.
+/// Whether the surface at the vertex with these spokes stays within this many limits of its position when the vertex
+/// moves, onto a neighbour if given.
 fn keeps(corners: &Corners, spokes: &[u32], to: &Vec3, onto: Option<u32>, limits: f64) -> bool {
     let Some(first) = spokes.first() else { return true };
     let vertex = &corners.vertices[corners.from(*first) as usize];
@@ -226,7 +230,7 @@ fn collapse(corners: &mut Corners) {
     }
 }
 
-/// Collapses the short ones of the edges between `marked` vertices, whatever that does to the surface.
+/// Collapses short edges between `marked` vertices, whatever the effect on the surface.
 pub(super) fn pull_together(corners: &mut Corners, marked: &[bool]) {
     let mut work = Work::default();
     for e in 0..corners.half_edges() {
@@ -277,7 +281,7 @@ fn try_collapse(corners: &mut Corners, e: u32, work: &mut Work) -> bool {
     if !corners.may_collapse(e, &work.around[0], &work.around[1]) {
         return false;
     }
-    // The end that goes: never a rim's inwards; otherwise whichever leaves the shorter edges.
+    // The end to remove: a rim is not pulled inwards; otherwise the one whose removal leaves shorter edges.
     let longest = |gone: usize| -> Option<f64> {
         if kinds[gone] == Kind::Rim
             && (kinds[1 - gone] != Kind::Rim
@@ -303,7 +307,7 @@ fn try_collapse(corners: &mut Corners, e: u32, work: &mut Work) -> bool {
                     * (corners.vertices[w as usize].target_mm
                         + corners.vertices[ends[1 - gone] as usize].target_mm);
                 let ratio = (corners.at(w) - to).norm() / target;
-                // An edge that was as long already may stay: a needle's other end goes first otherwise.
+                // An edge that was as long before is permitted: otherwise a needle's other end would go first.
                 if ratio > TOO_LONG
                     && (corners.at(w) - corners.at(ends[gone])).norm() < 0.95 * (corners.at(w) - to).norm()
                 {
@@ -324,7 +328,7 @@ fn try_collapse(corners: &mut Corners, e: u32, work: &mut Work) -> bool {
     true
 }
 
-/// Whether a rim without one of its vertices passes close by it.
+/// Whether a rim without one of its vertices stays close to it.
 fn rim_stays(corners: &Corners, gone: u32, kept: u32, spokes: &[u32]) -> bool {
     let ends = spokes.iter().flat_map(|&s| {
         let leaving = (corners.twin(s) == NONE).then(|| corners.to(s));
@@ -339,13 +343,13 @@ fn rim_stays(corners: &Corners, gone: u32, kept: u32, spokes: &[u32]) -> bool {
     (a + way * along - x).norm_squared() <= limit * limit
 }
 
-/// The two triangles of an edge a–b, with corners c and d across, and how many neighbours they have more than they should.
+/// The two triangles of an edge a–b, with corners c and d across, and the excess of their numbers of neighbours.
 pub(super) struct Pair {
     at: [Vec3; 4],
     excess: [i32; 4],
 }
 
-/// Nearer to six neighbours each, and no much sharper corner.
+/// Brings valences closer to six, without a much sharper corner.
 fn by_valence(pair: &Pair) -> bool {
     let sum = |change: [i32; 4]| (0..4).map(|k| (pair.excess[k] + change[k]).pow(2)).sum::<i32>();
     let [a, b, c, d] = pair.at;
@@ -354,7 +358,7 @@ fn by_valence(pair: &Pair) -> bool {
     sum([-1, -1, 1, 1]) < sum([0; 4]) && after > 0.5 * before
 }
 
-/// The angles across the edge sum to more than π (the criterion of Delaunay).
+/// The angles opposite the edge sum to more than π (the Delaunay criterion).
 pub(super) fn by_angles(pair: &Pair) -> bool {
     let [a, b, c, d] = pair.at;
     let angle = |at: Vec3| libm::atan2((a - at).cross(&(b - at)).norm(), (a - at).dot(&(b - at)));
@@ -371,7 +375,7 @@ fn flip(corners: &mut Corners, wanted: fn(&Pair) -> bool) {
     flip_some(corners, wanted, None);
 }
 
-/// Flips edges, only such whose ends are `marked` if that is given, and these without regard to where the surface was.
+/// Flips edges; if `marked` is given only those between marked vertices, without regard to the surface.
 pub(super) fn flip_some(corners: &mut Corners, wanted: fn(&Pair) -> bool, marked: Option<&[bool]>) {
     let mut excess: Vec<i32> =
         corners.vertices.iter().map(|v| if v.kind == Kind::Rim { -4 } else { -6 }).collect();
@@ -416,7 +420,7 @@ pub(super) fn flip_some(corners: &mut Corners, wanted: fn(&Pair) -> bool, marked
     );
 }
 
-/// Whether the surface stays where it is when an edge is flipped, and keeps its direction.
+/// Whether the surface stays in place and keeps its direction when an edge is flipped.
 fn may_flip(corners: &Corners, quad: [u32; 4], [a, b, c, d]: &[Vec3; 4]) -> bool {
     let normal: Vec3 = quad.iter().map(|&v| corners.vertices[v as usize].normal).sum();
     let normal = normal.try_normalize(1e-6).unwrap_or_default();
@@ -424,7 +428,7 @@ fn may_flip(corners: &Corners, quad: [u32; 4], [a, b, c, d]: &[Vec3; 4]) -> bool
     if !new.iter().all(|n| old.iter().all(|o| may_become(o, n, &normal))) {
         return false;
     }
-    // How far the two diagonals pass each other.
+    // Distance between the two diagonals.
     let across = (b - a).cross(&(d - c));
     let size = across.norm();
     let limit = quad.iter().map(|&v| corners.vertices[v as usize].limit_mm).fold(f64::MAX, f64::min);

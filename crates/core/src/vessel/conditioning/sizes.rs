@@ -1,17 +1,18 @@
-//! How long edges should be, and how far the surface may move.
+//! Target lengths of edges, and limits of the surface's motion.
 //!
-//! The local radius of the lumen is half the chord of a ray cast inward along the normal (as in the shape diameter function of
-//! Shapira et al., *The Visual Computer* 24, 2008, with one ray), medianed over neighbours. Edges are to be
+//! The local radius of the lumen is half the chord of a ray cast inward along the normal (as in the shape diameter
+//! function of Shapira et al., *The Visual Computer* 24, 2008, with one ray), median filtered over neighbours. The
+//! target length of edges is
 //!
 //! ```text
 //! h = min(R / 2.2,  0.5 / κ,  √(2.4 R d),  2 mm)       not shorter than min(max(0.6 t, R / 3.5), 0.4 mm)
 //! ```
 //!
-//! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of thickness d, a sag
-//! h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and length 8t/θ; with κ = θ²/8t the
-//! formula gives edges of 4 t/θ² there; R/3.5 and 0.4 mm end this sooner. κ is measured on the surface as it comes out, not on
-//! the triangles given, so that kinks of a coarse mesh that vanish within the limit cost nothing.
-//! Neighbouring lengths differ by at most 0.35 of their distance.
+//! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of
+//! thickness d, a sag h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and
+//! length 8t/θ; with κ = θ²/8t the formula gives edges of 4 t/θ² there; R/3.5 and 0.4 mm are further lower bounds. κ
+//! is measured on the resulting surface, not on the given triangles, so that kinks of a coarse mesh that vanish
+//! within the limit cost nothing. Neighbouring lengths differ by at most 0.35 of their distance.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -20,53 +21,58 @@ use super::corners::Corners;
 use super::reference::Reference;
 use crate::Vec3;
 
-/// Edges over the local radius: 22 around a tube, as many as the smooth wall needs to be as good as round.
+/// Edge length relative to the local radius: 22 around a tube, as many as the smooth wall needs to be practically
+/// round.
 const EDGE_PER_RADIUS: f64 = 1.0 / 2.2;
-/// Longest edge, mm: some radii of a device. In wide vessels that are given coarsely every edge is a kink, and a device must find it
-/// rounded on its own scale: with edges up to six of its radii nearly all insertions arrived, with ten and more few.
+/// Longest edge, mm: some radii of a device. In wide vessels with coarse meshes every edge is a kink, which must be
+/// rounded on the scale of a device: with edges up to six of its radii nearly all insertions succeeded, with ten and
+/// more few.
 const LONGEST_MM: f64 = 2.0;
-/// Largest angle between the normals at the ends of an edge, radians, that is aimed at. With 1.0 the quadrics at the crests of flow dividers
-/// stood 0.2 to 0.5 mm into the lumen, with kinks in which no equilibrium exists; with 0.4 edges are so short that facets of coarse meshes
-/// are no longer faired.
+/// Target for the largest angle between the normals at the ends of an edge, rad. With 1.0 the quadrics at the crests
+/// of flow dividers stood 0.2 to 0.5 mm into the lumen, with kinks at which no equilibrium exists; with 0.4 edges are
+/// so short that facets of coarse meshes are no longer faired.
 const TURN: f64 = 0.5;
-/// Shortest edge over the limit: the sharpest kink needs no shorter ones; …
+/// Shortest edge relative to the limit: the sharpest kink needs no shorter ones.
 const FLOOR: f64 = 0.6;
-/// … and over the local radius: the smooth wall rounds a kink over an edge or two by itself, and kinks of a coarse mesh are long; …
+/// Shortest edge relative to the local radius: the smooth wall rounds a kink over one or two edges by itself, and kinks of a
+/// coarse mesh are long.
 const FLOOR_PER_RADIUS: f64 = 1.0 / 3.5;
-/// … but in wide vessels this, mm: crests there are as sharp as in narrow ones, and about as long as a wire is thick has to be right.
+/// Upper bound of this shortest edge in wide vessels, mm: crests there are as sharp as in narrow ones, and must be accurate to about the
+/// thickness of a wire.
 const FLOOR_MM: f64 = 0.4;
-/// Where the surfaces are farther apart than the limit, edges are made so much shorter, …
+/// Factor by which edges are shortened where the surfaces are farther apart than the limit.
 const SHORTER: f64 = 0.65;
-/// … down to this part of the local radius.
+/// Smallest edge after shortening, as a fraction of the local radius.
 const SHORTEST: f64 = 1.0 / 5.0;
-/// The limit over the local radius, at most.
+/// Upper bound of the limit relative to the local radius.
 const LIMIT_PER_RADIUS: f64 = 0.05;
-/// The limit over the thickness of a septum, at most: two sheets that both move leave a third of it.
+/// Upper bound of the limit relative to the thickness of a septum: two sheets that both move leave a third of it.
 const LIMIT_PER_SEPTUM: f64 = 0.33;
-/// Where sheets touch already, least part of the limit, and of the edge that the radius asks for: nothing keeps them apart.
+/// Where sheets already touch, lower bounds of the limit, and of the edge required by the radius: nothing keeps them
+/// apart.
 const TOUCHING: (f64, f64) = (0.2, 0.25);
-/// Thickest septum that is looked for, in limits.
+/// Largest thickness of a septum that is detected, in limits.
 const SEPTUM: f64 = 4.0;
-/// By how much wanted lengths may grow per length.
+/// Largest growth of target lengths per length.
 const GRADING: f64 = 0.35;
-/// Most vertices from which rays are cast; others take the nearest one's radius.
+/// Largest number of vertices from which rays are cast; others take the nearest one's radius.
 const RAYS: usize = 20_000;
-/// What a ray meets within this part of the whole surface's size is what it starts from.
+/// Hits of a ray within this fraction of the whole surface's size belong to its start.
 const SKIP: f64 = 1e-5;
-/// Least radius over the median of all: a smaller chord is that of a fold.
+/// Smallest radius relative to the median of all: a smaller chord is that of a fold.
 const LEAST_RADIUS: f64 = 0.3;
 /// Triangles of edge h cover √3/4 h² each.
 const COVER: f64 = 0.433;
 
-/// What is wanted of the whole mesh.
+/// Requirements of the whole mesh.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted {
     pub(super) deviation_mm: f64,
     pub(super) most_triangles: usize,
 }
 
-/// Sets radius, limit and wanted length of all vertices. `curvature` is that of the surface so far, 1/mm, or nothing yet.
-/// Whether wanted lengths had to be raised to keep the number of triangles.
+/// Sets radius, limit and target length of all vertices. `curvature` is that of the surface so far, 1/mm, or empty at
+/// first. Returns whether target lengths had to be raised to limit the number of triangles.
 pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64], wanted: Wanted) -> bool {
     let septum = cast(corners, reference, wanted.deviation_mm);
     let live: Vec<u32> = corners.live_vertices().collect();
@@ -87,7 +93,7 @@ pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64
     raise(corners, wanted.most_triangles)
 }
 
-/// Raises all wanted lengths until there are not too many triangles; whether that was needed.
+/// Raises all target lengths until there are not too many triangles; returns whether that was needed.
 fn raise(corners: &mut Corners, most_triangles: usize) -> bool {
     let raise = (expected_triangles(corners) / most_triangles as f64).sqrt();
     let needed = raise > 1.0 && raise.is_finite();
@@ -97,7 +103,7 @@ fn raise(corners: &mut Corners, most_triangles: usize) -> bool {
     needed
 }
 
-/// Wants shorter edges at some vertices; whether lengths had to be raised to keep the number of triangles.
+/// Shortens the target at some vertices; returns whether lengths had to be raised to limit the number of triangles.
 pub(super) fn shorten(corners: &mut Corners, at: &[u32], wanted: Wanted) -> bool {
     for &v in at {
         let vertex = &mut corners.vertices[v as usize];
@@ -108,7 +114,7 @@ pub(super) fn shorten(corners: &mut Corners, at: &[u32], wanted: Wanted) -> bool
     raise(corners, wanted.most_triangles)
 }
 
-/// Triangles of the wanted size that cover the surface.
+/// Number of triangles of the target size that cover the surface.
 fn expected_triangles(corners: &Corners) -> f64 {
     let of = |t: usize| {
         let [a, b, c] = corners.positions(t as u32);
@@ -119,7 +125,7 @@ fn expected_triangles(corners: &Corners) -> f64 {
     (0..corners.triangles.len()).filter(|&t| corners.lives(3 * t as u32)).map(of).sum()
 }
 
-/// Sets all radii; returns how thick the septum behind each vertex is, mm, infinite where there is none near.
+/// Sets all radii; returns the thickness of the septum behind each vertex, mm, infinite if none is near.
 fn cast(corners: &mut Corners, reference: &Reference, deviation_mm: f64) -> Vec<f64> {
     let count = corners.vertices.len();
     let live: Vec<u32> = corners.live_vertices().collect();
@@ -157,7 +163,7 @@ fn cast(corners: &mut Corners, reference: &Reference, deviation_mm: f64) -> Vec<
     septum
 }
 
-/// Hands radii on over the surface to vertices that have none.
+/// Propagates radii over the surface to vertices without one.
 fn spread(corners: &Corners, radius: &mut [f64], septum: &mut [f64]) {
     let mut queue: VecDeque<u32> =
         corners.live_vertices().filter(|&v| radius[v as usize].is_finite()).collect();
@@ -175,7 +181,7 @@ fn spread(corners: &Corners, radius: &mut [f64], septum: &mut [f64]) {
     }
 }
 
-/// Lower median of each vertex and its neighbours.
+/// Lower median over each vertex and its neighbours.
 fn medians(corners: &Corners, values: &[f64]) -> Vec<f64> {
     let mut found = values.to_vec();
     let (mut spokes, mut around, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
@@ -191,8 +197,8 @@ fn medians(corners: &Corners, values: &[f64]) -> Vec<f64> {
     found
 }
 
-/// Lowers wanted lengths until neighbours differ by no more than [`GRADING`] of their distance: shortest first, as in Dijkstra's
-/// algorithm.
+/// Lowers target lengths until neighbours differ by at most [`GRADING`] of their distance: shortest first, as in
+/// Dijkstra's algorithm.
 fn grade(corners: &mut Corners) {
     let mut heap: BinaryHeap<Reverse<(u64, u32)>> = corners
         .live_vertices()

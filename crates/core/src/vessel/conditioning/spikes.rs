@@ -1,32 +1,32 @@
-//! Cuts off what sticks out of the lumen more sharply than any mesh of this fineness can hold: blades, spikes and folds.
+//! Cuts off parts that are sharper than a mesh of this resolution can represent: blades, spikes and folds.
 //!
-//! Around edges at which the surface bends back from the lumen by more than a right angle, and around needles, vertices move to the
-//! means of their neighbours until none is left, short edges are collapsed and edges flipped. That ends a blade where it is about as
-//! wide as an edge is long. It narrows the lumen there, beyond the limit if need be. Ridges into the lumen are not sharp in this
-//! sense, and stay.
+//! Around edges at which the surface bends back from the lumen by more than a right angle, and around needles,
+//! vertices move to the means of their neighbours until none is left, short edges are collapsed and edges flipped. A
+//! blade then ends where its width is about one edge. This narrows the lumen there, beyond the limit if need be.
+//! Ridges into the lumen are not sharp in this sense, and remain.
 
 use super::corners::{Corners, Kind};
 use super::remesh::{by_angles, flip_some, pull_together};
 use crate::Vec3;
 use crate::vessel::topology::NONE;
 
-/// Angle by which the surface may bend back from the lumen, radians: 95°.
+/// Largest angle by which the surface may bend back from the lumen, rad: 95°.
 const SHARP: f64 = 1.66;
-/// Angle of a fold, whichever way it bends, radians: 109°.
+/// Angle of a fold, in either direction, rad: 109°.
 const FOLD: f64 = 1.9;
-/// Least angle of a triangle, radians: 14°.
+/// Smallest angle of a triangle, rad: 14°.
 const NEEDLE: f64 = 0.24;
-/// Most passes: each takes about half an edge off a blade.
+/// Largest number of passes: each shortens a blade by about half an edge.
 const PASSES: usize = 30;
-/// Part of the way to the mean that a vertex goes in one pass.
+/// Fraction of the way to the mean that a vertex moves in one pass.
 const STEP: f64 = 0.5;
 
-/// Cuts off all that is sharp.
+/// Cuts off all sharp parts.
 pub(super) fn cut(corners: &mut Corners) {
     let (mut spokes, mut around) = (Vec::new(), Vec::new());
     let mut moved = vec![true; corners.vertices.len()];
     for _ in 0..PASSES {
-        // What was not moved has not got sharp.
+        // Only moved parts can have become sharp.
         let (sharp, mut bent) = sharp(corners, &moved);
         moved = sharp;
         if !moved.contains(&true) {
@@ -47,7 +47,7 @@ pub(super) fn cut(corners: &mut Corners) {
         for (v, mean) in means {
             let vertex = &mut corners.vertices[v as usize];
             let way = mean - vertex.at;
-            // A needle asks for nothing but other places on the surface.
+            // A needle only needs to move within the surface.
             let along = if bent[v as usize] { way } else { way - vertex.normal * vertex.normal.dot(&way) };
             vertex.at += along * STEP;
         }
@@ -57,7 +57,7 @@ pub(super) fn cut(corners: &mut Corners) {
     corners.set_normals();
 }
 
-/// Vertices of edges and triangles that no mesh should have, where at least one end is `among` these; and those of the edges among them.
+/// Vertices of invalid edges and triangles with at least one end `among` these; and those of the edges among them.
 fn sharp(corners: &Corners, among: &[bool]) -> (Vec<bool>, Vec<bool>) {
     let mut found = vec![false; corners.vertices.len()];
     let mut folded = found.clone();
@@ -67,7 +67,7 @@ fn sharp(corners: &Corners, among: &[bool]) -> (Vec<bool>, Vec<bool>) {
         let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
         let (x, y) = (corners.at(b) - corners.at(a), corners.at(c) - corners.at(a));
         let normal = x.cross(&y);
-        // Rims are as they were, and have short edges.
+        // Rims are unchanged, and have short edges.
         let inner = [a, b, c].iter().all(|&v| corners.kind(v) == Kind::Free);
         let needle = inner && x.dot(&y) > needle_cos * (x.norm_squared() * y.norm_squared()).sqrt();
         let back = corners.twin(e);

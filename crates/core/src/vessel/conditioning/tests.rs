@@ -1,4 +1,4 @@
-//! What conditioning leaves alone, what it makes even, and what it keeps.
+//! What conditioning leaves unchanged, makes uniform, and preserves.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ fn conditioned(mesh: &SurfaceMesh) -> Conditioned<'_> {
     condition(mesh, &Conditioning::default()).unwrap()
 }
 
-/// Numbers between 0 and 1, the same every time.
+/// Reproducible pseudorandom numbers between 0 and 1.
 struct Numbers(u64);
 
 impl Numbers {
@@ -54,7 +54,7 @@ fn even(length: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|i| length * i as f64 / count as f64).collect()
 }
 
-/// A tube whose triangles are as uneven as can be.
+/// A tube with extremely irregular triangles.
 fn uneven_tube(seed: u64) -> SurfaceMesh {
     let mut angles = even(TAU, 24);
     angles.pop();
@@ -105,7 +105,7 @@ fn an_uneven_tube_comes_back_even_and_within_the_limit() {
     assert!(found.changed && !found.too_many);
     let before = check(&mesh).unwrap();
     assert!(before.edge_max_mm / before.edge_min_mm > 1000.0, "{before:?}");
-    // Rims are kept; elsewhere nothing is short.
+    // Rims are preserved; elsewhere no edge is short.
     assert!(
         found.edge_max_mm < 1.3 && found.edge_median_mm > 0.25,
         "{:?}",
@@ -194,7 +194,7 @@ fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
 
 #[test]
 fn two_components_are_as_far_apart_as_they_were() {
-    // Two lumens beside each other: a septum of 0.15 mm between parallel sheets.
+    // Two adjacent lumens: a septum of 0.15 mm between parallel sheets.
     let size = Vec3::new(10.0, 6.0, 4.0);
     let above = Vec3::new(0.0, 0.0, size.z + 0.15);
     let mesh = joined(&cuboid(Vec3::zeros(), size, 3.0), &cuboid(above, size, 2.0));
@@ -235,7 +235,7 @@ fn duplicated_triangles_do_no_harm() {
     assert!(off_tube(&found.mesh) < 0.2, "{}", off_tube(&found.mesh));
 }
 
-/// Mean bump of a mesh over its edges.
+/// Mean bump of a mesh, in edges.
 fn roughness(mesh: &SurfaceMesh) -> f64 {
     let mut corners = Corners::new(mesh, 0.1);
     corners.set_normals();
@@ -245,7 +245,7 @@ fn roughness(mesh: &SurfaceMesh) -> f64 {
 #[test]
 fn a_smooth_tube_has_no_bumps_however_it_is_meshed_and_a_noisy_one_has() {
     let mut numbers = Numbers(3);
-    // Eight vertices around, and 24 that are a fifth of an edge off their places along the tube.
+    // Eight vertices around, and 24 that are displaced along the tube by a fifth of an edge.
     let coarse: Vec<f64> = (0..8).map(|k| TAU * f64::from(k) / 8.0).collect();
     let coarse = tube(&even(20.0, 13), &coarse);
     let fine: Vec<f64> = (0..24).map(|k| TAU * (f64::from(k) + 0.4 * numbers.next()) / 24.0).collect();

@@ -1,32 +1,34 @@
-//! A way through the lumen made a centre line: each point where the inscribed sphere is the largest of its cross-section.
+//! Centres a path through the lumen: each point becomes the centre of the largest inscribed sphere of its
+//! cross-section.
 
 use std::f64::consts::TAU;
 
 use super::lumen::{Lumen, Sphere};
 use crate::{Vec3, parallel};
 
-/// Points are so many radii apart.
+/// Distance of points, in radii.
 const SPACING_RADII: f64 = 0.25;
-/// How often a line is smoothed, moved to the middle, and divided anew.
+/// Number of rounds of smoothing, centring and resampling of a line.
 const ROUNDS: usize = 2;
-/// Passes of smoothing in each of them.
+/// Smoothing passes per round.
 const PASSES: usize = 6;
-/// Passes at the end, and their steps: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995. The second step takes
-/// back what the first shrinks.
+/// Final smoothing passes, and their steps; the second reverses the shrinkage of the first: Taubin, "A signal
+/// processing approach to fair surface design", SIGGRAPH 1995.
 const FAIRING: (usize, [f64; 2]) = (12, [0.5, -0.53]);
-/// A point is smoothed only if its sphere keeps this part of its radius.
+/// A point is smoothed only if its sphere keeps this fraction of its radius.
 const LEAST_LEFT: f64 = 0.97;
-/// A line's direction is that between the points so many before and behind.
+/// Number of points before and behind that determine a line's direction.
 const TANGENT_POINTS: usize = 2;
-/// Steps in a cross-section: the first in radii, how often they are halved, directions, and most of one length.
+/// Steps in a cross-section: the first in radii, the number of halvings, directions, and the largest number of steps
+/// of one length.
 const FIRST_STEP_RADII: f64 = 0.2;
 const HALVINGS: usize = 6;
 const DIRECTIONS: usize = 6;
 const MOST_STEPS: usize = 4;
-/// Angle between the directions of one step's length and those of the next.
+/// Angle between the directions of steps of successive lengths.
 const TURN: f64 = 0.4;
 
-/// The centre line along a way. Its last point stays where it is, and its first where that `is_fixed`.
+/// The centre line along a path. Its last point is fixed, and its first if `is_fixed`.
 pub(super) fn centred(lumen: &Lumen<'_>, way: &[Sphere], is_fixed: bool) -> Vec<Sphere> {
     let mut line = divided(way);
     for _ in 0..ROUNDS {
@@ -49,10 +51,10 @@ pub(super) fn centred(lumen: &Lumen<'_>, way: &[Sphere], is_fixed: bool) -> Vec<
     })
 }
 
-/// The line with points at a distance that goes with its radius, and its ends.
+/// The line with points at distances proportional to its radius, and its ends.
 pub(super) fn divided(line: &[Sphere]) -> Vec<Sphere> {
     let [first, .., last] = line else { return line.to_vec() };
-    // Places are counted in spacings, from the first point on.
+    // Positions are measured in spacings, from the first point on.
     let mut counted = vec![0.0];
     for pair in line.windows(2) {
         let radius_mm = 0.5 * (pair[0].radius_mm + pair[1].radius_mm);
@@ -79,7 +81,7 @@ pub(super) fn divided(line: &[Sphere]) -> Vec<Sphere> {
     points
 }
 
-/// Moves all points but the ends by a part of the way to the middle of their neighbours.
+/// Moves all points except the ends by a fraction of the way to the middle of their neighbours.
 fn smooth(line: &mut [Sphere], part: f64) {
     let mut before = line.first().map_or_else(Vec3::zeros, |point| point.centre_mm);
     for k in 1..line.len().saturating_sub(1) {
@@ -89,7 +91,7 @@ fn smooth(line: &mut [Sphere], part: f64) {
     }
 }
 
-/// The line with each point where the sphere is largest in the cross-section.
+/// The line with each point moved to the largest sphere in its cross-section.
 fn in_the_middle(lumen: &Lumen<'_>, line: &[Sphere], is_fixed: bool) -> Vec<Sphere> {
     let last = line.len() - 1;
     parallel::map(line.len(), |k| {
@@ -104,7 +106,7 @@ fn in_the_middle(lumen: &Lumen<'_>, line: &[Sphere], is_fixed: bool) -> Vec<Sphe
     })
 }
 
-/// The largest sphere next to one in the plane across a direction, by steps that grow shorter.
+/// The largest sphere near one in the plane across a direction, by steps of decreasing length.
 fn largest_across(lumen: &Lumen<'_>, sphere: &Sphere, along: &Vec3) -> Sphere {
     let e = along.cross(&Vec3::ith(along.iamin(), 1.0)).normalize();
     let f = along.cross(&e);

@@ -1,33 +1,35 @@
-//! The inside of a wall: how far a place is from it, and the spheres that fill its middle.
+//! The inside of a wall: distances from it, and spheres that fill its middle.
 
 use rustc_hash::FxHashMap;
 
 use crate::vessel::{NO_NEIGHBOUR, Nearest, Wall, WallQuery};
 use crate::{Result, Vec3};
 
-/// An opening's plane is this thick, in radii of the opening: rims are not quite flat.
+/// Thickness of an opening's plane, in radii of the opening: rims are not quite flat.
 const PLANE_RADII: f64 = 0.02;
-/// Most pieces a side that a triangle is looked at in: meshes of long triangles along thin vessels.
+/// Largest number of pieces per side into which a triangle is divided: for meshes with long triangles along thin
+/// vessels.
 const MOST_PIECES: f64 = 12.0;
-/// Spheres are left out whose centre is nearer than this to that of another one about as large, in its radii.
+/// Spheres are dropped if their centre is closer than this to that of another one of similar size, in its radii.
 const CLOSEST_RADII: f64 = 0.3;
-/// Rays start so far from the wall, over its size.
+/// Distance of rays' starts from the wall, relative to its size.
 const OFF: f64 = 1e-7;
-/// Chords that are tried for a sphere: one from the wall, and one from the wall's place nearest to the middle of that.
+/// Number of chords tried for a sphere: one from the wall, and one from the position of the wall nearest to its
+/// middle.
 const CHORDS: usize = 2;
 
-/// A sphere that holds no point of the wall.
+/// A sphere without points of the wall inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::vessel) struct Sphere {
     pub(in crate::vessel) centre_mm: Vec3,
     pub(in crate::vessel) radius_mm: f64,
 }
 
-/// The lumen of a wall, to ask about.
+/// The lumen of a wall, for queries.
 pub(super) struct Lumen<'a> {
     pub(super) wall: &'a Wall,
     query: WallQuery,
-    /// The opening that a vertex of a rim belongs to.
+    /// The opening of each vertex on a rim.
     opening_of: FxHashMap<u32, usize>,
     /// The triangle across each side of each triangle.
     across: Vec<[u32; 3]>,
@@ -44,12 +46,12 @@ impl<'a> Lumen<'a> {
         Ok(Self { wall, query, opening_of, across: wall.neighbours(), size_mm })
     }
 
-    /// How far a place is from the wall, mm; not positive outside the lumen, past an opening, and for what is no place.
+    /// Distance of a position from the wall, mm; not positive outside the lumen, past an opening, and for NaN.
     pub(super) fn clearance_mm(&self, x: &Vec3) -> f64 {
         self.nearest(x).map_or(f64::NEG_INFINITY, |near| near.distance_mm)
     }
 
-    /// The wall's nearest place, with a distance that is negative past an opening too.
+    /// The nearest point of the wall, with a negative distance also past an opening.
     fn nearest(&self, x: &Vec3) -> Option<Nearest> {
         let near = self.query.nearest(x, f64::INFINITY)?;
         let openings = self.wall.openings();
@@ -64,13 +66,13 @@ impl<'a> Lumen<'a> {
         }
     }
 
-    /// How far the wall is along a direction of unit length, mm; none where the way leaves through an opening.
+    /// Distance to the wall along a unit vector, mm; `None` if the path leaves through an opening.
     pub(super) fn free_mm(&self, from: &Vec3, direction: &Vec3) -> Option<f64> {
         self.query.first_met(from, direction, self.size_mm).map(|(mm, _)| mm)
     }
 
-    /// Spheres in the middle of the lumen, the largest first: about chords across it from places all over the wall, which are `spacing` of
-    /// their radii apart or less.
+    /// Spheres in the middle of the lumen, the largest first: about chords across it from positions all over the
+    /// wall, at most `spacing` of their radii apart.
     pub(super) fn spheres(&self, spacing: f64) -> Vec<Sphere> {
         let mesh = self.wall.mesh();
         let mut is_seen = vec![false; mesh.triangles.len()];
@@ -83,7 +85,7 @@ impl<'a> Lumen<'a> {
                 self.see_around(t, 0.5 * spacing * sphere.radius_mm, &mut is_seen);
             }
         }
-        // Sorting is stable: of equals the one over the first triangle stays.
+        // Sorting is stable: among equals the one over the first triangle stays.
         found.sort_by(|a, b| b.radius_mm.total_cmp(&a.radius_mm));
         let mut kept = Spheres::default();
         for sphere in found {
@@ -101,7 +103,7 @@ impl<'a> Lumen<'a> {
         kept.all
     }
 
-    /// Takes the triangles around one, no farther than `reach_mm` and no longer than twice that, for seen.
+    /// Marks the triangles around one, within `reach_mm` and at most twice that long, as seen.
     fn see_around(&self, triangle: usize, reach_mm: f64, is_seen: &mut [bool]) {
         let mesh = self.wall.mesh();
         let middle = |t: usize| mesh.corners(t).iter().sum::<Vec3>() / 3.0;
@@ -122,8 +124,8 @@ impl<'a> Lumen<'a> {
         }
     }
 
-    /// Adds the spheres about chords from a triangle, seen in pieces that are small beside the lumen there; the sphere of one that is small
-    /// as it is.
+    /// Adds the spheres about chords from a triangle, in pieces small compared with the lumen there; for a small
+    /// triangle, one sphere.
     fn spheres_over(&self, triangle: usize, spacing: f64, spheres: &mut Vec<Sphere>) -> Option<Sphere> {
         let corners = self.wall.mesh().corners(triangle);
         let [a, b, c] = corners;
@@ -142,7 +144,7 @@ impl<'a> Lumen<'a> {
         let count = pieces as usize;
         for i in 0..count {
             for j in 0..count - i {
-                // Each corner of the subdivision has a piece like the triangle, and most one upside down.
+                // Each corner of the subdivision has one piece like the triangle, and most have one upside down.
                 for third in [1.0 / 3.0, 2.0 / 3.0].into_iter().take(if i + j + 1 < count { 2 } else { 1 }) {
                     let (u, v) = ((i as f64 + third) / pieces, (j as f64 + third) / pieces);
                     spheres.extend(self.sphere_about_chord(&(a + (b - a) * u + (c - a) * v), &inward));
@@ -152,8 +154,8 @@ impl<'a> Lumen<'a> {
         None
     }
 
-    /// The sphere about the middle of the chord across the lumen from a place of the wall, moved on to the middle of the chord from the
-    /// wall's nearest place through it where it is larger there: in a round vessel on the axis.
+    /// The sphere about the middle of the chord across the lumen from a position of the wall, or about the middle of
+    /// the chord through it from the wall's nearest point, if larger: in a round vessel on the axis.
     fn sphere_about_chord(&self, from: &Vec3, inward: &Vec3) -> Option<Sphere> {
         let off_mm = OFF * self.size_mm;
         let (mut from, mut inward) = (*from, *inward);
@@ -181,17 +183,17 @@ fn level(radius_mm: f64) -> i32 {
     libm::log2(radius_mm).floor() as i32
 }
 
-/// The radius that spheres of a level are below.
+/// Upper bound of the radii of spheres of a level.
 fn largest_mm(level: i32) -> f64 {
     f64::from(level + 1).exp2()
 }
 
-/// Spheres in cells of about their own size, to find those about a place.
+/// Spheres in cells of similar size, for searching near a position.
 #[derive(Debug, Default)]
 pub(super) struct Spheres {
     pub(super) all: Vec<Sphere>,
     cells: FxHashMap<(i32, [i64; 3]), Vec<usize>>,
-    /// Lowest and highest level that has any.
+    /// Lowest and highest level with spheres.
     levels: Option<(i32, i32)>,
 }
 
@@ -204,7 +206,7 @@ impl Spheres {
             Some(self.levels.map_or((level, level), |(low, high)| (low.min(level), high.max(level))));
     }
 
-    /// The spheres of a level in the cells that are within `reach_mm` of a place, and some beside them.
+    /// The spheres of a level in cells within `reach_mm` of a position, and some others.
     fn about(&self, x: Vec3, level: i32, reach_mm: f64) -> impl Iterator<Item = usize> + '_ {
         let (low, high) = (cell(&x.add_scalar(-reach_mm), level), cell(&x.add_scalar(reach_mm), level));
         (low[0]..=high[0])
@@ -215,7 +217,8 @@ impl Spheres {
             .copied()
     }
 
-    /// Spheres at least about as large as this one that its own ways lead to: a way between their centres stays well inside the two.
+    /// Spheres at least about as large as this one that it connects to: a path between their centres stays well
+    /// inside the two.
     pub(super) fn overlapping(&self, sphere: &Sphere) -> impl Iterator<Item = usize> + '_ {
         let sphere = *sphere;
         let (_, high) = self.levels.unwrap_or_default();
@@ -235,7 +238,7 @@ impl Spheres {
             })
     }
 
-    /// Of the spheres that hold a place, the one whose centre is nearest.
+    /// Of the spheres that contain a position, the one with the nearest centre.
     pub(super) fn holding(&self, x: &Vec3) -> Option<usize> {
         let (low, high) = self.levels?;
         let away_mm = |k: usize| (self.all[k].centre_mm - x).norm();
@@ -247,6 +250,6 @@ impl Spheres {
 }
 
 fn cell(x: &Vec3, level: i32) -> [i64; 3] {
-    // Places are finite, and cells of no less than a millionth of a millimetre.
+    // Positions are finite, and cells at least a millionth of a millimetre.
     (x / largest_mm(level)).map(|c| c.floor() as i64).into()
 }

@@ -1,8 +1,8 @@
-//! The centre line of a surface, found in its lumen.
+//! Computes the centre line of a surface from its lumen.
 //!
-//! The lumen is filled with spheres about chords across it ([`lumen`]); the ways through them that are cheapest, length being dear where
-//! spheres are small, lead from one end to all others ([`ways`]); each is moved to the middle of the lumen and smoothed ([`line`]). Where a
-//! way enters the spheres of another it joins that one ([`growing`]).
+//! The lumen is filled with spheres about chords across it ([`lumen`]); the cheapest paths through them, length being
+//! expensive where spheres are small, lead from one end to all others ([`ways`]); each is moved to the middle of the
+//! lumen and smoothed ([`line`]). Where a path enters the spheres of another it is joined to it ([`growing`]).
 
 mod growing;
 mod line;
@@ -18,50 +18,51 @@ use self::ways::Ways;
 use super::{CentrelineTree, Target, Wall};
 use crate::{Error, Result, Vec3};
 
-/// Parts of a triangle are at most so large, in radii of the lumen there; where an end is not reached, the next.
+/// Largest pieces of a triangle, in radii of the local lumen; if an end is not reached, the next value is used.
 const SPACINGS: [f64; 3] = [0.5, 0.25, 0.125];
 
-/// Where a centre line begins or ends.
+/// An end of a centre line.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub enum CentrelineEnd {
-    /// An opening of the wall, by its number.
+    /// An opening of the wall, by its index.
     Opening(usize),
-    /// A place in the lumen, mm.
+    /// A position in the lumen, mm.
     Place(Vec3),
 }
 
-/// A centre line that was found in a wall.
+/// A centre line computed from a wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtractedCentreline {
-    /// The tree, from the first end on. Ends are targets of it: `opening 3`, `place 1` (counted from 1, as given).
+    /// The tree, from the first end on. Its ends are targets: `opening 3`, `place 1` (counted from 1, as given).
     pub tree: CentrelineTree,
-    /// Openings that no way leads to: of another piece of the surface.
+    /// Openings without a path: of another piece of the surface.
     pub unreached: Vec<usize>,
 }
 
-/// A stretch of a tree without a fork.
+/// A stretch of a tree without a bifurcation.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct CentrelineBranch {
-    /// Row of the root or of the fork where it begins.
+    /// Row of the root or bifurcation where it starts.
     pub from: usize,
-    /// Row of the end or of the fork where it ends.
+    /// Row of the end or bifurcation where it ends.
     pub to: usize,
     /// Its length, mm.
     pub length_mm: f64,
-    /// The least radius of its points, but for the fork where it begins, mm.
+    /// The smallest radius of its points, except the bifurcation where it starts, mm.
     pub least_radius_mm: f64,
 }
 
 impl ExtractedCentreline {
-    /// Finds the centre line of `wall` from one end to others: from its inlet ([`Wall::inlet`]) without `from`, to all other openings
-    /// without `to`.
+    /// Computes the centre line of `wall` from one end to others: from its inlet ([`Wall::inlet`]) without `from`, to
+    /// all other openings if `to` is empty.
     ///
-    /// Radii are those of the largest spheres in the lumen about each point. Lines are the ways along which the integral of 1/radius is least
-    /// (Antiga et al., IEEE Transactions on Medical Imaging 22, 2003), moved to where the sphere is the largest of its cross-section.
+    /// Radii are those of the largest spheres in the lumen about each point. Lines are the paths with the smallest
+    /// integral of 1/radius (Antiga et al., IEEE Transactions on Medical Imaging 22, 2003), moved to where the sphere
+    /// is the largest of its cross-section.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming `from` or `to` for an opening that is not there, a place outside the lumen, or one that no way leads to, and
-    /// for a surface without the openings that are needed.
+    /// [`Error::Parameter`] naming `from` or `to` for a nonexistent opening, a position outside the lumen, or one
+    /// without a path, and for a surface without the openings needed.
     pub fn of(wall: &Wall, from: Option<CentrelineEnd>, to: &[CentrelineEnd]) -> Result<Self> {
         let lumen = Lumen::new(wall)?;
         let inlet = wall.inlet().map_or(0, |opening| opening.index);
@@ -90,7 +91,7 @@ impl ExtractedCentreline {
         };
         let unreached: Vec<usize> = all.iter().enumerate().filter_map(is_missed).collect();
         let mut order: Vec<usize> = (0..ends.len()).filter(|&k| ways[k].is_some()).collect();
-        // Narrower branches join wider ones.
+        // Narrower branches are joined to wider ones.
         order.sort_by(|&a, &b| ends[b].radius_mm.total_cmp(&ends[a].radius_mm).then(a.cmp(&b)));
         let (mut growing, mut targets) = (Growing::default(), Vec::new());
         for k in order {
@@ -107,7 +108,7 @@ impl ExtractedCentreline {
 }
 
 impl CentrelineTree {
-    /// The stretches of the tree between its root, its forks and its ends, in the order of their last rows.
+    /// The stretches of the tree between its root, bifurcations and ends, in the order of their last rows.
     pub fn branches(&self) -> Vec<CentrelineBranch> {
         let (nodes, children) = (self.nodes(), self.children());
         let is_end = |row: usize| children[row].len() != 1;
@@ -130,7 +131,7 @@ impl CentrelineTree {
     }
 }
 
-/// What an end is called as a target.
+/// Name of an end as a target.
 fn name(end: &CentrelineEnd, index: usize) -> String {
     match end {
         CentrelineEnd::Opening(opening) => format!("opening {opening}"),
@@ -159,7 +160,7 @@ fn end(lumen: &Lumen<'_>, end: &CentrelineEnd, key: &str) -> Result<Sphere> {
         return Ok(Sphere { centre_mm, radius_mm });
     }
     match *end {
-        // The middle of a crooked rim may be outside; what is next to it is not.
+        // The middle of an irregular rim may be outside the lumen; nearby points are not.
         CentrelineEnd::Opening(number) => Ok(Sphere { centre_mm, radius_mm: openings[number].radius_mm }),
         CentrelineEnd::Place(place) => Err(Error::parameter(
             key,
@@ -169,7 +170,7 @@ fn end(lumen: &Lumen<'_>, end: &CentrelineEnd, key: &str) -> Result<Sphere> {
     }
 }
 
-/// The ways from the first sphere to the ends, through spheres that are nearer to each other where that is needed.
+/// The paths from the first sphere to the ends, through more closely spaced spheres if needed.
 fn found_ways(lumen: &Lumen<'_>, root: Sphere, ends: &[Sphere]) -> Vec<Option<Vec<Sphere>>> {
     let mut found = vec![None; ends.len()];
     for spacing in SPACINGS {

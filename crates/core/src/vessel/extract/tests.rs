@@ -2,13 +2,14 @@ use super::*;
 use crate::vessel::generate::axes;
 use crate::vessel::{GeneratedWall, anatomy};
 
-/// How far centre lines that were found are from the exact ones, over what is allowed: half a millimetre, or a twentieth of the radius where
-/// that is more. Ends within a radius and places that two branches are about are left out.
+/// Distance of computed centre lines from the exact ones, relative to the tolerance: half a millimetre, or a
+/// twentieth of the radius if larger. Positions within a radius of ends, and where two branches overlap, are
+/// excluded.
 #[derive(Debug, Default)]
 struct Miss {
     position: f64,
     radius: f64,
-    /// How far what was found is from any exact line, over the radius there.
+    /// Distance of the computed lines from any exact line, relative to the local radius.
     stray: f64,
 }
 
@@ -18,7 +19,7 @@ fn allowed_mm(radius_mm: f64) -> f64 {
     (0.05 * radius_mm).max(0.5)
 }
 
-/// The nearest place of the tree to a point, and the radius there.
+/// Distance from the nearest position of the tree to a point, and the radius there.
 fn nearest(tree: &CentrelineTree, x: &Vec3) -> (f64, f64) {
     let nodes = tree.nodes();
     let sides = nodes.iter().filter_map(|b| b.parent.map(|a| (&nodes[a], b)));
@@ -30,7 +31,7 @@ fn nearest(tree: &CentrelineTree, x: &Vec3) -> (f64, f64) {
     away.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
 }
 
-/// Whether a place of one axis is near an end of it or in the region of another.
+/// Whether a position of one axis is near an end of it or in the region of another.
 fn is_left_out(axes: &[Axis], own: usize, (x, radius_mm): &(Vec3, f64)) -> bool {
     let near_end =
         [axes[own].first(), axes[own].last()].iter().flatten().any(|e| (e.0 - x).norm() < *radius_mm);
@@ -74,7 +75,7 @@ fn trees_of_walls_are_those_that_the_walls_were_made_from() {
         let missed = miss(&exact, &found.tree);
         assert!(missed.position < 0.3 && missed.radius < 0.7 && missed.stray < 1.0, "{name}: {missed:?}");
 
-        // Axes and radii that are a little elsewhere are told from these.
+        // Counter-check: displaced axes and changed radii are detected.
         exact.iter_mut().flatten().for_each(|(x, _)| *x += Vec3::new(0.5, 0.4, 0.6));
         assert!(miss(&exact, &found.tree).position > 0.7, "{name}");
         exact.iter_mut().flatten().for_each(|(_, radius_mm)| *radius_mm *= 1.25);

@@ -1,21 +1,21 @@
-//! The ways through spheres whose sum of length over radius is least.
+//! The paths through spheres with the smallest integral of 1/radius.
 //!
-//! Antiga, Ene-Iordache and Remuzzi, "Computational geometry for patient-specific reconstruction and meshing of blood vessels from MR and
-//! CT angiography", IEEE Transactions on Medical Imaging 22, 2003: a centre line is the way along which ∫ ds/R is least, R being the radius
-//! of the inscribed sphere. Shortest ways by Dijkstra's method.
+//! Antiga, Ene-Iordache and Remuzzi, "Computational geometry for patient-specific reconstruction and meshing of blood
+//! vessels from MR and CT angiography", IEEE Transactions on Medical Imaging 22, 2003: a centre line is the path with
+//! the smallest ∫ ds/R, R being the radius of the inscribed sphere. Shortest paths by Dijkstra's method.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::lumen::{Sphere, Spheres};
 
-/// The shortest ways from one sphere to all others.
+/// The shortest paths from one sphere to all others.
 pub(super) struct Ways {
-    /// The sphere before each on its way; its own number for the first, none for what is not reached.
+    /// The sphere before each on its path; its own index for the first, `None` if not reached.
     before: Vec<Option<usize>>,
 }
 
-/// The end of a way, cheapest first.
+/// The end of a path, cheapest first.
 #[derive(PartialEq)]
 struct Reached {
     cost: f64,
@@ -65,7 +65,7 @@ impl Ways {
         Self { before }
     }
 
-    /// The spheres from the first to this one; none if no way leads there.
+    /// The spheres from the first to this one; `None` without a path.
     pub(super) fn to(&self, sphere: usize) -> Option<Vec<usize>> {
         let mut way = vec![sphere];
         loop {
@@ -80,7 +80,7 @@ impl Ways {
     }
 }
 
-/// ∫ ds/R between two centres, with a radius that changes evenly.
+/// ∫ ds/R between two centres, with a linear radius.
 fn length_over_radius(a: &Sphere, b: &Sphere) -> f64 {
     let length_mm = (b.centre_mm - a.centre_mm).norm();
     let ratio = b.radius_mm / a.radius_mm;

@@ -1,14 +1,14 @@
-//! Polygons and triangle strips as triangles.
+//! Triangulates polygons and triangle strips.
 
 use super::Reason;
 use crate::vessel::SurfaceMesh;
 
-/// Faces of a file, kept until all of its vertices are known, with a number that says where each is.
+/// Faces of a file, stored until all of its vertices are known, with a number that locates each in the file.
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     /// Corners of all faces, counted from 0.
     corners: Vec<i64>,
-    /// For each face where its corners end, and its number in the file.
+    /// For each face the end of its corners, and its number in the file.
     ends: Vec<(usize, usize)>,
 }
 
@@ -19,8 +19,8 @@ impl Faces {
         self.ends.push((self.corners.len(), number));
     }
 
-    /// Adds the triangles of a strip, every second one the other way round. Those that lead from one part of a strip to the
-    /// next have a corner twice, and are none.
+    /// Adds the triangles of a strip, every second one reversed. Those that join parts of a strip have a repeated
+    /// corner, and are dropped.
     pub(super) fn push_strip(&mut self, strip: &[i64], number: usize) {
         for (k, corners) in strip.windows(3).enumerate() {
             let &[a, b, c] = corners else { continue };
@@ -30,7 +30,7 @@ impl Faces {
         }
     }
 
-    /// Cuts all faces into triangles of `mesh`; `what` names a face by its number.
+    /// Divides all faces into triangles of `mesh`; `what` names a face by its number.
     pub(super) fn fill(self, mesh: &mut SurfaceMesh, what: impl Fn(usize) -> String) -> Result<(), Reason> {
         let mut begin = 0;
         for (end, number) in self.ends {
@@ -41,7 +41,7 @@ impl Faces {
     }
 }
 
-/// Cuts a polygon into a fan of triangles after checking its indices; `what` names it in messages.
+/// Divides a polygon into a fan of triangles after checking its indices; `what` names it in messages.
 fn push_fan(mesh: &mut SurfaceMesh, polygon: &[i64], what: impl Fn() -> String) -> Result<(), Reason> {
     let count = mesh.vertices_mm.len();
     if let Some(bad) = polygon.iter().find(|&&v| v < 0 || v >= count as i64 || v >= i64::from(u32::MAX)) {
@@ -50,8 +50,8 @@ fn push_fan(mesh: &mut SurfaceMesh, polygon: &[i64], what: impl Fn() -> String) 
             what()
         ));
     }
-    // A face of one or two corners is no reason to refuse thousands of others: as a triangle without area it is removed and
-    // counted with its like when the surface is repaired.
+    // A face of one or two corners is no reason to reject thousands of others: as a triangle without area it is
+    // removed and counted when the surface is repaired.
     match polygon {
         [] => return Ok(()),
         [a] => mesh.triangles.push([*a as u32; 3]),

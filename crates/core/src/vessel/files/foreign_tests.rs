@@ -1,4 +1,4 @@
-//! Files as other programs write them: each is the same small surface, and read as it.
+//! Files as other programs write them, all with the same small surface.
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn corners(mesh: &SurfaceMesh) -> Vec<[f64; 9]> {
     (0..mesh.triangles.len()).map(flat).collect()
 }
 
-/// What `bytes` hold under that name.
+/// The triangles in `bytes` of a file with that name.
 fn read(name: &str, bytes: &[u8]) -> Result<Vec<[f64; 9]>> {
     SurfaceMesh::from_bytes(bytes, Path::new(name), 1.0).map(|mesh| corners(&mesh))
 }
@@ -88,11 +88,11 @@ fn text_goes_on_where_its_lines_end() {
     is_read("a.stl", STL.replace("solid a\n", "solid vertex 1 of a facet\n").as_bytes());
     is_read("a.stl", STL.replacen("facet normal", "\n\n facet\tnormal nan -nan(ind) 1e5\n", 1).as_bytes());
     is_read("a.obj", OBJ.replace("f 1 2 3 4", "f 1 2 \\\n 3 \\ \n 4").as_bytes());
-    // The end of a comment is no word of the next line.
+    // The end of a comment does not belong to the next line.
     is_read("a.obj", OBJ.replace("# a square", "# C:\\scans\\").as_bytes());
     is_read("a.ply", PLY.replace("0 0 0\n1 0 0\n1 1 0.5\n", "0 0 0 1 0\n0 1 1\n0.5 ").as_bytes());
     is_refused("a.obj", OBJ.replace("4\n", "4 \\\n").trim_end().as_bytes(), "cut off");
-    // What flows must come out even.
+    // A wrong number of values must be detected.
     is_refused("a.ply", PLY.replace("0 0 0\n1 0 0\n", "0 0 0 1\n0 0\n9 ").as_bytes(), "line ");
     is_refused("a.stl", STL.replacen("endfacet\n", "", 1).as_bytes(), "before the last one is closed");
 }
@@ -128,7 +128,7 @@ fn plies_have_strips_unused_values_and_other_names() {
     let strip = PLY.replace("element face 1", "element tristrips 1").replace("4 0 1 2 3", "4 1 2 0 3");
     let mesh = SurfaceMesh::from_bytes(strip.as_bytes(), Path::new("a.ply"), 1.0).unwrap();
     assert_eq!(mesh.triangles, [[1, 2, 0], [0, 2, 3]]);
-    // Where a strip is folded back, corners come twice.
+    // Where a strip turns back, corners are repeated.
     let strip = strip.replace("4 1 2 0 3", "6 1 2 0 0 0 3");
     let mesh = SurfaceMesh::from_bytes(strip.as_bytes(), Path::new("a.ply"), 1.0).unwrap();
     assert_eq!(mesh.triangles, [[1, 2, 0]]);
@@ -183,7 +183,7 @@ fn axes_are_those_of_the_header_or_of_the_caller() {
     let turned: Vec<[f64; 9]> = expected().into_iter().map(lps).collect();
     for (name, bytes) in &said {
         assert_eq!(read(name, bytes).unwrap(), turned, "{}", String::from_utf8_lossy(bytes));
-        // The caller knows better.
+        // The caller's axes take precedence.
         let frame = SurfaceFrame { unit_mm: 1.0, axes: Some(PatientAxes::Lps) };
         let mesh = SurfaceMesh::from_bytes(bytes, Path::new(name), frame).unwrap();
         assert_eq!(corners(&mesh), expected());

@@ -1,17 +1,17 @@
-//! How the coordinates of a surface file are meant: their unit, and which way their axes point in the patient.
+//! Coordinate frames of surface files: their unit, and the directions of their axes in the patient.
 
 use serde::{Deserialize, Serialize};
 
 use super::Reason;
 use crate::{Error, Result, Vec3};
 
-/// Which way x, y and z point in the patient; z towards the head in both.
+/// Directions of x, y and z in the patient; z towards the head in both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PatientAxes {
     /// Left, posterior, superior: the axes of scenes and of DICOM.
     #[serde(rename = "LPS")]
     Lps,
-    /// Right, anterior, superior, as in NIfTI: x and y are those of LPS with the other sign.
+    /// Right, anterior, superior, as in NIfTI: x and y have the opposite sign of LPS.
     #[serde(rename = "RAS")]
     Ras,
 }
@@ -19,7 +19,7 @@ pub enum PatientAxes {
 impl std::str::FromStr for PatientAxes {
     type Err = Error;
 
-    /// Reads `LPS` or `RAS`, in either case.
+    /// Parses `LPS` or `RAS`, in either case.
     fn from_str(word: &str) -> Result<Self> {
         match word.to_ascii_uppercase().as_str() {
             "LPS" => Ok(Self::Lps),
@@ -30,7 +30,7 @@ impl std::str::FromStr for PatientAxes {
 }
 
 impl PatientAxes {
-    /// `LPS` or `RAS`, as scenes have it.
+    /// `LPS` or `RAS`, as in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lps => "LPS",
@@ -38,7 +38,7 @@ impl PatientAxes {
         }
     }
 
-    /// A point of these axes in those of scenes, LPS.
+    /// Transforms a point of these axes to those of scenes, LPS.
     pub(super) fn to_lps(self, point: Vec3) -> Vec3 {
         match self {
             Self::Lps => point,
@@ -47,7 +47,7 @@ impl PatientAxes {
     }
 }
 
-/// How the coordinates of a surface file are meant. A bare number is a unit, with axes as the file has them.
+/// Coordinate frame of a surface file. A bare number is a unit, with the file's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceFrame {
     /// Millimetres per unit of the file: 1 for millimetres, 10 for centimetres, 1000 for metres.
@@ -63,7 +63,7 @@ impl From<f64> for SurfaceFrame {
 }
 
 impl SurfaceFrame {
-    /// Refuses a unit that cannot be meant.
+    /// Rejects an implausible unit.
     pub(super) fn check(&self) -> Result<()> {
         if self.unit_mm.is_finite() && self.unit_mm > 0.0 {
             return Ok(());
@@ -76,15 +76,15 @@ impl SurfaceFrame {
     }
 }
 
-/// What introduces the axes in a title or comment.
+/// The prefix of the axes in a title or comment.
 const SPACE: &str = "SPACE=";
 
-/// The axes as headers write them: the value behind `SPACE=`.
+/// The axes given in headers: the value after `SPACE=`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct ToldAxes(Option<String>);
 
 impl ToldAxes {
-    /// Looks for `SPACE=` at the beginning of a word of a title or comment; what was found first counts.
+    /// Searches for `SPACE=` at the beginning of a word of a title or comment; the first one counts.
     pub(super) fn look_in(&mut self, header: &str) {
         let mut words = header.split(|c: char| c.is_whitespace() || matches!(c, ';' | ',' | '\0' | '"'));
         if let Some(value) = words.find_map(|word| word.strip_prefix(SPACE)) {
@@ -92,7 +92,7 @@ impl ToldAxes {
         }
     }
 
-    /// Takes a value that a file keeps apart.
+    /// Stores a value given separately in a file.
     pub(super) fn say(&mut self, value: &str) {
         self.0.get_or_insert_with(|| value.chars().take(20).collect());
     }

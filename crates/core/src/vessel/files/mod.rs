@@ -1,7 +1,7 @@
 //! Surface meshes in files: STL, OBJ, PLY and VTK's two formats, distinguished by extension.
 //!
-//! Files carry no unit, so the caller gives one: millimetres per file unit. Axes are those that the caller or the file says
-//! ([`SurfaceFrame`]); surfaces are handed on in those of scenes, LPS.
+//! Files carry no unit, so the caller gives one: millimetres per file unit. Axes are those given by the caller or the
+//! file ([`SurfaceFrame`]); surfaces are returned in those of scenes, LPS.
 
 mod faces;
 mod frame;
@@ -20,21 +20,21 @@ use crate::{Error, Result, Vec3};
 use frame::ToldAxes;
 pub use frame::{PatientAxes, SurfaceFrame};
 
-/// The formats, as messages name them.
+/// The supported formats, for messages.
 const KNOWN: &str = "use .stl, .obj, .ply, .vtp or .vtk";
-/// Those that are written.
+/// The formats for writing.
 const WRITTEN: &str = "write .stl, .obj or .ply";
 
 /// Largest surface file in bytes: the binary STL of 40 million triangles.
 const SIZE_LIMIT: u64 = 2 << 30;
 
-/// Largest surface accepted, mm: no vessel is ten metres long, and a wrong unit is easily a factor of a thousand.
+/// Largest surface accepted, mm: no vessel is ten metres long, and a wrong unit is often a factor of a thousand.
 const EXTENT_LIMIT_MM: f64 = 10_000.0;
 
-/// Why the content of a file is not usable, without the file's name.
+/// Why the content of a file is unusable, without the file's name.
 type Reason = String;
 
-/// What a file holds, in its own unit and axes.
+/// The content of a file, in its own unit and axes.
 #[derive(Debug, Default)]
 struct Parsed {
     mesh: SurfaceMesh,
@@ -65,7 +65,7 @@ impl Format {
         })
     }
 
-    /// What a file of this format is instead, by its beginning, where that leaves no doubt.
+    /// The real kind of a file with this extension, if its first bytes leave no doubt that it differs.
     fn but_seems(self, bytes: &[u8]) -> Option<&'static str> {
         let begins: [(&[u8], Option<Self>, &str); 6] = [
             (b"ply\n", Some(Self::Ply), "PLY files (.ply) do"),
@@ -90,34 +90,35 @@ fn format_of(path: &Path) -> Result<Format> {
 }
 
 impl SurfaceMesh {
-    /// Whether the extension of a file's name is that of a format that is read.
+    /// Whether the extension of a file's name is that of a readable format.
     pub fn is_named_by(path: &Path) -> bool {
         format_of(path).is_ok()
     }
 
-    /// Reads an STL (ASCII or binary), OBJ, PLY (ASCII or binary), VTP or legacy VTK (all encodings) surface. Polygons are cut into
-    /// fans of triangles, strips into their triangles; faces of fewer than three corners become triangles without area, which the
-    /// repair removes and counts. The surface is returned as it is in the file, in millimetres and in the axes of scenes;
-    /// [`Wall::from_surface`](super::Wall::from_surface) repairs it.
+    /// Reads an STL (ASCII or binary), OBJ, PLY (ASCII or binary), VTP or legacy VTK (all encodings) surface.
+    /// Polygons are divided into fans of triangles, strips into their triangles; faces of fewer than three corners
+    /// become triangles without area, which the repair removes and counts. The surface is returned unrepaired, in
+    /// millimetres and in the axes of scenes; [`Wall::from_surface`](super::Wall::from_surface) repairs it.
     ///
-    /// `frame`: how coordinates are meant, or just the millimetres per file unit (1 for millimetres, 10 for centimetres, 1000 for
-    /// metres).
+    /// `frame`: the coordinate frame, or just the millimetres per file unit (1 for millimetres, 10 for centimetres,
+    /// 1000 for metres).
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a unit that is not finite and positive, [`Error::File`] for a file that cannot be read,
-    /// [`Error::Content`] for an unknown extension, unusable content (the reason says where) or a surface over 10 m across.
+    /// [`Error::Parameter`] for a unit that is not finite and positive, [`Error::File`] for a file that cannot be
+    /// read, [`Error::Content`] for an unknown extension, unusable content (with its location) or a surface over 10 m
+    /// across.
     pub fn read(path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
         Self::read_of(&FileSystem, path, frame)
     }
 
-    /// The same of a surface that is among `files`.
+    /// As [`Self::read`], for a surface in `files`.
     ///
     /// # Errors
     /// As [`Self::read`].
     pub fn read_of(files: &dyn Files, path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
         let frame = frame.into();
         frame.check()?;
-        // A name without a known format is refused before a large file is read.
+        // Reject an unknown format before reading a large file.
         format_of(path)?;
         Self::from_bytes(&files.read(path, SIZE_LIMIT)?, path, frame)
     }
@@ -125,7 +126,7 @@ impl SurfaceMesh {
     /// Reads a surface from the bytes of a file; the format follows from the extension of `path`, and errors name it.
     ///
     /// # Errors
-    /// As [`Self::read`], less those of reading a file.
+    /// As [`Self::read`], except those of reading the file.
     pub fn from_bytes(bytes: &[u8], path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
         let frame = frame.into();
         frame.check()?;
@@ -168,7 +169,7 @@ fn parse(format: Format, bytes: &[u8]) -> std::result::Result<Parsed, Reason> {
         true => Err("the file holds no triangles".into()),
         false => Ok(parsed),
     });
-    // A file of another kind under this name is the likeliest cause of whatever is wrong with it.
+    // A file of another kind with this extension is the likeliest cause of any error.
     parsed.map_err(|reason| match format.but_seems(&bytes) {
         Some(name) => format!("{reason} (it begins as {name})"),
         None => reason,

@@ -1,7 +1,7 @@
-//! Wavefront OBJ: `v` and `f` lines; all objects and groups make one surface.
+//! Wavefront OBJ: `v` and `f` lines; all objects and groups form one surface.
 //!
-//! By hand, because the crate for it (tobj 4.0) splits a surface by object, group and material into models with vertices of
-//! their own, and keeps 64-bit numbers only by a feature that would change them for every other crate in a build.
+//! Own implementation, because the crate for it (tobj 4.0) splits a surface by object, group and material into models
+//! with separate vertices, and keeps 64-bit numbers only by a feature that would affect every other crate in a build.
 
 use std::fmt::Write;
 
@@ -11,10 +11,10 @@ use super::{Parsed, Reason};
 use crate::vessel::SurfaceMesh;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
-    // Comments and names may be in any encoding; what counts is ASCII.
+    // Comments and names may be in any encoding; only ASCII matters.
     let text = String::from_utf8_lossy(bytes);
     let (mut parsed, mut faces) = (Parsed::default(), Faces::default());
-    // What lines that go on have said so far.
+    // Text of continued lines so far.
     let mut begun = String::new();
     for (number, line) in lines(&text) {
         let content = match line.split_once('#') {
@@ -45,7 +45,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     Ok(parsed)
 }
 
-/// Carries out a line without its comment; `number` is that of its end.
+/// Processes a line without its comment; `number` is that of its end.
 fn statement(line: &str, number: usize, mesh: &mut SurfaceMesh, faces: &mut Faces) -> Result<(), Reason> {
     let mut words = line.split_whitespace();
     let what = || format!("line {number}");

@@ -1,6 +1,6 @@
 //! Numbers of binary files.
 
-/// A type of number.
+/// A numeric type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scalar {
     I8,
@@ -15,7 +15,7 @@ pub(super) enum Scalar {
     F64,
 }
 
-/// The order of bytes in numbers.
+/// Byte order of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     Little,
@@ -23,7 +23,7 @@ pub(super) enum Order {
 }
 
 impl Scalar {
-    /// Bytes of a number.
+    /// Size in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -58,7 +58,7 @@ impl Scalar {
     }
 }
 
-/// A number as one of a vertex: whole ones alone, others as one that no file has.
+/// A number as a vertex index; one that is not a whole number becomes an invalid index.
 pub(super) fn index(number: f64) -> i64 {
     if number.fract() == 0.0 { number as i64 } else { i64::MIN }
 }

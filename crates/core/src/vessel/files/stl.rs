@@ -1,8 +1,8 @@
 //! STL, binary and ASCII.
 //!
-//! By hand, because the crate for it (stl_io 0.11) reads only the first `solid` of an ASCII file, wants a blank after
-//! `solid`, takes a binary file whose header begins with "solid" for text, and narrows ASCII numbers to 32 bits. The format
-//! itself is 50 bytes a triangle.
+//! Own implementation, because the crate for it (stl_io 0.11) reads only the first `solid` of an ASCII file, requires
+//! a blank after `solid`, mistakes a binary file whose header begins with "solid" for text, and narrows ASCII numbers
+//! to 32 bits. The format itself is 50 bytes per triangle.
 
 use super::faces::Faces;
 use super::text::lines;
@@ -14,9 +14,9 @@ use crate::vessel::SurfaceMesh;
 const HEADER: usize = 80;
 /// Header and count.
 const BEGIN: usize = HEADER + 4;
-/// Normal and three corners as 12 floats, and two spare bytes.
+/// Normal and three corners as 12 floats, and two unused bytes.
 const RECORD: usize = 50;
-/// Counts of programs that write the header before they know how many triangles follow.
+/// Counts of programs that write the header before they know the number of triangles.
 const UNKNOWN: [usize; 2] = [0, u32::MAX as usize];
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
@@ -30,7 +30,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
         return parse_ascii(&String::from_utf8_lossy(bytes));
     }
     match declared {
-        // The size says what the count does not.
+        // The count is unknown: the size determines it.
         Some(count) if UNKNOWN.contains(&count) && room > 0 && room.is_multiple_of(RECORD) => {
             Ok(parse_binary(bytes, room / RECORD))
         }
@@ -50,13 +50,13 @@ fn declared_triangles(bytes: &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(*count) as usize)
 }
 
-/// Whether the text of a facet is there, behind what may be the header of a binary file.
+/// Whether there is the text of a facet, after what may be the header of a binary file.
 fn holds_facets(bytes: &[u8]) -> bool {
     let text = if bytes.len() < 4 * HEADER { bytes } else { &bytes[BEGIN..] };
     text.windows(5).any(|word| word.eq_ignore_ascii_case(b"facet"))
 }
 
-/// Reads records that the caller knows to be there.
+/// Reads records that are known to exist.
 fn parse_binary(bytes: &[u8], count: usize) -> Parsed {
     let mut parsed = Parsed::default();
     parsed.axes.look_in(&String::from_utf8_lossy(&bytes[..HEADER]));
@@ -76,11 +76,11 @@ fn parse_binary(bytes: &[u8], count: usize) -> Parsed {
     parsed
 }
 
-/// All solids of the file, as one surface. Words count, not lines: some files have one line only.
+/// All solids of the file, as one surface. Parsed by words, not lines: some files have only one line.
 fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
     let mut mesh = SurfaceMesh::default();
     let (mut faces, mut axes) = (Faces::default(), ToldAxes::default());
-    // Vertices before those of the facet that is being read.
+    // Number of vertices before those of the current facet.
     let mut facet: Option<usize> = None;
     for (number, line) in lines(text) {
         let mut words = line.split_whitespace().peekable();
@@ -97,7 +97,7 @@ fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
                 let first = facet.take().unwrap_or(mesh.vertices_mm.len());
                 faces.push(first as i64..mesh.vertices_mm.len() as i64, number);
             } else if is("solid") || is("endsolid") {
-                // A name may hold any word, and ends with its line or where a facet begins.
+                // A name may contain any word, and ends with its line or where a facet begins.
                 while words.peek().is_some_and(|word| !word.eq_ignore_ascii_case("facet")) {
                     axes.look_in(words.next().unwrap_or_default());
                 }
@@ -114,7 +114,7 @@ fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
 /// Binary STL with unit normals.
 pub(super) fn bytes(mesh: &SurfaceMesh) -> Vec<u8> {
     let mut out = Vec::with_capacity(BEGIN + RECORD * mesh.triangles.len());
-    // Must not begin with "solid", or careless readers take it for text.
+    // Must not begin with "solid", or careless readers mistake it for text.
     let title = b"endowire surface, unit mm";
     out.extend_from_slice(title);
     out.resize(HEADER, b' ');

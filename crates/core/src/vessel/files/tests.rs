@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A surface of arbitrary triangles; coordinates exactly representable in 32 bits so that STL keeps them.
+/// A surface of arbitrary triangles; coordinates are exactly representable in 32 bits, so that STL preserves them.
 fn any_surface() -> impl Strategy<Value = SurfaceMesh> {
     let vertex = prop::array::uniform3(-1000.0f32..1000.0).prop_map(|c| Vec3::from(c.map(f64::from)));
     prop::collection::vec(vertex, 3..20).prop_flat_map(|vertices_mm| {
@@ -63,7 +63,7 @@ proptest! {
             prop_assert_eq!(soup(&back), soup(&mesh));
             let scaled = SurfaceMesh::read(&path, 2.0).unwrap();
             prop_assert_eq!(scaled.vertices_mm[0], back.vertices_mm[0] * 2.0);
-            // The twin: a moved vertex is a difference that this comparison sees.
+            // Counter-check: this comparison detects a moved vertex.
             let mut moved = mesh.clone();
             moved.vertices_mm[mesh.triangles[0][0] as usize].x += 0.125;
             prop_assert_ne!(soup(&back), soup(&moved));
@@ -141,7 +141,7 @@ fn faces_without_three_corners_are_counted_and_the_others_stay() {
         let wall = crate::vessel::Wall::from_surface(&surface).unwrap();
         assert_eq!((wall.mesh().triangles.len(), wall.report().degenerate_removed), (1, degenerate));
     }
-    // The twin: a vertex that is used must be somewhere.
+    // Counter-check: a vertex that is used must be finite.
     let used = parse(Format::Obj, b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n").unwrap();
     let reason = placed(used, 1.0.into()).unwrap_err();
     assert!(reason.contains("vertex 2 is at (NaN") && reason.contains("1 triangles"), "{reason}");

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// The bytes of a file without a byte order mark. What begins with that of UTF-16 and goes on in ASCII becomes UTF-8.
+/// The bytes of a file without a byte order mark. ASCII text in UTF-16 with its mark becomes UTF-8.
 pub(super) fn without_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
     let units = |of: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
@@ -34,14 +34,14 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// A number as languages write them: Fortran's exponent is a D.
+/// A number in the syntax of various languages: Fortran's exponent is a D.
 pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| word.replace(['d', 'D'], "e").parse().ok())
 }
 
-/// The beginning of a text that may be the whole of a binary file.
+/// The beginning of a text, which may be a whole binary file, for messages.
 pub(super) fn shown(text: &str) -> String {
-    /// Longest piece that is shown.
+    /// Largest length shown.
     const SHOWN: usize = 60;
     text.chars().take(SHOWN).chain((text.chars().count() > SHOWN).then_some('…')).collect()
 }

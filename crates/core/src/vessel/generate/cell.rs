@@ -1,14 +1,15 @@
-//! The surface within one cell of a grid, by the values at its corners: its pieces, and where each crosses the cell's edges.
+//! The surface within one cell of a grid, given the values at its corners: its pieces, and their crossings of the
+//! cell's edges.
 //!
-//! On a face the crossings of its sides are joined to lines; what hangs together around the cell is a piece. On a face with four
-//! crossings it is the sign of the saddle of the bilinear interpolation that says which two belong together (Nielson and Hamann, "The
-//! asymptotic decider", Visualization 1991), and both cells at the face say the same. Where the narrow angle of a fork cuts off opposite
-//! corners of a cell, one vertex for both would make edges of four quadrilaterals; one for each piece makes none (Nielson, "Dual marching
-//! cubes", Visualization 2004).
+//! On a face the crossings of its sides are joined to lines; what is connected around the cell is a piece. On a face
+//! with four crossings the sign of the saddle of the bilinear interpolation determines which two are joined (Nielson
+//! and Hamann, "The asymptotic decider", Visualization 1991), equally for both cells at the face. Where the narrow
+//! angle of a bifurcation cuts off opposite corners of a cell, a single vertex for both would create edges of four
+//! quadrilaterals; one per piece does not (Nielson, "Dual marching cubes", Visualization 2004).
 
 use crate::Vec3;
 
-/// Edges of a cell. Along `axis`, at `du` and `dv` of the two axes that follow it, runs edge 4 axis + du + 2 dv.
+/// Edges of a cell. Edge 4 axis + du + 2 dv runs along `axis`, at `du` and `dv` of the two axes that follow it.
 pub(super) const EDGES: usize = 12;
 
 /// No piece: the surface does not cross the edge.
@@ -18,7 +19,7 @@ const NO_PIECE: u8 = u8::MAX;
 pub(super) struct Pieces {
     /// The piece that crosses each edge.
     pub(super) of_edge: [u8; EDGES],
-    /// Mean of the points where each crosses edges, from the cell's first corner, in cells.
+    /// Mean of the points where each piece crosses edges, from the cell's first corner, in cells.
     pub(super) means: Vec<[f64; 3]>,
 }
 
@@ -38,7 +39,7 @@ const ENDS: [[[usize; 3]; 2]; EDGES] = {
 };
 
 impl Pieces {
-    /// What the surface does in a cell of these values at its corners (x + 2 y + 4 z), if anything.
+    /// The pieces in a cell with these values at its corners (x + 2 y + 4 z), if any.
     pub(super) fn of(values: &[f64; 8]) -> Option<Self> {
         let inside = values.iter().filter(|value| **value < 0.0).count();
         if inside == 0 || inside == values.len() {
@@ -55,7 +56,7 @@ impl Pieces {
             })
         };
         let at: [Option<Vec3>; EDGES] = std::array::from_fn(crossing);
-        // The first edge of each piece stands for it.
+        // The first edge of each piece represents it.
         let mut first: [usize; EDGES] = std::array::from_fn(|edge| edge);
         let mut join = |a: usize, b: usize| {
             let (low, high) = (first[a].min(first[b]), first[a].max(first[b]));
@@ -75,7 +76,7 @@ impl Pieces {
                             value(at)
                         };
                         let [low, right, high, left] = sides;
-                        // What is joined is around a corner that the saddle cuts off.
+                        // The joined crossings are around a corner that the saddle cuts off.
                         if corner(0, 0) * corner(1, 1) > corner(1, 0) * corner(0, 1) {
                             join(low, right);
                             join(high, left);
@@ -118,7 +119,7 @@ impl Pieces {
 mod tests {
     use super::*;
 
-    /// Pieces of a cell of which these corners are inside; a list of corners by x + 2y + 4z.
+    /// Pieces of a cell with these corners inside; corners are x + 2y + 4z.
     fn pieces(inside: &[usize], depth: f64) -> Option<Pieces> {
         Pieces::of(&std::array::from_fn(|corner| if inside.contains(&corner) { -depth } else { 1.0 }))
     }
@@ -130,7 +131,8 @@ mod tests {
         assert_eq!(one.means.len(), 1);
         assert!((Vec3::from(one.means[0]) - Vec3::repeat(1.0 / 6.0)).norm() < 1e-15);
         assert_eq!(one.of_edge.iter().filter(|piece| **piece == 0).count(), 3);
-        // Opposite corners of the cell, and of a face: two pieces, unless they are deep enough to be one.
+        // Opposite corners of the cell, and of a face: two pieces, unless the values are large enough to connect
+        // them.
         assert_eq!(pieces(&[0, 7], 1.0).unwrap().means.len(), 2);
         assert_eq!(pieces(&[0, 3], 0.5).unwrap().means.len(), 2);
         assert_eq!(pieces(&[0, 3], 2.0).unwrap().means.len(), 1);

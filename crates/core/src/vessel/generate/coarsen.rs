@@ -1,9 +1,10 @@
 //! Fewer triangles where the vessel is wide.
 //!
-//! One grid spacing for a tree of thick and thin vessels is either too coarse for the thin ones or wasteful on the thick ones. So
-//! the grid resolves the thinnest, and edges shorter than a local target are then collapsed, edges flipped towards vertices of six
-//! neighbours, and vertices evened out and projected back: Botsch and Kobbelt, "A remeshing approach to multiresolution modeling",
-//! SGP 2004, without the splits. Rims keep to their plane. All orders are fixed, so the result is deterministic.
+//! One grid spacing for a tree of thick and thin vessels is either too coarse for the thin ones or wasteful on the
+//! thick ones. So the grid resolves the thinnest, then edges shorter than a local target are collapsed, edges flipped
+//! towards vertices of six neighbours, and vertices smoothed and projected back: Botsch and Kobbelt, "A remeshing
+//! approach to multiresolution modeling", SGP 2004, without the splits. Rims stay in their plane. All orders are
+//! fixed, so the result is deterministic.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -16,14 +17,16 @@ use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::{EdgeTable, NONE};
 use crate::{Vec3, parallel};
 
-/// Rounds of collapsing, flipping and evening out. Later rounds find next to nothing to collapse.
+/// Number of rounds of collapsing, flipping and smoothing. Later rounds find almost nothing to collapse.
 const ROUNDS: usize = 6;
-/// Edges shorter than this fraction of the target go, and none longer than that fraction may arise (Botsch and Kobbelt: 4/5, 4/3).
+/// Edges shorter than this fraction of the target are collapsed, unless one longer than `LONG` times the target
+/// results (Botsch and Kobbelt: 4/5, 4/3).
 const SHORT: f64 = 0.8;
-/// Where the grid is as coarse as wanted, one round takes out only the stumps that cuts and grazing cells leave.
+/// Fraction of the target used if the grid has the target resolution: one round then removes only the short edges of
+/// cuts and grazing cells.
 const STUMP: f64 = 0.45;
 const LONG: f64 = 1.4;
-/// Cosine by which a triangle may turn in a collapse or flip.
+/// Smallest cosine of the angle by which a triangle may rotate in a collapse or flip.
 const LEAST_COSINE: f64 = 0.8;
 
 pub(super) struct Coarsener<'a> {
@@ -34,12 +37,12 @@ pub(super) struct Coarsener<'a> {
     pub(super) edge: f64,
 }
 
-/// What is kept per vertex.
+/// Data per vertex.
 #[derive(Clone, Copy)]
 struct Vertex {
-    /// Which end's rim it is on.
+    /// The end whose rim it is on.
     rim: Option<usize>,
-    /// Wanted edge length, mm.
+    /// Target edge length, mm.
     target: f64,
 }
 
@@ -80,7 +83,7 @@ impl Coarsener<'_> {
         });
     }
 
-    /// Wanted edge length near a point of the surface.
+    /// Target edge length near a point of the surface.
     fn target(&self, point: &Vec3) -> f64 {
         let radius = self.nets.with_local(self.field, point, |local| self.field.value(local, point)).radius;
         super::local_edge(self.edge, radius)
@@ -91,7 +94,7 @@ impl Coarsener<'_> {
         (0..self.ends.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
-    /// The place next to the surface, or on its rim, next to `point`, and the edge length wanted there.
+    /// The position on the surface, or on its rim, near `point`, and the target edge length there.
     fn settle(&self, mut point: Vec3, rim: Option<usize>) -> (Vec3, f64) {
         let edge = self.nets.edge;
         let radius = self.nets.with_local(self.field, &point.clone(), |local| match rim {
@@ -108,12 +111,12 @@ impl Coarsener<'_> {
     fn collapse(&self, mesh: &mut SurfaceMesh, info: &mut [Vertex], shortest: f64) {
         let mut around = triangles_around(mesh);
         let mut gone = vec![false; mesh.triangles.len()];
-        // How often each vertex has moved: what was said of its edges before holds no more.
+        // Number of moves of each vertex: queued edges from before a move are obsolete.
         let mut moved = vec![0_u32; mesh.vertices_mm.len()];
         let short = |mesh: &SurfaceMesh, info: &[Vertex], moved: &[u32], a: u32, b: u32| {
             let wanted = info[a as usize].target.min(info[b as usize].target);
             let part = (mesh.vertices_mm[a as usize] - mesh.vertices_mm[b as usize]).norm() / wanted;
-            // Positive numbers are in the order of their bits.
+            // Positive numbers have the order of their bits.
             (part < shortest).then(|| Reverse((part.to_bits(), a, b, moved[a as usize], moved[b as usize])))
         };
         let table = EdgeTable::new(&mesh.triangles);
@@ -143,7 +146,7 @@ impl Coarsener<'_> {
                 (None, Some(_)) => pb,
                 _ => (pa + pb) / 2.0,
             };
-            // To settle takes longest: what is not sound next to the surface is not so on it.
+            // Projection takes longest: what is invalid near the surface is invalid on it.
             let wanted = info[a as usize].target.max(info[b as usize].target);
             if !stays_sound(mesh, &ring, [a, b], &start, wanted) || !link_is_simple(mesh, &around, a, b, open)
             {
@@ -211,7 +214,7 @@ fn triangles_around(mesh: &SurfaceMesh) -> Vec<Vec<u32>> {
     around
 }
 
-/// Whether collapsing a–b keeps the surface a manifold: the two have only the neighbours in common that their triangles show.
+/// Whether collapsing a–b keeps the surface a manifold: the two share only the neighbours in their common triangles.
 fn link_is_simple(mesh: &SurfaceMesh, around: &[Vec<u32>], a: u32, b: u32, open: bool) -> bool {
     let neighbours = |v: u32| {
         let mut all: Vec<u32> = Vec::with_capacity(2 * around[v as usize].len());
@@ -224,7 +227,7 @@ fn link_is_simple(mesh: &SurfaceMesh, around: &[Vec<u32>], a: u32, b: u32, open:
     neighbours(a).iter().filter(|v| of_b.binary_search(v).is_ok()).count() == if open { 1 } else { 2 }
 }
 
-/// Whether the triangles around a collapsed edge keep their direction, get no long edge and no sharp corner.
+/// Whether the triangles around a collapsed edge keep their direction, without long edges or sharp corners.
 fn stays_sound(mesh: &SurfaceMesh, ring: &[u32], ends: [u32; 2], position: &Vec3, target: f64) -> bool {
     ring.iter().all(|&t| {
         let triangle = mesh.triangles[t as usize];
@@ -257,7 +260,7 @@ fn quality(t: &[Vec3; 3]) -> f64 {
 fn flip(mesh: &mut SurfaceMesh, info: &[Vertex]) {
     let table = EdgeTable::new(&mesh.triangles);
     let mut valence = vec![0_i64; mesh.vertices_mm.len()];
-    // Edges that are not those of the table any more, or not yet.
+    // Edges no longer, or not yet, in the table.
     let (mut flipped, mut made) = (BTreeSet::new(), BTreeSet::new());
     for uses in table.edges() {
         valence[uses[0].low as usize] += 1;

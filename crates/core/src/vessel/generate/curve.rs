@@ -1,9 +1,9 @@
 //! Branches of a centre-line tree as smooth curves with a radius.
 //!
-//! Points are joined by a natural cubic spline over the chord length (twice continuously differentiable, straight where the
-//! points are), radii by the monotone cubic of Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980), which never overshoots.
-//! Both are resampled evenly in arc length; between samples a cubic Hermite is used, whose error of order ds⁴ is far below any
-//! mesh.
+//! Points are joined by a natural cubic spline over the chord length (twice continuously differentiable, straight
+//! where the points are collinear), radii by the monotone cubic of Fritsch and Carlson, SIAM J. Numer. Anal. 17
+//! (1980), which never overshoots. Both are resampled uniformly in arc length; between samples a cubic Hermite is
+//! used, whose error of order ds⁴ is far below any mesh.
 
 use std::f64::consts::FRAC_PI_3;
 
@@ -13,21 +13,21 @@ use crate::{Error, Result, Vec3};
 /// Samples per smallest radius of a branch.
 const SAMPLES_PER_RADIUS: f64 = 4.0;
 
-/// Most samples of one branch. A branch 50,000 radii long is an error of units, not a vessel.
+/// Largest number of samples of one branch. A branch 50,000 radii long is an error of units, not a vessel.
 const MOST_SAMPLES: f64 = 200_000.0;
 
-/// Most branches of a tree, and most samples of all of them: a wall of more takes minutes and gigabytes.
+/// Largest number of branches of a tree, and of samples of all of them: a larger wall takes minutes and gigabytes.
 const MOST_BRANCHES: usize = 5000;
 const MOST_SAMPLES_IN_ALL: usize = 2_000_000;
 
-/// A child that turns more than this is no continuation of its parent but a branch of its own: the spline would bend
-/// tighter than the vessel is wide.
+/// Largest angle between a child and its parent for a continuation; beyond, the child is a branch of its own: the
+/// spline would bend more tightly than the vessel is wide.
 const SHARPEST_CONTINUATION: f64 = FRAC_PI_3;
 
-/// Largest curvature times radius. At 1 the inner side of the bend folds over itself.
+/// Largest product of curvature and radius. At 1 the inner side of the bend folds over itself.
 const TIGHTEST_BEND: f64 = 0.95;
 
-/// Arc length pieces per spline segment; with 3 Gauss points each, lengths are exact to about 1e-9.
+/// Number of arc-length pieces per spline segment; with 3 Gauss points each, lengths are exact to about 1e-9.
 const PIECES: usize = 16;
 
 /// A sample of a branch.
@@ -43,20 +43,20 @@ pub(in crate::vessel) struct Sample {
     pub(in crate::vessel) slope: f64,
 }
 
-/// A branch: from the root or from a point on its parent's axis to a leaf, or to a sharp fork.
+/// A branch: from the root or a point on its parent's axis to a leaf, or to a sharp bifurcation.
 #[derive(Debug, Clone)]
 pub(in crate::vessel) struct Branch {
-    /// At least two, evenly spaced.
+    /// At least two, equally spaced.
     pub(in crate::vessel) samples: Vec<Sample>,
     /// Spacing of samples in mm.
     pub(in crate::vessel) step: f64,
-    /// Largest radius, also of what goes on straight beyond its ends, mm.
+    /// Largest radius, including the straight extensions of its ends, mm.
     pub(in crate::vessel) thickest: f64,
-    /// Row of the root, if the branch begins there: an open end.
+    /// Row of the root, if the branch starts there: an open end.
     pub(in crate::vessel) root_row: Option<usize>,
-    /// Row of the leaf, if the branch ends in one that is open.
+    /// Row of the leaf, if the branch ends in an open one.
     pub(in crate::vessel) leaf_row: Option<usize>,
-    /// The course at each sample: where every search for a foot begins.
+    /// The course at each sample, where a search for a foot starts.
     pub(in crate::vessel) at_samples: Vec<Course>,
 }
 
@@ -84,7 +84,7 @@ impl Branch {
         self.step * (self.samples.len() - 1) as f64
     }
 
-    /// The curve at arc length `s`; beyond the ends it goes on straight, with the same taper.
+    /// The curve at arc length `s`; beyond the ends it continues straight, with the same taper.
     pub(super) fn at(&self, s: f64) -> Place {
         let (Course { position, first, second }, (radius, slope)) = (self.course(s), self.width(s));
         Place { position, first, second, radius, slope }
@@ -115,7 +115,7 @@ impl Branch {
         }
     }
 
-    /// Radius and its slope at arc length `s`, as [`Branch::at`] has them.
+    /// Radius and its slope at arc length `s`, as in [`Branch::at`].
     pub(super) fn width(&self, s: f64) -> (f64, f64) {
         if let Some((sample, beyond)) = self.beyond(s) {
             let radius = sample.radius + beyond * sample.slope;
@@ -130,7 +130,7 @@ impl Branch {
         (radius(value), radius(first) / h)
     }
 
-    /// The end beyond which arc length `s` is, if any, and by how much.
+    /// The end beyond which arc length `s` is, if any, and the distance beyond.
     fn beyond(&self, s: f64) -> Option<(&Sample, f64)> {
         if s < 0.0 {
             return Some((&self.samples[0], s));
@@ -138,7 +138,7 @@ impl Branch {
         (s > self.length()).then(|| (&self.samples[self.samples.len() - 1], s - self.length()))
     }
 
-    /// The samples that arc length `s` is between, and the part of the way from one to the other.
+    /// The samples around arc length `s`, and the fraction of the way from one to the other.
     fn between(&self, s: f64) -> (&Sample, &Sample, f64) {
         let along = s / self.step;
         let index = (along as usize).min(self.samples.len() - 2);
@@ -146,8 +146,8 @@ impl Branch {
     }
 }
 
-/// Cuts `tree` into branches. At a fork the widest child (the straightest of equals) goes on unless it turns sharply; the
-/// others start on the parent's axis with their own radius.
+/// Divides `tree` into branches. At a bifurcation the widest child (the straightest of equals) continues unless it
+/// turns sharply; the others start on the parent's axis with their own radius.
 pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> {
     let (nodes, children) = (tree.nodes(), tree.children());
     let mut found: Vec<Branch> = Vec::new();
@@ -157,7 +157,7 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
     while let Some((mut rows, leaves_parent)) = pending.pop() {
         let mut last = rows[rows.len() - 1];
         if rows.len() == 1 && children[last].len() > 1 {
-            // A fork right at the root: the first piece is the one to the widest child, all the same.
+            // At a bifurcation at the root, the first piece is the one to the widest child all the same.
             let widest = continuation(tree, &children[last], None).unwrap_or(children[last][0]);
             pending.extend(children[last].iter().filter(|c| **c != widest).map(|&c| (vec![last, c], true)));
             rows.push(widest);
@@ -171,7 +171,7 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
                 [only] => Some(*only),
                 many => continuation(tree, many, direction),
             };
-            // Reversed, so that branches come out in the order of their rows.
+            // Reversed, so that branches are in the order of their rows.
             let side = children[last].iter().rev().filter(|c| Some(**c) != next);
             pending.extend(side.map(|&c| (vec![last, c], true)));
             match next {
@@ -195,7 +195,7 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
     Ok(found)
 }
 
-/// The child that continues a branch that arrives along `direction`.
+/// The child that continues a branch with this direction.
 fn continuation(tree: &CentrelineTree, children: &[usize], direction: Option<Vec3>) -> Option<usize> {
     let nodes = tree.nodes();
     let turn = |child: usize| {
@@ -215,7 +215,8 @@ fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_open: bo
     let points: Vec<Vec3> = rows.iter().map(|&r| nodes[r].position_mm).collect();
     let mut radii: Vec<f64> = rows.iter().map(|&r| nodes[r].radius_mm).collect();
     if leaves_parent {
-        // The branch is as wide at the parent's axis as at its first own point, but never sticks out of the parent's far side.
+        // The branch is as wide at the parent's axis as at its own first point, but never protrudes from the parent's
+        // far side.
         radii[0] = radii[0].min(radii[1]);
     }
     let spline = Spline::new(&points, &radii);
@@ -314,7 +315,7 @@ impl Spline {
         half * (5.0 * speed(middle - offset) + 8.0 * speed(middle) + 5.0 * speed(middle + offset)) / 9.0
     }
 
-    /// Parameter and segment at arc length `s`, by Newton from the piece that holds it.
+    /// Parameter and segment at arc length `s`, by Newton's method from the piece that contains it.
     fn parameter_at(&self, s: f64) -> (f64, usize) {
         let piece = self.arc.partition_point(|&start| start <= s).clamp(1, self.arc.len() - 1) - 1;
         let segment = piece / PIECES;
@@ -368,8 +369,8 @@ pub(in crate::vessel) fn natural_moments(points: &[Vec3], chords: &[f64]) -> Vec
     moments
 }
 
-/// Slopes of the monotone cubic (Fritsch–Carlson, in Butland's harmonic-mean form); the first and last secants at the ends, so
-/// that two points make a cone.
+/// Slopes of the monotone cubic (Fritsch–Carlson, in Butland's harmonic-mean form); the first and last secants at the
+/// ends, so that two points give a cone.
 fn monotone_slopes(radii: &[f64], chords: &[f64]) -> Vec<f64> {
     let secant: Vec<f64> = chords.iter().enumerate().map(|(k, h)| (radii[k + 1] - radii[k]) / h).collect();
     let mut slopes = vec![0.0; radii.len()];

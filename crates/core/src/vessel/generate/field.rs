@@ -1,41 +1,43 @@
 //! A vessel tree as an implicit surface: negative in the lumen, zero on the wall.
 //!
-//! Each branch is f = |p − c(s*)| − r(s*), where s* is the foot of p on the centre line: the surface swept by circles of radius r
-//! across the curve, exactly as the swept tube. Branches are joined by a smooth minimum of compact support (the cubic polynomial
-//! of Quilez, "Smooth minimum"), which changes nothing where the branches differ by more than the blend width, so a vessel keeps
-//! its radius away from its forks. Where one branch starts inside another, their surfaces run side by side and a plain smooth
-//! union would bulge; the width therefore fades out as the gradients align (Gourmel et al., "A gradient-based implicit blend",
-//! ACM TOG 32, 2013).
+//! Each branch is f = |p − c(s*)| − r(s*), where s* is the foot of p on the centre line: the surface swept by circles
+//! of radius r across the curve, exactly as the swept tube. Branches are joined by a smooth minimum of compact
+//! support (the cubic polynomial of Quilez, "Smooth minimum"), which changes nothing where the branches differ by
+//! more than the blend width, so a vessel keeps its radius away from bifurcations. Where one branch starts inside
+//! another, their surfaces are nearly parallel and a plain smooth union would bulge; so the width fades out as the
+//! gradients align (Gourmel et al., "A gradient-based implicit blend", ACM TOG 32, 2013).
 
 use std::sync::Arc;
 
 use super::curve::Branch;
 use crate::Vec3;
 
-/// Blend width over the radius of the thinner branch: makes a fillet of about that radius at a right-angled fork.
+/// Blend width relative to the radius of the thinner branch: gives a fillet of about that radius at a right-angled
+/// bifurcation.
 pub(in crate::vessel) const BLEND: f64 = 1.4;
 
 /// Cosines of the angle between gradients at which blending begins and is complete: 20° and 60°.
 pub(in crate::vessel) const BLEND_COSINES: [f64; 2] = [0.94, 0.5];
 
-/// Length over radius in which blending sets in behind a closed end. Such an end is hidden inside another branch; if its round cap
-/// blended, the other branch would bulge over it.
+/// Length, in radii, over which blending increases behind a closed end. Such an end is hidden inside another branch;
+/// if its round cap blended, the other branch would bulge over it.
 pub(in crate::vessel) const HIDDEN: f64 = 0.3;
 
-/// Newton steps to the foot; from a sample a quarter radius away three are enough.
+/// Largest number of Newton steps to the foot; from a sample a quarter radius away three are enough.
 const FOOT_STEPS: usize = 8;
 
-/// Last Newton step to the foot, in steps of the samples: what is left of the way is of the order of its square, which is rounding.
+/// Length of the last Newton step to the foot, in steps of the samples: the remaining error is of the order of its
+/// square, which is rounding.
 const FOOT: f64 = 1e-7;
 
-/// Relative error of distances that decide what is left out.
+/// Relative error of distances used for culling.
 const ROUNDING: f64 = 1e-12;
 
 /// The implicit surface of a tree.
 #[derive(Debug)]
 pub(super) struct Field {
     pub(super) branches: Vec<Branch>,
-    /// How far open ends go on straight before a flat end, mm. The mesh is cut at the true end.
+    /// Length of the straight extension of open ends before a flat end, mm. The mesh is cut at the true end.
     pub(super) extension: f64,
     steepness: f64,
 }
@@ -46,21 +48,21 @@ pub(super) struct Value {
     pub(super) f: f64,
     pub(super) gradient: Vec3,
     pub(super) radius: f64,
-    /// How far blending has set in here: 0 at a hidden end, 1 away from it.
+    /// Degree of blending: 0 at a hidden end, 1 away from it.
     exposure: f64,
 }
 
-/// What of the tree matters near a ball: per branch the samples that can be closest to a point of the ball.
+/// The relevant part of the tree near a ball: per branch the samples that can be closest to a point of the ball.
 #[derive(Debug, Clone)]
 pub(super) struct Local {
     parts: Vec<(usize, Vec<u32>)>,
     centre: Vec3,
     reach: f64,
-    /// Parts by their values at the centre, the least first.
+    /// Parts by their values at the centre, smallest first.
     order: Vec<Ranked>,
-    /// How far blends of all but the first of them can lie below the least of these.
+    /// Upper bound of how far blends of all but the first can lie below their smallest value.
     sag: f64,
-    /// What holds farther out.
+    /// The superset for a larger ball.
     wider: Option<Arc<Local>>,
 }
 
@@ -70,17 +72,18 @@ struct Ranked {
     part: usize,
     /// Its value at the centre.
     value: f64,
-    /// Most width of a blend with it or with one that is ranked behind it, mm: its radius may be the thinner one.
+    /// Upper bound of the width of a blend with it or with one ranked behind it, mm: its radius may be the thinner
+    /// one.
     widest: f64,
 }
 
-/// What each branch near a point is there.
+/// Values of the branches near a point.
 #[derive(Debug)]
 pub(super) struct Sounding {
     at: Vec3,
-    /// Of each the nearest sample, …
+    /// The nearest sample of each.
     feet: Vec<u32>,
-    /// … and its value.
+    /// The value of each.
     here: Vec<Value>,
 }
 
@@ -111,14 +114,14 @@ impl Local {
             behind = behind.max(ranked.widest);
             ranked.widest = behind;
         }
-        // Each blend of two of them lowers the lesser by a sixth of its width at most.
+        // Each blend of two lowers the smaller one by at most a sixth of its width.
         let widest =
             order.iter().skip(1).map(|ranked| BLEND * at_centre[ranked.part].radius).fold(0.0, f64::max);
         let sag = widest / 6.0 * parts.len().saturating_sub(2) as f64;
         Self { parts, centre, reach, order, sag, wider: None }
     }
 
-    /// The narrowest that holds at `point`.
+    /// The narrowest set valid at `point`.
     fn around(&self, point: &Vec3) -> &Self {
         let mut local = self;
         while let Some(wider) = &local.wider {
@@ -138,18 +141,19 @@ impl Field {
         Self { branches, extension, steepness }
     }
 
-    /// An upper bound on how fast the field changes, for culling.
+    /// An upper bound of the field's slope, for culling.
     pub(super) fn steepness(&self) -> f64 {
         self.steepness
     }
 
-    /// What matters within `reach` of `centre`.
+    /// The relevant part within `reach` of `centre`.
     pub(super) fn local(&self, centre: &Vec3, reach: f64) -> Local {
         let mut parts = Vec::new();
         for (index, branch) in self.branches.iter().enumerate() {
             parts.push((index, near(branch, centre, 2.0 * reach)));
         }
-        // Branches too far off to blend with anything in the ball are left out; their samples do not change the value.
+        // Branches too far away to blend with anything in the ball are omitted; their samples do not change the
+        // value.
         let here: Vec<Value> = parts.iter().map(|part| self.branch_value(part, centre)).collect();
         let least = here.iter().map(|v| v.f).fold(f64::INFINITY, f64::min);
         let slack = 2.0 * self.steepness() * reach;
@@ -158,8 +162,8 @@ impl Field {
         Local::new(&self.branches, parts, &here, *centre, reach)
     }
 
-    /// `wide` for a ball inside its own: the same branches, of which one by one is left out by the value at a point, with fewer
-    /// samples. The field has the same bits.
+    /// `wide` restricted to a ball inside its own: the same branches, each omitted or not by its value at a point,
+    /// with fewer samples. The field has the same bits.
     pub(super) fn narrowed(&self, wide: &Arc<Local>, sounding: &Sounding, reach: f64) -> Local {
         let Sounding { at, feet, here } = sounding;
         let nearer = |((index, samples), &nearest): (&(usize, Vec<u32>), &u32)| {
@@ -188,18 +192,18 @@ impl Field {
         self.value_of_near(local, point).unwrap_or_else(|| self.value_of_all(local, point))
     }
 
-    /// The same from all branches of `local`.
+    /// As [`Self::value`], from all branches of `local`.
     pub(super) fn value_of_all(&self, local: &Local, point: &Vec3) -> Value {
         blended(local.parts.iter().map(|part| self.branch_value(part, point)))
     }
 
-    /// The field from the few branches that reach `point`: where no other, and no blend of others, is near enough to blend with
-    /// these, the minimum is theirs to the bit. None where it takes more of them.
+    /// The field from the few branches that reach `point`: if no other branch or blend is near enough to blend with
+    /// these, the minimum is bitwise theirs. `None` if more of them are needed.
     fn value_of_near(&self, local: &Local, point: &Vec3) -> Option<Value> {
         let change = self.steepness * (point - local.centre).norm();
         let mut near: [Option<(usize, Value)>; FEW] = [None; FEW];
         let (mut count, mut highest, mut widest) = (0, f64::NEG_INFINITY, 0.0_f64);
-        // The least value of those left out, and the most width of a blend with them.
+        // The smallest value of those omitted, and the largest width of a blend with them.
         let mut others = (f64::INFINITY, 0.0_f64);
         for ranked in &local.order {
             let reached = |f: f64| count == 0 || f - local.sag <= highest + widest.min(ranked.widest);
@@ -234,7 +238,7 @@ impl Field {
         self.value_from(*index, nearest_of(&self.branches[*index], samples, point), point)
     }
 
-    /// The value of a branch, of which this sample is the nearest.
+    /// The value of a branch, given its nearest sample.
     fn value_from(&self, index: usize, nearest: u32, point: &Vec3) -> Value {
         let branch = &self.branches[index];
         let (low, high) = (branch.root_row.is_some(), branch.leaf_row.is_some());
@@ -263,7 +267,7 @@ impl Field {
         let offset = point - course.position;
         let distance = offset.norm();
         let radial = distance - radius;
-        // Past an open end the tube goes on for `extension` and stops flat.
+        // Past an open end the tube continues for `extension` and ends flat.
         let beyond = (-s).max(s - branch.length()) - self.extension;
         if beyond > radial {
             let outward = if s < 0.0 { -course.first } else { course.first };
@@ -279,11 +283,11 @@ impl Field {
     }
 }
 
-/// The samples of a branch that are no more than `slack` farther from `centre` than the nearest one.
+/// The samples of a branch at most `slack` farther from `centre` than the nearest one.
 pub(super) fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
     let distance = |k: usize| (branch.samples[k].position - centre).norm();
-    // Samples are `step` apart along the curve, so that the distance changes by no more from one to the next: what is far
-    // off is passed in strides that cannot leap over anything nearer than asked for.
+    // Samples are `step` apart along the curve, so the distance changes by at most that from one to the next: far
+    // ones are skipped in strides too short to miss anything nearer than requested.
     let stride = |excess: f64| ((excess / branch.step) as usize).max(1);
     let (mut nearest, mut k) = (f64::INFINITY, 0);
     while k < branch.samples.len() {
@@ -304,11 +308,11 @@ pub(super) fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
     samples
 }
 
-/// Samples that are compared, or branches that are blended, one by one.
+/// Number of samples compared, or branches blended, one by one.
 const FEW: usize = 4;
 
-/// The one of `samples` (ascending) nearest to `point`, the first of equals; by halves, of which those are left out that
-/// cannot come near enough: along the curve the distance changes by no more than `step` from one sample to the next.
+/// The one of `samples` (ascending) nearest to `point`, the first of equals; by bisection, discarding halves that
+/// cannot come near enough: along the curve the distance changes by at most `step` from one sample to the next.
 pub(super) fn nearest_of(branch: &Branch, samples: &[u32], point: &Vec3) -> u32 {
     fn search(branch: &Branch, samples: &[u32], point: &Vec3, best: &mut (f64, u32)) {
         let distance = |k: u32| (branch.samples[k as usize].position - point).norm();
@@ -340,7 +344,7 @@ pub(super) fn nearest_of(branch: &Branch, samples: &[u32], point: &Vec3) -> u32 
     best.1
 }
 
-/// From 0 at 0 to 1 at 1, level at both.
+/// From 0 at 0 to 1 at 1, with zero slope at both.
 fn smooth_step(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)

@@ -1,7 +1,7 @@
 //! Walls from centre-line trees.
 //!
-//! A tree without forks becomes a swept tube ([`sweep`]); one with forks an implicit surface ([`field`]) meshed by surface nets
-//! ([`nets`]), evened out, projected back and cut open at its ends ([`trim`]).
+//! A tree without bifurcations becomes a swept tube ([`sweep`]); one with bifurcations an implicit surface
+//! ([`field`]) meshed by surface nets ([`nets`]), smoothed, projected back and cut open at its ends ([`trim`]).
 
 mod cell;
 mod coarsen;
@@ -26,55 +26,58 @@ pub(super) use sweep::any_perpendicular;
 use trim::End;
 pub(super) use trim::{End as TreeEnd, ends as open_ends};
 
-/// Vertices are projected until the field is this small.
+/// Tolerance of the field in projecting vertices, mm.
 const ON_SURFACE_MM: f64 = 1e-10;
 
-/// What is guaranteed in the end.
+/// Guaranteed tolerance of the result, mm.
 const GUARANTEED_MM: f64 = 1e-6;
 
-/// Newton along an approximate gradient: quadratic on plain tubes, in fillets nearly so with the steps' length learnt.
+/// Largest number of Newton steps along an approximate gradient: quadratic on plain tubes, nearly so in fillets with
+/// adapted step lengths.
 const PROJECTION_STEPS: usize = 50;
-/// Part of the field's value that a step leaves, up to which the next learns from it, and how much longer or shorter it may be.
+/// Fraction of the field's value left by a step up to which the next one adapts its length, and the bounds of that
+/// adaptation.
 const LEFT_AT_MOST: f64 = 0.75;
 const SHARE_AT_MOST: f64 = 4.0;
 
-/// Rounds of evening out: where the nets stay as they are, and where they are coarsened. Surface nets leave short edges where the grid
-/// grazes the surface; more rounds change little.
+/// Rounds of smoothing: for unchanged nets, and for those that are coarsened. Surface nets leave short edges where
+/// the grid grazes the surface; more rounds change little.
 const SMOOTHING_ROUNDS: (usize, usize) = (8, 1);
 
 /// Surface nets on a random plane make 1.5 quadrilaterals per grid face area.
 const TRIANGLES_PER_FACE: f64 = 3.0;
 
-/// Grid spacing over the smallest radius: ten cells around the thinnest vessel, enough for forks to come out sound.
+/// Grid spacing relative to the smallest radius: ten cells around the thinnest vessel, enough for sound bifurcations.
 const GRID_PER_RADIUS: f64 = 0.6;
 
-/// Grids tried until one makes a manifold, and how much finer each is.
+/// Number of grids tried until one gives a manifold, and the factor of their spacings.
 const GRID_ATTEMPTS: usize = 6;
 const GRID_SHRINK: f64 = 0.95;
 
-/// Non-manifold edges that one grid may make by chance.
+/// Number of non-manifold edges that a grid may have by chance.
 const CHANCE_FAULTS: usize = 8;
 
-/// Cells before the plane of an end from which on an edge is not cut away with it.
+/// Distance from the plane of an end, in cells, beyond which an edge is not cut away with it.
 const CLEAR_OF_CUT: f64 = 4.0;
 
-/// Target of coarsening over edge length, so that it and the plain grid give about the same number of triangles.
+/// Target of coarsening relative to the edge length, chosen to give about the same number of triangles as the plain
+/// grid.
 const COARSENING: f64 = 1.0;
 
-/// Most triangles that are attempted: some gigabytes and a minute.
+/// Largest number of triangles attempted: some gigabytes and a minute.
 const MOST_TRIANGLES: f64 = 5e6;
 
-/// Attempts to reach a triangle count, and the relative error at which they end.
+/// Number of attempts to reach a triangle count, and the relative error at which they stop.
 const COUNT_ATTEMPTS: usize = 5;
 const COUNT_TOLERANCE: f64 = 0.02;
 
-/// How fine a generated wall is.
+/// Resolution of a generated wall.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub enum Resolution {
-    /// Typical length of an edge in mm. In a tree with forks, branches thinner than this resolves get shorter edges, about ten
-    /// around.
+    /// Typical length of an edge in mm. In a tree with bifurcations, branches too thin for this get shorter edges,
+    /// about ten around.
     EdgeMm(f64),
-    /// Number of triangles, met within 2 % where the geometry allows it.
+    /// Number of triangles, reached within 2 % if the geometry permits.
     Triangles(usize),
 }
 
@@ -90,7 +93,7 @@ impl Resolution {
 pub struct GeneratedWall {
     /// The wall, open at the root and at every leaf that is not closed.
     pub wall: Wall,
-    /// Which opening of the wall is the root of the tree.
+    /// Index of the opening at the root of the tree.
     pub inlet: usize,
     /// For each open end of the tree, the root first: row in the centre-line table, and opening of the wall.
     pub ends: Vec<(usize, usize)>,
@@ -101,13 +104,14 @@ pub struct GeneratedWall {
 impl GeneratedWall {
     /// Generates the wall of `tree`.
     ///
-    /// Without a fork the vertices lie on circles about the centre line (the polygonal lumen is inscribed), with forks on an
-    /// implicit surface of the same radius; both within 1e-6 mm. Ends are cut flat across the centre line.
+    /// Without a bifurcation the vertices lie on circles about the centre line (the polygonal lumen is inscribed),
+    /// with bifurcations on an implicit surface of the same radius; both within 1e-6 mm. Ends are cut flat across the
+    /// centre line.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for an edge length that is not positive, larger than the largest radius, or so small that more than
-    /// five million triangles would come out; for a bend tighter than the vessel is wide; for a branch that ends
-    /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot distinguish them.
+    /// [`Error::Parameter`] for an edge length that is not positive, larger than the largest radius, or so small that
+    /// more than five million triangles would result; for a bend tighter than the vessel is wide; for a branch that
+    /// ends inside another one. [`Error::Mesh`] if branches come so close that the grid cannot separate them.
     pub fn new(tree: &CentrelineTree, resolution: Resolution) -> Result<Self> {
         let branches = curve::branches(tree)?;
         check_resolution(&branches, resolution)?;
@@ -137,7 +141,7 @@ impl GeneratedWall {
         best.map(|(_, made)| made).ok_or_else(|| Error::Computation("no mesh was attempted".into()))
     }
 
-    /// `nets` keeps the nets of the last grid: in a tree of thin branches many edge lengths have the same.
+    /// `nets` caches the nets of the last grid: in a tree of thin branches many edge lengths share one.
     fn with_edge(branches: &[curve::Branch], edge_mm: f64, nets: &mut Option<TrimmedNets>) -> Result<Self> {
         let grid = checked_grid(branches, edge_mm)?;
         let field = Field::new(branches.to_vec(), 4.0 * grid);
@@ -156,22 +160,22 @@ impl GeneratedWall {
     }
 }
 
-/// The axes of the walls of `tree`, branch by branch: places and radii, mm.
+/// The axes of the walls of `tree`, branch by branch: positions and radii, mm.
 #[cfg(test)]
 pub(super) fn axes(tree: &CentrelineTree) -> Result<Vec<Vec<(Vec3, f64)>>> {
     let of_samples = |branch: curve::Branch| branch.samples.iter().map(|s| (s.position, s.radius)).collect();
     Ok(curve::branches(tree)?.into_iter().map(of_samples).collect())
 }
 
-/// Refuses a tube that runs into itself: between samples of the centre line a bend can be tighter than at them, a polygon of
-/// rings folds before its axis does, and a vessel may simply cross itself.
+/// Rejects a tube that intersects itself: between samples of the centre line a bend can be tighter than at them, a
+/// polygon of rings folds before its axis does, and a vessel may simply cross itself.
 fn check_apart(mesh: &SurfaceMesh) -> Result<()> {
     let found = self_intersections(mesh, 0.0);
     let Some([triangle, _]) = found.first.first() else { return Ok(()) };
     Err(Error::Mesh(wall_cuts_itself(&mesh.corners(*triangle)[0])))
 }
 
-/// What is said of a tube that runs into itself.
+/// The error for a tube that intersects itself.
 pub(super) fn wall_cuts_itself(at: &Vec3) -> String {
     format!(
         "the wall cuts itself near ({:.2}, {:.2}, {:.2}) mm: the vessel bends tighter than it is wide or runs into itself; \
@@ -180,7 +184,7 @@ pub(super) fn wall_cuts_itself(at: &Vec3) -> String {
     )
 }
 
-/// Refuses a resolution before a mesh is made.
+/// Rejects an unusable resolution before a mesh is made.
 pub(super) fn check_resolution(branches: &[curve::Branch], resolution: Resolution) -> Result<()> {
     match resolution {
         Resolution::EdgeMm(edge_mm) => checked_grid(branches, edge_mm).map(|_| ()),
@@ -192,12 +196,12 @@ pub(super) fn check_resolution(branches: &[curve::Branch], resolution: Resolutio
     }
 }
 
-/// The edge length that so many triangles have, about, mm.
+/// The approximate edge length for this number of triangles, mm.
 fn edge_of_count(branches: &[curve::Branch], count: usize) -> f64 {
     (branch_area(branches) * TRIANGLES_PER_FACE / count as f64).sqrt()
 }
 
-/// What is wrong with an edge length is wrong with the count that was asked for.
+/// Reformulates an error of an edge length as one of the requested count.
 fn of_count(error: Error, count: usize, edge: f64) -> Error {
     match error {
         Error::Parameter { name, mend, .. } if name == "edge_mm" => {
@@ -207,7 +211,7 @@ fn of_count(error: Error, count: usize, edge: f64) -> Error {
     }
 }
 
-/// Spacing of the grid for edges of a length that the branches can be meshed with, mm.
+/// Grid spacing for an edge length with which the branches can be meshed, mm.
 fn checked_grid(branches: &[curve::Branch], edge_mm: f64) -> Result<f64> {
     let largest = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(0.0, f64::max);
     if edge_mm.is_nan() || edge_mm <= 0.0 || edge_mm > largest {
@@ -226,7 +230,7 @@ fn checked_grid(branches: &[curve::Branch], edge_mm: f64) -> Result<f64> {
     Ok(grid)
 }
 
-/// Area of all branches taken alone, mm².
+/// Total area of all branches taken separately, mm².
 fn branch_area(branches: &[curve::Branch]) -> f64 {
     branches.iter().map(|b| b.samples.iter().map(|s| TAU * s.radius * b.step).sum::<f64>()).sum()
 }
@@ -235,12 +239,12 @@ fn smallest_radius(branches: &[curve::Branch]) -> f64 {
     branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(f64::INFINITY, f64::min)
 }
 
-/// Wanted edge length where the vessel has `radius`: thin branches keep about ten edges around.
+/// Target edge length where the vessel has `radius`: thin branches keep about ten edges around.
 fn local_edge(edge: f64, radius: f64) -> f64 {
     COARSENING * edge.min(GRID_PER_RADIUS * radius)
 }
 
-/// The wall of a tree with forks.
+/// The wall of a tree with bifurcations.
 fn implicit_mesh(
     field: &Field,
     ends: &[End],
@@ -276,14 +280,15 @@ fn implicit_mesh(
 
 /// Nets and the mesh made of them.
 struct TrimmedNets {
-    /// Grid spacing asked for, mm.
+    /// Requested grid spacing, mm.
     spacing: f64,
     nets: nets::Nets,
     mesh: SurfaceMesh,
 }
 
-/// Surface nets, cut open, without edges of more than two triangles. Those arise where one piece of surface in a cell passes a side of
-/// it twice, by chance in the narrow angle of a fork, as do ways through; a slightly finer grid falls differently.
+/// Surface nets, cut open, without edges of more than two triangles. Those arise where one piece of surface in a cell
+/// crosses a side twice, by chance in the narrow angle of a bifurcation, as do spurious passages; a slightly finer
+/// grid avoids them.
 fn manifold_nets(field: &Field, ends: &[End], spacing: f64, rounds: usize) -> Result<TrimmedNets> {
     let mut attempt = spacing;
     let mut tried = spacing;
@@ -291,8 +296,8 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64, rounds: usize) -> Re
     for _ in 0..GRID_ATTEMPTS {
         tried = attempt;
         let mut nets = nets::mesh(field, attempt)?;
-        // A way through between branches where the grid sees two sheets in one cell may be one that it made: then a finer one has
-        // none. Of a closed net of quadrilaterals V − E + F is V − F; a tree without loops has 2.
+        // A passage between branches where the grid has two sheets in one cell may be spurious: then a finer grid has
+        // none. For a closed net of quadrilaterals V − E + F is V − F; a tree without loops has 2.
         if nets.has_parted && nets.vertices.len() < nets.quads.len() + 2 {
             if std::mem::replace(&mut has_way_through, true) {
                 break;
@@ -300,7 +305,8 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64, rounds: usize) -> Re
             attempt *= GRID_SHRINK;
             continue;
         }
-        // Chance makes a few, and another grid others; many that stay are in the tree. Evening out changes none of them.
+        // By chance a few occur, different on another grid; many persistent ones are in the tree. Smoothing does not
+        // change them.
         let crowded = crowded_edges(&nets.quads);
         let many = crowded.len();
         if many > CHANCE_FAULTS {
@@ -311,7 +317,7 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64, rounds: usize) -> Re
             attempt *= GRID_SHRINK;
             continue;
         }
-        // Cutting takes away such edges near an end and beyond its plane only. Evening out moves them by a cell or so.
+        // Cutting removes such edges only near an end and beyond its plane. Smoothing moves them by about a cell.
         let stays = |&(v, _): &(u32, u32)| {
             ends.iter().all(|end| {
                 let offset = nets.vertices[v as usize] - end.centre;
@@ -357,11 +363,11 @@ fn crowded_edges(quads: &[[u32; 4]]) -> Vec<(u32, u32)> {
     edges.chunk_by(|a, b| a == b).filter(|uses| uses.len() > 2).map(|uses| uses[0]).collect()
 }
 
-/// Moves vertices towards the mean of their neighbours along the surface, and back onto it: by one step of Newton's method in each of
-/// `rounds`, which leaves less than the next round moves them, and in the end for good.
+/// Moves vertices towards the mean of their neighbours along the surface, and back onto it: by one Newton step in
+/// each of `rounds`, which leaves less error than the next round's motion, and fully in the end.
 fn even_out(field: &Field, nets: &mut nets::Nets, rounds: usize) {
     let mut vertices = std::mem::take(&mut nets.vertices);
-    // Gradients next to where vertices lie, known from the round before.
+    // Gradients near the vertices, from the previous round.
     let mut gradients = vec![Vec3::zeros(); vertices.len()];
     for round in 0..=rounds {
         let mut sum = vec![(Vec3::zeros(), 0.0); vertices.len()];
@@ -392,7 +398,7 @@ fn even_out(field: &Field, nets: &mut nets::Nets, rounds: usize) {
     nets.vertices = vertices;
 }
 
-/// A step of Newton's method along the gradient; the value where it began.
+/// A Newton step along the gradient; returns the value at its start.
 fn approach(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) -> field::Value {
     let value = field.value(local, point);
     *point += newton(&value, edge);
@@ -404,8 +410,8 @@ fn newton(value: &field::Value, edge: f64) -> Vec3 {
     step.cap_magnitude(0.5 * edge)
 }
 
-/// Such steps until the point is on the surface. In fillets, where the gradient is not quite that of the field, each is as much longer
-/// or shorter than Newton's as the one before it should have been.
+/// Repeats such steps until the point is on the surface. In fillets, where the gradient is approximate, each is
+/// scaled by the factor that the one before it should have had.
 fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
     let (mut share, mut before) = (1.0_f64, f64::NAN);
     for _ in 0..PROJECTION_STEPS {
@@ -422,7 +428,7 @@ fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
     }
 }
 
-/// Adds a triangle or a quadrilateral, the latter cut along its shorter diagonal.
+/// Adds a triangle or a quadrilateral, the latter divided along its shorter diagonal.
 fn push_polygon(vertices: &[Vec3], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
     match *polygon {
         [a, b, c] => triangles.push([a, b, c]),
@@ -438,10 +444,10 @@ fn push_polygon(vertices: &[Vec3], polygon: &[u32], triangles: &mut Vec<[u32; 3]
     }
 }
 
-/// Points looked at around an end.
+/// Number of points tested around an end.
 const END_PROBES: usize = 24;
 
-/// Refuses an end that another branch reaches: its rim would be no clean loop.
+/// Rejects an end that another branch reaches: its rim would not be a clean loop.
 pub(super) fn check_end_is_free(end: &End, field: impl Fn(&Vec3) -> f64) -> Result<()> {
     let u = sweep::any_perpendicular(&end.outward);
     let v = end.outward.cross(&u);
@@ -459,7 +465,7 @@ pub(super) fn check_end_is_free(end: &End, field: impl Fn(&Vec3) -> f64) -> Resu
     Ok(())
 }
 
-/// Pairs the ends of the tree with the openings of the wall; there must be as many, each in its place.
+/// Pairs the ends of the tree with the openings of the wall; their numbers and positions must agree.
 fn match_openings(wall: &Wall, ends: &[End], edge: f64) -> Result<Vec<(usize, usize)>> {
     let found = wall.openings().len();
     if found != ends.len() {

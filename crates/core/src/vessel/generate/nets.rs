@@ -1,8 +1,10 @@
-//! Surface nets: a vertex in every grid cell for every piece of surface in it, one quadrilateral around every grid edge that is crossed.
+//! Surface nets: one vertex in every grid cell for every piece of surface in it, one quadrilateral around every
+//! crossed grid edge.
 //!
-//! Gibson, "Constrained elastic surface nets", MICCAI 1998, with the pieces of [`super::cell`]. By hand, because the crate for it
-//! (fast-surface-nets 0.2) wants the whole box as a dense 32-bit array, of which a vessel tree fills a thousandth, and brings a second
-//! glam. Here the surface is followed from cell to cell, in 64 bits, and the field asked at the corners of cells that it passes alone.
+//! Gibson, "Constrained elastic surface nets", MICCAI 1998, with the pieces of [`super::cell`]. Own implementation,
+//! because the crate for it (fast-surface-nets 0.2) requires the whole box as a dense 32-bit array, of which a vessel
+//! tree fills a thousandth, and depends on another version of glam. Here the surface is followed from cell to cell,
+//! in 64 bits, and the field is evaluated only at the corners of cells that it crosses.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,20 +13,21 @@ use super::cell::{EDGES, Pieces};
 use super::field::{Field, Local};
 use crate::{Error, Result, Vec3};
 
-/// Cells along a block. Larger blocks waste samples away from the surface, smaller ones repeat more at their faces.
+/// Number of cells along a block. Larger blocks waste samples away from the surface, smaller ones repeat more at
+/// their faces.
 const BLOCK: usize = 8;
 const CORNERS: usize = BLOCK + 1;
 
-/// Cells along the parts of a block that keep what matters in them alone.
+/// Number of cells along a leaf, a part of a block with its own relevant samples.
 const LEAF: usize = 2;
 const LEAVES: usize = BLOCK / LEAF;
 
-/// Shifts the grid off round coordinates, where symmetric vessels would meet grid points exactly.
+/// Offset of the grid from round coordinates, where symmetric vessels would meet grid points exactly.
 const OFFSET: [f64; 3] = [0.3819, 0.2361, 0.1459];
 
-/// Room around a block, in cells: points are looked up by where they start from, and may move a little.
+/// Margin around a block, in cells: points are looked up by their initial position, and may move a little.
 pub(super) const MARGIN: f64 = 3.0;
-/// The same around a leaf; points that go farther are asked about with what matters to the block.
+/// Margin around a leaf; points that move farther use the block's samples.
 const LEAF_MARGIN: f64 = 1.0;
 
 type Key = [i32; 3];
@@ -37,15 +40,15 @@ pub(super) struct Nets {
     pub(super) has_parted: bool,
     /// Spacing of the grid, mm.
     pub(super) edge: f64,
-    /// For blocks with surface what matters in them, and in their leaves.
+    /// For blocks with surface, the relevant parts of the field in them and in their leaves.
     locals: BTreeMap<Key, (Arc<Local>, Leaves)>,
 }
 
 type Leaves = Vec<Option<Local>>;
 
 impl Nets {
-    /// Calls `evaluate` with what of the field matters near `point`: from the leaf or block it is in, or looked for anew if that has no
-    /// surface.
+    /// Calls `evaluate` with the relevant part of the field near `point`: from its leaf or block, or computed if that
+    /// has no surface.
     pub(super) fn with_local<T>(&self, field: &Field, point: &Vec3, evaluate: impl FnOnce(&Local) -> T) -> T {
         let blocks = [0, 1, 2].map(|axis| (point[axis] / self.edge - OFFSET[axis]) / BLOCK as f64);
         let key = blocks.map(|at| at.floor() as i32);
@@ -59,23 +62,23 @@ impl Nets {
     }
 }
 
-/// What is known of the cells of a block.
+/// Cell data of a block.
 struct Block {
-    /// What of the field matters in it, and in its leaves.
+    /// The relevant parts of the field in it, and in its leaves.
     local: Arc<Local>,
     leaves: Leaves,
-    /// Values at corners; not a number where none was asked for.
+    /// Values at corners; NaN where not evaluated.
     corners: Vec<f64>,
-    /// Whether each cell was looked at.
+    /// Whether each cell was visited.
     seen: Vec<bool>,
     /// Vertex of the first piece in each cell, or `u32::MAX`.
     cells: Vec<u32>,
-    /// Pieces of the cells that have several: which each edge belongs to.
+    /// Pieces of cells with several: the piece of each edge.
     several: BTreeMap<usize, [u8; EDGES]>,
 }
 
 impl Block {
-    /// What the surface does in a cell whose corners are known, if it passes.
+    /// The pieces in a cell whose corners are known, if the surface crosses it.
     fn pieces(&self, cell: [usize; 3]) -> Option<Pieces> {
         let [near, far] = [0, CORNERS * CORNERS].map(|up| corner_index(cell) + up);
         let row = |at: usize| [self.corners[at], self.corners[at + 1]];
@@ -103,7 +106,7 @@ fn leaf_index(at: [usize; 3]) -> usize {
     (at[2] * LEAVES + at[1]) * LEAVES + at[0]
 }
 
-/// Looks at cells of a grid where the surface leads.
+/// Follows the surface through the cells of a grid.
 struct Follower<'a> {
     field: &'a Field,
     edge: f64,
@@ -111,7 +114,7 @@ struct Follower<'a> {
 }
 
 impl Follower<'_> {
-    /// What the surface does in a cell, at a first look; `None` at later ones and where it does not pass.
+    /// The pieces in a cell, at the first visit; `None` at later ones and if the surface does not cross it.
     fn look(&mut self, cell: Key) -> Option<Pieces> {
         let key = cell.map(|k| k.div_euclid(BLOCK as i32));
         let at = cell.map(|k| k.rem_euclid(BLOCK as i32) as usize);
@@ -167,7 +170,7 @@ impl Follower<'_> {
     }
 }
 
-/// Half of the diagonal of so many cells.
+/// Half of the diagonal of this many cells.
 fn half_diagonal(cells: usize, edge: f64) -> f64 {
     0.75_f64.sqrt() * cells as f64 * edge
 }
@@ -190,7 +193,7 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
             if !block.seen[cell_index(at)] {
                 return;
             }
-            // Asked for again: to remember them took longer.
+            // Computed again: storing them was slower.
             let Some(pieces) = block.pieces(at) else { return };
             block.cells[cell_index(at)] = nets.vertices.len() as u32;
             for mean in &pieces.means {
@@ -220,7 +223,7 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
     Ok(nets)
 }
 
-/// Cells that the surface passes, in each branch some.
+/// Cells crossed by the surface, some in each branch.
 fn starts(field: &Field, edge: f64) -> Vec<Key> {
     let mut cells = Vec::new();
     for branch in &field.branches {
@@ -259,8 +262,8 @@ fn for_each_cell(mut visit: impl FnMut([usize; 3])) {
     }
 }
 
-/// Adds the quadrilateral around the grid edge from the first corner of `cell` along `axis`, if the surface crosses it.
-/// False if a cell around it has no vertex.
+/// Adds the quadrilateral around the grid edge from the first corner of `cell` along `axis`, if the surface crosses
+/// it. Returns false if a cell around it has no vertex.
 fn push_quad(
     blocks: &BTreeMap<Key, Block>,
     own: &Key,
@@ -272,7 +275,7 @@ fn push_quad(
     let mut ahead = cell;
     ahead[axis] += 1;
     let (a, b) = (block.corners[corner_index(cell)], block.corners[corner_index(ahead)]);
-    // Not numbers where the surface does not lead.
+    // NaN where the surface was not followed.
     if a.is_nan() || b.is_nan() || (a < 0.0) == (b < 0.0) {
         return true;
     }
@@ -291,7 +294,7 @@ fn push_quad(
             }
         }
         let edge = 4 * axis + usize::from(back_u) + 2 * usize::from(back_v);
-        // Most of its cells are in one block, whose place need not be looked for.
+        // Most of its cells are in the same block, which saves a look-up.
         let owner = if key == *own { Some(block) } else { blocks.get(&key) };
         quad[corner] = owner.map_or(u32::MAX, |b| b.vertex(cell_index(at), edge));
     }

@@ -1,4 +1,4 @@
-//! A tube around one branch: rings carried along by rotation-minimising frames.
+//! A tube around one branch: rings with rotation-minimising frames.
 //!
 //! Frames by double reflection: Wang, Jüttler, Zheng, Liu, "Computation of rotation minimizing frames", ACM TOG 27 (2008),
 //! algorithm 1; error of order ds⁴, exact on circles.
@@ -9,7 +9,7 @@ use super::curve::{Branch, Place};
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 
-/// Fewest corners of a ring that still looks and queries like a tube.
+/// Smallest number of corners of a ring for a usable tube.
 const FEWEST_AROUND: usize = 8;
 
 /// A tube of nearly equilateral triangles with edges of about `edge_mm`, open at both ends. Vertices lie **on** the circles of
@@ -25,7 +25,7 @@ pub(super) fn tube(branch: &Branch, edge_mm: f64) -> SurfaceMesh {
     let frames = frames(&places);
     let mut mesh = SurfaceMesh::default();
     for (k, (place, &(u, v))) in places.iter().zip(&frames).enumerate() {
-        // Every other ring is turned by half a step, so that triangles come out equilateral.
+        // Every other ring is rotated by half a step, so that triangles are equilateral.
         let turn = if k % 2 == 0 { 0.0 } else { PI / around as f64 };
         for j in 0..around {
             let angle = TAU * j as f64 / around as f64 + turn;
@@ -47,7 +47,7 @@ pub(super) fn tube(branch: &Branch, edge_mm: f64) -> SurfaceMesh {
     mesh
 }
 
-/// Two unit vectors across the tangent at each place, turning about it as little as possible.
+/// Two unit vectors across the tangent at each position, rotating about it as little as possible.
 fn frames(places: &[Place]) -> Vec<(Vec3, Vec3)> {
     let tangent = |k: usize| places[k].first.normalize();
     let mut across = any_perpendicular(&tangent(0));
@@ -59,14 +59,14 @@ fn frames(places: &[Place]) -> Vec<(Vec3, Vec3)> {
         let second = tangent(k) - tangent_mirrored;
         let carried =
             if second.norm_squared() > 0.0 { reflect(across_mirrored, second) } else { across_mirrored };
-        // Rounding only: keeps the frame orthonormal over long vessels.
+        // Corrects rounding, to keep the frame orthonormal over long vessels.
         across = (carried - tangent(k) * tangent(k).dot(&carried)).normalize();
         frames.push((across, tangent(k).cross(&across)));
     }
     frames
 }
 
-/// A unit vector across `axis`, from the coordinate axis least along it.
+/// A unit vector perpendicular to `axis`, from the coordinate axis least aligned with it.
 pub(in crate::vessel) fn any_perpendicular(axis: &Vec3) -> Vec3 {
     let least = Vec3::ith_axis(axis.iamin()).into_inner();
     (least - axis * axis.dot(&least)).normalize()

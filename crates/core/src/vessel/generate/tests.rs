@@ -43,7 +43,7 @@ fn the_volume_of_a_tube_converges_at_order_two() {
 
 #[test]
 fn a_coarse_table_of_a_circle_gives_a_smooth_torus() {
-    // Pappus: V = π r² · length. Points 20° apart; the spline errs by about the fourth power of that.
+    // Pappus: V = π r² · length. Points are 20° apart; the spline's error is about the fourth power of that.
     let rows: Vec<_> = (0..=9)
         .map(|k| {
             let (sin, cos) = (20.0 * f64::from(k)).to_radians().sin_cos();
@@ -90,14 +90,14 @@ fn away_from_forks_the_radius_is_kept_and_the_far_wall_does_not_bulge() {
         let far = made.wall.mesh().vertices_mm.iter().filter(|v| v.z < 30.0 || v.x < -0.3 * trunk);
         let worst = far.max_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
         assert!(off(&worst) < 5e-3, "{angle}: {worst} {}", off(&worst));
-        // The twin: at the fork itself the wall does leave the trunk's cylinder.
+        // Counter-check: at the bifurcation itself the wall does leave the trunk's cylinder.
         assert!(made.wall.mesh().vertices_mm.iter().any(|v| off(&v) > 0.1));
     }
 }
 
 #[test]
 fn a_fork_is_rounded_and_not_creased() {
-    // Plain union of the two cylinders meets at 90°; in the fillet neighbouring triangles turn by less.
+    // The plain union of the two cylinders meets at 90°; in the fillet neighbouring triangles have smaller angles.
     let made = generate(&fork(90.0, 8.0, 4.0), 0.8);
     let mesh = made.wall.mesh();
     let normal = |t: usize| {
@@ -127,7 +127,7 @@ fn a_triangle_count_is_met_and_thin_branches_stay_resolved() {
 
 #[test]
 fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
-    // The branch is 40 mm long and does not get out of a trunk of 41 mm.
+    // The branch is 40 mm long and stays inside a trunk of 41 mm.
     let message =
         GeneratedWall::new(&fork(90.0, 41.0, 3.0), Resolution::EdgeMm(1.0)).unwrap_err().to_string();
     assert!(message.starts_with("centreline row 4"), "{message}");
@@ -139,7 +139,7 @@ fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
     ]);
     let message = GeneratedWall::new(&hairpin, Resolution::EdgeMm(1.0)).unwrap_err().to_string();
     assert!(message.contains("bend radius"), "{message}");
-    // No bend is tight here, but the vessel comes back to where it was.
+    // No bend is tight here, but the vessel returns to where it was.
     let mut rows: Vec<_> = (0..=18)
         .map(|k| {
             let (sin, cos) = (20.0 * f64::from(k)).to_radians().sin_cos();
@@ -162,7 +162,7 @@ fn many_branches_from_one_point_are_told_apart_or_end_soon_with_the_grid_that_wa
         }));
         GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(0.5))
     };
-    // In their narrow angles cells hold two pieces of surface.
+    // In their narrow angles cells contain two pieces of surface.
     let report = check(star(20, 4.0).unwrap().wall.mesh()).unwrap();
     assert!(report.is_sound() && report.self_intersections == 0, "{report:?}");
     assert_eq!((report.components, report.openings.len()), (1, 21));
@@ -306,7 +306,7 @@ fn a_closed_end_is_half_a_ball_and_no_opening() {
     assert!(off(closed.wall.volume_mm3(), tube_mm3) > 0.05, "the cap is seen");
     let top = closed.wall.mesh().vertices_mm.iter().map(|v| v.z).fold(0.0, f64::max);
     assert!((top - length - radius).abs() < 0.02, "{top}");
-    // Only leaves close.
+    // Only leaves can be closed.
     for row in [0, 1, 3] {
         let error = tube.clone().with_closed_ends(vec![row]).unwrap_err().to_string();
         assert!(error.contains(&format!("closed end, row = {row}")), "{error}");

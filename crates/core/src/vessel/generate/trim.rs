@@ -1,7 +1,7 @@
 //! Cutting a mesh of the extended tree at its true ends, by planes across the centre line.
 //!
-//! Vertices near the plane are first moved onto the curve in which plane and wall meet, so that cutting what still straddles the
-//! plane leaves no thin triangles. Boundary vertices end up on both the plane and the implicit surface.
+//! Vertices near the plane are first moved onto the intersection curve of plane and wall, so that cutting the
+//! remaining triangles leaves no thin ones. Boundary vertices are then on both the plane and the implicit surface.
 
 use std::collections::BTreeMap;
 
@@ -48,7 +48,7 @@ pub(in crate::vessel) fn ends(branches: &[Branch]) -> Vec<End> {
     ends
 }
 
-/// Cuts off what lies beyond `end`.
+/// Cuts off everything beyond `end`.
 pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) {
     let reach = field.extension + 2.0 * edge;
     let local = field.local(&end.centre, 1.2 * end.radius + reach);
@@ -56,7 +56,7 @@ pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) {
     let near = |v: &Vec3| {
         let h = height(v);
         let lateral = (v - end.centre - h * end.outward).norm();
-        // Another branch may pass by: what belongs to the end lies on its own branch.
+        // Another branch may pass nearby: vertices of the end are on its own branch.
         h.abs() <= reach
             && lateral <= 1.2 * end.radius + edge
             && field.branch_alone(end.branch, v).f.abs() < 0.25 * edge
@@ -84,7 +84,7 @@ pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) {
         if h.iter().all(|h| *h >= 0.0) {
             continue;
         }
-        // Walk around the triangle; keep what is below the plane and put a vertex where an edge passes through it.
+        // Traverse the triangle; keep what is below the plane and add a vertex where an edge crosses it.
         let mut polygon = Vec::with_capacity(4);
         for k in 0..3 {
             let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
@@ -106,7 +106,7 @@ pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) {
     mesh.triangles = kept;
 }
 
-/// Moves a point onto the curve in which the end's plane meets the wall.
+/// Moves a point onto the intersection curve of the end's plane and the wall.
 pub(super) fn onto_rim(field: &Field, local: &Local, end: &End, start: Vec3, edge: f64) -> Vec3 {
     let flat = |v: Vec3| v - end.outward * v.dot(&end.outward);
     let mut point = end.centre + flat(start - end.centre);

@@ -1,11 +1,11 @@
-//! The field of a motion at one time: where points are, where they come from, and what derivatives become.
+//! The displacement field of a motion at one time: forward and inverse map, and transformation of derivatives.
 
 use nalgebra::Matrix3;
 
 use super::fade::Fade;
 use crate::Vec3;
 
-/// A turn and a displacement, weighed: w(X) (A X + b).
+/// A weighted rotation and displacement: w(X) (A X + b).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Affine {
     pub(super) matrix: Matrix3<f64>,
@@ -13,15 +13,15 @@ pub(super) struct Affine {
     pub(super) fade: Option<Fade>,
 }
 
-/// Where a vessel is at one time.
+/// The displacement of a vessel at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Displacement {
     modes: Vec<Affine>,
-    /// |∂u/∂X| is never more than this.
+    /// Upper bound of |∂u/∂X|.
     steepest: f64,
 }
 
-/// The field about a material point.
+/// The field near a material point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Local {
     /// F⁻¹, with F = I + ∂u/∂X.
@@ -30,9 +30,9 @@ pub struct Local {
     pub second: [Matrix3<f64>; 3],
 }
 
-/// Iterations after which a point is taken as it is; they halve the distance at least, and near by double the digits.
+/// Largest number of iterations; each at least halves the distance, and near the solution doubles the digits.
 const MOST: usize = 60;
-/// What is left over is rounding where it is less than this part of a coordinate.
+/// Residual, relative to a coordinate, that counts as rounding.
 const ROUNDING: f64 = f64::EPSILON;
 
 impl Displacement {
@@ -49,7 +49,7 @@ impl Displacement {
         each.sum()
     }
 
-    /// x = X + u(X): where a material point is, mm.
+    /// x = X + u(X): position of a material point, mm.
     pub fn place(&self, material: &Vec3) -> Vec3 {
         material + self.displacement_mm(material)
     }
@@ -84,8 +84,8 @@ impl Displacement {
         Local { inverse: inverse(&self.gradient(material)), second }
     }
 
-    /// X with X + u(X) = x: the material point that is there. Newton's method finds it, to a rigid motion in one step; where it does not come
-    /// nearer by half, X = x − u(X) does, since |∂u/∂X| is less than that.
+    /// X with X + u(X) = x: the material point there. By Newton's method, one step for a rigid motion; if it does not
+    /// halve the distance, X = x − u(X) does, since |∂u/∂X| is less than half.
     pub fn material(&self, place: &Vec3) -> Vec3 {
         let off = |x: &Vec3| place - self.place(x);
         let mut x = place - self.displacement_mm(place);
@@ -105,7 +105,8 @@ impl Displacement {
         x
     }
 
-    /// What lengths between material points are to lengths in the moved vessel, or those to these, at most: 1/(1 − |∂u/∂X|).
+    /// Upper bound of the ratio of lengths between material points and in the moved vessel, either way: 1/(1 −
+    /// |∂u/∂X|).
     pub fn stretch(&self) -> f64 {
         1.0 / (1.0 - self.steepest)
     }
@@ -117,7 +118,7 @@ fn inverse(f: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 impl Local {
-    /// Gradient and Hessian in space of what has these in the reference:
+    /// Gradient and Hessian in space, given those in the reference:
     ///
     /// ```text
     /// g = F⁻ᵀ ∇φ,    F⁻ᵀ (∇∇φ − Σ gₖ ∂²uₖ/∂X²) F⁻¹

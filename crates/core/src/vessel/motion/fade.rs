@@ -1,13 +1,13 @@
-//! How far a mode of a motion reaches.
+//! The region of a mode of a motion.
 //!
-//! With ρ = |X − m| the distance from a middle m, and τ = (ρ − r)/l from 0 to 1 over a shell of thickness l,
+//! With ρ = |X − m| the distance from a centre m, and τ = (ρ − r)/l from 0 to 1 over a shell of thickness l,
 //!
 //! ```text
 //! s(τ) = τ³ (10 − 15 τ + 6 τ²),    s′ = 30 τ² (1 − τ)²,    s″ = 60 τ (1 − τ)(1 − 2τ)
 //! ```
 //!
-//! has s = s′ = s″ = 0 at its beginning and 1, 0, 0 at its end, and s′ ≤ 15/8. A mode is weighed with s, nothing in the middle, or with
-//! 1 − s, nothing outside. With e = (X − m)/ρ
+//! has s = s′ = s″ = 0 at its start and 1, 0, 0 at its end, and s′ ≤ 15/8. A mode is weighted with s, zero in the
+//! middle, or with 1 − s, zero outside. With e = (X − m)/ρ
 //!
 //! ```text
 //! ∇s = s′/l e,    ∇∇s = s″/l² e eᵀ + s′/(l ρ) (I − e eᵀ)
@@ -21,11 +21,11 @@ use crate::Vec3;
 /// Largest s′.
 const STEEPEST: f64 = 15.0 / 8.0;
 
-/// A ball and the shell about it in which a motion fades.
+/// A ball and the shell around it in which a motion fades.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Around {
-    /// Middle, mm.
+    /// Centre, mm.
     pub centre_mm: [f64; 3],
     /// Radius of the ball, mm.
     pub radius_mm: f64,
@@ -37,7 +37,7 @@ pub struct Around {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fade {
     pub(super) around: Around,
-    /// Whether the ball is still and all outside moves, or the other way round.
+    /// Whether the ball rests and everything outside moves, or the opposite.
     pub(super) still: bool,
 }
 
@@ -46,17 +46,17 @@ impl Fade {
         Vec3::from(self.around.centre_mm)
     }
 
-    /// |∇w| is never more than this, 1/mm.
+    /// Upper bound of |∇w|, 1/mm.
     pub(super) fn steepest(&self) -> f64 {
         STEEPEST / self.around.fade_mm
     }
 
-    /// The weight changes nowhere farther from the centre than this, mm.
+    /// Distance from the centre beyond which the weight is constant, mm.
     pub(super) fn outer_mm(&self) -> f64 {
         self.around.radius_mm + self.around.fade_mm
     }
 
-    /// The weight where the distance from the centre is this.
+    /// The weight at this distance from the centre.
     pub(super) fn at_mm(&self, rho_mm: f64) -> f64 {
         let t = ((rho_mm - self.around.radius_mm) / self.around.fade_mm).clamp(0.0, 1.0);
         let share = t * t * t * (10.0 + t * (6.0 * t - 15.0));

@@ -1,22 +1,23 @@
 //! A vessel that moves: breathing, heartbeat, posture.
 //!
-//! A material point X of the vessel as its file has it, the *reference*, is at x = X + u(X, t). The field is a sum of modes
+//! A material point X of the vessel in its file, the *reference*, is at x = X + u(X, t). The field is a sum of modes
 //!
 //! ```text
 //! u(X, t) = Σ w(X) v(X, t),    v(X, t) = (R(a(t) θ) − I)(X − c) + a(t) d
 //! ```
 //!
-//! each a displacement d and a turn θ about an axis through c, with a waveform a(t) from 0 to 1 and a weight w(X) that fades over a shell
-//! about a point ([`Around`]). u and its first two derivatives in X are continuous:
+//! each a displacement d and a rotation θ about an axis through c, with a waveform a(t) from 0 to 1 and a weight w(X)
+//! that fades over a shell about a point ([`Around`]). u and its first two derivatives in X are continuous:
 //!
 //! ```text
 //! ∂u/∂X   = Σ w (R − I) + v ∇wᵀ
 //! ∂²uₖ/∂X² = Σ vₖ ∇∇w + ∇w Aₖ + Aₖᵀ ∇wᵀ    with Aₖ the k-th row of R − I
 //! ```
 //!
-//! What is asked of the moved vessel at x is asked of the reference at X ([`Displacement::material`]), where nothing has to be made anew.
-//! That there is one such X, and none that comes from the other side of the wall, follows from |∂u/∂X| < 1/2 everywhere, which is checked
-//! beforehand from |R − I| = 2 sin(θ/2), |∇w| ≤ 15/8 per fade and the largest |v| in its shell.
+//! Queries of the moved vessel at x become queries of the reference at X ([`Displacement::material`]), where nothing
+//! has to be recomputed. Existence and uniqueness of X, and that it is on the same side of the wall, follow from
+//! |∂u/∂X| < 1/2 everywhere, which is checked in advance from |R − I| = 2 sin(θ/2), |∇w| ≤ 15/8 per fade and the
+//! largest |v| in its shell.
 
 mod displacement;
 mod fade;
@@ -32,22 +33,22 @@ use crate::error::number;
 use crate::{Error, Result, Vec3};
 use mode::Mode;
 
-/// What |∂u/∂X| stays below.
+/// Upper bound of |∂u/∂X|.
 const STEEPEST: f64 = 0.5;
 
-/// How a vessel moves, checked.
+/// A checked motion of a vessel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VesselMotion {
     modes: Vec<Mode>,
-    /// |∂u/∂X| is never more than this.
+    /// Upper bound of |∂u/∂X|.
     steepest: f64,
 }
 
 impl VesselMotion {
-    /// The motion of these modes; none where there are none.
+    /// The motion with these modes; `None` without modes.
     ///
     /// # Errors
-    /// Values out of range, keys that contradict each other, and a field that strains or turns the vessel by half or more.
+    /// Values out of range, contradictory keys, and a field that strains or rotates the vessel by half or more.
     pub fn new(modes: &[MotionMode]) -> Result<Option<Self>> {
         if modes.is_empty() {
             return Ok(None);
@@ -56,7 +57,7 @@ impl VesselMotion {
         let modes = each.map(|(index, mode)| mode.check(&format!("vessel.motion[{index}]")));
         let modes = modes.collect::<Result<Vec<_>>>()?;
         let steepest = modes.iter().map(Mode::steepest).sum::<f64>();
-        // Also for what is not a number.
+        // NaN is rejected too.
         if steepest.is_nan() || steepest >= STEEPEST {
             let mend = format!(
                 "neighbouring points of the vessel would move apart by up to so much of their distance: it must stay below {STEEPEST}; \
@@ -75,12 +76,12 @@ impl VesselMotion {
         )
     }
 
-    /// Whether the vessel is elsewhere at one time than at another.
+    /// Whether the vessel's position depends on time.
     pub fn changes(&self) -> bool {
         self.modes.iter().any(Mode::changes)
     }
 
-    /// No point so far from `place` as `within_mm` is ever farther from where it is in the reference than this, mm.
+    /// Upper bound of the displacement of any point within `within_mm` of `place`, mm.
     pub fn farthest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
         self.modes.iter().map(|mode| mode.farthest_mm(place, within_mm)).sum()
     }

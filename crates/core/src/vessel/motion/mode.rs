@@ -1,4 +1,4 @@
-//! One mode of a motion: what moves, how far and when.
+//! One mode of a motion: region, amplitude and time course.
 //!
 //! Waveforms, with the phase φ of the period from 0 to 1:
 //!
@@ -20,26 +20,26 @@ use super::fade::{Around, Fade};
 use crate::error::{in_range, vector};
 use crate::{Error, Result, Vec3};
 
-/// Part of a beat in which the heart contracts.
+/// Fraction of a beat in which the heart contracts.
 const SYSTOLE: f64 = 0.4;
 /// Longest period, s.
 const LONGEST_S: f64 = 1e6;
-/// Farthest displacement, and largest radius, mm.
+/// Largest displacement, and largest radius, mm.
 const FARTHEST_MM: f64 = 1e4;
 
-/// How a mode goes with time.
+/// Time course of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Waveform {
     /// Out and back, staying out of breath longer than in.
     Breathing,
-    /// A beat in two fifths of the period, and rest.
+    /// A beat in two fifths of the period, then rest.
     Heartbeat,
-    /// Displaced all the time.
+    /// Constant displacement.
     Steady,
 }
 
-/// A turn about an axis.
+/// A rotation about an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turn {
@@ -51,33 +51,34 @@ pub struct Turn {
     pub angle_deg: f64,
 }
 
-/// `[[vessel.motion]]`: a displacement, a turn, or both, with a waveform, in all of the vessel or in a part of it.
+/// `[[vessel.motion]]`: a displacement, a rotation, or both, with a waveform, in all of the vessel or in a part of
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotionMode {
-    /// How it goes with time.
+    /// Its time course.
     pub waveform: Waveform,
-    /// Its period, s; of all waveforms but `steady`.
+    /// Its period, s; for all waveforms except `steady`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Part of the period that has gone by at the start, 0 to 1.
+    /// Phase at the start, as a fraction of the period, 0 to 1.
     #[serde(default)]
     pub phase: f64,
-    /// Displacement where it is largest, mm.
+    /// Largest displacement, mm.
     #[serde(default)]
     pub displacement_mm: [f64; 3],
-    /// A turn beside it.
+    /// An additional rotation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turn: Option<Turn>,
-    /// Where nothing moves; all outside of it does.
+    /// The region that does not move; everything outside does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub still: Option<Around>,
-    /// Where it moves; nothing outside of it does.
+    /// The region that moves; nothing outside does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within: Option<Around>,
 }
 
-/// A mode, checked.
+/// A checked mode.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mode {
     waveform: Waveform,
@@ -90,7 +91,7 @@ pub(super) struct Mode {
 }
 
 impl MotionMode {
-    /// Checks it; `name` is what messages call it.
+    /// Checks it; `name` is its name in messages.
     pub(super) fn check(&self, name: &str) -> Result<Mode> {
         let key = |key: &str| format!("{name}.{key}");
         let period_s = match (self.waveform, self.period_s) {
@@ -187,7 +188,7 @@ impl Mode {
         }
     }
 
-    /// Whether it goes with time.
+    /// Whether it depends on time.
     pub(super) fn changes(&self) -> bool {
         self.waveform != Waveform::Steady
     }
@@ -203,26 +204,26 @@ impl Mode {
         Affine { matrix, offset: offset + self.displacement * amplitude, fade: self.fade }
     }
 
-    /// Largest |R − I|: it grows with the angle up to half a turn.
+    /// Largest |R − I|: it increases with the angle up to half a turn.
     fn turning(&self) -> f64 {
         self.turn.map_or(0.0, |(.., angle)| 2.0 * libm::sin(0.5 * angle.abs()))
     }
 
-    /// |v| is never more than this at so far from a place, mm.
+    /// Upper bound of |v| within this distance of a position, mm.
     fn fastest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
         let turned =
             self.turn.map_or(0.0, |(centre, ..)| self.turning() * ((place - centre).norm() + within_mm));
         turned + self.displacement.norm()
     }
 
-    /// |∂(wv)/∂X| is never more than this.
+    /// Upper bound of |∂(wv)/∂X|.
     pub(super) fn steepest(&self) -> f64 {
         let faded =
             self.fade.map_or(0.0, |fade| fade.steepest() * self.fastest_mm(&fade.centre(), fade.outer_mm()));
         self.turning() + faded
     }
 
-    /// |wv| is never more than this at so far from a place, mm.
+    /// Upper bound of |wv| within this distance of a position, mm.
     pub(super) fn farthest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
         let weight = self.fade.map_or(1.0, |fade| {
             let rho_mm = (place - fade.centre()).norm();

@@ -23,7 +23,7 @@ fn turn(angle_deg: f64) -> Turn {
     Turn { centre_mm: [5.0, 0.0, 1.0], axis: [1.0, 2.0, 0.5], angle_deg }
 }
 
-/// A motion of everything at once, at its largest.
+/// A motion with all modes at once, at its maximum.
 fn field() -> Displacement {
     let still = MotionMode { still: Some(around(10.0, 90.0)), ..mode(Waveform::Breathing) };
     let displacement_mm = [2.0, -1.0, 0.0];

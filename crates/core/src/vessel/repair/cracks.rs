@@ -1,7 +1,8 @@
-//! Cracks: borders that lie on each other but do not share their vertices.
+//! Cracks: coincident borders that do not share their vertices.
 //!
-//! Coordinates written with few digits, or pieces meshed apart, leave gaps that are wider than the tolerance of welding and far
-//! narrower than the triangles beside them. Vertices of open edges are merged over such gaps, and those alone.
+//! Coordinates written with few digits, or pieces meshed separately, leave gaps that are wider than the welding
+//! tolerance and far narrower than the adjacent triangles. Vertices of open edges, and only those, are merged across
+//! such gaps.
 
 use std::collections::HashMap;
 
@@ -9,12 +10,13 @@ use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::{DisjointSets, EdgeTable};
 
-/// Width of a crack over the shortest open edge beside it.
+/// Largest width of a crack, relative to the shortest adjacent open edge.
 const WIDTH: f64 = 0.05;
 
-/// Merges vertices across cracks of a mesh whose edges `table` holds; returns how many went. Triangles may become duplicates, none loses its area.
+/// Merges vertices across cracks of a mesh whose edges are in `table`; returns how many were merged. Triangles may
+/// become duplicates, none loses its area.
 pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
-    // The shortest open edge at each vertex of one.
+    // The shortest open edge at each of its vertices.
     let mut reach = vec![f64::INFINITY; mesh.vertices_mm.len()];
     for uses in table.edges().filter(|uses| uses.len() == 1) {
         let (a, b) = (uses[0].low as usize, uses[0].high as usize);
@@ -25,7 +27,8 @@ pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
     if open.is_empty() {
         return 0;
     }
-    // Cells of the grid suit the median: where edges are far longer, a crack is closed up to twice the median's width only.
+    // Cells of the grid suit the median: where edges are far longer, a crack is closed only up to twice the median's
+    // width.
     let mut lengths: Vec<f64> = open.iter().map(|v| reach[*v as usize]).collect();
     let middle = lengths.len() / 2;
     let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
@@ -35,7 +38,7 @@ pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
     }
     let cell_of = |p: &Vec3| [p.x, p.y, p.z].map(|c| (c / cell).floor() as i64);
     let mut sets = DisjointSets::new(mesh.vertices_mm.len());
-    // Only looked up, never iterated: its order cannot reach the result.
+    // Only used for lookups, never iterated: its order cannot affect the result.
     let mut grid: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(open.len());
     for &v in &open {
         let p = mesh.vertices_mm[v as usize];
@@ -51,7 +54,7 @@ pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
             }
         }
         let crowd = grid.entry([x, y, z]).or_default();
-        // Crowds are no crack: a knot of more vertices than that is left as it is.
+        // A cluster of more vertices than this is not a crack, and is not changed.
         if crowd.len() < 64 {
             crowd.push(v);
         }

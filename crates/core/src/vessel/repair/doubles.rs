@@ -1,8 +1,8 @@
-//! Patches that lie on the surface a second time.
+//! Patches that duplicate part of the surface.
 //!
-//! Segmentations that were joined by hand, or scans of two views, hold pieces of the same wall twice, a little apart. A patch that is
-//! strongly curved, as around a fork, has a rim that reads like the opening of a vessel; taken for one it would let devices out. They go
-//! before cracks are closed, which would sew them to the rim of what they lie on.
+//! Manually joined segmentations, or scans from two views, contain pieces of the same wall twice, slightly apart. The
+//! rim of a strongly curved patch, as around a bifurcation, resembles the opening of a vessel, and would let devices
+//! out. Such patches are removed before cracks are closed, which would join them to the surface under their rim.
 
 use parry3d_f64::glamx::DVec3;
 use parry3d_f64::query::PointQuery;
@@ -13,13 +13,13 @@ use crate::Vec3;
 use crate::vessel::topology::{EdgeTable, NONE};
 use crate::vessel::{SurfaceMesh, mesh};
 
-/// Part of the largest piece's area below which an open piece can be a patch on it.
+/// Largest ratio of area of a patch to the largest piece.
 const PATCH: f64 = 0.3;
-/// Farthest that a patch is from what it lies on, as a part of the square root of its area. A stub of a vessel of its own, as long as
-/// wide, is off by a tenth or more.
+/// Largest distance of a patch from the surface below it, relative to the square root of its area. A separate stub of
+/// a vessel, as long as wide, is off by a tenth or more.
 const BESIDE: f64 = 0.05;
 
-/// Drops open pieces that lie on larger ones everywhere, and returns how many pieces and triangles they were.
+/// Drops open pieces that lie on larger ones everywhere, and returns the numbers of pieces and triangles dropped.
 pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {
@@ -33,7 +33,7 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize,
     }
     let largest = area_mm2.iter().copied().fold(0.0, f64::max);
     let mut patch: Vec<bool> = (0..count).map(|p| open[p] && area_mm2[p] < PATCH * largest).collect();
-    // Pieces are rare that could be one, and a hierarchy of all others is not for nothing.
+    // Candidates are rare, so the hierarchy of all others is built only if there is one.
     if !patch.contains(&true) {
         return (0, 0);
     }
@@ -53,7 +53,7 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize,
     (patch.iter().filter(|patch| **patch).count(), triangles)
 }
 
-/// What patches may lie on: all other pieces.
+/// The surfaces on which patches may lie: all other pieces.
 fn ground(mesh: &SurfaceMesh, piece_of: &[u32], patch: &[bool]) -> Option<TriMesh> {
     let triangles = mesh.triangles.iter().zip(piece_of).filter(|(_, piece)| !patch[**piece as usize]);
     let vertices = mesh.vertices_mm.iter().map(|v| DVec3::new(v.x, v.y, v.z)).collect();

@@ -1,23 +1,24 @@
-//! Triangles over a hole.
+//! Triangulation of holes.
 //!
-//! Of all triangulations of the loop the one whose sharpest angle between neighbours is smallest, and of these the one of least
-//! area: Liepa, "Filling holes in meshes", SGP 2003, after Barequet and Sharir, "Filling gaps in the boundary of a polyhedron"
-//! (1995). The time is that of the loop's length cubed, so long loops are cut in two by chords first.
+//! Of all triangulations of the loop the one with the smallest maximal angle between neighbours, and among these the
+//! one of smallest area: Liepa, "Filling holes in meshes", SGP 2003, after Barequet and Sharir, "Filling gaps in the
+//! boundary of a polyhedron" (1995). The time is cubic in the loop's length, so long loops are first divided by
+//! chords.
 
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::EdgeTable;
 
-/// Vertices of a loop that is triangulated at once, and of the longest that is at all.
+/// Largest number of vertices of a loop that is triangulated at once, and of any loop.
 const AT_ONCE: usize = 80;
 const LONGEST: usize = 4000;
 
-/// Worst angle, as 1 − cosine, and area of a triangulation.
+/// Largest angle, as 1 − cosine, and area of a triangulation.
 type Weight = (f64, f64);
 
 const NEVER: Weight = (f64::INFINITY, f64::INFINITY);
 
-/// The loop's geometry and what its chords may not be.
+/// The loop's geometry and its forbidden chords.
 struct Hole<'a> {
     mesh: &'a SurfaceMesh,
     table: &'a EdgeTable,
@@ -26,8 +27,8 @@ struct Hole<'a> {
     outer: Vec<Vec3>,
 }
 
-/// Triangles that close the loop `rim`, wound as it runs; none for a loop that is too long or that cannot be closed without an
-/// edge that the mesh has already. `table` is that of the mesh.
+/// Triangles that close the loop `rim`, wound in its direction; `None` for a loop that is too long or cannot be
+/// closed without an edge that the mesh already has. `table` is that of the mesh.
 pub(super) fn fill(mesh: &SurfaceMesh, table: &EdgeTable, rim: &[u32]) -> Option<Vec<[u32; 3]>> {
     if rim.len() < 3 || rim.len() > LONGEST {
         return None;
@@ -57,7 +58,7 @@ impl Hole<'_> {
         self.mesh.vertices_mm[self.rim[place] as usize]
     }
 
-    /// Whether two places of the loop may be joined across the hole.
+    /// Whether two positions of the loop may be joined across the hole.
     fn may_join(&self, i: usize, k: usize) -> bool {
         let (i, k) = (i.min(k), i.max(k));
         k - i == 1
@@ -65,7 +66,7 @@ impl Hole<'_> {
             || self.table.uses(self.rim[i], self.rim[k]).is_empty()
     }
 
-    /// Closes the loop of some places, in order.
+    /// Closes the loop of some positions, in order.
     fn close(&self, places: &[usize], triangles: &mut Vec<[u32; 3]>) -> Option<()> {
         if places.len() > AT_ONCE
             && let Some((i, k)) = self.chord(places)
@@ -77,7 +78,7 @@ impl Hole<'_> {
         if places.len() > 4 * AT_ONCE { None } else { self.best(places, triangles) }
     }
 
-    /// The chord that is shortest against the way around it and leaves a fifth of the loop on either side.
+    /// The chord that is shortest relative to the path around it and leaves a fifth of the loop on either side.
     fn chord(&self, places: &[usize]) -> Option<(usize, usize)> {
         let count = places.len();
         let mut best = (f64::INFINITY, None);
@@ -92,7 +93,7 @@ impl Hole<'_> {
         best.1
     }
 
-    /// The best triangulation of a loop of some places, by the best ones of its parts.
+    /// The best triangulation of a loop of some positions, from the best ones of its parts.
     fn best(&self, places: &[usize], triangles: &mut Vec<[u32; 3]>) -> Option<()> {
         let n = places.len();
         let at: Vec<Vec3> = places.iter().map(|place| self.at(*place)).collect();
@@ -199,7 +200,7 @@ mod tests {
 
     #[test]
     fn an_edge_that_is_there_is_not_made_again() {
-        // Two triangles of a tetrahedron: the loop's four vertices have one edge across already.
+        // Two triangles of a tetrahedron: the loop's four vertices already have one edge across.
         let mesh = SurfaceMesh {
             vertices_mm: [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].map(Vec3::from).to_vec(),
             triangles: vec![[0, 2, 1], [0, 1, 3]],

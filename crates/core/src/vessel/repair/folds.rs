@@ -1,41 +1,41 @@
 //! Local self-intersections and folds.
 //!
-//! Attene, "A lightweight approach to repairing digitized polygon meshes", Visual Computer 26 (2010): what intersects is cut out
-//! with a ring around it, fragments go, and the hole is filled; where the filling intersects again, the next round cuts a wider
-//! ring. Nothing else is touched. A surface that runs through itself over a large part of its area, as two vessels that cross
-//! do, is not cured: that would cut the vessel open.
+//! Attene, "A lightweight approach to repairing digitized polygon meshes", Visual Computer 26 (2010): intersecting
+//! triangles are cut out with a ring around them, fragments are removed, and the hole is filled; if the filling
+//! intersects again, the next round cuts a wider ring. Nothing else is changed. A surface that intersects itself over
+//! a large part of its area, such as two vessels that cross, is not repaired: that would cut the vessel open.
 
 use super::fill::fill;
 use crate::vessel::crossings::crossings;
 use crate::vessel::topology::{DisjointSets, EdgeTable};
 use crate::vessel::{SurfaceMesh, mesh, opening};
 
-/// Rounds, each with one more ring about what intersects.
+/// Number of rounds, each with one more ring around the intersections.
 const ROUNDS: usize = 5;
-/// Intersecting pairs beyond which nothing is cured: this is no local fault.
+/// Number of intersecting pairs beyond which nothing is repaired: it is not a local fault.
 const MOST_PAIRS: usize = 20_000;
-/// Part of the area of its piece above which what would be cut out is no local fault.
+/// Area to be cut out, as a fraction of its piece's, above which a fault is not local.
 const LOCAL: f64 = 0.1;
-/// Part of that area up to which a part that is cut off is a fragment, and how much larger than the cut it may be.
+/// Largest area of a fragment, as a fraction of its piece's, and relative to that of the cut.
 const FRAGMENT: f64 = 0.02;
 const FRAGMENT_OVER_CUT: f64 = 2.0;
 
-/// What [`cure`] did.
+/// The result of [`cure`].
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(super) struct Cured {
     /// Intersecting pairs found.
     pub(super) found: usize,
-    /// Pairs that are left.
+    /// Remaining pairs.
     pub(super) left: usize,
-    /// Whether a limit ended the search: then nothing was done.
+    /// Whether a limit stopped the search: then nothing was changed.
     pub(super) capped: bool,
     /// Triangles cut out.
     pub(super) removed: usize,
-    /// Triangles put in.
+    /// Triangles added.
     pub(super) added: usize,
 }
 
-/// A state between rounds: the mesh, what intersects, and how many open loops there are.
+/// A state between rounds: the mesh, its intersections, and the number of open loops.
 #[derive(Clone)]
 struct State {
     mesh: SurfaceMesh,
@@ -44,7 +44,7 @@ struct State {
     added: usize,
 }
 
-/// Cures a consistently oriented mesh.
+/// Repairs a consistently oriented mesh.
 pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> Cured {
     let found = crossings(mesh, tolerance_mm, None, MOST_PAIRS);
     let mut cured =
@@ -71,7 +71,7 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> Cured {
     cured
 }
 
-/// One round; none if there is nothing that it may cut out.
+/// One round; `None` if there is nothing that it may cut out.
 fn round(state: &State, rings: usize, tolerance_mm: f64) -> Option<State> {
     let mesh = &state.mesh;
     let table = EdgeTable::new(&mesh.triangles);
@@ -91,7 +91,7 @@ fn round(state: &State, rings: usize, tolerance_mm: f64) -> Option<State> {
     if !bad.contains(&true) {
         return None;
     }
-    // What is left, with the new number of each triangle.
+    // The remaining triangles, with the new index of each.
     let mut number = vec![u32::MAX; mesh.triangles.len()];
     let mut next = State {
         mesh: SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: Vec::new() },
@@ -132,7 +132,7 @@ fn grow(mesh: &SurfaceMesh, bad: &mut [bool]) {
 
 /// Bad triangles that share vertices.
 struct Clusters {
-    /// By vertex; `u32::MAX` where no bad triangle is.
+    /// By vertex; `u32::MAX` without bad triangles.
     of_vertex: Vec<u32>,
     count: usize,
 }
@@ -153,7 +153,7 @@ impl Clusters {
                 continue;
             }
             let root = sets.find(v as u32) as usize;
-            // The root is the smallest of its set: its number is there already.
+            // The root is the smallest of its set, so its index is already set.
             of_vertex[v] = if root == v { count } else { of_vertex[root] };
             count += u32::from(root == v);
         }
@@ -166,7 +166,7 @@ impl Clusters {
     }
 }
 
-/// Takes out of `bad` the clusters that are too large for a local fault.
+/// Removes from `bad` the clusters that are too large for a local fault.
 fn keep_local(mesh: &SurfaceMesh, clusters: &Clusters, piece: &[u32], area: &[f64], bad: &mut [bool]) {
     let mut share = vec![0.0; clusters.count];
     for (index, triangle) in mesh.triangles.iter().enumerate().filter(|(index, _)| bad[*index]) {
@@ -178,7 +178,8 @@ fn keep_local(mesh: &SurfaceMesh, clusters: &Clusters, piece: &[u32], area: &[f6
     }
 }
 
-/// Takes out of `bad` the clusters that a branch of the vessel hangs on, and marks the fragments that the others cut off.
+/// Removes from `bad` the clusters to which a branch of the vessel is attached, and marks the fragments that the
+/// others cut off.
 fn restore_bridges(
     mesh: &SurfaceMesh,
     clusters: &Clusters,
@@ -197,7 +198,7 @@ fn restore_bridges(
             size[*p as usize] += mesh::area(&mesh.corners(*t as usize));
             parent[*p as usize] = piece[*t as usize] as usize;
         }
-        // The largest part of each piece is the piece.
+        // The largest part of each piece represents it.
         let mut trunk = vec![usize::MAX; area.len()];
         for p in 0..parts {
             let best = &mut trunk[parent[p]];
@@ -235,19 +236,20 @@ fn restore_bridges(
         }
         fragments.fill(false);
     }
-    // Cuts that go on cutting branches off are not made.
+    // If cuts keep cutting off branches, none is made.
     bad.fill(false);
     fragments
 }
 
-/// Triangles over the loops of `mesh` that were no open edges in the mesh of `before`. None if one cannot be closed.
+/// Triangles over the loops of `mesh` whose edges were not open in the mesh of `before`. `None` if one cannot be
+/// closed.
 fn close_new(mesh: &SurfaceMesh, before: &EdgeTable) -> Option<Vec<[u32; 3]>> {
     let table = EdgeTable::new(&mesh.triangles);
     let mut filled = Vec::new();
     for opening in opening::boundary(mesh, &table).openings {
         let rim = &opening.boundary;
         let was_open = |k: usize| before.uses(rim[k], rim[(k + 1) % rim.len()]).len() == 1;
-        // A loop that has old open edges is the rim of an opening, ragged now.
+        // A loop with old open edges is the rim of an opening, now ragged.
         if !(0..rim.len()).any(was_open) {
             filled.extend(fill(mesh, &table, rim)?);
         }

@@ -1,8 +1,8 @@
-//! Which open ends are ends of the vessel, and which are damage.
+//! Distinguishes open ends of the vessel from damage.
 //!
-//! At an end of the vessel the wall runs up to the rim along the vessel; around a hole it lies across. So, for every edge of a
-//! loop, let c be the direction in the plane of its triangle that points out over the edge: at an end all c agree, around a hole
-//! or along a tear they cancel.
+//! At an end of the vessel the wall approaches the rim along the vessel; around a hole it lies across. For every edge
+//! of a loop, let c be the direction in the plane of its triangle that points out over the edge: at an end all c
+//! agree, around a hole or along a tear they cancel.
 
 use super::fill::fill;
 use crate::Vec3;
@@ -12,27 +12,30 @@ use crate::vessel::{SurfaceMesh, mesh};
 
 /// Length of the mean of all c above which a loop is an end.
 const COHERENT: f64 = 0.5;
-/// Mean of outward normals along a loop's direction below which a loop is no hole but an end, or the border of a sheet.
+/// Mean of outward normals along a loop's direction below which a loop is not a hole but an end, or the border of a
+/// sheet.
 const ACROSS: f64 = 0.6;
-/// Area over that of a circle of the same length below which a loop is a slit.
+/// Area relative to that of a circle of the same length below which a loop is a slit.
 const SLIT: f64 = 0.05;
-/// A vessel may be cut off flush at the wall of another: a ring of so many vertices, so round and so flat is an end.
+/// A vessel may be cut off flush at the wall of another: a ring with at least this many vertices, as round and flat
+/// as below, is an end.
 const RING_VERTICES: usize = 12;
 const RING_ROUND: f64 = 0.9;
 const RING_FLAT: f64 = 0.03;
-/// Part of the surface's area above which a hole is not closed: nobody knows what was there.
+/// Area of a hole, as a fraction of the surface's, above which it is not closed, since its shape is unknown.
 const LARGEST: f64 = 0.05;
 /// Pieces of fewer triangles have borders, not holes.
 const SMALLEST_PIECE: u32 = 8;
 
-/// What [`fill_holes`] did.
+/// The result of [`fill_holes`].
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct Filled {
     pub(super) holes: usize,
     pub(super) triangles: usize,
 }
 
-/// Closes the holes and tears of a consistently oriented mesh, whose edges `table` holds, and leaves the ends of the vessel open.
+/// Closes the holes and tears of a consistently oriented mesh, whose edges are in `table`, and leaves the ends of the
+/// vessel open.
 pub(super) fn fill_holes(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Filled {
     let mut filled = Filled::default();
     if table.edges().all(|uses| uses.len() != 1) {
@@ -60,21 +63,21 @@ pub(super) fn fill_holes(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Filled {
     filled
 }
 
-/// How the wall lies at a loop of open edges.
+/// The position of the wall at a loop of open edges.
 pub(super) struct Rim {
     /// Length of the mean of all c: 1 at the end of a tube, 0 around a hole or a sheet.
     coherence: f64,
     /// Mean of the outward normals along the loop's direction: 1 around a hole, 0 at the end of a tube, −1 around a sheet.
     pub(super) across: f64,
     area_mm2: f64,
-    /// Area over that of a circle of the same length.
+    /// Area relative to that of a circle of the same length.
     round: f64,
-    /// Farthest vertex from the loop's plane over its radius.
+    /// Distance of the farthest vertex from the loop's plane, relative to its radius.
     off_plane: f64,
 }
 
 impl Rim {
-    /// The loop of `opening`; `None` where it has no length.
+    /// The loop of `opening`; `None` if its length is zero.
     pub(super) fn of(mesh: &SurfaceMesh, table: &EdgeTable, opening: &Opening) -> Option<Self> {
         let count = opening.boundary.len();
         let at = |k: usize| mesh.vertices_mm[opening.boundary[k % count] as usize];
@@ -86,7 +89,8 @@ impl Rim {
             let [p, q, r] = mesh.corners(only.triangle as usize);
             let normal = (q - p).cross(&(r - p)).try_normalize(0.0).unwrap_or_default();
             let side = at(k + 1) - at(k);
-            // The cap runs from a to b, the triangle from b to a: out over the edge is to the right of the triangle.
+            // The cap runs from a to b, the triangle from b to a: outwards over the edge is to the right of the
+            // triangle.
             coherence += (-side).cross(&normal);
             across += side.norm() * normal.dot(&opening.direction);
             around += side.norm();

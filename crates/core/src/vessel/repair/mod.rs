@@ -1,6 +1,6 @@
-//! What it takes to make a vessel wall of a surface with faults beyond doubled vertices and turned faces.
+//! Repair of a surface with faults beyond duplicate vertices and flipped faces.
 //!
-//! Every step leaves what is not faulty as it is, and a surface without its fault untouched.
+//! No step changes sound parts, or a surface without its fault.
 
 mod cracks;
 mod doubles;
@@ -18,7 +18,8 @@ use super::sliver;
 use super::topology::Edges;
 use super::wall::{RepairReport, drop_unreferenced, remove_duplicates};
 
-/// Joins cracks and takes superfluous sheets away. For a mesh of welded vertices with these edges, before its winding is made consistent.
+/// Joins cracks and removes superfluous sheets, for a mesh of welded vertices with these edges, before its winding is
+/// made consistent.
 pub(super) fn join_sheets(
     mesh: &mut SurfaceMesh,
     edges: &mut Edges,
@@ -51,7 +52,8 @@ pub(super) fn join_sheets(
     }
 }
 
-/// Drops pieces that are no vessel, closes holes and cures folds. For a mesh of consistent winding with these edges.
+/// Drops pieces that are not vessels, closes holes and repairs folds, for a mesh of consistent winding with these
+/// edges.
 pub(super) fn cure(mesh: &mut SurfaceMesh, edges: &mut Edges, tolerance_mm: f64, report: &mut RepairReport) {
     let dropped = pieces::drop_pieces(mesh, edges.of(&mesh.triangles));
     if dropped.triangles > 0 {
@@ -64,7 +66,7 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, edges: &mut Edges, tolerance_mm: f64,
     report.holes_filled = filled.holes;
     report.triangles_added = filled.triangles;
     if filled.triangles > 0 {
-        // The filling of a crack has no area: its needles are flipped into the triangles beside.
+        // The filling of a crack has no area: its needles are flipped into the adjacent triangles.
         sliver::remove_degenerate(mesh, tolerance_mm);
     }
     let cured = folds::cure(mesh, tolerance_mm);
@@ -77,7 +79,7 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, edges: &mut Edges, tolerance_mm: f64,
         sliver::remove_degenerate(mesh, tolerance_mm);
     }
     if filled.triangles + cured.added > 0 {
-        // Two fillings that share a chord, or a flip that met another: as rare as it is unwelcome.
+        // Rare: two fillings that share a chord, or a flip that met another.
         report.sheets_removed += sheets::prune(mesh);
     }
     if dropped.triangles + filled.triangles + cured.removed + cured.added > 0 {

@@ -1,4 +1,4 @@
-//! Pieces that are no vessel: specks, patches that float over the surface, the outer skin of a wall with two.
+//! Pieces that are not vessels: specks, patches that float over the surface, the outer skin of a wall with two.
 
 use super::holes::Rim;
 use crate::Vec3;
@@ -6,23 +6,23 @@ use crate::vessel::topology::EdgeTable;
 use crate::vessel::wall::signed_volume;
 use crate::vessel::{SurfaceMesh, inside, mesh, opening};
 
-/// Part of the largest piece's area below which a piece is a speck, whatever it is.
+/// Ratio of area to the largest piece's below which any piece is a speck.
 const SPECK: f64 = 1e-3;
-/// The same for a piece that is closed, into which no device gets, or that encloses next to nothing.
+/// The same ratio for a closed piece, which no device can enter, or one that encloses almost nothing.
 const BLOB: f64 = 0.05;
-/// Volume over area to the power of 3/2 (a ball: 0.094) that is next to nothing.
+/// Volume over area to the power of 3/2 (a sphere: 0.094) that is almost nothing.
 const FLAT: f64 = 1e-6;
-/// The same for a sheet.
+/// The same ratio for a sheet.
 const SHEET: f64 = 0.3;
-/// A main piece has at least so many triangles: beside less nothing is small.
+/// Smallest number of triangles of a main piece: relative to fewer, nothing is small.
 const FEWEST: usize = 8;
-/// Area of an inner skin over that of the outer one, at least.
+/// Smallest ratio of the areas of the inner and the outer skin.
 const SKIN: f64 = 0.15;
-/// Triangles of an inner piece that are asked whether they are inside, and how many must be.
+/// Number of triangles of an inner piece tested for being inside, and how many must be.
 const ASKED: usize = 16;
 const INSIDE: f64 = 0.8;
 
-/// What [`drop_pieces`] did.
+/// The result of [`drop_pieces`].
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct Dropped {
     /// Specks and floating sheets.
@@ -46,7 +46,7 @@ struct Piece {
     gone: bool,
 }
 
-/// Drops the pieces of a consistently oriented mesh that are no vessel; `table` holds its edges.
+/// Drops the pieces of a consistently oriented mesh that are not vessels; `table` holds its edges.
 pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped {
     let mut dropped = Dropped::default();
     let (piece_of, count) = table.components(mesh.triangles.len());
@@ -70,7 +70,7 @@ pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped 
     dropped
 }
 
-/// Drops the triangles of some pieces, and returns how many they were; `piece_of` has the piece of each.
+/// Drops the triangles of some pieces, and returns their number; `piece_of` gives the piece of each.
 pub(super) fn drop_triangles(
     mesh: &mut SurfaceMesh,
     piece_of: &[u32],
@@ -114,12 +114,12 @@ fn measure(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], count: usize
     pieces
 }
 
-/// Marks pieces that hold another one of their kind: that one is the lumen, they are the outside of the wall.
+/// Marks pieces that contain another one of their kind: that one is the lumen, they are the outside of the wall.
 fn drop_skins(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece]) -> usize {
     let mut order: Vec<usize> = (0..pieces.len()).filter(|p| !pieces[*p].gone).collect();
     order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
     let mut skins = 0;
-    // Pieces are few once specks are gone; if not, this is no vessel with two skins.
+    // Pieces are few once specks are removed; if not, this is not a vessel with two skins.
     const MOST: usize = 8;
     order.truncate(MOST);
     for (rank, &outer) in order.iter().enumerate() {

@@ -1,9 +1,9 @@
-//! Seams whose two sides have other vertices: T-junctions.
+//! Seams with different vertices on both sides: T-junctions.
 //!
-//! Parts that were meshed apart meet along a line, and each has vertices of its own there. An open edge is split at the open
-//! vertices that lie on it, so that both sides share all of them; gaps and overlaps are closed by that, since an edge goes where
-//! its new vertices are. Vertices that stand opposite each other over a gap are merged. An edge is split where most of its parts
-//! then meet an open edge of the other side, and else stays as it is: rims that only pass each other are no seam.
+//! Parts meshed separately meet along a line, with vertices of their own there. An open edge is split at the open
+//! vertices that lie on it, so that both sides share all of them; this closes gaps and overlaps, since an edge moves
+//! to its new vertices. Vertices opposite each other across a gap are merged. An edge is split only if most of its
+//! parts then meet an open edge of the other side: rims that merely pass each other are not a seam.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,12 +11,12 @@ use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::{EdgeTable, EdgeUse};
 
-/// A vertex lies on an edge that is no farther away than this part of the edge's length, and no farther than the median open edge is long.
-/// A circle of twelve edges is 0.07 of an edge from its chords.
+/// Largest distance of a vertex from an edge on which it lies, relative to the edge's length; it must not exceed the
+/// median open edge either. A circle of twelve edges is 0.07 of an edge from its chords.
 const WIDTH: f64 = 0.15;
-/// Open edges longer than so many median ones are not looked along.
+/// Length, in median open edges, above which open edges are not searched along.
 const MOST_CELLS: f64 = 1000.0;
-/// Vertices in a cell beyond which it is a crowd and no seam.
+/// Number of vertices in a cell above which it is a cluster and not a seam.
 const CROWD: usize = 64;
 
 /// An open edge and the vertices that lie on it, in order from its first corner.
@@ -27,7 +27,7 @@ struct Split {
 }
 
 impl Split {
-    /// The edges that it is split into.
+    /// The edges into which it is split.
     fn parts(&self) -> impl Iterator<Item = (u32, u32)> {
         let [first, last] = self.ends;
         let begins = std::iter::once(first).chain(self.vertices.iter().copied());
@@ -39,16 +39,16 @@ fn undirected((a, b): (u32, u32)) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// Splits open edges of a mesh, whose edges `table` holds, at the vertices of the other side of a seam, and merges those that stand
-/// opposite each other; returns how many edges were split and vertices merged.
+/// Splits open edges of a mesh, whose edges are in `table`, at the vertices of the other side of a seam, and merges
+/// vertices opposite each other; returns the numbers of edges split and vertices merged.
 pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     let open: Vec<EdgeUse> = table.edges().filter(|uses| uses.len() == 1).map(|uses| uses[0]).collect();
     let Some(rims) = Rims::new(mesh, &open) else { return (0, 0) };
     let opposite = rims.opposite();
     let merged = |v: u32| opposite.get(&v).copied().unwrap_or(v);
     let mut splits = rims.splits(&opposite);
-    // How often an edge is there when all is sewn. Maps are looked up, and what is taken from them is sorted: their order cannot
-    // reach the result.
+    // The number of uses of each edge after sewing. Maps are only looked up, and what is taken from them is sorted:
+    // their order cannot affect the result.
     let split: HashSet<(u32, u32)> = splits.iter().map(|s| (s.edge.low, s.edge.high)).collect();
     let mut sides: HashMap<(u32, u32), usize> = HashMap::new();
     let whole = open.iter().map(|edge| (edge.low, edge.high)).filter(|edge| !split.contains(edge));
@@ -62,7 +62,7 @@ pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
         a != b && sides.get(&(a, b)) == Some(&2)
     };
     splits.retain(|split| 2 * split.parts().filter(is_met).count() > split.parts().count());
-    // Vertices at edges that meet nothing stay where they are.
+    // Vertices at edges that meet nothing are not moved.
     let at_seams: HashSet<u32> =
         parts.iter().filter(|part| is_met(part)).flat_map(|(a, b)| [merged(*a), merged(*b)]).collect();
     for split in &splits {
@@ -81,7 +81,7 @@ pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     (splits.len(), target.len())
 }
 
-/// The open edges of a mesh and their vertices, by place.
+/// The open edges of a mesh and their vertices, by position.
 struct Rims<'a> {
     mesh: &'a SurfaceMesh,
     open: &'a [EdgeUse],
@@ -93,7 +93,7 @@ struct Rims<'a> {
 }
 
 impl<'a> Rims<'a> {
-    /// None where edges have no length.
+    /// `None` if edges have no length.
     fn new(mesh: &'a SurfaceMesh, open: &'a [EdgeUse]) -> Option<Self> {
         let at = |v: u32| mesh.vertices_mm[v as usize];
         let length = |edge: &EdgeUse| (at(edge.low) - at(edge.high)).norm();
@@ -122,7 +122,7 @@ impl<'a> Rims<'a> {
         [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i64)
     }
 
-    /// Vertices in the cell of a place and those around it, but for crowds.
+    /// Vertices in the cell of a position and its neighbours, except in clusters.
     fn around(&self, p: &Vec3) -> impl Iterator<Item = u32> {
         let [x, y, z] = self.place(p);
         let cells = (0..27_i64).map(move |k| {
@@ -131,7 +131,8 @@ impl<'a> Rims<'a> {
         cells.filter_map(|cell| self.grid.get(&cell)).filter(|crowd| crowd.len() <= CROWD).flatten().copied()
     }
 
-    /// Pairs of vertices that are each other's nearest and as near as a vertex on an edge is: the later with the earlier one.
+    /// Pairs of vertices that are each other's nearest and as close as a vertex on an edge is: the later with the
+    /// earlier one.
     fn opposite(&self) -> HashMap<u32, u32> {
         let mut beside: HashSet<(u32, u32)> = HashSet::new();
         for edge in self.open {
@@ -155,10 +156,10 @@ impl<'a> Rims<'a> {
         nearest.iter().filter(is_mutual).map(|(v, w)| (*v, *w)).collect()
     }
 
-    /// The open edges on which open vertices lie: each vertex on the one that it is nearest to, if it is not to become an end of it.
+    /// The open edges on which open vertices lie: each vertex on the nearest one, unless it will become an end of it.
     fn splits(&self, opposite: &HashMap<u32, u32>) -> Vec<Split> {
         let merged = |v: u32| opposite.get(&v).copied().unwrap_or(v);
-        // For each vertex the nearest edge that it lies on: distance, edge, and how far along it.
+        // For each vertex the nearest edge that it lies on: distance, edge, and position along it.
         let mut nearest: HashMap<u32, (f64, usize, f64)> = HashMap::new();
         let mut near = Vec::new();
         for (index, edge) in self.open.iter().enumerate() {
@@ -175,7 +176,7 @@ impl<'a> Rims<'a> {
             near.sort_unstable();
             near.dedup();
             let width = (WIDTH * length).min(self.cell);
-            // A flat triangle is no seam.
+            // A flat triangle is not a seam.
             let own = self.mesh.triangles[edge.triangle as usize].map(merged);
             for &v in near.iter().filter(|v| !own.contains(&merged(**v))) {
                 let along = (self.at(v) - a).dot(&(b - a)) / (length * length);
@@ -208,12 +209,12 @@ impl<'a> Rims<'a> {
     }
 }
 
-/// Cuts the triangle at a split edge into a fan around the corner across.
+/// Divides the triangle at a split edge into a fan around the opposite corner.
 fn apply(mesh: &mut SurfaceMesh, split: &Split) {
     let has_edge = |t: &[u32; 3]| {
         (0..3).position(|k| undirected((t[k], t[(k + 1) % 3])) == (split.edge.low, split.edge.high))
     };
-    // Another edge of the triangle may have been split before: what holds this edge then is among the last triangles.
+    // Another edge of the triangle may have been split before: then this edge is in one of the last triangles.
     let Some(index) = std::iter::once(split.edge.triangle as usize)
         .chain((0..mesh.triangles.len()).rev())
         .find(|index| has_edge(&mesh.triangles[*index]).is_some())
@@ -239,7 +240,7 @@ mod tests {
     use super::*;
     use crate::vessel::{Wall, check};
 
-    /// A tube of rings along z, each with its number of vertices; two rings one after the other at a place make a seam.
+    /// A tube of rings along z, each with its number of vertices; two successive rings at one position form a seam.
     fn tube(pieces: &[&[(f64, u32, f64)]]) -> SurfaceMesh {
         let mut mesh = SurfaceMesh::default();
         for rings in pieces {
@@ -263,7 +264,8 @@ mod tests {
         mesh
     }
 
-    /// A tube with a seam at 20 mm, `gap` wide, whose upper side has `count` vertices, turned by a part of an edge.
+    /// A tube with a seam at 20 mm, `gap` wide, whose upper side has `count` vertices, rotated by a fraction of an
+    /// edge.
     fn seamed(count: u32, turn: f64, gap: f64) -> SurfaceMesh {
         let rings = |from: f64, count: u32, turn: f64| [0.0, 1.0, 2.0, 3.0].map(|z| (from + z, count, turn));
         tube(&[&rings(17.0, 24, 0.0), &rings(20.0 + gap, count, turn)])
@@ -301,7 +303,7 @@ mod tests {
             assert!(!report.is_sound() && report.facing_openings.len() == 1, "{:?}", report.facing_openings);
             assert!(report.hints.iter().any(|hint| hint.contains("face each other")), "{:?}", report.hints);
         }
-        // The twin: two tubes apart are two vessels.
+        // Counter-check: two separate tubes are two vessels.
         let apart = check(&seamed(48, 0.0, 30.0)).unwrap();
         assert!(apart.is_sound() && apart.facing_openings.is_empty(), "{:?}", apart.hints);
         let whole = tube(&[&[0.0, 1.0, 2.0, 3.0].map(|z| (z, 24, 0.0))]);

@@ -1,23 +1,23 @@
 //! Edges of more than two triangles.
 //!
-//! Cut along such edges a surface falls into sheets. A sheet that others can do without – a fin, a second layer, a membrane
-//! across the lumen – is the smaller one at its edges and goes. Where what is left still touches itself along an edge, the
-//! edge is cut into as many as there are pairs of triangles (Guéziec et al., "Cutting and stitching", IEEE TVCG 7, 2001):
-//! vertices are doubled, nothing moves.
+//! Cut along such edges a surface decomposes into sheets. A sheet that others do not need – a fin, a second layer, a
+//! membrane across the lumen – is the smaller one at its edges and is removed. Where the rest still touches itself
+//! along an edge, the edge is divided into one per pair of triangles (Guéziec et al., "Cutting and stitching", IEEE
+//! TVCG 7, 2001): vertices are duplicated, nothing moves.
 
 use crate::Vec3;
 use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::{DisjointSets, EdgeTable, EdgeUse, Edges};
 use crate::vessel::{SurfaceMesh, mesh};
 
-/// Rounds of removing sheets: each may lay bare the next.
+/// Rounds of removing sheets: each may expose the next.
 const ROUNDS: usize = 16;
-/// Part of the largest sheet beside it above which a sheet is not taken for dirt.
+/// Ratio of size to the largest adjacent sheet above which a sheet is not removed.
 const LARGEST: f64 = 0.5;
-/// Part of its crowded edges at which a sheet must be the odd one out to be an intruder.
+/// Fraction of its crowded edges at which a sheet must be the odd one out to count as an intruder.
 const ODD: f64 = 0.5;
 
-/// What [`resolve`] did.
+/// The result of [`resolve`].
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct Resolved {
     /// Triangles removed.
@@ -49,7 +49,7 @@ pub(super) fn resolve(mesh: &mut SurfaceMesh, edges: &mut Edges) -> Resolved {
     resolved
 }
 
-/// What a surface falls into along its crowded edges, those of more than two triangles.
+/// The decomposition of a surface along its crowded edges, those of more than two triangles.
 struct Sheets {
     /// The sheet of each triangle.
     of: Vec<u32>,
@@ -58,7 +58,7 @@ struct Sheets {
     users: Vec<Vec<u32>>,
     /// The crowded edges of each sheet.
     edges: Vec<Vec<usize>>,
-    /// At how many of them it has no partner.
+    /// The number of these at which it has no partner.
     odd: Vec<usize>,
 }
 
@@ -99,11 +99,12 @@ impl Sheets {
         sheets
     }
 
-    /// Removes the sheets that no edge needs: intruders, or if there are none small ones. Returns how many triangles went.
+    /// Removes the sheets that no edge needs: intruders, or without any, small ones. Returns the number of triangles
+    /// removed.
     fn remove(&self, mesh: &mut SurfaceMesh) -> usize {
         let crowded = |s: &usize| !self.edges[*s].is_empty();
         let mut order: Vec<usize> = (0..self.area.len()).filter(crowded).collect();
-        // The smallest first; of equal ones the later in the file.
+        // The smallest first; among equals the later in the file.
         order.sort_by(|a, b| self.area[*a].total_cmp(&self.area[*b]).then(b.cmp(a)));
         let intrudes = |s: &usize| self.odd[*s] as f64 >= ODD * self.edges[*s].len() as f64;
         let (intruders, others): (Vec<usize>, Vec<usize>) = order.iter().partition(|s| intrudes(s));
@@ -118,7 +119,7 @@ impl Sheets {
         0
     }
 
-    /// Which of the candidates can go together: each edge keeps two triangles, and a larger sheet.
+    /// Which candidates can be removed together: each edge keeps two triangles, and a larger sheet.
     fn spare(&self, candidates: &[usize]) -> Vec<bool> {
         let mut left: Vec<usize> = self.users.iter().map(Vec::len).collect();
         let mut gone = vec![false; self.area.len()];
@@ -130,7 +131,7 @@ impl Sheets {
                     .filter(|user| *user != s && !gone[*user])
                     .map(|user| self.area[user])
                     .fold(0.0, f64::max);
-                // Of two layers of one size one goes, as long as something far larger holds both.
+                // Of two layers of equal size one is removed, if something far larger holds both.
                 left[*edge] >= own(edge) + 2 && self.area[s] <= LARGEST * largest
             });
             if spare {
@@ -144,7 +145,8 @@ impl Sheets {
     }
 }
 
-/// Removes triangles, the smallest first, until no edge has more than two; returns how many. The last resort for knots.
+/// Removes triangles, the smallest first, until no edge has more than two; returns their number. The last resort for
+/// complicated clusters.
 pub(super) fn prune(mesh: &mut SurfaceMesh) -> usize {
     let before = mesh.triangles.len();
     loop {
@@ -169,7 +171,7 @@ pub(super) fn prune(mesh: &mut SurfaceMesh) -> usize {
     }
 }
 
-/// Doubles vertices so that no edge has more than two triangles; returns how many edges had.
+/// Duplicates vertices so that no edge has more than two triangles; returns the number of edges that had.
 fn cut(mesh: &mut SurfaceMesh, table: &EdgeTable, sheet: &[u32]) -> usize {
     // Corners 3t … 3t + 2 of triangle t; those that stay one vertex are joined across the edges that stay.
     let mut corners = DisjointSets::new(3 * mesh.triangles.len());
@@ -201,7 +203,7 @@ fn cut(mesh: &mut SurfaceMesh, table: &EdgeTable, sheet: &[u32]) -> usize {
     if count == 0 {
         return 0;
     }
-    // The first set of corners at a vertex keeps it, each other one gets a vertex of its own.
+    // The first set of corners at a vertex keeps it, the others get vertices of their own.
     let mut owner = vec![u32::MAX; mesh.vertices_mm.len()];
     let mut vertex_of = vec![u32::MAX; 3 * mesh.triangles.len()];
     for t in 0..mesh.triangles.len() {
@@ -226,8 +228,8 @@ fn cut(mesh: &mut SurfaceMesh, table: &EdgeTable, sheet: &[u32]) -> usize {
     count
 }
 
-/// Pairs of the triangles at a crowded edge that go on into each other: those of one sheet first, then the flattest. One may be
-/// left over.
+/// Pairs of triangles at a crowded edge that continue each other: those of one sheet first, then the flattest. One
+/// may remain.
 fn pairs(mesh: &SurfaceMesh, uses: &[EdgeUse], sheet: &[u32]) -> Vec<(usize, usize)> {
     // In the plane of the triangle, away from the edge.
     let away = |u: &EdgeUse| -> Vec3 {
@@ -238,7 +240,7 @@ fn pairs(mesh: &SurfaceMesh, uses: &[EdgeUse], sheet: &[u32]) -> Vec<(usize, usi
         let offset = apex - low;
         (offset - along * along.dot(&offset)).try_normalize(0.0).unwrap_or_default()
     };
-    // A knot of thousands of triangles has no best pairs worth the time.
+    // A cluster of thousands of triangles is not worth pairing optimally.
     const MOST: usize = 32;
     let directions: Vec<Vec3> = uses.iter().take(MOST).map(away).collect();
     let apart = |a: usize, b: usize| sheet[uses[a].triangle as usize] != sheet[uses[b].triangle as usize];

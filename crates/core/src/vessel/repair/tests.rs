@@ -1,4 +1,4 @@
-//! Each repair on a generated wall that was spoiled in one way, against the clean one.
+//! Each repair on a generated wall with one kind of fault, compared with the clean one.
 
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use crate::Vec3;
 use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::EdgeTable;
 
-/// A forked vessel: three openings.
+/// A bifurcating vessel: three openings.
 fn fork() -> Wall {
     let node = |position: [f64; 3], radius_mm, parent| CentrelineNode {
         position_mm: Vec3::from(position),
@@ -44,7 +44,7 @@ fn without(mesh: &SurfaceMesh, gone: &[usize]) -> SurfaceMesh {
     left
 }
 
-/// A copy of some triangles on vertices of their own, moved.
+/// A displaced copy of some triangles with their own vertices.
 fn add(mesh: &mut SurfaceMesh, from: &SurfaceMesh, triangles: &[usize], moved: impl Fn(Vec3) -> Vec3) {
     let shift = mesh.vertices_mm.len() as u32;
     mesh.vertices_mm.extend(from.vertices_mm.iter().map(|v| moved(*v)));
@@ -95,7 +95,7 @@ fn missing_triangles_are_filled_and_ends_stay_open() {
 
 #[test]
 fn a_tear_along_the_vessel_is_sewn_up() {
-    // Every triangle on one side of a line gets vertices of its own there, pulled away a little.
+    // Every triangle on one side of a line gets its own vertices there, slightly pulled away.
     let clean = fork();
     let mut torn = clean.mesh().clone();
     let mut double = std::collections::BTreeMap::new();
@@ -124,7 +124,7 @@ fn a_tear_along_the_vessel_is_sewn_up() {
 
 #[test]
 fn a_curved_patch_on_the_surface_is_no_vessel() {
-    // Around the fork's crotch, 0.05 mm off to either side: its rim reads like the opening of a vessel.
+    // Around the bifurcation's crotch, 0.05 mm off to either side: its rim resembles the opening of a vessel.
     let clean = fork();
     let patch = around(clean.mesh(), [0.0, 34.0, 0.0], 6.0);
     for off_mm in [0.05, -0.05] {
@@ -134,7 +134,7 @@ fn a_curved_patch_on_the_surface_is_no_vessel() {
         assert_eq!((report.pieces_dropped, report.piece_triangles_dropped), (1, patch.len()));
         assert_eq!((report.cracks_closed, report.fold_triangles_removed), (0, 0));
     }
-    // Far from it the same piece is one that something may be made of.
+    // Far from it the same piece may be meaningful.
     let mut apart = clean.mesh().clone();
     add(&mut apart, clean.mesh(), &patch, |v| v + Vec3::y() * 3.0);
     let before = apart.triangles.len();
@@ -145,7 +145,7 @@ fn a_curved_patch_on_the_surface_is_no_vessel() {
 
 #[test]
 fn a_vertex_on_an_edge_opens_no_slit() {
-    // A T-junction: one triangle of an edge is cut in two at the edge's middle, the other is not.
+    // A T-junction: one triangle of an edge is divided at the edge's middle, the other is not.
     let clean = fork();
     let mut spoiled = clean.mesh().clone();
     let t = around(clean.mesh(), [4., 15., 0.], 0.8)[0];
@@ -202,7 +202,7 @@ fn fins_second_layers_and_membranes_go() {
     layered.triangles.extend(patch.iter().map(|i| mesh.triangles[*i].map(copy)));
     let report = repaired(&layered, &clean, 2e-3);
     assert!(report.sheets_removed > 4 && report.edges_cut == 0, "{report:?}");
-    // A lid across an opening: its end is closed by a membrane a little inside.
+    // A lid across an opening: its end is closed by a membrane slightly inside.
     let inner = Opening { ..clean.openings()[0].clone() };
     let mut lidded = mesh.clone();
     let centre = lidded.vertices_mm.len() as u32;
@@ -213,7 +213,7 @@ fn fins_second_layers_and_membranes_go() {
     assert_eq!(report.sheets_removed, ring.len());
 }
 
-/// The second ring of vertices behind an opening, in order: the border of what is left without the triangles at the rim.
+/// The second ring of vertices behind an opening, in order: the border without the triangles at the rim.
 fn ring_inside(mesh: &SurfaceMesh, opening: &Opening) -> Vec<u32> {
     let at_rim = |t: &[u32; 3]| t.iter().any(|v| opening.boundary.contains(v));
     let rest: Vec<[u32; 3]> = mesh.triangles.iter().copied().filter(|t| !at_rim(t)).collect();
@@ -253,7 +253,7 @@ fn specks_and_floating_patches_go_and_two_vessels_stay() {
     });
     let report = repaired(&dirty, &clean, 0.0);
     assert_eq!((report.pieces_dropped, report.skins_dropped), (2, 0));
-    // The twin: a second vessel beside the first is no dirt.
+    // Counter-check: a second vessel beside the first is not debris.
     let all: Vec<usize> = (0..clean.mesh().triangles.len()).collect();
     let mut two = clean.mesh().clone();
     add(&mut two, clean.mesh(), &all, |v| v + Vec3::new(0.0, 0.0, 20.0));

@@ -1,61 +1,64 @@
-//! The axis of a branch as a device feels its wall: where it runs, and how wide it is.
+//! The axis of a branch for contact: its course and radius.
 //!
-//! The course is the natural cubic spline through the samples that a mesh is made from ([`Branch`]), which joins them by cubics of their own:
-//! between those the curvature jumps by a little, and with it the slope of the wall of a branch that tapers. Both run through the same
-//! points and differ by the fourth power of the samples' distance.
+//! The course is the natural cubic spline through the samples from which a mesh is made ([`Branch`]). The branch
+//! itself joins them by separate cubics: between those the curvature jumps slightly, and with it the slope of the
+//! wall of a tapering branch. Both pass through the same points and differ by the fourth power of the samples'
+//! distance.
 
 use crate::Vec3;
 use crate::vessel::generate::curve::{Branch, natural_moments};
 
-/// Steepest taper that an open end goes on with: beyond it its radius changes by 4/27 of that at most.
+/// Largest taper of the extension of an open end: its radius changes by at most 4/27 of it.
 const STEEPEST: f64 = 0.67;
-/// Newton steps to the foot of a point, from a sample a quarter of the radius away: three are enough.
+/// Largest number of Newton steps to the foot of a point: from a sample a quarter of the radius away three are
+/// enough.
 const FOOT_STEPS: usize = 8;
-/// Knots from one that is looked at to the next, where the nearest is not known to some radii; and steps from there on.
+/// Stride, in knots, of the coarse search for the nearest one, where it is unknown by some radii; and number of steps
+/// from there.
 const COARSE: usize = 16;
 /// See [`COARSE`].
 const JUMPS: usize = 4;
-/// Last of these steps, in distances of the samples: what is left of the way is of the order of its square.
+/// Length of the last of these steps, in distances of the samples: the remaining error is of the order of its square.
 const FOOT: f64 = 1e-6;
 
 /// A knot of the spline, and the cubics from there to the next.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
     position: Vec3,
-    /// Derivative of the course, of nearly unit length, …
+    /// Derivative of the course, of nearly unit length.
     tangent: Vec3,
-    /// … the second one, 1/mm, …
+    /// Second derivative, 1/mm.
     moment: Vec3,
-    /// … and the third one up to the next knot, 1/mm².
+    /// Third derivative up to the next knot, 1/mm².
     third: Vec3,
     radius: f64,
-    /// Slope of the radius, …
+    /// Slope of the radius.
     slope: f64,
-    /// … and the factors of the square and the cube of the way in its course.
+    /// Coefficients of the square and the cube of the distance in the radius.
     flare: [f64; 2],
 }
 
-/// The knot next to a point.
+/// The knot nearest to a point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct NearKnot {
-    /// How far it is, mm.
+    /// Its distance, mm.
     pub(super) away: f64,
     pub(super) knot: usize,
-    /// An arc length next to the foot of the point.
+    /// An arc length near the foot of the point.
     pub(super) near: f64,
 }
 
-/// How an axis ends.
+/// The kind of an axis's end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum End {
-    /// By half a ball: a sac's dome, or an end that is hidden in another branch.
+    /// A hemisphere: a sac's dome, or an end that is hidden in another branch.
     Round,
-    /// Open: the tube goes on straight for so much, mm, and ends by half a ball there, where nobody gets.
+    /// Open: the tube continues straight for this length, mm, and ends in a hemisphere out of reach.
     Open(f64),
 }
 
 impl End {
-    /// How far the axis goes on, mm.
+    /// Length of the extension, mm.
     fn beyond_mm(self) -> f64 {
         match self {
             Self::Round => 0.0,
@@ -75,7 +78,7 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// What is a little farther along.
+    /// Shifts it by a small arc length.
     fn shift(&mut self, by: f64) {
         self.position += (self.first + (self.second * 0.5 + self.third * (by / 6.0)) * by) * by;
         self.first += (self.second + self.third * (0.5 * by)) * by;
@@ -133,7 +136,7 @@ impl Axis {
         self.step
     }
 
-    /// Length without what is beyond its ends, mm.
+    /// Length without extensions, mm.
     pub(super) fn length(&self) -> f64 {
         self.step * (self.knots.len() - 1) as f64
     }
@@ -146,13 +149,13 @@ impl Axis {
         self.knots[knot].radius
     }
 
-    /// Whether there is an axis on both sides of a knot, and none beyond its ends near it.
+    /// Whether the axis exists on both sides of a knot, without an extension near it.
     pub(super) fn is_inner(&self, knot: usize) -> bool {
         (knot > 0 || self.ends[0] == End::Round)
             && (knot + 1 < self.knots.len() || self.ends[1] == End::Round)
     }
 
-    /// Most that the field of this branch changes in its lumen over what a distance does.
+    /// Upper bound of the slope of this branch's field in its lumen, relative to a distance.
     pub(super) fn steepness(&self) -> f64 {
         let of = |k: usize| {
             let Knot { moment, radius, slope, .. } = self.knots[k];
@@ -167,7 +170,7 @@ impl Axis {
         ((s / self.step).round().max(0.0) as usize).min(self.knots.len() - 1)
     }
 
-    /// Arc lengths between which there is a wall.
+    /// Range of arc lengths with a wall.
     pub(super) fn range(&self) -> [f64; 2] {
         [-self.ends[0].beyond_mm(), self.length() + self.ends[1].beyond_mm()]
     }
@@ -197,8 +200,8 @@ impl Axis {
         Place { position, first, second, third, radius }
     }
 
-    /// Straight on from a knot at an end, by so much along the axis and `way` mm outwards. The taper goes on less and less over a radius,
-    /// x(w) = w (1 − w/R)², as it does where surfaces are drawn out beyond their openings.
+    /// Straight on from a knot at an end, by `along` along the axis and `way` mm outwards. The taper decreases over a
+    /// radius, x(w) = w (1 − w/R)², as in the extensions of surfaces.
     fn beyond(&self, knot: usize, along: f64, way: f64) -> Place {
         let Knot { position, tangent, radius, slope, .. } = self.knots[knot];
         let (outwards, x) = (along.signum(), (way / radius).min(1.0));
@@ -217,7 +220,7 @@ impl Axis {
         }
     }
 
-    /// Arc length of the foot of a point, from near it on, and what is there.
+    /// Arc length of the foot of a point, starting near it, and the place there.
     pub(super) fn foot(&self, x: &Vec3, near: f64) -> (f64, Place) {
         let ([low, high], length) = (self.range(), self.length());
         let mut s = near.clamp(low, high);
@@ -238,8 +241,8 @@ impl Axis {
         (s, place)
     }
 
-    /// The knot nearest to a point among these, how far it is, mm, and an arc length next to the foot. Of a branch that comes back to where it was it is that of the stretch whose
-    /// middle is nearest.
+    /// The knot nearest to a point among these, its distance, mm, and an arc length near the foot. For a branch that
+    /// returns to where it was, that of the stretch whose middle is nearest.
     pub(super) fn nearest(&self, x: &Vec3, from: usize, to: usize) -> NearKnot {
         let away = |k: usize| (self.knots[k].position - x).norm_squared();
         let (mut knot, mut least) = (to, away(to));
@@ -249,14 +252,14 @@ impl Axis {
                 (knot, least) = (k, here);
             }
         }
-        // Steps of Newton's method, by how many knots.
+        // Newton steps, in knots.
         let jump = |k: usize| {
             let Knot { position, tangent, moment, .. } = &self.knots[k];
             let offset = x - position;
             let stretch = (tangent.norm_squared() - offset.dot(moment)).max(0.25);
             offset.dot(tangent) / (stretch * self.step)
         };
-        // They get near, and single knots the rest of the way.
+        // These come close; single knots cover the rest.
         for _ in 0..JUMPS {
             let by = jump(knot).clamp(-(COARSE as f64), COARSE as f64);
             let next = (knot as f64 + by.round()).clamp(from as f64, to as f64) as usize;
@@ -271,7 +274,7 @@ impl Axis {
         NearKnot { away: away(knot).sqrt(), knot, near }
     }
 
-    /// The knot nearest to a point, along the axis from one on.
+    /// The knot nearest to a point, following the axis from another.
     pub(super) fn follow(&self, x: &Vec3, from: usize) -> usize {
         let away = |k: usize| (self.knots[k].position - x).norm_squared();
         let mut k = from;

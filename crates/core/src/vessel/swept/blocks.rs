@@ -1,7 +1,7 @@
-//! What of a tree is near a place.
+//! Spatial index of a tree.
 //!
-//! Axes are cut into blocks of a few radii, each in a ball with the lumen about it. A place far from all is as far from a branch as from its
-//! balls at least; near a block the parts of branches that can matter are known.
+//! Axes are divided into blocks of a few radii, each in a ball with its lumen. The distance of a position from a
+//! branch is at least that from its balls; near a block the relevant parts of branches are known.
 
 use std::sync::OnceLock;
 
@@ -9,9 +9,9 @@ use super::axis::Axis;
 use crate::Vec3;
 use crate::vessel::generate::BLEND;
 
-/// Steps of the axis in a block: there are four to the branch's least radius.
+/// Number of steps of the axis per block: there are four per smallest radius of the branch.
 const STEPS: usize = 16;
-/// Most blocks whose parts are all looked for at once, so that steps allocate nothing.
+/// Largest number of blocks for which all parts are found in advance, so that steps do not allocate.
 const AT_ONCE: usize = 3000;
 
 /// A stretch of a branch from one of its knots to another.
@@ -26,7 +26,7 @@ pub(crate) struct Part {
 struct Block {
     part: Part,
     centre: Vec3,
-    /// Of the ball that holds its lumen, mm.
+    /// Radius of the ball that contains its lumen, mm.
     reach: f64,
     /// Largest radius of the vessel in it, mm.
     radius: f64,
@@ -37,16 +37,16 @@ struct Block {
 #[derive(Debug)]
 pub(crate) struct Blocks {
     blocks: Vec<Block>,
-    /// The first block of each branch, and the number of its first knot among all.
+    /// The first block of each branch, and the global index of its first knot.
     first: Vec<(usize, u32)>,
     /// Steepness of each branch.
     steepness: Vec<f64>,
-    /// How far from the vessel parts are complete, mm.
+    /// Distance from the vessel up to which parts are complete, mm.
     reach: f64,
 }
 
 impl Blocks {
-    /// For places no farther than `reach_mm` outside the lumen.
+    /// For positions at most `reach_mm` outside the lumen.
     pub(super) fn new(axes: &[Axis], reach_mm: f64) -> Self {
         let (mut blocks, mut first, mut knots) = (Vec::new(), Vec::new(), 0);
         for (branch, axis) in axes.iter().enumerate() {
@@ -69,17 +69,17 @@ impl Blocks {
         all
     }
 
-    /// Most that the field of a branch changes in its lumen over what a distance does.
+    /// Upper bound of the slope of a branch's field in its lumen, relative to a distance.
     pub(super) fn steepness(&self, branch: usize) -> f64 {
         self.steepness[branch]
     }
 
-    /// Number of a knot among all.
+    /// Global index of a knot.
     pub(super) fn piece(&self, branch: u32, knot: u32) -> u32 {
         self.first[branch as usize].1 + knot
     }
 
-    /// Branch and knot of that number.
+    /// Branch and knot of a global index.
     pub(super) fn knot(&self, piece: u32) -> (usize, usize) {
         let branch = self.first.partition_point(|(_, first)| *first <= piece) - 1;
         (branch, (piece - self.first[branch].1) as usize)
@@ -92,7 +92,7 @@ impl Blocks {
         self.near((first + knot / STEPS).min(end - 1))
     }
 
-    /// Of every block, how near its lumen is at least: less than 0 in its ball, mm.
+    /// For every block a lower bound of the distance to its lumen, negative in its ball, mm.
     pub(super) fn gaps<'a>(&'a self, x: &'a Vec3) -> impl Iterator<Item = (f64, Part)> + 'a {
         self.blocks.iter().map(move |block| ((x - block.centre).norm() - block.reach, block.part))
     }
@@ -123,7 +123,7 @@ impl Block {
         let (from, to) = (part.from as usize, part.to as usize);
         let step = axis.step();
         let [low, high] = axis.range();
-        // What goes on beyond an end belongs to the block there.
+        // The extension beyond an end belongs to the block there.
         let begin = if from == 0 { low } else { step * from as f64 };
         let end = if to + 1 == axis.len() { high } else { step * to as f64 };
         let centre = axis.at(0.5 * (begin + end)).position;
@@ -133,7 +133,7 @@ impl Block {
             radius = radius.max(place.radius[0]);
             reach = reach.max((place.position - centre).norm() + place.radius[0]);
         }
-        // Beyond an open end it widens by 4/27 of its taper at most; between knots by next to nothing.
+        // Beyond an open end it widens by at most 4/27 of its taper; between knots by almost nothing.
         Self { part, centre, reach: reach + step + 0.1 * radius, radius, near: OnceLock::new() }
     }
 }

@@ -1,15 +1,15 @@
-//! The place of the wall next to a point, and how far it is, with derivatives.
+//! The closest point of the wall, and the distance with derivatives.
 //!
-//! Of a single branch that does not taper f is the distance. Elsewhere the place y is found by Newton's method: f(y) = 0 and x − y along the
-//! normal there, n = ∇f/|∇f|. With δ = (x − y)·n and the curvature A = P ∇∇f P/|∇f| of the wall at y, P = I − nnᵀ, the distance of x has the
-//! gradient n and the Hessian
+//! For a single branch without taper f is the distance. Elsewhere the closest point y is found by Newton's method:
+//! f(y) = 0 and x − y along the normal there, n = ∇f/|∇f|. With δ = (x − y)·n and the curvature A = P ∇∇f P/|∇f| of
+//! the wall at y, P = I − nnᵀ, the distance of x has the gradient n and the Hessian
 //!
 //! ```text
 //! A (I + δ A)⁻¹
 //! ```
 //!
-//! A point that has sunk into the wall asks for the place next to it that is on its own side of the wall: the search begins on the tube that
-//! it has sunk into, and finds what is nearest from there on, whatever other lumen is behind.
+//! For a point that has sunk into the wall the closest point on its own side of the wall is needed: the search starts
+//! on the tube into which it has sunk, and finds the nearest from there, whatever other lumen is behind.
 
 use nalgebra::Matrix3;
 
@@ -18,69 +18,70 @@ use super::field::{Depth, Feet, SweptField, Value};
 use crate::Vec3;
 use crate::products::outer;
 
-/// Most steps to the place next to a point.
+/// Largest number of steps to the closest point.
 const STEPS: usize = 40;
-/// Such a step is no longer than this part of the vessel's radius, …
+/// Largest step, as a fraction of the vessel's radius.
 const LONGEST: f64 = 0.5;
-/// … and the last one shorter than this: a step of Newton's method leaves its square.
+/// The last step is shorter than this: a Newton step leaves its square as error.
 const LAST: f64 = 1e-5;
-/// The same where branches are joined and the Hessian is not known: steps leave a part of their length.
+/// The same where branches are joined and the Hessian is unknown: convergence is linear.
 const LAST_IN_JOINT: f64 = 1e-11;
-/// Steps from one look for the Hessian of a joint to the next.
+/// Number of steps between evaluations of the Hessian of a joint.
 const PATIENCE: usize = 3;
-/// The wall of a branch that lies in the lumen by more than this part of its radius is none: another branch opens there. Where they are joined it does by
-/// a sixth of the joint's width, 0.23 radii.
+/// Depth in the lumen, as a fraction of the branch's radius, from which the wall of a branch does not exist, because
+/// another branch opens there. At a joint the wall lies in by a sixth of the joint's width, 0.23 radii.
 const HOLE: f64 = 0.3;
-/// How far the wall may be from where the first step to it ends, in radii of the vessel.
+/// Largest distance of the wall from the end of the first step to it, in radii of the vessel.
 const NEARBY: f64 = 0.1;
-/// Where the wall bends towards a sunk point, and the point is nearer than this to the middle of the bend, in parts of its radius, the distance bends no more.
+/// Where the wall bends towards a sunk point, distance from the centre of the bend, as a fraction of its radius,
+/// below which the distance is treated as flat.
 const FOCUS: f64 = 0.05;
-/// A way into the wall is followed by steps of this part of the vessel's radius at least.
+/// Smallest step along a path into the wall, as a fraction of the vessel's radius.
 const STRIDE: f64 = 0.01;
 
-/// Where the wall of a tree is near a point.
+/// The wall of a tree near a point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Near {
-    /// No wall is nearer than this, mm; less than 0 outside of the lumen.
+    /// Lower bound of the distance to the wall, mm; negative outside the lumen.
     pub(crate) clearance_mm: f64,
-    /// The knot next to it.
+    /// The knot nearest to it.
     pub(crate) piece: u32,
 }
 
-/// From where on the wall next to a point is looked for.
+/// Where the search for the closest point of the wall starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum From {
     /// Through space, near a knot.
     Space(u32),
-    /// Along the wall, of a point that has sunk into it near a knot.
+    /// Along the wall, for a point that has sunk into it near a knot.
     Side(u32),
 }
 
-/// The place of the wall next to a point.
+/// The closest point of the wall.
 pub(crate) struct Closest<'a> {
     field: &'a SweptField,
     feet: Feet,
-    /// The place, and the field there; or the point itself where the field is the distance.
+    /// The closest point, and the field there; or the point itself where the field is the distance.
     place: Vec3,
     value: Value,
-    /// How far the point is outside of the wall, mm.
+    /// Distance of the point outside the wall, mm.
     outside: f64,
     /// Whether the field at the point is its distance.
     is_distance: bool,
 }
 
 impl Closest<'_> {
-    /// How far the point is from the wall, mm; less than 0 behind it.
+    /// Distance of the point from the wall, mm; negative behind it.
     pub(crate) fn distance_mm(&self) -> f64 {
         -self.outside
     }
 
-    /// The gradient of that: the unit normal of the wall, into the lumen.
+    /// The gradient of the distance: the unit normal of the wall, into the lumen.
     pub(crate) fn normal(&self) -> Vec3 {
         -self.value.gradient.normalize()
     }
 
-    /// Its Hessian, 1/mm.
+    /// The Hessian of the distance, 1/mm.
     pub(crate) fn hessian(&self) -> Matrix3<f64> {
         if self.is_distance {
             return -self.value.turning;
@@ -97,25 +98,25 @@ impl Closest<'_> {
         (hessian + hessian.transpose()) * -0.5
     }
 
-    /// Whether the place is where branches are joined.
+    /// Whether the closest point is at a joint of branches.
     #[cfg(test)]
     pub(super) fn is_in_joint(&self) -> bool {
         self.value.is_joint
     }
 
-    /// The knot next to the place.
+    /// The knot nearest to the closest point.
     pub(crate) fn piece(&self) -> u32 {
         self.field.piece(self.value.branch, self.value.foot)
     }
 }
 
 impl SweptField {
-    /// The knot next to an arc length of a branch.
+    /// The knot nearest to an arc length of a branch.
     fn piece(&self, branch: u32, foot: f64) -> u32 {
         self.blocks.piece(branch, self.axes[branch as usize].knot_at(foot) as u32)
     }
 
-    /// The branch that a point is deepest in, or nearest to.
+    /// The branch in which a point is deepest, or to which it is nearest.
     pub(crate) fn near(&self, x: &Vec3) -> Near {
         match self.deepest(x) {
             None => Near { clearance_mm: f64::NAN, piece: 0 },
@@ -125,7 +126,7 @@ impl SweptField {
         }
     }
 
-    /// How deep a place is in that branch. None of one that is not finite.
+    /// Depth of a position in that branch. `None` if not finite.
     fn deepest(&self, x: &Vec3) -> Option<Depth> {
         let mut best: Option<Depth> = None;
         let mut ask = |part: Part, lowest: &mut f64| {
@@ -137,7 +138,7 @@ impl SweptField {
             }
         };
         let mut lowest = f64::INFINITY;
-        // What is nearest by its ball comes first, and most others are then out of the question.
+        // The one with the nearest ball comes first, which excludes most others.
         let first = self.blocks.gaps(x).min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, part)) = first {
             ask(part, &mut lowest);
@@ -150,7 +151,7 @@ impl SweptField {
         best
     }
 
-    /// Whether a point is in the lumen, what goes on beyond open ends included.
+    /// Whether a point is in the lumen, including extensions of open ends.
     pub(crate) fn contains(&self, x: &Vec3) -> bool {
         self.deepest(x).is_some_and(|depth| depth.f < 0.0 || self.level(&depth, x) < 0.0)
     }
@@ -160,21 +161,21 @@ impl SweptField {
         self.deepest(x).map_or(f64::NAN, |depth| self.level(&depth, x))
     }
 
-    /// f at a place that is so deep in one of the branches.
+    /// f at a position with this depth in one of the branches.
     fn level(&self, depth: &Depth, x: &Vec3) -> f64 {
         let branch = depth.branch as usize;
         let parts = self.blocks.about(branch, self.axes[branch].knot_at(depth.foot));
         self.value(&mut self.feet(parts, x, 0.0), x).map_or(f64::NAN, |value| value.f)
     }
 
-    /// Where a straight way leaves the lumen, as a part of it, up to `farthest` times its length.
+    /// Where a straight path leaves the lumen, as a fraction of it, up to `farthest` times its length.
     pub(crate) fn crossing(&self, from: &Vec3, to: &Vec3, farthest: f64) -> Option<f64> {
         let (way, length) = (to - from, (to - from).norm());
         let mut part = 0.0;
         while part <= farthest && length > 0.0 {
             let x = from + way * part;
             let depth = self.deepest(&x)?;
-            // What is in no branch may still be where they are joined.
+            // A position in no branch may still be in a joint.
             if depth.f >= 0.0 && self.level(&depth, &x) >= 0.0 {
                 return Some(part);
             }
@@ -183,12 +184,12 @@ impl SweptField {
         None
     }
 
-    /// The place of the wall next to a point. None of a point that is not finite.
+    /// The closest point of the wall to a point. `None` if that is not finite.
     pub(crate) fn closest(&self, x: &Vec3, from: From) -> Option<Closest<'_>> {
         self.closer_than(x, from, f64::INFINITY).ok()?
     }
 
-    /// The same if it may be nearer than `limit_mm`; else how far it is at least, mm.
+    /// As [`Self::closest`], if it may be nearer than `limit_mm`; otherwise a lower bound of the distance, mm.
     pub(crate) fn closer_than(
         &self,
         x: &Vec3,
@@ -227,7 +228,7 @@ impl SweptField {
             let outside = value.f;
             return Ok(Some(Closest { field: self, feet, place: *x, value, outside, is_distance: true }));
         }
-        // The wall is about as far as f says; from near there on all that counts is known.
+        // The wall is about as far as f; from near there on everything relevant is known.
         let size = value.gradient.norm();
         let start = x - value.gradient * (value.f / (size * size));
         let mut feet = self.feet(parts, &start, NEARBY * value.radius);
@@ -235,7 +236,7 @@ impl SweptField {
         Ok(self.descend(x, feet, start, value))
     }
 
-    /// The place of the wall next to `x`, from a place on where the field is `value`.
+    /// The closest point of the wall to `x`, starting from a position where the field is `value`.
     fn descend(&self, x: &Vec3, mut feet: Feet, mut place: Vec3, mut value: Value) -> Option<Closest<'_>> {
         let mut known: Option<Matrix3<f64>> = None;
         for step in 0..STEPS {
@@ -255,7 +256,7 @@ impl SweptField {
             let along = (outside - towards) / size;
             let bent = Matrix3::identity() + across * hessian * across * along;
             let wanted = across * (offset - hessian * n * (along * towards));
-            // Beyond the middle of a bend the place next to a point is where it is farthest.
+            // Beyond the centre of a bend the stationary point is where the distance is largest.
             let aside = match bent.try_inverse().filter(|_| bent.determinant() > FOCUS) {
                 Some(inverse) => inverse * wanted,
                 None => wanted,

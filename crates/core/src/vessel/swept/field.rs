@@ -1,20 +1,21 @@
 //! The implicit surface of a tree with the derivatives that contact needs.
 //!
-//! f is that of the generator (`generate/field.rs`): of a branch f = |x − c(s)| − r(s), s the foot of x on its axis, of several their smooth
-//! minimum. With the offset o = x − c ⊥ c′, u = o/|o| and σ = 1/(c′·c′ − o·c″),
+//! f is that of the generator (`generate/field.rs`): for one branch f = |x − c(s)| − r(s), s the foot of x on its
+//! axis, for several their smooth minimum. With the offset o = x − c ⊥ c′, u = o/|o| and σ = 1/(c′·c′ − o·c″),
 //!
 //! ```text
 //! ∇s = σ c′,    ∇∇s = σ² (c′c″ᵀ + c″c′ᵀ − σ (3 c′·c″ − o·c‴) c′c′ᵀ)
 //! ∇f = u − r′ ∇s,    ∇∇f = (I − uuᵀ − σ c′c′ᵀ)/|o| − r″ ∇s∇sᵀ − r′ ∇∇s
 //! ```
 //!
-//! Two of them, f ≤ g, are joined on a width w, which has a slope of its own: with h = 1 − (g − f)/w and k = ½ h²
+//! Two of them, f ≤ g, are joined over a width w, which has a slope of its own: with h = 1 − (g − f)/w and k = ½ h²
 //!
 //! ```text
 //! F = f − w h³/6,    ∇F = (1 − k) ∇f + k ∇g + (h³/3 − h²/2) ∇w
 //! ```
 //!
-//! ∇w takes the Hessians of both. ∇∇w would take their third derivatives: the Hessian of a joint comes from differences of its gradient.
+//! ∇w needs the Hessians of both. ∇∇w would need their third derivatives: the Hessian of a joint is computed by
+//! differences of its gradient.
 
 use std::sync::Arc;
 
@@ -26,40 +27,41 @@ use crate::Vec3;
 use crate::products::outer;
 use crate::vessel::generate::{BLEND, BLEND_COSINES, HIDDEN, any_perpendicular};
 
-/// Step of differences over the radius: with what rounding and the third derivative leave, ten digits of a Hessian.
+/// Step of finite differences relative to the radius: with rounding and the third derivative, a Hessian has ten
+/// digits.
 const DIFFERENCE: f64 = 1e-4;
-/// How much wider than the nearest branch one is taken for that it is joined with, for a third that is joined with both.
+/// Assumed bound of the ratio of radii of a branch joined with the nearest one, for a third that is joined with both.
 const WIDER: f64 = 2.0;
-/// Most branches that are joined at one place: of more, those that begin first count.
+/// Largest number of branches joined at one position; of more, the first count.
 const MOST_JOINED: usize = 16;
 
-/// The field of one or more branches at a place.
+/// The field of one or more branches at a position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Value {
     /// f, mm: negative in the lumen.
     pub(super) f: f64,
     /// ∇f.
     pub(super) gradient: Vec3,
-    /// The gradient that the width of a joint takes, without that of the widths before it, …
+    /// The gradient used for the width of a joint, without that of earlier widths.
     towards: Vec3,
-    /// … and its derivative, near ∇∇f: in a single branch it is.
+    /// Its derivative, approximately ∇∇f: exact for a single branch.
     pub(super) turning: Matrix3<f64>,
     /// Radius of the vessel, mm, and its gradient.
     pub(super) radius: f64,
     radius_slope: Vec3,
-    /// How far joining has set in: 0 at a round end, 1 away from it; and its gradient.
+    /// Degree of joining: 0 at a round end, 1 away from it; and its gradient.
     exposure: f64,
     exposure_slope: Vec3,
     /// Whether branches are joined here.
     pub(super) is_joint: bool,
-    /// Whether f is the distance: a single branch that does not taper.
+    /// Whether f is the distance: a single branch without taper.
     pub(super) is_distance: bool,
-    /// The branch that it is of, or most of it, and the arc length of the foot.
+    /// The branch it mostly belongs to, and the arc length of the foot.
     pub(super) branch: u32,
     pub(super) foot: f64,
 }
 
-/// The branches that may count at a place, in their order, each with an arc length near the foot.
+/// The branches that may be relevant at a position, in order, each with an arc length near the foot.
 #[derive(Debug, Clone)]
 pub(super) struct Feet {
     all: [(u32, f64); MOST_JOINED],
@@ -79,12 +81,13 @@ fn smooth_step(t: f64) -> (f64, f64) {
     (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t))
 }
 
-/// The field of a single branch at a place, without derivatives.
+/// The field of a single branch at a position, without derivatives.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Depth {
     /// f, mm: negative in the lumen.
     pub(super) f: f64,
-    /// No wall is nearer than this, mm: in the lumen of a branch its own wall, for that lumen is part of all.
+    /// Lower bound of the distance to the wall, mm: in the lumen of a branch that to its own wall, since that lumen
+    /// is part of the whole.
     pub(super) room: f64,
     /// Radius of the vessel, mm.
     pub(super) radius: f64,
@@ -94,7 +97,7 @@ pub(super) struct Depth {
 }
 
 impl SweptField {
-    /// How deep a place is in a single branch, whose foot is near an arc length.
+    /// Depth of a position in a single branch, whose foot is near an arc length.
     pub(super) fn depth(&self, branch: usize, x: &Vec3, near: f64) -> Depth {
         let (foot, place) = self.axes[branch].foot(x, near);
         let [radius, ..] = place.radius;
@@ -153,7 +156,8 @@ impl SweptField {
         }
     }
 
-    /// No wall is nearer to a place with these feet than this, mm: the lumen of each branch is part of all.
+    /// Lower bound of the distance to the wall of a position with these feet, mm: the lumen of each branch is part of
+    /// the whole.
     pub(super) fn room(&self, feet: &mut Feet, x: &Vec3) -> f64 {
         let mut room = f64::NEG_INFINITY;
         for (branch, near) in &mut feet.all[..feet.count] {
@@ -164,7 +168,7 @@ impl SweptField {
         room
     }
 
-    /// What of these parts of branches, in their order, may count at a place and within `way` mm of it.
+    /// The parts of branches, of those given, in order, that may be relevant within `way` mm of a position.
     pub(super) fn feet(&self, parts: &[Part], x: &Vec3, way: f64) -> Feet {
         let nearest =
             |part: &Part| self.axes[part.branch as usize].nearest(x, part.from as usize, part.to as usize);
@@ -185,8 +189,9 @@ impl SweptField {
             let axis = &self.axes[part.branch as usize];
             let NearKnot { away, knot, near } = known.get(index).copied().unwrap_or_else(|| nearest(part));
             let radius = axis.radius(knot);
-            // Between knots a branch comes nearer by a step at most, and its radius changes by less; not so what goes on beyond its ends. What
-            // is higher than another by the most width of a joint leaves no trace; a joint is between a thin branch and the mean of others at most.
+            // Between knots a branch comes nearer by at most a step, and its radius changes by less; its extensions
+            // excepted. A branch higher than another by the largest width of a joint has no effect; a joint is at
+            // most between a thin branch and the mean of others.
             let least = away - radius - 2.0 * (axis.step() + way);
             if axis.is_inner(knot) && least > low.0 + BLEND * radius.min(WIDER * low.1) {
                 continue;
@@ -199,7 +204,7 @@ impl SweptField {
         feet
     }
 
-    /// The field at a place, and its feet there. None where nothing counts.
+    /// The field at a position, and its feet there. `None` if no branch is relevant.
     pub(super) fn value(&self, feet: &mut Feet, x: &Vec3) -> Option<Value> {
         let mut joined: Option<Value> = None;
         let mut last: Option<Value> = None;
@@ -207,7 +212,7 @@ impl SweptField {
             let value = self.branch(*branch as usize, x, *near);
             *near = value.foot;
             match &mut last {
-                // A branch that comes back counts where it is nearest.
+                // A branch that returns counts where it is nearest.
                 Some(other) if other.branch == *branch => {
                     if value.f < other.f {
                         *other = value;
@@ -224,7 +229,8 @@ impl SweptField {
         Some(joined.map_or(done, |before| join(&before, &done)))
     }
 
-    /// ∇∇f at a place where the field is that, but for its part along the normal on both sides, which no wall has a use for.
+    /// ∇∇f at a position with this field, except for its component along the normal on both sides, which is not
+    /// needed.
     pub(super) fn hessian(&self, feet: &Feet, x: &Vec3, value: &Value) -> Matrix3<f64> {
         if !value.is_joint {
             return value.turning;
@@ -237,7 +243,7 @@ impl SweptField {
         })
     }
 
-    /// The same, good enough for the next step to the wall.
+    /// An approximate Hessian, sufficient for the next step to the wall.
     pub(super) fn rough_hessian(&self, feet: &Feet, x: &Vec3, value: &Value) -> Matrix3<f64> {
         let step = DIFFERENCE * value.radius;
         Self::tangential(value, |way| {
@@ -245,12 +251,12 @@ impl SweptField {
         })
     }
 
-    /// ∇f at a place next to that of a value.
+    /// ∇f at a position near that of a value.
     fn gradient_at(&self, feet: &Feet, x: &Vec3, value: &Value) -> Vec3 {
         self.value(&mut feet.clone(), x).map_or(value.gradient, |value| value.gradient)
     }
 
-    /// A symmetric matrix of what it makes of the two ways along the wall.
+    /// A symmetric matrix from its action on the two directions along the wall.
     fn tangential(value: &Value, of: impl Fn(Vec3) -> Vec3) -> Matrix3<f64> {
         let n = value.gradient.normalize();
         let u = any_perpendicular(&n);
@@ -266,7 +272,7 @@ impl SweptField {
     }
 }
 
-/// The smooth minimum of two values: a cubic polynomial on a width that hangs on the angle between the gradients.
+/// The smooth minimum of two values: a cubic polynomial over a width that depends on the angle between the gradients.
 fn join(a: &Value, b: &Value) -> Value {
     let (low, high) = if a.f <= b.f { (a, b) } else { (b, a) };
     let thin = if a.radius <= b.radius { a } else { b };

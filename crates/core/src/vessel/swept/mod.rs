@@ -1,7 +1,8 @@
-//! A vessel that is given by its centre line, asked and felt without a mesh.
+//! A vessel given by its centre line, for queries and contact without a mesh.
 //!
-//! The wall is the surface that a mesh of the vessel is made from ([`GeneratedWall`](super::GeneratedWall)): where it is, how it bends and
-//! what is inside follow from the centre line alone. A mesh is made when somebody wants triangles, to draw them or to write them.
+//! The wall is the surface from which a mesh of the vessel is made ([`GeneratedWall`](super::GeneratedWall)):
+//! position, curvature and inside follow from the centre line alone. A mesh is made only if triangles are needed, for
+//! rendering or export.
 
 mod axis;
 mod blocks;
@@ -27,11 +28,12 @@ pub(crate) use closest::From as ClosestFrom;
 use closest::From;
 pub(crate) use field::SweptField;
 
-/// Places of a cross-section that stand for its wall where what goes on beyond openings is kept apart from it.
+/// Number of sample points on a cross-section, from which extensions of openings are kept apart.
 const AROUND: usize = 12;
-/// Knots from one such cross-section to the next: half of the branch's least radius.
+/// Number of knots between such cross-sections: half of the branch's smallest radius.
 const BETWEEN: usize = 2;
-/// Two stretches of a tube are not neighbours in a bend where the way between them is this part of π/2 times their distance.
+/// Ratio of the path between two stretches of a tube to π/2 times their distance above which they are not neighbours
+/// in a bend.
 const NEIGHBOURS: f64 = 1.05;
 
 /// A vessel swept by circles along a centre-line tree.
@@ -42,15 +44,15 @@ pub struct SweptVessel {
     field: SweptField,
     openings: Vec<Opening>,
     inlet: usize,
-    /// Its mesh, once one was wanted.
+    /// Its mesh, once needed.
     meshed: OnceLock<Meshed>,
 }
 
 impl SweptVessel {
-    /// The vessel of `tree`, whose mesh would be as fine as that.
+    /// The vessel of `tree`, with this resolution of its mesh.
     ///
     /// # Errors
-    /// As [`GeneratedWall::new`](super::GeneratedWall::new), less those of meshing.
+    /// As [`GeneratedWall::new`](super::GeneratedWall::new), except those of meshing.
     pub fn new(tree: CentrelineTree, resolution: Resolution) -> Result<Self> {
         let branches = curve::branches(&tree)?;
         check_resolution(&branches, resolution)?;
@@ -71,17 +73,17 @@ impl SweptVessel {
         Ok(Self { tree, resolution, field, openings, inlet, meshed: OnceLock::new() })
     }
 
-    /// The centre line that it is made from.
+    /// Its centre line.
     pub fn tree(&self) -> &CentrelineTree {
         &self.tree
     }
 
-    /// How fine its mesh is.
+    /// The resolution of its mesh.
     pub fn resolution(&self) -> Resolution {
         self.resolution
     }
 
-    /// Radius of its narrowest place, mm.
+    /// Its smallest radius, mm.
     pub(crate) fn least_radius_mm(&self) -> f64 {
         let knots = self.field.axes.iter().flat_map(|axis| (0..axis.len()).map(|knot| axis.radius(knot)));
         knots.fold(f64::INFINITY, f64::min)
@@ -97,7 +99,7 @@ impl SweptVessel {
         self.inlet
     }
 
-    /// Whether a place is in the lumen.
+    /// Whether a position is in the lumen.
     pub fn contains(&self, x: &Vec3) -> bool {
         let is_beyond = |opening: &Opening| {
             let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
@@ -108,13 +110,13 @@ impl SweptVessel {
         self.field.contains(x) && !self.openings.iter().any(is_beyond)
     }
 
-    /// How far a place is from the wall, mm, on whichever side.
+    /// Distance of a position from the wall, mm, on either side.
     pub(crate) fn distance_mm(&self, x: &Vec3) -> f64 {
         let near = self.field.near(x);
         self.field.closest(x, From::Space(near.piece)).map_or(f64::NAN, |closest| closest.distance_mm().abs())
     }
 
-    /// The box about the vessel, mm.
+    /// The bounding box of the vessel, mm.
     pub(crate) fn bounds_mm(&self) -> (Vec3, Vec3) {
         let nodes = self.tree.nodes().iter();
         let balls = nodes.map(|node| (node.position_mm, Vec3::repeat(node.radius_mm)));
@@ -122,12 +124,12 @@ impl SweptVessel {
         balls.fold(nowhere, |(low, high), (x, r)| (low.inf(&(x - r)), high.sup(&(x + r))))
     }
 
-    /// Its wall for devices that look for it up to `reach_mm` outside of the lumen.
+    /// Its wall, for queries up to `reach_mm` outside the lumen.
     pub(crate) fn field(&self, reach_mm: f64) -> SweptField {
         SweptField::new(Arc::clone(&self.field.axes), reach_mm)
     }
 
-    /// Its mesh, made with the first question or found in `store`.
+    /// Its mesh, made when first needed or found in `store`.
     ///
     /// # Errors
     /// As [`GeneratedWall::new`](super::GeneratedWall::new).
@@ -149,14 +151,14 @@ impl SweptField {
         self.axes.iter().map(Axis::len).sum()
     }
 
-    /// The field of these axes, for places up to `reach_mm` outside of the lumen.
+    /// The field of these axes, for positions up to `reach_mm` outside the lumen.
     fn new(axes: Arc<[Axis]>, reach_mm: f64) -> Self {
         let blocks = Blocks::new(&axes, reach_mm);
         Self { axes, blocks }
     }
 }
 
-/// How the ends of a branch are, whose openings are not known yet.
+/// The kinds of a branch's ends, with openings still unknown.
 fn ends_of(branch: &Branch) -> [End; 2] {
     [branch.root_row, branch.leaf_row].map(|row| row.map_or(End::Round, |_| End::Open(0.0)))
 }
@@ -166,7 +168,7 @@ fn opening_at(openings: &[Opening], end: &TreeEnd) -> usize {
     openings.iter().position(|opening| opening.centre_mm == end.centre).unwrap_or(0)
 }
 
-/// The openings of the ends, numbered, with what may go on beyond them.
+/// The openings of the ends, numbered, with the lengths of their extensions.
 fn openings(axes: &[Axis], ends: &[TreeEnd]) -> Vec<Opening> {
     let mut openings: Vec<Opening> =
         ends.iter().map(|end| Opening::at_end(end.centre, end.radius, end.outward)).collect();
@@ -187,7 +189,7 @@ fn openings(axes: &[Axis], ends: &[TreeEnd]) -> Vec<Opening> {
     openings
 }
 
-/// Refuses a tube that runs into itself.
+/// Rejects a tube that intersects itself.
 fn check_apart(axis: &Axis) -> Result<()> {
     let widest = (0..axis.len()).map(|knot| axis.radius(knot)).fold(0.0, f64::max);
     for knot in 0..axis.len() {

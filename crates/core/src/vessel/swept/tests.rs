@@ -23,7 +23,7 @@ fn tree(rows: &[([f64; 4], Option<usize>)]) -> CentrelineTree {
     CentrelineTree::new(rows.iter().map(node).collect()).unwrap()
 }
 
-/// A tube along z whose radius goes from 3 mm to this over 40 mm.
+/// A tube along z whose radius changes from 3 mm to this over 40 mm.
 fn cone(end_mm: f64) -> CentrelineTree {
     let row = |k: usize| {
         let part = k as f64 / 10.0;
@@ -32,7 +32,7 @@ fn cone(end_mm: f64) -> CentrelineTree {
     tree(&(0..=10).map(row).collect::<Vec<_>>())
 }
 
-/// Places in front of the wall by up to `depth_mm` and behind it by a fifth of that, all over a vessel.
+/// Positions in front of the wall by up to `depth_mm` and behind it by a fifth of that, all over a vessel.
 fn places(field: &SweptField, depth_mm: f64, count: u64) -> impl Iterator<Item = Vec3> + '_ {
     (0..count).map(move |k| {
         let number = |n: u64| unit(splitmix64(11, 4 * k + n));
@@ -72,7 +72,8 @@ fn derivatives_are_those_of_the_distance() {
                 let [plus, minus] = [h, -h].map(|way| closest(&field, &(x + Vec3::ith(k, way))));
                 let slope = (plus.distance_mm() - minus.distance_mm()) / (2.0 * h);
                 let bend = (plus.normal() - minus.normal()) / (2.0 * h);
-                // Where a width begins or a radius changes its curvature the Hessian jumps, and differences see both of it.
+                // Where a joint begins or a radius changes its curvature the Hessian jumps, and differences cross the
+                // jump.
                 assert!((slope - normal[k]).abs() < 1e-4, "{x:?}: {slope} {}", normal[k]);
                 bent += usize::from((bend - hessian.column(k)).norm() > 1e-3 * (1.0 + hessian.norm()));
             }
@@ -101,7 +102,7 @@ fn the_distance_in_a_cone_is_exact() {
         let size = cosine / (radius - depth);
         assert!((hessian.trace() + size).abs() < 1e-6 * size, "{} {size}", hessian.trace());
     }
-    // What the radial gap would be off by.
+    // The error of the radial gap.
     assert!(plain > 4e-4, "{plain}");
 }
 
@@ -135,7 +136,7 @@ fn ways_leave_the_lumen_where_they_meet_the_mesh() {
         }
         let number = |n: u64| unit(splitmix64(5, 4 * k as u64 + n)) - 0.5;
         let to = from + Vec3::new(number(0), number(1), number(2)) * 60.0;
-        // Beyond an opening the field goes on, and the mesh does not.
+        // Beyond an opening the field continues, and the mesh does not.
         let out = |x: &Vec3| swept.openings().iter().any(|o| o.beyond_and_aside_mm(x).0 > -1.0);
         match (field.crossing(&from, &to, 1.0), query.crossing(&from, &to, 1.0)) {
             (Some(one), Some(other)) => {
@@ -144,7 +145,7 @@ fn ways_leave_the_lumen_where_they_meet_the_mesh() {
                 assert!(apart_mm < 1.0 || out(&(from + (to - from) * one)), "{apart_mm} at {from:?}");
             }
             (None, None) => stayed += 1,
-            // A chord of the mesh lies inside of the wall, and some ways graze it.
+            // A chord of the mesh is inside the wall, and some paths graze it.
             (one, other) => {
                 let part = one.or(other).unwrap();
                 let x = from + (to - from) * part;
@@ -180,7 +181,7 @@ fn openings_are_where_and_what_those_of_the_mesh_are() {
                 one.beyond_mm,
                 other.beyond_mm
             );
-            // It goes on straight, and nobody feels where that ends.
+            // It continues straight, and its end is out of reach.
             let field = swept.field(1.0);
             let x = one.centre_mm + one.direction * (one.beyond_mm - 2.0);
             assert!(closest(&field, &x).distance_mm() > 0.9 * one.radius_mm.min(2.0 + one.radius_mm));
@@ -194,7 +195,7 @@ fn what_makes_no_vessel_is_refused() {
     let told = |tree: CentrelineTree, edge_mm: f64| {
         SweptVessel::new(tree, Resolution::EdgeMm(edge_mm)).unwrap_err().to_string()
     };
-    // A tube that comes back through itself.
+    // A tube that intersects itself.
     let ring = |k: usize| {
         let (sin, cos) = (0.25 * k as f64).sin_cos();
         ([12.0 * cos, 12.0 * sin, 0.1 * k as f64, 2.0], k.checked_sub(1))
@@ -243,7 +244,7 @@ fn the_far_side_of_a_septum_is_another_wall() {
             assert!((own.normal() - Vec3::x()).norm() < 5e-3, "{rho} {z}");
         }
     }
-    // Through space the same place is next to the other limb.
+    // Through space the nearest wall is that of the other limb.
     let x = Vec3::new(1.75 - 2.0, 0.0, 34.0);
     let other = closest(&field, &x);
     assert!((other.distance_mm() + 0.5).abs() < 2e-3 && other.normal().x < -0.99, "{}", other.distance_mm());

@@ -34,6 +34,12 @@ def _ends() -> list[ends.End]:
     return [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit()]
 
 
+def _check_above_zero(name: str, value: float) -> None:
+    # NaN is above nothing.
+    if not isinstance(value, (int, float, np.number)) or not 0.0 < value < np.inf:
+        raise InputError(f"{name} = {value!r}: must be a number above 0")
+
+
 @dataclass(eq=False)
 class Task:
     """Instruments in a vessel, a target, and what is observed, worth and the end."""
@@ -79,8 +85,14 @@ class Task:
         if self.observed not in ("scaled", "physical"):
             raise InputError(f"observed = {self.observed!r}: give scaled or physical")
 
-        if self.solves is not None and self.solves < 1:
-            raise InputError(f"solves = {self.solves!r}: allow at least one, or give None")
+        for name in ("threshold_mm", "force_limit_n", "control_period_s"):
+            _check_above_zero(name, getattr(self, name))
+        if len(self.speed_limits) != 2:
+            raise InputError(f"speed_limits = {self.speed_limits!r}: give a push in mm/s and a turn in rad/s")
+        for k, limit in enumerate(self.speed_limits):
+            _check_above_zero(f"speed_limits[{k}]", limit)
+        if self.solves is not None and (not isinstance(self.solves, int) or self.solves < 1):
+            raise InputError(f"solves = {self.solves!r}: give a whole number of at least one, or None")
 
     def limits(self) -> NDArray[np.float64]:
         """Fastest push in mm/s and turn in rad/s of each instrument, shape (n_instruments, 2)."""

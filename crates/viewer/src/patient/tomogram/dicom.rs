@@ -1,10 +1,11 @@
-//! A series of CT slices: a folder of DICOM files, one slice each.
+//! A series of CT slices: a folder of DICOM files, one per slice.
 //!
-//! CT Image IOD (DICOM PS3.3, A.3), native pixels of 16 bits in any uncompressed transfer syntax. With rows along **r**, columns along **c**
-//! (`ImageOrientationPatient`), the middle of the first pixel at **p** (`ImagePositionPatient`) and the distances Δc between columns and Δr
-//! between rows (`PixelSpacing`, which tells that of rows first), pixel (i, j) of a slice is at **p** + i Δc **r** + j Δr **c** (C.7.6.2.1.1),
-//! in the scene's axes: left, posterior, superior. Slices are put in order along **r** × **c** and must be evenly spaced; those of a tilted gantry go
-//! aside from each other by as much each time, which an affine can say.
+//! CT Image IOD (DICOM PS3.3, A.3), native pixels of 16 bits in any uncompressed transfer syntax. With rows along
+//! **r**, columns along **c** (`ImageOrientationPatient`), the centre of the first pixel at **p**
+//! (`ImagePositionPatient`) and the distances Δc between columns and Δr between rows (`PixelSpacing`, which gives
+//! that of rows first), pixel (i, j) of a slice is at **p** + i Δc **r** + j Δr **c** (C.7.6.2.1.1), in the scene's
+//! axes: left, posterior, superior. Slices are sorted along **r** × **c** and must be equally spaced; those of a
+//! tilted gantry are sheared uniformly, which an affine map represents.
 
 use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -25,20 +26,20 @@ use super::{MOST_VOXELS, Scan};
 /// Transfer syntaxes with native pixels.
 const NATIVE: [&str; 3] =
     [uids::IMPLICIT_VR_LITTLE_ENDIAN, uids::EXPLICIT_VR_LITTLE_ENDIAN, "1.2.840.10008.1.2.2"];
-/// Directions of a series differ by no more, and are unit vectors at right angles within it.
+/// Tolerance of directions within a series, and of their being orthonormal.
 const DIRECTION: f64 = 1e-3;
-/// Part of the distance between slices by which one may be off its place.
+/// Largest displacement of a slice, as a fraction of the distance between slices.
 const UNEVEN: f64 = 0.02;
-/// Slices that may be missing in a row for a gap to be told as such, and the one behind it.
+/// Largest number of consecutive missing slices that is reported as a gap, including the one behind it.
 const MOST_MISSING: f64 = 20.0;
-/// Missing slices that are named.
+/// Number of missing slices named in messages.
 const NAMED: usize = 5;
-/// Part of a spacing by which that of another slice may differ: numbers are written in 16 letters at most, and computed before.
+/// Largest relative difference of spacings between slices: numbers are written with at most 16 characters.
 const SPACING: f64 = 1e-4;
-/// What is taken in place of padding: air.
+/// Value that replaces padding: air.
 const PADDED_HU: f32 = -1000.0;
 
-/// What is read of a slice.
+/// The data of a slice.
 struct Slice {
     path: PathBuf,
     series: String,
@@ -51,11 +52,11 @@ struct Slice {
     hu: Vec<f32>,
 }
 
-/// Reads the series in a folder; files that are no DICOM, and folders in it, are passed over.
+/// Reads the series in a folder; other files, and subfolders, are skipped.
 ///
 /// # Errors
-/// [`Error::Content`] for a slice that is none of a tomogram, and slices that are not one evenly spaced series; [`Error::File`] for what
-/// cannot be read.
+/// [`Error::Content`] for a slice that does not belong to a tomogram, and slices that are not one equally spaced
+/// series; [`Error::File`] for unreadable files.
 pub(super) fn read(folder: &Path) -> Result<Scan> {
     let mut slices = Vec::new();
     let mut voxels = 0;
@@ -71,7 +72,7 @@ pub(super) fn read(folder: &Path) -> Result<Scan> {
     joined(slices).map_err(|why| Error::content(folder, why))
 }
 
-/// Files of a folder that begin as DICOM files do, in the order of their names.
+/// Files of a folder with the signature of DICOM, in the order of their names.
 fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = |path: &Path| {
         let path = path.to_path_buf();
@@ -96,7 +97,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 type Told<T> = std::result::Result<T, String>;
 
-/// A slice; `None` of the directory of a medium.
+/// A slice; `None` for a DICOMDIR.
 fn slice(path: &Path) -> Told<Option<Slice>> {
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let Some(object) = object(&bytes)? else { return Ok(None) };
@@ -155,7 +156,7 @@ fn slice(path: &Path) -> Told<Option<Slice>> {
     let stored = pixels(&object, usize::from(rows) * usize::from(columns))?;
     let spare = 16 - u32::from(bits);
     let value = |raw: u16| {
-        // What is above the stored bits is not the pixel's.
+        // Bits above the stored ones do not belong to the pixel.
         let up = raw << spare;
         f64::from(if signed { i32::from(up as i16 >> spare) } else { i32::from(up >> spare) })
     };
@@ -174,7 +175,7 @@ fn slice(path: &Path) -> Told<Option<Slice>> {
     }))
 }
 
-/// What a file tells; `None` of the directory of a medium.
+/// The object in a file; `None` for a DICOMDIR.
 fn object(bytes: &[u8]) -> Told<Option<DefaultDicomObject>> {
     let explicit = TransferSyntaxRegistry.get(uids::EXPLICIT_VR_LITTLE_ENDIAN).ok_or("cannot be read")?;
     let mut rest = bytes.get(128..).unwrap_or_default();
@@ -192,8 +193,8 @@ fn object(bytes: &[u8]) -> Told<Option<DefaultDicomObject>> {
     OpenFileOptions::new().from_reader(bytes).map(Some).map_err(|e| unreadable(&e))
 }
 
-/// Refuses a file with an element that says it is longer than the file, in the elements up to the first that is not `wanted`: a reader
-/// makes room for it before it reads.
+/// Rejects a file with an element longer than the file, in the elements up to the first that is not `wanted`: a
+/// reader allocates before it reads.
 fn check_lengths(bytes: &[u8], syntax: &TransferSyntax, wanted: impl Fn(Tag) -> bool) -> Told<()> {
     let mut tokens =
         LazyDataSetReader::new_with_ts(Cursor::new(bytes), syntax).map_err(|e| unreadable(&e))?;
@@ -263,7 +264,7 @@ fn numbers<const N: usize>(object: &DefaultDicomObject, tag: Tag, name: &str) ->
     if all.iter().all(|x| x.is_finite()) { Ok(all) } else { Err(format!("{name} is not finite")) }
 }
 
-/// An error with what brought it about, on one line.
+/// An error with its causes, on one line.
 fn chain(error: &dyn std::error::Error) -> String {
     let mut told = error.to_string();
     let mut source = error.source();
@@ -274,13 +275,13 @@ fn chain(error: &dyn std::error::Error) -> String {
     told.chars().map(|c| if c.is_control() { ' ' } else { c }).take(300).collect()
 }
 
-/// Whether spacings are the same but for rounding.
+/// Whether spacings are equal up to rounding.
 fn alike(a: [f64; 2], b: [f64; 2]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SPACING * b.abs())
 }
 
-/// Where slices are missing from a row of them that is even but for that: along the normal, mm; `None` of an uneven one. `at`: places
-/// along the normal, in order.
+/// Positions of missing slices in an otherwise equally spaced series, along the normal, mm; `None` for an irregular
+/// one. `at`: positions along the normal, in order.
 fn missing(at: &[f64]) -> Option<Vec<f64>> {
     let apart: Vec<f64> = at.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = apart.len().checked_sub(1)? / 2;

@@ -1,4 +1,4 @@
-//! One phantom in every format: the same volume, and what each reader refuses.
+//! One phantom in every format: the same volume, and what each reader rejects.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,12 +34,12 @@ fn read(file: &Path) -> std::result::Result<Volume, String> {
     Volume::read(&CtSpec { file: file.into(), offset_mm: [0.0; 3] }, &wall()).map_err(|e| e.to_string())
 }
 
-/// What is the same of two volumes, to the bit.
+/// What two volumes must share, to the bit.
 fn told(volume: &Volume) -> ([usize; 3], Matrix3<f64>, Vec3, &[[f32; 2]]) {
     (volume.size, volume.into, volume.origin_mm, &volume.voxels)
 }
 
-/// How a NIfTI file tells where its voxels are.
+/// How a NIfTI file gives the positions of its voxels.
 #[derive(Clone, Copy, PartialEq)]
 enum Placing {
     Affine,
@@ -57,7 +57,7 @@ fn nifti(second: bool, big: bool, placing: Placing) -> Vec<u8> {
             own.reverse();
         }
     };
-    // Whole numbers of the dimensions, and decimal ones, are twice and four times as long in the second.
+    // Whole numbers of the dimensions, and decimal ones, are two and four times as long in the second format.
     let whole = |n: i64| if second { n.to_le_bytes().to_vec() } else { (n as i16).to_le_bytes().to_vec() };
     let code = |n: i32| if second { n.to_le_bytes().to_vec() } else { (n as i16).to_le_bytes().to_vec() };
     let real = |x: f64| if second { x.to_le_bytes().to_vec() } else { (x as f32).to_le_bytes().to_vec() };
@@ -84,7 +84,8 @@ fn nifti(second: bool, big: bool, placing: Placing) -> Vec<u8> {
     put(units, &if second { 2_i32.to_le_bytes().to_vec() } else { vec![2] });
     put(q_code, &code(i32::from(placing == Placing::Quaternion)));
     put(s_code, &code(i32::from(placing == Placing::Affine)));
-    // Right and anterior are the other way. The quaternion is a third of a turn about (1, 1, 1), exact in single precision.
+    // Right and anterior have the opposite sign. The quaternion is a third of a turn about (1, 1, 1), exact in single
+    // precision.
     let sign = [-1.0, -1.0, 1.0];
     (0..3).for_each(|k| put(quaternion + k * side, &real(0.5)));
     for r in 0..3 {
@@ -94,7 +95,7 @@ fn nifti(second: bool, big: bool, placing: Placing) -> Vec<u8> {
             put(rows + (4 * r + c) * side, &real(sign[r] * x));
         }
     }
-    // Stored numbers are told by slope and intercept.
+    // Slope and intercept define the stored numbers.
     let stored = hu().into_iter().map(|hu| (hu + 1024) / 2);
     let voxels: Vec<u8> = stored.flat_map(|n| if big { n.to_be_bytes() } else { n.to_le_bytes() }).collect();
     bytes[if second { 4..12 } else { 344..348 }].copy_from_slice(if second {
@@ -141,7 +142,7 @@ fn both_formats_of_nifti_are_one_volume_in_either_byte_order_bare_or_compressed(
         let volume = read(&path).unwrap();
         assert_eq!((volume.into, volume.origin_mm), (turned.try_inverse().unwrap(), first.origin_mm));
     }
-    // The twin: an affine that is off by the last digit of the second format is another.
+    // Counter-check: an affine map that is off by the last digit of the second format differs.
     let mut off = nifti(true, false, Placing::Affine);
     off[424] ^= 1;
     assert_ne!(told(&read(&write("off.nii", &off)).unwrap()), told(&first));
@@ -200,7 +201,7 @@ fn put_word(object: &mut InMemDicomObject, tag: Tag, value: u16) {
     object.put(DataElement::new(tag, VR::US, PrimitiveValue::from(value)));
 }
 
-/// The phantom as a series in a new folder, each slice as `change` makes it; names are in another order than places.
+/// The phantom as a series in a new folder, each slice modified by `change`; names are not in the order of positions.
 fn series(syntax: &str, change: Change) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for k in 0..SIZE[2] {
@@ -258,7 +259,7 @@ fn a_series_of_slices_is_the_volume_that_a_nifti_file_is() {
         std::fs::write(folder.path().join("notes.txt"), "not a slice").unwrap();
         assert_eq!(told(&read(folder.path()).unwrap()), told(&expected), "{syntax}");
     }
-    // Signed numbers, with something else above the stored bits.
+    // Signed numbers, with other bits above the stored ones.
     let signed = series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|k, object| {
         let stored = hu().into_iter().skip(20 * k).take(20).map(|hu| (hu + 1024) / 2 - 512);
         let words: Vec<u16> = stored.map(|n| n as u16 & 0x0fff | 0x5000).collect();
@@ -267,14 +268,14 @@ fn a_series_of_slices_is_the_volume_that_a_nifti_file_is() {
         put(object, tags::RESCALE_INTERCEPT, VR::DS, "0");
     });
     assert_eq!(told(&read(signed.path()).unwrap()), told(&expected));
-    // The twins: another intercept, and rows for columns.
+    // Counter-checks: another intercept, and rows for columns.
     let other =
         series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|_, o| put(o, tags::RESCALE_INTERCEPT, VR::DS, "-1023"));
     assert_ne!(told(&read(other.path()).unwrap()), told(&expected));
     let turned =
         series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|_, o| put(o, tags::PIXEL_SPACING, VR::DS, "0.75\\0.5"));
     assert_ne!(told(&read(turned.path()).unwrap()), told(&expected));
-    // What pads a slice is air, and a tilted gantry shears.
+    // Padding becomes air, and a tilted gantry shears.
     let padded = series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|k, object| {
         put_word(object, tags::PIXEL_PADDING_VALUE, ((hu()[59] + 1024) / 2) as u16);
         put(
@@ -336,12 +337,12 @@ fn what_is_not_one_even_series_of_tomograms_is_refused_with_its_file_and_the_men
         let error = read(folder.path()).unwrap_err();
         assert!(error.contains(said) && !error.contains('\n'), "{said}: {error}");
     }
-    // The gap is named by the slices beside it: names are in another order than places.
+    // The gap is described by the slices beside it: names are not in the order of positions.
     let folder = series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &place(2, 17.5));
     let error = read(folder.path()).unwrap_err();
     let named = "2 of 5 slices are missing, which are 1.250 mm apart: along their normal at 15.00 mm (between 0.dcm and 1.dcm), 16.25 mm";
     assert!(error.contains(named), "{error}");
-    // Spacings are compared within rounding.
+    // Spacings are compared up to rounding.
     let rounded = of_one(tags::PIXEL_SPACING, VR::DS, "0.50000001\\0.74999999");
     assert!(read(series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &rounded).path()).is_ok());
     let packed = series("1.2.840.10008.1.2.4.70", &|_, _| ());

@@ -1,8 +1,8 @@
-//! A computed tomogram as background: NIfTI or a series of DICOM slices in, lengths of tissue and bone out.
+//! A computed tomogram as background: reads NIfTI or a series of DICOM slices, computes lengths of tissue and bone.
 //!
-//! Hounsfield units tell attenuation relative to water. Up to [`SOFT_HU`] a voxel is taken as soft tissue of less or more mass,
-//! above as a mixture with cortical bone, so that one volume gives lengths in two materials whatever the spectrum. A ray is
-//! marched in steps of half a voxel through the trilinear interpolation of its voxels.
+//! Hounsfield units give attenuation relative to water. Up to [`SOFT_HU`] a voxel counts as soft tissue of lower or
+//! higher density, above as a mixture with cortical bone, so that one volume gives lengths in two materials for any
+//! spectrum. A ray is marched in steps of half a voxel through the trilinear interpolation of the voxels.
 
 mod dicom;
 mod nifti;
@@ -17,24 +17,24 @@ use crate::c_arm::CArm;
 use crate::spec::CtSpec;
 use warp::Warp;
 
-/// Sides of a voxel that can be meant, mm: a unit mistake is easily a factor of a thousand, and rays march by half a side.
+/// Plausible sides of a voxel, mm: a mistake of units is often a factor of a thousand, and rays march by half a side.
 const VOXEL_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
-/// Most voxels of a volume: 512 × 512 × 1024, two gigabytes of materials.
+/// Largest number of voxels: 512 × 512 × 1024, two gigabytes of materials.
 const MOST_VOXELS: u64 = 1 << 28;
-/// Air: no tissue at all below this.
+/// Upper bound of air: no tissue below this.
 const AIR_HU: f32 = -950.0;
-/// Bone begins.
+/// Lower bound of bone.
 const SOFT_HU: f32 = 120.0;
 /// Solid cortical bone at 60 keV: (0.574/0.206 − 1) · 1000.
 const CORTICAL_HU: f32 = 1790.0;
-/// Values that Hounsfield units can have: what pads a picture may be lower than air, what metal does may need 16 bits.
+/// Possible values of Hounsfield units: padding may be lower than air, metal may need 16 bits.
 const POSSIBLE_HU: std::ops::RangeInclusive<f32> = -32_768.0..=65_535.0;
-/// Values within as much of each other are those of a picture scaled to [0, 1] or [-1, 1].
+/// Range of values below which they are those of an image scaled to [0, 1] or [-1, 1].
 const SCALED: f32 = 2.0;
-/// Part of the smallest voxel side that a ray advances at once.
+/// Step along a ray, as a fraction of the smallest voxel side.
 const STEP: f64 = 0.5;
 
-/// Rays from one that is marched to the next, along rows and columns: least and most.
+/// Distance between marched rays, along rows and columns: smallest and largest.
 const EVERY: [f64; 2] = [2.0, 16.0];
 
 /// Equivalent lengths per length in a voxel: soft tissue, cortical bone.
@@ -49,7 +49,8 @@ fn materials(hu: f32) -> [f32; 2] {
     [(1.0 + SOFT_HU / 1000.0) * (1.0 - bone).max(0.0), bone]
 }
 
-/// Values as a scanner gave them, with voxel (i, j, k) at `origin_mm` + `axes` · (i, j, k) in the scene's axes; the first index is the fastest.
+/// Values of a scanner, with voxel (i, j, k) at `origin_mm` + `axes` · (i, j, k) in the scene's axes; the first index
+/// is the fastest.
 #[derive(Debug, PartialEq)]
 struct Scan {
     size: [usize; 3],
@@ -59,8 +60,8 @@ struct Scan {
 }
 
 impl Scan {
-    /// Refuses values that cannot be Hounsfield units: air is -1000, fat about -100, water 0 and bone above 300, of which a body has the first
-    /// two or is in the first.
+    /// Rejects values that cannot be Hounsfield units: air is -1000, fat about -100, water 0 and bone above 300; a
+    /// body contains the first two or is surrounded by air.
     fn check_values(&self) -> std::result::Result<(), String> {
         let place =
             |i: usize| [i % self.size[0], i / self.size[0] % self.size[1], i / self.size[0] / self.size[1]];
@@ -96,16 +97,17 @@ pub(crate) struct Volume {
     step_mm: f64,
     /// Soft tissue and bone of each voxel, the first index fastest.
     voxels: Vec<[f32; 2]>,
-    /// Part of the vessel's surface that is in the volume, 0 to 1.
+    /// Fraction of the vessel's surface inside the volume, 0 to 1.
     vessel_held: f64,
 }
 
 impl Volume {
-    /// Reads Hounsfield units: a NIfTI file, or a folder of DICOM slices. `wall` is what the volume is to be around.
+    /// Reads Hounsfield units: a NIfTI file, or a folder of DICOM slices. `wall` must be at least partly inside the
+    /// volume.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the key for a file that is not there, [`Error::Content`] for one that is no usable volume, and
-    /// for one that holds nothing of the vessel.
+    /// [`Error::Parameter`] naming the key for a missing file, [`Error::Content`] for an unusable volume, and for one
+    /// that contains no part of the vessel.
     pub(crate) fn read(spec: &CtSpec, wall: &SurfaceMesh) -> Result<Self> {
         let path = &spec.file;
         let told = std::fs::metadata(path)
@@ -127,7 +129,7 @@ impl Volume {
         Ok(volume)
     }
 
-    /// Part of the vessel's surface that is in the volume, 0 to 1.
+    /// Fraction of the vessel's surface inside the volume, 0 to 1.
     pub(crate) fn vessel_held(&self) -> f64 {
         self.vessel_held
     }
@@ -138,7 +140,7 @@ impl Volume {
         (0..3).all(|k| (-0.5..=self.size[k] as f64 - 0.5).contains(&at[k]))
     }
 
-    /// How much of the area of a surface has its middle in the volume, 0 to 1.
+    /// Fraction of the area of a surface with its centroids in the volume, 0 to 1.
     fn part_held(&self, wall: &SurfaceMesh) -> f64 {
         let (mut held, mut all) = (0.0, 0.0);
         for index in 0..wall.triangles.len() {
@@ -152,7 +154,7 @@ impl Volume {
         if all > 0.0 { held / all } else { 1.0 }
     }
 
-    /// Refuses a vessel of which no vertex is in the volume.
+    /// Rejects a vessel without a vertex in the volume.
     fn check_holds(&self, wall: &SurfaceMesh) -> std::result::Result<(), String> {
         if wall.vertices_mm.is_empty() || wall.vertices_mm.iter().any(|v| self.holds(v)) {
             return Ok(());
@@ -186,7 +188,7 @@ impl Volume {
         Some(Self { size, into, origin_mm, step_mm: STEP * smallest, voxels, vessel_held: 1.0 })
     }
 
-    /// Lengths in all of the body and in its bone of the central ray of each pixel.
+    /// Lengths of the central ray of each pixel in the whole body and in its bone.
     pub(crate) fn project(&self, view: &CArm) -> [Vec<f32>; 2] {
         let marched = self.rays(view, |pixel| {
             let [tissue, bone] = self.march(view, pixel, None);
@@ -195,7 +197,7 @@ impl Volume {
         [0, 1].map(|k| marched.iter().map(|lengths| lengths[k]).collect())
     }
 
-    /// Lengths in all of the body where it has moved to.
+    /// Lengths in the whole displaced body.
     pub(crate) fn project_moved(&self, view: &CArm, displacement: &Displacement) -> Vec<f32> {
         let warp = Warp::new(self, displacement);
         self.rays(view, |pixel| {
@@ -207,8 +209,8 @@ impl Volume {
         .collect()
     }
 
-    /// What `of` says of rays, for each pixel. Rays that are asked for are half a voxel apart at the isocentre, and at least every fourth is; those
-    /// between are interpolated.
+    /// The values of `of` for each pixel. Rays evaluated are half a voxel apart at the isocentre, and at most every
+    /// fourth; those between are interpolated.
     fn rays<const K: usize>(&self, view: &CArm, of: impl Fn([f64; 2]) -> [f32; K] + Sync) -> Vec<[f32; K]> {
         let ray_mm = view.pixel_mm() * view.sod_mm() / view.sid_mm();
         let every = (self.step_mm / ray_mm).clamp(EVERY[0], EVERY[1]) as usize;
@@ -229,11 +231,11 @@ impl Volume {
         (0..width * height).map(at).collect()
     }
 
-    /// Lengths in soft tissue and bone along one ray, through the volume at rest or where it has moved to.
+    /// Lengths in soft tissue and bone along one ray, through the volume at rest or displaced.
     fn march(&self, view: &CArm, pixel: [f64; 2], moved: Option<&Warp>) -> [f32; 2] {
         let (source, direction) = view.ray(pixel);
         let (start, slope) = (self.into * (source - self.origin_mm), self.into * direction);
-        // Where the ray is between the middles of the outermost voxels, in millimetres.
+        // The stretch of the ray between the centres of the outermost voxels, in millimetres.
         let (mut near, mut far) = (0.0_f64, f64::MAX);
         for k in 0..3 {
             let last = (self.size[k] - 1) as f64;
@@ -264,7 +266,7 @@ impl Volume {
             (0..steps as usize).for_each(|n| add(place(n as f64 + 0.5)));
             return sum.map(|s| s * step as f32);
         };
-        // Ways back are asked for now and then, and are straight between.
+        // Inverse displacements are evaluated at intervals, and linear in between.
         let stretch = (warp::ASKED_MM / step).ceil() as usize;
         let (mut begin, mut from) = (0, warp.material(place(0.0)));
         while begin < steps as usize {
@@ -285,7 +287,7 @@ impl Volume {
     }
 }
 
-/// Interpolation of values on a lattice, the first index fastest; level beyond its outermost ones.
+/// Interpolation of values on a lattice, the first index fastest; constant beyond its outermost ones.
 #[inline]
 fn trilinear<const K: usize>(size: [usize; 3], values: &[[f32; K]], at: [f32; 3]) -> [f32; K] {
     let place = |k: usize| {

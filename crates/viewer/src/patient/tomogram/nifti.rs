@@ -1,8 +1,8 @@
 //! NIfTI-1 and NIfTI-2 files, bare or compressed.
 //!
-//! The two formats tell the same with headers of 348 and 540 bytes; the library in use reads the first. Of the second
-//! (<https://nifti.nimh.nih.gov/pub/dist/doc/nifti2.h>) the header is read here, and its voxels as if they had one of the first. Axes are
-//! right, anterior, superior in both.
+//! The two formats have equivalent headers of 348 and 540 bytes; the library used reads the first. For the second
+//! (<https://nifti.nimh.nih.gov/pub/dist/doc/nifti2.h>) the header is read here, and its voxels as if they had one of
+//! the first. Axes are right, anterior, superior in both.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -18,16 +18,16 @@ use nifti::{
 
 use super::{MOST_VOXELS, Scan};
 
-/// Bytes of a header of the second format.
+/// Size of a header of the second format, bytes.
 const SECOND_BYTES: usize = 540;
-/// What its magic string begins with in a file of header and voxels, and in one of a pair.
+/// Start of its magic string in a file of header and voxels, and in one of a pair.
 const SECOND: &[u8] = b"n+2\0";
 const SECOND_OF_PAIR: &[u8] = b"ni2\0";
 
 /// Reads a file of either format.
 ///
 /// # Errors
-/// [`Error::Content`] for one that is no usable volume.
+/// [`Error::Content`] for an unusable volume.
 pub(super) fn read(path: &Path) -> Result<Scan> {
     let bad = |reason: String| Error::content(path, reason);
     let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
@@ -42,14 +42,14 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
             (header, placed, volume)
         }
         None => {
-            // The header first: it says how much memory the volume asks for.
+            // The header first: it gives the memory the volume needs.
             let mut header = NiftiHeader::from_file(path).map_err(unreadable)?;
             check_size(&header).map_err(bad)?;
             let is_scaled = scaled(&mut header).map_err(bad)?;
             let placed = Placed::first(&header);
             let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
             let read = object.into_volume();
-            // The library scales by what the file says.
+            // The library applies the file's scaling.
             let volume = match is_scaled {
                 true => read,
                 false => InMemNiftiVolume::from_reader(read.into_raw_data().as_slice(), &header)
@@ -78,7 +78,7 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
     Ok(Scan { size: [nx, ny, nz].map(usize::from), axes, origin_mm, hu })
 }
 
-/// Whether values are to be scaled; a slope of 0, or one that is no number, says that they are as they are stored (as nibabel has it), and
+/// Whether values are to be scaled; a slope of 0 or NaN means that they are stored unscaled (as in nibabel), and
 /// becomes 1.
 fn scaled(header: &mut NiftiHeader) -> std::result::Result<bool, String> {
     if header.scl_slope == 0.0 || !header.scl_slope.is_finite() {
@@ -91,14 +91,14 @@ fn scaled(header: &mut NiftiHeader) -> std::result::Result<bool, String> {
     }
 }
 
-/// A file's bytes, unpacked if they are compressed.
+/// A file's bytes, decompressed if needed.
 fn plain(path: &Path) -> io::Result<Box<dyn Read>> {
     let mut file = BufReader::new(File::open(path)?);
     let compressed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
     Ok(if compressed { Box::new(GzDecoder::new(file)) } else { Box::new(file) })
 }
 
-/// Refuses a volume that memory may not hold, and one whose header contradicts itself about the size of a voxel.
+/// Rejects a volume too large for memory, and one whose header contradicts itself about the size of a voxel.
 fn check_size(header: &NiftiHeader) -> std::result::Result<(), String> {
     let bits = header.data_type().map_or(header.bitpix, |kind| 8 * kind.size_of() as i16);
     if header.bitpix != bits {
@@ -118,11 +118,11 @@ fn check_size(header: &NiftiHeader) -> std::result::Result<(), String> {
     ))
 }
 
-/// The header of a file of the second format as one of the first, where its voxels are placed, and where they begin; `None` of any
-/// other file.
+/// The header of a file of the second format converted to the first, with the placement and the offset of its voxels;
+/// `None` for any other file.
 fn second(path: &Path) -> std::result::Result<Option<(NiftiHeader, Placed, u64)>, String> {
     let mut bytes = Vec::with_capacity(SECOND_BYTES);
-    // What cannot be read is told by the reader of the first format.
+    // Unreadable files are reported by the reader of the first format.
     let read = plain(path).and_then(|file| file.take(SECOND_BYTES as u64).read_to_end(&mut bytes));
     if read.is_err() || bytes.len() < SECOND_BYTES {
         return Ok(None);
@@ -138,7 +138,7 @@ fn second(path: &Path) -> std::result::Result<Option<(NiftiHeader, Placed, u64)>
     let mut dim = [0; 8];
     for (k, n) in dim.iter_mut().enumerate() {
         let side = of.i64(16 + 8 * k);
-        // Sides beyond the last dimension say nothing.
+        // Sizes beyond the last dimension are meaningless.
         *n = match u16::try_from(side) {
             Ok(side) => side,
             Err(_) if (k as i64) > of.i64(16) => 1,
@@ -169,7 +169,7 @@ fn second(path: &Path) -> std::result::Result<Option<(NiftiHeader, Placed, u64)>
     Ok(Some((header, placed, begins)))
 }
 
-/// Numbers of a header at their places.
+/// Numbers of a header at their offsets.
 struct Fields<'a> {
     bytes: &'a [u8],
     order: Endianness,
@@ -202,9 +202,9 @@ impl Fields<'_> {
     }
 }
 
-/// Where voxels are, as headers of both formats tell it.
+/// Placement of voxels, as given by headers of both formats.
 struct Placed {
-    /// Rows of an affine.
+    /// Rows of an affine map.
     sform: Option<[[f64; 4]; 3]>,
     /// Three parts of a quaternion, and the origin.
     qform: Option<[[f64; 3]; 2]>,
@@ -246,7 +246,7 @@ impl Placed {
         if rows.iter().flatten().any(|x| !x.is_finite()) {
             return Err("its affine is not finite; mend its sform or qform".into());
         }
-        // Spatial units in the lower three bits: metre, millimetre, micrometre; unknown is taken as millimetre.
+        // Spatial units in the lower three bits: metre, millimetre, micrometre; unknown counts as millimetre.
         let unit = match units & 7 {
             1 => 1000.0,
             3 => 1e-3,

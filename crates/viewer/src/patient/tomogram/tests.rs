@@ -1,4 +1,4 @@
-//! Volumes as rays meet them, and as files tell them.
+//! Volumes traversed by rays, and read from files.
 
 use endowire_core::vessel::motion::{Around, MotionMode, Waveform};
 use endowire_core::vessel::{SurfaceMesh, VesselMotion};
@@ -43,7 +43,7 @@ fn rays_through_a_ball_are_as_long_as_its_chords() {
         let middle = 32 * 64 + 32;
         assert!((bone[middle] - 20.0).abs() < 1.0, "{}", bone[middle]);
         assert!((tissue[middle] - 40.0).abs() < 1.5, "{}", tissue[middle]);
-        // Beside the core there is water only: 2√(30² − off²).
+        // Beside the core there is only water: 2√(30² − off²).
         let beside = 32 * 64 + 10;
         let (_, direction) = arm.ray([10.5, 32.5]);
         let off = (arm.isocentre_mm() - arm.source_mm()).cross(&direction).norm();
@@ -72,14 +72,14 @@ fn a_volume_goes_with_its_vessel() {
         VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0)
     };
     let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-    // Moved by whole voxels it is the ball that begins there, but for where steps along rays begin.
+    // Displaced by whole voxels it is the ball that starts there, except for the start of steps along rays.
     let there =
         Volume { origin_mm: ball.origin_mm + Vec3::new(0.0, 4.0, 6.0), voxels: ball.voxels.clone(), ..ball };
     let moved = body(&steady([0.0, 4.0, 6.0], None));
     let rest = ball.project(&arm)[0].clone();
     assert!(apart(&moved, &there.project(&arm)[0]) < 0.1, "{}", apart(&moved, &there.project(&arm)[0]));
     assert!(apart(&moved, &rest) > 5.0, "the twin: it has moved");
-    // A field that fades, against the inverse at each place.
+    // A field that fades, compared with the inverse at each position.
     let field =
         steady([1.0, 2.0, 7.0], Some(Around { centre_mm: [5.0, 0.0, 5.0], radius_mm: 10.0, fade_mm: 30.0 }));
     let warp = Warp::new(&ball, &field);

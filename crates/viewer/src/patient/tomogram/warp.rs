@@ -1,23 +1,24 @@
-//! A volume that moves with its vessel: where what is at a place has come from.
+//! A volume displaced with its vessel: the inverse displacement.
 //!
-//! A voxel's material goes along with the field of the motion, x = X + u(X), so that at x there is what the volume has at X. X takes Newton's
-//! method ([`Displacement::material`]); it is found on a lattice, and X − x is interpolated between its points. Over [`LATTICE_MM`] that is off by
-//! h²/8 |∂²u|: a tenth of a millimetre for a breath of 12 mm that fades over 85 mm.
+//! A voxel's material moves with the field of the motion, x = X + u(X), so at x there is the material of the volume
+//! at X. X is found by Newton's method ([`Displacement::material`]) on a lattice, and X − x is interpolated between
+//! its points. Over [`LATTICE_MM`] the error is h²/8 |∂²u|: a tenth of a millimetre for a breath of 12 mm that fades
+//! over 85 mm.
 
 use endowire_core::Vec3;
 use endowire_core::vessel::Displacement;
 
 use super::{Volume, trilinear};
 
-/// Most distance of the lattice's points, mm.
+/// Largest distance of the lattice's points, mm.
 const LATTICE_MM: f64 = 8.0;
-/// Distance along a ray at which ways back are asked for, mm.
+/// Distance along a ray between evaluations of the inverse displacement, mm.
 pub(super) const ASKED_MM: f64 = 0.5 * LATTICE_MM;
 
-/// Ways back from places of a volume, on a lattice over its voxels.
+/// Inverse displacements in a volume, on a lattice over its voxels.
 pub(super) struct Warp {
     size: [usize; 3],
-    /// Points of the lattice for each voxel.
+    /// Lattice points per voxel.
     per_voxel: [f32; 3],
     /// X − x in voxels, the first index fastest.
     back: Vec<[f32; 3]>,
@@ -46,7 +47,7 @@ impl Warp {
         }
     }
 
-    /// The voxel coordinates that what is at `at` has at rest.
+    /// The voxel coordinates at rest of the material at `at`.
     pub(super) fn material(&self, at: [f32; 3]) -> [f32; 3] {
         let back = trilinear(self.size, &self.back, std::array::from_fn(|k| at[k] * self.per_voxel[k]));
         std::array::from_fn(|k| at[k] + back[k])

@@ -1,4 +1,4 @@
-//! What is left out touches nothing, and is looked at where it may.
+//! Skipped elements touch nothing, and are evaluated where they may.
 
 use super::super::tests::{RADIUS_MM, Rod, ellipse, rod, swept};
 use super::*;
@@ -9,12 +9,12 @@ use crate::solve::External;
 
 const ELEMENTS: usize = 12;
 
-/// A tube with a radius of 3 mm that a device with a radius of 0.45 mm lies in, straight.
+/// A straight device with a radius of 0.45 mm fits in this tube with a radius of 3 mm.
 fn tube() -> ContactSurface {
     swept(&ellipse(3.0, 3.0, 36), 61, |k| (Vec3::z() * (0.5 * f64::from(k)), Vec3::x(), 1.0))
 }
 
-/// A rod along the tube whose nodes are up to `off_mm` off it, and turned by about as much.
+/// A rod along the tube whose nodes are up to `off_mm` off its axis, and rotated by about as much.
 fn off_axis(rod: &Rod<'_>, seed: u64, off_mm: f64) -> RodState {
     let number = |k: u64| 2.0 * unit(splitmix64(seed, k)) - 1.0;
     let middle = Vec3::new(1.7 * number(90), 1.7 * number(91), 8.0);
@@ -28,8 +28,9 @@ fn off_axis(rod: &Rod<'_>, seed: u64, off_mm: f64) -> RodState {
     state
 }
 
-/// Safe parts of ways and energies at trials about a base: of a device of which elements are left out, and of one that looks at all of
-/// them. `more_mm` is added to how far elements are thought to be from touching anything. And how many elements were left out.
+/// Safe fractions and energies at trials about a base, of a device whose clear elements are skipped, and of one that
+/// evaluates all; and the number of skipped elements. `more_mm` is added to the assumed distance of elements from
+/// touching.
 fn asked(surface: &ContactSurface, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>, usize) {
     let proximity = [1.0, 0.75, 0.5, 0.25];
     let mut knowing = rod(surface, ELEMENTS, &proximity, 10.0);
@@ -55,7 +56,7 @@ fn asked(surface: &ContactSurface, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, V
             span.room.free_mm += more_mm;
             span.room.clearance_mm += more_mm;
         }
-        // Once more, as a base that has been looked at.
+        // Once more, as a base that has been evaluated.
         contact.linearise(&elements, &base, &mut assembly);
         let left_out = contact.cache.spans.iter().filter(|span| !span.at_base).count();
         let told: Vec<[f64; 2]> = trials
@@ -86,7 +87,7 @@ fn what_is_left_out_touches_nothing() {
         left_out += out;
         stopped += whole.iter().filter(|[safe, _]| *safe < 1.0).count();
         pressing += whole.iter().filter(|[_, value]| *value > 0.0).count();
-        // A twin: thought to be farther from the wall than they are, elements go through it.
+        // Counter-check: with too large an assumed distance, elements go through the wall.
         let (told, whole, _) = asked(&surface, seed, 2.0);
         wrong += differ(&told, &whole);
     }
@@ -109,7 +110,7 @@ fn no_point_of_an_element_moves_farther_than_is_said() {
         assert!((to - from).norm() <= most_mm);
         nearest = nearest.min(most_mm - (to - from).norm());
     }
-    // It is no more than it must be: a node that moves farther than the other says so exactly, but for turns.
+    // The bound is tight: a node that moves farther than the other attains it, except for rotations.
     assert!(nearest < 0.1 * RADIUS_MM, "{nearest}");
 }
 
@@ -121,7 +122,7 @@ fn where_there_are_no_numbers_there_is_no_room() {
     let (good, mut bad) = (rod.at(Vec3::new(0.0, 0.0, 8.0)), rod.at(Vec3::new(0.0, 0.0, 8.0)));
     bad.positions[ELEMENTS / 2] = Vec3::repeat(f64::NAN);
     let mut assembly = Assembly::<PLAIN>::new(ELEMENTS);
-    // Elements that are looked at at a good state after a base of numbers and after one with a node that has none.
+    // Elements evaluated at a good state after a base of finite numbers and after one with NaN at a node.
     for (base, elements_near) in [(&good, 0), (&bad, 2)] {
         let mut contact = rod.contact();
         assembly.assemble(&elements, base);

@@ -1,29 +1,29 @@
-//! The header of a PLY file: which elements follow, and what each of their rows holds.
+//! The header of a PLY file: the elements, and the properties of their rows.
 
 use super::super::scalar::{Order, Scalar};
 use super::super::text::shown;
 use super::super::{Reason, ToldAxes};
 use super::MEND;
 
-/// How rows are written.
+/// Encoding of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
     Binary(Order),
 }
 
-/// What is wanted of a property.
+/// Use of a property.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
     /// A coordinate, by its axis.
     Coordinate(usize),
     /// The list of a face's or strip's vertices.
     Corners,
-    /// Nothing.
+    /// Unused.
     Unused,
 }
 
-/// A value of each row, or a list of them.
+/// A value of each row, or a list of values.
 #[derive(Debug)]
 pub(super) struct Property {
     pub(super) role: Role,
@@ -50,7 +50,7 @@ pub(super) struct Header {
     pub(super) lines: usize,
 }
 
-/// The end of the first line, which is that of all others: a binary file's rows begin right behind it.
+/// The end of the first line, which is that of all others: a binary file's rows begin right after it.
 fn line_end(bytes: &[u8]) -> &'static [u8] {
     match bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r')) {
         Some(at) if bytes[at..].starts_with(b"\r\n") => b"\r\n",
@@ -131,7 +131,7 @@ impl Element {
         matches!(self.name.as_str(), "face" | "tristrips")
     }
 
-    /// Takes the only list of a face for its corners where none is called so.
+    /// Uses the only list of a face as its corners if none has that name.
     fn settle(&mut self) {
         if !self.has_corners() || self.properties.iter().any(|property| property.role == Role::Corners) {
             return;
@@ -142,7 +142,7 @@ impl Element {
         }
     }
 
-    /// A property from the words behind `property`.
+    /// A property from the words after `property`.
     fn property(&self, words: &[&str]) -> Option<Property> {
         let (length, value, name) = match words {
             ["list", length, value, name] => (Some(scalar(length)?), scalar(value)?, *name),

@@ -1,7 +1,7 @@
 //! PLY, ASCII and binary of either byte order: polygons and triangle strips.
 //!
-//! By hand, because the crate for it (ply-rs-bw 4.0) reads headers of ASCII alone, wants a number in every value of a row, used or
-//! not, and a line for every row of text.
+//! Own implementation, because the crate for it (ply-rs-bw 4.0) reads only ASCII headers, requires a number in every
+//! value of a row, used or not, and a line for every row of text.
 
 mod header;
 mod rows;
@@ -14,10 +14,10 @@ use crate::vessel::SurfaceMesh;
 use header::{Element, Encoding, Header, Role};
 use rows::{BinaryRows, Rows, TextRows};
 
-/// What to do about a file that cannot be read.
+/// What to do about an unreadable file.
 const MEND: &str = "mend it, or export the surface again as PLY 1.0, STL or OBJ";
 
-/// What separates the strips in a list of them.
+/// Separator of strips in a list of them.
 const STRIP_ENDS: i64 = -1;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
@@ -33,7 +33,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
                 surface(&header, &mut rows).map(|surface| (surface, rows))
             };
             with(false).map(|(surface, _)| surface).or_else(|reason| match with(true) {
-                // What flows must come out even: else a row is damaged.
+                // A wrong number of values means that a row is damaged.
                 Ok((surface, mut rows)) => rows.is_at_end().then_some(surface).ok_or(reason),
                 Err(_) => Err(reason),
             })?
@@ -54,7 +54,7 @@ fn check_counts(header: &Header, length: usize) -> Result<(), Reason> {
     Ok(())
 }
 
-/// The surface that is in the elements of a file.
+/// The surface in the elements of a file.
 fn surface(header: &Header, rows: &mut impl Rows) -> Result<SurfaceMesh, Reason> {
     let (mut mesh, mut faces) = (SurfaceMesh::default(), Faces::default());
     for element in &header.elements {
@@ -72,7 +72,7 @@ fn surface(header: &Header, rows: &mut impl Rows) -> Result<SurfaceMesh, Reason>
     Ok(mesh)
 }
 
-/// Refuses vertices that are nowhere.
+/// Rejects vertices without coordinates.
 fn check_vertices(element: &Element) -> Result<(), Reason> {
     let has = |axis: usize| element.properties.iter().any(|p| p.role == Role::Coordinate(axis));
     match (0..3).all(has) {

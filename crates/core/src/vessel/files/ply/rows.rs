@@ -1,4 +1,4 @@
-//! Values of rows, one after the other, as text or as bytes.
+//! Values of rows, read one after the other, as text or bytes.
 
 use super::super::Reason;
 use super::super::scalar::{Order, Scalar};
@@ -6,13 +6,13 @@ use super::super::text::{lines, number, shown};
 
 /// Rows from which values are taken.
 pub(super) trait Rows {
-    /// Goes on to the next row.
+    /// Starts the next row.
     fn begin(&mut self) -> Result<(), Reason>;
     /// The next value.
     fn value(&mut self, kind: Scalar) -> Result<f64, Reason>;
-    /// Passes over as many values of a type, whatever they are.
+    /// Skips this many values of a type.
     fn skip(&mut self, kind: Scalar, count: usize) -> Result<(), Reason>;
-    /// Most values that may still come.
+    /// Upper bound of the number of remaining values.
     fn left(&self) -> usize;
 }
 
@@ -21,13 +21,13 @@ pub(super) struct TextRows<'a> {
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
     line: (usize, &'a str),
     words: std::str::SplitWhitespace<'a>,
-    /// Whether values go on in the next line where one ends: a few programs break long rows, or write all on one line.
+    /// Whether rows may continue on the next line: a few programs break long rows, or write everything on one line.
     flowing: bool,
     length: usize,
 }
 
 impl<'a> TextRows<'a> {
-    /// Rows in `text`, with a line each, or `flowing`; `before`: lines before it in the file.
+    /// Rows in `text`, one per line, or `flowing`; `before`: number of lines before it in the file.
     pub(super) fn new(text: &'a str, before: usize, flowing: bool) -> Self {
         let lines = lines(text).map(move |(number, line)| (number + before, line));
         Self {
@@ -39,7 +39,7 @@ impl<'a> TextRows<'a> {
         }
     }
 
-    /// Whether nothing but blanks is left.
+    /// Whether only blanks remain.
     pub(super) fn is_at_end(&mut self) -> bool {
         self.words.next().is_none() && self.lines.all(|(_, line)| line.trim().is_empty())
     }
@@ -98,7 +98,7 @@ pub(super) struct BinaryRows<'a> {
     pub(super) order: Order,
 }
 
-/// Why a binary file ends too early.
+/// The error for a binary file that ends too early.
 const SHORT: &str = "the file ends here: it is cut off";
 
 impl Rows for BinaryRows<'_> {

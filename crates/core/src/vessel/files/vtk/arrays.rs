@@ -1,6 +1,7 @@
-//! Arrays of XML files, however they are kept: as text, or as bytes in base64 or raw, in place or appended, packed or not.
+//! Arrays of XML files in all encodings: as text, or as bytes in base64 or raw, in place or appended, compressed or
+//! not.
 //!
-//! "VTK XML Formats" in the documentation of VTK, and `vtkXMLDataParser.cxx` where that is silent.
+//! "VTK XML Formats" in the documentation of VTK, and `vtkXMLDataParser.cxx` where that is incomplete.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -12,7 +13,7 @@ use super::super::scalar::{Order, Scalar};
 use super::super::text::{number, shown};
 use super::super::{Reason, SIZE_LIMIT};
 
-/// How the bytes of arrays are packed.
+/// Compression of arrays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Packing {
     None,
@@ -20,14 +21,14 @@ enum Packing {
     Lz4,
 }
 
-/// What a file says of all of its arrays.
+/// Properties common to all arrays of a file.
 #[derive(Debug)]
 pub(super) struct Encoding<'a> {
     order: Order,
     /// Type of the counts before an array's bytes.
     header: Scalar,
     packing: Packing,
-    /// What is appended behind the XML, and whether it is base64.
+    /// The data appended after the XML, and whether it is base64.
     appended: Option<(&'a [u8], bool)>,
 }
 
@@ -70,7 +71,7 @@ impl<'a> Encoding<'a> {
     fn read(&self, array: Node<'_, '_>) -> Result<Vec<f64>, Reason> {
         let kind = array.attribute("type").unwrap_or_default();
         let kind = scalar(kind).ok_or_else(|| format!("type {:?} is not known", shown(kind)))?;
-        // Elements of its own may stand before or behind the numbers of an array.
+        // Other elements may stand before or behind the numbers of an array.
         let text =
             || array.children().filter(Node::is_text).filter_map(|node| node.text()).collect::<String>();
         let bytes = match (array.attribute("format"), array.attribute("offset")) {
@@ -97,7 +98,7 @@ impl<'a> Encoding<'a> {
         Ok(bytes.chunks_exact(kind.size()).filter_map(|bytes| kind.read(bytes, self.order)).collect())
     }
 
-    /// The bytes of the array that begins here, behind its header: one count, or those of its blocks.
+    /// The bytes of the array that begins here, after its header: one count, or those of its blocks.
     fn unpacked<'b>(&self, data: &'b [u8]) -> Result<Cow<'b, [u8]>, Reason> {
         let size = self.header.size();
         let count = |k: usize| {
@@ -129,7 +130,7 @@ impl<'a> Encoding<'a> {
             let packed = count(3 + k)?;
             let part = rest.get(..packed).ok_or_else(|| short(packed, rest.len()))?;
             rest = &rest[packed..];
-            // A last block of 0 bytes is one like the others.
+            // A size of 0 of the last block means that it is full.
             let length = if k + 1 == blocks && last > 0 { last } else { block };
             if bytes.len().saturating_add(length) as u64 > SIZE_LIMIT {
                 return Err(format!("it is more than {SIZE_LIMIT} bytes long unpacked"));
@@ -140,12 +141,12 @@ impl<'a> Encoding<'a> {
         Ok(Cow::Owned(bytes))
     }
 
-    /// Appends the `length` bytes that `part` holds packed.
+    /// Appends the `length` bytes compressed in `part`.
     fn unpack(&self, part: &[u8], length: usize, bytes: &mut Vec<u8>) -> Result<(), Reason> {
         let before = bytes.len();
         match self.packing {
             Packing::Lz4 => {
-                /// LZ4 packs no better than this.
+                /// Upper bound of LZ4's compression ratio.
                 const BEST: usize = 256;
                 if length > part.len().saturating_mul(BEST) {
                     return Err(format!("{} bytes cannot hold {length}", part.len()));
@@ -164,7 +165,7 @@ impl<'a> Encoding<'a> {
     }
 }
 
-/// A type by its name in XML. Letters are bytes.
+/// A type by its XML name. Letters are bytes.
 fn scalar(name: &str) -> Option<Scalar> {
     Some(match name {
         "Int8" => Scalar::I8,
@@ -181,8 +182,8 @@ fn scalar(name: &str) -> Option<Scalar> {
     })
 }
 
-/// The bytes that base64 text stands for, up to what is none. Texts that are filled up with `=` may follow each other: a header has
-/// one of its own.
+/// The bytes of base64 text, up to the first invalid character. Several texts padded with `=` may follow each other:
+/// a header has one of its own.
 fn base64(text: &[u8]) -> Vec<u8> {
     let digit = |byte: u8| match byte {
         b'A'..=b'Z' => Some(u32::from(byte - b'A')),

@@ -1,6 +1,7 @@
 //! VTK's older format (`.vtk`), text or bytes: polygonal data, and the surface cells of unstructured grids.
 //!
-//! "VTK Legacy Formats" in the documentation of VTK; cells since version 5 have arrays of offsets and of corners, counts before.
+//! "VTK Legacy Formats" in the documentation of VTK; since version 5 cells have arrays of offsets and corners, before
+//! that counts.
 
 use super::super::faces::Faces;
 use super::super::scalar::{Order, Scalar};
@@ -27,7 +28,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     };
     let mut found = Found::default();
     while let Some(keyword) = input.next_word() {
-        // What belongs to points and cells comes behind them.
+        // Point and cell data follow the surface and are not needed.
         if matches!(keyword.to_ascii_uppercase().as_str(), "POINT_DATA" | "CELL_DATA") {
             break;
         }
@@ -52,7 +53,7 @@ struct Found {
     /// Cells of an unstructured grid, and their types.
     cells: Cells,
     types: Vec<f64>,
-    /// How many lines and lone points there are.
+    /// Number of lines and isolated points.
     others: usize,
 }
 
@@ -74,7 +75,7 @@ impl Found {
     }
 }
 
-/// Reads what follows a keyword.
+/// Reads the section of a keyword.
 fn section(
     keyword: &str,
     input: &mut Input<'_>,
@@ -119,7 +120,7 @@ fn section(
     Ok(())
 }
 
-/// What is left of a file, and the number of the line there, which counts in text alone.
+/// The rest of a file, and its line number, which is meaningful in text only.
 struct Input<'a> {
     rest: &'a [u8],
     line: usize,
@@ -131,7 +132,7 @@ impl<'a> Input<'a> {
         if self.is_binary { why.to_owned() } else { format!("line {}: {why}", self.line) }
     }
 
-    /// What is left of the line, without its end.
+    /// The rest of the line, without its end.
     fn take_line(&mut self) -> String {
         let length =
             self.rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(self.rest.len());
@@ -141,7 +142,7 @@ impl<'a> Input<'a> {
         line
     }
 
-    /// Passes over the end of a line and blanks before it, and over nothing else: bytes may follow.
+    /// Skips the end of a line and blanks before it, and nothing else: bytes may follow.
     fn end_line(&mut self) {
         let blanks = self.rest.iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
         match &self.rest[blanks..] {
@@ -168,7 +169,7 @@ impl<'a> Input<'a> {
         self.next_word().unwrap_or_default()
     }
 
-    /// The next word that tells of no metadata, which may stand behind any array.
+    /// The next word that does not belong to metadata, which may follow any array.
     fn word_beyond_metadata(&mut self) -> String {
         loop {
             match self.word() {
@@ -188,10 +189,10 @@ impl<'a> Input<'a> {
         scalar(&word).ok_or_else(|| self.here(&format!("{:?} is no type of number", shown(&word))))
     }
 
-    /// So many numbers, which begin on the next line where they are bytes.
+    /// This many numbers; as bytes they begin on the next line.
     fn numbers(&mut self, kind: Scalar, count: usize) -> Result<Vec<f64>, Reason> {
         if !self.is_binary {
-            // A number takes a letter and a blank.
+            // A number takes at least a character and a blank.
             if count > self.rest.len() {
                 return Err(self.here(&format!(
                     "{count} numbers are announced, more than are left: the file is cut off"
@@ -222,7 +223,7 @@ impl<'a> Input<'a> {
         Ok(bytes)
     }
 
-    /// Cells behind their keyword, as either version has them.
+    /// Cells after their keyword, in either version.
     fn cells(&mut self) -> Result<Cells, Reason> {
         let (first, second) = (self.count()?, self.count()?);
         let (rest, line) = (self.rest, self.line);
@@ -244,7 +245,7 @@ impl<'a> Input<'a> {
         Cells::from_counts(&numbers, first).map_err(|why| self.here(&why))
     }
 
-    /// Values of an array of a field behind its counts: strings, or nothing where they are numbers, which nobody needs.
+    /// Values of an array of a field after its counts: strings, or nothing for numbers, which are not needed.
     fn field(&mut self, count: usize) -> Result<Vec<String>, Reason> {
         let kind = self.word();
         if kind == "bit" {
@@ -267,8 +268,8 @@ impl<'a> Input<'a> {
         Ok(values)
     }
 
-    /// A string of a binary file: its length takes 1, 2, 4 or 8 bytes, as the first two bits say (`vtkDataReader::DecodeString` and
-    /// its like).
+    /// A string of a binary file: its length takes 1, 2, 4 or 8 bytes, as encoded in the first two bits
+    /// (`vtkDataReader::DecodeString` and related functions).
     fn string(&mut self) -> Result<String, Reason> {
         let first = self.rest.first().copied().unwrap_or_default();
         let (kind, bits) = match first >> 6 {
@@ -284,7 +285,7 @@ impl<'a> Input<'a> {
         Ok(String::from_utf8_lossy(bytes).into_owned())
     }
 
-    /// Passes over lines up to an empty one.
+    /// Skips lines up to an empty one.
     fn skip_paragraph(&mut self) {
         self.end_line();
         while !self.rest.is_empty() && !self.take_line().trim().is_empty() {}

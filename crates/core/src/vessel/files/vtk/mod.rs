@@ -1,7 +1,7 @@
 //! Surfaces of VTK, as ParaView, 3D Slicer, SimVascular and VMTK write them: XML (`.vtp`) and the older format (`.vtk`).
 //!
-//! By hand, because the crate for them (vtkio 0.6) ends the program on files that are damaged, and knows neither padded parts of
-//! base64 nor the cells of legacy files since version 5.
+//! Own implementation, because the crate for them (vtkio 0.6) aborts on damaged files, and supports neither padded
+//! parts of base64 nor the cells of legacy files since version 5.
 
 mod arrays;
 mod legacy;
@@ -13,11 +13,11 @@ use super::scalar::index;
 pub(super) use legacy::parse as parse_legacy;
 pub(super) use xml::parse as parse_xml;
 
-/// What to do about data that are no surface.
+/// What to do about data that are not a surface.
 const EXTRACT: &str =
     "extract its surface (ParaView: Extract Surface; vtkDataSetSurfaceFilter) and write that";
 
-/// Corners of many cells, one cell after another, and where each cell ends among them.
+/// Corners of many cells, one cell after another, and the end of each cell among them.
 #[derive(Debug, Default)]
 struct Cells {
     corners: Vec<i64>,
@@ -25,7 +25,7 @@ struct Cells {
 }
 
 impl Cells {
-    /// Cells from their corners and ends, as XML files have them.
+    /// Cells from their corners and ends, as in XML files.
     fn from_ends(corners: &[f64], ends: &[f64]) -> Result<Self, Reason> {
         let corners: Vec<i64> = corners.iter().copied().map(index).collect();
         let mut cells = Self { corners, ends: Vec::with_capacity(ends.len()) };
@@ -43,7 +43,7 @@ impl Cells {
         Ok(cells)
     }
 
-    /// Cells from the count of each and its corners, as older legacy files have them.
+    /// Cells from the count of each and its corners, as in older legacy files.
     fn from_counts(numbers: &[f64], count: usize) -> Result<Self, Reason> {
         let mut cells = Self::default();
         let mut rest = numbers;

@@ -1,4 +1,4 @@
-//! Files of VTK in all of their encodings, made here as VTK 9 makes them.
+//! Files of VTK in all of their encodings, written here as VTK 9 does.
 
 use std::io::Write;
 
@@ -9,7 +9,7 @@ use super::super::scalar::Order;
 use super::*;
 use crate::vessel::SurfaceMesh;
 
-/// Points of a strip of squares; the last but one is used by no polygon.
+/// Points of a strip of squares; no polygon uses the last but one.
 const POINTS: [f32; 18] =
     [0.0, 0.0, 0.0, 1.0, 0.0, 0.25, 0.0, 1.0, 0.0, 1.0, 1.0, 0.5, 0.0, 2.0, 0.0, 1.0, 2.0, -1.5];
 /// A quadrilateral, a triangle, and a strip of two triangles.
@@ -35,7 +35,7 @@ fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// LZ4 that packs nothing: literals alone.
+/// LZ4 without compression: literals alone.
 fn lz4(bytes: &[u8]) -> Vec<u8> {
     let mut packed = vec![(bytes.len().min(15) << 4) as u8];
     if let Some(mut more) = bytes.len().checked_sub(15) {
@@ -49,7 +49,7 @@ fn lz4(bytes: &[u8]) -> Vec<u8> {
     packed
 }
 
-/// How arrays are written.
+/// Encoding of arrays.
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     order: Order,
@@ -90,7 +90,7 @@ impl Kept {
 
     /// An array with its header.
     fn packed(self, bytes: &[u8]) -> [Vec<u8>; 2] {
-        /// Short, so that arrays have several.
+        /// Small, so that arrays have several blocks.
         const BLOCK: usize = 16;
         if self.compressor.is_empty() {
             return [[self.counts(&[bytes.len()]), bytes.to_vec()].concat(), Vec::new()];
@@ -159,7 +159,7 @@ fn xml_is_read_in_every_encoding() {
         let parsed = parse_xml(&kept.file()).unwrap_or_else(|why| panic!("{kept:?}: {why}"));
         assert!(is_right(&parsed.mesh), "{kept:?}: {:?}", parsed.mesh);
     }
-    // The twin: bytes in another order are another surface, or none.
+    // Counter-check: bytes in another order are another surface, or none.
     let little = Kept { order: Order::Little, wide: false, compressor: "", place: "raw" }.file();
     let at = little.windows(12).position(|window| window == b"LittleEndian").unwrap();
     let mut wrong = little.clone();
@@ -234,7 +234,7 @@ fn what_is_no_surface_is_told() {
     }
 }
 
-/// A legacy file with cells as versions before 5 have them, or since.
+/// A legacy file with cells as in versions before 5, or since.
 fn legacy(is_binary: bool, is_new: bool) -> Vec<u8> {
     let mut file = format!(
         "# vtk DataFile Version {}\ntitle\n{}\nDATASET POLYDATA\n",

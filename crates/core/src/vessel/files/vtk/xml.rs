@@ -10,13 +10,13 @@ use super::{Cells, EXTRACT};
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 
-/// What ends the XML where data are appended, which are none.
+/// The element with appended data, which are not XML.
 const APPENDED: &[u8] = b"<AppendedData";
 
 pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     let appended = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
     let (head, tail) = bytes.split_at(appended.unwrap_or(bytes.len()));
-    // Comments may be in any encoding; what counts is ASCII.
+    // Comments may be in any encoding; only ASCII matters.
     let mut text = String::from_utf8_lossy(head).into_owned();
     if appended.is_some() {
         text += "</VTKFile>";
@@ -78,12 +78,12 @@ fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
-/// The array of a name.
+/// The array with this name.
 fn named<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.attribute("Name") == Some(name))
 }
 
-/// What is appended in `AppendedData`, behind the underscore that it begins with, and whether it is base64.
+/// The data appended in `AppendedData`, after its initial underscore, and whether they are base64.
 fn data_in(element: &[u8]) -> Option<(&[u8], bool)> {
     let end = element.iter().position(|byte| *byte == b'>')?;
     let is_raw = element[..end].windows(3).any(|window| window == b"raw");
@@ -91,10 +91,10 @@ fn data_in(element: &[u8]) -> Option<(&[u8], bool)> {
     Some((&element[begin + 1..], !is_raw))
 }
 
-/// Cells of a kind; none where a piece has none.
+/// Cells of a kind; empty if a piece has none.
 fn cells(piece: Node<'_, '_>, kind: &str, encoding: &Encoding<'_>) -> Result<Cells, Reason> {
     let Some(list) = child(piece, kind) else { return Ok(Cells::default()) };
-    // Where none are counted, arrays may say anything.
+    // If the count is zero, arrays may contain anything.
     if piece.attribute(format!("NumberOf{kind}").as_str()).is_some_and(|count| count.trim() == "0") {
         return Ok(Cells::default());
     }

@@ -1,0 +1,54 @@
+//! Fields as scenes and Python name them.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Field, Magnet, Weight};
+use crate::{Result, Vec3};
+
+/// One of the fields that are there, by its numbers: `[[field]]` of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum FieldSpec {
+    /// A length of an instrument that is magnetised along its axis, in a uniform magnetic field ([`Magnet`]).
+    Magnet {
+        /// Number of the instrument, the innermost is 0.
+        #[serde(default)]
+        instrument: usize,
+        /// Where the magnet begins, from the tip, mm.
+        #[serde(default)]
+        start_mm: f64,
+        /// Where it ends, from the tip, mm.
+        end_mm: f64,
+        /// Its dipole moment towards the tip, A·m².
+        moment_am2: f64,
+        /// The field, T.
+        field_t: [f64; 3],
+    },
+    /// A dead force per length of all of an instrument ([`Weight`]).
+    Weight {
+        /// Number of the instrument, the innermost is 0.
+        #[serde(default)]
+        instrument: usize,
+        /// The force, N/mm.
+        force_n_per_mm: [f64; 3],
+    },
+}
+
+impl FieldSpec {
+    /// The field.
+    ///
+    /// # Errors
+    /// As [`Magnet::new`] and [`Weight::new`].
+    pub fn field(&self) -> Result<Arc<dyn Field>> {
+        Ok(match *self {
+            Self::Magnet { instrument, start_mm, end_mm, moment_am2, field_t } => {
+                Arc::new(Magnet::new(instrument, start_mm..end_mm, moment_am2, Vec3::from(field_t))?)
+            }
+            Self::Weight { instrument, force_n_per_mm } => {
+                Arc::new(Weight::new(instrument, Vec3::from(force_n_per_mm))?)
+            }
+        })
+    }
+}
