@@ -77,7 +77,8 @@ pub use nalgebra;
 pub use scene::Scene;
 pub use shape::Shape;
 pub use vessel::{
-    CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution, SurfaceMesh, SweptVessel, VesselMotion, Wall, anatomy,
+    CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution, SurfaceMesh, SweptVessel, VesselMotion, Wall,
+    anatomy,
 };
 
 /// A point or direction in space, millimetres or unit length as its name says.

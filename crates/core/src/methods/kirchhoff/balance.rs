@@ -85,7 +85,7 @@ impl Balance {
 
     /// Energy that is stored or was dissipated beyond what was put in, mJ: a relaxation that stops on its way may be higher than where it began, and the
     /// rest of it gives the difference back.
-    pub(super) fn borrowed_mj(&self, (dissipated_mj, released_mj): (f64, f64)) -> f64 {
-        (dissipated_mj + released_mj - (self.mean_mj - self.stored_mj)).max(0.0)
+    pub(super) fn borrowed_mj(&self, lost_mj: f64) -> f64 {
+        (lost_mj - (self.mean_mj - self.stored_mj)).max(0.0)
     }
 }

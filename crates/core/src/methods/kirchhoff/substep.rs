@@ -213,6 +213,28 @@ impl<const C: usize> Tools<C> {
         inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
     }
 
+    /// Energy dissipated by friction on the wall, and of loops on each other, at least and at most, mJ.
+    fn dissipated_mj(&self, mesh: &Mesh, rod: &RodState) -> (f64, f64) {
+        let on_wall = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        let on_loops = self.loops.dissipated_mj();
+        (on_wall.0 + on_loops.0, on_wall.1 + on_loops.1)
+    }
+
+    /// The energy balance of a part in which the wall moved, the drag did `aside_mj`, and friction dissipated this at least and at most.
+    fn balance(
+        &self,
+        environment: &Environment<'_>,
+        (was, is): (Start<'_>, Start<'_>),
+        (left, aside_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
+        rubbed_mj: (f64, f64),
+    ) -> Balance {
+        let reports = (&was.state.report, &is.state.report);
+        let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
+        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
+        let by_fields = work_of_fields(environment, was, is);
+        Balance::new(environment.surroundings.stack, reports, by_wall.with(by_fields), rubbed_mj)
+    }
+
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
     pub(super) fn try_step(
         &mut self,
@@ -250,8 +272,8 @@ impl<const C: usize> Tools<C> {
         }
         self.newton.neighbourhood.bounds = near;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-        let coils = !self.joined.is_empty();
-        let mut free = coils.then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1));
+        let mut free =
+            (!self.joined.is_empty()).then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1));
         let mut fields = environment.field_load(&*mesh);
         let free = free.as_mut().map(|free| free as &mut dyn External);
         let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
@@ -302,31 +324,22 @@ impl<const C: usize> Tools<C> {
             }
             return Err(wrong);
         }
-        let (least_mj, most_mj) = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        let (least_mj, most_mj) = self.dissipated_mj(mesh, rod);
         let farthest_mm = self.newton.neighbourhood.farthest(rod);
-        let (least_loops_mj, most_loops_mj) = self.loops.dissipated_mj();
-        let (least_mj, most_mj) = (least_mj + least_loops_mj, most_mj + most_loops_mj);
         let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
         let elsewhere_mj = between_mj + self.write_report(environment, hands, next);
-        if found.residual > AT_REST {
-            hold_hands(&start.state.report, &mut next.parts().1.report);
-        }
+        hold_hands(found.residual, &start.state.report, &mut next.parts().1.report);
         let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
-        let by_fields = work_of_fields(environment, start, next.start());
+        let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
         let after = next.parts().1;
-        let reports = (&start.state.report, &after.report);
-        let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
-        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
-        let balance = Balance::new(surroundings.stack, reports, by_wall.with(by_fields), rubbed_mj);
         let lacks = balance.lacks();
         if near && lacks {
             return Err(Lost::Unbalanced);
         }
         let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
-        let lost_mj = balance.lost_mj(jumps);
-        let (dissipated_mj, released_mj) = lost_mj;
-        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(lost_mj) };
+        let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
+        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(dissipated_mj + released_mj) };
         let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
         let residual = found.residual;
@@ -334,8 +347,12 @@ impl<const C: usize> Tools<C> {
     }
 }
 
-/// Keeps the hand forces of the last equilibrium: those of a state that is not at rest are arbitrary, and would count as work.
-fn hold_hands(before: &StepReport, after: &mut StepReport) {
+/// Keeps the hand forces of the last equilibrium where the residual says that the device is not at rest: its own are arbitrary, and would
+/// count as work.
+fn hold_hands(residual: f64, before: &StepReport, after: &mut StepReport) {
+    if residual <= AT_REST {
+        return;
+    }
     (after.push_force_n, after.torque_nmm) = (before.push_force_n, before.torque_nmm);
     for (was, is) in before.instruments.iter().zip(&mut after.instruments) {
         (is.push_force_n, is.torque_nmm) = (was.push_force_n, was.torque_nmm);
