@@ -119,9 +119,9 @@ def ticks(n, steps, solves):
     """Two instruments at 1 kHz in the arch and, with --surface, in another vessel: hands go to and fro and turn, with new speeds every 60 ms, and rest for 20 ms
     before that; how long ticks take, how far hands are ahead, and how far tips at rest are from where they come to with hands held still."""
     cases = [("arch", two_instruments(endowire.Vessel.generate("aortic_arch"), (260.0, 230.0)))]
-    if told.surface:
-        vessel = endowire.Vessel.read(told.surface)
-        cases.append((told.surface, two_instruments(vessel, (40.0, 25.0), opening=told.opening)))
+    if args.surface:
+        vessel = endowire.Vessel.read(args.surface)
+        cases.append((args.surface, two_instruments(vessel, (40.0, 25.0), opening=args.opening)))
     for name, both in cases:
         rng = np.random.default_rng(1)
         took_ms, behind_mm, off_mm = np.empty(steps), np.zeros(steps), []
@@ -233,6 +233,6 @@ if __name__ == "__main__":
     parser.add_argument("--solves", type=int, help="linear solves of a step (of environments, pushes and ticks)")
     parser.add_argument("--surface", help="a vessel beside the arch, for ticks")
     parser.add_argument("--opening", type=int, default=0, help="where it is entered")
-    told = parser.parse_args()
-    for one in told.parts:
-        PARTS[one](told.simulations, told.steps, told.solves)
+    args = parser.parse_args()
+    for one in args.parts:
+        PARTS[one](args.simulations, args.steps, args.solves)

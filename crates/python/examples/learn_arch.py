@@ -4,7 +4,7 @@
     python crates/python/examples/learn_arch.py evaluate out/learn       # what has been learnt, and what does not learn, on unseen arches
     python crates/python/examples/learn_arch.py plot out/learn           # the curve
 
-Of several folders, `out/learn-1 out/learn-2 …`, each is learnt in its turn from a seed of its own, and `evaluate` and `plot` tell of all of them.
+Of several folders, `out/learn-1 out/learn-2 …`, each is learnt in its turn from a seed of its own, and `evaluate` and `plot` cover all of them.
 
 What is learnt: SAC, whose memory begins with episodes of a hand of the library that follows the centre line and with random ones. The policy sees a
 roadmap of the way ahead from the tip, and its last action; nothing of the wall. It learns on a hundred arches that are kept, with rewards of its own;
@@ -29,8 +29,6 @@ from endowire.gym.sb3 import Learned, SB3VecEnv
 #: Episodes of evaluation, each in the arch of its seed; arches that are learnt on come from the seed of learning.
 EVALUATED = range(900_000, 901_000)
 ENVIRONMENTS = 16
-#: Linear solves of a step that is learnt from: a few steps take seconds, and the other environments would wait.
-SOLVES = 30
 #: Steps of each environment with which the memory begins: of the hand, and random ones.
 FIRST = {"follow": 150, "random": 60}
 SEEN = {"roadmap": observations.Roadmap(), "last_action": observations.LastAction()}
@@ -55,7 +53,7 @@ CURVE, EVERY = ("steps", "processor_s", "reached", "return"), 1024
 
 
 def learning_task(seed):
-    """Arches that are kept, five times the reward for the way against that at its end, and steps of a fixed cost."""
+    """Arches that are kept, five times the reward for the way against that at its end, and an end where steps take seconds."""
     left = ends.LeftVessel()
     # It leads nowhere: the learner shall not guess what would come after it.
     left.terminates = True
@@ -63,8 +61,7 @@ def learning_task(seed):
         vessels=arches.ArchVariety(count=100, seed=seed),
         observations=SEEN,
         rewards=[rewards.Reached(2.0), rewards.EachStep(-0.01), rewards.Approach(0.01)],
-        ends=[ends.TargetReached(), left, ends.StepLimit(250)],
-        solves=SOLVES,
+        ends=[ends.TargetReached(), left, ends.Laborious(), ends.StepLimit(250)],
     )
 
 
@@ -202,15 +199,15 @@ def evaluate(out, episodes, names, most_s):
                 policy = Patient(known_policy(out, name, seed), most_s)
                 began = time.process_time()
                 (outcome,) = evaluation.evaluate(unseen_task(), policy, [seed])
-                told = {"policy": name, **vars(outcome), "out_of_time": policy.given_up}
-                rows.append({**told, "processor_s": round(time.process_time() - began, 2)})
+                row = {"policy": name, **vars(outcome), "out_of_time": policy.given_up}
+                rows.append({**row, "processor_s": round(time.process_time() - began, 2)})
                 writer.writerow(rows[-1])
                 appended.flush()
-            arrived[name] = tell(name, [row for row in rows if row["policy"] == name])
+            arrived[name] = summarise(name, [row for row in rows if row["policy"] == name])
     return arrived
 
 
-def tell(name, rows):
+def summarise(name, rows):
     reached = [row for row in rows if str(row["reached"]) == "True"]
     low, high = evaluation.interval(len(reached), len(rows))
     safe = sum(str(row["safe_success"]) == "True" for row in rows)
@@ -256,22 +253,22 @@ def main():
     )
     parser.add_argument("--most-s", type=float, default=30.0, help="processor time of an episode")
     parser.add_argument("--picture", type=Path)
-    told = parser.parse_args()
+    args = parser.parse_args()
     torch.set_num_threads(1)
-    if told.what == "train":
-        for k, out in enumerate(told.out):
-            train(out, told.minutes, told.seed + k)
-    elif told.what == "evaluate":
+    if args.what == "train":
+        for k, out in enumerate(args.out):
+            train(out, args.minutes, args.seed + k)
+    elif args.what == "evaluate":
         # What does not learn is the same for all seeds.
         arrived = [
-            evaluate(out, told.episodes, ["learnt"] if k else told.policies, told.most_s)
-            for k, out in enumerate(told.out)
+            evaluate(out, args.episodes, ["learnt"] if k else args.policies, args.most_s)
+            for k, out in enumerate(args.out)
         ]
         if len(arrived) > 1:
             learnt = [of.get("learnt", 0) for of in arrived]
-            print(f"learnt, of {told.episodes}: {learnt}, mean {np.mean(learnt):.1f}")
+            print(f"learnt, of {args.episodes}: {learnt}, mean {np.mean(learnt):.1f}")
     else:
-        plot(told.out, told.picture or told.out[0] / "curve.png")
+        plot(args.out, args.picture or args.out[0] / "curve.png")
 
 
 if __name__ == "__main__":

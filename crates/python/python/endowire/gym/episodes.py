@@ -116,12 +116,12 @@ class Episodes:
         moves[..., 0] = np.clip(moves[..., 0], -inserted_mm, self._lengths_mm - inserted_mm)
         moves[~moving] = 0.0
         solves = self.task.solves
-        told = self.batch.step(moves) if solves is None else self.batch.tick(moves, solves)
+        stopped = self.batch.step(moves) if solves is None else self.batch.tick(moves, solves)
         # Where the way ends an instrument stays, and may be pulled back.
-        self.failures = {k: failure for k, failure in told.items() if not isinstance(failure, EndOfWay)}
+        self.failures = {k: failure for k, failure in stopped.items() if not isinstance(failure, EndOfWay)}
         self.steps += moving
         if self.task.assessed:
-            moves[list(told)] = 0.0
+            moves[list(stopped)] = 0.0
             noted = [record if moves_now else None for record, moves_now in zip(self.records, moving, strict=True)]
             self.batch.note(noted, moves, self.steps * self.task.control_period_s)
         self.safe_steps += moving & (self.batch.largest_contact_force_n <= self.task.force_limit_n)
@@ -166,32 +166,32 @@ class Episodes:
         return terminated, truncated
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """What is told beside the observations, a row for each environment; after `ended`, which says which episodes are over."""
+        """Information beside the observations, a row for each environment; call it after `ended`, which says which episodes are over."""
         failed = np.array([str(self.failures.get(k, "")) for k in range(len(self.sites))], dtype=object)
         safety = np.where(self.steps > 0, self.safe_steps / np.maximum(self.steps, 1), 1.0)
-        told = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
-        told |= {"safety": safety, "failure": failed}
-        told |= {"steps": self.steps.copy(), "path_length_mm": self.path_length_mm.copy()}
-        told |= {"behind_mm": np.abs(self.batch.behind[..., 0]).max(axis=1)}
-        told |= {"wall_force_n": self.force_n[:, 0].copy(), "tip_force_n": self.force_n[:, 1].copy()}
-        told |= {
+        info = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
+        info |= {"safety": safety, "failure": failed}
+        info |= {"steps": self.steps.copy(), "path_length_mm": self.path_length_mm.copy()}
+        info |= {"behind_mm": np.abs(self.batch.behind[..., 0]).max(axis=1)}
+        info |= {"wall_force_n": self.force_n[:, 0].copy(), "tip_force_n": self.force_n[:, 1].copy()}
+        info |= {
             "largest_wall_force_n": self.largest_force_n[:, 0].copy(),
             "largest_tip_force_n": self.largest_force_n[:, 1].copy(),
         }
         # Every force of the episode below the task's limit; the tip's is a sum of contacts, and may be above where none of them is.
         is_safe = (self.largest_force_n <= self.task.force_limit_n).all(axis=1)
-        # A clock's time is that of no seed: it is told of episodes that are over.
+        # A clock's time is that of no seed: it is given for episodes that are over.
         took_s = np.where(self._over, perf_counter() - self._begun_s, 0.0)
-        told |= {"safe_success": self.reached & is_safe, "wall_time_s": took_s}
+        info |= {"safe_success": self.reached & is_safe, "wall_time_s": took_s}
         if self.task.assessed:
-            told["assessment"] = np.full(len(self.sites), None, dtype=object)
+            info["assessment"] = np.full(len(self.sites), None, dtype=object)
             for k in np.flatnonzero(self._over):
                 record, vessel = self.records[k], self.sites[k].vessel
                 if record is not None:
-                    told["assessment"][k] = record.assess(vessel, self.target_mm[k], self.task.threshold_mm)
+                    info["assessment"][k] = record.assess(vessel, self.target_mm[k], self.task.threshold_mm)
         if self.task.stand_in:
-            told["stand_in"] = np.full(len(self.sites), self.task.stand_in, dtype=object)
-        return told
+            info["stand_in"] = np.full(len(self.sites), self.task.stand_in, dtype=object)
+        return info
 
     def _look(self) -> None:
         self.tip_mm = self.batch.tip_mm

@@ -111,7 +111,7 @@ def table(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def interval(successes: int, episodes: int, z: float = 1.959964) -> tuple[float, float]:
-    """The interval of Wilson (1927) for a share, of 95 % unless told: it holds near 0 and 1, too.
+    """The interval of Wilson (1927) for a share, of 95 % by default: it holds near 0 and 1, too.
 
     Raises InputError where there is no episode, and for successes that are not among them.
     """

@@ -32,7 +32,7 @@ _FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 _FINEST_RATE = 10_000
 #: Key frames follow one another so closely that a single frame is read quickly; crf 18 leaves the noise of pictures.
 _CODEC, _OPTIONS = "libx264", {"g": "2", "crf": "18", "threads": "1"}
-#: What is told of each step beside observation and action.
+#: What is recorded of each step beside observation and action.
 _OF_STEP = {"next.reward": "float32", "next.done": "bool", "next.truncated": "bool", "next.success": "bool"}
 #: Where each step is.
 _PLACE = {
@@ -86,14 +86,14 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        told = self.env.reset(seed=seed, options=options)
+        result = self.env.reset(seed=seed, options=options)
         self._end()
-        self._observed = told[0]
-        return told
+        self._observed = result[0]
+        return result
 
     def step(self, action: NDArray[Any]) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        told = self.env.step(action)
-        observed, reward, terminated, truncated, info = told
+        result = self.env.step(action)
+        observed, reward, terminated, truncated, info = result
         row: dict[str, Any] = {"action": self._inner._episodes.action[0].ravel().astype(np.float32)}
         if self._vectors:
             parts = [np.ravel(self._observed[name]) for name in self._vectors]
@@ -105,7 +105,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             self._shoot(key, self._observed[name][plane])
         self._rows.append(row)
         self._observed = observed
-        return told
+        return result
 
     def close(self) -> None:
         self._end()

@@ -34,7 +34,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        told = self.env.reset(seed=seed, options=options)
+        result = self.env.reset(seed=seed, options=options)
         self._end()
         self._number += 1
         recording = rerun.RecordingStream("endowire", recording_id=f"episode {self._number}")
@@ -50,12 +50,12 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         recording.log("vessel", wall, static=True)
         target = rerun.Points3D(episodes.target_mm, radii=self._inner.task.threshold_mm)
         recording.log("target", target, static=True)
-        self._log({"way_mm": told[1]["way_mm"]})
-        return told
+        self._log({"way_mm": result[1]["way_mm"]})
+        return result
 
     def step(self, action: NDArray[Any]) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        told = self.env.step(action)
-        _, reward, _, _, info = told
+        result = self.env.step(action)
+        _, reward, _, _, info = result
         episodes = self._inner._episodes
         numbers = {"reward": float(reward), "way_mm": info["way_mm"]}
         numbers["largest_contact_force_n"] = episodes.batch.largest_contact_force_n[0]
@@ -64,7 +64,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             force_n = episodes.batch.push_force_n[0, k]
             numbers[f"instrument_{k}/push_force_n"] = force_n
         self._log(numbers)
-        return told
+        return result
 
     def close(self) -> None:
         self._end()

@@ -92,8 +92,8 @@ class SB3VecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def _infos(self) -> list[dict[str, Any]]:
-        told = self.episodes.info()
-        return [{name: values[k] for name, values in told.items()} for k in range(self.num_envs)]
+        info = self.episodes.info()
+        return [{name: values[k] for name, values in info.items()} for k in range(self.num_envs)]
 
 
 class Learned:

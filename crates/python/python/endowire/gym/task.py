@@ -76,7 +76,7 @@ class Task:
     view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
     #: Whether ``info["assessment"]`` tells the measures of an episode that is over, as `endowire.assess` does of a recorded run.
     assessed: bool = False
-    #: What the vessel stands in for, where it is not that of the task's name; told in ``info["stand_in"]``.
+    #: What the vessel stands in for, where it is not that of the task's name; reported in ``info["stand_in"]``.
     stand_in: str = ""
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     """``num_envs`` environments of a task. Environment k does to the bit what `InsertionEnv` does with the same seed.
 
     An environment whose episode has ended begins a new one in the next step, whose action it does not look at (AutoresetMode.NEXT_STEP).
-    What fails in one is told in ``info["failure"]`` and truncates its episode; the others go on.
+    A failure of one environment is reported in ``info["failure"]`` and truncates its episode; the others go on.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 8, "autoreset_mode": AutoresetMode.NEXT_STEP}

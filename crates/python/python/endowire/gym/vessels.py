@@ -68,7 +68,7 @@ class FixedVessel:
 
     def __init__(self, vessel: Vessel, centreline: NDArray[np.float64] | None = None, **sheath: Any) -> None:
         """A vessel with the centre line it was made from, or another one (x, y, z, radius, parent; shape (n, 5)). In one of a surface alone it is found
-        in the lumen, from the sheath's ``opening`` if that is told.
+        in the lumen, from the sheath's ``opening`` if that is given.
 
         Raises InputError for a surface in which none is found.
         """
