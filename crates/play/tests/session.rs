@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use endowire_core::Vec3;
 use endowire_core::insertion::{Injection, Simulation, Step};
@@ -83,8 +84,10 @@ fn replayed(scene: Scene, session: &Session) -> Simulation {
 
 /// The same, with what was injected.
 fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation, Vec<Injection>) {
-    let file =
-        std::env::temp_dir().join(format!("endowire-played-{}-{}.toml", scene.name, std::process::id()));
+    // Tests run side by side, several of them with the same scene.
+    static FILES: AtomicUsize = AtomicUsize::new(0);
+    let number = FILES.fetch_add(1, Ordering::Relaxed);
+    let file = std::env::temp_dir().join(format!("endowire-played-{}-{number}.toml", std::process::id()));
     std::fs::write(&file, session.script()).unwrap();
     scene.take_script(&file).unwrap();
     std::fs::remove_file(&file).unwrap();
