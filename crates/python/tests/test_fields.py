@@ -46,7 +46,7 @@ def test_copies_and_pickles_stay_in_the_field(simulation):
     ("wrong", "says"),
     [
         ({"kind": "magnet", "end_mm": 4.0, "moment_am2": 4e-3, "field_t": [50.0, 0.0, 0.0]}, "field_t = 50"),
-        ({"kind": "weight", "force_n_per_mm": [float("nan"), 0.0, 0.0]}, "force_n_per_mm"),
+        ({"kind": "weight", "force_n_per_mm": [float("nan"), 0.0, 0.0]}, "every number must be finite"),
         ({"kind": "weight", "instrument": 3, "force_n_per_mm": [0.0, 0.0, 1e-5]}, "none of the 1 instruments"),
         ({"kind": "wind"}, "wind"),
     ],

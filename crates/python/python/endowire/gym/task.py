@@ -85,8 +85,10 @@ class Task:
         if self.observed not in ("scaled", "physical"):
             raise InputError(f"observed = {self.observed!r}: give scaled or physical")
 
-        for name in ("threshold_mm", "force_limit_n", "control_period_s"):
+        for name in ("threshold_mm", "control_period_s"):
             _check_above_zero(name, getattr(self, name))
+        if np.isnan(self.force_limit_n):
+            raise InputError(f"force_limit_n = {self.force_limit_n!r}: must be a number")
         if len(self.speed_limits) != 2:
             raise InputError(f"speed_limits = {self.speed_limits!r}: give a push in mm/s and a turn in rad/s")
         for k, limit in enumerate(self.speed_limits):
