@@ -71,9 +71,8 @@ impl<'a> FieldLoad<'a> {
     pub fn energy_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
         let each = self.parts.iter().flat_map(|(field, weight, samples)| {
             samples.iter().map(move |sample| {
-                let more = field.density(&sample.point(elements, state)).value
-                    - field.density(&sample.at_the_mouth(state)).value;
-                weight * sample.weight_mm * more
+                let value = field.density(&sample.point(elements, state)).value;
+                weight * sample.weight_mm * (value - sample.reference(*field, state))
             })
         });
         each.sum()
@@ -94,9 +93,9 @@ impl Sample {
         )
     }
 
-    /// The same as it comes out of the sheath.
-    fn at_the_mouth(&self, state: &RodState) -> MaterialPoint {
-        self.placed(state.positions[0], state.frames[0].t)
+    /// Energy density of the same material at the sheath's mouth, mJ/mm.
+    fn reference(&self, field: &dyn Field, state: &RodState) -> f64 {
+        field.density(&self.placed(state.positions[0], state.frames[0].t)).value
     }
 
     fn placed(&self, position_mm: Vec3, tangent: Vec3) -> MaterialPoint {
@@ -107,8 +106,8 @@ impl Sample {
 
 impl External for FieldLoad<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        into.add_value(self.energy_mj(elements, state));
         self.sizes = Sizes::default();
+        let mut energy_mj = 0.0;
         for (field, weight, samples) in &self.parts {
             for of_element in samples.chunk_by(|a, b| a.element == b.element) {
                 let e = of_element[0].element;
@@ -116,6 +115,7 @@ impl External for FieldLoad<'_> {
                 for sample in of_element {
                     let weight = weight * sample.weight_mm;
                     let density = field.density(&sample.point(elements, state));
+                    energy_mj += weight * (density.value - sample.reference(*field, state));
                     self.sizes.force_n += weight * density.by_position.norm();
                     self.sizes.moment_nmm += weight * density.by_tangent.norm();
                     sum.add_directed((sample.xi, elements[e].length), weight, &density);
@@ -123,6 +123,7 @@ impl External for FieldLoad<'_> {
                 into.add_points(state, &elements[e], e, &sum);
             }
         }
+        into.add_value(energy_mj);
     }
 
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
