@@ -123,7 +123,7 @@ impl SelfContact {
             return false;
         };
         self.is_placed = false;
-        self.tree.place(&super::Curve { elements, state, closed: false });
+        self.tree.place(&super::Curve { elements, state, skins: &self.skins, closed: false });
         let tip = state.positions[last + 1];
         let from = tip - state.frames[last + 1].t * advance_mm;
         let reach_mm = |e: usize| 0.5 * (self.skins[e].radius_mm + self.skins[last].radius_mm);
@@ -136,7 +136,7 @@ impl SelfContact {
             return false;
         }
         self.is_placed = false;
-        let curve = |state| super::Curve { elements, state, closed: self.closed };
+        let curve = |state| super::Curve { elements, state, skins: &self.skins, closed: self.closed };
         self.tree.place(&curve(from));
         self.tree.move_to(&curve(to));
         self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0

@@ -2,11 +2,17 @@
 //!
 //! On an element of length h it is the cubic of [`hermite`], in the parameter s = h ξ. Neighbouring elements share
 //! position and tangent, so it is continuously differentiable in s, from one end of a rod to the other. Where several
-//! rods are solved together there are gaps between them, which are not elements of either.
+//! rods are solved together there are gaps between them, which are not elements of either. Where the radius changes
+//! abruptly, as at the tip of a catheter, the surface has a shoulder: a stretch ends there, as at the end of a rod.
 
+use super::Skin;
 use crate::Vec3;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
+
+/// Relative change of the radius between neighbouring elements above which the surface has a shoulder: elements of a
+/// taper differ by less.
+const SHOULDER: f64 = 0.1;
 
 /// A point on the centre line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +36,7 @@ pub(super) struct Jet {
 pub(super) struct Curve<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) state: &'a RodState,
+    pub(super) skins: &'a [Skin],
     /// Whether the rod is a ring: its end is its start.
     pub(super) closed: bool,
 }
@@ -61,24 +68,26 @@ impl Curve<'_> {
         [(x[e], frames[e].t), (x[e + 1], frames[e + 1].t)]
     }
 
-    /// The element before one on its rod.
+    /// The element before one on its stretch.
     pub(super) fn before(&self, e: usize) -> Option<usize> {
-        if e == 0 {
-            return self.closed.then(|| self.elements.len() - 1);
-        }
-        (!self.is_break(e - 1)).then_some(e - 1)
+        let before = if e == 0 { self.closed.then(|| self.elements.len() - 1) } else { Some(e - 1) };
+        before.filter(|before| self.goes_on(*before, e))
     }
 
-    /// The element after one on its rod.
+    /// The element after one on its stretch.
     pub(super) fn after(&self, e: usize) -> Option<usize> {
-        let next = e + 1;
-        if next == self.elements.len() {
-            return self.closed.then_some(0);
-        }
-        (!self.is_break(next)).then_some(next)
+        let after = if e + 1 == self.elements.len() { self.closed.then_some(0) } else { Some(e + 1) };
+        after.filter(|after| self.goes_on(*after, e))
     }
 
-    /// The point at a distance along the centre line from another, or the end if that comes first; and its distance.
+    /// Whether the surface of an element continues in a neighbour, which is no gap.
+    fn goes_on(&self, into: usize, from: usize) -> bool {
+        let [a, b] = [into, from].map(|e| self.skins[e].radius_mm);
+        !self.is_break(into) && (a - b).abs() <= SHOULDER * a.max(b)
+    }
+
+    /// The point at a distance along the centre line from another, or the end of the stretch if that comes first; and
+    /// its distance.
     pub(super) fn walk(&self, from: Place, by: f64) -> (Place, f64) {
         let Place { mut element, xi } = from;
         let mut s = xi * self.length_mm(element) + by;
@@ -98,7 +107,7 @@ impl Curve<'_> {
         (Place { element, xi: (s / self.length_mm(element)).clamp(0.0, 1.0) }, by + (inside - s))
     }
 
-    /// Whether a point is the end of the rod in this direction, 1 or −1.
+    /// Whether a point is the end of the stretch in this direction, 1 or −1.
     pub(super) fn ends(&self, place: Place, direction: f64) -> bool {
         if direction > 0.0 {
             place.xi == 1.0 && self.after(place.element).is_none()

@@ -25,30 +25,38 @@ impl SelfContact {
             self.pairs.clear();
             return;
         }
-        let curve = self.curve(elements, state);
         self.place_tree(elements);
         self.counters.searches += 1;
         let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
-        self.site_positions.clear();
-        self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
         let mut near = std::mem::take(&mut self.near);
         self.tree.near(reach_mm, self.apart_mm(), &mut near);
         self.counters.elements += near.len() as u64;
         std::mem::swap(&mut self.before, &mut self.pairs);
-        self.pairs.clear();
+        let mut pairs = std::mem::take(&mut self.pairs);
+        pairs.clear();
+        let curve = Curve { elements, state, skins: &self.skins, closed: self.closed };
+        self.site_positions.clear();
+        self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
         for (a, b) in &near {
-            self.find_between(&curve, *a, *b, reach_mm);
-            self.find_between(&curve, *b, *a, reach_mm);
+            self.find_between(&curve, (*a, *b), reach_mm, &mut pairs);
+            self.find_between(&curve, (*b, *a), reach_mm, &mut pairs);
         }
-        self.near = near;
+        (self.near, self.pairs) = (near, pairs);
         self.pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
-        self.pairs.dedup_by(|q, p| p.site == q.site && (q.arc_mm - p.arc_mm).abs() < TWICE * p.touch_mm);
+        self.pairs.dedup_by(|q, p| {
+            let same = p.site == q.site && (q.arc_mm - p.arc_mm).abs() < TWICE * p.touch_mm;
+            // At a shoulder the thicker side is felt.
+            if same && q.depth_mm() > p.depth_mm() {
+                std::mem::swap(q, p);
+            }
+            same
+        });
         self.counters.pairs += self.pairs.len() as u64;
         self.remember();
     }
 
     /// Finds the pairs of the sites of element `a` with element `b`: minima within `b` of the distance from a site.
-    fn find_between(&mut self, curve: &Curve<'_>, a: usize, b: usize, reach_mm: f64) {
+    fn find_between(&self, curve: &Curve<'_>, (a, b): (usize, usize), reach_mm: f64, into: &mut Vec<Pair>) {
         let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
         for site in self.first_sites[a]..self.first_sites[a + 1] {
             let x = self.site_positions[site];
@@ -67,7 +75,7 @@ impl SelfContact {
             let place = self.sites[site].place;
             let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, touch_mm);
             if gap.distance < KNOWN * touch_mm {
-                self.pairs.extend(self.pair(curve, site, gap, touch_mm));
+                into.extend(self.pair(curve, site, gap, touch_mm));
             }
         }
     }
@@ -124,7 +132,7 @@ impl SelfContact {
     /// Places the hierarchy at the base, if it is not there yet.
     pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
         if !std::mem::replace(&mut self.is_placed, true) {
-            self.tree.place(&Curve { elements, state: &self.base, closed: self.closed });
+            self.tree.place(&Curve { elements, state: &self.base, skins: &self.skins, closed: self.closed });
         }
     }
 
@@ -135,7 +143,7 @@ impl SelfContact {
             return *part;
         }
         self.place_tree(elements);
-        self.tree.move_to(&Curve { elements, state: to, closed: self.closed });
+        self.tree.move_to(&Curve { elements, state: to, skins: &self.skins, closed: self.closed });
         let part = self.tree.safe_part(self.apart_mm());
         self.checked.0.copy_from(to);
         self.checked.1 = part;

@@ -215,8 +215,8 @@ impl SelfContact {
         Self { closed: true, ..self }
     }
 
-    fn curve<'a>(&self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
-        Curve { elements, state, closed: self.closed }
+    fn curve<'a>(&'a self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
+        Curve { elements, state, skins: &self.skins, closed: self.closed }
     }
 
     /// Counts so far.

@@ -54,7 +54,7 @@ impl SelfContact {
         moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
-        let curve = Curve { elements, state: base, closed: self.closed };
+        let curve = Curve { elements, state: base, skins: &self.skins, closed: self.closed };
         let mut changed = 0;
         for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
             pair.change_mm = pair.change(moved);

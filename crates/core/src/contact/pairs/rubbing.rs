@@ -154,8 +154,8 @@ impl SelfContact {
         let Rubbing { begun, advances_mm, renewal, least_n, .. } = &self.rubbing;
         let follows = renewal.follows();
         let (now, was) = (
-            Curve { elements, state, closed: self.closed },
-            Curve { elements, state: begun, closed: self.closed },
+            Curve { elements, state, skins: &self.skins, closed: self.closed },
+            Curve { elements, state: begun, skins: &self.skins, closed: self.closed },
         );
         let (mut change_n, mut sum_n) = (0.0, *least_n);
         for pair in &mut self.pairs {

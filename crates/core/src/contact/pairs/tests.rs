@@ -126,6 +126,33 @@ fn a_crossing_is_felt_the_same_wherever_sites_lie() {
 }
 
 #[test]
+fn a_thick_part_is_not_felt_beyond_its_shoulder() {
+    // A rod, thick up to x = 5, and another across it on its thin part, this far beyond the shoulder and above the axis.
+    let forces = |beyond: f64, high: f64| {
+        let (mut elements, mut state) = along(|x| Vec3::new(x, 0.0, 0.0), 10.0, 20);
+        let (others, other) = along(move |y| Vec3::new(5.0 + beyond, y - 3.03, high), 6.0, 12);
+        elements.push(ElementData::BREAK);
+        elements.extend(others);
+        state.join(&other);
+        let radius = |e: usize| if e < 10 { 0.3 } else { 0.1 };
+        let skin = |e: usize| Skin { radius_mm: radius(e), modulus_n_per_mm2: 40.0 };
+        let skins = (0..elements.len()).map(skin).collect();
+        let touching = SelfContact::new(&elements, skins).touching_at(&elements, &state);
+        (touching.iter().map(|t| t.force_n).sum::<f64>(), touching)
+    };
+    // A little above the thin part: free. Pressed in by a hundredth: that and no more, as far from the shoulder.
+    for beyond in [0.35, 0.5, 1.0, 3.0] {
+        assert_eq!(forces(beyond, 0.201).0, 0.0, "{beyond}");
+        let (force_n, touching) = forces(beyond, 0.199);
+        assert!((force_n / forces(3.0, 0.199).0 - 1.0).abs() < 0.05, "{beyond}: {force_n}");
+        assert!(touching.iter().all(|t| t.penetration_mm < 1.0001e-3), "{beyond}: {touching:?}");
+    }
+    // On the thick part, and over the rounded shoulder.
+    assert!(forces(-1.0, 0.399).0 > 0.0 && forces(-1.0, 0.401).0 == 0.0);
+    assert!(forces(0.2, 0.34).0 > 0.0 && forces(0.2, 0.35).0 == 0.0);
+}
+
+#[test]
 fn ends_that_meet_head_on_are_felt_as_near_as_they_are() {
     // Open rings with this gap whose ends face each other, or are offset.
     for (apart, aside) in [(0.19, 0.0), (0.15, 0.5), (0.0, 0.9), (0.12, 0.7)] {

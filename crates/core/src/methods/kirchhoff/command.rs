@@ -215,7 +215,7 @@ impl<const C: usize> Workspace<C> {
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
                     // No equilibrium: if the vessel is too narrow to go on, the error says so, here and below.
-                    if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
+                    if control.failed(part_mm, lost) || sum.substeps > SUBSTEP_LIMIT {
                         refuse_narrow(&at_start, was, &way.commands)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"

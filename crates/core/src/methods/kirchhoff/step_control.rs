@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::substep::{Effort, Found};
+use super::substep::{Effort, Found, Lost};
 
 /// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
 pub(super) const FOLD_MM: f64 = 0.05;
@@ -99,9 +99,11 @@ impl StepControl {
     }
 
     /// A part of this length failed. Returns whether there is nothing else to try.
-    pub(super) fn failed(&mut self, part_mm: f64) -> bool {
+    pub(super) fn failed(&mut self, part_mm: f64, lost: Lost) -> bool {
         if self.flight_mm.is_some() {
-            return true;
+            // A tip that would be pushed through a loop goes less far in a shorter part.
+            self.flight_mm = Some(0.5 * part_mm);
+            return lost != Lost::Beyond || part_mm <= LEAST_MM;
         }
         if self.has_friction && !self.stride.held && part_mm <= HELD_MM && self.budget > 0 {
             self.stride = Stride { part_mm, held: true };
@@ -129,6 +131,8 @@ impl StepControl {
 mod tests {
     use super::*;
 
+    const FAR: Lost = Lost::Unbalanced;
+
     fn control(part_mm: f64) -> StepControl {
         StepControl::new(100, Stride { part_mm, held: false }, false)
     }
@@ -151,7 +155,7 @@ mod tests {
     fn what_is_far_is_halved_and_what_is_much_nearer_doubled() {
         let mut control = control(10.0);
         assert_eq!(control.next(4.0), (Effort::Near, 4.0));
-        assert!(!control.failed(4.0));
+        assert!(!control.failed(4.0, FAR));
         assert_eq!(control.next(4.0), (Effort::Near, 2.0));
         control.succeeded(2.0, &found(0.5));
         assert_eq!(control.next(2.0), (Effort::Near, 2.0));
@@ -164,31 +168,31 @@ mod tests {
     #[test]
     fn friction_is_held_in_short_parts_until_the_device_need_not_slide() {
         let mut control = StepControl { has_friction: true, ..control(1.0) };
-        assert!(!control.failed(1.0));
+        assert!(!control.failed(1.0, FAR));
         assert_eq!(control.next(1.0), (Effort::Near, 0.5));
-        assert!(!control.failed(0.5));
+        assert!(!control.failed(0.5, FAR));
         assert_eq!(control.next(1.0), (Effort::Held, 0.5));
         control.succeeded(0.5, &Found { slides: 2, ..found(0.1) });
         assert_eq!(control.next(1.0), (Effort::Held, 1.0));
         control.succeeded(1.0, &found(0.5));
         assert_eq!(control.next(1.0), (Effort::Near, 1.0));
         // If that fails too, it is a fold.
-        assert!(!control.failed(FOLD_MM) && !control.failed(FOLD_MM));
+        assert!(!control.failed(FOLD_MM, FAR) && !control.failed(FOLD_MM, FAR));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
     }
 
     #[test]
     fn at_a_fold_it_moves_once_and_goes_on_as_before() {
         let mut control = control(0.06);
-        assert!(!control.failed(0.06));
+        assert!(!control.failed(0.06, FAR));
         assert_eq!(control.next(1.0).0, Effort::Near);
-        assert!(!control.failed(0.03));
+        assert!(!control.failed(0.03, FAR));
         assert_eq!(control.next(1.0), (Effort::Flight, 0.03));
         // With energy that nobody put in the part is shortened.
         assert!(control.can_shorten(0.03) && !control.can_shorten(LEAST_MM));
         control.shorten(0.03);
         assert!(matches!(control.next(1.0), (Effort::Near, part_mm) if part_mm <= 0.015));
-        assert!(!control.failed(0.015));
+        assert!(!control.failed(0.015, FAR));
         control.succeeded(0.015, &found(7.0));
         assert_eq!(control.next(1.0).0, Effort::Near);
     }
@@ -197,12 +201,22 @@ mod tests {
     fn in_a_jam_it_moves_on_and_what_does_not_come_to_rest_is_the_end() {
         let mut control = control(1.0);
         control.took(200);
-        assert!(!control.failed(1.0));
+        assert!(!control.failed(1.0, FAR));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
         control.succeeded(FOLD_MM, &found(0.01));
         assert_eq!(control.next(1.0), (Effort::Flight, 2.0 * FOLD_MM));
         control.succeeded(2.0 * FOLD_MM, &found(0.9));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
-        assert!(control.failed(FOLD_MM));
+        assert!(control.failed(FOLD_MM, FAR));
+    }
+
+    #[test]
+    fn a_tip_that_would_pass_a_loop_moves_less_and_less() {
+        let mut control = control(FOLD_MM);
+        assert!(!control.failed(FOLD_MM, Lost::Beyond));
+        assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
+        assert!(!control.failed(FOLD_MM, Lost::Beyond));
+        assert_eq!(control.next(1.0), (Effort::Flight, 0.5 * FOLD_MM));
+        assert!(control.failed(LEAST_MM, Lost::Beyond));
     }
 }
