@@ -1,10 +1,31 @@
 //! Uniform triangles of target size on the given surface.
 //!
-//! Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004: edges longer than 4/3 of the
-//! target are split, those shorter than 4/5 collapsed, edges flipped towards six neighbours (four on a rim), and
-//! vertices moved over the surface to the centroids of their surroundings, weighted by area over the fourth power of
-//! the target length (Du, Faber, Gunzburger, *SIAM Review* 41, 1999). Vertices are always on the given surface. All
-//! orders are fixed.
+//! After Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004. One round:
+//!
+//! 1. Edges longer than 4/3 of the target are split, the longest first, until none is left or there are four times as
+//!    many triangles as are wanted. A new vertex lies on the given surface, or in the middle of its edge where the
+//!    nearest place on the surface is farther away than a quarter of the edge.
+//! 2. Edges shorter than 4/5 of the target are collapsed in passes with bounds of 1/5, 2/5, 3/5 and 4/5, so that the
+//!    shortest go first.
+//! 3. Twice, edges are flipped towards six neighbours per vertex (four on a rim), unless a triangle becomes much
+//!    worse, and free vertices are moved over the surface to the centroids of their surroundings, weighted by area
+//!    over the fourth power of the target length (Du, Faber, Gunzburger, *SIAM Review* 41, 1999).
+//!
+//! After the last round, flips by the Delaunay criterion alternate with such moves, and a flip is the last.
+//!
+//! **What is refused.** A collapse, flip or move that turns a triangle by more than about 45° or makes a needle; a
+//! needle may become better. A collapse that makes an edge longer than 1.4 of its target, unless it was about as long
+//! before. A collapse, move or flip that takes the mesh farther from where it was than a fraction of the limit of
+//! deviation: this preserves ridges and tips, but not the tips of folds. Vertices of a rim do not move; they are
+//! removed only where the rim stays close to them, and only along it. Locked vertices, where the mesh is not a
+//! manifold, are neither removed nor moved, no edge with one at its ends or opposite it is flipped, and an open edge
+//! between two of them is not split.
+//!
+//! **Cutting off spikes** (`spikes`) uses `pull_together` and `flip_some`: between marked vertices short edges are
+//! collapsed to their middles and edges are flipped, whatever the effect on the surface. All other vertices remain on
+//! the given surface, except for the middles of step 1.
+//!
+//! All orders are fixed.
 
 use super::corners::{Corners, Kind, Vertex, next, previous};
 use super::reference::{Reference, square_to};
