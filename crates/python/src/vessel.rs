@@ -305,8 +305,8 @@ impl Vessel {
 
     /// Whether an instrument can follow the way to a target; the check takes some 10 ms. Returns a dictionary of
     /// `passage` ("passes", "tight", "blocked", "short"), length_mm, taken_mm (length of the instrument along the
-    /// least bent path), reaches_mm (how far the tip comes), the points `narrowest` and `sharpest`, and `way`, all points:
-    /// arc_mm, position_mm, lumen_radius_mm, device_radius_mm, clearance_mm, bend_radius_mm (of the centre line),
+    /// least bent path), reaches_mm (how far the tip comes), the points `narrowest` and `sharpest`, and `way`, all
+    /// points: arc_mm, position_mm, lumen_radius_mm, device_radius_mm, clearance_mm, bend_radius_mm (of the centre line),
     /// cut_radius_mm (of the least bent path within the clearance), bears_radius_mm (that the instrument takes
     /// without force: bending that costs at most `force_n`); radii of straight stretches are None.
     ///

@@ -142,7 +142,7 @@ impl Session {
             .collect()
     }
 
-    /// The fluoroscopic picture of each plane: live while the pedal is down, else the last ones.
+    /// The fluoroscopic picture of each plane: live while the pedal is pressed, otherwise the last ones.
     ///
     /// # Errors
     /// What cannot be drawn, by key.

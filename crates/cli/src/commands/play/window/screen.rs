@@ -34,7 +34,7 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn of([width, height]: [usize; 2], planes: usize) -> Self {
         let panel = PANEL_PX.min(height / 3);
-        // The 3D view takes two fifths of the width, or one fifth with two planes.
+        // The 3D view gets at least two fifths of the width, or one fifth with two planes.
         let most = if planes > 1 { width * 2 / 5 } else { width * 3 / 5 };
         let side = (height - panel).min(most);
         let left = planes * side;
