@@ -8,7 +8,8 @@ use crate::way::Way;
 
 /// Largest number of events of one kind: the longest, or the first ones.
 const MOST: usize = 3;
-/// Shortest duration, s, that is reported: of rests with the beam on, and of motions without it.
+/// Shortest duration, s, that is reported: of rests with the beam on; and of motions without it, or with an
+/// instrument ahead of the one inside it.
 const IDLE_S: f64 = 2.0;
 const UNSEEN_S: f64 = 0.5;
 /// Motions at most this far apart count as one, s: a step of a script happens at once, when its time is over.
