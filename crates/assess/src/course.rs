@@ -1,44 +1,46 @@
-//! A trainee's course: how each measure goes from attempt to attempt, and whether that is more than chance.
+//! The course of a trainee: how each measure changes over attempts, and whether the change is more than chance.
 //!
-//! The change from one attempt to the next is the median of the slopes of all pairs of attempts (Theil 1950, Sen 1968): one bad day does not
-//! carry it off. A trend is told where no more than one in twenty orders of the same values would rise, or fall, as steadily (Mann 1945,
-//! Kendall 1975). Of three attempts in a row nothing can be told yet: one order in six is as steady as any.
+//! The change per attempt is the median of the slopes of all pairs of attempts (Theil 1950, Sen 1968), which is
+//! robust against a single bad day. A trend is reported if at most one in twenty permutations of the same values
+//! rises, or falls, as steadily (Mann 1945, Kendall 1975). Three attempts are too few for a trend: one permutation in
+//! six is monotonic.
 
 use serde::Serialize;
 
 use crate::metric::{Better, Group, Metric};
 use crate::score::Score;
 
-/// A trend is told where chance makes one as steady no more often than this.
+/// Largest probability, under chance, of a change as steady as a reported trend.
 const CHANCE: f64 = 0.05 + 1e-9;
-/// Values that differ by no more than this part of them are equal.
+/// Relative difference up to which two values count as equal.
 const ROUNDING: f64 = 1e-9;
-/// Most attempts of which all orders are counted; of more a normal distribution stands for them.
+/// Largest number of attempts for which permutations are counted exactly; beyond it, the normal approximation is
+/// used.
 const COUNTED: usize = 60;
 
-/// One attempt of a course.
+/// One attempt.
 #[derive(Debug, Clone, Copy)]
 pub struct Attempt<'a> {
     /// Its measures.
     pub metrics: &'a [Metric],
-    /// Its score, if it is one of a subject.
+    /// Its score, if it was an attempt at a subject.
     pub score: Option<&'a Score>,
 }
 
-/// Where a measure goes.
+/// Direction in which a measure changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Trend {
-    /// To where experts have it.
+    /// Towards the values of experts.
     Better,
-    /// Away from there.
+    /// Away from the values of experts.
     Worse,
-    /// Neither, or too few attempts to tell.
+    /// Neither, or too few attempts to decide.
     None,
 }
 
 impl Trend {
-    /// For people.
+    /// In words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Better => "gets better",
@@ -48,22 +50,23 @@ impl Trend {
     }
 }
 
-/// The values of something over attempts, and where they go.
+/// The values of a measure or score over attempts, and their trend.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
-    /// One for each attempt; none where it was not measured.
+    /// One per attempt; `None` where it was not measured.
     pub values: Vec<Option<f64>>,
-    /// The first that was measured.
+    /// The first measured value.
     pub first: Option<f64>,
-    /// The last that was measured.
+    /// The last measured value.
     pub last: Option<f64>,
-    /// The best of all.
+    /// The best value.
     pub best: Option<f64>,
-    /// Change from one attempt to the next: the median of the slopes of all pairs.
+    /// Change per attempt: median of the slopes of all pairs.
     pub per_attempt: Option<f64>,
-    /// Part of all orders of these values that go as steadily in this direction; none of fewer than two values.
+    /// Fraction of all permutations of these values that change at least as steadily in this direction; `None` for
+    /// fewer than two values.
     pub chance: Option<f64>,
-    /// Where they go.
+    /// Their trend.
     pub trend: Trend,
 }
 
@@ -72,30 +75,30 @@ pub struct Line {
 pub struct MetricLine {
     /// Name of the measure.
     pub name: &'static str,
-    /// What it is about.
+    /// Its group.
     pub group: Group,
     /// Its unit.
     pub unit: &'static str,
-    /// Which of two values is the better one.
+    /// Which values are better.
     pub better: Better,
     /// Its values.
     #[serde(flatten)]
     pub line: Line,
 }
 
-/// All measures over attempts, the first attempt first.
+/// All measures over attempts, in order of attempts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Course {
-    /// Scores, hundredths; none where the attempts are of no subject.
+    /// Scores, in percent; `None` if the attempts are not at a subject.
     pub score: Option<Line>,
-    /// Attempts that were passed, likewise.
+    /// Whether each attempt was passed; `None` if the attempts are not at a subject.
     pub passed: Option<Vec<bool>>,
-    /// The measures, in the order of their groups.
+    /// The measures, ordered by group.
     pub metrics: Vec<MetricLine>,
 }
 
 impl Course {
-    /// That of attempts in their order, which are all measured alike.
+    /// The course of attempts in order. All of them have the measures of the first.
     pub fn of(attempts: &[Attempt<'_>]) -> Self {
         let scores: Option<Vec<&Score>> = attempts.iter().map(|attempt| attempt.score).collect();
         let scores = scores.filter(|scores| !scores.is_empty());
@@ -117,14 +120,14 @@ impl Course {
         }
     }
 
-    /// The measures that go there.
+    /// The measures with this trend.
     pub fn going(&self, trend: Trend) -> impl Iterator<Item = &MetricLine> {
         self.metrics.iter().filter(move |one| one.line.trend == trend)
     }
 }
 
 impl Line {
-    /// That of values, of which less or more is better.
+    /// The line of `values`; `better` says which values are better.
     pub fn of(values: Vec<Option<f64>>, better: Better) -> Self {
         let known: Vec<(f64, f64)> =
             values.iter().enumerate().filter_map(|(at, value)| Some((at as f64, (*value)?))).collect();
@@ -153,12 +156,12 @@ impl Line {
     }
 }
 
-/// Whether two values are equal but for rounding.
+/// Whether two values are equal up to rounding.
 fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
-/// Pairs of values that rise, less those that fall.
+/// Number of rising pairs minus number of falling pairs.
 fn rises(values: &[f64]) -> i64 {
     let pairs = values.iter().enumerate().flat_map(|(at, a)| values[at + 1..].iter().map(move |b| (a, b)));
     let apart = pairs.filter(|(a, b)| !same(**a, **b));
@@ -178,7 +181,8 @@ fn median_slope(known: &[(f64, f64)]) -> Option<f64> {
     }
 }
 
-/// Part of the orders of these values in which at least so many more pairs rise than fall; equal values are neither.
+/// Fraction of the permutations of these values in which the rising pairs outnumber the falling ones by at least
+/// `rises`. Pairs of equal values count as neither.
 fn chance(values: &[f64], rises: u64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -189,7 +193,8 @@ fn chance(values: &[f64], rises: u64) -> f64 {
         let deviation = ((spread(values.len() as f64) - ties).max(1.0) / 18.0).sqrt();
         return 0.5 * libm::erfc((rises as f64 - 1.0).max(0.0) / deviation * std::f64::consts::FRAC_1_SQRT_2);
     }
-    // Orders by the number of pairs that fall: each set of equal values is put among the smaller ones.
+    // Distribution of permutations by their number of falling pairs: each set of equal values is merged with the
+    // smaller values.
     let (mut smaller, mut pairs) = (0, 0);
     let mut parts = vec![1.0];
     for count in equal {
@@ -201,8 +206,9 @@ fn chance(values: &[f64], rises: u64) -> f64 {
     parts[..=most_falls].iter().sum::<f64>().min(1.0)
 }
 
-/// Parts of the orders of `smaller` and `larger` values in which 0, 1, 2 and more pairs fall. The last value is one of the larger ones, with
-/// which no pair falls, or one of the smaller ones, with which as many fall as there are larger ones.
+/// Fractions of the orderings of `smaller` smaller and `larger` larger values that have 0, 1, 2, … falling pairs. If
+/// the last value is a larger one, it adds no falling pair; if it is a smaller one, it adds one for each larger
+/// value.
 fn falls_between(smaller: usize, larger: usize) -> Vec<f64> {
     let mut with_fewer: Vec<Vec<f64>> = vec![vec![1.0]; smaller + 1];
     for l in 1..=larger {
@@ -239,20 +245,22 @@ mod tests {
     #[test]
     fn chances_are_those_of_all_orders() {
         let of = |count: u32, rises: u64| chance(&(0..count).map(f64::from).collect::<Vec<_>>(), rises);
-        // Of four values one order of 24 rises throughout, and four have at most one pair that falls.
+        // Of the 24 permutations of four values, one rises throughout, and four have at most one falling pair.
         assert!((of(4, 6) - 1.0 / 24.0).abs() < 1e-12);
         assert!((of(4, 4) - 4.0 / 24.0).abs() < 1e-12);
         assert!((of(3, 3) - 1.0 / 6.0).abs() < 1e-12);
         assert!((of(2, 1) - 0.5).abs() < 1e-12);
-        // The table of Kendall's tau: of ten values S ≥ 21 in 0.036 of all orders.
+        // From the table of Kendall's tau: for ten values, S ≥ 21 in 0.036 of all permutations.
         assert!((of(10, 21) - 0.036).abs() < 5e-4, "{}", of(10, 21));
-        // Three of one and three of another: 20 orders, of which one has all of the first before.
+        // Three equal values and three other equal values have 20 orderings; in one of them all of the first come
+        // first.
         assert!((chance(&[4.0, 4.0, 4.0, 0.0, 0.0, 0.0], 9) - 0.05).abs() < 1e-12);
-        // 1 1 2 3 in twelve orders: one has five pairs that rise and none that falls, two have one that falls.
+        // The values 1 1 2 3 have twelve orderings: one has five rising and no falling pairs, two have one falling
+        // pair.
         assert!((chance(&[1.0, 1.0, 2.0, 3.0], 5) - 1.0 / 12.0).abs() < 1e-12);
         assert!((chance(&[1.0, 1.0, 2.0, 3.0], 3) - 3.0 / 12.0).abs() < 1e-12);
         assert_eq!(chance(&[7.0; 5], 0), 1.0);
-        // Where counting ends the normal distribution goes on, with ties and without.
+        // The normal approximation agrees with counting where it takes over, with and without ties.
         let tied =
             |count: u32, rises: u64| chance(&(0..count).map(|k| f64::from(k / 3)).collect::<Vec<_>>(), rises);
         for (counted, beyond) in [(of(60, 300), of(61, 308)), (tied(60, 300), tied(61, 308))] {
@@ -273,7 +281,7 @@ mod tests {
         assert_eq!(line(&[40.0, 30.0, 25.0], Better::Lower).trend, Trend::None, "one order of six");
         assert_eq!(line(&[40.0, 30.0, 35.0, 24.0], Better::Lower).trend, Trend::None);
         assert_eq!(line(&[4.0, 4.0, 4.0, 0.0, 0.0, 0.0], Better::Lower).trend, Trend::Better);
-        // One bad day among seven does not hide what was learnt.
+        // One bad day among seven does not hide the learning.
         let bad_day = line(&[40.0, 36.0, 33.0, 90.0, 30.0, 28.0, 27.0], Better::Lower);
         assert_eq!(bad_day.trend, Trend::Better);
         assert!((-4.0..-1.0).contains(&bad_day.per_attempt.unwrap()), "{:?}", bad_day.per_attempt);
@@ -283,7 +291,7 @@ mod tests {
     fn what_stays_or_was_not_measured_has_no_trend() {
         let stays = line(&[3.0; 8], Better::Lower);
         assert_eq!((stays.trend, stays.per_attempt), (Trend::None, Some(0.0)));
-        // What differs by rounding alone stays too.
+        // A difference of rounding size is no trend.
         let rounded = line(&[3.0, 3.0 - 1e-15, 3.0 - 2e-15, 3.0 - 3e-15], Better::Lower);
         assert_eq!((rounded.trend, rounded.chance), (Trend::None, Some(1.0)));
         let gaps = Line::of(vec![None, Some(2.0), None, Some(1.0)], Better::Lower);

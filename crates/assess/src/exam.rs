@@ -1,5 +1,5 @@
-//! A subject on its way: how near the goal is, what of the limits is used, and when it ends. It follows a record that grows, and ends at the
-//! same moment whether it sees the record tick by tick or whole.
+//! A subject in progress: how near the goal is, how much of each limit is used, and when the subject ends. The exam
+//! follows a growing record. It ends at the same time whether it sees the record tick by tick or at once.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use crate::way::Way;
 pub enum EndedBy {
     /// The goal was reached.
     Goal,
-    /// `limits.time_s` has passed.
+    /// `limits.time_s` passed.
     Time,
     /// The beam was on for longer than `limits.beam_s`.
     Beam,
@@ -30,7 +30,7 @@ pub enum EndedBy {
 }
 
 impl EndedBy {
-    /// For people.
+    /// In words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Goal => "the goal is reached",
@@ -45,75 +45,75 @@ impl EndedBy {
 /// The end of a subject.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ended {
-    /// Why.
+    /// The reason.
     pub by: EndedBy,
-    /// When, s.
+    /// Time of the end, s.
     pub time_s: f64,
 }
 
-/// A limit, and what of it is used.
+/// A limit and how much of it is used.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Used {
-    /// What is limited.
+    /// The limited quantity.
     pub what: &'static str,
-    /// So far.
+    /// Its current value.
     pub value: f64,
-    /// At most.
+    /// Its limit.
     pub limit: f64,
     /// Unit of both.
     pub unit: &'static str,
 }
 
-/// How a subject stands.
+/// Progress of a subject.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
-    /// What commands call the subject.
+    /// Name of the subject in commands.
     pub subject: String,
     /// Title and task, for people.
     #[serde(skip)]
     pub task: Arc<Subject>,
-    /// From the tip to the target, mm; none while it is not in, and where a sac is to be packed.
+    /// Distance from the tip to the target, mm; `None` while the tip is outside the vessel, and for a sac.
     pub distance_mm: Option<f64>,
     /// Contrast medium injected at the target so far, ml.
     pub injected_there_ml: f64,
-    /// Volume of coils in the sac over that of the sac; none where there is no sac.
+    /// Volume of the coils in the sac over the volume of the sac; `None` if there is no sac.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub packing_density: Option<f64>,
-    /// How far it is to the goal, in words: one thing each.
+    /// How far it is to the goal, in words, one line per quantity.
     pub to_go: Vec<String>,
-    /// The limits that there are.
+    /// The limits that are set.
     pub used: Vec<Used>,
-    /// What has come of it, once it has ended.
+    /// The result, once it has ended.
     pub verdict: Option<Verdict>,
-    /// The whole score, likewise.
+    /// The whole score, once it has ended.
     #[serde(skip)]
     pub score: Option<Arc<Score>>,
 }
 
-/// A subject that is being done.
+/// A subject in progress.
 #[derive(Debug, Clone)]
 pub struct Exam {
     subject: Arc<Subject>,
     reach: Reach,
-    /// Samples before this one have been looked at and do not change any more.
+    /// Number of samples that were examined and no longer change.
     seen: usize,
     wall_force_n: f64,
     score: Option<Arc<Score>>,
 }
 
 impl Exam {
-    /// A subject where it is to be done.
+    /// Starts a subject at a site.
     ///
     /// # Errors
-    /// [`Error::Content`] for a goal that does not fit: a target that the vessel does not name, or where its centre line begins, an instrument that
-    /// is not there, a sac where there is none.
+    /// [`Error::Content`] if the goal does not fit the site: a target that the vessel does not name or at the start
+    /// of its centre line, an instrument that does not exist, or a sac where there is none.
     pub fn new(subject: Subject, site: &Site<'_>) -> Result<Self> {
         let reach = Reach::new(&subject.goal, site)
             .map_err(|error| Error::content(subject.path(), error.to_string()))?;
         Ok(Self { subject: Arc::new(subject), reach, seen: 0, wall_force_n: 0.0, score: None })
     }
 
-    /// Refuses a record that does not say what the goal asks: it could not be reached in it.
+    /// Refuses a record without the data that the goal needs: the goal could never be reached in it.
     ///
     /// # Errors
     /// [`Error::Content`] with the goal's key.
@@ -121,17 +121,17 @@ impl Exam {
         self.reach.check(record).map_err(|error| Error::content(self.subject.path(), error.to_string()))
     }
 
-    /// What is to be done.
+    /// The task.
     pub fn subject(&self) -> &Subject {
         &self.subject
     }
 
-    /// The way to its target; none of a sac.
+    /// The way to its target; `None` for a sac.
     pub fn way(&self) -> Option<&Way> {
         self.reach.way.as_ref()
     }
 
-    /// Looks at what a record has more than before; the score as soon as it ends.
+    /// Examines the new samples of a record. Returns the score when the subject ends.
     pub fn follow(&mut self, record: &Record) -> Option<&Arc<Score>> {
         if self.score.is_some() {
             return None;
@@ -143,12 +143,12 @@ impl Exam {
                 return self.score.as_ref();
             }
         }
-        // The last one may become longer: rests are one sample.
+        // The last sample may still grow: consecutive rests are one sample.
         self.seen = record.samples.len().saturating_sub(1);
         None
     }
 
-    /// The score of a whole record: of what was done until the end, or of all of it where there was none.
+    /// The score of a whole record: up to the end of the subject, or of all of it if the subject did not end.
     pub fn score(mut self, record: &Record) -> Arc<Score> {
         match self.follow(record) {
             Some(score) => Arc::clone(score),
@@ -160,7 +160,7 @@ impl Exam {
         Score::new(&self.subject, record, &assess(record, self.way()), ended)
     }
 
-    /// How it stands with a record that was followed.
+    /// Progress at the end of a record that was followed.
     pub fn standing(&self, record: &Record) -> Standing {
         let limits = &self.subject.limits;
         let used = [
@@ -188,11 +188,12 @@ impl Exam {
         standing
     }
 
-    /// The end of the subject, if it is in a sample: that which comes first, limits before the goal.
+    /// The end of the subject, if it lies within this sample: the earliest one; at equal times limits precede the
+    /// goal.
     fn end_in(&mut self, record: &Record, index: usize) -> Option<Ended> {
         let sample = &record.samples[index];
         let begun_s = index.checked_sub(1).map_or(0.0, |before| record.samples[before].time_s);
-        // A rest that becomes longer has begun with what it is.
+        // The values of a sample hold from its end; those of a rest, which may grow, from its beginning.
         let so_s = if sample.rests() { begun_s } else { sample.time_s };
         self.wall_force_n = self.wall_force_n.max(sample.wall_force_n);
         let goal_s = self.reach.reached_s(record, sample, so_s);
@@ -216,13 +217,13 @@ impl Exam {
     }
 }
 
-/// Contrast medium that was injected from one moment to another, ml.
+/// Contrast medium injected between two times, ml.
 pub(crate) fn injected_ml(record: &Record, from_s: f64, to_s: f64) -> f64 {
     let injected = record.injections.iter().filter(|one| (from_s..=to_s).contains(&one.time_s));
     injected.map(|one| one.volume_ml).fold(0.0, |sum, ml| sum + ml)
 }
 
-/// When more than so much had been injected, s.
+/// Time at which the injected volume exceeded `most_ml`, s.
 fn exceeded_s(record: &Record, most_ml: f64) -> Option<f64> {
     let mut sum_ml = 0.0;
     let over = record.injections.iter().find(|one| {

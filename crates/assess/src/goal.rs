@@ -1,4 +1,4 @@
-//! What ends a subject well: a tip at a place, or a sac that coils fill.
+//! Goals of a subject: a tip at a place, or a sac packed with coils.
 
 use endowire_core::error::in_range;
 use endowire_core::{Error, Result};
@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::subject::LARGEST;
 
-/// What is to be reached.
+/// The goal of a subject.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(try_from = "GoalFile", untagged)]
 pub enum Goal {
-    /// A tip at a place, as `until` of a script's line.
+    /// A tip at a place, as with `until` in a script line.
     Place(PlaceGoal),
     /// A sac that is packed.
     Packing(PackingGoal),
@@ -19,14 +19,14 @@ pub enum Goal {
 /// A tip at a place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlaceGoal {
-    /// Name of a point of the vessel's centre line.
+    /// Name of a point on the vessel's centre line.
     pub target: String,
-    /// How near the tip must come to it, mm.
+    /// Largest distance of the tip from it, mm.
     pub tip_within_mm: f64,
-    /// Whose tip: the name of an instrument; the foremost of all if absent.
+    /// Instrument whose tip counts; by default the foremost tip of all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
-    /// Contrast medium that must then be injected there, ml; none if absent.
+    /// Contrast medium to inject there afterwards, ml; `None` for no injection.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inject_ml: Option<f64>,
 }
@@ -34,11 +34,11 @@ pub struct PlaceGoal {
 /// A sac that is packed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PackingGoal {
-    /// Volume of coils in the sac over that of the sac, at least.
+    /// Smallest volume of the coils in the sac over the volume of the sac.
     pub packing_density: f64,
 }
 
-/// The table as its file says it.
+/// The `goal` table as it is in the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GoalFile {
@@ -87,7 +87,7 @@ impl TryFrom<GoalFile> for Goal {
 }
 
 impl Goal {
-    /// Checks its values; at most so much medium may be injected in all.
+    /// Checks the values; `contrast_ml` limits the total volume of medium.
     pub(crate) fn check(&self, contrast_ml: Option<f64>) -> Result<()> {
         let goal = match self {
             Self::Packing(goal) => return in_range("goal.packing_density", goal.packing_density, 1.0),
@@ -105,7 +105,7 @@ impl Goal {
         }
     }
 
-    /// Name of the point that is to be reached; none of a sac.
+    /// Name of the target point; `None` for a sac.
     pub fn target(&self) -> Option<&str> {
         match self {
             Self::Place(goal) => Some(&goal.target),

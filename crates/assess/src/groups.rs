@@ -1,4 +1,4 @@
-//! The measures, group by group. Values come from the record alone: nothing is simulated again.
+//! The measures, group by group. All values come from the record: nothing is simulated again.
 
 use endowire_core::Vec3;
 
@@ -7,9 +7,9 @@ use crate::record::{REST_MM, Record};
 use crate::smoothness::{spectral_arc_length, speeds, submovements};
 use crate::way::Way;
 
-/// Part of the time in which forces are at most that of the 95th percentile.
+/// Fraction of the time in which forces are at most the 95th percentile.
 const MOST_OF_TIME: f64 = 0.95;
-/// Shortest way to which one that was gone is compared, mm.
+/// Shortest path, mm, with which a path length is compared.
 const SHORTEST_MM: f64 = 1.0;
 
 const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
@@ -19,7 +19,7 @@ const SLUZEWSKI: &str = "Sluzewski et al. 2004: packing of aneurysms and compact
 const REVIEW: &str =
     "review of simulator studies, European Journal of Vascular and Endovascular Surgery 2016";
 
-/// A measure that less of is better.
+/// A measure of which less is better.
 fn lower(
     group: Group,
     (name, unit): (&'static str, &'static str),
@@ -27,7 +27,7 @@ fn lower(
     definition: &'static str,
     study: &'static str,
 ) -> Metric {
-    // An empty sum is −0.
+    // Turns −0, the sum of nothing, into 0.
     let value = value.map(|value| value + 0.0);
     Metric { name, group, value, unit, better: Better::Lower, definition, study }
 }
@@ -36,7 +36,7 @@ fn higher(metric: Metric) -> Metric {
     Metric { better: Better::Higher, ..metric }
 }
 
-/// All measures of a procedure in the order of their groups, on a way if one is known.
+/// All measures of a procedure, ordered by group; `way` is the way to the target, if known.
 pub fn assess(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let mut all = Vec::new();
     all.extend(time(record));
@@ -54,12 +54,12 @@ fn rests(record: &Record) -> impl Iterator<Item = (f64, f64)> {
     rest.map(|(took_s, sample)| (sample.time_s - took_s, sample.time_s))
 }
 
-/// Time in which no hand moves, s.
+/// Time during which no instrument is moved, s.
 fn idle_s(record: &Record) -> f64 {
     rests(record).map(|(from, to)| to - from).sum()
 }
 
-/// That of it with the beam on, s; none where the beam was not recorded.
+/// Time during which no instrument is moved and the beam is on, s; `None` if the beam was not recorded.
 fn beam_on_idle_s(record: &Record) -> Option<f64> {
     record.beam.as_ref()?;
     rests(record).map(|(from, to)| record.beam_on_s(from, to)).sum()
@@ -89,7 +89,7 @@ fn radiation(record: &Record) -> Vec<Metric> {
     };
     let frames = sum(|state| state.frames_per_s);
     let kerma = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3);
-    // µGy mm² are 10⁻² µGy cm².
+    // 1 µGy·mm² is 10⁻² µGy·cm².
     let kerma_area = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3 * state.field_mm2 * 1e-2);
     let area_s = sum(|state| state.field_mm2 * 1e-2);
     let field = area_s.zip(sum(|_| 1.0)).filter(|(_, on_s)| *on_s > 0.0).map(|(area, on_s)| area / on_s);
@@ -135,12 +135,12 @@ fn contrast(record: &Record) -> Vec<Metric> {
     ]
 }
 
-/// The tips in order.
+/// Positions of the foremost tip, in order.
 fn tips(record: &Record) -> Vec<Vec3> {
     record.samples.iter().filter_map(|sample| sample.tip_mm).collect()
 }
 
-/// The same beside the centre line.
+/// Positions of the foremost tip to be compared with the centre line, in order.
 fn on_centreline(record: &Record) -> Vec<Vec3> {
     record.samples.iter().filter_map(crate::Sample::on_centreline_mm).collect()
 }
@@ -198,7 +198,7 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     ]
 }
 
-/// How often a hand changed between pushing and pulling.
+/// How often the motion of an instrument changed between pushing and pulling.
 fn reversals(record: &Record, hand: usize) -> usize {
     let advances = record.samples.iter().filter_map(|sample| sample.hands.get(hand));
     let signs: Vec<bool> =

@@ -1,14 +1,14 @@
-//! What a trainee is scored by: measures of a recorded procedure, as studies of novices and experts have them.
+//! Assessment of trainees: measures of a recorded procedure, as used in studies of novices and experts.
 //!
-//! A [`Record`] is what hands, beam and injector have done and what came of it; a [`Way`] is where it was to go. [`assess`] measures both in
-//! seven groups. Every measure says its unit, how it is defined, whether less or more of it is better and in which study it was used; one
-//! that needs what was not recorded has no value.
+//! A [`Record`] holds what the operator did with instruments, beam and injector, and the result; a [`Way`] leads to the
+//! target. [`assess`] computes measures of both in seven groups. Every measure states its unit, its definition, whether
+//! less or more of it is better, and the study that used it. It has no value if the data that it needs were not recorded.
 //!
-//! A [`Subject`] is a task for trainees: a goal in a scene, limits, and thresholds of measures. An [`Exam`] follows a record until the goal
-//! is reached or a limit is passed, and gives its [`Score`].
+//! A [`Subject`] is a task for trainees: a goal in a scene, limits, and thresholds of measures. An [`Exam`] follows a
+//! record until the goal is reached or a limit is passed, and gives its [`Score`].
 //!
-//! What stood out of a record is [`noticed`], a [`Timeline`] is what of it can be drawn over time, and a [`Course`] says where measures go from
-//! one attempt to the next.
+//! [`noticed`] lists remarkable moments of a record, a [`Timeline`] holds what can be drawn over time, and a [`Course`]
+//! shows how measures change over attempts.
 //!
 //! ```
 //! use endowire_assess::{Record, assess};
@@ -17,7 +17,7 @@
 //! assert!(metrics.iter().all(|metric| !metric.definition.is_empty()));
 //! ```
 
-// A score has the same bits on every machine.
+// Scores must have the same bits on every machine.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod course;

@@ -1,4 +1,4 @@
-//! A measure and what it means.
+//! Measures and their meaning.
 
 use serde::Serialize;
 
@@ -6,28 +6,28 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Group {
-    /// How long it took.
+    /// Duration.
     Time,
-    /// What the beam did.
+    /// Use of the beam.
     Radiation,
-    /// What was injected.
+    /// Injected contrast medium.
     Contrast,
-    /// How hands and tip moved.
+    /// Motion of instruments and tip.
     Motion,
-    /// What could have done harm.
+    /// Possible harm.
     Safety,
-    /// Where the tip went.
+    /// Path of the tip.
     Way,
-    /// Whether it arrived.
+    /// Whether the goal was reached.
     Task,
 }
 
 impl Group {
-    /// The groups in order.
+    /// All groups, in order.
     pub const ALL: [Self; 7] =
         [Self::Time, Self::Radiation, Self::Contrast, Self::Motion, Self::Safety, Self::Way, Self::Task];
 
-    /// What it is called.
+    /// Name of the group.
     pub fn name(self) -> &'static str {
         match self {
             Self::Time => "time",
@@ -41,18 +41,18 @@ impl Group {
     }
 }
 
-/// What of a measure experts have.
+/// Which values of a measure are better: those of experts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Better {
-    /// Less of it.
+    /// Lower values.
     Lower,
-    /// More of it.
+    /// Higher values.
     Higher,
 }
 
 impl Better {
-    /// In a sentence: "less" or "more".
+    /// For use in a sentence: "less" or "more".
     pub fn words(self) -> &'static str {
         match self {
             Self::Lower => "less",
@@ -64,18 +64,18 @@ impl Better {
 /// A measure of a procedure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Metric {
-    /// What it is called, in lower case and with its unit.
+    /// Name, in lower case and with its unit.
     pub name: &'static str,
-    /// What it is about.
+    /// Its group.
     pub group: Group,
-    /// Its value; none where what it needs was not recorded, or it means nothing of this procedure.
+    /// Its value; `None` if the data that it needs were not recorded, or if it has no meaning for this procedure.
     pub value: Option<f64>,
-    /// Its unit; "1" of ratios and numbers.
+    /// Its unit; "1" for ratios and counts.
     pub unit: &'static str,
-    /// Which of two values is the better one.
+    /// Which values are better.
     pub better: Better,
-    /// How it is computed.
+    /// Definition in words.
     pub definition: &'static str,
-    /// Where it was used.
+    /// Study that used it.
     pub study: &'static str,
 }

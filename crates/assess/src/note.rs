@@ -1,4 +1,4 @@
-//! What is noted of a simulation, step by step.
+//! Recording of a simulation, step by step.
 
 use endowire_core::Vec3;
 use endowire_core::insertion::{Command, Move, Packing, Simulation};
@@ -6,8 +6,8 @@ use endowire_core::insertion::{Command, Move, Packing, Simulation};
 use crate::record::{Hand, Packed, Record, Sample};
 
 impl Record {
-    /// Notes a step of a simulation that ended at a time, in which hands made these moves; what coils do in the vessel's sac, if it has one.
-    /// Rests that follow each other are one sample.
+    /// Records a step that ended at `time_s`, in which the instruments made these moves. `packing` is the state of
+    /// coils in the vessel's sac, if it has one. Consecutive rests become one sample.
     pub fn note(&mut self, time_s: f64, moves: &[Move], simulation: &Simulation, packing: Option<Packing>) {
         let (report, force) = (simulation.report(), simulation.wall_force());
         let instruments = simulation.stack().instruments();
@@ -18,7 +18,7 @@ impl Record {
         let displacement = simulation.displacement();
         let at_rest =
             |tip_mm: Option<Vec3>| displacement.as_ref().zip(tip_mm).map(|(now, tip)| now.material(&tip));
-        // That of a device alone is the foremost one.
+        // With a single device, its tip is already recorded as the foremost tip.
         let tip_of = |index: usize| (instruments.len() > 1).then(|| simulation.tip_of_mm(index)).flatten();
         let hands = report.hands().into_iter().enumerate().map(|(index, told)| {
             let moved = moves.iter().find(|one| one.instrument == index);

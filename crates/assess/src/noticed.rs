@@ -1,4 +1,4 @@
-//! What stands out of a procedure: moments and stretches that a teacher would point at.
+//! Remarkable moments and stretches of a procedure, which a teacher would point out.
 
 use serde::Serialize;
 
@@ -6,17 +6,18 @@ use crate::record::{AGAINST_WALL_N, Record, Sample};
 use crate::stretch::{Stretch, common, joined, longest};
 use crate::way::Way;
 
-/// Most of one kind; the longest, or the first ones.
+/// Largest number of events of one kind: the longest, or the first ones.
 const MOST: usize = 3;
-/// Rests with the beam on, and motions without it, that are worth a word, s.
+/// Shortest duration, s, that is reported: of rests with the beam on; and of motions without it, or with an
+/// instrument ahead of the one inside it.
 const IDLE_S: f64 = 2.0;
 const UNSEEN_S: f64 = 0.5;
-/// Motions that are no farther apart than this are one, s: steps of a script are carried out at once when their time is over.
+/// Motions at most this far apart count as one, s: a step of a script happens at once, when its time is over.
 const APART_S: f64 = 0.5;
-/// Pulls that are worth a word, mm.
+/// Shortest pull-back that is reported, mm.
 const PULLED_MM: f64 = 10.0;
 
-/// What stood out.
+/// Kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoticedKind {
@@ -26,30 +27,30 @@ pub enum NoticedKind {
     TipForce,
     /// The device snapped to another equilibrium.
     Jumped,
-    /// The tip was in a branch that is not on the way.
+    /// The tip was in a branch off the way.
     WrongBranch,
-    /// An instrument was farther in than the one in it.
+    /// An outer instrument was inserted farther than the one inside it.
     CatheterAhead,
-    /// The beam was on while no hand moved.
+    /// The beam was on while no instrument moved.
     IdleBeam,
-    /// A hand moved while the beam was off.
+    /// An instrument moved while the beam was off.
     Unseen,
-    /// Medium was injected with the tip held by a wall.
+    /// Medium was injected with the tip pressed against a wall.
     AgainstWall,
-    /// A hand pulled back.
+    /// An instrument was pulled back.
     PulledBack,
 }
 
-/// A moment, or a stretch, that stood out.
+/// A remarkable moment or stretch of time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Noticed {
-    /// What it is.
+    /// Its kind.
     pub what: NoticedKind,
-    /// When it began, s.
+    /// Begin, s.
     pub from_s: f64,
-    /// When it ended, s: the same of a moment.
+    /// End, s; the same as the begin for a moment.
     pub to_s: f64,
-    /// For people.
+    /// Description for people.
     pub text: String,
 }
 
@@ -63,7 +64,7 @@ impl Noticed {
     }
 }
 
-/// What stands out of a procedure, on a way if one is known, in the order in which it happened.
+/// Remarkable events of a procedure in order of time; `way` is the way to the target, if known.
 pub fn noticed(record: &Record, way: Option<&Way>) -> Vec<Noticed> {
     let mut all: Vec<Noticed> = largest(record).collect();
     all.extend(jumps(record));
@@ -76,10 +77,10 @@ pub fn noticed(record: &Record, way: Option<&Way>) -> Vec<Noticed> {
     all
 }
 
-/// The largest forces, where there are any worth the name.
+/// The largest forces, if they exceed the threshold of contact.
 fn largest(record: &Record) -> impl Iterator<Item = Noticed> {
     let most = |of: fn(&Sample) -> f64| {
-        // The first of equal ones.
+        // The first of several equal ones.
         record
             .samples
             .iter()
@@ -96,7 +97,7 @@ fn largest(record: &Record) -> impl Iterator<Item = Noticed> {
     })
 }
 
-/// The first jumps, and how many more there were.
+/// The first jumps, with the number of further ones.
 fn jumps(record: &Record) -> Vec<Noticed> {
     let at: Vec<f64> = record.samples.iter().filter(|one| one.jumped).map(|one| one.time_s).collect();
     let more = |number: usize| match at.len().saturating_sub(MOST) {
@@ -111,7 +112,7 @@ fn jumps(record: &Record) -> Vec<Noticed> {
     .collect()
 }
 
-/// Stretches of samples, each as long as it took.
+/// The stretches of the samples that satisfy a condition.
 fn while_samples<'a>(
     record: &'a Record,
     is: impl Fn(&Sample) -> bool + 'a,
@@ -136,12 +137,12 @@ fn ahead(record: &Record) -> Vec<Noticed> {
     stretches.into_iter().map(told).collect()
 }
 
-/// Beam that shows nothing new, and motions that it does not show; nothing where it was not recorded.
+/// Stretches of beam without motion, and of motion without beam; none if the beam was not recorded.
 fn beam(record: &Record) -> Vec<Noticed> {
     let Some(stretches) = record.beam_stretches() else { return vec![] };
     let all: Vec<_> = stretches.map(|(state, end_s)| (state.on, (state.time_s, end_s))).collect();
     let of = |on: bool| joined(all.iter().filter(|one| one.0 == on).map(|one| one.1), 0.0);
-    // Before its first state the beam was off.
+    // The beam is off before its first recorded state.
     let dark = all.first().map_or(record.end_s(), |first| first.1.0);
     let off = joined([(0.0, dark)].into_iter().chain(of(false)), 0.0);
     let moves = joined(while_samples(record, |sample| !sample.rests()), APART_S);
@@ -165,7 +166,7 @@ fn against_wall(record: &Record) -> Vec<Noticed> {
     told.collect()
 }
 
-/// The longest ways that a hand pulled back without pushing between.
+/// The longest pull-backs without a push in between.
 fn pulls(record: &Record) -> Vec<Noticed> {
     let most = record.hand_count();
     let mut all: Vec<(f64, Stretch, usize)> = Vec::new();

@@ -1,4 +1,4 @@
-//! How near a goal is, sample by sample.
+//! Distance to a goal, sample by sample.
 
 use endowire_core::error::nearest_name;
 use endowire_core::vessel::CentrelineTree;
@@ -9,33 +9,33 @@ use crate::goal::{Goal, PackingGoal, PlaceGoal};
 use crate::record::{Record, Sample};
 use crate::way::Way;
 
-/// Volumes that differ by less are the same, ml: sums are rounded.
+/// Volumes that differ by less count as equal, ml: sums are rounded.
 pub(crate) const SAME_ML: f64 = 1e-9;
 
-/// Where a goal is looked for.
+/// Where the goal of a subject lies.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Site<'a> {
-    /// The vessel's centre line, which names places.
+    /// The vessel's centre line, whose points have names.
     pub tree: Option<&'a CentrelineTree>,
-    /// Names of the instruments, the innermost first.
+    /// Names of the instruments, innermost first.
     pub instruments: &'a [String],
-    /// Whether there is a sac of which it is known what coils fill.
+    /// Whether the scene has a sac whose packing is recorded.
     pub has_sac: bool,
 }
 
-/// A goal on its way.
+/// Progress towards a goal.
 #[derive(Debug, Clone)]
 pub(crate) struct Reach {
     goal: Goal,
-    /// The way to its place.
+    /// The way to the target.
     pub(crate) way: Option<Way>,
-    /// Since when the tip is at the target, s.
+    /// Time since which the tip has been at the target, s.
     there_since_s: Option<f64>,
     pub(crate) injected_there_ml: f64,
 }
 
 impl Reach {
-    /// A goal at a site; errors name the key of the goal that does not fit.
+    /// Looks up a goal at a site. Errors name the key that does not fit.
     pub(crate) fn new(goal: &Goal, site: &Site<'_>) -> Result<Self> {
         let way = match goal {
             Goal::Place(goal) => Some(way_to(goal, site)?),
@@ -48,7 +48,7 @@ impl Reach {
         Ok(Self { goal: goal.clone(), way, there_since_s: None, injected_there_ml: 0.0 })
     }
 
-    /// Refuses a record that does not say what the goal asks.
+    /// Refuses a record without the data that the goal needs.
     pub(crate) fn check(&self, record: &Record) -> Result<()> {
         match &self.goal {
             Goal::Packing(goal) if record.samples.iter().all(|sample| sample.packing.is_none()) => {
@@ -73,14 +73,14 @@ impl Reach {
         }
     }
 
-    /// From the tip to the target, mm; none while it is not in, and of a sac.
+    /// Distance from the tip to the target, mm; `None` while the tip is outside the vessel, and for a sac.
     pub(crate) fn distance_mm(&self, sample: &Sample) -> Option<f64> {
         let way = self.way.as_ref()?;
         let (target_mm, _) = way.target_mm()?;
         Some((sample.tip_of_mm(way.instrument)? - target_mm).norm())
     }
 
-    /// When the goal is reached, if it is in this sample, which has been so since a moment.
+    /// Time at which the goal is reached, if it is in this sample, whose values hold from `so_s` on.
     pub(crate) fn reached_s(&mut self, record: &Record, sample: &Sample, so_s: f64) -> Option<f64> {
         let goal = match &self.goal {
             Goal::Packing(goal) => {
@@ -106,7 +106,7 @@ impl Reach {
     }
 }
 
-/// The way to the place of a goal, for the tip that it names.
+/// The way to the goal's target, for the tip that the goal names.
 fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
     let refuse = |value: String, mend: String| Error::parameter("goal.target", value, mend);
     let target = format!("{:?}", goal.target);

@@ -1,4 +1,4 @@
-//! What was recorded of a procedure.
+//! Records of procedures.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,75 +6,78 @@ use std::path::Path;
 use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// File of what the beam did, beside steps.csv or a session's script; there is none where no beam was recorded.
+/// Name of the beam log, beside steps.csv or a session's script; absent if the beam was not recorded.
 pub const BEAM: &str = "beam.csv";
 
-/// Motions of hands below these are rest: lengths, mm, and turns, rad.
+/// Motions below these count as rest: advance, mm, and rotation, rad.
 pub(crate) const REST_MM: f64 = 1e-9;
 const REST_RAD: f64 = 1e-9;
-/// A tip is held against a wall by more than this, N.
+/// Tip force above which a tip counts as pressed against a wall, N.
 pub(crate) const AGAINST_WALL_N: f64 = 1e-3;
 
-/// What one hand did in a step, and felt after it.
+/// Motion of one instrument in a step, and its state after the step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hand {
-    /// Length pushed in, negative pulled back.
+    /// Advance; negative when pulled back.
     pub advance_mm: f64,
-    /// Turn.
+    /// Rotation.
     pub rotate_rad: f64,
-    /// Length inserted after it.
+    /// Inserted length after the step.
     pub inserted_mm: f64,
-    /// Force with which it pushes; none where it is not defined.
+    /// Push force; `None` where it is undefined.
     pub push_force_n: Option<f64>,
-    /// Torque with which it holds.
+    /// Torque that holds the instrument.
     pub torque_nmm: f64,
-    /// Where the tip of its instrument is; none while it is not in, of a device alone ([`Sample::tip_mm`]), and where it was not recorded.
+    /// Position of the instrument's tip; `None` while it is outside, for a single device ([`Sample::tip_mm`]), and if
+    /// it was not recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_mm: Option<Vec3>,
-    /// Where that is in the vessel at rest; none where the vessel does not move, or it was not recorded.
+    /// Material position of that tip, in the vessel at rest; `None` if the vessel does not move, or if it was not
+    /// recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_at_rest_mm: Option<Vec3>,
 }
 
-/// What coils do in a sac.
+/// Packing of a sac with coils.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Packed {
-    /// Volume of coils in the sac over that of the sac.
+    /// Volume of the coils in the sac over the volume of the sac.
     pub density: f64,
-    /// Length of coils that is out of the catheter and outside the neck, mm.
+    /// Length of coil that has left the catheter and lies outside the neck, mm.
     pub outside_mm: f64,
 }
 
-/// A step.
+/// The record of one step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sample {
-    /// When it ended, since the start.
+    /// Time of its end, since the start.
     pub time_s: f64,
-    /// Where the foremost tip is; none while nothing is in.
+    /// Position of the foremost tip; `None` while nothing is inserted.
     pub tip_mm: Option<Vec3>,
-    /// Where that is in the vessel at rest; none where the vessel does not move, or it was not recorded.
+    /// Material position of that tip, in the vessel at rest; `None` if the vessel does not move, or if it was not
+    /// recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_at_rest_mm: Option<Vec3>,
-    /// The hands, the innermost instrument first.
+    /// The instruments, innermost first.
     pub hands: Vec<Hand>,
-    /// Sum of the sizes of wall forces, and of those at the tip.
+    /// Sum of the magnitudes of all wall forces.
     pub wall_force_n: f64,
-    /// That at the tip.
+    /// Sum of the magnitudes of wall forces at the tip.
     pub tip_force_n: f64,
-    /// Whether the device snapped from one equilibrium to another.
+    /// Whether the device jumped from one equilibrium to another.
     pub jumped: bool,
-    /// What coils do in the vessel's sac; none where there is none.
+    /// Packing of the vessel's sac; `None` if there is no sac.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub packing: Option<Packed>,
 }
 
 impl Sample {
-    /// Where the tip is beside the centre line, which is that of the vessel at rest.
+    /// Position of the tip to be compared with the centre line, which belongs to the vessel at rest.
     pub(crate) fn on_centreline_mm(&self) -> Option<Vec3> {
         self.tip_at_rest_mm.or(self.tip_mm)
     }
 
-    /// Where the tip of a hand's instrument is, likewise; the foremost one where no hand is named.
+    /// The same for the tip of an instrument; for the foremost tip if `hand` is `None`.
     pub(crate) fn tip_of_mm(&self, hand: Option<usize>) -> Option<Vec3> {
         match hand {
             Some(hand) if self.hands.len() > 1 => {
@@ -84,69 +87,69 @@ impl Sample {
         }
     }
 
-    /// Whether no hand moves.
+    /// Whether no instrument moves.
     pub(crate) fn rests(&self) -> bool {
         let moves = |hand: &Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
         !self.hands.iter().any(moves)
     }
 
-    /// Whether an instrument is farther in than the one in it.
+    /// Whether an outer instrument is inserted farther than the one inside it.
     pub(crate) fn is_ahead(&self) -> bool {
         self.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
     }
 }
 
-/// Contrast medium that was injected.
+/// An injection of contrast medium.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Injection {
-    /// When it began.
+    /// Time of its begin.
     pub time_s: f64,
-    /// How much.
+    /// Volume.
     pub volume_ml: f64,
-    /// How fast.
+    /// Flow rate.
     pub rate_ml_per_s: f64,
 }
 
-/// What the beam and the C-arm are from a time on: a row of beam.csv.
+/// State of the beam and the C-arm from a time on: a row of beam.csv.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamState {
-    /// Since the start, rising.
+    /// Time since the start, increasing from row to row.
     pub time_s: f64,
     /// Whether the pedal is down.
     pub on: bool,
-    /// Frames a second while it is.
+    /// Frame rate while the pedal is down.
     pub frames_per_s: f64,
-    /// Air kerma at the detector, of a frame.
+    /// Air kerma at the detector per frame.
     pub dose_ngy: f64,
-    /// Area that the blades leave open at the detector.
+    /// Area at the detector that the collimator leaves open.
     pub field_mm2: f64,
-    /// Angles of the C-arm.
+    /// Primary angle of the C-arm (LAO/RAO).
     pub primary_deg: f64,
-    /// That towards head or feet.
+    /// Secondary angle of the C-arm (cranial/caudal).
     pub secondary_deg: f64,
 }
 
-/// A procedure.
+/// The record of a procedure.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
-    /// Names of the instruments, the innermost first; none where they were not recorded.
+    /// Names of the instruments, innermost first; empty if they were not recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<String>,
-    /// Its steps, times rising.
+    /// Its steps, in order of time.
     pub samples: Vec<Sample>,
-    /// Injections in order.
+    /// Injections, in order of time.
     pub injections: Vec<Injection>,
     /// The beam, if it was recorded.
     pub beam: Option<Vec<BeamState>>,
 }
 
 impl Record {
-    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv,
-    /// packing.csv and beam.csv where they are there.
+    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv and, if they exist,
+    /// instruments.csv, injections.csv, packing.csv and beam.csv.
     ///
     /// # Errors
-    /// [`Error::Content`] for a file that is not there or does not fit, naming it.
+    /// [`Error::Content`] naming a file that is missing or invalid.
     pub fn read(path: &Path) -> Result<Self> {
         if !path.is_file() {
             return Self::of_folder(path);
@@ -155,10 +158,10 @@ impl Record {
         Self::from_session(&bytes, path)
     }
 
-    /// A session from the bytes of its file, which `path` names in messages.
+    /// Reads a session from the bytes of its file; `path` is for messages.
     ///
     /// # Errors
-    /// [`Error::Content`] for what is none.
+    /// [`Error::Content`] if it is not a session.
     pub fn from_session(bytes: &[u8], path: &Path) -> Result<Self> {
         #[derive(Deserialize)]
         struct Session {
@@ -168,7 +171,7 @@ impl Record {
         Ok(session.record)
     }
 
-    /// Hands of the sample that has most of them.
+    /// Largest number of instruments in a sample.
     pub(crate) fn hand_count(&self) -> usize {
         self.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0)
     }
@@ -200,7 +203,7 @@ impl Record {
         })
     }
 
-    /// Each sample with the time that it took.
+    /// Each sample with its duration, s.
     pub(crate) fn timed(&self) -> impl Iterator<Item = (f64, &Sample)> {
         let mut before_s = 0.0;
         self.samples.iter().map(move |sample| {
@@ -210,20 +213,20 @@ impl Record {
         })
     }
 
-    /// How long it took, s.
+    /// Duration of the procedure, s.
     pub(crate) fn end_s(&self) -> f64 {
         self.samples.last().map_or(0.0, |last| last.time_s)
     }
 
-    /// Time between two moments during which the beam was on, s; none where it was not recorded.
+    /// Beam-on time between two times, s; `None` if the beam was not recorded.
     pub(crate) fn beam_on_s(&self, from_s: f64, to_s: f64) -> Option<f64> {
         let on = self.beam_stretches()?.filter(|(state, _)| state.on);
         let each = on.map(|(state, end_s)| (end_s.min(to_s) - state.time_s.max(from_s)).max(0.0));
-        // A sum of nothing is −0.
+        // Starts from 0, because the sum of nothing would be −0.
         Some(each.fold(0.0, |sum, s| sum + s))
     }
 
-    /// When the beam has been on for so long, s; none where it was not, or was not recorded.
+    /// Time at which the beam has been on for `limit_s`, s; `None` if it has not, or was not recorded.
     pub(crate) fn beam_used_up_s(&self, limit_s: f64) -> Option<f64> {
         let mut left_s = limit_s;
         self.beam_stretches()?.filter(|(state, _)| state.on).find_map(|(state, end_s)| {
@@ -234,13 +237,13 @@ impl Record {
         })
     }
 
-    /// Whether an injection began with the tip held by a wall.
+    /// Whether an injection began with the tip pressed against a wall.
     pub(crate) fn is_against_wall(&self, injection: &Injection) -> bool {
         let during = self.samples.iter().find(|sample| sample.time_s >= injection.time_s);
         during.or(self.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
     }
 
-    /// The same until an end: as far as a sample of this number, which is cut at a time.
+    /// The record up to `time_s`, which lies in the sample of this index.
     pub(crate) fn until(&self, sample: usize, time_s: f64) -> Self {
         let mut samples = self.samples[..=sample].to_vec();
         samples[sample].time_s = time_s;
@@ -251,7 +254,7 @@ impl Record {
         Self { instruments: self.instruments.clone(), samples, injections, beam }
     }
 
-    /// The same until a time.
+    /// The record up to a time.
     pub fn before(&self, time_s: f64) -> Self {
         let after = self.samples.partition_point(|sample| sample.time_s < time_s);
         match self.samples.get(after) {
@@ -260,7 +263,7 @@ impl Record {
         }
     }
 
-    /// States of the beam with the times at which they end.
+    /// States of the beam, each with the time of its end.
     pub(crate) fn beam_stretches(&self) -> Option<impl Iterator<Item = (&BeamState, f64)>> {
         let beam = self.beam.as_ref()?;
         let ends = beam.iter().skip(1).map(|state| state.time_s).chain([f64::INFINITY]);
@@ -374,7 +377,7 @@ fn optional<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Option<Vec<T>>>
     if path.exists() { rows(path).map(Some) } else { Ok(None) }
 }
 
-/// The rows of a table; the last one of a run that was killed may be cut, and is left out.
+/// Reads the rows of a table. An incomplete last row, left by a run that was killed, is dropped.
 fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>> {
     let mend = "give the folder of a recorded run (endowire run)";
     let refuse = |error: String| Error::content(path, format!("{error}; {mend}"));

@@ -1,4 +1,4 @@
-//! What a subject was done with: its thresholds beside the measures.
+//! The score of a subject: its measures against its thresholds.
 
 use serde::Serialize;
 
@@ -8,55 +8,55 @@ use crate::record::Record;
 use crate::subject::{Limits, Subject, Threshold};
 use crate::unjudged::{Unjudged, limits, why_absent};
 
-/// Score of a subject that is done as it should be.
+/// The score when all thresholds are met.
 const BEST: f64 = 100.0;
 
-/// A measure and what was asked of it.
+/// A measure and the threshold for it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scored {
-    /// The measure, until the subject's end.
+    /// The measure, up to the end of the subject.
     #[serde(flatten)]
     pub metric: Metric,
-    /// What was asked of it, if anything was.
+    /// Its threshold, if there is one.
     pub threshold: Option<Threshold>,
-    /// Whether it is so; none where nothing was asked, or it cannot be judged.
+    /// Whether the threshold is met; `None` if there is none or it cannot be judged.
     pub passed: Option<bool>,
-    /// Why it cannot be judged, if that is so. Then it is not kept either.
+    /// Why the threshold cannot be judged. It then counts as missed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unjudged: Option<&'static str>,
 }
 
-/// What has come of a subject.
+/// The result of a subject.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Whether its goal was reached, and all its thresholds that have points are kept.
+    /// Whether the goal was reached and all thresholds with points are met.
     pub passed: bool,
-    /// Points of the thresholds that are kept, in hundredths of all; 0 where the goal was not reached.
+    /// Points of the thresholds that are met, in percent of all points; 0 if the goal was not reached.
     pub score: f64,
-    /// How it ended; none where it was left before.
+    /// Its end; `None` if it was left before.
     pub ended: Option<Ended>,
 }
 
-/// How well a subject was done, and by which measures.
+/// The score of a subject and the measures behind it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Score {
-    /// What commands call the subject.
+    /// Name of the subject in commands.
     pub subject: String,
-    /// What has come of it.
+    /// The result.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// The limits that there were.
+    /// The limits that applied.
     #[serde(skip)]
     pub limits: Limits,
-    /// The thresholds and limits that cannot be judged.
+    /// Thresholds and limits that cannot be judged.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unjudged: Vec<Unjudged>,
-    /// All measures, in the order of their groups.
+    /// All measures, ordered by group.
     pub metrics: Vec<Scored>,
 }
 
 impl Score {
-    /// That of a record, of which these are the measures.
+    /// The score of a record with these measures.
     pub(crate) fn new(subject: &Subject, record: &Record, metrics: &[Metric], ended: Option<Ended>) -> Self {
         let scored = |metric: &Metric| {
             let threshold = subject.threshold.iter().find(|threshold| threshold.metric == metric.name);
@@ -86,7 +86,7 @@ impl Score {
         Self { subject: subject.stem(), verdict, limits: subject.limits, unjudged, metrics }
     }
 
-    /// What cannot be judged, by its reason: one sentence each.
+    /// What cannot be judged, grouped by reason, one sentence each.
     pub fn unjudged_words(&self) -> Vec<String> {
         let mut reasons: Vec<(&str, Vec<&str>)> = vec![];
         for Unjudged { what, why } in &self.unjudged {
@@ -99,7 +99,7 @@ impl Score {
         reasons.into_iter().map(words).collect()
     }
 
-    /// The measures of which something was asked.
+    /// The measures that have a threshold.
     pub fn asked(&self) -> impl Iterator<Item = (&Scored, &Threshold)> {
         self.metrics.iter().filter_map(|one| Some((one, one.threshold.as_ref()?)))
     }

@@ -1,4 +1,4 @@
-//! The file of a session of play: beside its script, with the times, rests and the beam that a script does not tell.
+//! The session file of play. It lies beside the script and holds what a script cannot: times, rests and the beam.
 
 use std::path::PathBuf;
 
@@ -6,16 +6,17 @@ use serde::Serialize;
 
 use crate::record::Record;
 
-/// What stands in a `*.session.json`, which [`Record::read`] reads.
+/// Content of a `*.session.json`, as read by [`Record::read`].
 #[derive(Debug, Serialize)]
 pub struct SessionFile {
-    /// File of the scene.
+    /// Scene file.
     pub scene_file: PathBuf,
-    /// What of it was set, `KEY=VALUE`.
+    /// Overridden keys of the scene, `KEY=VALUE`.
     pub set: Vec<String>,
-    /// When it was recorded, seconds since 1970 began in UTC; none of one in which time goes by as inputs say: it is the same at any time.
+    /// Time of the recording, seconds since 1970-01-01 UTC; `None` if the session's time advances by its inputs
+    /// alone, so that its file is the same at any date.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded_unix_s: Option<u64>,
-    /// What was done.
+    /// The record.
     pub record: Record,
 }

@@ -1,20 +1,21 @@
-//! How smooth a motion is: of the tip's speed, at even times.
+//! Smoothness of the tip's motion, from its speed at regular times.
 
 use crate::record::Record;
 use crate::spectrum::amplitudes;
 
-/// Even times are so far apart, s: hands do nothing faster than ten times a second.
+/// Sampling interval, s: hands do not move at more than 10 Hz.
 const STEP_S: f64 = 0.05;
-/// Spectral arc length: zeros make the spectrum longer by two to this power, amplitudes below this part of the largest end it.
+/// Spectral arc length: zero padding lengthens the signal by two to the power of `PADDING`; the spectrum ends at the
+/// last amplitude of at least this fraction of the largest.
 const PADDING: u32 = 4;
 const LEAST_AMPLITUDE: f64 = 0.05;
-/// Most even times: a day.
+/// Largest number of sampling times: one day.
 const MOST: usize = 1_728_000;
 /// A submovement is faster than this, mm/s, for at least this long, s.
 const MOVING_MM_PER_S: f64 = 2.0;
 const SHORTEST_S: f64 = 0.1;
 
-/// Speed of the tip at even times, mm/s; its way is straight between samples.
+/// Speed of the tip at regular times, mm/s; the tip moves straight between samples.
 pub(crate) fn speeds(record: &Record) -> Vec<f64> {
     let places = record.samples.iter().filter_map(|sample| Some((sample.time_s, sample.tip_mm?)));
     let places: Vec<_> = places.collect();
@@ -39,8 +40,9 @@ pub(crate) fn speeds(record: &Record) -> Vec<f64> {
     (1..=count).map(&mut speed).collect()
 }
 
-/// Spectral arc length (Balasubramanian, Melendez-Calderon and Burdet, IEEE Transactions on Biomedical Engineering 59, 2012, and with an
-/// adaptive end 2015): less the length of the amplitude spectrum of the speed, both scaled to one. Nearer to zero is smoother.
+/// Spectral arc length: the negative length of the amplitude spectrum of the speed, with amplitude and frequency
+/// scaled to one (Balasubramanian, Melendez-Calderon and Burdet, IEEE Transactions on Biomedical Engineering 59,
+/// 2012; with an adaptive cut-off, 2015). Closer to zero is smoother.
 pub(crate) fn spectral_arc_length(speeds: &[f64]) -> Option<f64> {
     if speeds.len() < 2 || speeds.iter().all(|speed| *speed == 0.0) {
         return None;
@@ -53,12 +55,12 @@ pub(crate) fn spectral_arc_length(speeds: &[f64]) -> Option<f64> {
     let last = amplitudes.iter().rposition(|value| *value >= LEAST_AMPLITUDE * largest)?;
     let step = 1.0 / last.max(1) as f64;
     let pieces = amplitudes[..=last].windows(2);
-    // Roots have the same bits on every machine, `hypot` has not.
+    // Square roots have the same bits on every machine; `hypot` does not.
     let of_piece = |pair: &[f64]| (step * step + ((pair[1] - pair[0]) / largest).powi(2)).sqrt();
     Some(-pieces.map(of_piece).sum::<f64>())
 }
 
-/// Number of submovements, and how long one takes on average, s.
+/// Number of submovements, and their mean duration, s.
 pub(crate) fn submovements(speeds: &[f64]) -> (usize, Option<f64>) {
     let of = |stretch: &[f64]| stretch[0] > MOVING_MM_PER_S;
     let stretches = speeds.chunk_by(|a, b| (*a > MOVING_MM_PER_S) == (*b > MOVING_MM_PER_S));
@@ -81,7 +83,7 @@ mod tests {
             one.iter().enumerate().map(|(k, v)| v * (1.0 + 0.8 * (2.5 * k as f64).sin())).collect();
         let [one, two, tremor] = [&one, &two, &tremor].map(|speeds| spectral_arc_length(speeds).unwrap());
         assert!(one > two && one > tremor, "{one} {two} {tremor}");
-        // A bell of speed has −1.4 to −1.6 in the papers.
+        // The papers give −1.4 to −1.6 for a bell-shaped speed.
         assert!((-1.9..-1.2).contains(&one), "{one}");
         assert!(spectral_arc_length(&[0.0; 9]).is_none() && spectral_arc_length(&[]).is_none());
     }

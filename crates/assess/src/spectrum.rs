@@ -1,10 +1,10 @@
-//! Amplitude spectra with the same bits on every machine: libraries of fast transforms choose their ways by the processor, and have tables of the
-//! system's sines.
+//! Amplitude spectra with the same bits on every machine. FFT libraries do not give these: they choose their
+//! algorithm by the processor and use the sines of the system.
 
 use std::f64::consts::TAU;
 
-/// Amplitudes of the discrete Fourier transform of real values, from the mean to half the rate (Cooley and Tukey, Mathematics of Computation 19, 1965).
-/// Their number must be a power of two, at least two.
+/// Amplitudes of the discrete Fourier transform of real values, from the mean to half the sampling rate (Cooley and
+/// Tukey, Mathematics of Computation 19, 1965). The number of values must be a power of two and at least two.
 pub(crate) fn amplitudes(values: &[f64]) -> Vec<f64> {
     let count = values.len();
     debug_assert!(count.is_power_of_two() && count > 1);
@@ -14,7 +14,7 @@ pub(crate) fn amplitudes(values: &[f64]) -> Vec<f64> {
             [cos, sin]
         })
         .collect();
-    // Halves are those of even and of odd places, at all levels: values begin in the order of their places with the bits reversed.
+    // Each half holds the even or the odd indices, at all levels: values start in bit-reversed order.
     let beyond = usize::BITS - count.trailing_zeros();
     let mut spectrum: Vec<[f64; 2]> =
         (0..count).map(|place| [values[place.reverse_bits() >> beyond], 0.0]).collect();
@@ -51,7 +51,7 @@ mod tests {
             let expected = of(f64::cos).hypot(of(f64::sin));
             assert!((amplitude - expected).abs() < 1e-11, "{k}: {amplitude}, {expected}");
         }
-        // The twin: another value has another spectrum.
+        // The twin: a different value gives a different spectrum.
         let mut other = values;
         other[5] += 1e-6;
         assert!((super::amplitudes(&other)[3] - amplitudes[3]).abs() > 1e-9);

@@ -1,9 +1,9 @@
-//! Stretches of time, from one moment to another, s.
+//! Stretches of time, s.
 
-/// A beginning and an end, s.
+/// Begin and end, s.
 pub(crate) type Stretch = (f64, f64);
 
-/// Stretches in order as few: those that are no more than `gap_s` apart are one.
+/// Merges ordered stretches that are at most `gap_s` apart.
 pub(crate) fn joined(stretches: impl IntoIterator<Item = Stretch>, gap_s: f64) -> Vec<Stretch> {
     let mut all: Vec<Stretch> = Vec::new();
     for (from_s, to_s) in stretches {
@@ -15,7 +15,7 @@ pub(crate) fn joined(stretches: impl IntoIterator<Item = Stretch>, gap_s: f64) -
     all
 }
 
-/// What two lists of stretches, each in order, have in common.
+/// The intersection of two ordered lists of stretches.
 pub(crate) fn common(a: &[Stretch], b: &[Stretch]) -> Vec<Stretch> {
     let (mut i, mut j) = (0, 0);
     let mut all = Vec::new();
@@ -33,7 +33,7 @@ pub(crate) fn common(a: &[Stretch], b: &[Stretch]) -> Vec<Stretch> {
     all
 }
 
-/// The longest ones of at least a length, in order.
+/// The longest stretches of at least `at_least_s`, at most `most` of them, in order.
 pub(crate) fn longest(mut stretches: Vec<Stretch>, at_least_s: f64, most: usize) -> Vec<Stretch> {
     stretches.retain(|(from_s, to_s)| to_s - from_s >= at_least_s);
     stretches.sort_by(|a, b| (b.1 - b.0).total_cmp(&(a.1 - a.0)));

@@ -1,4 +1,4 @@
-//! Training subjects: what is to be done in a scene, when it ends, and what is asked of it. A file of TOML, written without code.
+//! Training subjects: a task in a scene, its end, and its thresholds. A subject is a TOML file, written without code.
 
 use std::path::{Path, PathBuf};
 
@@ -12,41 +12,42 @@ use crate::goal::Goal;
 use crate::metric::{Better, Metric};
 use crate::record::Record;
 
-/// Levels, from the easiest on.
+/// Levels, from the easiest.
 const LEVELS: std::ops::RangeInclusive<u8> = 1..=4;
-/// Largest distance, time, volume, force and number of points that can be meant.
+/// Largest valid distance, time, volume, force and number of points.
 pub(crate) const LARGEST: f64 = 1e6;
 
-/// A subject as its file says it.
+/// A subject as its file defines it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Subject {
     /// Its title.
     pub name: String,
-    /// How hard it is, 1 to 4.
+    /// Difficulty, 1 to 4.
     pub level: u8,
-    /// The task: what to do, why, and what counts.
+    /// The task in words: what to do, why, and what counts.
     pub text: String,
-    /// Scene file, from the folder of the subject; its script is a demonstration alone.
+    /// Scene file, relative to the subject's folder; its script serves only as a demonstration.
     pub scene: PathBuf,
-    /// Keys of the scene that have other values here, `KEY=VALUE`.
+    /// Overridden keys of the scene, `KEY=VALUE`.
     #[serde(default)]
     pub set: Vec<String>,
-    /// File of `[[script]]` tables by which the subject can be done, from the same folder; the scene's own script if absent.
+    /// File of `[[script]]` tables that solves the subject, relative to the same folder; by default the scene's own
+    /// script.
     pub reference: Option<PathBuf>,
-    /// What is to be reached.
+    /// The goal.
     pub goal: Goal,
-    /// What ends it early.
+    /// Limits that end it early.
     #[serde(default)]
     pub limits: Limits,
-    /// What is asked of the measures.
+    /// Thresholds of measures.
     #[serde(default)]
     pub threshold: Vec<Threshold>,
     #[serde(skip)]
     path: PathBuf,
 }
 
-/// Beyond one of these a subject ends, and is not passed.
+/// Limits. A subject ends, not passed, as soon as one of them is exceeded.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
@@ -56,24 +57,24 @@ pub struct Limits {
     pub beam_s: Option<f64>,
     /// Contrast medium, ml.
     pub contrast_ml: Option<f64>,
-    /// Sum of the sizes of wall forces, N.
+    /// Sum of the magnitudes of wall forces, N.
     pub wall_force_n: Option<f64>,
 }
 
-/// What is asked of a measure.
+/// Threshold of a measure.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Threshold {
     /// Name of the measure ([`Metric::name`]).
     #[serde(skip_serializing)]
     pub metric: String,
-    /// Its largest value, where less is better.
+    /// Largest value, for a measure of which less is better.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most: Option<f64>,
-    /// Its smallest value, where more is better.
+    /// Smallest value, for a measure of which more is better.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_least: Option<f64>,
-    /// What it counts in the score; 1 if absent. With 0 it is told and need not be kept.
+    /// Points in the score; 1 by default. With 0 the measure is reported and need not be met.
     #[serde(default = "one")]
     pub points: f64,
 }
@@ -83,12 +84,12 @@ fn one() -> f64 {
 }
 
 impl Threshold {
-    /// Whether a value is as it should be.
+    /// Whether a value meets the threshold.
     pub(crate) fn holds(&self, value: f64) -> bool {
         self.at_most.is_none_or(|most| value <= most) && self.at_least.is_none_or(|least| value >= least)
     }
 
-    /// Checks it beside the measure of its name; `key` is what messages call it.
+    /// Checks it against the measure that it names; `key` is its name in messages.
     fn check(&self, key: &str, metrics: &[Metric]) -> Result<()> {
         let Some(metric) = metrics.iter().find(|metric| metric.name == self.metric) else {
             let nearest = nearest_name(metrics.iter().map(|metric| metric.name), &self.metric);
@@ -125,10 +126,11 @@ impl Threshold {
 }
 
 impl Subject {
-    /// Reads a subject.
+    /// Reads a subject from a file.
     ///
     /// # Errors
-    /// [`Error::Content`] with file, key and value of what does not fit, a scene or a reference that is not there among it.
+    /// [`Error::Content`] with file, key and value of what is invalid, including a scene or reference that does not
+    /// exist.
     pub fn read(path: &Path) -> Result<Self> {
         let (subject, _): (Self, String) = from_toml(path)?;
         let subject = subject.of_file(path)?;
@@ -143,15 +145,15 @@ impl Subject {
         Ok(subject)
     }
 
-    /// Reads a subject from the text of its file, which `path` names; the files that it names are not looked for.
+    /// Reads a subject from the text of its file; `path` is for messages. The files that it names are not looked for.
     ///
     /// # Errors
-    /// As [`Self::read`], less those of files.
+    /// As [`Self::read`], except for missing files.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         parse_toml::<Self>(text, path)?.of_file(path)
     }
 
-    /// Whether a text is meant to be a subject and no scene: it names a scene.
+    /// Whether a text is a subject rather than a scene: it names a scene.
     pub fn is_meant(text: &str) -> bool {
         #[derive(Deserialize)]
         struct Head {
@@ -199,7 +201,7 @@ impl Subject {
         Ok(())
     }
 
-    /// What commands call it: the stem of its file.
+    /// Name of the subject in commands: the stem of its file.
     pub fn stem(&self) -> String {
         self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
     }
@@ -213,7 +215,7 @@ impl Subject {
         self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
     }
 
-    /// A path of the subject, seen from the working directory.
+    /// Path of a file of the subject, relative to the working directory.
     pub fn resolve(&self, file: &Path) -> PathBuf {
         self.folder().join(file)
     }

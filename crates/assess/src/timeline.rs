@@ -1,4 +1,4 @@
-//! A procedure over time in few numbers, for whoever draws it: even pieces of time, whatever the length of the record.
+//! A procedure over time, reduced for drawing to a fixed number of equal intervals.
 
 use endowire_core::Vec3;
 use serde::Serialize;
@@ -6,51 +6,53 @@ use serde::Serialize;
 use crate::record::{BeamState, Injection, Record, Sample};
 use crate::way::Way;
 
-/// No piece is shorter, s: hands do little that is faster.
+/// Shortest interval, s: hands do little that is faster.
 const SHORTEST_S: f64 = 0.1;
 
-/// What a hand does.
+/// Motion of one instrument over time.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct HandLine {
-    /// Speed of each piece, mm/s; negative pulled back.
+    /// Mean speed in each interval, mm/s; negative when pulled back.
     pub push_mm_per_s: Vec<f64>,
-    /// Speed of turning, °/s.
+    /// Mean rotation speed, °/s.
     pub turn_deg_per_s: Vec<f64>,
-    /// Length in at its end, mm.
+    /// Inserted length at the end of the interval, mm.
     pub inserted_mm: Vec<f64>,
-    /// Largest force of the hand in it, N.
+    /// Largest magnitude of the push force, N.
     pub force_n: Vec<f64>,
 }
 
-/// A procedure in even pieces of time.
+/// A procedure in equal intervals of time.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Timeline {
-    /// Length of a piece, s.
+    /// Length of an interval, s.
     pub piece_s: f64,
-    /// The end, s.
+    /// End of the procedure, s.
     pub end_s: f64,
-    /// Where the foremost tip is at the end of each piece, beside the centre line; none while nothing is in.
+    /// Position of the foremost tip at the end of each interval, to be compared with the centre line; `None` while
+    /// nothing is inserted.
     pub tip_mm: Vec<Option<Vec3>>,
-    /// The same of the instrument that is to arrive, where the way is for a named one; else empty.
+    /// The same for the tip of the instrument that must arrive, if the way names one; otherwise empty.
     pub arriving_mm: Vec<Option<Vec3>>,
-    /// Whether the foremost tip is in a branch that is not on the way.
+    /// Whether the foremost tip is in a branch off the way.
     pub wrong: Vec<bool>,
-    /// Largest sum of wall forces in each piece, N.
+    /// Largest sum of wall forces in each interval, N.
     pub wall_force_n: Vec<f64>,
-    /// Largest wall force at the tip, N.
+    /// Largest wall force at the tip in each interval, N.
     pub tip_force_n: Vec<f64>,
-    /// Volume of coils in the sac over that of the sac at the end of each piece; empty where no sac is packed.
+    /// Volume of the coils in the sac over the volume of the sac, at the end of each interval; empty if no sac is
+    /// packed.
     pub packing_density: Vec<f64>,
-    /// The hands, the innermost instrument first.
+    /// The instruments, innermost first.
     pub hands: Vec<HandLine>,
-    /// The beam, from each of these moments on; none where it was not recorded.
+    /// States of the beam, each from its time on; `None` if the beam was not recorded.
     pub beam: Option<Vec<BeamState>>,
-    /// What was injected.
+    /// Injections.
     pub injections: Vec<Injection>,
 }
 
 impl Timeline {
-    /// That of a record in at most so many pieces, on a way if one is known.
+    /// The timeline of a record in at most `most_pieces` intervals; `way` is the way to the target, if known.
     pub fn of(record: &Record, way: Option<&Way>, most_pieces: usize) -> Self {
         let end_s = record.end_s();
         let pieces = ((end_s / SHORTEST_S).ceil() as usize).min(most_pieces).max(1);
@@ -88,18 +90,18 @@ impl Timeline {
         line
     }
 
-    /// Adds a sample to the pieces that it lies in.
+    /// Adds a sample to the intervals that it overlaps.
     fn add(&mut self, took_s: f64, sample: &Sample, arriving: Option<usize>) {
         let (from_s, to_s) = (sample.time_s - took_s, sample.time_s);
         let pieces = self.tip_mm.len();
         let piece_of = |time_s: f64| ((time_s / self.piece_s) as usize).min(pieces - 1);
-        // A moment between two pieces is the end of the earlier one.
+        // The boundary between two intervals belongs to the earlier one.
         let first = piece_of(from_s);
         let last = piece_of(to_s - 1e-9 * self.end_s).max(first);
         for piece in first..=last {
             let begin_s = piece as f64 * self.piece_s;
             let share_s = to_s.min(begin_s + self.piece_s) - from_s.max(begin_s);
-            // Of a sample that takes no time all is in its piece.
+            // A sample of zero duration counts in full in its interval.
             let share = if took_s > 0.0 { (share_s / took_s).clamp(0.0, 1.0) } else { 1.0 };
             self.tip_mm[piece] = sample.on_centreline_mm();
             if let Some(tip) = self.arriving_mm.get_mut(piece) {
@@ -162,13 +164,13 @@ mod tests {
             (vec![0.5, 0.2], vec![0.5, 0.2])
         );
         assert_eq!(line.tip_mm[0], Some(Vec3::new(30.0, 0.0, 0.0)));
-        // No piece is shorter than a tenth of a second, however many are asked for; what was pushed is all there.
+        // No interval is shorter than 0.1 s, however many are requested; the total advance is preserved.
         let fine = Timeline::of(&record, None, 1000);
         assert_eq!(fine.tip_mm.len(), 40);
         let pushed_mm: f64 = fine.hands[0].push_mm_per_s.iter().map(|speed| speed * fine.piece_s).sum();
         assert!((pushed_mm - 30.0).abs() < 1e-9, "{pushed_mm}");
         assert_eq!(Timeline::of(&Record::default(), None, 10).tip_mm, [None]);
-        // Of a sac it has what is packed; of others nothing.
+        // Packing is filled in only for a sac.
         assert!(line.packing_density.is_empty());
         let mut packed = record;
         packed.samples[1].packing = Some(Packed { density: 0.1, outside_mm: 0.0 });

@@ -1,4 +1,5 @@
-//! What of a subject cannot be judged, and why: what it asks of was not recorded, or means nothing of the procedure.
+//! Thresholds and limits that cannot be judged, because their data were not recorded or have no meaning for the
+//! procedure.
 
 use serde::Serialize;
 
@@ -11,9 +12,9 @@ const NO_BEAM: &str = "no beam was recorded: a folder of endowire run has none; 
 /// A threshold or a limit that cannot be judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unjudged {
-    /// Its measure, or the key of the limit.
+    /// Name of the measure, or key of the limit.
     pub what: String,
-    /// Why, and how to mend it.
+    /// The reason and the remedy.
     pub why: &'static str,
 }
 
@@ -35,7 +36,7 @@ pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
     }
 }
 
-/// The limits that a record cannot tell of.
+/// The limits that a record has no data for.
 pub(crate) fn limits(limits: &Limits, record: &Record) -> Vec<Unjudged> {
     let beam = limits.beam_s.filter(|_| record.beam.is_none());
     beam.map(|_| Unjudged { what: "limits.beam_s".to_owned(), why: NO_BEAM }).into_iter().collect()

@@ -1,49 +1,50 @@
-//! Where a tip was to go, and which branches it went into.
+//! The way of a tip to its target, and wrong branches.
 
 use endowire_core::vessel::{CentrelinePath, CentrelineTree};
 use endowire_core::{Result, Vec3};
 
-/// The way through a tree to a place.
+/// The way through a centre-line tree to a place.
 #[derive(Debug, Clone)]
 pub struct Way {
     tree: CentrelineTree,
     path: CentrelinePath,
-    /// The rows that are no wrong ways: those of the path and beyond its end.
+    /// Rows that are not in a wrong branch: those on the path and beyond its end.
     right: Vec<bool>,
-    /// Row where the path's vessel first divides.
+    /// Row of the first fork along the path.
     first_fork: Option<usize>,
     target_mm: Option<(Vec3, f64)>,
-    /// The hand whose instrument is to arrive; the foremost tip where there is none.
+    /// Index of the instrument that must arrive; `None` for the foremost tip.
     pub(crate) instrument: Option<usize>,
 }
 
 impl Way {
-    /// The way to a target of the tree, at which what is within some mm of it has arrived.
+    /// The way to a named target of the tree; a tip within `within_mm` of it has arrived. `None` if the target is
+    /// where the tree begins.
     ///
     /// # Errors
-    /// [`endowire_core::Error::Parameter`] for a target that is not there, or where the tree begins.
+    /// [`endowire_core::Error::Parameter`] if no target has this name.
     pub fn to_target(tree: &CentrelineTree, name: &str, within_mm: f64) -> Result<Option<Self>> {
         let place_mm = tree.nodes()[tree.target(name)?.row].position_mm;
         Ok(Self::towards(tree, place_mm, within_mm))
     }
 
-    /// The same for the tip of a hand's instrument: it is that which arrives.
+    /// The same way for the tip of one instrument, by its index.
     #[must_use]
     pub fn for_instrument(self, hand: usize) -> Self {
         Self { instrument: Some(hand), ..self }
     }
 
-    /// The hand whose instrument is to arrive; none where the foremost tip is.
+    /// Index of the instrument that must arrive; `None` for the foremost tip.
     pub fn instrument(&self) -> Option<usize> {
         self.instrument
     }
 
-    /// The way to a place nobody named: there is no arrival at it. None where the tree begins.
+    /// The way to a place that is not a target, so there is no arrival. `None` if the tree begins there.
     pub fn to_place(tree: &CentrelineTree, place_mm: &Vec3) -> Option<Self> {
         Self::to_row(tree, tree.nearest_row(place_mm))
     }
 
-    /// The way to a place, at which what is within some mm of it has arrived. None where the tree begins.
+    /// The way to a place; a tip within `within_mm` of it has arrived. `None` if the tree begins there.
     pub fn towards(tree: &CentrelineTree, place_mm: Vec3, within_mm: f64) -> Option<Self> {
         let way = Self::to_place(tree, &place_mm)?;
         Some(Self { target_mm: Some((place_mm, within_mm)), ..way })
@@ -69,7 +70,7 @@ impl Way {
         Some(Self { tree: tree.clone(), path, right, first_fork, target_mm: None, instrument: None })
     }
 
-    /// The target, and how near to it is there, mm.
+    /// The target, and the distance within which a tip has arrived, mm.
     pub fn target_mm(&self) -> Option<(Vec3, f64)> {
         self.target_mm
     }
@@ -79,10 +80,10 @@ impl Way {
         (self.path.nearest(to).arc_mm - self.path.nearest(from).arc_mm).abs()
     }
 
-    /// The wrong branch that a place is in, deeper than its radius: the first of its rows. None on the way.
+    /// First row of the wrong branch that a place is in, if it is deeper in it than the radius. `None` on the way.
     pub(crate) fn wrong_branch(&self, place: &Vec3) -> Option<usize> {
         let nodes = self.tree.nodes();
-        // A row stands for the stretch from the one before.
+        // A row represents the stretch from its parent.
         let deep = |row: &usize| {
             let (to, from) = (&nodes[*row], &nodes[nodes[*row].parent.unwrap_or(*row)]);
             let piece = to.position_mm - from.position_mm;
@@ -91,7 +92,7 @@ impl Way {
         };
         let mut at = (0..nodes.len()).min_by(|a, b| deep(a).total_cmp(&deep(b)))?;
         let on = self.path.nearest(place);
-        // A tip that slides along the wall dips into the mouths that it passes.
+        // A tip that slides along the wall dips into the ostia that it passes.
         if self.right[at] || on.distance_mm <= on.radius_mm + nodes[at].radius_mm {
             return None;
         }
@@ -101,7 +102,8 @@ impl Way {
         Some(at)
     }
 
-    /// Whether a place is beyond the way's first fork, out of the vessel that it begins in.
+    /// Whether a place is beyond the first fork, outside the vessel in which the way begins; `None` if there is no
+    /// fork.
     pub(crate) fn is_past_first_fork(&self, place: &Vec3) -> Option<bool> {
         let fork = &self.tree.nodes()[self.first_fork?];
         let arc_mm = self.path.nearest(&fork.position_mm).arc_mm;

@@ -1,4 +1,4 @@
-//! Subjects and scores in words, for whoever shows them.
+//! Subjects and scores in words, for display.
 
 use crate::exam::Standing;
 use crate::goal::{Goal, PackingGoal};
@@ -6,7 +6,7 @@ use crate::score::{Scored, Verdict};
 use crate::subject::{Limits, Threshold};
 
 impl Goal {
-    /// What is to be reached.
+    /// The goal in words.
     pub fn words(&self) -> String {
         let goal = match self {
             Self::Packing(PackingGoal { packing_density }) => {
@@ -20,13 +20,13 @@ impl Goal {
     }
 }
 
-/// A part in hundredths, with the digits that were given.
+/// A fraction in percent, with the digits that were given.
 fn percent(part: f64) -> f64 {
     (part * 1e6).round() / 1e4
 }
 
 impl Standing {
-    /// How far it is to the goal: one thing each.
+    /// How far it is to the goal, one line per quantity.
     pub(crate) fn to_go_words(&self) -> Vec<String> {
         let goal = match &self.task.goal {
             Goal::Packing(PackingGoal { packing_density }) => {
@@ -47,7 +47,7 @@ impl Standing {
 }
 
 impl Limits {
-    /// Each limit that there is.
+    /// The limits that are set.
     pub fn words(&self) -> Vec<String> {
         let Self { time_s, beam_s, contrast_ml, wall_force_n } = *self;
         let limits = [
@@ -62,7 +62,7 @@ impl Limits {
 }
 
 impl Threshold {
-    /// What it asks for.
+    /// The threshold in words.
     pub fn words(&self) -> String {
         let most = self.at_most.map(|most| format!("at most {most}"));
         most.or_else(|| self.at_least.map(|least| format!("at least {least}"))).unwrap_or_default()
@@ -70,7 +70,7 @@ impl Threshold {
 }
 
 impl Scored {
-    /// Whether what was asked of it is so.
+    /// Whether the threshold is met.
     pub fn kept_words(&self) -> &'static str {
         match self.passed {
             Some(true) => "kept",
@@ -79,11 +79,11 @@ impl Scored {
         }
     }
 
-    /// Its value with its unit.
+    /// The value with its unit.
     pub fn value_words(&self) -> String {
         match (self.metric.value, self.metric.unit) {
             (None, _) => "not measured".to_owned(),
-            // Numbers and ratios.
+            // Counts and ratios.
             (Some(value), "1") if value.fract() == 0.0 => value.to_string(),
             (Some(value), "1") => format!("{value:.3}"),
             (Some(value), unit) => format!("{value:.3} {unit}"),
@@ -92,7 +92,7 @@ impl Scored {
 }
 
 impl Verdict {
-    /// What has come of the subject.
+    /// The result in words.
     pub fn words(&self) -> String {
         let how = if self.passed { "passed" } else { "not passed" };
         let end = match self.ended {

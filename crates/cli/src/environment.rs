@@ -1,10 +1,10 @@
-//! What the surroundings of the process say to libraries below us.
+//! Environment of the process that affects libraries.
 
-/// Starts the program anew with Mesa's device-select layer off, where no desktop is there to select for.
+/// Restarts the program with Mesa's device-select layer disabled if there is no desktop.
 ///
-/// The Vulkan loader puts that layer in front of every driver. It asks the Wayland desktop for its graphics card, and without
-/// a runtime folder a library below it prints an error on stderr. Only its variable, `NODEVICE_SELECT`, keeps it out, and the
-/// environment of a running process cannot be changed safely.
+/// The Vulkan loader puts that layer in front of every driver. It asks the Wayland desktop for its graphics card;
+/// without a runtime folder, a library below it prints an error on stderr. Only the layer's variable
+/// `NODEVICE_SELECT` disables it, and the environment of a running process cannot be changed safely.
 #[cfg(target_os = "linux")]
 pub(crate) fn without_desktop() {
     use std::env::{args_os, current_exe, var_os};
@@ -16,7 +16,7 @@ pub(crate) fn without_desktop() {
         return;
     }
     let (Ok(program), Some(name)) = (current_exe(), args_os().next()) else { return };
-    // Comes back only where it fails; then the message stays, and all else works.
+    // Returns only on failure; then the message appears, and everything else works.
     let _ = std::process::Command::new(program)
         .arg0(name)
         .args(args_os().skip(1))
@@ -24,6 +24,6 @@ pub(crate) fn without_desktop() {
         .exec();
 }
 
-/// Nothing to do: other systems have no such layer.
+/// Does nothing: other systems have no such layer.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn without_desktop() {}

@@ -1,15 +1,15 @@
-//! Why a command did not do what it was asked, and the exit code that says so.
+//! Failures of commands and their exit codes.
 
 use std::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// What ends a command early.
+/// A failure that ends a command.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The input or its use is at fault: exit code 2.
+    /// Bad input or usage: exit code 2.
     Input(String),
-    /// The computation failed on good input: exit code 1.
+    /// The computation failed on valid input: exit code 1.
     Computation(String),
 }
 
@@ -22,7 +22,7 @@ impl Failure {
         })
     }
 
-    /// The same failure, with where it happened in front.
+    /// The same failure, prefixed with its place.
     pub(crate) fn at(self, place: impl fmt::Display) -> Self {
         match self {
             Self::Input(text) => Self::Input(format!("{place}: {text}")),
@@ -30,7 +30,7 @@ impl Failure {
         }
     }
 
-    /// The same failure after the computation has begun: no input would have avoided it.
+    /// The same failure as a computation error: no other input would have avoided it.
     pub(crate) fn into_computation(self) -> Self {
         Self::Computation(self.to_string())
     }

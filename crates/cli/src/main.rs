@@ -1,4 +1,4 @@
-//! The `endowire` command: parse, resolve, run, and say with the exit code how it went.
+//! The `endowire` command: parses arguments, runs the command, and reports the result by its exit code.
 
 mod args;
 mod cache;
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
     match commands::dispatch(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            // One failure, one line, whatever a library has put into it.
+            // A failure is always one line, whatever a library has put into it.
             let text = failure.to_string();
             let line =
                 text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");

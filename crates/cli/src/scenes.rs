@@ -1,4 +1,4 @@
-//! Scenes with what a command line sets, and how their runs went.
+//! Scenes with settings of a command line, and convergence of their runs.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::output::recording::RecordedSummary;
 use crate::output::tell;
 
-/// Reads a scene with these values of its keys.
+/// Reads a scene with overridden keys.
 pub(crate) fn read(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> {
     let scene = with_any_device(path, settings)?;
     let other =
@@ -28,12 +28,14 @@ pub(crate) fn read(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> 
     Ok(scene)
 }
 
-/// The same for those who leave out what the scene says its own device is made of, where another takes its place.
+/// The same for callers that ignore the materials that the scene gives for its own device, when another device
+/// replaces it.
 pub(crate) fn with_any_device(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> {
     Ok(scene_with(path, settings, |scene| ViewSpec::of_scene(scene, path).map(drop))?)
 }
 
-/// Reads the scene of a recording once more, from `scene` if that is given: with what was set in the run, and `more`. Its file too.
+/// Reads the scene of a recording again, from `scene` if given, with the settings of the run and `more`; also returns
+/// its path.
 pub(crate) fn of_recording(
     summary: &RecordedSummary,
     scene: Option<&Path>,
@@ -47,7 +49,7 @@ pub(crate) fn of_recording(
     Ok((path, scene))
 }
 
-/// The same with the script of a file in place of its own, if one is given.
+/// The same with the script of a file, if one is given, instead of the scene's own.
 pub(crate) fn with_script(
     path: &Path,
     settings: &[Setting],
@@ -65,7 +67,8 @@ pub(crate) fn with_script(
     Ok(scene)
 }
 
-/// Has contrast medium flow along the vessel's centre line, which is looked for where medium flows and the scene names none.
+/// Lets contrast medium flow along the vessel's centre line. It is extracted if there is medium and the scene names
+/// none.
 pub(crate) fn let_medium_flow(
     view: &mut ViewSpec,
     scene: &Scene,
@@ -75,7 +78,7 @@ pub(crate) fn let_medium_flow(
     if flows { view.take_centreline(scene, store) } else { Ok(()) }
 }
 
-/// Says that the centre line was found in the surface, if one was needed and the scene names none.
+/// Reports that the centre line was extracted from the surface, if one was needed and the scene names none.
 pub(crate) fn tell_found_centreline(path: &Path, scene: &Scene) {
     let Some(tree) = scene.found_centreline() else { return };
     let targets: Vec<&str> = tree.targets().iter().map(|target| target.name.as_str()).collect();
@@ -87,17 +90,18 @@ pub(crate) fn tell_found_centreline(path: &Path, scene: &Scene) {
     ));
 }
 
-/// Tables and keys at the top of a scene file.
+/// Top-level tables and keys of a scene file.
 const TOP: [&str; 9] =
     ["vessel", "device", "instrument", "sheath", "method", "script", "view", "seed", "name"];
 
-/// Of the texts `KEY=VALUE` for frames those that are of the scene, and those of its table `view`, whose keys are called from there.
+/// Splits texts `KEY=VALUE` for frames into those of the scene, and those of its table `view`, whose keys are
+/// relative to that table.
 pub(crate) fn of_scene_and_view(texts: &[String]) -> Result<(Vec<Setting>, Vec<&str>), Failure> {
     let (mut of_scene, mut of_view) = (Vec::new(), Vec::new());
     for text in texts {
         let key = text.split('=').next().unwrap_or_default().trim();
         let first = key.split(['.', '[']).next().unwrap_or_default();
-        // The view has a key `device` of its own, a list.
+        // `device` is a key of the view too, a list.
         if TOP.contains(&first) && key != "device" {
             of_scene.push(text.parse()?);
         } else {
@@ -107,7 +111,7 @@ pub(crate) fn of_scene_and_view(texts: &[String]) -> Result<(Vec<Setting>, Vec<&
     Ok((of_scene, of_view))
 }
 
-/// Fails where steps found no equilibrium and that was not allowed; `kept` says where all of them are.
+/// Fails if steps did not converge and this was not allowed; `kept` says where all steps are saved.
 pub(crate) fn check_converged(
     place: impl Display,
     tally: &Tally,
@@ -125,7 +129,7 @@ pub(crate) fn check_converged(
     }
 }
 
-/// Files of a folder that are in TOML, by their names.
+/// TOML files of a folder, sorted by name.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let unusable = |e: std::io::Error| Failure::Input(format!("{}: {e}: name a folder", folder.display()));
     let entries = std::fs::read_dir(folder).map_err(unusable)?;

@@ -1,9 +1,9 @@
-//! What comparisons and experiments are made of, by name: their arguments list it, and they carry it out.
+//! Names in comparisons and experiments, used both by their arguments and by their implementation.
 
 use endowire_methods::NAMES;
 
-/// What is compared: every method, ours first, and the paper's in its other readings: with unit tangents and the planes of triangles, and as
-/// printed.
+/// The compared methods: all methods, ours first, and two variants of the paper's: with unit tangents and the planes
+/// of triangles, and as printed.
 pub(crate) const CANDIDATES: [&str; NAMES.len() + 2] = {
     let [ours, dense, banded, rest @ ..] = NAMES;
     let [a, b, c, d, e, f] = rest;
@@ -23,10 +23,10 @@ pub(crate) const CASES: [(&str, &str, f64); 5] = [
     ("arch", "mm", 0.1),
 ];
 
-/// Ends of the aortic arch that a wire is steered to, in the order of their rows in its centre-line table.
+/// Targets in the aortic arch, in the order of their rows in its centre-line table.
 pub(crate) const ARCH_TARGETS: [&str; 4] =
     ["ascending aorta", "innominate", "left carotid", "left subclavian"];
-/// Those of the hepatic arteries.
+/// Targets in the hepatic arteries.
 pub(crate) const HEPATIC_TARGETS: [&str; 5] =
     ["aorta", "splenic", "gastroduodenal", "right hepatic", "left hepatic"];
 

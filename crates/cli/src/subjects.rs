@@ -12,13 +12,13 @@ use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::scenes;
 
-/// Folder of the subjects that are called by their names.
+/// Folder of subjects that can be named without a path.
 pub(crate) const FOLDER: &str = "assets/subjects";
 
-/// Largest file that is looked at whether it is one, bytes: input files are no larger.
+/// Size limit of input files, bytes; a larger file is not examined.
 const LARGEST_FILE: u64 = 16 << 20;
 
-/// A score with where it comes from.
+/// A score with its provenance.
 #[derive(Serialize)]
 pub(crate) struct ScoreDocument<'a> {
     #[serde(flatten)]
@@ -27,12 +27,12 @@ pub(crate) struct ScoreDocument<'a> {
     pub(crate) score: &'a Score,
 }
 
-/// The file of a subject that is called by its name.
+/// The file of a subject given by name.
 fn named(which: &Path) -> PathBuf {
     Path::new(FOLDER).join(format!("{}.toml", which.display()))
 }
 
-/// Reads a subject by its file or its name.
+/// Reads a subject, given by file or name.
 pub(crate) fn read(which: &Path) -> Result<Subject, Failure> {
     if which.is_file() {
         return Ok(Subject::read(which)?);
@@ -48,30 +48,30 @@ pub(crate) fn read(which: &Path) -> Result<Subject, Failure> {
     Err(Failure::Input(format!("{}: is no file and no subject of {FOLDER}{nearest}", which.display())))
 }
 
-/// The same of what may be a scene too: none then.
+/// The same for what may be a scene instead; then `None`.
 pub(crate) fn if_meant(which: &Path) -> Result<Option<Subject>, Failure> {
     let meant = if which.exists() {
-        // What is wrong with a file its reader tells.
+        // The reader reports errors of the file.
         let bytes = endowire_core::file::read(which, LARGEST_FILE).unwrap_or_default();
         std::str::from_utf8(&bytes).is_ok_and(Subject::is_meant)
     } else {
-        // A name without an ending is hardly that of a scene.
+        // A name without an extension is more likely a subject than a scene.
         named(which).is_file() || which.extension().is_none()
     };
     meant.then(|| read(which)).transpose()
 }
 
-/// What a subject sets of its scene.
+/// The settings that a subject makes in its scene.
 pub(crate) fn settings(subject: &Subject) -> Result<Vec<Setting>, Failure> {
     let parsed = subject.set.iter().map(|text| text.parse::<Setting>());
     parsed.collect::<Result<_, _>>().map_err(|error| Failure::from(error).at(subject.path().display()))
 }
 
-/// The subject in its scene, to be followed.
+/// The exam of a subject in its scene.
 pub(crate) fn exam(subject: Subject, scene: &Scene, cache: &Cache) -> Result<Exam, Failure> {
     let place = subject.path().display().to_string();
     let in_subject = |error: endowire_core::Error| Failure::from(error).at(&place);
-    // Only a place is looked for along the centre line, which may have to be found first.
+    // Only a target point needs the centre line, which may have to be extracted first.
     let tree = subject.goal.target().map(|_| scene.centreline(cache)).transpose().map_err(in_subject)?;
     let stack = scene.stack().map_err(in_subject)?;
     let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
@@ -79,12 +79,12 @@ pub(crate) fn exam(subject: Subject, scene: &Scene, cache: &Cache) -> Result<Exa
     Ok(Exam::new(subject, &site)?)
 }
 
-/// What has come of a subject, on one line.
+/// The result of a subject in one line.
 pub(crate) fn verdict(score: &Score) -> String {
     format!("{}: {}", score.subject, score.verdict.words())
 }
 
-/// A score for a person.
+/// A score as text.
 pub(crate) fn text(score: &Score) -> String {
     let row = |(scored, threshold): (&Scored, &Threshold)| {
         let (kept, value) = (scored.kept_words(), scored.value_words());

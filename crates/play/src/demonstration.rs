@@ -1,4 +1,4 @@
-//! A script that is shown: its steps in the time that they take, and what it injects as its lines begin.
+//! Playback of a script in a session: its steps in real time, and its injections as their lines begin.
 
 use endowire_core::Result;
 use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
@@ -7,37 +7,37 @@ use crate::hand::Motion;
 use crate::history::Done;
 use crate::{TICKS_PER_S, USUAL_DEG_PER_S, USUAL_MM_PER_S};
 
-/// Least time of a step, s: a tick carries out no more than so many.
+/// Shortest duration of a step, s: limits the steps per tick to 16.
 const LEAST_S: f64 = 1.0 / (16.0 * TICKS_PER_S);
-/// Part of a tick by which a step may come too soon: sums of times are rounded.
+/// Tolerance, in ticks, by which a step may come early: sums of times are rounded.
 const EARLY: f64 = 1e-6;
 
-/// A script on its way.
+/// A script during playback.
 #[derive(Debug)]
 pub(crate) struct Demonstration {
     run: ScriptRun<'static>,
-    /// Ticks that have gone by while it was shown.
+    /// Ticks during which it was played.
     ticks: u64,
-    /// When the steps so far end, s.
+    /// End time of the steps so far, s.
     done_s: f64,
-    /// Injections that have been told.
+    /// Number of injections already returned.
     injected: usize,
-    /// Lines that have been told.
+    /// Number of lines already returned.
     lines: usize,
     pub(crate) paused: bool,
 }
 
-/// What is next.
+/// What comes next.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Next {
     /// Nothing in this tick.
     Later,
-    /// The script is at its end.
+    /// The end of the script.
     End,
     /// A step.
     Step {
         step: Done,
-        /// Whether it is the first of its line.
+        /// Whether it is the first step of its line.
         begins: bool,
     },
 }
@@ -47,12 +47,12 @@ impl Demonstration {
         Self { run: script.into_run(), ticks: 0, done_s: 0.0, injected: 0, lines: 0, paused: false }
     }
 
-    /// A sixtieth of a second goes by.
+    /// Advances by one tick.
     pub(crate) fn tick(&mut self) {
         self.ticks += 1;
     }
 
-    /// What is next in this tick. A step that is told has been carried out when this is asked again.
+    /// The next step within this tick. The caller must carry it out before the next call.
     ///
     /// # Errors
     /// As [`ScriptRun::next`].
@@ -74,14 +74,14 @@ impl Demonstration {
         Ok(Next::Step { step, begins })
     }
 
-    /// What is injected now: by lines that have begun since this was asked last.
+    /// Injections of lines that have begun since the last call.
     pub(crate) fn injections(&mut self) -> Vec<Injection> {
         let told = std::mem::replace(&mut self.injected, self.run.injections().len());
         self.run.injections()[told..].to_vec()
     }
 }
 
-/// Time of a step that has none, s.
+/// Duration, s, of a step without a time.
 fn usual_s(moves: &[Move]) -> f64 {
     let each = moves.iter().map(|one| {
         let (mm, rad) = (one.command.advance_mm.abs(), one.command.rotate_rad.abs());
@@ -90,7 +90,8 @@ fn usual_s(moves: &[Move]) -> f64 {
     each.fold(0.0, f64::max)
 }
 
-/// A move in the units of a hand. Some angles in radians are those of no degrees; then the nearest ones differ in the last bit.
+/// Converts a move to millimetres and degrees. Not every angle in radians is the image of one in degrees; in that
+/// case the last bit differs.
 fn shown(one: &Move) -> Motion {
     let (advance_mm, rad) = (one.command.advance_mm, one.command.rotate_rad);
     let near = rad.to_degrees();

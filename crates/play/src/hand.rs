@@ -1,39 +1,39 @@
-//! A hand on an instrument: what it does in a tick.
+//! The operator's hand on an instrument: its motion in a tick.
 
 use endowire_core::insertion::{Command, Move};
 use endowire_core::{Error, Result};
 
 use crate::TICKS_PER_S;
 
-/// Most that a nudge moves in one tick: 60 mm and 300° a second.
+/// Largest motion by nudges in one tick: 60 mm and 300° per second.
 const NUDGE_MM: f64 = 1.0;
 const NUDGE_DEG: f64 = 5.0;
-/// Fastest hand, mm/s and degrees/s: ten turns a second.
+/// Largest speeds, mm/s and degrees/s: ten turns a second.
 const FASTEST_MM_PER_S: f64 = 300.0;
 const FASTEST_DEG_PER_S: f64 = 3600.0;
-/// Most that is still to be done after a nudge, mm and degrees.
+/// Largest pending motion of nudges, mm and degrees.
 const MOST_MM: f64 = 1e4;
 const MOST_DEG: f64 = 3.6e4;
 
-/// What one instrument does in one step, in the units of a script.
+/// Motion of one instrument in one step, in the units of a script.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Number of the instrument, the innermost being 0.
+    /// Index of the instrument; 0 is the innermost.
     pub instrument: usize,
-    /// Length pushed, mm; negative pulls.
+    /// Advance, mm; negative when pulled back.
     pub advance_mm: f64,
-    /// Turn, degrees.
+    /// Rotation, degrees.
     pub rotate_deg: f64,
 }
 
 impl Motion {
-    /// The same as a command. By the sums of a script, so that it has the same bits.
+    /// The same motion as a command, computed as a script does, so that it has the same bits.
     pub(crate) fn as_move(self) -> Move {
         let command = Command { advance_mm: self.advance_mm, rotate_rad: self.rotate_deg.to_radians() };
         Move { instrument: self.instrument, command }
     }
 
-    /// Adds it to what instruments do in the same tick.
+    /// Adds it to the motions of the same tick.
     pub(crate) fn add_to(self, motions: &mut Vec<Self>) {
         match motions.iter_mut().find(|one| one.instrument == self.instrument) {
             Some(one) => {
@@ -45,12 +45,12 @@ impl Motion {
     }
 }
 
-/// A hand that holds an instrument.
+/// The hand on one instrument.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Hand {
     mm_per_s: f64,
     deg_per_s: f64,
-    /// What nudges have left to do.
+    /// Pending motion of nudges.
     todo_mm: f64,
     todo_deg: f64,
 }
@@ -71,7 +71,8 @@ impl Hand {
         Ok(())
     }
 
-    /// Length and turn of the next tick, of an instrument that can go by `room_mm` backwards and forwards; nudges are used up by it.
+    /// Advance (mm) and rotation (degrees) in the next tick. The advance is limited to `room_mm`; pending nudges are
+    /// reduced even if it is.
     pub(crate) fn tick(&mut self, room_mm: [f64; 2]) -> (f64, f64) {
         let nudge_mm = self.todo_mm.clamp(-NUDGE_MM, NUDGE_MM);
         let nudge_deg = self.todo_deg.clamp(-NUDGE_DEG, NUDGE_DEG);

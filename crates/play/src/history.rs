@@ -1,4 +1,4 @@
-//! All steps of a session, done and undone, and states to go back and forth to.
+//! All steps of a session, done and undone, with saved states for going to any step.
 
 use endowire_core::Result;
 use endowire_core::insertion::{Move, Simulation, State, Step, StepReport};
@@ -9,41 +9,41 @@ use crate::hand::Motion;
 use crate::readout::Went;
 use crate::script::{self, Lines};
 
-/// A state is kept each so many steps at first: those between are carried out once more, which takes less than a second.
+/// Initial interval, in steps, between saved states: steps in between are repeated, which takes less than a second.
 const EVERY: usize = 64;
-/// Most states that are kept, of some hundred kilobytes each: where there are more every other one goes. Of a vessel that moves for an hour
-/// there is one each 512 steps then.
+/// Largest number of saved states, of some hundred kilobytes each. If there are more, every other one is dropped; in
+/// a vessel that moves for an hour, one in 512 steps then remains.
 const MOST_STATES: usize = 512;
 
-/// Contrast medium that a hand has injected.
+/// An injection of contrast medium by the operator.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Injected {
-    /// Number of the instrument that it went through; none where none with a lumen was in.
+    /// Index of the instrument that it went through; `None` if no instrument with a lumen was inserted.
     pub(crate) instrument: Option<usize>,
-    /// Volume and rate, as they were given.
+    /// Volume and rate as requested.
     pub(crate) ml: f64,
     pub(crate) ml_per_s: f64,
-    /// Steps carried out before it.
+    /// Number of steps carried out before it.
     pub(crate) after_step: usize,
-    /// What flows of it.
+    /// The injection in the pictures.
     pub(crate) flow: InjectionSpec,
 }
 
 /// A step that was carried out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Done {
-    /// None where hands rest and a vessel moves.
+    /// Empty if the operator rests and only the vessel moves.
     pub(crate) motions: Vec<Motion>,
-    /// How many such steps a second has.
+    /// Number of such steps per second.
     pub(crate) per_s: f64,
-    /// The instrument that leaves its coil behind in this step, in which nothing else moves.
+    /// The instrument that detaches its coil in this step; nothing else moves then.
     pub(crate) detach: Option<usize>,
-    /// Linear solves, where it is a tick.
+    /// Limit of linear solves, if the step is a tick.
     pub(crate) solves: Option<usize>,
 }
 
 impl Done {
-    /// Carries the step out; where the vessel moves, time goes by as it does in the script's line.
+    /// Carries out the step. In a moving vessel, time advances as in a script line.
     ///
     /// # Errors
     /// As [`Step::carry_out`].
@@ -56,28 +56,28 @@ impl Done {
     }
 }
 
-/// Whether the vessel moves while hands rest.
+/// Whether the vessel moves while the operator rests.
 pub(crate) fn moves_by_itself(simulation: &Simulation) -> bool {
     simulation.motion().is_some_and(VesselMotion::changes)
 }
 
-/// What was done, step by step. What was undone stays behind it until something else is done.
+/// All steps. Those that were undone are kept until something else is done.
 #[derive(Debug)]
 pub(crate) struct History {
     steps: Vec<Done>,
-    /// How many of the steps are done; those after them are undone.
+    /// Number of steps that are done; later ones are undone.
     done: usize,
-    /// How all steps up to each went, the first before any.
+    /// Totals after each number of steps, starting with none.
     went: Vec<Went>,
     /// State after step `every · index`.
     states: Vec<State>,
     every: usize,
     most_states: usize,
-    /// Steps after which a hand began to move.
+    /// Numbers of steps after which a motion began.
     begun: Vec<usize>,
-    /// Whether a hand begins to move with the next step.
+    /// Whether a motion begins with the next step.
     begins: bool,
-    /// By their steps.
+    /// In order of steps.
     injected: Vec<Injected>,
 }
 
@@ -101,27 +101,27 @@ impl History {
         self.done
     }
 
-    /// How the steps that are done went.
+    /// Totals over the steps that are done.
     pub(crate) fn went(&self) -> Went {
         self.went[self.done]
     }
 
-    /// Notes that a motion begins with the next step.
+    /// Marks the next step as the begin of a motion.
     pub(crate) fn begin_motion(&mut self) {
         self.begins = true;
     }
 
-    /// Where the last motion began, before this moment.
+    /// Step at which the last motion before the current step began.
     pub(crate) fn last_motion(&self) -> usize {
         self.begun.iter().rev().copied().find(|step| *step < self.done).unwrap_or(0)
     }
 
-    /// Where the next motion of those that were undone ended.
+    /// Step at which the next undone motion ended.
     pub(crate) fn next_motion(&self) -> usize {
         self.begun.iter().copied().find(|step| *step > self.done).unwrap_or(self.steps.len())
     }
 
-    /// Adds a step that `after` has just carried out.
+    /// Adds a step; `after` is the simulation that has just carried it out.
     pub(crate) fn push(&mut self, step: Done, after: &Simulation) {
         self.forget_undone();
         if std::mem::take(&mut self.begins) {
@@ -154,10 +154,10 @@ impl History {
         self.injected.retain(|one| one.after_step <= done);
     }
 
-    /// Brings the simulation to the moment after step `step` of those there are, forth or back.
+    /// Brings the simulation to the state after step `step`, backwards or forwards.
     ///
     /// # Errors
-    /// As [`Simulation::step_until`]; steps that were carried out once can be again.
+    /// As [`Simulation::step_until`]; repeating a step that succeeded does not fail.
     pub(crate) fn go_to(&mut self, step: usize, simulation: &mut Simulation) -> Result<()> {
         let kept = step / self.every;
         simulation.restore(&self.states[kept])?;
@@ -169,12 +169,13 @@ impl History {
         Ok(())
     }
 
-    /// Injections that are undone, by their steps.
+    /// Undone injections, in order of steps.
     pub(crate) fn undone_injections(&self) -> impl Iterator<Item = &Injected> {
         self.injected.iter().filter(|one| one.after_step > self.done)
     }
 
-    /// Lets those that were undone before and are not any more begin at `time_s`; what flows of them.
+    /// Restarts at `time_s` the injections that were undone when `before` steps were done and no longer are; returns
+    /// them.
     pub(crate) fn inject_again(&mut self, before: usize, time_s: f64) -> Vec<InjectionSpec> {
         let again = |one: &&mut Injected| (before + 1..=self.done).contains(&one.after_step);
         let flow = |one: &mut Injected| {
@@ -184,7 +185,7 @@ impl History {
         self.injected.iter_mut().filter(again).map(flow).collect()
     }
 
-    /// What is done, as a script.
+    /// The steps that are done, as a script.
     pub(crate) fn script(&self, simulation: &Simulation) -> String {
         let injected = self.injected.iter().filter(|one| one.after_step <= self.done);
         let lines = Lines { stack: simulation.stack(), timed: moves_by_itself(simulation) };

@@ -1,68 +1,69 @@
-//! What comes from outside: keys, mouse, pedals, or a line of JSON.
+//! Inputs of a session, from keys, mouse, pedals or lines of JSON.
 
 use endowire_viewer::{Mode, Pose};
 use serde::{Deserialize, Serialize};
 
-/// One input; as JSON an object whose `do` names it: `{"do": "move", "instrument": "wire", "mm_per_s": 20}`.
+/// One input. As JSON, it is an object whose `do` names it: `{"do": "move", "instrument": "wire", "mm_per_s": 20}`.
 ///
-/// An instrument that is not named is the one that was selected.
+/// Without a name, an input applies to the selected instrument.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Input {
-    /// Takes an instrument in the hand.
+    /// Selects an instrument.
     Select {
         /// Its name.
         instrument: String,
     },
-    /// Moves an instrument from now on at these speeds, until it is told otherwise.
+    /// Moves an instrument at these speeds until the next such input.
     Move {
         /// Name of the instrument.
         instrument: Option<String>,
-        /// Speed of pushing, mm/s; negative pulls.
+        /// Advance speed, mm/s; negative pulls back.
         #[serde(default)]
         mm_per_s: f64,
-        /// Speed of turning, degrees/s.
+        /// Rotation speed, degrees/s.
         #[serde(default)]
         deg_per_s: f64,
     },
-    /// Moves an instrument by so much, as fast as a tick may go.
+    /// Moves an instrument by an amount, as fast as a tick allows.
     Nudge {
         /// Name of the instrument.
         instrument: Option<String>,
-        /// Length to push, mm; negative pulls.
+        /// Advance, mm; negative pulls back.
         #[serde(default)]
         mm: f64,
-        /// Angle to turn by, degrees.
+        /// Rotation, degrees.
         #[serde(default)]
         deg: f64,
     },
-    /// Lets all instruments rest.
+    /// Stops all instruments.
     Stop {},
     /// Presses or releases the pedal.
     Pedal {
-        /// Whether it is down.
+        /// Whether it is pressed.
         down: bool,
-        /// What is shown while it is; as before if absent.
+        /// Imaging mode while it is pressed; unchanged if absent.
         mode: Option<Mode>,
     },
-    /// Injects contrast medium at the tip of the outermost instrument that is in; of several, of those with a lumen.
+    /// Injects contrast medium at the tip of the outermost inserted instrument; of several instruments, only those
+    /// with a lumen count.
     Inject {
         /// Volume, ml.
         ml: f64,
         /// Rate, ml/s.
         ml_per_s: f64,
     },
-    /// Leaves the coil of an instrument behind, where it comes to rest, and takes its pusher out.
+    /// Detaches the coil of an instrument where it comes to rest, and withdraws its pusher.
     Detach {
         /// Name of the instrument.
         instrument: Option<String>,
     },
-    /// Brings the C-arm to these angles.
+    /// Turns the C-arm to these angles.
     CArm {
-        /// As they are said: "LAO 40 CRA 10".
+        /// In clinical notation: "LAO 40 CRA 10".
         pose: Pose,
     },
-    /// Turns the C-arm by so much.
+    /// Turns the C-arm by these angles.
     TurnCArm {
         /// Towards LAO, degrees.
         #[serde(default)]
@@ -71,28 +72,28 @@ pub enum Input {
         #[serde(default)]
         cra_deg: f64,
     },
-    /// Moves what is seen over the patient.
+    /// Moves the field of view over the patient.
     Table {
-        /// Rightwards in the picture, mm at the isocentre.
+        /// To the right in the picture, mm at the isocentre.
         #[serde(default)]
         right_mm: f64,
         /// Downwards in the picture, mm at the isocentre.
         #[serde(default)]
         down_mm: f64,
-        /// Whether that is the picture of the second plane.
+        /// Whether the picture of the second plane is meant.
         #[serde(default)]
         second: bool,
     },
     /// Magnifies by a factor.
     Zoom {
-        /// Above 1 comes nearer.
+        /// Above 1 magnifies.
         factor: f64,
     },
-    /// Sets the blades: shares of the field's width and height that they leave open.
+    /// Sets the collimator: fractions of the field's width and height that stay open.
     Collimate {
-        /// Of the width, 0.1 to 1.
+        /// Fraction of the width, 0.1 to 1.
         width: f64,
-        /// Of the height, 0.1 to 1.
+        /// Fraction of the height, 0.1 to 1.
         height: f64,
     },
     /// Turns the camera of the 3D view.
@@ -104,13 +105,13 @@ pub enum Input {
         #[serde(default)]
         elevation_deg: f64,
     },
-    /// Shows the scene's script from its start, or goes on where it rests. An instrument that is moved ends it; `stop` has it rest.
+    /// Plays the scene's script from its start, or continues it. Moving an instrument ends it; `stop` pauses it.
     Script {},
-    /// Takes the last motion back: all steps since a hand began to move.
+    /// Undoes the last motion: all steps since an instrument began to move.
     Undo {},
-    /// Does the next motion of those that were undone again, and what was injected in it. They are there until something else is done.
+    /// Redoes the next undone motion and its injections. Undone motions are kept until something else is done.
     Redo {},
-    /// Goes back to the moment after a step.
+    /// Goes to the state after a step.
     GoTo {
         /// Number of the step; 0 is the start.
         step: usize,

@@ -1,4 +1,5 @@
-//! What keys do, in a window and on a page. A key is told by its place on the keyboard, as the `code` of UI Events has it: `"ArrowUp"`, `"KeyC"`.
+//! Key bindings for windows and pages. A key is identified by its position on the keyboard, the `code` of UI Events:
+//! `"ArrowUp"`, `"KeyC"`.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +8,7 @@ use endowire_viewer::Mode;
 use crate::pad::Pad;
 use crate::{Input, USUAL_DEG_PER_S, USUAL_MM_PER_S};
 
-/// Keys and what they do; F1 and Esc are those of whoever shows the session.
+/// Keys and their effects, for display; F1 and Esc are handled by the window or page.
 pub const KEYS: &[(&str, &str)] = &[
     ("up, down", "push, pull (hold)"),
     ("left, right", "turn (hold)"),
@@ -27,39 +28,39 @@ pub const KEYS: &[(&str, &str)] = &[
     ("Backspace, Shift Backspace", "undo the last motion, do it again"),
 ];
 
-/// Keys that are held with others.
+/// Modifier keys.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Modifiers {
-    /// Shift: four times as fast, and the other meaning of a key.
+    /// Shift: four times as fast, or the alternative meaning of a key.
     pub shift: bool,
-    /// Ctrl: a fifth as fast.
+    /// Ctrl: a fifth of the speed.
     pub control: bool,
 }
 
-/// Keys that are down, and what they have come to.
+/// State of the keyboard and the gamepad.
 #[derive(Debug)]
 pub struct Keys {
     instruments: Vec<String>,
-    /// The chosen one; none for all.
+    /// The selected instrument; `None` for all.
     chosen: Option<usize>,
-    /// Of those that are held.
+    /// Keys that are held, of those that act while held.
     down: BTreeSet<&'static str>,
-    /// Of the keyboard, and what does the same on a gamepad.
+    /// Of the keyboard, and of the gamepad.
     modifiers: [Modifiers; 2],
-    /// Shares of the usual speeds that the sticks of a gamepad ask for.
+    /// Fractions of the usual speeds requested by the gamepad's sticks.
     leans: [f64; 2],
-    /// Whether the beam stays on.
+    /// Whether the beam is locked on.
     locked: bool,
     open: f64,
 }
 
-/// Keys that move instruments while they are down, …
+/// Keys that move instruments while held.
 const ARROWS: [&str; 4] = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
-/// … and pedals.
+/// Keys that act as pedals while held.
 const PEDALS: [&str; 4] = ["Space", "KeyC", "KeyV", "KeyB"];
 
 impl Keys {
-    /// Keys that nobody holds, of a session with these instruments, the innermost first.
+    /// The initial state, without held keys, for a session with these instruments, innermost first.
     pub fn new(instruments: Vec<String>) -> Self {
         Self {
             instruments,
@@ -72,13 +73,13 @@ impl Keys {
         }
     }
 
-    /// Hears that Shift and their like have changed: hands go faster or slower.
+    /// Handles a change of modifier keys, which changes the speeds.
     pub fn modify(&mut self, modifiers: Modifiers) -> Vec<Input> {
         self.modifiers[0] = modifiers;
         self.moving()
     }
 
-    /// What a gamepad does that is held otherwise than before.
+    /// Handles a change of the gamepad's state.
     pub fn pad(&mut self, before: &Pad, now: &Pad) -> Vec<Input> {
         let asked = (self.modifiers[1], self.leans);
         (self.modifiers[1], self.leans) = (now.modifiers(), now.leans());
@@ -95,7 +96,8 @@ impl Keys {
         self.modifiers.iter().any(|held| held.shift)
     }
 
-    /// Lets go of what keys hold: the window has lost the keyboard. What other hands do goes on.
+    /// Releases all held keys, because the window has lost the keyboard focus. Other sources of input are not
+    /// affected.
     pub fn let_go(&mut self) -> Vec<Input> {
         let held = |keys: [&str; 4]| keys.iter().any(|key| self.down.contains(key));
         let (moves, shines) = (held(ARROWS), self.locked || held(PEDALS));
@@ -108,7 +110,7 @@ impl Keys {
         inputs
     }
 
-    /// What a key does that goes down, once more while it is held (`again`), or up; nothing of other keys.
+    /// Handles a key that goes down, repeats while held (`again`), or goes up; other keys have no effect.
     pub fn key(&mut self, code: &str, down: bool, again: bool) -> Vec<Input> {
         if let Some(held) = ARROWS.into_iter().chain(PEDALS).find(|held| *held == code) {
             if down {
@@ -176,14 +178,14 @@ impl Keys {
         }
     }
 
-    /// Takes another instrument in the hand; that before rests.
+    /// Selects an instrument and stops the previous one.
     fn choose(&mut self, index: Option<usize>) -> Vec<Input> {
         self.chosen = index;
         let select = index.map(|index| Input::Select { instrument: self.instruments[index].clone() });
         std::iter::once(Input::Stop {}).chain(select).chain(self.moving()).collect()
     }
 
-    /// What arrows and sticks have hands do now.
+    /// The motion commanded by arrow keys and sticks.
     fn moving(&self) -> Vec<Input> {
         let control = self.modifiers.iter().any(|held| held.control);
         let axis = |plus, minus, lean: f64| {
@@ -222,7 +224,7 @@ mod tests {
         assert!(keys.key("ArrowUp", true, true).is_empty());
         assert_eq!(keys.modify(Modifiers { shift: false, control: true }), [moved("wire", 2.0, 0.0)]);
         assert_eq!(keys.key("ArrowLeft", true, false), [moved("wire", 2.0, -18.0)]);
-        // Changing hands leaves nothing behind that moves.
+        // Selecting another instrument stops the previous one.
         let changed = keys.key("Tab", true, false);
         let select = Input::Select { instrument: "catheter".to_owned() };
         assert_eq!(changed, [Input::Stop {}, select, moved("catheter", 2.0, -18.0)]);
@@ -231,7 +233,7 @@ mod tests {
         let all = keys.key("Digit0", true, false);
         assert_eq!(all, [Input::Stop {}, moved("wire", 10.0, 0.0), moved("catheter", 10.0, 0.0)]);
         assert_eq!(keys.let_go(), [moved("wire", 0.0, 0.0), moved("catheter", 0.0, 0.0)]);
-        // What no key holds is another hand's.
+        // Motion from another source is not stopped when no key is held.
         assert!(keys.let_go().is_empty());
         assert_eq!(
             keys.modify(Modifiers { shift: true, control: false }),

@@ -1,4 +1,4 @@
-//! The room: C-arm, table, blades, pedal, injector, camera.
+//! The cath lab: C-arm, table, collimator, pedal, injector, camera.
 
 use endowire_assess::BeamState;
 use endowire_core::vessel::{SurfaceMesh, Wall};
@@ -8,38 +8,39 @@ use endowire_viewer::{CameraSpec, InjectionSpec, Mode, Pose, View, ViewSpec};
 use crate::TICKS_PER_S;
 use crate::session::Delivered;
 
-/// Part of the field that the vessel fills where the scene leaves the field open.
+/// Fraction of the field that the vessel fills if the scene gives no field.
 const FILL: f64 = 0.92;
-/// Magnification modes of detectors reach from about 48 cm down to 11 cm.
+/// Range of the magnification. Magnification modes of detectors cover fields from about 48 cm down to 11 cm.
 const MAGNIFICATION: [f64; 2] = [0.5, 8.0];
-/// Angles that C-arms reach, degrees: LAO and RAO, cranial and caudal.
+/// Largest angles of a C-arm, degrees: LAO and RAO, cranial and caudal.
 const MOST_LAO_DEG: f64 = 120.0;
 const MOST_CRA_DEG: f64 = 60.0;
-/// Least share of the field that blades leave open.
+/// Smallest fraction of the field that the collimator leaves open.
 const LEAST_SHARE: f64 = 0.1;
-/// Frames a second: what fluoroscopy of an intervention has, unless the scene says less.
+/// Frames per second, as in interventional fluoroscopy.
 const FRAMES_PER_S: f64 = 30.0;
-/// Energies that stand for the spectrum unless the scene says otherwise: within a ten-thousandth, at an eighth of the work.
+/// Number of energies that represent the spectrum unless the scene gives it: accurate to 10⁻⁴, at an eighth of the
+/// cost.
 const ENERGY_BINS: u32 = 8;
-/// Injections that a session remembers; earlier ones have long been washed out.
+/// Largest number of injections kept in the pictures; earlier ones have been washed out.
 const MOST_INJECTIONS: usize = 8;
 
-/// What stands around the patient, and what it has cost in dose.
+/// The equipment around the patient, and the dose so far. Its configuration is called the room.
 #[derive(Debug, Clone)]
 pub struct Lab {
     fluoro: ViewSpec,
     three_d: ViewSpec,
-    /// Shares of the field that the blades leave open.
+    /// Fractions of the field that the collimator leaves open.
     open: [f64; 2],
     bounds_mm: [Vec3; 2],
     down: bool,
-    /// Changes with `fluoro` and with `three_d`.
+    /// Counters that change with `fluoro` and with `three_d`.
     revisions: [u64; 2],
     beam_ticks: u64,
-    /// Of earlier rooms; of this one there are so many ticks.
+    /// Dose in earlier configurations, and the number of ticks with the beam on in the current one.
     dose_ngy: f64,
     room_ticks: u64,
-    /// What exposure control brings in this room, once it is known.
+    /// Dose per frame chosen by exposure control for this configuration, once it is known.
     delivered_ngy: Option<f64>,
 }
 
@@ -59,7 +60,7 @@ impl Lab {
         [arm.primary_deg, arm.secondary_deg] = arm.angles_deg();
         arm.pose = None;
         arm.isocentre_mm = arm.isocentre_mm.or(Some(((low + high) / 2.0).into()));
-        // A field that does not change with the pose, as a detector's does not.
+        // Fixed, because a detector's field does not change with the pose.
         let fitting_mm = (high - low).amax() / FILL * arm.sid_mm / arm.sod_mm;
         let field_mm = arm.field_mm.or(arm.pixel_mm.map(|pitch| pitch * before_px)).unwrap_or(fitting_mm);
         (arm.field_mm, arm.pixel_mm) = (Some(field_mm), None);
@@ -80,17 +81,17 @@ impl Lab {
         Ok(lab)
     }
 
-    /// What fluoroscopy shows.
+    /// Specification of the fluoroscopic view.
     pub fn fluoro(&self) -> &ViewSpec {
         &self.fluoro
     }
 
-    /// What the 3D view shows.
+    /// Specification of the 3D view.
     pub fn three_d(&self) -> &ViewSpec {
         &self.three_d
     }
 
-    /// Numbers that change with [`Lab::fluoro`] and with [`Lab::three_d`].
+    /// Counters that change with [`Lab::fluoro`] and with [`Lab::three_d`].
     pub fn revisions(&self) -> [u64; 2] {
         self.revisions
     }
@@ -100,7 +101,7 @@ impl Lab {
         self.down
     }
 
-    /// How long the beam was on, s.
+    /// Beam-on time, s.
     pub fn beam_s(&self) -> f64 {
         self.beam_ticks as f64 / TICKS_PER_S
     }
@@ -110,7 +111,7 @@ impl Lab {
         (self.dose_ngy + self.room_ngy()) / 1000.0
     }
 
-    /// The beam from a time on, for those who assess a session.
+    /// State of the beam from `time_s` on, for assessment.
     pub(crate) fn beam(&self, time_s: f64) -> BeamState {
         let arm = &self.fluoro.c_arm;
         let side_mm = arm.field_mm.unwrap_or(0.0) / arm.magnification;
@@ -126,12 +127,12 @@ impl Lab {
         }
     }
 
-    /// Air kerma at the detectors while the room was as it is.
+    /// Air kerma at the detectors in the current configuration, nGy.
     fn room_ngy(&self) -> f64 {
         self.frame_ngy() * self.room_ticks as f64 * self.fluoro.frames_per_s / TICKS_PER_S
     }
 
-    /// That of a frame.
+    /// Air kerma at the detectors per frame, nGy.
     fn frame_ngy(&self) -> f64 {
         let spec = &self.fluoro;
         let wanted_ngy = || {
@@ -141,14 +142,14 @@ impl Lab {
         self.delivered_ngy.unwrap_or_else(wanted_ngy)
     }
 
-    /// Hears what a frame brings, if that is of the room as it is.
+    /// Stores the dose of a frame, if the frame was made in the current configuration.
     pub(crate) fn exposed(&mut self, delivered: Delivered) {
         if delivered.revision == self.revisions[0] {
             self.delivered_ngy = Some(delivered.frame_ngy);
         }
     }
 
-    /// Angles of the second plane, LAO and cranial positive; none where there is one plane.
+    /// Angles of the second plane, LAO and cranial positive; `None` for a single plane.
     pub fn second_deg(&self) -> Option<[f64; 2]> {
         let second = self.fluoro.biplane_deg.map(|turn_deg| self.fluoro.c_arm.turned(turn_deg));
         second.map(|second| second.angles_deg())
@@ -159,13 +160,13 @@ impl Lab {
         self.fluoro.c_arm.magnification
     }
 
-    /// Width of what is seen at the isocentre, mm.
+    /// Width of the field of view at the isocentre, mm.
     pub fn field_mm(&self) -> f64 {
         let arm = &self.fluoro.c_arm;
         arm.field_mm.unwrap_or(0.0) / arm.magnification * arm.sod_mm / arm.sid_mm
     }
 
-    /// A sixtieth of a second goes by.
+    /// Advances by one tick.
     pub(crate) fn tick(&mut self) {
         if self.down {
             self.beam_ticks += 1;
@@ -180,7 +181,7 @@ impl Lab {
             let mend = "a roadmap shows an angiogram: inject contrast medium first";
             return Err(Error::parameter("mode", "roadmap", mend));
         }
-        // Each run of subtraction takes its own mask.
+        // Each DSA run takes a new mask.
         if self.fluoro.xray.mode != mode || (mode == Mode::Dsa && down && !self.down) {
             self.change(|spec| spec.xray.mode = mode)?;
         }
@@ -188,7 +189,8 @@ impl Lab {
         Ok(())
     }
 
-    /// Injects `ml` at `at_mm` of the vessel with this wall, or at the inlet, from `time_s` on; what flows of it.
+    /// Injects `ml` from `time_s` on, at `at_mm` in the vessel with this wall, or at the inlet; returns the
+    /// injection.
     pub(crate) fn inject(
         &mut self,
         wall: &Wall,
@@ -213,7 +215,7 @@ impl Lab {
         Ok(bolus)
     }
 
-    /// Has injections flow no more, and others from now on.
+    /// Removes undone injections from the pictures and adds others.
     pub(crate) fn flow_again<'a>(
         &mut self,
         undone: impl Iterator<Item = &'a InjectionSpec>,
@@ -228,7 +230,7 @@ impl Lab {
         injection.drain(..injection.len().saturating_sub(MOST_INJECTIONS));
         self.change(|spec| {
             if spec.xray.mode == Mode::Roadmap && injection.is_empty() {
-                // It would be one of no angiogram.
+                // A roadmap without an angiogram would be empty.
                 spec.xray.mode = Mode::Fluoro;
             }
             spec.injection = injection;
@@ -251,7 +253,8 @@ impl Lab {
         self.change(|spec| (spec.c_arm.primary_deg, spec.c_arm.secondary_deg) = (lao, cra))
     }
 
-    /// Moves the middle of the picture over the patient, as far as the vessel goes: along the picture of the first plane, or of the second.
+    /// Moves the centre of the field of view over the patient, within the bounds of the vessel, along the picture of
+    /// the first or the second plane.
     pub(crate) fn table(&mut self, [right_mm, down_mm]: [f64; 2], second: bool) -> Result<()> {
         finite(["right_mm", "down_mm"], [right_mm, down_mm])?;
         let plane = if second { self.second_deg() } else { None };
@@ -290,7 +293,7 @@ impl Lab {
         Ok(())
     }
 
-    /// Shares of the field that the blades leave open.
+    /// Fractions of the field that the collimator leaves open.
     pub fn open(&self) -> [f64; 2] {
         self.open
     }
@@ -305,7 +308,7 @@ impl Lab {
         Ok(())
     }
 
-    /// Changes what fluoroscopy shows, if that can be.
+    /// Changes the fluoroscopic view if the result is valid.
     fn change(&mut self, with: impl FnOnce(&mut ViewSpec)) -> Result<()> {
         let mut spec = self.fluoro.clone();
         with(&mut spec);
@@ -318,7 +321,7 @@ impl Lab {
     }
 }
 
-/// Sets the blades at the detector; at a magnification, shares are of what is seen of it.
+/// Sets the collimator at the detector; the fractions refer to the magnified field.
 fn collimate(spec: &mut ViewSpec, open: [f64; 2]) {
     let seen_mm = spec.c_arm.field_mm.map(|field| field / spec.c_arm.magnification);
     spec.c_arm.collimation_mm =

@@ -1,8 +1,9 @@
-//! Instruments moved by hand under fluoroscopy: a session as a state machine, without a window, a thread or a clock.
+//! Interactive sessions under fluoroscopy: a state machine without a window, a thread or a clock.
 //!
-//! A [`Session`] takes [`Input`]s (one line of JSON each, if they come from outside) and ticks of a sixtieth of a second. It tells its
-//! [`Readout`], and a [`Snapshot`] of which [`Pictures`] draws what a cath lab shows. All motions are kept, so that a session can go back to any
-//! moment and becomes a script that carries the same motions out to the bit ([`Session::script`]).
+//! A [`Session`] takes [`Input`]s (in JSON, one line each) and ticks of 1/60 s. It gives a [`Readout`] for the
+//! operator, and a [`Snapshot`] from which [`Pictures`] draws the images of a cath lab. All motions are kept, so a
+//! session can return to any step, and can be written as a script that repeats the motions to the bit
+//! ([`Session::script`]).
 
 mod demonstration;
 mod hand;
@@ -27,11 +28,11 @@ pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Reado
 pub use script::script_head;
 pub use session::{Delivered, Session, Snapshot, TICK_SOLVES};
 
-/// Ticks of a session in a second.
+/// Ticks per second.
 pub const TICKS_PER_S: f64 = 60.0;
 
-/// How fast a key moves an instrument, mm/s; steps of a script without times are shown as fast.
+/// Speed of an instrument moved by a key, mm/s, and of script steps without times.
 pub const USUAL_MM_PER_S: f64 = 10.0;
 
-/// How fast a key turns one, degrees/s, likewise.
+/// Rotation speed of an instrument moved by a key, degrees/s, and of script steps without times.
 pub const USUAL_DEG_PER_S: f64 = 90.0;

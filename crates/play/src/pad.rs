@@ -1,10 +1,10 @@
-//! What a gamepad does: sticks move and turn what is chosen, buttons do what keys do.
+//! Gamepad bindings: sticks move and rotate the selected instrument, buttons act as keys.
 
 use std::collections::BTreeSet;
 
 use crate::keys::Modifiers;
 
-/// Buttons and sticks, and what they do.
+/// Buttons and sticks with their effects, for display.
 pub const PAD: &[(&str, &str)] = &[
     ("left stick, up down", "push, pull, as fast as it leans"),
     ("right stick, left right", "turn, as fast as it leans"),
@@ -17,10 +17,10 @@ pub const PAD: &[(&str, &str)] = &[
     ("select, start", "next instrument, fluoroscopy on or off"),
 ];
 
-/// A stick that leans by less is at rest: worn ones do not come back to the middle.
+/// Deflection below which a stick is at rest: worn sticks do not return to the centre.
 const DEAD_ZONE: f64 = 0.15;
 
-/// A button, by where it is: makers write different letters on them.
+/// A button, by its position: labels differ between makers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "each is where its name says")]
 pub enum Button {
@@ -41,7 +41,7 @@ pub enum Button {
 }
 
 impl Button {
-    /// All of them.
+    /// All buttons.
     pub const ALL: [Self; 14] = [
         Self::Lower,
         Self::Right,
@@ -59,7 +59,7 @@ impl Button {
         Self::CrossDown,
     ];
 
-    /// The key that does the same; none of bumpers, which are Shift and Ctrl.
+    /// The key with the same effect; `None` for the bumpers, which act as Shift and Ctrl.
     fn key(self) -> Option<&'static str> {
         Some(match self {
             Self::Lower => "KeyI",
@@ -79,30 +79,30 @@ impl Button {
     }
 }
 
-/// How a gamepad is held at a moment; nothing is pressed on one that is not there.
+/// State of a gamepad; at rest if none is connected.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Pad {
-    /// How far the left stick leans up, from -1 to 1.
+    /// Deflection of the left stick upwards, −1 to 1.
     pub up: f64,
-    /// How far the right stick leans to the right.
+    /// Deflection of the right stick to the right, −1 to 1.
     pub right: f64,
-    /// Buttons that are pressed.
+    /// Pressed buttons.
     pub down: BTreeSet<Button>,
 }
 
 impl Pad {
-    /// Shares of the usual speeds of pushing and turning.
+    /// Fractions of the usual advance and rotation speeds.
     pub(crate) fn leans(&self) -> [f64; 2] {
         [self.up, self.right].map(share)
     }
 
-    /// Keys that are held with the sticks.
+    /// Modifier keys that the bumpers stand for.
     pub(crate) fn modifiers(&self) -> Modifiers {
         let held = |button| self.down.contains(&button);
         Modifiers { shift: held(Button::RightBumper), control: held(Button::LeftBumper) }
     }
 
-    /// Keys that go up and down from a moment to this one.
+    /// Keys released and pressed since an earlier state.
     pub(crate) fn keys_since(&self, before: &Self) -> Vec<(&'static str, bool)> {
         let up = before.down.difference(&self.down).map(|button| (button, false));
         let down = self.down.difference(&before.down).map(|button| (button, true));
@@ -110,10 +110,11 @@ impl Pad {
     }
 }
 
-/// Nothing within the dead zone, all at the end, straight between in hundredths: what a stick trembles by is no other speed.
+/// Fraction of the speed for a deflection: 0 within the dead zone, 1 at the end, linear in between. It is rounded to
+/// hundredths, so that trembling does not change the speed.
 fn share(lean: f64) -> f64 {
     let beyond = (lean.abs().clamp(0.0, 1.0) - DEAD_ZONE).max(0.0) / (1.0 - DEAD_ZONE);
-    // What is no number is beyond nothing.
+    // NaN becomes 0.
     let whole = (100.0 * beyond).round();
     if whole > 0.0 { whole.copysign(lean) / 100.0 } else { 0.0 }
 }
@@ -142,7 +143,7 @@ mod tests {
             assert_eq!(share(broken), 0.0);
         }
         assert_eq!([share(f64::INFINITY), share(-7.0)], [1.0, -1.0]);
-        // The twin: without rounding a tremble would be another speed.
+        // The twin: without rounding, trembling would change the speed.
         assert_eq!(share(0.5749), share(0.5751));
         let steps: Vec<f64> = (0..=1000).map(|k| share(f64::from(k) / 1000.0)).collect();
         assert!(steps.windows(2).all(|pair| pair[0] <= pair[1]), "what leans more is not slower");
@@ -159,13 +160,13 @@ mod tests {
         assert_eq!(keys.pad(&half, &coarse), [moved("wire", 20.0, -360.0)]);
         let fine = held(0.575, -1.0, &[Button::LeftBumper]);
         assert_eq!(keys.pad(&coarse, &fine), [moved("wire", 1.0, -18.0)]);
-        // The other instrument goes on as the sticks lean, and that before rests.
+        // The newly selected instrument follows the sticks, and the previous one stops.
         let next = held(0.575, -1.0, &[Button::LeftBumper, Button::Select]);
         let select = Input::Select { instrument: "catheter".to_owned() };
         assert_eq!(keys.pad(&fine, &next), [Input::Stop {}, select, moved("catheter", 1.0, -18.0)]);
-        // One that is unplugged lets go of all.
+        // Disconnecting the gamepad releases everything.
         assert_eq!(keys.pad(&next, &rest), [moved("catheter", 0.0, 0.0)]);
-        // Arrows and a stick together are no faster than either.
+        // Arrow keys and a stick together are not faster than either.
         keys.key("ArrowUp", true, false);
         assert_eq!(keys.pad(&rest, &held(1.0, 0.0, &[])), [moved("catheter", 10.0, 0.0)]);
     }

@@ -1,8 +1,8 @@
-//! Draws what a cath lab shows: the live image of each plane, or the last one held, and the 3D view.
+//! Draws the images of a cath lab: the live image of each plane, or the last one held, and the 3D view.
 //!
-//! What stays from frame to frame takes a tenth of a second or more where the room has changed, a coarse picture of it a fifth of that. Whoever shows pictures on a
-//! clock draws them by [`Pictures::soon`] and has [`Sharpening`] carried out beside them, on another thread; all others wait
-//! ([`Pictures::fluoro`]).
+//! The static part of a frame takes 0.1 s or more after a change of the room; a coarse picture of it takes a fifth of
+//! that. Callers that draw on a clock use [`Pictures::soon`] and carry out [`Sharpening`] on another thread; all
+//! others wait ([`Pictures::fluoro`]).
 
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
@@ -11,12 +11,12 @@ use endowire_viewer::{DeviceView, FrameTime, Image, Pushed, Renderer, ViewSpec};
 
 use crate::session::{Delivered, Snapshot};
 
-/// Pixels of a picture for each of a coarse one, across: of 512 there are 128, which show where a wire is.
+/// Ratio of picture size to coarse picture size: 128 of 512 pixels, which is enough to see a wire.
 const COARSER: u32 = 4;
-/// Frames for which a room has to stay as it is before it is drawn sharply.
+/// Number of frames for which the room must be unchanged before it is drawn sharply.
 const REST: u32 = 3;
 
-/// Pictures of a session.
+/// The pictures of a session.
 #[derive(Debug)]
 pub struct Pictures {
     pushed: Pushed,
@@ -25,20 +25,20 @@ pub struct Pictures {
     three_d: Option<(u64, Renderer)>,
     /// The last live image of each plane.
     held: Vec<Image>,
-    /// The room of the last frame, and for how many frames it has been as it is.
+    /// Revision of the room in the last frame, and for how many frames it has been unchanged.
     rested: (u64, u32),
 }
 
-/// What draws one plane, each with the room that it is for.
+/// The renderers of one plane, each with the revision of the room for which it was made.
 #[derive(Debug, Default)]
 struct Plane {
     sharp: Option<(u64, Renderer)>,
     coarse: Option<(u64, Renderer)>,
-    /// Whether the sharp one is being made for another room.
+    /// Whether the sharp renderer is being updated elsewhere.
     away: bool,
 }
 
-/// What makes a sharp picture of a room that has changed.
+/// The computation of a sharp picture after a change of the room.
 #[derive(Debug)]
 pub struct Sharpening {
     plane: usize,
@@ -47,7 +47,7 @@ pub struct Sharpening {
     renderer: Renderer,
 }
 
-/// What has come of it.
+/// Its result.
 #[derive(Debug)]
 pub struct Sharpened {
     plane: usize,
@@ -55,14 +55,14 @@ pub struct Sharpened {
 }
 
 impl Sharpening {
-    /// Computes what stays from frame to frame.
+    /// Computes the static part of the frames.
     pub fn carry_out(self) -> Sharpened {
         let Self { plane, revision, spec, mut renderer } = self;
         let made = renderer.change(&spec).and_then(|()| renderer.prepare());
         Sharpened { plane, made: made.map(|()| (revision, renderer)) }
     }
 
-    /// The same with a graphics processor whose answers are waited for.
+    /// The same on a graphics processor, awaiting its answers.
     #[cfg(feature = "gpu")]
     pub async fn carry_out_on(self, graphics: &endowire_viewer::Graphics) -> Sharpened {
         let Self { plane, revision, spec, mut renderer } = self;
@@ -85,10 +85,11 @@ impl Pictures {
         Ok(Self { pushed, wall, planes: vec![], three_d: None, held: vec![], rested: (0, 0) })
     }
 
-    /// The fluoroscopic picture of each plane: live while the pedal is down, else the last ones; none before the first.
+    /// The fluoroscopic picture of each plane: live while the pedal is pressed, otherwise the last ones; empty before
+    /// the first.
     ///
     /// # Errors
-    /// As [`Renderer::new`] and [`Renderer::render_at`]; the pictures before stay.
+    /// As [`Renderer::new`] and [`Renderer::render_at`]; the previous pictures are kept.
     pub fn fluoro(&mut self, snapshot: &Snapshot) -> Result<&[Image]> {
         if snapshot.lab.is_live() {
             self.sharpen(snapshot)?;
@@ -97,7 +98,8 @@ impl Pictures {
         Ok(&self.held)
     }
 
-    /// The same without delay: coarse ones where the room has changed, until what [`Self::sharpenings`] has told is carried out.
+    /// The same without delay: coarse pictures after a change of the room, until the result of [`Self::sharpenings`]
+    /// is handed to [`Self::sharpened`].
     ///
     /// # Errors
     /// As [`Self::fluoro`].
@@ -111,7 +113,8 @@ impl Pictures {
         Ok(&self.held)
     }
 
-    /// What is to be carried out for sharp pictures, and then given to [`Self::sharpened`]; nothing while the room goes on changing.
+    /// The computations needed for sharp pictures, whose results go to [`Self::sharpened`]; empty while the room
+    /// keeps changing.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -136,7 +139,7 @@ impl Pictures {
         Ok(all)
     }
 
-    /// Takes what was carried out.
+    /// Takes the result of such a computation.
     ///
     /// # Errors
     /// As [`Renderer::change`]; the plane stays coarse.
@@ -148,7 +151,8 @@ impl Pictures {
         Ok(())
     }
 
-    /// What a frame brings to the detectors of all planes where exposure control chooses that; none without it, or before it is known.
+    /// Dose of a frame at the detectors of all planes, if chosen by exposure control; `None` without it, or before it
+    /// is known.
     pub fn delivered(&self, snapshot: &Snapshot) -> Option<Delivered> {
         let revision = snapshot.lab.revisions()[0];
         snapshot.lab.fluoro().exposure.as_ref()?;
@@ -161,7 +165,7 @@ impl Pictures {
         Some(Delivered { revision, frame_ngy })
     }
 
-    /// The same, computed where it is not known.
+    /// The same, computed if it is unknown.
     ///
     /// # Errors
     /// As [`Self::fluoro`].
@@ -172,7 +176,7 @@ impl Pictures {
         Ok(self.delivered(snapshot))
     }
 
-    /// Has each plane drawn sharply, now.
+    /// Prepares the sharp renderer of each plane.
     fn sharpen(&mut self, snapshot: &Snapshot) -> Result<()> {
         let revision = snapshot.lab.revisions()[0];
         let specs = snapshot.lab.fluoro().planes();
@@ -183,7 +187,7 @@ impl Pictures {
         Ok(())
     }
 
-    /// Draws each plane by what is there.
+    /// Draws each plane, sharply if its sharp renderer is up to date, otherwise coarsely.
     fn drawn(&mut self, snapshot: &Snapshot) -> Result<Vec<Image>> {
         let revision = snapshot.lab.revisions()[0];
         let specs = snapshot.lab.fluoro().planes();
@@ -223,14 +227,14 @@ impl Pictures {
         image.ok_or_else(|| Error::parameter("view.views", "3d", "was not drawn"))
     }
 
-    /// What draws the fluoroscopic picture, for people.
+    /// Name of the backend that draws the fluoroscopic picture.
     pub fn backend(&self) -> Option<&str> {
         let plane = self.planes.first()?;
         plane.sharp.as_ref().or(plane.coarse.as_ref()).map(|(_, renderer)| renderer.backend())
     }
 }
 
-/// The renderer of a room, with what it has in common with the one before, or `beside` it.
+/// The renderer of a room, updated from the previous room, or created with data shared with `beside`.
 fn made<'a>(
     place: &'a mut Option<(u64, Renderer)>,
     beside: Option<&Renderer>,

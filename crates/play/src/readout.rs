@@ -1,16 +1,16 @@
-//! What the operator reads.
+//! Readouts for the operator.
 
 use endowire_assess::Standing;
 use endowire_core::insertion::{Packing, StepReport};
 use endowire_viewer::Mode;
 use serde::Serialize;
 
-/// Beyond these a hand is warned.
+/// Limits above which the operator is warned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Push force, N, of either sign.
+    /// Push force, N, in either direction.
     pub push_n: f64,
-    /// Torque, N·mm, of either sign.
+    /// Torque, N·mm, in either direction.
     pub torque_nmm: f64,
 }
 
@@ -21,16 +21,16 @@ impl Default for Limits {
     }
 }
 
-/// What has happened that an operator must know.
+/// An event that the operator must know of.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Event {
-    /// Steps carried out before it.
+    /// Number of steps carried out before it.
     pub step: usize,
     /// Time of the session, s.
     pub time_s: f64,
-    /// What kind.
+    /// Its kind.
     pub kind: EventKind,
-    /// For people.
+    /// Description.
     pub text: String,
 }
 
@@ -38,23 +38,23 @@ pub struct Event {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EventKind {
-    /// A device let go of energy and jumped.
+    /// A device released energy and jumped.
     Jumped,
     /// A step that the vessel does not allow, or that found no equilibrium.
     Blocked,
-    /// An input or a step beyond what there is.
+    /// An invalid input or step.
     Refused,
     /// The tip has left the vessel.
     Left,
-    /// A force or torque of a hand is beyond its limit.
+    /// The force or torque on an instrument exceeds its limit.
     Limit,
-    /// A coil was left behind.
+    /// A coil was detached.
     Detached,
-    /// Loops of coils have come out of the neck of the sac that they fill.
+    /// Loops of coils have come out of the neck of the sac.
     Herniated,
-    /// The script that is shown is at its end, or a hand has taken over.
+    /// The script has ended, or was ended by a motion of the operator.
     Script,
-    /// The subject has ended: its goal is reached, or one of its limits is passed.
+    /// The subject has ended: its goal was reached, or a limit was passed.
     Ended,
 }
 
@@ -63,60 +63,60 @@ pub enum EventKind {
 pub struct InstrumentReadout {
     /// Its name.
     pub name: String,
-    /// Its own length, mm.
+    /// Total length, mm.
     pub length_mm: f64,
     /// Length inserted, mm.
     pub inserted_mm: f64,
-    /// How much farther the hand has pushed than the device has followed in its ticks yet, mm.
+    /// Advance that the device has not yet followed in its ticks, mm.
     pub behind_mm: f64,
-    /// Turn of the hand, degrees.
+    /// Rotation of the tail, degrees.
     pub rotation_deg: f64,
-    /// Force with which the hand pushes, N; none where it jumps.
+    /// Push force, N; `None` where it jumps.
     pub push_force_n: Option<f64>,
-    /// Torque with which the hand holds it, N·mm.
+    /// Torque that holds the instrument, N·mm.
     pub torque_nmm: f64,
-    /// Whether force or torque are beyond the limits.
+    /// Whether force or torque exceed their limits.
     pub warns: bool,
 }
 
-/// The room.
+/// The cath lab.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LabReadout {
     /// Whether the beam is on.
     pub live: bool,
-    /// What is shown.
+    /// Imaging mode.
     pub mode: Mode,
-    /// Positioner primary angle, LAO positive.
+    /// Primary angle, LAO positive.
     pub lao_deg: f64,
-    /// Positioner secondary angle, cranial positive.
+    /// Secondary angle, cranial positive.
     pub cra_deg: f64,
-    /// Both angles of the second plane, where there is one.
+    /// Both angles of the second plane, if there is one.
     pub second_deg: Option<[f64; 2]>,
     /// Magnification.
     pub magnification: f64,
-    /// Width of what is seen at the isocentre, mm.
+    /// Width of the field of view at the isocentre, mm.
     pub field_mm: f64,
-    /// Shares of the field that the blades leave open.
+    /// Fractions of the field that the collimator leaves open.
     pub open: [f64; 2],
-    /// How long the beam was on, s.
+    /// Beam-on time, s.
     pub beam_s: f64,
-    /// Air kerma at the detectors so far, µGy: what exposure control has brought, where it acts.
+    /// Air kerma at the detectors so far, µGy; as delivered by exposure control, if it acts.
     pub dose_ugy: f64,
 }
 
-/// How the steps so far went, less those taken back.
+/// Statistics of the steps so far, without undone ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Went {
-    /// Steps that found no equilibrium.
+    /// Number of steps without an equilibrium.
     pub unconverged_steps: u64,
-    /// Steps in which a device jumped.
+    /// Number of steps in which a device jumped.
     pub jumps: u64,
-    /// Last resorts ([`StepReport::relaxations`]).
+    /// Number of relaxations ([`StepReport::relaxations`]).
     pub relaxations: u64,
 }
 
 impl Went {
-    /// With one more step.
+    /// Adds a step.
     pub(crate) fn and(self, report: &StepReport) -> Self {
         Self {
             unconverged_steps: self.unconverged_steps + u64::from(report.has_failed()),
@@ -126,38 +126,38 @@ impl Went {
     }
 }
 
-/// All that is read at one moment.
+/// The readout at one time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Readout {
-    /// Steps carried out.
+    /// Number of steps carried out.
     pub step: usize,
-    /// How they went.
+    /// Statistics of these steps.
     #[serde(flatten)]
     pub went: Went,
     /// Time of the session, s.
     pub time_s: f64,
-    /// Whether the scene's script is shown.
+    /// Whether the scene's script is being played.
     pub demonstrates: bool,
-    /// Name of the instrument that is in the hand.
+    /// Name of the selected instrument.
     pub selected: String,
-    /// Each instrument, the innermost first.
+    /// The instruments, innermost first.
     pub instruments: Vec<InstrumentReadout>,
-    /// Tip of the farthest, mm.
+    /// Position of the foremost tip, mm.
     pub tip_mm: Option<[f64; 3]>,
-    /// Wall contacts.
+    /// Number of wall contacts.
     pub contacts: usize,
-    /// Largest force on the wall at one contact, N.
+    /// Largest wall force at one contact, N.
     pub wall_force_n: f64,
-    /// The room.
+    /// The cath lab.
     pub lab: LabReadout,
-    /// What coils fill of the scene's sac, if it has one.
+    /// Packing of the scene's sac, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub packing: Option<Packing>,
-    /// How the subject stands, if it is one.
+    /// Progress of the subject, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<Standing>,
-    /// What has happened last.
+    /// The last event.
     pub event: Option<Event>,
-    /// How many events there were.
+    /// Number of events so far.
     pub events: usize,
 }

@@ -1,4 +1,4 @@
-//! What hands have done as a script, which does it again to the bit: motions, how fast they were, and contrast medium.
+//! Writes a session as a script that repeats it to the bit: motions, their speeds, and contrast medium.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,12 +9,12 @@ use endowire_methods::Setting;
 use crate::hand::Motion;
 use crate::history::{Done, Injected};
 
-/// Least increment of a line, mm and degrees: less than that a line does in one step.
+/// Smallest step of a script line, mm and degrees: a smaller motion is a single step.
 const LEAST: f64 = 1e-9;
 
-/// The head of a script that stands in `file`: of which scene it is, and the command that carries it out again with these settings of the scene.
+/// The head of a script to be saved as `file`: its scene, and the command that carries it out with these settings.
 pub fn script_head(scene: &Path, settings: &[Setting], file: &Path) -> String {
-    // A name with a line break would end the comment.
+    // A line break in a name would end the comment.
     let shown = |path: &Path| path.display().to_string().replace(char::is_control, " ");
     let set = settings.iter().filter(|setting| setting.key.begins() != "script");
     let set: String =
@@ -26,16 +26,17 @@ pub fn script_head(scene: &Path, settings: &[Setting], file: &Path) -> String {
     )
 }
 
-/// How steps become lines.
+/// Converts steps to script lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lines<'a> {
     pub(crate) stack: &'a Stack,
-    /// Whether what is done hangs on the time: then lines keep that to the bit too.
+    /// Whether results depend on time; lines then reproduce times to the bit too.
     pub(crate) timed: bool,
 }
 
 impl Lines<'_> {
-    /// Steps with what was injected between them, by steps rising. Alike steps in a row are one line where that has the same bits.
+    /// The script of steps with the injections between them, in order. Equal consecutive steps become one line if
+    /// that gives the same bits.
     pub(crate) fn of<'a>(self, steps: &[Done], injected: impl Iterator<Item = &'a Injected>) -> String {
         let mut text = String::new();
         let mut told = 0;
@@ -59,7 +60,7 @@ impl Lines<'_> {
         }
     }
 
-    /// Whether a line of `count` such steps is cut into them to the bit.
+    /// Whether a line of `count` such steps is divided into exactly these steps.
     fn cuts_evenly(self, step: &Done, count: usize) -> bool {
         if step.detach.is_some() {
             return count == 1;
@@ -68,7 +69,7 @@ impl Lines<'_> {
     }
 }
 
-/// How long each step of a line of `count` such steps takes, s, as `Motion::steps` of scripts has it to the bit.
+/// Duration, s, of each step of a line of `count` such steps, with the same bits as in `Motion::steps` of scripts.
 pub(crate) fn step_s(Done { motions, per_s, .. }: &Done, count: usize) -> f64 {
     let many = count as f64;
     let each = motions.iter().map(|one| {
@@ -80,7 +81,7 @@ pub(crate) fn step_s(Done { motions, per_s, .. }: &Done, count: usize) -> f64 {
     duration_s * (1.0 / many)
 }
 
-/// The same of motions alone (see `Motion::steps` of scripts).
+/// The same for the motions alone (see `Motion::steps` of scripts).
 fn moves_evenly(motions: &[Motion], count: usize) -> bool {
     let share = 1.0 / count as f64;
     let small = |value: f64| value != 0.0 && value.abs() < LEAST;
@@ -135,7 +136,7 @@ fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach, solves 
     text.push('\n');
 }
 
-/// Writes a line that injects, or says why there is none.
+/// Writes an injection, or a comment if a script cannot express it.
 fn inject(text: &mut String, one: &Injected, stack: &Stack) {
     let (ml, ml_per_s) = (one.ml, one.ml_per_s);
     let _ = match one.instrument {

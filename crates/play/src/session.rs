@@ -1,4 +1,4 @@
-//! The state machine: inputs and ticks in, readouts and snapshots out.
+//! The session: inputs and ticks go in, readouts and snapshots come out.
 
 mod exam;
 
@@ -18,12 +18,13 @@ use crate::lab::Lab;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 use crate::telemetry::Telemetry;
 
-/// Events that are kept.
+/// Largest number of events that are kept.
 const MOST_EVENTS: usize = 1000;
-/// Linear solves of a tick for screens ([`Session::with_ticks`]): some milliseconds for a wire in arteries. Most ticks take three or four.
+/// Limit of linear solves per tick for display ([`Session::with_ticks`]): some milliseconds for a wire in arteries.
+/// Most ticks take three or four.
 pub const TICK_SOLVES: usize = 60;
 
-/// The kind of event that an error is.
+/// The kind of event for an error.
 fn kind_of(error: &Error) -> EventKind {
     match error {
         Error::End(PhysicalEnd::Left { .. }) => EventKind::Left,
@@ -32,7 +33,7 @@ fn kind_of(error: &Error) -> EventKind {
     }
 }
 
-/// A session of instruments moved by hand.
+/// An interactive session.
 pub struct Session {
     simulation: Simulation,
     hands: Vec<Hand>,
@@ -40,50 +41,50 @@ pub struct Session {
     history: History,
     lab: Lab,
     limits: Limits,
-    /// Linear solves of a tick; none where each ends in equilibrium.
+    /// Limit of linear solves per tick; `None` if each tick ends in equilibrium.
     solves: Option<usize>,
-    /// What can be shown, and what is.
+    /// The script that can be played, and the one being played.
     script: Option<Script>,
     demonstration: Option<Demonstration>,
     ticks: u64,
-    /// Whether a hand moved in the last tick.
+    /// Whether an instrument moved in the last tick.
     moving: bool,
-    /// Whether a vessel that moves holds still: after undo, until a hand moves, so that what was undone is still there.
+    /// Whether a moving vessel is paused: from an undo until the next motion, so that undone steps are not lost.
     holds_still: bool,
     events: Vec<Event>,
     events_in_all: usize,
     telemetry: Telemetry,
-    /// The sac that coils fill, and what they do of it now.
+    /// The sac for coils, and its current packing.
     sac: Option<(Sac, Option<Packing>)>,
-    /// What is to be done, if it is a subject.
+    /// The exam, if the session is a subject.
     exam: Option<Exam>,
 }
 
-/// What is drawn of a moment.
+/// Data for drawing one frame.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     /// The line of all instruments.
     pub shape: Shape,
-    /// Inserted length of each.
+    /// Inserted length of each instrument, mm.
     pub inserted_mm: Vec<f64>,
     /// Contacts with the wall.
     pub contacts: Vec<ContactView>,
-    /// Where the vessel is; none where it never moves.
+    /// Displacement of the vessel; `None` if it never moves.
     pub displacement: Option<Displacement>,
-    /// Coils that were left behind.
+    /// Detached coils.
     pub coils: Vec<DetachedCoil>,
-    /// The room.
+    /// The cath lab.
     pub lab: Lab,
     /// Number and time of the frame.
     pub moment: FrameTime,
-    /// What is read.
+    /// The readout.
     pub readout: Readout,
 }
 
-/// What a frame of fluoroscopy brings to the detectors of all planes.
+/// Dose of one fluoroscopic frame at the detectors of all planes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delivered {
-    /// The room that it is of ([`Lab::revisions`]).
+    /// Revision of the room ([`Lab::revisions`]).
     pub(crate) revision: u64,
     /// Air kerma, nGy.
     pub(crate) frame_ngy: f64,
@@ -96,7 +97,8 @@ impl std::fmt::Debug for Session {
 }
 
 impl Session {
-    /// A session of a simulation as it is, in the room that `view` describes, with a square fluoroscopic picture of `side_px` pixels.
+    /// A session that starts from the current state of a simulation, in the room described by `view`, with a square
+    /// fluoroscopic picture of `side_px` pixels.
     ///
     /// # Errors
     /// Limits that are not above 0; as [`ViewSpec::validate`].
@@ -128,18 +130,19 @@ impl Session {
         })
     }
 
-    /// The same with a script of the simulation as it is, which [`Input::Script`] shows.
+    /// Adds a script, which starts from the current state and is played by [`Input::Script`].
     #[must_use]
     pub fn with_script(mut self, script: Script) -> Self {
         self.script = Some(script);
         self
     }
 
-    /// The same with ticks of about so many linear solves ([`Simulation::tick`]): none takes long, and what the device has not followed in one goes on in the
-    /// next. Without, a tick in which the device snaps takes as long as it takes.
+    /// Limits each tick to about this many linear solves ([`Simulation::tick`]), so that none takes long; the device
+    /// follows the rest of the motion in later ticks. Without it, a tick in which the device jumps takes as long as
+    /// it needs.
     ///
     /// # Errors
-    /// No solves at all.
+    /// `solves` is 0.
     pub fn with_ticks(mut self, solves: usize) -> Result<Self> {
         if solves == 0 {
             return Err(Error::parameter("solves", 0, "allow at least one in a tick"));
@@ -148,7 +151,7 @@ impl Session {
         Ok(self)
     }
 
-    /// The same in a vessel with this sac, if it has one: readouts say what coils fill of it.
+    /// Adds the vessel's sac, if it has one; readouts then report its packing.
     #[must_use]
     pub fn with_sac(mut self, sac: Option<Sac>) -> Self {
         self.sac = sac.map(|sac| (sac, None));
@@ -156,7 +159,7 @@ impl Session {
         self
     }
 
-    /// Measures anew what coils fill. Whether loops have come out of the neck.
+    /// Updates the packing. Returns whether loops have newly come out of the neck.
     fn pack(&mut self) -> bool {
         let Some((sac, packing)) = &mut self.sac else { return false };
         let before = packing.is_some_and(|packing| packing.herniated);
@@ -164,10 +167,10 @@ impl Session {
         !before && packing.is_some_and(|packing| packing.herniated)
     }
 
-    /// Takes an input. What is refused is an event too, and changes nothing else.
+    /// Applies an input. A refused input becomes an event and changes nothing else.
     ///
     /// # Errors
-    /// [`Error::Parameter`] with what is out of range or not there.
+    /// [`Error::Parameter`] for a value that is out of range or a name that does not exist.
     pub fn apply(&mut self, input: &Input) -> Result<()> {
         let done = self.carry_out(input);
         if let Err(error) = &done {
@@ -226,7 +229,7 @@ impl Session {
         self.hands.iter_mut().for_each(|hand| *hand = Hand::default());
     }
 
-    /// Shows the script, or goes on with it.
+    /// Starts the script, or continues it.
     fn demonstrate(&mut self) -> Result<()> {
         if let Some(shown) = &mut self.demonstration {
             shown.paused = false;
@@ -246,11 +249,11 @@ impl Session {
         Ok(())
     }
 
-    /// Leaves the coil of an instrument behind: a motion of its own.
+    /// Detaches the coil of an instrument, as a motion.
     fn detach(&mut self, instrument: usize) -> Result<()> {
         self.take_over();
         self.stop();
-        // What is refused changes nothing: it is looked at where the device will be once it has followed.
+        // The check uses a copy in which the device has caught up, so that a refusal changes nothing.
         let mut followed = self.simulation.clone();
         if followed.report().is_under_way() {
             followed.step(Command::default())?;
@@ -260,24 +263,25 @@ impl Session {
         self.advance(Done { detach: Some(instrument), ..Self::resting() }, true)
     }
 
-    /// A step in which hands rest.
+    /// A step without motion.
     fn resting() -> Done {
         Done { motions: vec![], per_s: TICKS_PER_S, detach: None, solves: None }
     }
 
-    /// Lets the device follow its hands to where it rests.
+    /// Lets the device catch up with its commanded motion and come to rest.
     fn catch_up(&mut self) -> Result<()> {
         if self.simulation.report().is_under_way() { self.advance(Self::resting(), false) } else { Ok(()) }
     }
 
-    /// A hand moves: what was shown is at its end.
+    /// Ends a script that is being played, because the operator moves an instrument.
     fn take_over(&mut self) {
         if self.demonstration.take().is_some() {
             self.happened(EventKind::Script, "the script ends here: a hand has taken over".to_owned());
         }
     }
 
-    /// Goes to the moment after a step, forth or back. Medium of later moments is taken out of the vessel, and what is done again flows from now on.
+    /// Goes to the state after a step, backwards or forwards. Contrast medium of undone steps is removed; that of
+    /// redone steps flows from now on.
     fn go_to(&mut self, step: usize) -> Result<()> {
         self.stop();
         self.demonstration = None;
@@ -291,7 +295,7 @@ impl Session {
     }
 
     fn inject(&mut self, instrument: Option<usize>, ml: f64, ml_per_s: f64) -> Result<()> {
-        // Medium is told where it is in the vessel at rest.
+        // The position of medium is a material place, in the vessel at rest.
         let displacement = self.simulation.displacement();
         let at_rest =
             |tip: Vec3| displacement.as_ref().map_or(tip, |displacement| displacement.material(&tip));
@@ -308,7 +312,8 @@ impl Session {
         instrument.map_or(Ok(self.selected), |name| self.simulation.stack().find(name))
     }
 
-    /// A sixtieth of a second goes by: hands that move carry out one step, and a script that is shown those that end in it.
+    /// Advances by 1/60 s. Instruments that move carry out one step; a script that is played carries out the steps
+    /// that end in this tick.
     pub fn tick(&mut self) {
         self.ticks += 1;
         self.lab.tick();
@@ -344,7 +349,7 @@ impl Session {
         self.note(&[]);
     }
 
-    /// How far hands have pushed each instrument in, mm: the device may have to follow.
+    /// Commanded inserted length of each instrument, mm; the device may not have followed yet.
     fn hands_mm(&self) -> Vec<f64> {
         let report = self.simulation.report();
         let mut lengths_mm = report.lengths_mm();
@@ -352,22 +357,23 @@ impl Session {
         lengths_mm
     }
 
-    /// Notes what hands have done in this tick.
+    /// Records the motions of this tick.
     fn note(&mut self, motions: &[Motion]) {
         let time_s = self.time_s();
-        // The beam of a tick is that at its beginning.
+        // The beam state of a tick is that at its beginning.
         let beam = self.lab.beam((time_s - 1.0 / TICKS_PER_S).max(0.0));
         let packing = self.sac.as_ref().and_then(|(_, packing)| *packing);
         self.telemetry.tick(time_s, motions, (&self.simulation, packing), beam);
         self.examine();
     }
 
-    /// What hands, beam and injector have done so far, for those who assess it: undone or not, rests included.
+    /// The record of instruments, beam and injector so far, for assessment; it includes undone steps and rests.
     pub fn record(&self) -> &endowire_assess::Record {
         self.telemetry.record()
     }
 
-    /// Carries out what a script does in this tick, which is added to `done`; it, where it goes on.
+    /// Carries out the steps of a script in this tick and adds their motions to `done`; returns the script if it
+    /// continues.
     fn show(&mut self, mut shown: Demonstration, done: &mut Vec<Motion>) -> Option<Demonstration> {
         shown.tick();
         loop {
@@ -399,7 +405,7 @@ impl Session {
         }
     }
 
-    /// Carries out a step; whether it was possible.
+    /// Carries out a step; returns whether it succeeded.
     fn step(&mut self, step: Done, begins: bool) -> bool {
         match self.advance(step, begins) {
             Ok(()) => true,
@@ -410,7 +416,7 @@ impl Session {
         }
     }
 
-    /// Carries out a step, with which a motion `begins` or goes on.
+    /// Carries out a step; `begins` marks the first one of a motion.
     fn advance(&mut self, step: Done, begins: bool) -> Result<()> {
         if begins {
             self.history.begin_motion();
@@ -444,7 +450,7 @@ impl Session {
         Ok(())
     }
 
-    /// Notes an event; one that goes on is noted once.
+    /// Records an event, unless it equals the last one at the same step.
     fn happened(&mut self, kind: EventKind, text: String) {
         let step = self.history.steps();
         let alike = |last: &Event| last.step == step && last.kind == kind && last.text == text;
@@ -463,42 +469,42 @@ impl Session {
         self.ticks as f64 / TICKS_PER_S
     }
 
-    /// Whether the script is shown now, and does not rest.
+    /// Whether the script is being played and not paused.
     pub fn demonstrates(&self) -> bool {
         self.demonstration.as_ref().is_some_and(|shown| !shown.paused)
     }
 
-    /// Steps carried out, less those taken back.
+    /// Number of steps carried out, without undone ones.
     pub fn steps(&self) -> usize {
         self.history.steps()
     }
 
-    /// How these steps went.
+    /// Statistics of these steps.
     pub fn went(&self) -> Went {
         self.history.went()
     }
 
-    /// The last events, at most a thousand.
+    /// The last events, at most 1000.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
-    /// The simulation as it is.
+    /// The simulation.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// All motions, and what was injected, as `[[script]]` tables of a scene file, which carry them out to the bit.
+    /// All motions and injections as `[[script]]` tables of a scene file, which repeat them to the bit.
     pub fn script(&self) -> String {
         self.history.script(&self.simulation)
     }
 
-    /// Hears what exposure control has brought to the detectors since the room is as it is; until then what is wanted counts.
+    /// Stores the dose chosen by exposure control for the current room; until then the nominal dose counts.
     pub fn exposed(&mut self, delivered: Delivered) {
         self.lab.exposed(delivered);
     }
 
-    /// What is drawn of this moment.
+    /// Data for drawing the current state.
     pub fn snapshot(&self) -> Snapshot {
         let report = self.simulation.report();
         let contact = |c: &endowire_core::insertion::Contact| ContactView {
@@ -518,7 +524,7 @@ impl Session {
         }
     }
 
-    /// What the operator reads.
+    /// The readout.
     pub fn readout(&self) -> Readout {
         let report = self.simulation.report();
         let spec = self.lab.fluoro();
@@ -577,10 +583,10 @@ impl Session {
             .collect()
     }
 
-    /// What contrast medium goes through: the outermost instrument that is in and has a lumen.
+    /// The instrument through which contrast medium is injected: the outermost inserted one with a lumen.
     fn injects_through(&self) -> Option<usize> {
         let stack = self.simulation.stack();
-        // A device alone may leave its lumen to the pictures.
+        // The lumen of a single device may be given by the view alone.
         let in_view =
             !stack.is_several() && self.lab.fluoro().device.iter().any(|part| part.inner_radius_mm > 0.0);
         let opens = |one: &usize| {

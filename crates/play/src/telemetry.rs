@@ -1,23 +1,24 @@
-//! What a session is assessed by: what hands, beam and injector do, tick by tick. A script does not tell: it knows no rests and no beam.
+//! The record for assessment: instruments, beam and injector, tick by tick. A script is not enough, because it
+//! contains neither rests nor the beam.
 
 use endowire_assess::{BeamState, Injection, Record};
 use endowire_core::insertion::{Move, Packing, Simulation};
 
 use crate::hand::Motion;
 
-/// The record of a session so far. What is taken back by undo was done all the same.
+/// The record of a session so far. It includes undone motions, because they took place.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Telemetry {
     record: Record,
 }
 
 impl Telemetry {
-    /// What it has noted.
+    /// The record so far.
     pub(crate) fn record(&self) -> &Record {
         &self.record
     }
 
-    /// Notes a tick that ends at a time, in which hands carried out these motions.
+    /// Records a tick that ends at `time_s`, with these motions.
     pub(crate) fn tick(
         &mut self,
         time_s: f64,
@@ -34,7 +35,7 @@ impl Telemetry {
         self.record.note(time_s, &moves, simulation, packing);
     }
 
-    /// Notes an injection.
+    /// Records an injection.
     pub(crate) fn inject(&mut self, time_s: f64, volume_ml: f64, rate_ml_per_s: f64) {
         self.record.injections.push(Injection { time_s, volume_ml, rate_ml_per_s });
     }

@@ -1,4 +1,4 @@
-//! Numbers to and from Python and numpy.
+//! Conversion of numbers to and from Python and numpy.
 
 use endowire_core::Vec3;
 use numpy::ndarray::ArrayViewD;
@@ -15,7 +15,7 @@ use pyo3::types::{PyDict, PyFloat, PyInt, PyList, PySequence, PyString, PyTuple}
 
 use crate::error::refuse;
 
-/// An array of this shape with these numbers, which it takes over.
+/// An array of this shape that takes over these numbers.
 pub(crate) fn array<'py, T: Element, D: IntoDimension>(
     py: Python<'py>,
     numbers: Vec<T>,
@@ -37,14 +37,15 @@ pub(crate) fn points<'py>(
     array(py, numbers, [rows, 3])
 }
 
-/// Most numbers of an array: 800 MB. An array that repeats itself takes no memory until it is copied.
+/// Largest number of elements of an array: 800 MB. An array with repeated elements needs no memory until it is
+/// copied.
 const MOST_NUMBERS: usize = 100_000_000;
-/// Most items of any other sequence, all within it counted. `range(10**12)` takes no memory either.
+/// Largest number of items of any other sequence, including nested ones. `range(10**12)` needs no memory either.
 const MOST_ITEMS: usize = 10_000_000;
-/// Deepest sequence of sequences; numpy has no more dimensions.
+/// Deepest nesting of sequences; numpy has no more dimensions.
 const DEEPEST: usize = 64;
 
-/// Numbers of anything like an array. Of any shape, so that one of another is refused by the argument's name.
+/// Numbers of anything array-like, of any shape, so that errors about the shape can name the argument.
 pub(crate) struct Numbers<'py>(PyArrayLikeDyn<'py, f64, AllowTypeChange>);
 
 impl Numbers<'_> {
@@ -71,7 +72,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Numbers<'py> {
     }
 }
 
-/// Takes the items of a sequence, and of those in it, from those that are left.
+/// Subtracts the items of a sequence, including nested ones, from the number `left`.
 fn count(object: &Bound<'_, PyAny>, left: &mut usize, depth: usize) -> PyResult<()> {
     let items = if object.is_instance_of::<PyFloat>() || object.is_instance_of::<PyInt>() || depth == 0 {
         1
@@ -96,14 +97,14 @@ fn too_many(what: &str, items: usize, most: usize) -> PyErr {
     refuse(what, format!("{items} items and more"), &format!("at most {most} are taken at once"))
 }
 
-/// The items of a sequence that is no text.
+/// The items of a sequence other than text.
 pub(crate) struct List<T>(pub(crate) Vec<T>);
 
 impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for List<T> {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        // Arrays are no `Sequence`, and serve.
+        // Arrays are not a `Sequence`, but are accepted.
         let items = match object.len() {
             Ok(items) if !object.is_instance_of::<PyString>() && !object.is_instance_of::<PyDict>() => items,
             _ => return Err(PyTypeError::new_err(format!("{} is no list", object.repr()?))),
@@ -111,13 +112,13 @@ impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for List<T> {
         if items > MOST_ITEMS {
             return Err(too_many("sequence", items, MOST_ITEMS));
         }
-        // One after the other, as many as it says that it has.
+        // Extracts the items one by one, as many as its length says.
         let item = |index| object.get_item(index)?.extract::<T>().map_err(Into::into);
         (0..items).map(item).collect::<PyResult<_>>().map(Self)
     }
 }
 
-/// The numbers of a one-dimensional array, all finite.
+/// The numbers of a one-dimensional array; all must be finite.
 pub(crate) fn numbers(name: &str, list: &Numbers<'_>) -> PyResult<Vec<f64>> {
     let view = list.as_array();
     if view.ndim() != 1 {
@@ -130,7 +131,7 @@ pub(crate) fn numbers(name: &str, list: &Numbers<'_>) -> PyResult<Vec<f64>> {
     view.iter().enumerate().map(finite).collect()
 }
 
-/// The rows of a table of `N` columns.
+/// The rows of a table with `N` columns.
 pub(crate) fn rows<const N: usize>(name: &str, table: &Numbers<'_>) -> PyResult<Vec<[f64; N]>> {
     let view = table.as_array();
     if !matches!(view.shape(), [_, columns] if *columns == N) {
@@ -139,12 +140,13 @@ pub(crate) fn rows<const N: usize>(name: &str, table: &Numbers<'_>) -> PyResult<
     Ok(view.rows().into_iter().map(|row| std::array::from_fn(|k| row[k])).collect())
 }
 
-/// An array of another shape than it must have.
+/// The error for an array of the wrong shape.
 pub(crate) fn misshapen(name: &str, shape: &[usize], mend: &str) -> PyErr {
     refuse(name, format!("an array of shape {shape:?}"), mend)
 }
 
-/// A number that counts something or says which, 0 or more. Taken as one of Python's, so that a negative one is refused by the argument's name.
+/// A count or an index, 0 or more. It is taken as a signed integer, so that the error about a negative one names the
+/// argument.
 pub(crate) fn natural<T: TryFrom<i64>>(name: &str, number: i64) -> PyResult<T> {
     T::try_from(number).map_err(|_| refuse(name, number, "must be 0 or more"))
 }

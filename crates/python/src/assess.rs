@@ -1,4 +1,4 @@
-//! What sessions and recorded runs are scored by.
+//! Assessment of sessions and recorded runs.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::document;
 use crate::error::{exception, refuse};
 use crate::interrupt::interruptible;
 
-/// What is to be reached on which line.
+/// The target and the centre line of a task.
 struct Task {
     centreline: Option<PathBuf>,
     target: Option<String>,
@@ -42,7 +42,7 @@ impl Task {
     }
 }
 
-/// Refuses a distance at which nothing can have arrived.
+/// Refuses a distance that is not positive.
 pub(crate) fn check_within(within_mm: f64) -> PyResult<()> {
     if within_mm > 0.0 && within_mm.is_finite() {
         return Ok(());
@@ -61,12 +61,13 @@ fn scored(path: &Path, subject: &Path, centreline: Option<&Path>) -> endowire_co
     Ok(exam.score(&record))
 }
 
-/// Measures a session of `endowire play` (*.session.json) or the folder of a recorded run, as `endowire assess` does. `centreline` is the
-/// table of the vessel's centre line, and `target` the name of its point that was to be reached, within `within_mm` of it; without a
-/// table what depends on the way has no value, and without a target the way is that to where the tip ended.
+/// Measures a session of `endowire play` (*.session.json) or the folder of a recorded run, as `endowire assess` does.
+/// `centreline` is the table of the vessel's centre line, and `target` the name of the point on it that was to be
+/// reached within `within_mm`. Without a table, measures that depend on the way have no value; without a target, the
+/// way leads to the final position of the tip.
 ///
-/// Returns a list of dictionaries: name, group, value (None where what it needs was not recorded), unit, better ("lower" or "higher"),
-/// definition and study. Raises InputError for files that do not fit, and for a target that is not there.
+/// Returns a list of dictionaries: name, group, value (None if its data were not recorded), unit, better ("lower" or
+/// "higher"), definition and study. Raises InputError for invalid files and for an unknown target.
 #[pyfunction]
 #[pyo3(signature = (path, *, centreline=None, target=None, within_mm=5.0))]
 pub(crate) fn assess<'py>(
@@ -81,12 +82,13 @@ pub(crate) fn assess<'py>(
     document::write(py, &measured.map_err(exception)?)
 }
 
-/// Scores a session of `endowire play` (*.session.json) or the folder of a recorded run by a training subject, the file of one, as
-/// `endowire assess --subject` does. `centreline` is the table of the vessel's centre line, which names the subject's target; a subject in which a
-/// sac is to be packed needs none.
+/// Scores a session of `endowire play` (*.session.json) or the folder of a recorded run by the file of a training
+/// subject, as `endowire assess --subject` does. `centreline` is the table of the vessel's centre line with the
+/// subject's target; it is not needed if a sac is to be packed.
 ///
-/// Returns a dictionary: subject, passed, score (0 to 100), ended (None, or what ended it and when), and metrics, which are those of assess
-/// with threshold and passed, None where nothing was asked. Raises InputError for files that do not fit.
+/// Returns a dictionary: subject, passed, score (0 to 100), ended (None, or reason and time of the end), and metrics,
+/// which are those of assess with threshold and passed (None without a threshold). Raises InputError for invalid
+/// files.
 #[pyfunction]
 #[pyo3(signature = (path, subject, *, centreline=None))]
 pub(crate) fn score<'py>(
@@ -99,12 +101,13 @@ pub(crate) fn score<'py>(
     document::write(py, &*scored.map_err(exception)?)
 }
 
-/// The course of a trainee's attempts at one task, in the order of `paths`, as `endowire assess` tells it of several sessions: sessions of
-/// `endowire play` (*.session.json) or folders of recorded runs. With a `subject`, the file of one, they are scored by it; `centreline`,
-/// `target` and `within_mm` are as those of assess and score.
+/// The course of a trainee's attempts at one task, in the order of `paths`, as from `endowire assess` with several
+/// sessions. The paths are sessions of `endowire play` (*.session.json) or folders of recorded runs. With the file of
+/// a `subject`, they are scored by it; `centreline`, `target` and `within_mm` are as in assess and score.
 ///
-/// Returns a dictionary: score and passed (None without a subject), and metrics, a list of dictionaries: name, group, unit, better, values,
-/// first, last, best, per_attempt, chance and trend ("better", "worse" or "none"). Raises InputError for files that do not fit.
+/// Returns a dictionary: score and passed (None without a subject), and metrics, a list of dictionaries: name, group,
+/// unit, better, values, first, last, best, per_attempt, chance and trend ("better", "worse" or "none"). Raises
+/// InputError for invalid files.
 #[pyfunction]
 #[pyo3(signature = (paths, *, subject=None, centreline=None, target=None, within_mm=5.0))]
 pub(crate) fn course<'py>(

@@ -1,4 +1,4 @@
-//! Many simulations, stepped side by side.
+//! Many simulations, stepped in parallel.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -17,7 +17,8 @@ use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
 use crate::start::Start;
 use crate::state::State;
 
-/// Simulations stepped side by side on all cores (or on RAYON_NUM_THREADS threads), each to the bit as if it were alone.
+/// Simulations stepped in parallel on all cores (or on RAYON_NUM_THREADS threads), each with the same bits as if
+/// stepped alone.
 #[pyclass(frozen, module = "endowire", name = "Batch")]
 pub(crate) struct Batch {
     inner: Mutex<Members>,
@@ -26,12 +27,12 @@ pub(crate) struct Batch {
 #[derive(Clone)]
 struct Members {
     batch: insertion::Batch,
-    /// What each has come from.
+    /// The start of each simulation.
     starts: Vec<Arc<Py<Start>>>,
 }
 
 impl Batch {
-    /// Does something with the members, without the interpreter.
+    /// Runs `work` on the members with the interpreter released.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Members) -> T + Send) -> T {
         py.detach(|| {
             let mut members: MutexGuard<'_, Members> =
@@ -40,7 +41,7 @@ impl Batch {
         })
     }
 
-    /// Does something with one of them; a negative index counts from the end.
+    /// Runs `work` on one simulation; a negative index counts from the end.
     fn at<T: Send>(
         &self,
         py: Python<'_>,
@@ -57,7 +58,7 @@ impl Batch {
         })
     }
 
-    /// Has each carry out its moves; returns the failures.
+    /// Carries out moves in each simulation; returns the failures.
     fn carry_out<'py>(
         &self,
         py: Python<'py>,
@@ -81,7 +82,7 @@ impl Batch {
         Ok(failures)
     }
 
-    /// A number of each report.
+    /// A number from each report.
     fn of_each<'py, T: numpy::Element + Send>(
         &self,
         py: Python<'py>,
@@ -93,7 +94,7 @@ impl Batch {
         PyArray1::from_vec(py, list)
     }
 
-    /// A number of each hand.
+    /// A number for each instrument of each simulation.
     fn of_hands<'py>(
         &self,
         py: Python<'py>,
@@ -110,7 +111,7 @@ impl Batch {
 }
 
 impl Members {
-    /// Instruments of each.
+    /// Number of instruments per simulation.
     fn hands(&self) -> usize {
         self.starts.first().map_or(1, |start| start.get().instruments.len())
     }
@@ -145,26 +146,29 @@ impl Batch {
         self.with(py, |members| members.starts.len())
     }
 
-    /// Carries out one command in each: an array of shape (n, n_instruments, 2) of advance_mm and rotate_rad. Where both are 0, nothing is
-    /// done.
+    /// Carries out one command in each simulation: an array of shape (n, n_instruments, 2) of advance_mm and
+    /// rotate_rad. A simulation whose numbers are all 0 is not stepped.
     ///
-    /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step` would have raised; empty
-    /// where all went well. Those that failed are as before, and do not concern the others.
+    /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step`
+    /// would have raised; empty if all succeeded. Simulations that failed are unchanged, and do not affect the
+    /// others.
     fn step<'py>(&self, py: Python<'py>, moves: Numbers<'_>) -> PyResult<Bound<'py, PyDict>> {
         self.carry_out(py, &moves, |batch, moves| batch.step_together(moves))
     }
 
-    /// As `step`, in ticks of about so many linear solves each (`Simulation.tick`): no simulation keeps the others waiting for long. What is left over
-    /// is told in `behind`, and the next tick or step goes on with it, also where a simulation is not moved.
+    /// As `step`, in ticks of about `solves` linear solves each (`Simulation.tick`), so that no simulation delays the
+    /// others for long. The remaining motion is available as `behind`, and is continued by the next tick or step,
+    /// even if its command is 0.
     fn tick<'py>(&self, py: Python<'py>, moves: Numbers<'_>, solves: i64) -> PyResult<Bound<'py, PyDict>> {
         let solves = natural("solves", solves)?;
         self.carry_out(py, &moves, |batch, moves| batch.tick(moves, solves))
     }
 
-    /// Notes in records what each simulation has just done: `moves` as `step` was told, and when that ended, `times_s`, shape (n,). Where a record is
-    /// None, nothing is noted.
+    /// Adds the last step of each simulation to a record: `moves` as in `step`, and its end times `times_s`, shape
+    /// (n,). A record may be None, for nothing to be added.
     ///
-    /// Raises InputError for other numbers of records or times than of simulations, and as `Record.note`; then nothing is noted.
+    /// Raises InputError if the number of records or times differs from that of simulations, and as `Record.note`;
+    /// then nothing is added.
     fn note(
         &self,
         py: Python<'_>,
@@ -194,8 +198,8 @@ impl Batch {
         Ok(())
     }
 
-    /// What hands have done in ticks that instruments have not yet followed: advance_mm and rotate_rad of each, shape (n, n_instruments, 2); zeros where
-    /// nothing is left over.
+    /// Commanded motion in ticks that instruments have not yet followed: advance_mm and rotate_rad of each, shape (n,
+    /// n_instruments, 2); zeros if nothing remains.
     #[getter]
     fn behind<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (rows, hands, list) = self.with(py, |members| {
@@ -210,14 +214,14 @@ impl Batch {
         array(py, list, [rows, hands, 2])
     }
 
-    /// A copy of one of them.
+    /// A copy of one simulation.
     fn simulation(&self, py: Python<'_>, index: isize) -> PyResult<Simulation> {
         self.at(py, index, |members, k| {
             Ok(Simulation::new(members.batch.simulations()[k].clone(), Arc::clone(&members.starts[k])))
         })
     }
 
-    /// Puts a copy of a simulation in the place of one of them.
+    /// Replaces one simulation by a copy of `simulation`.
     fn replace(&self, py: Python<'_>, index: isize, simulation: &Simulation) -> PyResult<()> {
         let new = simulation.with(py, |simulation| simulation.clone());
         self.at(py, index, |members, k| {
@@ -228,26 +232,27 @@ impl Batch {
         })
     }
 
-    /// The state of one of them.
+    /// The state of one simulation.
     fn state(&self, py: Python<'_>, index: isize) -> PyResult<State> {
         self.at(py, index, |members, k| Ok(State { state: members.batch.simulations()[k].state() }))
     }
 
-    /// Lets one of them go on from a state of its scene.
+    /// Restores a state of its scene in one simulation.
     fn restore(&self, py: Python<'_>, index: isize, state: &State) -> PyResult<()> {
         self.at(py, index, |members, k| {
             members.batch.simulations_mut()[k].restore(&state.state).map_err(exception)
         })
     }
 
-    /// Positions of the tips, mm, shape (n, 3); of several instruments that of the farthest.
+    /// Positions of the tips, mm, shape (n, 3); of several instruments the foremost.
     #[getter]
     fn tip_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let tips: Vec<_> = self.with(py, |members| members.batch.simulations().iter().map(tip_mm).collect());
         points(py, tips)
     }
 
-    /// Positions of the tips of all instruments, mm, shape (n, n_instruments, 3); what is not in is in the sheath's mouth.
+    /// Positions of the tips of all instruments, mm, shape (n, n_instruments, 3); the mouth of the sheath for those
+    /// that are outside.
     #[getter]
     fn tips_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (rows, hands, list) = self.with(py, |members| {
@@ -274,25 +279,25 @@ impl Batch {
         array(py, list, [count, lengths.len(), 3])
     }
 
-    /// Lengths inside the sheath's mouth, mm, shape (n, n_instruments).
+    /// Inserted lengths, from the mouth of the sheath, mm, shape (n, n_instruments).
     #[getter]
     fn inserted_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.of_hands(py, |hand| hand.inserted_mm)
     }
 
-    /// Turns of the tails since the start, rad, shape (n, n_instruments).
+    /// Rotations of the tails since the start, rad, shape (n, n_instruments).
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.of_hands(py, |hand| hand.rotation_rad)
     }
 
-    /// Forces with which the hands push, N, shape (n, n_instruments); NaN where a force jumps.
+    /// Push forces, N, shape (n, n_instruments); NaN where a force jumps.
     #[getter]
     fn push_force_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.of_hands(py, push_force_n)
     }
 
-    /// Torques with which the hands hold the tails, N·mm, shape (n, n_instruments).
+    /// Torques that hold the tails, N·mm, shape (n, n_instruments).
     #[getter]
     fn torque_nmm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.of_hands(py, |hand| hand.torque_nmm)
@@ -304,8 +309,8 @@ impl Batch {
         self.of_each(py, |report| report.contacts.iter().map(|c| c.force_n).fold(0.0, f64::max))
     }
 
-    /// How hard the wall holds the instruments, N, shape (n, 2): the largest force at a contact, and the sum of those at the tip; normal force
-    /// and friction together. 0 without contact.
+    /// Wall forces, N, shape (n, 2): the largest force at a contact, and the sum of those at the tip, including
+    /// friction. 0 without contact.
     #[getter]
     fn wall_forces_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (rows, list) = self.with(py, |members| {
@@ -327,13 +332,13 @@ impl Batch {
         self.of_each(py, |report| report.iterations)
     }
 
-    /// Whether the last steps met the method's own convergence test, shape (n,).
+    /// Whether the last steps converged by the method's own test, shape (n,).
     #[getter]
     fn converged<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         self.of_each(py, |report| report.converged)
     }
 
-    /// A batch of copies that share their vessels.
+    /// A copy of the batch; the copies share their vessels.
     fn copy(&self, py: Python<'_>) -> Self {
         self.with(py, |members| Self { inner: Mutex::new(members.clone()) })
     }

@@ -1,4 +1,4 @@
-//! Hands that steer, as the library has them.
+//! The controllers of the library.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,10 +12,12 @@ use crate::arrays::{List, Numbers, array, natural, rows};
 use crate::error::{exception, refuse};
 use crate::simulation::Simulation;
 
-/// A hand that steers one instrument along a way: it looks at a simulation and says what to do next, without learning.
+/// A controller that steers one instrument along a way. It examines a simulation and chooses the next command,
+/// without learning.
 ///
-/// `path_mm` is the way, shape (n, 4): x, y, z and the vessel's radius, mm. `lead` is the instrument that is steered; `followers` go
-/// behind its tip, pairs of an instrument and how far, mm. It has arrived where the tip is no more than `arrived_mm` before the end of the way.
+/// `path_mm` is the way, shape (n, 4): x, y, z and the vessel's radius, mm. `lead` is the steered instrument;
+/// `followers` follow behind its tip, as pairs of an instrument and a distance, mm. The controller has arrived when
+/// the tip is at most `arrived_mm` before the end of the way.
 #[pyclass(frozen, module = "endowire", name = "Controller")]
 pub(crate) struct Controller {
     inner: Mutex<Hand>,
@@ -38,9 +40,10 @@ impl Controller {
 
 #[pymethods]
 impl Controller {
-    /// Turns the bent tip to where the way goes and pushes on; where it goes astray or makes no way it pulls back and tries another turn.
+    /// Turns the bent tip into the direction of the way and advances. If it leaves the way or makes no progress, it
+    /// pulls back and tries another rotation.
     ///
-    /// Raises InputError for a path that is none.
+    /// Raises InputError for an invalid path.
     #[staticmethod]
     #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = None))]
     fn follow_path(
@@ -52,10 +55,10 @@ impl Controller {
         Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers)?, arrived_mm)))
     }
 
-    /// Tries turns of the instruments `turned` (that which leads, unless set) on copies of the simulation, pushes and pulls for 20 mm
-    /// after each, and does what brought the tip farthest along the way.
+    /// Tries rotations of the instruments `turned` (by default the leading one) on copies of the simulation, pushes
+    /// and pulls for 20 mm after each, and carries out the one that moved the tip farthest along the way.
     ///
-    /// Raises InputError for a path that is none.
+    /// Raises InputError for an invalid path.
     #[staticmethod]
     #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = None, turned = None))]
     fn search_ahead(
@@ -75,8 +78,9 @@ impl Controller {
         Ok(Self::of(SearchAhead::new(path(&path_mm)?, team, turned, arrived_mm)))
     }
 
-    /// What to do with a simulation as it is now: advance_mm and rotate_rad of each instrument, shape (n_instruments, 2); None where it
-    /// ends, as `ended` tells. Ask once before every step, and carry it out.
+    /// The next command for the current state of a simulation: advance_mm and rotate_rad of each instrument, shape
+    /// (n_instruments, 2); None at the end, whose reason is `ended`. Call it once before every step, and carry the
+    /// command out.
     ///
     /// Raises InputError for instruments that the simulation does not have.
     fn next<'py>(
@@ -85,7 +89,7 @@ impl Controller {
         simulation: &Simulation,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let hands = simulation.pushed().len();
-        // A copy, so that others may look at the simulation meanwhile.
+        // A copy, so that the simulation is not locked meanwhile.
         let copy = simulation.with(py, |simulation| simulation.clone());
         let told = self.with(py, move |hand| {
             let action = hand.controller.next(&copy)?;
@@ -105,13 +109,13 @@ impl Controller {
         array(py, numbers, [hands, 2]).map(Some)
     }
 
-    /// "arrived" or "given up" where the last answer of `next` was None.
+    /// "arrived" or "given up" if the last result of `next` was None.
     #[getter]
     fn ended(&self, py: Python<'_>) -> Option<&'static str> {
         self.with(py, |hand| hand.ended)
     }
 
-    /// How often it has pulled back to try something else.
+    /// Number of times it has pulled back to try something else.
     #[getter]
     fn retries(&self, py: Python<'_>) -> usize {
         self.with(py, |hand| hand.controller.retries())

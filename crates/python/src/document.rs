@@ -1,4 +1,4 @@
-//! Tables of options as Python's dictionaries, read as scene files read them.
+//! Tables of options as Python dictionaries, read like those of scene files.
 
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -7,12 +7,12 @@ use serde_json::Value;
 
 use crate::error::InputError;
 
-/// What a dictionary says; errors call it `name`.
+/// Reads a dictionary; `name` is its name in errors.
 pub(crate) fn read<T: DeserializeOwned>(name: &str, table: &Bound<'_, PyAny>) -> PyResult<T> {
     typed(name, value(name, table)?)
 }
 
-/// What `defaults` say, but for what a dictionary says otherwise, key by key and table by table.
+/// The values of `defaults`, overridden key by key and table by table by those of a dictionary.
 pub(crate) fn read_over<T: DeserializeOwned + Serialize>(
     name: &str,
     defaults: &T,
@@ -31,7 +31,7 @@ pub(crate) fn write<'py>(py: Python<'py>, document: &impl Serialize) -> PyResult
 
 fn value(name: &str, table: &Bound<'_, PyAny>) -> PyResult<Value> {
     let text: String = table.py().import("json")?.call_method1("dumps", (table,))?.extract()?;
-    // Python writes NaN and Infinity, which no key takes.
+    // Python writes NaN and Infinity, which no key accepts.
     serde_json::from_str(&text)
         .map_err(|_| InputError::new_err(format!("{name}: every number must be finite")))
 }

@@ -1,4 +1,4 @@
-//! Errors as exceptions, in the same words. The classes are Python's own: `endowire/errors.py`.
+//! Errors as exceptions with the same messages. The classes are defined in Python: `endowire/errors.py`.
 
 use endowire_core::Error;
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -13,14 +13,14 @@ pub(crate) fn exception(error: Error) -> PyErr {
     let text = error.to_string();
     match error {
         Error::End(_) => EndOfWay::new_err(text),
-        // What the handler of the signal has raised.
+        // The exception raised by the signal handler.
         Error::Stopped => Python::attach(PyErr::take).unwrap_or_else(|| PyKeyboardInterrupt::new_err(())),
         error if error.is_input() => InputError::new_err(text),
         _ => ComputationError::new_err(text),
     }
 }
 
-/// A value that is out of its range, told as the libraries tell it.
+/// The error for a value out of range, in the format of the library.
 pub(crate) fn refuse(name: &str, value: impl std::fmt::Display, mend: &str) -> PyErr {
     exception(Error::parameter(name, value, mend))
 }

@@ -1,5 +1,5 @@
-//! Processes that were forked, as `multiprocessing` of Python makes them on Linux: they have the memory of the process that they come from and one of
-//! its threads. What is given to threads that are not there would be waited for without end.
+//! Support for forked processes, as made by Python's `multiprocessing` on Linux. They have the memory of the parent
+//! process but only one of its threads, so work given to the other threads would never finish.
 
 use std::process;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -9,20 +9,20 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::ComputationError;
 
-/// The process that has imported the module: its threads are rayon's own, of which there is one set.
+/// The process that imported the module. It uses the global threads of rayon.
 static IMPORTED_IN: OnceLock<u32> = OnceLock::new();
-/// The threads of a process that was forked from it, by its number.
+/// The threads of a process forked from it, with its process id.
 static THREADS: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Notes the process.
+/// Stores the current process.
 pub(crate) fn imported() {
     IMPORTED_IN.get_or_init(process::id);
 }
 
-/// Does `work` where what it divides goes to threads of this process.
+/// Runs `work` so that its parallel parts use threads of this process.
 ///
 /// # Errors
-/// ComputationError where the system gives no threads.
+/// ComputationError if the system provides no threads.
 pub(crate) fn on_own_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let own = process::id();
     if IMPORTED_IN.get().is_none_or(|imported| *imported == own) {
@@ -39,7 +39,7 @@ fn threads(own: u32) -> PyResult<Arc<ThreadPool>> {
     let pool = ThreadPoolBuilder::new().build();
     let pool =
         Arc::new(pool.map_err(|e| ComputationError::new_err(format!("threads of a forked process: {e}")))?);
-    // That of another process would wait for its threads to end.
+    // Dropping the pool of the parent process would wait for its threads to end.
     std::mem::forget(kept.replace((own, Arc::clone(&pool))));
     Ok(pool)
 }

@@ -1,4 +1,4 @@
-//! Pictures of both views, and what is seen in them.
+//! Pictures of both views, and their labels.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -23,8 +23,8 @@ pub(crate) struct Renderer {
     inner: Mutex<viewer::Renderer>,
 }
 
-/// The frames of one moment: `three_d`, 8-bit RGBA of shape (height, width, 4), and `fluoro`, 8 or 16 bits of shape (height, width); None
-/// where a view was not asked for.
+/// The frames of one state: `three_d`, 8-bit RGBA of shape (height, width, 4), and `fluoro`, 8 or 16 bits of shape
+/// (height, width); None for a view that was not requested.
 #[pyclass(frozen, get_all, module = "endowire", name = "Frames")]
 pub(crate) struct Frames {
     /// The 3D view.
@@ -34,7 +34,7 @@ pub(crate) struct Frames {
 }
 
 impl Renderer {
-    /// A renderer for a plane of `spec`, but for what `view` says otherwise.
+    /// A renderer for a plane of `spec`, overridden by `view`.
     pub(crate) fn prepare(
         py: Python<'_>,
         spec: &ViewSpec,
@@ -64,7 +64,7 @@ impl Renderer {
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
 
-    /// Does something with the renderer, without the interpreter.
+    /// Runs `work` on the renderer with the interpreter released.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
@@ -76,7 +76,7 @@ impl Renderer {
         worked?.map_err(exception)
     }
 
-    /// The instruments, made of what the table of the view says, if it says so.
+    /// The instruments, with the materials of the view's table if it gives them.
     fn views(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<Vec<viewer::DeviceView>> {
         let mut views = simulation.views(py);
         let several = views.len() > 1;
@@ -89,7 +89,7 @@ impl Renderer {
         Ok(views)
     }
 
-    /// Takes the vessel to where it is in a simulation.
+    /// Moves the vessel to its position in a simulation.
     fn move_vessel(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<()> {
         let displacement = simulation.with(py, |simulation| simulation.displacement());
         self.with(py, |renderer| renderer.move_vessel(displacement.as_ref()))
@@ -98,8 +98,9 @@ impl Renderer {
 
 #[pymethods]
 impl Renderer {
-    /// Prepares views of a vessel. `view` has the keys of `[view]` of a scene file: views (["3d", "fluoro"]), size_px, c_arm, xray, detector,
-    /// patient, camera, … With `biplane_deg` in it, `plane` 1 is the fluoroscopy of the second plane.
+    /// Prepares views of a vessel. `view` has the keys of `[view]` of a scene file: views (["3d", "fluoro"]),
+    /// size_px, c_arm, xray, detector, patient, camera, … If it contains `biplane_deg`, `plane` 1 is the fluoroscopy
+    /// of the second plane.
     ///
     /// Raises InputError for values out of range, and for a vessel that cannot be drawn.
     #[new]
@@ -108,20 +109,20 @@ impl Renderer {
         Self::prepare(py, &ViewSpec::default(), Some(view), plane, vessel)
     }
 
-    /// What draws: "CPU reference", or the graphics interface and adapter.
+    /// Name of the backend: "CPU reference", or the graphics interface and adapter.
     #[getter]
     fn backend(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |renderer| Ok(renderer.backend().to_owned()))
     }
 
-    /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; None without a tomogram.
+    /// Fraction of the vessel's surface inside the tomogram of its patient, 0 to 1; None without a tomogram.
     #[getter]
     fn vessel_held(&self, py: Python<'_>) -> PyResult<Option<f64>> {
         self.with(py, |renderer| Ok(renderer.vessel_held()))
     }
 
-    /// Draws the views of a simulation as it is. `frame` is the number of the frame, which seeds its noise and tells its time; the next one
-    /// unless set.
+    /// Draws the views of a simulation in its current state. `frame` is the number of the frame, which determines its
+    /// noise and its time; by default the next one.
     ///
     /// Raises InputError for a negative frame, and for a simulation that cannot be drawn.
     #[pyo3(signature = (simulation, frame=None))]
@@ -140,10 +141,11 @@ impl Renderer {
         Ok(Frames { three_d: of(frames.three_d)?, fluoro: of(frames.fluoro)? })
     }
 
-    /// What the fluoroscopic view shows, without noise: a dictionary of `mask` (height, width; k + 1 where instrument k covers half of the pixel),
-    /// `vessel` (the same of the lumen, 255; None where the wall is not closed), `devices` (centre_line_px, centre_line_mm, depth_mm, tip_px,
-    /// tip_mm, tip_visible), `contacts` (pixel, position_mm, visible) and `camera_matrix` (3, 4), which takes (x, y, z, 1) in mm to pixel
-    /// coordinates times the depth from the source. Pixel coordinates are x and y from the top left.
+    /// Labels of the fluoroscopic view, without noise: a dictionary of `mask` (height, width; k + 1 where instrument
+    /// k covers half of the pixel), `vessel` (the same for the lumen, 255; None if the wall is not closed), `devices`
+    /// (centre_line_px, centre_line_mm, depth_mm, tip_px, tip_mm, tip_visible), `contacts` (pixel, position_mm,
+    /// visible) and `camera_matrix` (3, 4), which maps (x, y, z, 1) in mm to pixel coordinates times the depth from
+    /// the source. Pixel coordinates are x and y from the top left.
     fn labels<'py>(&self, py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
         let views = self.views(py, simulation)?;
         self.move_vessel(py, simulation)?;
@@ -174,7 +176,7 @@ impl Renderer {
     }
 }
 
-/// A picture as an array, which takes its pixels over.
+/// A picture as an array that takes over its pixels.
 fn pixels(py: Python<'_>, image: Image) -> PyResult<Py<PyAny>> {
     let (height, width) = (image.height() as usize, image.width() as usize);
     Ok(match image.format() {

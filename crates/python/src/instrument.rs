@@ -1,4 +1,4 @@
-//! What is pushed.
+//! Instruments.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::document;
 use crate::error::{InputError, exception};
 
-/// The sections of an instrument, and what it is made of.
+/// The sections and the materials of an instrument.
 type Pickled<'py> = (Bound<'py, PyAny>, String);
 
 /// A wire or catheter: its sections, tip first.
@@ -17,14 +17,15 @@ type Pickled<'py> = (Bound<'py, PyAny>, String);
 #[derive(Clone)]
 pub(crate) struct Instrument {
     pub(crate) device: Device,
-    /// What it is made of, for pictures.
+    /// Its materials, for pictures.
     pub(crate) parts: Vec<DevicePart>,
 }
 
 #[pymethods]
 impl Instrument {
-    /// An instrument of sections, tip first: dictionaries with the keys of `[[device.section]]` of a scene file (length_mm, radius_mm,
-    /// bending_stiffness_nmm2, and if wanted inner_radius_mm, torsional_stiffness_nmm2, rest_curvature_per_mm).
+    /// An instrument made of sections, tip first: dictionaries with the keys of `[[device.section]]` of a scene file
+    /// (length_mm, radius_mm, bending_stiffness_nmm2, and optionally inner_radius_mm, torsional_stiffness_nmm2,
+    /// rest_curvature_per_mm).
     ///
     /// Raises InputError naming the section and the value that is out of range.
     #[new]
@@ -33,7 +34,7 @@ impl Instrument {
         Ok(Self::of_device(Device::new(sections).map_err(exception)?))
     }
 
-    /// An instrument that is the same everywhere: lengths in mm, bending stiffness EI in N·mm².
+    /// A uniform instrument: lengths in mm, bending stiffness EI in N·mm².
     #[staticmethod]
     fn uniform(length_mm: f64, radius_mm: f64, bending_stiffness_nmm2: f64) -> PyResult<Self> {
         let device = Device::uniform(length_mm, radius_mm, bending_stiffness_nmm2).map_err(exception)?;
@@ -58,7 +59,7 @@ impl Instrument {
         document::write(py, &self.device.sections())
     }
 
-    /// Nothing changes an instrument: its copy is itself.
+    /// An instrument is immutable, so it is its own copy.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
@@ -91,7 +92,7 @@ impl Instrument {
 }
 
 impl Instrument {
-    /// A device without a file: tubes of no material.
+    /// A device without a file: tubes without a material.
     pub(crate) fn of_device(device: Device) -> Self {
         Self { parts: section_parts(&device), device }
     }

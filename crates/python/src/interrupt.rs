@@ -1,4 +1,4 @@
-//! Work that Ctrl-C ends.
+//! Work that Ctrl-C can end.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -10,14 +10,15 @@ use pyo3::prelude::*;
 use crate::error::ComputationError;
 use crate::forked::on_own_threads;
 
-/// How long a signal waits at most.
+/// Interval at which signals are checked.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Does `work` on a thread of its own, without the interpreter, while this one looks for signals: for what takes seconds in one piece. After a
-/// signal the thread ends when its work is done, and nobody hears of it.
+/// Runs `work` on another thread, with the interpreter released, while this thread checks for signals: for work that
+/// takes seconds without a break. After a signal, the thread continues until its work is done, and its result is
+/// dropped.
 ///
 /// # Errors
-/// What the signal's handler raises, `KeyboardInterrupt` for Ctrl-C.
+/// The exception raised by the signal handler, `KeyboardInterrupt` for Ctrl-C.
 pub(crate) fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
@@ -25,7 +26,7 @@ pub(crate) fn interruptible<T: Send + 'static>(
     waited_for(py, None, work)
 }
 
-/// As [`interruptible`], for work that looks at `stop`: after a signal that is set, and the end of the work is waited for.
+/// As [`interruptible`], for work that checks `stop`: a signal sets it, and the end of the work is awaited.
 ///
 /// # Errors
 /// As [`interruptible`].
@@ -44,7 +45,7 @@ fn waited_for<T: Send + 'static>(
 ) -> PyResult<T> {
     let (sender, mut receiver) = sync_channel(1);
     thread::Builder::new().name("endowire".to_owned()).spawn(move || {
-        // Nobody may listen after a signal.
+        // Fails if the receiver is gone after a signal, which does not matter.
         let _ = sender.send(on_own_threads(work));
     })?;
     loop {
@@ -56,7 +57,7 @@ fn waited_for<T: Send + 'static>(
                 if let Some(stop) = stop {
                     stop.store(true, Ordering::Relaxed);
                     let listening = &mut receiver;
-                    // What it made is not wanted any more.
+                    // The result is no longer needed.
                     let _ = py.detach(move || listening.recv());
                 }
                 return Err(signal);

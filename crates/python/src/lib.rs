@@ -1,7 +1,7 @@
-//! The native module of the Python package `endowire`: the classes of the libraries as Python sees them.
+//! The native module of the Python package `endowire`: Python classes for the types of the libraries.
 //!
-//! Nothing is computed here. Arguments become values of `endowire-core` and `endowire-viewer`, results become numpy arrays, errors become
-//! exceptions with the same words. The interpreter is let go of while anything is computed.
+//! Nothing is computed here. Arguments become values of `endowire-core` and `endowire-viewer`, results become numpy
+//! arrays, and errors become exceptions with the same messages. The interpreter is released during computations.
 
 #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands over what it has extracted")]
 
@@ -28,7 +28,7 @@ mod vessel;
 
 use pyo3::prelude::*;
 
-/// The native part of `endowire`; import that instead.
+/// The native part of `endowire`; import `endowire` instead.
 #[pymodule(gil_used = false)]
 mod _endowire {
     use pyo3::prelude::*;

@@ -1,4 +1,4 @@
-//! What hands do, as arrays: for each instrument the length pushed in, mm, and the turn, rad.
+//! Commands as arrays: advance, mm, and rotation, rad, of each instrument.
 
 use endowire_core::insertion::{Command, Move};
 use pyo3::exceptions::PyTypeError;
@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use crate::arrays::{List, Numbers, misshapen};
 use crate::error::refuse;
 
-/// What all of `instruments` do, for each of `count`, or of any count: an array of shape (count, instruments, 2).
+/// The commands of all `instruments`, for each of `count` entries, or for any number of them: an array of shape
+/// (count, instruments, 2).
 pub(crate) fn moves(
     moves: &Numbers<'_>,
     count: Option<usize>,
@@ -33,12 +34,12 @@ pub(crate) fn moves(
     Ok(numbers.chunks_exact(2 * instruments).map(hands).collect())
 }
 
-/// Commands of instruments in their order, as moves at the same time.
+/// Simultaneous moves from the commands of the instruments in order.
 pub(crate) fn together(commands: impl Iterator<Item = Command>) -> Vec<Move> {
     commands.enumerate().map(|(instrument, command)| Move { instrument, command }).collect()
 }
 
-/// A number for each of `instruments`: a list of them, or of an only instrument one number; zeros where nothing is given.
+/// One number per instrument: a list, or a single number for a single instrument; zeros if absent.
 pub(crate) fn of_each(
     name: &str,
     value: Option<&Bound<'_, PyAny>>,

@@ -1,4 +1,4 @@
-//! What hands, tips and forces did, step by step, and what that is scored by.
+//! Records of instruments, tips and forces, step by step, for assessment.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -13,7 +13,7 @@ use crate::interrupt::interruptible;
 use crate::simulation::Simulation;
 use crate::vessel::{Goal, Vessel};
 
-/// What was noted of a procedure, step by step: `assess` measures it as `endowire.assess` measures a recorded run.
+/// The record of a procedure, step by step; `assess` measures it as `endowire.assess` measures a recorded run.
 #[pyclass(frozen, module = "endowire", name = "Record")]
 #[derive(Default)]
 pub(crate) struct Record {
@@ -28,19 +28,19 @@ impl Record {
 
 #[pymethods]
 impl Record {
-    /// One in which nothing is noted yet.
+    /// An empty record.
     #[new]
     fn new() -> Self {
         Self::default()
     }
 
-    /// Steps that are noted; rests that follow each other are one.
+    /// Number of recorded steps; consecutive rests are one.
     fn __len__(&self) -> usize {
         self.lock().samples.len()
     }
 
-    /// Notes a step of a simulation: that it ended at `time_s` since the start, and what hands did in it, as `Simulation.step` was told. Where tips
-    /// are, forces and jumps are those of its report.
+    /// Records a step of a simulation: its end `time_s` since the start, and the command as given to
+    /// `Simulation.step`. Positions of tips, forces and jumps come from the simulation's report.
     ///
     /// Raises InputError for a time before that of the last step.
     #[pyo3(signature = (simulation, time_s, advance_mm=None, rotate_rad=None))]
@@ -58,10 +58,11 @@ impl Record {
         Ok(())
     }
 
-    /// The measures: a list of dictionaries, as `endowire.assess` returns it. With a `vessel`, `target` is the name of a point of its centre line
-    /// or a place in mm that was to be reached, within `within_mm` of it; without a target the way is that to where the tip ended.
+    /// The measures: a list of dictionaries, as returned by `endowire.assess`. With a `vessel`, `target` is the name
+    /// of a point of its centre line, or a place in mm, that was to be reached within `within_mm`; without a target,
+    /// the way leads to the final position of the tip.
     ///
-    /// Raises InputError for a target that is not there, one without a vessel, and a vessel without a centre line.
+    /// Raises InputError for an unknown target, a target without a vessel, and a vessel without a centre line.
     #[pyo3(signature = (vessel=None, target=None, within_mm=5.0))]
     fn assess<'py>(
         &self,
@@ -93,7 +94,7 @@ impl Record {
         document::write(py, &measured)
     }
 
-    /// A copy that goes on by itself.
+    /// An independent copy.
     fn copy(&self) -> Self {
         Self { inner: Mutex::new(self.lock().clone()) }
     }

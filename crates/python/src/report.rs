@@ -1,4 +1,4 @@
-//! The report of a step.
+//! Reports of steps.
 
 use endowire_core::insertion::{self, InstrumentReport};
 use numpy::{PyArray1, PyArray2};
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use crate::arrays::points;
 use crate::document;
 
-/// What is seen and felt after a step. Quantities of hands are arrays of shape (n_instruments,), the innermost instrument first.
+/// The results of a step. Quantities per instrument are arrays of shape (n_instruments,), innermost instrument first.
 #[pyclass(frozen, module = "endowire", name = "StepReport")]
 pub(crate) struct StepReport {
     report: insertion::StepReport,
@@ -35,57 +35,57 @@ impl StepReport {
     }
 }
 
-/// The force of a hand; NaN where it jumps.
+/// The push force of an instrument; NaN where it jumps.
 pub(crate) fn push_force_n(hand: &InstrumentReport) -> f64 {
     hand.push_force_n.unwrap_or(f64::NAN)
 }
 
 #[pymethods]
 impl StepReport {
-    /// Length of each instrument inside the sheath's mouth, mm.
+    /// Length of each instrument beyond the mouth of the sheath, mm.
     #[getter]
     fn inserted_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.inserted_mm)
     }
 
-    /// Turn of each tail since the start, rad.
+    /// Rotation of each tail since the start, rad.
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.rotation_rad)
     }
 
-    /// Turn of each tip since the start, carried along the axis without twist, rad.
+    /// Rotation of each tip since the start, relative to a frame carried along the axis without twist, rad.
     #[getter]
     fn tip_rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.tip_rotation_rad)
     }
 
-    /// Force with which the hand pushes each instrument, N; negative where it must pull, NaN where it jumps: the tip is at that of another,
-    /// or nothing is in.
+    /// Push force on each instrument, N. It is negative if the instrument must be pulled, and NaN where it jumps: if
+    /// the tip is at that of another, or if nothing is inserted.
     #[getter]
     fn push_force_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, push_force_n)
     }
 
-    /// Torque with which the hand holds each tail, N·mm.
+    /// Torque that holds each tail, N·mm.
     #[getter]
     fn torque_nmm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.torque_nmm)
     }
 
-    /// Energy of bending, mJ.
+    /// Bending energy, mJ.
     #[getter]
     fn bend_energy_mj(&self) -> f64 {
         self.report.energy.bend
     }
 
-    /// Energy of twist, mJ.
+    /// Twist energy, mJ.
     #[getter]
     fn twist_energy_mj(&self) -> f64 {
         self.report.energy.twist
     }
 
-    /// Energy of the vessel wall's deformation, mJ.
+    /// Energy of the deformed vessel wall, mJ.
     #[getter]
     fn wall_energy_mj(&self) -> f64 {
         self.report.energy.wall
@@ -103,25 +103,25 @@ impl StepReport {
         self.report.max_penetration_mm
     }
 
-    /// Energy that friction took in this step, mJ.
+    /// Energy dissipated by friction in this step, mJ.
     #[getter]
     fn dissipated_mj(&self) -> f64 {
         self.report.dissipated_mj
     }
 
-    /// Force of the blood that flows on all instruments, N, shape (3,); 0 where no flow is given.
+    /// Total drag of the blood flow on all instruments, N, shape (3,); 0 without flow.
     #[getter]
     fn drag_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.report.drag_n.as_slice())
     }
 
-    /// Where the wall holds the instruments: points on the axis, mm, shape (n, 3).
+    /// Points of contact with the wall, on the axis, mm, shape (n, 3).
     #[getter]
     fn contact_positions_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         points(py, self.report.contacts.iter().map(|c| c.position_mm))
     }
 
-    /// Force of the wall at each contact, normal and friction together, N, shape (n, 3).
+    /// Force of the wall at each contact, including friction, N, shape (n, 3).
     #[getter]
     fn contact_forces_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         points(py, self.report.contacts.iter().map(insertion::Contact::total_n))
@@ -133,13 +133,13 @@ impl StepReport {
         self.of_contacts(py, |c| c.force_n)
     }
 
-    /// Depth of each contact, mm, shape (n,).
+    /// Penetration at each contact, mm, shape (n,).
     #[getter]
     fn contact_penetrations_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_contacts(py, |c| c.penetration_mm)
     }
 
-    /// The opening through which the tip has left the vessel, while it is beyond it; None inside.
+    /// The opening through which the tip has left the vessel, while it is outside; None inside.
     #[getter]
     fn left_through(&self) -> Option<usize> {
         self.report.left_through
@@ -151,51 +151,52 @@ impl StepReport {
         self.report.iterations
     }
 
-    /// Linear solves of these.
+    /// Linear solves in these iterations.
     #[getter]
     fn solves(&self) -> u32 {
         self.report.solves
     }
 
-    /// What hands have done in ticks that the instruments have not yet followed: advance_mm and rotate_rad of each, of shape
-    /// (n_instruments, 2). None where nothing is left over; zeros where the instruments are on their way to where they come to rest.
+    /// Commanded motion in ticks that the instruments have not yet followed: advance_mm and rotate_rad of each, of
+    /// shape (n_instruments, 2). None if nothing remains; zeros while the instruments are still coming to rest.
     #[getter]
     fn behind<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let behind: Vec<_> = self.report.behind.iter().map(|c| vec![c.advance_mm, c.rotate_rad]).collect();
         if behind.is_empty() { Ok(None) } else { Ok(Some(PyArray2::from_vec2(py, &behind)?)) }
     }
 
-    /// Parts that the command was cut into.
+    /// Number of parts into which the command was divided.
     #[getter]
     fn substeps(&self) -> u32 {
         self.report.substeps
     }
 
-    /// How often the instruments slid on while the hands held still, because friction and wall forces were not to be had in one step.
+    /// How often the instruments slid further while the commands rested, because friction and wall forces could not
+    /// be found in one step.
     #[getter]
     fn slides(&self) -> u32 {
         self.report.slides
     }
 
-    /// Parts of the command in which the way from the last equilibrium was lost; 0 nearly always.
+    /// Number of parts of the command that did not follow a path from the last equilibrium; nearly always 0.
     #[getter]
     fn relaxations(&self) -> u32 {
         self.report.relaxations
     }
 
-    /// What is left out of balance, over the largest force in the instruments.
+    /// Out-of-balance force relative to the largest force in the instruments.
     #[getter]
     fn imbalance(&self) -> f64 {
         self.report.imbalance
     }
 
-    /// Energy that was lost in jumps, to motion and friction together, mJ; 0 without.
+    /// Energy released in jumps, to motion and friction together, mJ; 0 without jumps.
     #[getter]
     fn released_mj(&self) -> f64 {
         self.report.jump.map_or(0.0, |jump| jump.released_mj)
     }
 
-    /// Where the largest jump has led, mm, shape (3,); None without one.
+    /// Position where the largest jump ended, mm, shape (3,); None without one.
     #[getter]
     fn jump_position_mm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.report.jump.map(|jump| PyArray1::from_slice(py, jump.position_mm.as_slice()))
@@ -207,13 +208,13 @@ impl StepReport {
         self.report.jumped
     }
 
-    /// Whether the step met the method's own convergence test.
+    /// Whether the step converged by the method's own test.
     #[getter]
     fn converged(&self) -> bool {
         self.report.converged
     }
 
-    /// All of it as dictionaries, lists and numbers, under the names of the Rust library.
+    /// The whole report as dictionaries, lists and numbers, with the names of the Rust library.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         document::write(py, &self.report)
     }

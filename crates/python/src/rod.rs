@@ -18,8 +18,8 @@ pub(crate) enum Case<'py> {
 
 /// Solves a static rod case: the path of a case file, or its tables as dictionaries.
 ///
-/// Returns the document of `endowire rod --json`, less what it says of the program; `converged` tells whether it is an equilibrium.
-/// Raises InputError for a case that does not fit.
+/// Returns the document of `endowire rod --json`, without the provenance; `converged` says whether it is an
+/// equilibrium. Raises InputError for an invalid case.
 #[pyfunction]
 pub(crate) fn solve_rod<'py>(py: Python<'py>, case: Case<'py>) -> PyResult<Bound<'py, PyAny>> {
     let case = match case {

@@ -20,7 +20,7 @@ use crate::simulation::Simulation;
 use crate::start::Start;
 use crate::vessel::Vessel;
 
-/// A scene file: what is pushed into what, how, and how it is seen.
+/// A scene file: vessel, instruments, method, script and views.
 #[pyclass(frozen, module = "endowire", name = "Scene")]
 pub(crate) struct Scene {
     scene: Arc<SceneFile>,
@@ -29,9 +29,9 @@ pub(crate) struct Scene {
 
 #[pymethods]
 impl Scene {
-    /// Reads a scene file, or the text of one, from whose `path` its own paths start.
+    /// Reads a scene file, or its `text`, in which paths are relative to the folder of `path`.
     ///
-    /// Raises InputError naming file, line and key of what does not fit.
+    /// Raises InputError naming file, line and key of an error.
     #[new]
     #[pyo3(signature = (path, text=None))]
     fn new(path: PathBuf, text: Option<&str>) -> PyResult<Self> {
@@ -54,7 +54,7 @@ impl Scene {
         self.scene.seed
     }
 
-    /// The simulation, nothing inserted but what its instruments say.
+    /// The simulation at its start; only what the instruments specify is inserted.
     fn simulation(slf: &Bound<'_, Self>) -> PyResult<Simulation> {
         Simulation::begin(slf.py(), Start::of_scene(slf)?)
     }
@@ -67,7 +67,8 @@ impl Scene {
 
     /// The moves of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
     ///
-    /// Raises InputError where a line has `until`: how many steps there are is not known beforehand. `run` carries such a script out.
+    /// Raises InputError if a line has `until`, because the number of steps is then not known beforehand. `run`
+    /// carries out such a script.
     #[getter]
     fn moves<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let stack = self.scene.stack().map_err(exception)?;
@@ -89,10 +90,10 @@ impl Scene {
         array(py, numbers, [steps.len(), hands, 2])
     }
 
-    /// Carries its script out in a simulation of it at the start, lines with `until` among them. Returns the last StepReport. Ctrl-C ends it
-    /// between two steps.
+    /// Carries out its script, including lines with `until`, in a simulation of the scene at its start. Returns the
+    /// last StepReport. Ctrl-C ends it between two steps.
     ///
-    /// Raises what `Simulation.step` raises, after the steps before.
+    /// Raises what `Simulation.step` raises; earlier steps are kept.
     fn run(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<StepReport> {
         let script =
             self.scene.stack().and_then(|stack| self.scene.steps(&stack, &NoStore)).map_err(exception)?;
@@ -109,8 +110,8 @@ impl Scene {
         Ok(simulation.report(py))
     }
 
-    /// What draws the views of its `[view]` table, in which `view` says otherwise, in `vessel` if it is at hand. With
-    /// `biplane_deg` in it, `plane` 1 is the fluoroscopy of the second plane.
+    /// A renderer for its `[view]` table, overridden by `view`, in `vessel` if that already exists. With
+    /// `biplane_deg`, `plane` 1 is the fluoroscopy of the second plane.
     #[pyo3(signature = (view=None, vessel=None, plane=0))]
     fn renderer(
         &self,
@@ -126,7 +127,7 @@ impl Scene {
         }
     }
 
-    /// Nothing changes a scene: its copy is itself.
+    /// A scene is immutable, so it is its own copy.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
@@ -147,7 +148,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// The simulation, and what is pushed in it.
+    /// The simulation and its instruments.
     pub(crate) fn built(&self, py: Python<'_>) -> PyResult<(insertion::Simulation, Vec<Instrument>)> {
         let scene = Arc::clone(&self.scene);
         let built = interruptible(py, move || scene.simulation(&NoStore))?.map_err(exception)?;

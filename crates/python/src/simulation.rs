@@ -1,4 +1,4 @@
-//! An insertion under way.
+//! Insertions.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -21,26 +21,27 @@ use crate::start::{Arguments, Start};
 use crate::state::State;
 use crate::vessel::Vessel;
 
-/// What a simulation has come from, where it is, and the fields that it was put into, as JSON.
+/// Start and state of a simulation, and the fields that it was put into, as JSON.
 type Pickled = (Py<Start>, State, Option<String>);
 
-/// An instrument, or several.
+/// One instrument or several.
 #[derive(FromPyObject)]
 pub(crate) enum Instruments {
     One(Instrument),
     List(List<Instrument>),
 }
 
-/// An insertion under way: instruments in a vessel, stepped by what the hand does.
+/// An insertion: instruments in a vessel, stepped by commands.
 ///
-/// Copies share the vessel and cost microseconds. A pickle has the state and what the simulation was made of, once for all simulations in it that are copies
-/// of one; that of a scene needs the scene's files where they were. A step that raises leaves everything as it was, to the bit.
+/// Copies share the vessel and take microseconds. A pickle contains the state and the start of the simulation, the
+/// latter only once for all copies in the same pickle. The pickle of a scene's simulation needs the files of the
+/// scene in their places. A step that raises leaves everything unchanged, to the bit.
 #[pyclass(frozen, module = "endowire", name = "Simulation")]
 pub(crate) struct Simulation {
     inner: Mutex<insertion::Simulation>,
-    /// Counted here, since the interpreter may be let go of where it is copied.
+    /// Has its own reference count, since copies may be made with the interpreter released.
     start: Arc<Py<Start>>,
-    /// The fields that it was put into; none where it has those that it began with.
+    /// The fields that it was put into; `None` while it has the initial ones.
     fields: Mutex<Option<Vec<FieldSpec>>>,
 }
 
@@ -52,7 +53,7 @@ impl Clone for Simulation {
 }
 
 impl Simulation {
-    /// A simulation that has come from `start`.
+    /// A simulation with this start.
     pub(crate) fn new(simulation: insertion::Simulation, start: Arc<Py<Start>>) -> Self {
         Self { inner: Mutex::new(simulation), start, fields: Mutex::new(None) }
     }
@@ -62,17 +63,17 @@ impl Simulation {
         Ok(Self::new(start.simulation(), Arc::new(Py::new(py, start)?)))
     }
 
-    /// What it has come from.
+    /// Its start.
     pub(crate) fn start(&self) -> Arc<Py<Start>> {
         Arc::clone(&self.start)
     }
 
-    /// What is pushed.
+    /// The instruments.
     pub(crate) fn pushed(&self) -> &[Instrument] {
         &self.start.get().instruments
     }
 
-    /// What hands do, each by its own command.
+    /// Moves from the commands of the instruments.
     pub(crate) fn moves(
         &self,
         advance_mm: Option<&Bound<'_, PyAny>>,
@@ -85,7 +86,8 @@ impl Simulation {
         Ok(together(commands.map(|(advance_mm, rotate_rad)| Command { advance_mm, rotate_rad })))
     }
 
-    /// The simulation, alone. Never wait for it with the interpreter held: whoever has it may step for long.
+    /// Locks the simulation. Never call it with the interpreter held: another thread may hold the lock for a long
+    /// step.
     fn lock(&self) -> MutexGuard<'_, insertion::Simulation> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -94,7 +96,7 @@ impl Simulation {
         self.fields.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Puts it into fields, and remembers which.
+    /// Puts the instruments into fields, which are stored for pickling.
     fn put_into(&self, py: Python<'_>, specs: Vec<FieldSpec>) -> PyResult<()> {
         let fields = specs.iter().map(FieldSpec::field).collect::<Result<Vec<_>, _>>().map_err(exception)?;
         self.with(py, |simulation| simulation.set_fields(fields)).map_err(exception)?;
@@ -102,7 +104,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Does something with the simulation, without the interpreter.
+    /// Runs `work` on the simulation with the interpreter released.
     pub(crate) fn with<T: Send>(
         &self,
         py: Python<'_>,
@@ -111,7 +113,7 @@ impl Simulation {
         py.detach(|| work(&mut self.lock()))
     }
 
-    /// The instruments as the viewer sees them; nothing of those that are out.
+    /// The instruments for the viewer; empty for those that are outside.
     pub(crate) fn views(&self, py: Python<'_>) -> Vec<DeviceView> {
         let (shape, lengths_mm, coils) = self.with(py, |simulation| {
             (simulation.shape().clone(), simulation.report().lengths_mm(), simulation.coils().to_vec())
@@ -142,17 +144,19 @@ impl Simulation {
 
 #[pymethods]
 impl Simulation {
-    /// Instruments at the mouth of a sheath in a vessel, nothing inserted.
+    /// Instruments at the mouth of a sheath in a vessel, with nothing inserted.
     ///
-    /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 unless set), or at `position_mm` with a `direction`; told
-    /// nothing, at the inlet of the vessel's centre line, and of one without at the lowest of its wide openings. `wall` has the keys of `[vessel.wall]`
-    /// of a scene file (modulus_n_per_mm2, friction, region), `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the
-    /// friction of the sheath's valve, N, and `sheath_friction` the coefficient in its mouth.
+    /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 by default), or at `position_mm` with a
+    /// `direction`. By default it is at the inlet of the vessel's centre line, or without one at the lowest of the
+    /// wide openings. `wall` has the keys of `[vessel.wall]` of a scene file (modulus_n_per_mm2, friction, region),
+    /// `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the friction of the sheath's valve,
+    /// N, and `sheath_friction` the friction coefficient in its mouth.
     ///
-    /// Several instruments lie in one another, the innermost first. For each of them may be told `names`, for messages; `friction` between it
-    /// and those outside it; and `may_lead`, whether its tip may be farther in than that of the instrument in it.
+    /// Several instruments lie inside each other, innermost first. Optional lists with one entry per instrument are
+    /// `names`, for messages; `friction` against the enclosing instruments; and `may_lead`, whether its tip may be
+    /// inserted farther than that of the instrument inside it.
     ///
-    /// Raises InputError for values that are out of range or do not belong together.
+    /// Raises InputError for values that are out of range or inconsistent.
     #[new]
     #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, wall=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
@@ -198,12 +202,12 @@ impl Simulation {
         Self::begin(py, Start::of_arguments(py, vessel, instruments, arguments)?)
     }
 
-    /// Carries out one command: the length pushed in (negative: pulled back), mm, and the turn of the tail, rad; one for each
-    /// instrument, and of an only instrument a number. Time, and a vessel that moves, goes on until `time_s` meanwhile, s; not at all if
-    /// absent. Returns the StepReport.
+    /// Carries out one command: advance (negative to pull back), mm, and rotation of the tail, rad, as lists with one
+    /// entry per instrument, or as numbers for a single instrument. Meanwhile time, and a vessel that moves, advance
+    /// to `time_s`, s; not at all if absent. Returns the StepReport.
     ///
-    /// Raises InputError for a command that cannot be followed, EndOfWay where the way ends, ComputationError where no equilibrium was found;
-    /// then everything is as before.
+    /// Raises InputError for an invalid command, EndOfWay where the way ends, and ComputationError if no equilibrium
+    /// was found; then everything is unchanged.
     #[pyo3(signature = (advance_mm=None, rotate_rad=None, time_s=None))]
     fn step(
         &self,
@@ -217,12 +221,13 @@ impl Simulation {
         stepped.map(StepReport::new).map_err(exception)
     }
 
-    /// As `step` in a tick of fixed cost, for haptics and screens that must have an answer in time: about so many linear solves
-    /// (`StepReport.solves`), whether the instruments come to rest in them or not. What is left over is reported (`StepReport.behind`), and the next
-    /// tick or step goes on with it; with hands at rest ticks lead to an equilibrium. Eight solves follow hands at 1 kHz.
+    /// As `step`, as a tick of bounded cost, for haptics and displays that need an answer in time: about `solves`
+    /// linear solves (`StepReport.solves`), whether or not the instruments come to rest. The remaining motion is
+    /// reported (`StepReport.behind`) and continued by the next tick or step; ticks without commands lead to an
+    /// equilibrium. Eight solves are enough to follow commands at 1 kHz.
     ///
-    /// Raises what `step` raises, except where no equilibrium is found within the tick; what hands have done and the instruments have not is
-    /// forgotten then.
+    /// Raises what `step` raises, except if no equilibrium is found within the tick. The remaining motion is dropped
+    /// when it raises.
     #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, solves, time_s=None))]
     fn tick(
         &self,
@@ -237,10 +242,10 @@ impl Simulation {
         ticked.map(StepReport::new).map_err(exception)
     }
 
-    /// Leaves the coil of an instrument behind, where it comes to rest, and takes its pusher out. Returns the StepReport.
+    /// Detaches the coil of an instrument, where it comes to rest, and withdraws its pusher. Returns the StepReport.
     ///
-    /// Raises InputError for an instrument that is no coil, is detached already or is not out yet, ComputationError where it does not come to
-    /// rest; then everything is as before.
+    /// Raises InputError for an instrument that is not a coil, is already detached, or is not yet out of the
+    /// catheter, and ComputationError if it does not come to rest; then everything is unchanged.
     #[pyo3(signature = (instrument=0))]
     fn detach(&self, py: Python<'_>, instrument: i64) -> PyResult<StepReport> {
         let place = natural("instrument", instrument)?;
@@ -248,28 +253,28 @@ impl Simulation {
         done.map(StepReport::new).map_err(exception)
     }
 
-    /// Puts the instruments into these fields, in place of those in which they were; they go over into them with the next step or tick. Each is a dictionary
-    /// with the keys of `[[field]]` of a scene: `{"kind": "magnet", "instrument": 0, "start_mm": 0.0, "end_mm": 4.0, "moment_am2": 4e-3, "field_t":
-    /// [0.05, 0.0, 0.0]}`, a magnet along the axis between two distances from the tip in a uniform magnetic field, or `{"kind": "weight", "instrument": 0,
-    /// "force_n_per_mm": [0.0, 0.0, -1e-5]}`.
+    /// Replaces the fields; the instruments respond with the next step or tick. Each field is a dictionary with the
+    /// keys of `[[field]]` of a scene: `{"kind": "magnet", "instrument": 0, "start_mm": 0.0, "end_mm": 4.0,
+    /// "moment_am2": 4e-3, "field_t": [0.05, 0.0, 0.0]}`, a magnet along the axis between two distances from the tip
+    /// in a uniform magnetic field, or `{"kind": "weight", "instrument": 0, "force_n_per_mm": [0.0, 0.0, -1e-5]}`.
     ///
-    /// Raises InputError for values out of range, and for an instrument that is not there; then nothing has changed.
+    /// Raises InputError for values out of range, and for an unknown instrument; then nothing is changed.
     fn set_fields(&self, py: Python<'_>, fields: &Bound<'_, PyAny>) -> PyResult<()> {
         self.put_into(py, document::read("fields", fields)?)
     }
 
-    /// Coils that were detached, in their order: a list of pairs of an instrument and the points of its coil, from the end that was detached to
-    /// the tip, mm, shape (n, 3).
+    /// Detached coils, in order: a list of pairs of an instrument and the points of its coil, from the detached end
+    /// to the tip, mm, shape (n, 3).
     #[getter]
     fn coils<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyArray2<f64>>)>> {
         let coils = self.with(py, |simulation| simulation.coils().to_vec());
         coils.into_iter().map(|coil| Ok((coil.instrument, points(py, coil.shape.positions_mm)?))).collect()
     }
 
-    /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and rotate_rad. Returns the last
-    /// StepReport. Ctrl-C ends it between two steps.
+    /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and
+    /// rotate_rad. Returns the last StepReport. Ctrl-C ends it between two steps.
     ///
-    /// Raises what `step` raises, after the steps before.
+    /// Raises what `step` raises; earlier steps are kept.
     fn run(&self, py: Python<'_>, moves: Numbers<'_>) -> PyResult<StepReport> {
         for moves in crate::moves::moves(&moves, None, self.pushed().len())? {
             self.with(py, |simulation| simulation.step_together(&moves).map(drop)).map_err(exception)?;
@@ -278,7 +283,7 @@ impl Simulation {
         Ok(self.report(py))
     }
 
-    /// the report of the last step.
+    /// The report of the last step.
     #[getter]
     pub(crate) fn report(&self, py: Python<'_>) -> StepReport {
         StepReport::new(self.with(py, |simulation| simulation.report().clone()))
@@ -322,24 +327,26 @@ impl Simulation {
         PyArray1::from_vec(py, self.with(py, |simulation| simulation.shape().from_tip_mm.clone()))
     }
 
-    /// Position of the tip, mm, shape (3,); of several instruments that of the farthest.
+    /// Position of the tip, mm, shape (3,); of several instruments the foremost.
     #[getter]
     fn tip_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let tip = self.with(py, |simulation| tip_mm(simulation));
         PyArray1::from_vec(py, vec![tip.x, tip.y, tip.z])
     }
 
-    /// Positions of the tips of all instruments, mm, shape (n_instruments, 3); what is not in is in the sheath's mouth.
+    /// Positions of the tips of all instruments, mm, shape (n_instruments, 3); the mouth of the sheath for those that
+    /// are outside.
     #[getter]
     fn tips_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         points(py, self.with(py, |simulation| tips_mm(simulation)))
     }
 
-    /// What holds an instrument, and all that lies in it, on the line of those outside it: a dictionary of `force_n`, the force across the
-    /// line, shape (n, 3), `tension_n`, the axial force behind, `friction_n` along the line towards the tip and `friction_nmm` about it, shape (n,), at the
-    /// points of `positions_mm`; `length_mm` is the length that each of them stands for.
+    /// Forces between an instrument, with everything inside it, and the enclosing instruments: a dictionary of
+    /// `force_n`, the force across the line, shape (n, 3), `tension_n`, the axial force behind, `friction_n` along
+    /// the line towards the tip and `friction_nmm` about it, shape (n,), at the points of `positions_mm`; `length_mm`
+    /// is the length that each point represents.
     ///
-    /// Raises InputError for an instrument that is not there.
+    /// Raises InputError for an unknown instrument.
     fn lateral_forces<'py>(&self, py: Python<'py>, instrument: i64) -> PyResult<Bound<'py, PyDict>> {
         let count = self.pushed().len();
         let Some(place) = usize::try_from(instrument).ok().filter(|place| *place < count) else {
@@ -357,20 +364,20 @@ impl Simulation {
         Ok(told)
     }
 
-    /// Length of each instrument inside the sheath's mouth, mm, shape (n_instruments,).
+    /// Length of each instrument beyond the mouth of the sheath, mm, shape (n_instruments,).
     #[getter]
     fn inserted_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.inserted_mm)
     }
 
-    /// Turn of each tail since the start, rad, shape (n_instruments,).
+    /// Rotation of each tail since the start, rad, shape (n_instruments,).
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.rotation_rad)
     }
 
-    /// Points of the centre line at these arc lengths from the tip, mm: shape (n,) to (n, 3). Lengths that are not inserted are in the
-    /// sheath's mouth.
+    /// Points of the centre line at these arc lengths from the tip, mm: shape (n,) to (n, 3). Lengths beyond the
+    /// inserted one give the mouth of the sheath.
     ///
     /// Raises InputError for lengths that are not finite.
     fn points_mm<'py>(
@@ -382,14 +389,14 @@ impl Simulation {
         points(py, self.with(py, |simulation| points_at(simulation, &lengths)))
     }
 
-    /// All that the next step depends on, beside what surrounds the instruments.
+    /// Everything that the next step depends on, except for the surroundings of the instruments.
     fn state(&self, py: Python<'_>) -> State {
         State { state: self.with(py, |simulation| simulation.state()) }
     }
 
-    /// Goes on from a state of the same scene, to the bit.
+    /// Restores a state of the same scene, to the bit.
     ///
-    /// Raises InputError for a state of another method, vessel or instrument; then nothing has changed.
+    /// Raises InputError for a state of another method, vessel or instrument; then nothing is changed.
     fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
         self.with(py, |simulation| simulation.restore(&state.state)).map_err(exception)
     }
@@ -432,7 +439,7 @@ impl Simulation {
     }
 }
 
-/// The tip; before anything is inserted it is in the sheath's mouth.
+/// The tip; the mouth of the sheath before anything is inserted.
 pub(crate) fn tip_mm(simulation: &insertion::Simulation) -> Vec3 {
     simulation.shape().tip_mm().unwrap_or(simulation.sheath().position_mm)
 }

@@ -1,4 +1,5 @@
-//! What simulations begin from. Copies have it in common, and so it is written once into a pickle of many; what each has of its own is its state.
+//! Starts of simulations. Copies share their start, so a pickle of many copies contains it only once, plus the state
+//! of each.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -17,7 +18,7 @@ use crate::interrupt::interruptible;
 use crate::scene::Scene;
 use crate::vessel::Vessel;
 
-/// A simulation before its first step, and what it was made of. For pickles of simulations; nothing else needs one.
+/// A simulation before its first step, and its inputs. It is used only in pickles of simulations.
 #[pyclass(frozen, module = "endowire._endowire", name = "_Start")]
 pub(crate) struct Start {
     pub(crate) instruments: Vec<Instrument>,
@@ -30,7 +31,7 @@ enum MadeOf {
     Scene(Py<Scene>),
 }
 
-/// What `Simulation` is told beside vessel and instruments.
+/// Arguments of `Simulation` besides vessel and instruments.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Arguments {
     pub(crate) opening: Option<usize>,
@@ -68,17 +69,17 @@ impl Start {
         Ok(Self { instruments, simulation, made_of: MadeOf::Arguments(vessel, Box::new(arguments)) })
     }
 
-    /// What a scene says.
+    /// The start of a scene's simulation.
     pub(crate) fn of_scene(scene: &Bound<'_, Scene>) -> PyResult<Self> {
         let (simulation, instruments) = scene.get().built(scene.py())?;
         let made_of = MadeOf::Scene(scene.clone().unbind());
         Ok(Self { instruments, simulation: Mutex::new(simulation), made_of })
     }
 
-    /// The simulation, whose long steps end with Ctrl-C.
+    /// The simulation; Ctrl-C ends its long steps.
     pub(crate) fn simulation(&self) -> insertion::Simulation {
         let mut simulation = self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        // What the handler raises is kept for the one who hears of the end of the step.
+        // The exception of the signal handler is kept for the caller that is told about the end of the step.
         simulation.stop_when(|| {
             Python::attach(|py| py.check_signals().map_err(|raised| raised.restore(py)).is_err())
         });
@@ -122,7 +123,7 @@ impl Start {
 }
 
 impl Arguments {
-    /// Instruments as the library has them.
+    /// Instruments as a stack of the library.
     fn stack(&self, instruments: &[Instrument]) -> PyResult<Stack> {
         let count = instruments.len();
         let told = [

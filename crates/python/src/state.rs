@@ -1,4 +1,4 @@
-//! All that the next step depends on.
+//! States of simulations.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -13,20 +13,21 @@ use pyo3::types::PyBytes;
 use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
-/// The first bytes of a saved state, which is sealed, and those of every version.
+/// First bytes of a saved state, which ends with a hash, and those common to all versions.
 const FORMAT: &[u8] = b"endowire.State 8\n";
 const ANY_FORMAT: &[u8] = b"endowire.State ";
 
-/// Whether a file has been written by `State.save`, of whatever version, or is empty, so that nothing of it can be lost.
+/// Whether a file was written by `State.save` of any version, or is empty, so that overwriting it loses nothing.
 fn is_state(path: &Path) -> io::Result<bool> {
     let mut begins = Vec::new();
     File::open(path)?.take(ANY_FORMAT.len() as u64).read_to_end(&mut begins)?;
     Ok(begins.is_empty() || begins == ANY_FORMAT)
 }
 
-/// All that the next step of a simulation depends on, beside what surrounds the instruments.
+/// Everything that the next step of a simulation depends on, except for the surroundings of the instruments.
 ///
-/// It never changes, is small, and can be copied, pickled, sent and saved. `Simulation.restore` goes on from it to the bit.
+/// It is immutable and small, and can be copied, pickled, sent and saved. `Simulation.restore` continues from it to
+/// the bit.
 #[pyclass(frozen, module = "endowire", name = "State")]
 pub(crate) struct State {
     pub(crate) state: insertion::State,
@@ -34,7 +35,7 @@ pub(crate) struct State {
 
 #[pymethods]
 impl State {
-    /// Name of the method that it is a state of.
+    /// Name of its method.
     #[getter]
     fn method(&self) -> &str {
         self.state.method()
@@ -46,14 +47,14 @@ impl State {
         StepReport::new(self.state.report().clone())
     }
 
-    /// The state as bytes, every bit of its numbers kept.
+    /// The state as bytes, which keep every bit of its numbers.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &self.bytes()?))
     }
 
     /// A state from the bytes of `to_bytes`.
     ///
-    /// Raises InputError for bytes that are none, are not whole, or have been changed.
+    /// Raises InputError for bytes that are not a state, are incomplete, or were changed.
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
         let refuse = |what: String| InputError::new_err(format!("the bytes of a state: {what}"));
@@ -70,12 +71,14 @@ impl State {
         Ok(Self { state })
     }
 
-    /// Writes the state into a file, which is that of before or this one, whole, whenever the program or the power ends.
+    /// Writes the state to a file. At any time the file is completely the previous or the new one, even if the
+    /// program or the power fails.
     ///
-    /// Raises InputError for a file that is there and holds no state: it is not written over; and for one that cannot be written.
+    /// Raises InputError for a file that cannot be written, and for an existing file without a state, which is not
+    /// overwritten.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let failed = |e| exception(Error::file(&path, e));
-        // A link stays one: the file that it leads to is replaced.
+        // A link is kept, and the file that it points to is replaced.
         let place = match path.canonicalize() {
             Ok(place) => place,
             Err(e) if e.kind() == ErrorKind::NotFound && path.symlink_metadata().is_err() => path.clone(),
@@ -90,13 +93,13 @@ impl State {
         whole::write_bytes(&place, &self.bytes()?).map_err(failed)
     }
 
-    /// Reads a state from a file of `save`.
+    /// Reads a state from a file written by `save`.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
         Self::from_bytes(&endowire_core::file::read(&path, u64::MAX).map_err(exception)?)
     }
 
-    /// Nothing changes a state: its copy is itself.
+    /// A state is immutable, so it is its own copy.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }

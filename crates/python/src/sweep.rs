@@ -1,4 +1,4 @@
-//! Sweeps, as the program carries them out.
+//! Sweeps, as in the program.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,11 +16,14 @@ use crate::interrupt::{interruptible, stoppable};
 const PROGRAM: Program =
     Program { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION") };
 
-/// Does the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (the number of cores unless set), and writes
-/// runs.parquet there when all have one, as `endowire sweep` does. `shard` is the part to do: "1/4" is the first of four.
+/// Carries out the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (by default
+/// the number of cores), and writes runs.parquet there when all have one, as `endowire sweep` does. `shard` is the
+/// part to carry out: "1/4" is the first of four.
 ///
-/// Returns a dictionary of `runs`, `earlier` (those that had a row before), `failed`, `unconverged` (those with steps that are no equilibria) and `table` (its path). Ctrl-C stops it; the same call goes on.
-/// Raises InputError for a sweep that does not fit, for `record` in it, and for a folder that holds another sweep. What fails in a run is in its row.
+/// Returns a dictionary of `runs`, `earlier` (those that had a row before), `failed`, `unconverged` (those with steps
+/// that did not converge) and `table` (its path). Ctrl-C stops it; the same call resumes it. Raises InputError for an
+/// invalid sweep, for `record` in it, and for a folder with another sweep. Failures within a run are reported in its
+/// row.
 #[pyfunction]
 #[pyo3(signature = (path, out, *, jobs=None, shard="1/1"))]
 pub(crate) fn sweep<'py>(
@@ -61,9 +64,9 @@ pub(crate) fn sweep<'py>(
     Ok(document)
 }
 
-/// Makes one table of the rows in the folders of shards, in whatever order they are given; its number of runs.
+/// Merges the rows in the folders of shards, in any order, into one table; returns the number of runs.
 ///
-/// Raises InputError for rows of different sweeps, and where runs are missing.
+/// Raises InputError for rows of different sweeps, and for missing runs.
 #[pyfunction]
 pub(crate) fn merge_sweeps(py: Python<'_>, folders: List<PathBuf>, out: PathBuf) -> PyResult<usize> {
     interruptible(py, move || merge(&folders.0, &out))?.map_err(exception)

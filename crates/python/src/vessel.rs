@@ -1,4 +1,4 @@
-//! What instruments are pushed into.
+//! Vessels.
 
 use std::collections::BTreeMap;
 use std::ffi::CString;
@@ -25,27 +25,28 @@ use crate::error::{InputError, exception, refuse};
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
 
-/// A vessel's wall, and its centre line: the one it was made from, or else one that is found in its lumen when something first needs it, from
-/// the opening that devices come in by (from the sheath's in the vessel of a scene) to all others. It never changes.
+/// A vessel's wall and its centre line. The centre line is the one that the wall was made from; otherwise it is
+/// extracted from the lumen when first needed, from the inlet (in the vessel of a scene, the sheath's opening) to all
+/// other openings. A vessel is immutable.
 #[pyclass(frozen, module = "endowire", name = "Vessel")]
 pub(crate) struct Vessel {
     pub(crate) lumen: Lumen,
-    /// The centre line it was made with.
+    /// The centre line that it was made with.
     given: Option<Line>,
-    /// Without one, that which was found, once one was needed, …
+    /// Otherwise the centre line that was extracted when needed.
     found: OnceLock<Line>,
-    /// … and the opening where it begins.
+    /// The opening where the extracted one begins.
     begins: usize,
 }
 
 /// A centre line.
 struct Line {
     tree: CentrelineTree,
-    /// The opening at its root; one that begins inside has none.
+    /// The opening at its root; `None` if it begins inside.
     inlet: Option<usize>,
 }
 
-/// Where a centre line begins or ends: the number of an opening, or a place in mm.
+/// An end of a centre line: the number of an opening, or a place in mm.
 #[derive(FromPyObject)]
 enum End {
     Opening(usize),
@@ -61,14 +62,14 @@ impl End {
     }
 }
 
-/// Where a way leads: the name of a target, or a place in mm.
+/// The end of a way: the name of a target, or a place in mm.
 #[derive(FromPyObject)]
 pub(crate) enum Goal {
     Name(String),
     Place([f64; 3]),
 }
 
-/// Calls what the core calls `from` and `to` by the arguments of the method.
+/// Replaces the core's names `from` and `to` in an error by the arguments of the method.
 fn as_argument(error: Error) -> Error {
     match error {
         Error::Parameter { name, value, mend } if name == "from" => {
@@ -81,18 +82,18 @@ fn as_argument(error: Error) -> Error {
     }
 }
 
-/// What a vessel is made of, its centre line, its inlet, and names with their rows.
+/// The lumen of a vessel, its centre line, its inlet, and names with their rows.
 type Pickled<'py> =
     (PickledLumen<'py>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>);
 
-/// The bytes of a wall; or a tree, its closed rows, and how fine its mesh is.
+/// The bytes of a wall; or a tree, its closed rows, and the resolution of its mesh.
 #[derive(IntoPyObject)]
 enum PickledLumen<'py> {
     Wall(Bound<'py, PyBytes>),
     Tree(Bound<'py, PyArray2<f64>>, Vec<usize>, Option<f64>, Option<usize>),
 }
 
-/// The same as it is read.
+/// The same when read.
 #[derive(FromPyObject)]
 enum UnpickledLumen<'py> {
     Wall(Vec<u8>),
@@ -116,11 +117,12 @@ struct OpeningDocument {
 
 #[pymethods]
 impl Vessel {
-    /// Reads a surface file (STL, OBJ, PLY, VTP, VTK) and mends what can be mended; `unit_mm` is millimetres per unit of the file, `axes`
-    /// "LPS" or "RAS" where the file's header does not tell or is wrong (without either: LPS, the axes of scenes).
+    /// Reads a surface file (STL, OBJ, PLY, VTP, VTK) and repairs it if possible. `unit_mm` is millimetres per unit
+    /// of the file. `axes` is "LPS" or "RAS", if the file's header is silent or wrong (by default LPS, the axes of
+    /// scenes).
     ///
-    /// Warns (UserWarning) where the unit may be another, and where openings face each other. Raises InputError for a file that cannot be
-    /// read or serves as no wall.
+    /// Warns (UserWarning) if the unit may be wrong, and if openings face each other. Raises InputError for a file
+    /// that cannot be read or is not usable as a wall.
     #[staticmethod]
     #[pyo3(signature = (path, unit_mm = 1.0, axes = None))]
     fn read(py: Python<'_>, path: PathBuf, unit_mm: f64, axes: Option<&str>) -> PyResult<Self> {
@@ -137,14 +139,15 @@ impl Vessel {
         Ok(Self::of_wall(wall))
     }
 
-    /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3), counter-clockwise seen
-    /// from outside. What can be mended is mended.
+    /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3),
+    /// counter-clockwise seen from outside. The surface is repaired if possible.
     ///
-    /// Raises InputError for arrays of another shape, for what is no number of a vertex, and for a surface that serves as no wall.
+    /// Raises InputError for arrays of the wrong shape, for invalid indices, and for a surface that is not usable as
+    /// a wall.
     #[staticmethod]
     fn from_arrays(py: Python<'_>, vertices_mm: Numbers<'_>, triangles: Numbers<'_>) -> PyResult<Self> {
         let vertices_mm: Vec<Vec3> = rows("vertices_mm", &vertices_mm)?.into_iter().map(Vec3::from).collect();
-        // Numbers as they are given: as whole ones they would lose their fractions.
+        // Indices are taken as floats and checked: a conversion to integers would drop fractions.
         let index = |corner: f64| {
             let last = vertices_mm.len().min(u32::MAX as usize) as f64 - 1.0;
             match (0.0..=last).contains(&corner) && corner.fract() == 0.0 {
@@ -161,13 +164,16 @@ impl Vessel {
         Ok(Self::of_wall(made.map_err(exception)?))
     }
 
-    /// Builds the wall of a centre-line tree: a built-in anatomy ("straight_tube", "curved_tube", "aortic_arch", "hepatic"), the path of a
-    /// table, or an array of shape (n, 5) of x, y, z, radius (mm) and the row of the parent (-1 for the root).
+    /// Builds the wall of a centre-line tree: a built-in anatomy ("straight_tube", "curved_tube", "aortic_arch",
+    /// "hepatic"), the path of a table, or an array of shape (n, 5) of x, y, z, radius (mm) and the row of the parent
+    /// (-1 for the root).
     ///
-    /// Devices feel the surface that the tree says, not triangles: those are made when something draws, writes or asks for them, and `edge_mm` or
-    /// `triangles` say how fine; without them edges are a quarter of the smallest radius.
+    /// Devices touch the exact surface of the tree. Triangles are generated only when something draws, writes or
+    /// reads them; `edge_mm` or `triangles` set their resolution, by default with edges of a quarter of the smallest
+    /// radius.
     ///
-    /// Raises InputError for a tree that makes no vessel. Where no mesh can be made of one that does, what asks for it raises.
+    /// Raises InputError for a tree that does not define a vessel. If it does but cannot be meshed, only methods that
+    /// need the triangles raise.
     #[staticmethod]
     #[pyo3(signature = (tree, edge_mm = None, triangles = None))]
     fn generate(
@@ -217,19 +223,21 @@ impl Vessel {
 
     /// Its centre line, shape (n, 5): x, y, z, radius (mm) and the row of the parent (-1 for the root).
     ///
-    /// Raises InputError where it was made from none and none is found (`with_centreline` says where one begins and ends).
+    /// Raises InputError if the vessel was not made from one and none can be extracted (`with_centreline` can set
+    /// where it begins and ends).
     #[getter]
     fn centreline<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         table(py, &self.line(py)?.tree)
     }
 
-    /// Whether its centre line is found by itself: it was made from none, and `with_centreline` did not say where one begins.
+    /// Whether its centre line is extracted automatically: the vessel was not made from one, and `with_centreline`
+    /// was not used.
     #[getter]
     fn centreline_found(&self) -> bool {
         self.given.is_none()
     }
 
-    /// The opening at the root of its centre line; None of one that begins inside.
+    /// The opening at the root of its centre line; None if it begins inside.
     #[getter]
     pub(crate) fn inlet(&self) -> Option<usize> {
         match &self.given {
@@ -238,7 +246,8 @@ impl Vessel {
         }
     }
 
-    /// Named points of its centre line: positions in mm by name; `opening 1` and so on of one that was found.
+    /// Named points of its centre line: positions in mm by name; those of an extracted one are called `opening 1` and
+    /// so on.
     ///
     /// Raises InputError as `centreline`.
     #[getter]
@@ -248,10 +257,10 @@ impl Vessel {
         Ok(tree.targets().iter().map(|target| (target.name.clone(), place(target))).collect())
     }
 
-    /// The way along its centre line from the root to the target of that name, or to the point nearest to a place in mm: shape (n, 4), x, y, z
-    /// and radius in mm, as `Controller.follow_path` and `search_ahead` take it.
+    /// The way along its centre line from the root to the target of this name, or to the point nearest to a place in
+    /// mm: shape (n, 4), x, y, z and radius in mm, as used by `Controller.follow_path` and `search_ahead`.
     ///
-    /// Raises InputError for an unknown name, for the root, where the way begins, and as `centreline`.
+    /// Raises InputError for an unknown name, for the root itself, and as `centreline`.
     fn path<'py>(&self, py: Python<'py>, to: Goal) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let way = self.way(py, to)?;
         let numbers: Vec<f64> =
@@ -259,15 +268,17 @@ impl Vessel {
         array(py, numbers, [way.points().len(), 4])
     }
 
-    /// This vessel with the centre line that is found in its lumen between these ends: `centreline`, `inlet`, `targets` ("opening 3", "place 1") and
-    /// `branches` are those of it. Radii are of the largest spheres inside; points lie where the sphere is the largest of its cross-section
-    /// (ways of least ∫ ds/radius: Antiga et al., IEEE Transactions on Medical Imaging 22, 2003).
+    /// This vessel with the centre line extracted from its lumen between these ends, which determines `centreline`,
+    /// `inlet`, `targets` ("opening 3", "place 1") and `branches`. Radii are those of the largest inscribed spheres;
+    /// points lie where the sphere is the largest of its cross-section (paths of least ∫ ds/radius: Antiga et al.,
+    /// IEEE Transactions on Medical Imaging 22, 2003).
     ///
-    /// `start` is the number of an opening, or a place inside in mm; without it the inlet,
-    /// the lowest of the openings of at least 0.4 of the widest one's radius. `ends` are such numbers and places; all
-    /// other openings without them. Openings that no way leads to are no targets.
+    /// `start` is the number of an opening, or a place inside in mm; by default the inlet, the lowest of the openings
+    /// with at least 0.4 of the widest one's radius. `ends` are openings and places too; by default all other
+    /// openings. Openings that cannot be reached are not targets.
     ///
-    /// Raises InputError naming `start` or `ends` for an opening that is not there, a place outside, and one that no way leads to.
+    /// Raises InputError naming `start` or `ends` for an unknown opening, a place outside, and one that cannot be
+    /// reached.
     #[pyo3(signature = (start = None, ends = None))]
     fn with_centreline(&self, py: Python<'_>, start: Option<End>, ends: Option<Vec<End>>) -> PyResult<Self> {
         let lumen = self.lumen.clone();
@@ -283,8 +294,8 @@ impl Vessel {
         Ok(Self::of_line(self.lumen.clone(), Some(Line { tree: found.tree, inlet })))
     }
 
-    /// Stretches of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`), length_mm and
-    /// least_radius_mm.
+    /// Segments of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`),
+    /// length_mm and least_radius_mm.
     ///
     /// Raises InputError as `centreline`.
     #[getter]
@@ -292,10 +303,12 @@ impl Vessel {
         document::write(py, &self.line(py)?.tree.branches())
     }
 
-    /// Whether an instrument can follow the way to a target, which takes hundredths of a second: a dictionary of `passage` ("passes", "tight",
-    /// "blocked", "short"), length_mm, taken_mm (the instrument that lies in it), reaches_mm (how far the tip comes), the points `narrowest` and `sharpest`, and `way`, all points: arc_mm, position_mm, lumen_radius_mm,
-    /// device_radius_mm, clearance_mm, bend_radius_mm (of the centre line), cut_radius_mm (what the room makes of it), bears_radius_mm (what
-    /// the instrument takes without force: bending that costs at most `force_n`); radii of what is straight are None.
+    /// Whether an instrument can follow the way to a target; the check takes some 10 ms. Returns a dictionary of
+    /// `passage` ("passes", "tight", "blocked", "short"), length_mm, taken_mm (length of the instrument along the
+    /// least bent path), reaches_mm (how far the tip comes), the points `narrowest` and `sharpest`, and `way`, all
+    /// points: arc_mm, position_mm, lumen_radius_mm, device_radius_mm, clearance_mm, bend_radius_mm (of the centre line),
+    /// cut_radius_mm (of the least bent path within the clearance), bears_radius_mm (that the instrument takes
+    /// without force: bending that costs at most `force_n`); radii of straight stretches are None.
     ///
     /// The way is that of `path`: `to` is the name of a target, or a place in mm.
     ///
@@ -322,12 +335,12 @@ impl Vessel {
         Ok(PyArray1::from_vec(py, inside.map_err(exception)?))
     }
 
-    /// Writes the wall as a surface file; the ending (stl, obj, ply) says which.
+    /// Writes the wall as a surface file, in the format of the extension (stl, obj, ply).
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         self.wall(py)?.mesh().write(&path).map_err(exception)
     }
 
-    /// Nothing changes a vessel: its copy is itself.
+    /// A vessel is immutable, so it is its own copy.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
@@ -398,7 +411,7 @@ impl Vessel {
 }
 
 impl Vessel {
-    /// That of a surface alone.
+    /// The vessel of a surface.
     pub(crate) fn of_wall(wall: Wall) -> Self {
         Self::of_line(wall.into(), None)
     }
@@ -417,7 +430,7 @@ impl Vessel {
         Ok(Self::of_line(lumen, Some(Line { tree, inlet })))
     }
 
-    /// That of a centre-line tree.
+    /// The vessel of a centre-line tree.
     fn swept(tree: CentrelineTree, resolution: Resolution) -> endowire_core::Result<Self> {
         let vessel = SweptVessel::new(tree, resolution)?;
         let line = Line { tree: vessel.tree().clone(), inlet: Some(vessel.inlet()) };
@@ -428,14 +441,14 @@ impl Vessel {
         Self { lumen, given, found: OnceLock::new(), begins: 0 }
     }
 
-    /// Its wall as triangles, made if there are none yet.
+    /// Its wall as triangles, generated if necessary.
     pub(crate) fn wall(&self, py: Python<'_>) -> PyResult<&Wall> {
         let lumen = self.lumen.clone();
         interruptible(py, move || lumen.wall(&NoStore).map(|_| ()))?.map_err(exception)?;
         self.lumen.wall(&NoStore).map_err(exception)
     }
 
-    /// Its centre line, found if there is none.
+    /// Its centre line, extracted if necessary.
     fn line(&self, py: Python<'_>) -> PyResult<&Line> {
         if let Some(line) = self.given.as_ref().or(self.found.get()) {
             return Ok(line);
@@ -466,7 +479,7 @@ impl Vessel {
     }
 }
 
-/// The rows of a tree, the parent of the root -1.
+/// The rows of a tree; the parent of the root is -1.
 fn table<'py>(py: Python<'py>, tree: &CentrelineTree) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let row = |node: &CentrelineNode| {
         let (p, parent) = (node.position_mm, node.parent.map_or(-1.0, |row| row as f64));
@@ -505,25 +518,25 @@ impl Tree<'_> {
     }
 }
 
-/// The built-in anatomy of that name, unless a file is called so.
+/// The built-in anatomy of this name, unless a file has the same name.
 fn built_in(path: &Path) -> Option<CentrelineTree> {
     path.to_str().filter(|_| !path.exists()).and_then(anatomy::tree)
 }
 
-/// Warns as `warnings.warn` does, at the line that called.
+/// Warns as `warnings.warn` does, at the line of the caller.
 fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
-/// How the coordinates of a surface file are meant.
+/// Units and axes of a surface file.
 fn frame(unit_mm: f64, axes: Option<&str>) -> PyResult<SurfaceFrame> {
     let axes = axes.map(str::parse).transpose().map_err(exception)?;
     Ok(SurfaceFrame { unit_mm, axes })
 }
 
-/// Checks a surface file as `endowire vessel check` does: a dictionary of what was found, and `sound`. Arguments as those of `Vessel.read`;
-/// septa thinner than `septum_mm` are counted.
+/// Checks a surface file as `endowire vessel check` does; returns a dictionary of the findings, and `sound`.
+/// Arguments are as in `Vessel.read`; septa thinner than `septum_mm` are counted.
 #[pyfunction]
 #[pyo3(signature = (path, unit_mm = 1.0, septum_mm = 1.0, axes = None))]
 pub(crate) fn check_vessel<'py>(

@@ -1,8 +1,8 @@
-//! Bytes as the text that a page may have (RFC 4648).
+//! Base64 (RFC 4648) for data embedded in pages.
 
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Four digits for three bytes, filled up with `=`.
+/// Encodes each three bytes as four digits, padded with `=`.
 pub fn base64(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {

@@ -1,8 +1,8 @@
-//! Pages that any browser shows without a network: a run, or tables of results.
+//! Self-contained HTML pages, shown by any browser without a network: of a run, of tables of results, of assessments.
 //!
-//! A [`Run`] is what the page of a run has: the vessel, shapes step by step, numbers, events and frames. It comes from a recording on disk, or
-//! from a [`Recorder`] that has followed a simulation. [`run_page`] and [`tables_page`] make one file of it, with all scripts and data in it;
-//! [`assessed_page`] makes one of what trainees did.
+//! A [`Run`] holds the data of a run's page: the vessel, shapes step by step, numbers, events and frames. It is made
+//! from a recording on disk, or from a [`Recorder`] that follows a simulation. [`run_page`] and [`tables_page`] each
+//! make one HTML file that contains all scripts and data; [`assessed_page`] does so for the assessments of trainees.
 
 mod base64;
 mod recorder;
@@ -15,7 +15,7 @@ pub use run::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, events};
 use serde::Serialize;
 pub use vessel::Vessel;
 
-/// The pages; their scripts read the data where the mark is.
+/// Templates of the pages; their scripts read the data that replace the marker.
 const RUN: &str = concat!(include_str!("head.html"), include_str!("page.html"));
 const TABLES: &str = concat!(include_str!("head.html"), include_str!("tables.html"));
 const ASSESSED: &str = concat!(
@@ -33,23 +33,23 @@ const MARK: &str = "/*DATA*/null";
 /// The page of a run.
 ///
 /// # Errors
-/// A summary that JSON cannot say.
+/// A summary that cannot be written as JSON.
 pub fn run_page(run: &Run) -> serde_json::Result<String> {
     page(RUN, run)
 }
 
-/// The page of tables, a document that the script of `tables.html` reads.
+/// The page of tables; the document is read by the script in `tables.html`.
 ///
 /// # Errors
-/// What JSON cannot say.
+/// Data that cannot be written as JSON.
 pub fn tables_page(tables: &impl Serialize) -> serde_json::Result<String> {
     page(TABLES, tables)
 }
 
-/// The page of what trainees did, a document that the scripts of `assess` read.
+/// The page of assessments; the document is read by the scripts in `assess`.
 ///
 /// # Errors
-/// What JSON cannot say.
+/// Data that cannot be written as JSON.
 pub fn assessed_page(assessed: &impl Serialize) -> serde_json::Result<String> {
     page(ASSESSED, assessed)
 }
@@ -58,7 +58,8 @@ fn page(page: &str, document: &impl Serialize) -> serde_json::Result<String> {
     Ok(page.replacen(MARK, &json(document)?, 1))
 }
 
-/// A document for a script. "<" stands in strings alone, and could end the script (`</script>`) or keep it from ending (`<!--<script>`).
+/// Serialises a document for a script element. "<" occurs only in strings and is escaped, since it could end the
+/// script (`</script>`) or keep it from ending (`<!--<script>`).
 fn json(document: &impl Serialize) -> serde_json::Result<String> {
     Ok(serde_json::to_string(document)?.replace('<', "\\u003c"))
 }

@@ -1,10 +1,10 @@
-//! A simulation that goes on, followed in memory.
+//! Follows a running simulation in memory.
 
 use endowire_core::insertion::Simulation;
 
 use crate::run::{MOST_NODES, Moment, Row};
 
-/// What a page shows of the steps so far: a row of each, and shapes as far as there is room.
+/// Data of a page about the steps so far: one row per step, and as many shapes as fit.
 #[derive(Debug, Default)]
 pub struct Recorder {
     rows: Vec<Row>,
@@ -12,7 +12,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Notes a simulation after so many steps. Those that were undone meanwhile, and this one if it is known, are forgotten.
+    /// Records a simulation after this many steps. Rows and shapes from this step on, left by steps that were undone,
+    /// are dropped.
     pub fn note(&mut self, step: usize, simulation: &Simulation) {
         self.rows.truncate(self.rows.partition_point(|row| row.step < step));
         self.moments.truncate(self.moments.partition_point(|moment| moment.step < step));
@@ -27,7 +28,7 @@ impl Recorder {
         self.make_room();
     }
 
-    /// Takes every other shape away where they have become too many; the last one stays.
+    /// Drops every other shape when there are too many; the last one stays.
     fn make_room(&mut self) {
         let nodes: usize = self.moments.iter().map(Moment::nodes).sum();
         if nodes <= MOST_NODES {
@@ -46,7 +47,7 @@ impl Recorder {
         &self.rows
     }
 
-    /// Shapes of some of them, the last one among these.
+    /// Shapes of some of the steps, including the last.
     pub fn moments(&self) -> &[Moment] {
         &self.moments
     }

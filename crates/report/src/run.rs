@@ -1,4 +1,4 @@
-//! What the page of a run shows.
+//! Data of the page of a run.
 
 use endowire_core::Vec3;
 use endowire_core::insertion::Simulation;
@@ -7,43 +7,44 @@ use serde_json::Value;
 
 use crate::vessel::Vessel;
 
-/// Most nodes of all shapes together: what fits into a page of a few megabytes.
+/// Largest number of nodes in all shapes together: a page of a few megabytes.
 pub const MOST_NODES: usize = 120_000;
 
-/// The document in the page.
+/// The document of the page.
 #[derive(Debug, Serialize)]
 pub struct Run {
-    /// What `summary.json` of a recording says, or some of it.
+    /// Content of `summary.json` of a recording, or part of it.
     pub summary: Value,
-    /// Names of the instruments, the innermost first.
+    /// Names of the instruments, innermost first.
     pub instruments: Vec<String>,
-    /// Where they are.
+    /// The vessel.
     #[serde(flatten)]
     pub vessel: Vessel,
-    /// Shapes, by their steps; at least one.
+    /// Shapes, in order of steps; at least one.
     pub steps: Vec<Moment>,
-    /// Numbers, by their steps; the last step is that of the last shape.
+    /// Numbers, in order of steps; the last step is that of the last shape.
     pub series: Series,
-    /// What has happened.
+    /// Events.
     pub events: Vec<Event>,
     /// Pictures.
     pub frames: Vec<Frame>,
 }
 
-/// A step in 3D.
+/// The shape at a step.
 #[derive(Debug, Clone, Serialize)]
 pub struct Moment {
     pub(crate) step: usize,
-    /// Coordinates x y z of the line, sheath first, hundredths of a millimetre.
+    /// Coordinates x y z of the line, sheath first, in hundredths of a millimetre.
     line: Vec<i32>,
-    /// Length of each instrument along the line, as a share of it.
+    /// Length of each instrument along the line, as a fraction of it.
     shares: Vec<f32>,
-    /// Place and force of contacts: hundredths of a millimetre, and newton.
+    /// Positions and forces of contacts: hundredths of a millimetre, and newtons.
     contacts: Vec<([i32; 3], [f32; 3])>,
 }
 
 impl Moment {
-    /// The line of all instruments after a step, the sheath first, mm; how much of each is in, mm; and places (mm) and forces (N) of contacts.
+    /// The shape after a step, from the line of all instruments, sheath first (mm), their inserted lengths (mm), and
+    /// positions (mm) and forces (N) of contacts.
     pub fn new(
         step: usize,
         line_mm: &[Vec3],
@@ -62,7 +63,7 @@ impl Moment {
         }
     }
 
-    /// How many nodes its line has.
+    /// Number of nodes of the line.
     pub(crate) fn nodes(&self) -> usize {
         self.line.len() / 3
     }
@@ -88,7 +89,7 @@ pub struct Row {
     converged: bool,
     #[serde(default)]
     relaxations: u32,
-    // None in recordings of versions that did not tell them.
+    // `None` in recordings of older versions, which lack these columns.
     imbalance: Option<f64>,
     wall_force_sum_n: Option<f64>,
     wall_force_largest_n: Option<f64>,
@@ -96,7 +97,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// That of a simulation after a step.
+    /// The row of a simulation after a step.
     pub fn of(step: usize, simulation: &Simulation) -> Self {
         let (report, force) = (simulation.report(), simulation.wall_force());
         Self {
@@ -120,7 +121,7 @@ impl Row {
     }
 }
 
-/// The columns, each a curve.
+/// The columns; each is drawn as a curve.
 #[derive(Debug, Serialize)]
 pub struct Series {
     step: Vec<usize>,
@@ -137,7 +138,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Those of rows, by their steps.
+    /// The columns of rows, in order of steps.
     pub fn of(rows: &[Row]) -> Self {
         Self {
             step: rows.iter().map(|row| row.step).collect(),
@@ -155,18 +156,18 @@ impl Series {
     }
 }
 
-/// Something that has happened in a step.
+/// An event in a step.
 #[derive(Debug, Serialize)]
 pub struct Event {
     /// Number of the step.
     pub step: usize,
-    /// What kind of thing.
+    /// Kind of the event.
     pub what: &'static str,
-    /// For people.
+    /// Description for people.
     pub text: String,
 }
 
-/// Events that rows tell of.
+/// The events that follow from rows.
 pub fn events(rows: &[Row]) -> Vec<Event> {
     let mut events = Vec::new();
     let mut out = None;
@@ -198,7 +199,7 @@ pub fn events(rows: &[Row]) -> Vec<Event> {
 pub struct Frame {
     /// Number of the step.
     pub step: usize,
-    /// What it shows.
+    /// Name of the view.
     pub view: String,
     /// The picture as PNG, in Base64.
     pub png: String,

@@ -1,4 +1,4 @@
-//! The vessel for a page: few triangles, since it is drawn again with every turn.
+//! The vessel on a page: reduced to few triangles, since it is redrawn with every rotation.
 
 use std::collections::HashMap;
 
@@ -8,19 +8,19 @@ use serde::Serialize;
 
 use crate::run::scaled;
 
-/// Most triangles that a page draws.
+/// Largest number of triangles.
 const MOST: usize = 6000;
 
-/// The vessel as a page draws it.
+/// The vessel for drawing.
 #[derive(Debug, Clone, Serialize)]
 pub struct Vessel {
-    /// Coordinates x y z of its vertices, tenths of a millimetre.
+    /// Coordinates x y z of its vertices, in tenths of a millimetre.
     vertices: Vec<i32>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Vessel {
-    /// That of a mesh, with fewer triangles.
+    /// The reduced vessel of a mesh.
     pub fn of(mesh: &SurfaceMesh) -> Self {
         let mesh = simplified(mesh);
         let vertices = mesh.vertices_mm.iter().flat_map(|v| scaled(v, 10.0)).collect();
@@ -28,7 +28,7 @@ impl Vessel {
     }
 }
 
-/// The mesh with vertices that are near each other made one, until it has few triangles.
+/// Merges nearby vertices of the mesh until it has few triangles.
 fn simplified(mesh: &SurfaceMesh) -> SurfaceMesh {
     let Some((low, high)) = mesh.bounds_mm() else { return mesh.clone() };
     if mesh.triangles.len() <= MOST {

@@ -1,4 +1,4 @@
-//! Axes: a key of the scene and the values that it takes.
+//! Axes of a sweep: a key of the scene and its values.
 
 use endowire_core::{Error, Result};
 use endowire_methods::Key;
@@ -7,58 +7,58 @@ use toml::Value;
 
 use crate::draw::Stream;
 
-/// Most values of one axis, and most runs of a sweep.
+/// Largest number of values of one axis, and of runs of a sweep.
 pub(crate) const RUN_LIMIT: usize = 1_000_000;
 
-/// `[[axis]]` of a sweep file: a key, and one of list, grid, random and latin.
+/// An `[[axis]]` of a sweep file: a key, and one of list, grid, random and latin.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxisSpec {
-    /// The key of the scene.
+    /// Key of the scene.
     pub key: String,
-    /// These values as they stand; each with all values of all other lists and grids.
+    /// Given values; combined with all values of all other lists and grids.
     pub list: Option<Vec<Value>>,
-    /// Numbers in even steps; each with all values of all other lists and grids.
+    /// Evenly spaced numbers; combined with all values of all other lists and grids.
     pub grid: Option<Grid>,
-    /// A number drawn for each sample, evenly from a range.
+    /// A number drawn uniformly from a range for each sample.
     pub random: Option<Range>,
-    /// A number drawn for each sample, one in each of as many equal parts of a range as there are samples: together with the other axes of
-    /// this kind a Latin hypercube.
+    /// A number drawn for each sample, one in each of as many equal parts of a range as there are samples: together
+    /// with the other `latin` axes a Latin hypercube.
     pub latin: Option<Range>,
 }
 
-/// Numbers in even steps from one to another.
+/// Evenly spaced numbers.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
-    /// The first.
+    /// First number.
     pub from: f64,
-    /// The last.
+    /// Last number.
     pub to: f64,
-    /// How many, 2 or more.
+    /// How many numbers, at least 2.
     pub count: usize,
-    /// Whether steps are factors.
+    /// Whether the spacing is logarithmic.
     #[serde(default)]
     pub log: bool,
 }
 
-/// A range to draw from.
+/// Range of a drawn number.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// Its lower end.
+    /// Lower end.
     pub from: f64,
-    /// Its upper end.
+    /// Upper end.
     pub to: f64,
-    /// Whether logarithms are drawn evenly.
+    /// Whether the logarithm is drawn uniformly.
     #[serde(default)]
     pub log: bool,
-    /// Whether whole numbers are drawn, both ends among them.
+    /// Whether integers are drawn, both ends included.
     #[serde(default)]
     pub integer: bool,
 }
 
-/// A key with its values.
+/// A key with its values, checked.
 #[derive(Debug, Clone)]
 pub struct Axis {
     pub(crate) key: Key,
@@ -73,7 +73,7 @@ enum Values {
 }
 
 impl Axis {
-    /// The axis number `index` of a sweep with this seed and so many samples.
+    /// The axis of this `index` in a sweep with this seed and number of samples.
     ///
     /// # Errors
     /// Names the key of the sweep file that is missing, out of range or contradicts another.
@@ -103,7 +103,7 @@ impl Axis {
         Ok(Self { key, values })
     }
 
-    /// Number of its values that are crossed with those of other axes: 1 where it is drawn.
+    /// Number of values that are combined with those of other axes; 1 if values are drawn.
     pub(crate) fn crossed(&self) -> usize {
         match &self.values {
             Values::Listed(list) => list.len(),
@@ -111,7 +111,7 @@ impl Axis {
         }
     }
 
-    /// Its value in a run: `place` of those that are crossed, or that of `sample`.
+    /// Value in a run: the one with index `place` of a list or grid, otherwise the one drawn for `sample`.
     pub(crate) fn value(&self, place: usize, sample: usize) -> Value {
         match &self.values {
             Values::Listed(list) => list[place].clone(),
@@ -123,7 +123,7 @@ impl Axis {
         }
     }
 
-    /// Values that stand for all of them: each one of a list, the ends of a range.
+    /// Values that represent the axis in checks: all of a list, the ends of a range.
     pub(crate) fn examples(&self) -> Vec<Value> {
         match &self.values {
             Values::Listed(list) => list.clone(),
@@ -132,7 +132,7 @@ impl Axis {
     }
 }
 
-/// The same error, of a key of that table.
+/// Prefixes the key in an error with its table.
 fn inside(table: &str, error: Error) -> Error {
     match error {
         Error::Parameter { name, value, mend } => {
@@ -142,10 +142,10 @@ fn inside(table: &str, error: Error) -> Error {
     }
 }
 
-/// Between two numbers, `t` from 0 to 1 of the way.
+/// Interpolates between two numbers; `t` runs from 0 to 1.
 fn between(from: f64, to: f64, log: bool, t: f64) -> f64 {
     match t {
-        // Ends are met to the bit.
+        // The ends are exact.
         0.0 => from,
         1.0 => to,
         _ if log => from * (t * (to / from).ln()).exp(),
@@ -179,7 +179,7 @@ impl Grid {
     }
 }
 
-/// Whole numbers below this are all to be had.
+/// Below this bound every integer can be drawn.
 const INTEGER_LIMIT: f64 = 9e15;
 
 impl Range {
@@ -198,10 +198,10 @@ impl Range {
         Ok(())
     }
 
-    /// The value `unit` of the way along it.
+    /// Value at the fraction `unit` of the range.
     fn at(&self, unit: f64) -> Value {
         if self.integer {
-            // Each whole number has a stretch of the same length: one more than the way.
+            // Each integer has an interval of the same length, hence the upper end plus one.
             let value = between(self.from, self.to + 1.0, self.log, unit).floor();
             return Value::Integer(value.min(self.to) as i64);
         }

@@ -30,20 +30,20 @@ struct SweepSpec {
     axis: Vec<AxisSpec>,
 }
 
-/// What is kept of each run beside its row.
+/// What is recorded of each run besides its row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Recorded {
-    /// Its recording without frames.
+    /// A recording without frames.
     Shapes,
-    /// Its recording with the frames that `[view]` of the scene asks for.
+    /// A recording with the frames of the scene's `[view]`.
     Frames,
 }
 
-/// One scene and the values that its keys take.
+/// A scene and the values of its keys.
 #[derive(Debug)]
 pub struct Sweep {
-    /// The scene with what `[set]` says.
+    /// The scene with the settings of `[set]`.
     base: SceneTables,
     pub(crate) axes: Vec<Axis>,
     pub(crate) samples: usize,
@@ -53,16 +53,16 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Reads a sweep file and its scene; every value of a list and the ends of every range are tried in the scene.
+    /// Reads a sweep file and its scene. Every value of a list and both ends of every range are tried in the scene.
     ///
     /// # Errors
-    /// Names file, key and value of what does not fit: a key that the scene does not know, a value that its key does not take, an axis
-    /// without values, more than a million runs.
+    /// Names file, key and value of what is invalid: a key that the scene does not know, a value that its key does
+    /// not accept, an axis without values, more than a million runs.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_with(path, &[])
     }
 
-    /// Reads a sweep file that has these settings in its table `[set]` too, in place of its own of the same keys.
+    /// Reads a sweep file with additional settings, which override those of its table `[set]`.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -73,10 +73,11 @@ impl Sweep {
         Self::of_spec(&spec, text, path)
     }
 
-    /// Reads a sweep from the text of a file, from whose folder the path of its scene starts; errors call it `path`.
+    /// Reads a sweep from the text of a file. The path of its scene is relative to the folder of `path`, which is
+    /// also the name in errors.
     ///
     /// # Errors
-    /// As [`Self::read`], less those of reading the file.
+    /// As [`Self::read`], except for reading the file.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         Self::of_spec(&parse_toml(text, path)?, text.to_owned(), path)
     }
@@ -116,7 +117,7 @@ impl Sweep {
             let reason = "script = []: give at least one [[script]] table, what the hand does";
             return Err(Error::content(&scene_path, reason));
         }
-        // What is set may have come from files that the scene does not name any more.
+        // Settings may come from files that the scene no longer names.
         let set = base.text()?;
         let mut inputs = vec![text.into_bytes(), scene.text().as_bytes().to_vec(), set.into_bytes()];
         for input in base_scene.input_paths() {
@@ -131,8 +132,8 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// Refuses axes in device files of which none of the first runs can make a device: a value beside another way to say the same makes none
-    /// in any.
+    /// Refuses axes of device files if none of the first runs yields a valid device, for example because the value
+    /// conflicts with another key in every run.
     fn check_devices(&self) -> Result<()> {
         if self.axes.iter().all(|axis| !axis.key.is_of_device()) {
             return Ok(());
@@ -145,7 +146,7 @@ impl Sweep {
         }
     }
 
-    /// What its reader should know before it is carried out: an axis that changes nothing. None where there is none.
+    /// A remark on an axis that has no effect, to be shown before the sweep runs; `None` if there is no such axis.
     pub fn remark(&self) -> Option<String> {
         let index = self.axes.iter().position(|axis| axis.key.to_string() == SEED)?;
         Some(format!(
@@ -159,17 +160,17 @@ impl Sweep {
         self.axes.iter().map(Axis::crossed).product::<usize>() * self.samples
     }
 
-    /// Whether there are none; there is always one.
+    /// Always false: a sweep has at least one run.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// What is kept of each run beside its row.
+    /// What is recorded of each run besides its row.
     pub fn recorded(&self) -> Option<Recorded> {
         self.recorded
     }
 
-    /// SHA-256 of the sweep, its scene and the files that the scene names.
+    /// SHA-256 of the sweep file, its scene and the files that the scene names.
     pub(crate) fn hash(&self) -> &str {
         &self.hash
     }
@@ -183,7 +184,7 @@ impl Sweep {
         let mut scene = self.base.clone();
         let of_device = |axis: &&(&Axis, &Value)| axis.0.key.is_of_device();
         let pairs: Vec<(&Axis, &Value)> = self.axes.iter().zip(values).collect();
-        // A device file may be a value itself.
+        // Values of device files come last, since the device file itself may be a value.
         for (axis, value) in
             pairs.iter().filter(|pair| !of_device(pair)).chain(pairs.iter().filter(of_device))
         {
@@ -192,19 +193,19 @@ impl Sweep {
         Ok(scene)
     }
 
-    /// The file that all scenes are variants of: paths start from its folder.
+    /// The base scene file; paths are relative to its folder.
     pub(crate) fn scene_path(&self) -> &Path {
         self.base.path()
     }
 }
 
-/// The key of a scene that recordings carry and no step reads.
+/// A key of the scene that is written to recordings but affects no step.
 const SEED: &str = "seed";
 
-/// Runs whose devices are tried before the first.
+/// Number of runs whose devices are checked before the sweep starts.
 const TRIED: usize = 16;
 
-/// Number of samples: 1 where nothing is drawn.
+/// Number of samples; 1 if nothing is drawn.
 fn samples(spec: &SweepSpec) -> Result<usize> {
     let drawn = spec.axis.iter().any(|axis| axis.random.is_some() || axis.latin.is_some());
     match (spec.samples, drawn) {
@@ -238,7 +239,7 @@ fn check_axes(axes: &[Axis], spec: &SweepSpec) -> Result<()> {
         }
         for given in spec.set.keys() {
             let key = Key::parse(given)?;
-            // An axis within a table of [set] replaces nothing but its own key, as in a table of the scene.
+            // An axis inside a table of `[set]` replaces only its own key, as inside a table of the scene.
             if axis.key.holds(&key) {
                 let what = if same(&key) { String::new() } else { format!("with {given} in it ") };
                 let mend = format!("{what}is given in [set] too: keep one of the two");
@@ -261,7 +262,7 @@ fn check_axes(axes: &[Axis], spec: &SweepSpec) -> Result<()> {
     }
 }
 
-/// The same error, of a table of the sweep file.
+/// Prefixes an error with the table of the sweep file.
 fn in_table(path: &Path, table: &str, error: &Error) -> Error {
     Error::content(path, format!("{table}: {error}"))
 }

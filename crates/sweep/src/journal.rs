@@ -1,7 +1,7 @@
-//! Rows on disk while a sweep goes on: a file of JSON lines to which each row is appended as soon as it is there.
+//! Rows on disk during a sweep: a file of JSON lines to which each row is appended as soon as it is computed.
 //!
-//! The first line says which sweep and which part of it the rows belong to. A program that is killed within a line leaves one without an end:
-//! it is dropped when the sweep goes on, and its run is done again.
+//! The first line identifies the sweep and the part of it that the rows belong to. A program that is killed while
+//! writing leaves an incomplete line; it is dropped when the sweep resumes, and its run is repeated.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek, SeekFrom, Write};
@@ -15,23 +15,23 @@ use serde::{Deserialize, Serialize};
 use crate::row::{Columns, Row};
 use crate::shard::Shard;
 
-/// What rows belong to: the first line.
+/// The first line: identifies the sweep of the rows.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Header {
-    /// Names the format.
+    /// Name and version of the format.
     format: String,
     /// Hash of the sweep.
     pub(crate) sweep: String,
-    /// Its runs.
+    /// Number of runs of the whole sweep.
     pub(crate) runs: usize,
     pub(crate) shard: Shard,
     pub(crate) columns: Columns,
 }
 
-/// The format and its version.
+/// The current format.
 const FORMAT: &str = "endowire sweep 2";
 
-/// A power failure takes no more than the rows of so long.
+/// Interval between syncs to disk: a power failure loses at most the rows written within it.
 const SYNC: Duration = Duration::from_secs(1);
 
 impl Header {
@@ -40,22 +40,22 @@ impl Header {
     }
 }
 
-/// The file of a sweep that goes on, held by one program at a time.
+/// The journal of a running sweep, locked against other programs.
 pub(crate) struct Journal {
     path: PathBuf,
     file: Mutex<(File, Instant)>,
 }
 
-/// A journal as it was found.
+/// Content of an existing journal.
 pub(crate) struct Found {
     pub(crate) header: Header,
     pub(crate) rows: Vec<Row>,
-    /// Bytes of whole lines.
+    /// Number of bytes of complete lines.
     bytes: u64,
 }
 
 impl Journal {
-    /// Begins a journal, or goes on with that of the same sweep: the rows that are there.
+    /// Creates a journal, or opens that of the same sweep and returns its rows.
     ///
     /// # Errors
     /// A file that cannot be written, that another program is writing, or that belongs to another sweep.
@@ -63,7 +63,7 @@ impl Journal {
         let failed = |e| Error::file(path, e);
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
         let mut file = file.map_err(failed)?;
-        // Some network file systems have no locks: better a sweep without than none.
+        // Some network file systems have no locks; there the sweep runs without one.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             let reason =
                 "another program is carrying out this sweep: wait until it has ended, or give another folder";
@@ -106,7 +106,7 @@ impl Journal {
         self.check_there(file)
     }
 
-    /// Fails where the journal is not in its place any more: a file that is open takes what is written to it, also without a name.
+    /// Fails if the journal was removed or replaced: an open file still accepts writes after it has been deleted.
     fn check_there(&self, file: &File) -> Result<()> {
         match (file.metadata(), self.path.metadata()) {
             (Ok(own), Ok(there)) if there.len() == own.len() => Ok(()),
@@ -119,10 +119,10 @@ impl Journal {
 }
 
 impl Found {
-    /// Reads a journal; none where its first line is not whole.
+    /// Reads a journal; `None` if its first line is incomplete.
     ///
     /// # Errors
-    /// A file that cannot be read, or whose lines are no rows.
+    /// A file that cannot be read, or that contains an invalid line.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>> {
         let text = endowire_core::file::read(path, u64::MAX)?;
         let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);

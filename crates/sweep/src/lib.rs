@@ -1,8 +1,9 @@
-//! Sweeps: one scene, run many times with other values of its keys, and a table with one row a run.
+//! Sweeps: one scene run many times with different values of its keys, and a table with one row per run.
 //!
-//! [`Sweep`] is what a sweep file says: a scene, and an [axis](Axis) for each key that varies. [`Sweep::carry_out`] does its runs on several
-//! threads and keeps each row as soon as it is there (`journal`), so that a sweep that was killed goes on where it was; at the end the rows
-//! become one Parquet file (`table`), which depends on the sweep alone: not on the number of threads, on kills or on shards.
+//! A [`Sweep`] is read from a sweep file: a scene, and an [axis](Axis) for each key that varies. [`Sweep::carry_out`]
+//! does its runs on several threads and saves each row at once (`journal`), so that a sweep that was killed can resume.
+//! At the end the rows become one Parquet file (`table`). It depends on the sweep only, not on the number of threads, on
+//! interruptions or on shards.
 //!
 //! ```toml
 //! scene = "scenes/curved_tube.toml"   # relative to this file

@@ -1,4 +1,4 @@
-//! Shards into one table.
+//! Merges shards into one table.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,11 +10,12 @@ use crate::row::Row;
 use crate::shard::STEM;
 use crate::table;
 
-/// Writes one table of all rows in these folders, which together hold one sweep; its number of runs. In whatever order they are given, and
-/// whatever the shards, the file is to the byte that of a sweep in one piece.
+/// Merges the rows in these folders, which together hold one sweep, into one table; returns the number of runs. The
+/// file is identical, byte for byte, to that of an undivided sweep, whatever the shards and the order of the folders.
 ///
 /// # Errors
-/// A folder without rows, rows of different sweeps, runs that differ from shard to shard or are missing, a file that cannot be written.
+/// A folder without rows, rows of different sweeps, runs that differ between shards or are missing, a file that
+/// cannot be written.
 pub fn merge(folders: &[PathBuf], out: &Path) -> Result<usize> {
     let Some((header, rows)) = gathered(folders)? else {
         let mend = "no rows in these folders: give those of endowire sweep --out";
@@ -34,21 +35,21 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<usize> {
     Ok(rows.len())
 }
 
-/// The rows of a sweep as they are read by people.
+/// The rows of a sweep in readable form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
-    /// Names of the columns, those of the Parquet table.
+    /// Column names, as in the Parquet table.
     pub columns: Vec<String>,
-    /// Their values, by the numbers of the runs; what there is not is empty.
+    /// Values, in order of run numbers; missing values are empty.
     pub rows: Vec<Vec<String>>,
-    /// Runs of the sweep, those included that have no row yet.
+    /// Number of runs of the sweep, including those without a row yet.
     pub runs: usize,
 }
 
-/// What there is of a sweep in a folder, also of one that goes on; none where there are no rows.
+/// The rows of a sweep in a folder, also while it is running; `None` if there are no rows.
 ///
 /// # Errors
-/// As [`merge`], but for runs that are missing.
+/// As [`merge`], except for missing runs.
 pub fn table_of(folder: &Path) -> Result<Option<Table>> {
     let Some((header, rows)) = gathered(&[folder.to_owned()])? else { return Ok(None) };
     let rows: Vec<Row> = rows.into_values().collect();
@@ -56,7 +57,7 @@ pub fn table_of(folder: &Path) -> Result<Option<Table>> {
     Ok(Some(Table { columns, rows, runs: header.runs }))
 }
 
-/// All rows in these folders, by their runs.
+/// All rows in these folders, by run number.
 fn gathered(folders: &[PathBuf]) -> Result<Option<(Header, BTreeMap<usize, Row>)>> {
     let mut rows: BTreeMap<usize, Row> = BTreeMap::new();
     let mut first: Option<(PathBuf, Header)> = None;
@@ -82,7 +83,7 @@ fn gathered(folders: &[PathBuf]) -> Result<Option<(Header, BTreeMap<usize, Row>)
     Ok(first.map(|(_, header)| (header, rows)))
 }
 
-/// Files of rows in folders, in an order of their own.
+/// Paths of the journals in these folders, in a fixed order.
 fn journals(folders: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for folder in folders {

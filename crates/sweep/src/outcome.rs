@@ -1,96 +1,96 @@
-//! What a scripted insertion has come to.
+//! Outcome of a scripted insertion.
 
 use endowire_core::insertion::{Energy, InstrumentReport, Met, ScriptRun, Simulation, Tally, WallForce};
 use endowire_core::{Error, PhysicalEnd};
 use serde::{Deserialize, Serialize};
 
-/// The end of a run, or where it is while it goes on.
+/// Outcome of a run, or its current state while it is running.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunOutcome {
-    /// Steps carried out.
+    /// Number of steps carried out.
     pub steps: usize,
-    /// Steps of the script.
+    /// Number of steps in the script.
     pub steps_asked: usize,
-    /// Whether all steps were carried out and every one met its convergence test.
+    /// Whether all steps were carried out and all of them converged.
     pub converged: bool,
-    /// What ended it; none while it goes on.
+    /// The reason for its end; `None` while it is running.
     pub ended_by: Option<EndedBy>,
-    /// The step that failed and why, if one did.
+    /// The step that failed and the reason, if one did.
     pub failure: Option<StepFailure>,
-    /// Length inserted at the end, mm.
+    /// Inserted length at the end, mm.
     pub inserted_mm: f64,
-    /// Turn of the tail at the end, rad.
+    /// Rotation of the tail at the end, rad.
     pub rotation_rad: f64,
-    /// Tip at the end, mm.
+    /// Tip position at the end, mm.
     pub tip_mm: Option<[f64; 3]>,
     /// Push force at the end, N.
     pub push_force_n: f64,
     /// Torque at the end, N·mm.
     pub torque_nmm: f64,
-    /// Lines of the script with a condition that have ended.
+    /// Script lines with a condition that have ended.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub until: Vec<UntilOutcome>,
-    /// Each of several instruments at the end.
+    /// The instruments at the end, if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<InstrumentOutcome>,
     /// Energy at the end, mJ.
     pub energy_mj: Energy,
-    /// How hard the wall holds the device at the end.
+    /// Wall forces on the device at the end.
     pub wall_force: WallForce,
-    /// How its steps went.
+    /// Statistics of the steps.
     #[serde(flatten)]
     pub tally: Tally,
-    /// The opening through which the tip has left the vessel at the end.
+    /// The opening through which the tip has left the vessel at the end, if it has.
     pub left_through: Option<usize>,
 }
 
-/// How a line of the script with a condition has ended.
+/// End of a script line with a condition.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UntilOutcome {
     /// The line.
     pub line: String,
-    /// Its steps.
+    /// Number of its steps.
     pub steps: usize,
-    /// The step of the script after which it ended.
+    /// Number of the script's step after which it ended.
     pub after_step: usize,
-    /// What has ended it; none where it went all of its way.
+    /// The condition that was met; `None` if the line was carried out in full.
     pub met: Option<Met>,
 }
 
-/// One of several instruments at the end of a run.
+/// State of one of several instruments at the end of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentOutcome {
     /// Its name.
     pub name: String,
-    /// What its hand has done and feels.
+    /// Its motion and the reaction forces.
     #[serde(flatten)]
     pub report: InstrumentReport,
 }
 
-/// What ended a run.
+/// The reason for the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EndedBy {
-    /// All lines of the script went all of their way, or were ended by a condition that another line followed.
+    /// All script lines were carried out in full, or were ended by their condition with another line following.
     Script,
-    /// The condition of the last line: the tip is as near to its target as was asked for.
+    /// The condition of the last line: the tip came as near to its target as requested.
     Arrived,
-    /// The condition of the last line: the hand pushes as hard as was said.
+    /// The condition of the last line: the push force reached the given value.
     PushForce,
     /// The vessel is narrower than the device.
     Blocked,
-    /// The tip has left the vessel, farther than anything is known.
+    /// The tip has left the vessel and the region around it that is known.
     Left,
-    /// A step that found no equilibrium or could not be carried out.
+    /// A step found no equilibrium or could not be carried out.
     Failed,
     /// An interrupt.
     Interrupted,
-    /// What could not be written.
+    /// An output could not be written.
     Unrecorded,
 }
 
 impl EndedBy {
-    /// As it is written.
+    /// Name in outputs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Script => "script",
@@ -114,19 +114,20 @@ impl From<Met> for EndedBy {
     }
 }
 
-/// What ended a run early: no equilibrium, a recording or frame that could not be written, or an interrupt.
+/// The reason for an early end of a run: no equilibrium, a recording or frame that could not be written, or an
+/// interrupt.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepFailure {
     /// Number of the step, from 1.
     pub step: usize,
-    /// What was said.
+    /// The error message.
     pub reason: String,
-    /// What kind of end it is.
+    /// Its kind.
     pub kind: EndedBy,
 }
 
 impl StepFailure {
-    /// That of a step which the simulation or its script refused.
+    /// The failure of a step that the simulation or its script refused.
     pub fn new(step: usize, error: &Error) -> Self {
         let kind = match error {
             Error::End(PhysicalEnd::Blocked { .. }) => EndedBy::Blocked,
@@ -138,7 +139,7 @@ impl StepFailure {
 }
 
 impl RunOutcome {
-    /// That of a script of at most `steps_asked` steps after `steps` of them, which went as `tally` says.
+    /// The outcome of a script of at most `steps_asked` steps after `steps` of them, with the statistics `tally`.
     pub fn new(
         simulation: &Simulation,
         hand: &ScriptRun<'_>,

@@ -1,13 +1,13 @@
-//! Where results come from.
+//! Provenance of results.
 
 use sha2::{Digest, Sha256};
 
-/// The program that computes.
+/// The program that computes the results.
 #[derive(Debug, Clone, Copy)]
 pub struct Program {
     /// Its version.
     pub version: &'static str,
-    /// The revision of its source.
+    /// Git revision of its source.
     pub git_revision: &'static str,
 }
 
@@ -15,7 +15,7 @@ pub struct Program {
 pub fn hash_inputs(inputs: &[impl AsRef<[u8]>]) -> String {
     let mut hash = Sha256::new();
     for input in inputs.iter().map(AsRef::as_ref) {
-        // Lengths keep two inputs from hashing like their concatenation cut elsewhere.
+        // The lengths ensure that different splits of the same bytes have different hashes.
         hash.update((input.len() as u64).to_le_bytes());
         hash.update(input);
     }

@@ -1,4 +1,4 @@
-//! Rows: what is kept of each run.
+//! Rows: the results that are kept of each run.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
@@ -6,51 +6,51 @@ use toml::Value;
 
 use crate::outcome::RunOutcome;
 
-/// What is kept of a run: its parameters, what it has come to, and where that comes from. There are no times in it, so that a run that is
-/// done again gives the same bytes.
+/// The results of a run: its parameters, its outcome and its provenance. A row contains no times, so that a repeated
+/// run gives the same bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Number of the run, from 0.
     pub run: usize,
-    /// Values of the axes, in their order.
+    /// Values of the axes, in order.
     pub parameters: Vec<Json>,
-    /// What the run has come to; none where it could not begin.
+    /// Outcome; `None` if the run could not start.
     pub outcome: Option<RunOutcome>,
-    /// Why it could not begin.
+    /// Why the run could not start.
     pub refused: Option<String>,
-    /// SHA-256 of the scene as it was run and of the files that it names.
+    /// SHA-256 of the scene of the run and of the files that it names.
     pub scene_hash: String,
     /// Seed of the scene.
     pub seed: u64,
     /// Version of the program.
     pub version: String,
-    /// Revision of its source.
+    /// Git revision of its source.
     pub git_revision: String,
 }
 
 impl Row {
-    /// Why the run did not do all of its script.
+    /// Why the run did not complete its script.
     pub fn failure(&self) -> Option<&str> {
         let step = self.outcome.as_ref().and_then(|outcome| outcome.failure.as_ref());
         self.refused.as_deref().or(step.map(|failure| failure.reason.as_str()))
     }
 
-    /// Whether steps of the run were no equilibria.
+    /// Whether some steps of the run did not converge.
     pub fn is_unconverged(&self) -> bool {
         self.outcome.as_ref().is_some_and(|outcome| outcome.tally.unconverged_steps > 0)
     }
 }
 
-/// What of its columns a table has from its sweep.
+/// The columns of a table that depend on the sweep.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Columns {
-    /// Keys of the axes, and what their values are.
+    /// Keys of the axes, with the kinds of their values.
     pub(crate) parameters: Vec<(String, ParameterKind)>,
-    /// Names of several instruments.
+    /// Names of the instruments, if there are several.
     pub(crate) instruments: Vec<String>,
 }
 
-/// What the values of an axis are.
+/// Kind of an axis's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum ParameterKind {
@@ -58,7 +58,7 @@ pub(crate) enum ParameterKind {
     Integer,
     Number,
     Text,
-    /// Lists, tables, or values of several kinds: as JSON.
+    /// Lists, tables, or values of different kinds, as JSON.
     Json,
 }
 
@@ -79,7 +79,7 @@ impl ParameterKind {
     }
 }
 
-/// A value of a scene file as JSON.
+/// Converts a value of a scene file to JSON.
 pub(crate) fn json(value: &Value) -> Json {
     match value {
         Value::String(text) => Json::from(text.as_str()),

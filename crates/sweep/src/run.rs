@@ -14,7 +14,7 @@ use crate::provenance::{Program, hash_inputs};
 use crate::row::{Row, json};
 use crate::shared::Shared;
 
-/// One run: the scene of a sweep with a value for each axis.
+/// One run: the scene of a sweep with one value for each axis.
 #[derive(Debug, Clone)]
 pub struct Run<'a> {
     pub(crate) sweep: &'a Sweep,
@@ -22,9 +22,9 @@ pub struct Run<'a> {
     pub(crate) values: Vec<Value>,
 }
 
-/// Records runs of a sweep, on several threads at once. What it cannot write ends the sweep.
+/// Records runs of a sweep, on several threads at once. A recording that cannot be written ends the sweep.
 pub trait Record: Sync {
-    /// Begins the recording of a run, nothing inserted yet.
+    /// Begins the recording of a run, before anything is inserted.
     ///
     /// # Errors
     /// What cannot be written, and where.
@@ -34,7 +34,7 @@ pub trait Record: Sync {
 
 /// The recording of one run.
 pub trait Recorder {
-    /// Keeps a step, which ends at `time_s` where the script has speeds.
+    /// Records a step; it ends at `time_s` if the script has speeds.
     ///
     /// # Errors
     /// What cannot be written, and where.
@@ -55,13 +55,13 @@ pub trait Recorder {
 
 /// Why a run has no row.
 pub(crate) enum Interrupted {
-    /// It was asked to stop.
+    /// It was stopped on request.
     Stopped,
     /// It could not be recorded.
     Unrecorded(String),
 }
 
-/// What runs are carried out with.
+/// Resources shared by the runs of a sweep.
 pub(crate) struct Workshop<'a> {
     pub(crate) store: &'a (dyn WallStore + Sync),
     pub(crate) starts: &'a Shared<Simulation>,
@@ -71,7 +71,7 @@ pub(crate) struct Workshop<'a> {
 }
 
 impl Sweep {
-    /// The run of that number, from 0: the last axis goes fastest, and samples faster still.
+    /// The run with this number, from 0. The sample varies fastest, then the last axis.
     pub fn run(&self, number: usize) -> Run<'_> {
         let (mut rest, sample) = (number / self.samples, number % self.samples);
         let mut values: Vec<Value> = Vec::with_capacity(self.axes.len());
@@ -84,22 +84,22 @@ impl Sweep {
     }
 }
 
-/// Tables and keys of a scene that do not touch what is there at the start.
+/// Tables and keys of a scene that do not affect the initial state.
 const LATER: [&str; 4] = ["name", "seed", "script", "view"];
 
 /// Keys of a scene file whose values are paths.
 const PATHS: [&str; 3] = ["file", "tree", "centreline"];
 
 impl Run<'_> {
-    /// Its number in the sweep, from 0.
+    /// Number in the sweep, from 0.
     pub fn number(&self) -> usize {
         self.number
     }
 
-    /// The scene as a file that may lie anywhere: its paths are absolute.
+    /// The scene as a file that is valid in any folder: its paths are absolute.
     ///
     /// # Errors
-    /// Values of several axes that do not go together.
+    /// Values of several axes that are incompatible.
     pub fn standalone(&self) -> Result<String> {
         let path = self.sweep.scene_path();
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -109,7 +109,7 @@ impl Run<'_> {
         scene.text()
     }
 
-    /// Carries it out; what fails is in its row.
+    /// Carries out the run; failures are reported in its row.
     pub(crate) fn carry_out(&self, workshop: &Workshop<'_>) -> std::result::Result<Row, Interrupted> {
         let mut row = self.row(workshop.program, None);
         match self.begin(workshop, &mut row) {
@@ -119,7 +119,7 @@ impl Run<'_> {
         Ok(row)
     }
 
-    /// Its row before anything is known of it.
+    /// The row of a run without results.
     pub(crate) fn row(&self, program: Program, refused: Option<String>) -> Row {
         Row {
             run: self.number,
@@ -182,7 +182,7 @@ impl Run<'_> {
             steps += 1;
             tally.count(steps, &simulation);
             if let Some(recorder) = &mut recorder {
-                // What comes next is asked twice, and changes nothing.
+                // Looks one step ahead on a copy, which changes nothing.
                 let last = matches!(hand.clone().next(&simulation), Ok(None));
                 recorder
                     .step(&step.moves, step.time_s, last, &simulation)
@@ -197,7 +197,7 @@ impl Run<'_> {
     }
 }
 
-/// Makes the paths in a scene start from the root.
+/// Makes the paths in a scene absolute.
 fn make_absolute(place: &mut Value, folder: &Path) {
     match place {
         Value::Table(table) => {

@@ -1,18 +1,18 @@
-//! Bytes with a hash at their end, which tells whether they are whole and as they were written; and hashes as text.
+//! Bytes followed by their hash, which reveals truncation and corruption; and hashes as text.
 
 use sha2::{Digest, Sha256};
 
-/// Bytes of a hash.
+/// Length of a hash in bytes.
 pub const BYTES: usize = 32;
 
-/// Bytes and their hash.
+/// Appends the hash to bytes.
 pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let hash = Sha256::digest(&bytes);
     bytes.extend(hash);
     bytes
 }
 
-/// The bytes before the hash, if it is theirs.
+/// The bytes without their hash; `None` if the hash does not match.
 pub fn opened(bytes: &[u8]) -> Option<&[u8]> {
     let (body, hash) = bytes.split_last_chunk::<BYTES>()?;
     (Sha256::digest(body).as_slice() == hash).then_some(body)

@@ -1,39 +1,39 @@
-//! Parts of a sweep that are carried out apart from each other.
+//! Shards: parts of a sweep that are carried out independently.
 
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// One of several parts of a sweep: every so manieth run.
+/// One of `count` parts of a sweep: every `count`-th run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// Its number, from 1.
+    /// Number of this shard, from 1.
     number: usize,
-    /// How many there are.
+    /// Number of shards.
     count: usize,
 }
 
 impl Default for Shard {
-    /// The only one: all of the sweep.
+    /// The whole sweep as one shard.
     fn default() -> Self {
         Self { number: 1, count: 1 }
     }
 }
 
 impl Shard {
-    /// Whether a run belongs to it.
+    /// Whether a run belongs to this shard.
     pub(crate) fn has(self, run: usize) -> bool {
         run % self.count == self.number - 1
     }
 
-    /// The name of a file of it.
+    /// Name of this shard's file with an extension.
     pub(crate) fn file_name(self, ending: &str) -> String {
         let Self { number, count } = self;
         if count == 1 { format!("{STEM}.{ending}") } else { format!("{STEM}-{number}-of-{count}.{ending}") }
     }
 }
 
-/// How files of rows begin.
+/// Common start of the names of files with rows.
 pub(crate) const STEM: &str = "runs";
 
 impl FromStr for Shard {

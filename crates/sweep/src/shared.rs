@@ -1,4 +1,4 @@
-//! What several runs have in common, made once.
+//! Data that several runs share and that are computed once.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,9 +7,9 @@ use endowire_core::Result;
 use endowire_core::vessel::{CentrelineRecipe, CentrelineTree, Wall, WallRecipe, WallStore};
 use sha2::{Digest, Sha256};
 
-/// Things that several threads want, found by what they are made of; as many as were wanted last are kept.
+/// A cache for several threads; it keeps the most recently used values, by key.
 pub(crate) struct Shared<T> {
-    /// The latest first.
+    /// Most recently used first.
     entries: Mutex<VecDeque<Entry<T>>>,
     most: usize,
 }
@@ -17,15 +17,16 @@ pub(crate) struct Shared<T> {
 type Entry<T> = ([u8; 32], Arc<Mutex<Option<T>>>);
 
 impl<T: Clone> Shared<T> {
-    /// Keeps the last `most`.
+    /// Creates a cache of at most `most` values.
     pub(crate) fn new(most: usize) -> Self {
         Self { entries: Mutex::new(VecDeque::new()), most }
     }
 
-    /// The one that is made of `key`. Others who want it wait while it is made; those who want another do not.
+    /// Returns the value for `key`, computed by `make` if necessary. Threads that want the same value wait meanwhile;
+    /// others do not.
     pub(crate) fn get(&self, key: &[u8], make: impl FnOnce() -> Result<T>) -> Result<T> {
         let entry = self.entry(Sha256::digest(key).into());
-        // One that could not be made is made again: it fails again.
+        // Failures are not cached: a second attempt fails again.
         let mut made = entry.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(made) = &*made {
             return Ok(made.clone());
@@ -46,7 +47,7 @@ impl<T: Clone> Shared<T> {
     }
 }
 
-/// Walls and centre lines of another store, the latest of them in memory.
+/// An in-memory cache of walls and centre lines above another store.
 pub(crate) struct SharedWalls<'a> {
     below: &'a (dyn WallStore + Sync),
     walls: Shared<Wall>,
@@ -54,7 +55,7 @@ pub(crate) struct SharedWalls<'a> {
 }
 
 impl<'a> SharedWalls<'a> {
-    /// Keeps the last `most` of `below`.
+    /// Caches the last `most` values of `below`.
     pub(crate) fn new(below: &'a (dyn WallStore + Sync), most: usize) -> Self {
         Self { below, walls: Shared::new(most), centrelines: Shared::new(most) }
     }

@@ -1,4 +1,4 @@
-//! Rows as one Parquet file.
+//! Rows as a Parquet file.
 
 use std::fs::File;
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::outcome::{InstrumentOutcome, RunOutcome};
 use crate::row::{Columns, ParameterKind, Row};
 use crate::whole;
 
-/// The values of a column, one a row.
+/// The values of a column, one per row.
 enum Cells {
     Booleans(Vec<Option<bool>>),
     Integers(Vec<Option<i64>>),
@@ -25,7 +25,7 @@ enum Cells {
 }
 
 impl Cells {
-    /// The value of a row; empty where there is none.
+    /// The value of a row as text; empty if missing.
     fn text(&self, row: usize) -> String {
         match self {
             Self::Booleans(cells) => cells[row].map(|v| v.to_string()),
@@ -42,7 +42,7 @@ struct Column {
     cells: Cells,
 }
 
-/// Writes rows in the order of their runs into a file that is there whole or not at all.
+/// Writes rows, in order of runs, to a file that is written completely or not at all.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -55,7 +55,7 @@ pub(crate) fn write(path: &Path, columns: &Columns, rows: &[Row]) -> Result<()> 
     written.map_err(|e| Error::file(path, e))
 }
 
-/// Names of all columns, and rows of their values as texts.
+/// Names of all columns, and the rows with their values as text.
 pub(crate) fn as_texts(columns: &Columns, rows: &[Row]) -> (Vec<String>, Vec<Vec<String>>) {
     let columns = self::columns(columns, rows);
     let row = |index: usize| columns.iter().map(|column| column.cells.text(index)).collect();
@@ -74,7 +74,7 @@ fn columns(columns: &Columns, rows: &[Row]) -> Vec<Column> {
         all.extend(instrument(name, index, rows));
     }
     all.push(texts("scene_hash", rows, |row| Some(row.scene_hash.clone())));
-    // An axis may be the scene's seed.
+    // An axis may vary the scene's seed; then the column exists already.
     if columns.parameters.iter().all(|(key, _)| key != "seed") {
         all.push(integers("seed", rows, |row| i64::try_from(row.seed).ok()));
     }
@@ -83,7 +83,7 @@ fn columns(columns: &Columns, rows: &[Row]) -> Vec<Column> {
     all
 }
 
-/// The values of an axis.
+/// The column of an axis.
 fn parameter(key: &str, kind: ParameterKind, rows: &[Row], index: usize) -> Column {
     let value = |row: &Row| row.parameters[index].clone();
     match kind {
@@ -98,7 +98,7 @@ fn parameter(key: &str, kind: ParameterKind, rows: &[Row], index: usize) -> Colu
     }
 }
 
-/// What runs have come to.
+/// The columns of outcomes.
 fn results(rows: &[Row]) -> Vec<Column> {
     let integer = |name: &str, of: fn(&RunOutcome) -> Option<i64>| {
         integers(name, rows, |row| row.outcome.as_ref().and_then(of))
@@ -146,7 +146,7 @@ fn results(rows: &[Row]) -> Vec<Column> {
     ]
 }
 
-/// What one of several instruments has come to.
+/// The columns of one of several instruments.
 fn instrument(name: &str, index: usize, rows: &[Row]) -> Vec<Column> {
     let number = |what: &str, of: fn(&InstrumentOutcome) -> Option<f64>| {
         let one =
@@ -174,7 +174,7 @@ fn texts(name: &str, rows: &[Row], of: impl Fn(&Row) -> Option<String>) -> Colum
     Column { name: name.to_owned(), cells: Cells::Texts(rows.iter().map(of).collect()) }
 }
 
-/// Writes one group of rows.
+/// Writes all rows as one row group.
 fn write_to(file: File, columns: &[Column]) -> ParquetResult<()> {
     let types = columns.iter().map(Column::parquet_type).collect::<ParquetResult<Vec<TypePtr>>>()?;
     let schema = Type::group_type_builder("runs").with_fields(types).build()?;
@@ -186,7 +186,7 @@ fn write_to(file: File, columns: &[Column]) -> ParquetResult<()> {
         }
     }
     group.close()?;
-    // Ends the file with its footer.
+    // Writes the footer.
     writer.into_inner()?.sync_all()?;
     Ok(())
 }
@@ -219,7 +219,7 @@ impl Column {
     }
 }
 
-/// Writes the values that are there, and where they are.
+/// Writes the values that exist, with their definition levels.
 fn write_cells<T: DataType>(
     mut writer: SerializedColumnWriter<'_>,
     cells: impl Iterator<Item = Option<T::T>>,

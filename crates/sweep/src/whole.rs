@@ -1,20 +1,21 @@
-//! Files that are there whole or not at all: written beside their place, then renamed into it.
+//! Atomic writing of files: a file is written under a temporary name and then renamed, so that it is complete or
+//! absent.
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// What a file is called until it is whole.
+/// Temporary name of a file until it is complete.
 pub fn unfinished(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     name.into()
 }
 
-/// Writes a file with `write`, which gets the path to write to; its failure leaves nothing.
+/// Writes a file with `write`, which gets the path to write to. A failure leaves no file.
 ///
 /// # Errors
-/// What `write` says, and a file that cannot be put into its place.
+/// Those of `write`, and a file that cannot be renamed.
 pub fn write(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
     let part = unfinished(path);
     let written = write(&part).and_then(|()| std::fs::rename(&part, path));
@@ -24,19 +25,19 @@ pub fn write(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Re
     written
 }
 
-/// Removes a file, if it is there.
+/// Removes a file if it exists.
 ///
 /// # Errors
-/// One that cannot be removed.
+/// A file that cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
     match std::fs::remove_file(path) {
-        // The second is what a path through something that is no folder gives.
+        // `NotADirectory`: the path leads through something that is not a folder.
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(()),
         other => other,
     }
 }
 
-/// Writes bytes, and waits for the disk before they take the place of what was there.
+/// Writes bytes and syncs them to disk before they replace an existing file.
 ///
 /// # Errors
 /// As [`write()`].

@@ -1,4 +1,4 @@
-//! The runs of a sweep on several threads.
+//! Runs a sweep on several threads.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -19,34 +19,34 @@ use crate::table;
 
 /// How a sweep is carried out. The table does not depend on it.
 pub struct Order<'a> {
-    /// Where rows, table and recordings go; made if it is not there.
+    /// Folder for rows, table and recordings; created if missing.
     pub folder: &'a Path,
-    /// The part of the sweep to do.
+    /// The part of the sweep to carry out.
     pub shard: Shard,
-    /// Runs at the same time; the number of cores if absent.
+    /// Number of simultaneous runs; by default the number of cores.
     pub jobs: Option<usize>,
-    /// Where walls that take long to make are kept.
+    /// Store for walls that take long to compute.
     pub store: &'a (dyn WallStore + Sync),
-    /// The program that computes.
+    /// The program that computes the results.
     pub program: Program,
-    /// What records runs, if they are recorded.
+    /// The recorder of runs, if they are recorded.
     pub record: Option<&'a dyn Record>,
-    /// Set when no more is to be done: what is under way is dropped, and done when the sweep goes on.
+    /// Set to stop the sweep: unfinished runs are dropped and repeated when the sweep resumes.
     pub stop: &'a AtomicBool,
-    /// Told at the beginning and after each run.
+    /// Called at the beginning and after each run.
     pub progress: &'a (dyn Fn(Progress) + Sync),
 }
 
-/// How far a sweep is.
+/// Progress of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Runs to do in all.
+    /// Number of runs to carry out.
     pub runs: usize,
-    /// Those that have a row.
+    /// Number of runs with a row.
     pub done: usize,
-    /// Those of them that failed.
+    /// Number of these that failed.
     pub failed: usize,
-    /// Those of them with steps that are no equilibria.
+    /// Number of these with steps that did not converge.
     pub unconverged: usize,
 }
 
@@ -61,23 +61,24 @@ impl Progress {
     }
 }
 
-/// What has come of a sweep.
+/// Result of carrying out a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Told {
-    /// How far it is.
+    /// Progress.
     pub progress: Progress,
-    /// Runs that had a row before.
+    /// Number of runs that had a row before.
     pub earlier: usize,
-    /// The table; none where runs are left to do.
+    /// Path of the table; `None` if runs are left.
     pub table: Option<PathBuf>,
 }
 
 impl Sweep {
-    /// Does the runs of a sweep, or of a shard of it, that have no row yet, and writes the table when all have one. May be called again after it
-    /// was stopped or killed.
+    /// Carries out the runs of a sweep, or of a shard, that have no row yet, and writes the table when all have one.
+    /// It can be called again after an interruption.
     ///
     /// # Errors
-    /// A folder that cannot be written or holds another sweep; a run that cannot be recorded. What fails in a run is in its row.
+    /// A folder that cannot be written or holds another sweep; a run that cannot be recorded. Failures within a run
+    /// are reported in its row.
     pub fn carry_out(&self, order: &Order<'_>) -> Result<Told> {
         std::fs::create_dir_all(order.folder).map_err(|e| Error::file(order.folder, e))?;
         let header = Header::new(self.hash().to_owned(), self.len(), order.shard, self.columns().clone());
@@ -98,12 +99,12 @@ impl Sweep {
         }
         rows.sort_by_key(|row| row.run);
         let path = order.folder.join(order.shard.file_name("parquet"));
-        // What cannot be written now could be when the folder was made.
+        // A computation error rather than bad input: the folder was writable at the start.
         table::write(&path, self.columns(), &rows).map_err(|error| Error::Computation(error.to_string()))?;
         Ok(Told { progress, earlier, table: Some(path) })
     }
 
-    /// Does these runs, in this order as far as there are threads; their rows.
+    /// Carries out these runs, started in this order; returns their rows.
     fn work(
         &self,
         runs: &[usize],
@@ -113,10 +114,10 @@ impl Sweep {
     ) -> Result<Vec<Row>> {
         let available = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = order.jobs.unwrap_or(available).clamp(1, runs.len().max(1));
-        // Neighbours share what they have in common, and as many neighbourhoods are under way as threads.
+        // Neighbouring runs share data, and each thread works on its own neighbourhood.
         let walls = SharedWalls::new(order.store, 2 * threads + 2);
         let starts = Shared::new(threads + 1);
-        // Stopped by the caller, or by a failure of another thread.
+        // Set when the caller stops the sweep or another thread fails.
         let broken = AtomicBool::new(false);
         let workshop = Workshop {
             store: &walls,
@@ -160,7 +161,7 @@ impl Sweep {
         error.map_or(Ok(rows), Err)
     }
 
-    /// The row of a run. One that panics must not take the others with it.
+    /// The row of a run. A panic in one run must not end the others.
     fn row(&self, number: usize, workshop: &Workshop<'_>) -> std::result::Result<Row, Interrupted> {
         let run = self.run(number);
         let carried_out = catch_unwind(AssertUnwindSafe(|| run.carry_out(workshop)));

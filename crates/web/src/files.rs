@@ -1,4 +1,4 @@
-//! A `Map` of JavaScript as files.
+//! A JavaScript `Map` as a set of files.
 
 use endowire_core::file::InMemory;
 use js_sys::{Map, Uint8Array};
@@ -6,10 +6,10 @@ use wasm_bindgen::prelude::*;
 
 use crate::thrown;
 
-/// Files by their paths.
+/// Converts a map from paths to contents.
 ///
 /// # Errors
-/// A key that is no string, or a value that is no `Uint8Array`.
+/// A key that is not a string, or a value that is not a `Uint8Array`.
 pub(crate) fn of_map(map: &Map) -> Result<InMemory, JsError> {
     let mut files = InMemory::default();
     for entry in map.entries() {

@@ -13,7 +13,7 @@ pub struct Graphics(Rc<endowire_viewer::Graphics>);
 
 #[wasm_bindgen]
 impl Graphics {
-    /// Opens the graphics processor that the browser offers.
+    /// Opens the browser's graphics processor.
     ///
     /// # Errors
     /// Why there is none.
@@ -21,7 +21,7 @@ impl Graphics {
         endowire_viewer::Graphics::open().await.map(|graphics| Self(Rc::new(graphics))).map_err(thrown)
     }
 
-    /// Its name, for people.
+    /// Its name, for display.
     #[wasm_bindgen(getter)]
     pub fn name(&self) -> String {
         self.0.name().to_owned()

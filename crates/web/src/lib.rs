@@ -1,8 +1,9 @@
-//! endowire in a browser: what a page, or a program in JavaScript, sees of scenes and sessions.
+//! endowire in a browser: scenes and sessions for pages and programs in JavaScript.
 //!
-//! Nothing is computed here. A [`Session`] takes the inputs of `endowire_play` as objects, lets time go by, and tells readouts, shapes and
-//! pictures, and of a training subject its task and its score; a [`Surface`] says of a file what can be done with it. There is no file system: files are a
-//! `Map` from their paths to their bytes, and [`missing_files`] tells which are needed.
+//! Nothing is computed here. A [`Session`] takes the inputs of `endowire_play` as objects, advances in ticks, and
+//! gives readouts, shapes and pictures, and for a training subject its task and its score. A [`Surface`] checks
+//! whether a file is usable as a vessel. There is no file system: files are a `Map` from paths to bytes, and
+//! [`missing_files`] lists those that are needed.
 
 mod files;
 mod graphics;
@@ -32,34 +33,35 @@ extern "C" {
     fn console_error(text: &str);
 }
 
-/// Has a panic tell the console what it was; the module is of no use after one.
+/// Prints panics to the console; the module is unusable after a panic.
 #[wasm_bindgen(start)]
 fn start() {
     std::panic::set_hook(Box::new(|panic| console_error(&panic.to_string())));
 }
 
-/// An error as JavaScript throws it, in the words of the core.
+/// A JavaScript error with the message of an error of the core.
 fn thrown(error: impl std::fmt::Display) -> JsError {
     JsError::new(&error.to_string())
 }
 
-/// A value as the object that its JSON says.
+/// Converts a value to a JavaScript object, through JSON.
 fn object(value: &impl Serialize) -> Result<JsValue, JsError> {
     let text = serde_json::to_string(value).map_err(thrown)?;
     js_sys::JSON::parse(&text).map_err(|_| thrown("an object cannot be made"))
 }
 
-/// The value that the JSON of an object says.
+/// Converts a JavaScript object to a value, through JSON.
 fn value<T: DeserializeOwned>(object: &JsValue) -> Result<T, JsError> {
     let text = js_sys::JSON::stringify(object).ok().and_then(|text| text.as_string());
     serde_json::from_str(&text.unwrap_or_default()).map_err(thrown)
 }
 
-/// Paths of the files that a scene or a training subject at `path` needs and that are not among `files`, as far as those tell: ask again with
-/// these until nothing is missing. Each path is as `new Session` looks for it.
+/// Paths of the files that a scene or a training subject at `path` needs and that are missing in `files`. Files may
+/// name further files, so call it again with these added until nothing is missing. `new Session` looks up files by
+/// these paths.
 ///
 /// # Errors
-/// Names file, line and key of what is wrong in one of them.
+/// Names file, line and key of an error in one of the files.
 #[wasm_bindgen(js_name = missingFiles, unchecked_return_type = "string[]")]
 pub fn missing_files(
     #[wasm_bindgen(unchecked_param_type = "Map<string, Uint8Array>")] files: &Map,
@@ -70,10 +72,10 @@ pub fn missing_files(
     Ok(missing.iter().map(|path| JsValue::from(path.display().to_string())).collect())
 }
 
-/// Keys of a session with what they do, for people: of the keyboard, and of a gamepad.
+/// Keys and gamepad controls of a session with their effects, for display.
 ///
 /// # Errors
-/// None in a browser that is whole.
+/// None in a working browser.
 #[wasm_bindgen(unchecked_return_type = "{ keyboard: [string, string][], gamepad: [string, string][] }")]
 pub fn keys() -> Result<JsValue, JsError> {
     #[derive(Serialize)]

@@ -1,4 +1,4 @@
-//! What a file of a page opens: a scene, or a training subject in its scene.
+//! Opens a file on a page: a scene, or a training subject with its scene.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,28 +9,28 @@ use endowire_core::file::{Files, InMemory};
 use endowire_methods::{Scene, Setting, scene_with_of};
 use endowire_viewer::ViewSpec;
 
-/// Largest text that is looked at whether it is a subject, bytes: input files are no larger.
+/// Size limit of a scene or subject file, bytes.
 const LARGEST_TEXT: u64 = 16 << 20;
 
-/// A scene, with what a subject sets of it and asks for.
+/// A scene, with the settings and the task of a subject.
 #[derive(Debug)]
 pub(crate) struct Opened {
-    /// The scene's file.
+    /// File of the scene.
     pub(crate) scene: PathBuf,
-    /// Its keys that have other values.
+    /// Overridden keys of the scene.
     pub(crate) settings: Vec<Setting>,
-    /// What is to be done, if it is a subject.
+    /// The subject, if there is one.
     pub(crate) subject: Option<Subject>,
 }
 
 impl Opened {
-    /// What the file at `path` opens.
+    /// Opens the file at `path`.
     ///
     /// # Errors
-    /// What is wrong in a subject, by file and key.
+    /// Errors in a subject, by file and key.
     pub(crate) fn of(files: &InMemory, path: &Path) -> Result<Self> {
         let bytes = files.read(path, LARGEST_TEXT)?;
-        // What is no text the reader of scenes tells.
+        // If it is not text, the reader of scenes reports that.
         let text = std::str::from_utf8(&bytes).unwrap_or_default();
         if !Subject::is_meant(text) {
             return Ok(Self { scene: path.to_owned(), settings: vec![], subject: None });
@@ -40,13 +40,13 @@ impl Opened {
         Ok(Self { scene: subject.resolve(&subject.scene), settings, subject: Some(subject) })
     }
 
-    /// The script by which the subject can be done, where that is not the scene's.
+    /// The script that solves the subject, unless it is the scene's own.
     pub(crate) fn reference(&self) -> Option<PathBuf> {
         let subject = self.subject.as_ref()?;
         Some(subject.resolve(subject.reference.as_ref()?))
     }
 
-    /// The scene.
+    /// Reads the scene.
     ///
     /// # Errors
     /// As [`scene_with_of`].
@@ -54,7 +54,7 @@ impl Opened {
         scene_with_of(files.clone(), &self.scene, &self.settings, |scene| self.view(scene).map(drop))
     }
 
-    /// Its table `[view]`.
+    /// The `[view]` table of the scene.
     ///
     /// # Errors
     /// As [`ViewSpec::of_scene`].
@@ -63,10 +63,10 @@ impl Opened {
     }
 }
 
-/// Paths of the files that the one at `path` needs and that are not there, as far as those that are there tell.
+/// Paths of the files that the one at `path` needs and that are missing, as far as the available files name them.
 ///
 /// # Errors
-/// Names file, line and key of what is wrong in one of them.
+/// Names file, line and key of an error in one of them.
 pub(crate) fn missing(files: &Arc<InMemory>, path: &Path) -> Result<Vec<PathBuf>> {
     let missing = |mut needed: Vec<PathBuf>| {
         needed.sort();
@@ -83,7 +83,7 @@ pub(crate) fn missing(files: &Arc<InMemory>, path: &Path) -> Result<Vec<PathBuf>
     if !own.is_empty() {
         return Ok(own);
     }
-    // A setting may lie in a device file, which the scene itself names.
+    // A setting may refer to a device file that the scene itself names.
     let plain = missing(Scene::read_of(files.clone(), &opened.scene)?.input_paths());
     if !plain.is_empty() {
         return Ok(plain);
@@ -98,7 +98,7 @@ pub(crate) fn missing(files: &Arc<InMemory>, path: &Path) -> Result<Vec<PathBuf>
 mod tests {
     use super::*;
 
-    /// A subject of `assets` with all that it asks for, a round after the other.
+    /// A subject from `assets` with all files that it needs, and the files that were missing in each round.
     fn gathered(path: &str) -> (Arc<InMemory>, Vec<Vec<PathBuf>>) {
         let assets = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets"));
         let mut files = Arc::new(InMemory::default());
@@ -125,7 +125,7 @@ mod tests {
         assert!(all.iter().any(|one| one.ends_with("vessels/straight_tube.stl")), "{all:?}");
         let opened = Opened::of(&files, Path::new(path)).unwrap();
         assert_eq!(opened.read(&files).unwrap().name, "straight_tube");
-        // A scene is itself, and sets nothing.
+        // A scene opens as itself, without settings.
         let scene = opened.scene.to_str().unwrap();
         let plain = Opened::of(&gathered(scene).0, &opened.scene).unwrap();
         assert!(plain.subject.is_none() && plain.settings.is_empty());

@@ -2,7 +2,7 @@
 
 use endowire_play::{Button, Pad};
 
-/// Buttons in the order of the layout; those it has and sessions do not are none.
+/// Buttons in the order of the layout; `None` for those that sessions do not use.
 const BUTTONS: [Option<Button>; 16] = [
     Some(Button::Lower),
     Some(Button::Right),
@@ -22,7 +22,8 @@ const BUTTONS: [Option<Button>; 16] = [
     Some(Button::CrossRight),
 ];
 
-/// How a gamepad is held: numbers of pressed buttons, and how far the left stick leans up and the right one to the right, −1 to 1.
+/// State of a gamepad: indices of pressed buttons, and the deflections of the left stick upwards and of the right
+/// stick to the right, −1 to 1.
 pub(crate) fn held(pressed: &[u8], up: f64, right: f64) -> Pad {
     let down = pressed.iter().filter_map(|number| *BUTTONS.get(usize::from(*number))?).collect();
     Pad { up, right, down }

@@ -1,4 +1,4 @@
-//! A session with its pictures and keys, from files in memory.
+//! A session with its pictures and keys, made from files in memory.
 
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -21,37 +21,37 @@ use serde_json::{Value, json};
 use crate::opened::Opened;
 use crate::three_d::ThreeD;
 
-/// A session as a page shows it.
+/// A session on a page.
 #[derive(Debug)]
 pub(crate) struct Played {
     pub(crate) session: Session,
     pub(crate) keys: Keys,
-    /// The scene's file, and its keys that have other values.
+    /// File of the scene, and its overridden keys.
     scene_path: PathBuf,
     settings: Vec<Setting>,
-    /// The script that was given, or else that of the subject or the scene.
+    /// The script that was given, otherwise that of the subject or the scene.
     script: Script,
-    /// Where a report of it comes from, and what it has of the steps.
+    /// Provenance of a report of the session, and its data of the steps.
     provenance: Value,
     recorder: Recorder,
-    /// Steps that it has.
+    /// Number of steps in the recorder.
     noted: usize,
     pictures: Pictures,
     three_d: ThreeD,
-    /// What pictures are made of, for a graphics processor.
+    /// Copies for drawing on a graphics processor.
     pushed: Pushed,
     wall: Wall,
 }
 
-/// The file whose script takes the place of any other, where there is one.
+/// Name of a file whose script overrides any other.
 pub(crate) const SCRIPT: &str = "script.toml";
 
 impl Played {
-    /// What the file at `path` of `files` opens, with pictures of so many pixels a side: a scene, or a subject, whose script is not shown.
-    /// With the script of [`SCRIPT`], which is shown in either, if that is among the files.
+    /// Opens the file at `path`, with pictures of `side_px` pixels a side: a scene, or a subject, whose script cannot
+    /// be played. If `files` contains [`SCRIPT`], that script is used, and can be played in either case.
     ///
     /// # Errors
-    /// As those of subjects, scenes, simulations and pictures: what is wrong in which file, by key.
+    /// As those of subjects, scenes, simulations and pictures, by file and key.
     pub(crate) fn new(files: &Arc<InMemory>, path: &Path, side_px: u32) -> Result<Self> {
         let opened = Opened::of(files, path)?;
         let mut scene = opened.read(files)?;
@@ -100,12 +100,12 @@ impl Played {
         })
     }
 
-    /// The same with the script by which a subject can be done.
+    /// Makes the script playable that solves the subject.
     pub(crate) fn watched(self) -> Self {
         Self { session: self.session.with_script(self.script.clone()), ..self }
     }
 
-    /// What is assessed of it, with the scene's file seen from where `folder` is, recorded at this time.
+    /// The session file for assessment, recorded at this time; the scene's path is relative to `folder`.
     pub(crate) fn session_file(&self, folder: &Path, recorded_unix_s: Option<u64>) -> SessionFile {
         SessionFile {
             scene_file: folder.join(&self.scene_path),
@@ -115,20 +115,20 @@ impl Played {
         }
     }
 
-    /// The head of its script where that stands in `file`, likewise.
+    /// The head of its script saved as `file`; the scene's path is relative to `folder`.
     pub(crate) fn script_head(&self, folder: &Path, file: &Path) -> String {
         script_head(&folder.join(&self.scene_path), &self.settings, file)
     }
 
-    /// Takes what keys have come to.
+    /// Applies the inputs produced by keys.
     pub(crate) fn take(&mut self, inputs: &[Input]) {
         for input in inputs {
-            // What is refused is an event of the session.
+            // A refused input becomes an event of the session.
             let _ = self.apply(input);
         }
     }
 
-    /// Takes an input.
+    /// Applies an input.
     ///
     /// # Errors
     /// As [`Session::apply`].
@@ -138,13 +138,13 @@ impl Played {
         done
     }
 
-    /// A sixtieth of a second goes by.
+    /// Advances by 1/60 s.
     pub(crate) fn tick(&mut self) {
         self.session.tick();
         self.note();
     }
 
-    /// Keeps what a report has of a step that was done, or forgets what was undone.
+    /// Records the current step for a report, or drops steps that were undone.
     fn note(&mut self) {
         let steps = self.session.steps();
         if steps != self.noted {
@@ -153,7 +153,7 @@ impl Played {
         }
     }
 
-    /// What a page shows of the session so far, with these pictures of it.
+    /// The data of a report of the session so far, with these pictures.
     ///
     /// # Errors
     /// [`Error::Parameter`] before the first step.
@@ -197,7 +197,7 @@ impl Played {
         self.drawn(Pictures::fluoro)
     }
 
-    /// The same without delay: a coarse one where the room has just changed.
+    /// The same without delay: coarse pictures just after a change of the room.
     ///
     /// # Errors
     /// As [`Pictures::soon`].
@@ -217,7 +217,7 @@ impl Played {
         Ok(images)
     }
 
-    /// What the sharp picture of a room needs that has come to rest.
+    /// The computations for sharp pictures, once the room no longer changes.
     ///
     /// # Errors
     /// As [`Pictures::sharpenings`].
@@ -225,7 +225,7 @@ impl Played {
         self.pictures.sharpenings(&self.session.snapshot())
     }
 
-    /// Takes what was computed of it.
+    /// Takes the result of such a computation.
     ///
     /// # Errors
     /// As [`Pictures::sharpened`].
@@ -233,7 +233,7 @@ impl Played {
         self.pictures.sharpened(done)
     }
 
-    /// The 3D view, where it is another than the last time; one that a graphics processor draws comes with a later call.
+    /// The 3D view, if it differs from the last one. From a graphics processor it arrives in a later call.
     ///
     /// # Errors
     /// As [`Pictures::three_d`].
@@ -241,36 +241,36 @@ impl Played {
         self.three_d.next(&self.session.snapshot(), &mut self.pictures)
     }
 
-    /// Has the 3D view drawn by a graphics processor from now on.
+    /// Draws the 3D view on a graphics processor from now on.
     pub(crate) fn three_d_by(&mut self, graphics: Rc<Graphics>) {
         self.three_d.draw_by(graphics, self.pushed.clone(), self.wall.clone());
     }
 
-    /// Has the 3D view drawn by the processor from now on.
+    /// Draws the 3D view on the processor from now on.
     pub(crate) fn three_d_here(&mut self) {
         self.three_d.draw_here();
     }
 
-    /// What draws the 3D view, for people.
+    /// Name of the backend that draws the 3D view.
     pub(crate) fn three_d_backend(&self) -> String {
         self.three_d.backend()
     }
 
-    /// What draws the fluoroscopic picture, for people; nothing before the first.
+    /// Name of the backend that draws the fluoroscopic picture; `None` before the first picture.
     pub(crate) fn backend(&self) -> Option<&str> {
         self.pictures.backend()
     }
 }
 
-/// The `[view]` table of a scene as a page can draw it, with what medium flows along.
+/// Adapts the `[view]` table of a scene to a page, and reads the centre line along which contrast medium flows.
 fn view(mut view: ViewSpec, files: &dyn Files) -> Result<ViewSpec> {
     if let Some(ct) = &view.patient.ct {
         let mend = "tomograms are read by the program alone: leave [view.patient.ct] out here";
         return Err(Error::parameter("view.patient.ct.file", ct.file.display(), mend));
     }
-    // No graphics processor of a page answers at once.
+    // Graphics processors in a browser answer asynchronously.
     view.backend = Backend::Cpu;
-    // The viewer reads from a file system, and there is none.
+    // The viewer reads from a file system, which does not exist here.
     if let Some(tree) = view.flow.tree.take() {
         view.flow.centreline = Some(Arc::new(CentrelineTree::read_of(files, &tree)?));
     }

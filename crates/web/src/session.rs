@@ -21,24 +21,26 @@ use crate::{files, object, pad, thrown, value};
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &'static str = include_str!("types.d.ts");
 
-/// Instruments moved by hand under fluoroscopy: inputs and ticks in, readouts, shapes and pictures out. It knows no clock.
+/// An interactive session under fluoroscopy. Inputs and ticks go in; readouts, shapes and pictures come out. It uses
+/// no clock.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Session {
     played: Played,
     pad: Pad,
     graphics: Option<Rc<endowire_viewer::Graphics>>,
-    /// Sharp pictures that a graphics processor has answered meanwhile.
+    /// Sharp pictures that a graphics processor has completed.
     sharpened: Rc<RefCell<Vec<Sharpened>>>,
 }
 
 #[wasm_bindgen]
 impl Session {
-    /// A session of the scene or the training subject at `path` of `files`, with the script of `script.toml` in place of its own if that is among them.
-    /// Pictures have `side` pixels a side. The script of a subject is not shown, unless it is given or the session is `watched`.
+    /// A session of the scene or the training subject at `path` of `files`, with pictures of `side` pixels a side.
+    /// The script in `script.toml`, if it is among the files, overrides the scene's own. The script of a subject
+    /// cannot be played, unless it is given or the session is `watched`.
     ///
     /// # Errors
-    /// What is wrong in which file, by line and key.
+    /// Names file, line and key of an error.
     #[wasm_bindgen(constructor)]
     pub fn new(
         #[wasm_bindgen(unchecked_param_type = "Map<string, Uint8Array>")] files: &Map,
@@ -50,22 +52,23 @@ impl Session {
         Ok(Self { played, pad: Pad::default(), graphics: None, sharpened: Rc::default() })
     }
 
-    /// The same session with the script by which its subject can be done, which `{ do: "script" }` shows. This one is of no use any more.
+    /// The same session with the script that solves its subject, to be played by `{ do: "script" }`. This object
+    /// becomes invalid.
     #[must_use]
     pub fn watched(self) -> Session {
         Self { played: self.played.watched(), ..self }
     }
 
-    /// Has sharp pictures computed by a graphics processor from now on.
+    /// Computes sharp pictures on a graphics processor from now on.
     #[wasm_bindgen(js_name = useGraphics)]
     pub fn use_graphics(&mut self, graphics: &Graphics) {
         self.graphics = Some(graphics.shared());
     }
 
-    /// Takes an input.
+    /// Applies an input.
     ///
     /// # Errors
-    /// What is out of range or not there; then nothing has changed.
+    /// A value that is out of range or a name that does not exist; nothing has changed then.
     pub fn apply(
         &mut self,
         #[wasm_bindgen(unchecked_param_type = "Input")] input: &JsValue,
@@ -74,48 +77,48 @@ impl Session {
         self.played.apply(&input).map_err(thrown)
     }
 
-    /// Hears a key that goes down, once more while it is held (`again`), or up, by its `code`.
+    /// Handles a key, by its `code`, that goes down, repeats while held (`again`), or goes up.
     pub fn key(&mut self, code: &str, down: bool, again: bool) {
         let inputs = self.played.keys.key(code, down, again);
         self.played.take(&inputs);
     }
 
-    /// Hears that Shift or Ctrl are held or not.
+    /// Handles a change of Shift or Ctrl.
     pub fn modify(&mut self, shift: bool, control: bool) {
         let inputs = self.played.keys.modify(Modifiers { shift, control });
         self.played.take(&inputs);
     }
 
-    /// Lets go of what keys hold: the page has lost the keyboard.
+    /// Releases all held keys, because the page has lost the keyboard focus.
     #[wasm_bindgen(js_name = letGo)]
     pub fn let_go(&mut self) {
         let inputs = self.played.keys.let_go();
         self.played.take(&inputs);
     }
 
-    /// Hears how a gamepad is held: numbers of pressed buttons of the standard layout, and how far the left stick leans up and the right one to the
-    /// right, −1 to 1.
+    /// Handles the state of a gamepad: indices of pressed buttons in the standard layout, and the deflections of the
+    /// left stick upwards and of the right stick to the right, −1 to 1.
     pub fn gamepad(&mut self, pressed: &[u8], up: f64, right: f64) {
         let before = std::mem::replace(&mut self.pad, pad::held(pressed, up, right));
         let inputs = self.played.keys.pad(&before, &self.pad);
         self.played.take(&inputs);
     }
 
-    /// A sixtieth of a second goes by.
+    /// Advances by 1/60 s.
     pub fn tick(&mut self) {
         self.played.tick();
     }
 
-    /// What the operator reads.
+    /// The readout for the operator.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "Readout")]
     pub fn readout(&self) -> Result<JsValue, JsError> {
         object(&self.played.session.readout())
     }
 
-    /// Nodes of the line of all instruments, from the sheath to the tip: x, y, z of each, mm.
+    /// Nodes of the common line of all instruments, from the sheath to the tip: x, y, z of each, mm.
     pub fn positions(&self) -> Vec<f64> {
         self.played
             .session
@@ -127,7 +130,7 @@ impl Session {
             .collect()
     }
 
-    /// Contacts with the wall: place (mm) and force on the wall (N), six numbers each.
+    /// Wall contacts: position (mm) and force on the wall (N), six numbers each.
     pub fn contacts(&self) -> Vec<f64> {
         let contacts = &self.played.session.simulation().report().contacts;
         contacts
@@ -139,7 +142,7 @@ impl Session {
             .collect()
     }
 
-    /// The fluoroscopic picture of each plane: live while the pedal is down, else the last ones.
+    /// The fluoroscopic picture of each plane: live while the pedal is pressed, otherwise the last ones.
     ///
     /// # Errors
     /// What cannot be drawn, by key.
@@ -148,7 +151,8 @@ impl Session {
         self.played.fluoro().map_err(thrown)?.into_iter().map(picture).collect()
     }
 
-    /// The same without delay: coarse pictures where the room has just changed, until `sharpen` was called while it rests.
+    /// The same without delay: coarse pictures after a change of the room, until it no longer changes and `sharpen`
+    /// was called.
     ///
     /// # Errors
     /// What cannot be drawn, by key.
@@ -160,7 +164,8 @@ impl Session {
         self.played.soon().map_err(thrown)?.into_iter().map(picture).collect()
     }
 
-    /// Computes the sharp picture of a room that has come to rest: by a graphics processor meanwhile, or without one in a tenth of a second or more.
+    /// Computes the sharp pictures once the room no longer changes: asynchronously on a graphics processor, otherwise
+    /// at once, which takes 0.1 s or more.
     ///
     /// # Errors
     /// What cannot be drawn, by key.
@@ -180,19 +185,19 @@ impl Session {
         Ok(())
     }
 
-    /// Has the 3D view drawn by a graphics processor from now on; where it fails, the processor takes over.
+    /// Draws the 3D view on a graphics processor from now on; if that fails, on the processor.
     #[wasm_bindgen(js_name = draw3DBy)]
     pub fn draw_3d_by(&mut self, graphics: &Graphics) {
         self.played.three_d_by(graphics.shared());
     }
 
-    /// Has the 3D view drawn by the processor from now on, as it is at first.
+    /// Draws the 3D view on the processor from now on, which is the default.
     #[wasm_bindgen(js_name = draw3DHere)]
     pub fn draw_3d_here(&mut self) {
         self.played.three_d_here();
     }
 
-    /// The 3D view; nothing where it is the one before. By a graphics processor it comes with a later call.
+    /// The 3D view; `undefined` if it is unchanged. From a graphics processor it arrives in a later call.
     ///
     /// # Errors
     /// What cannot be drawn, by key.
@@ -204,68 +209,71 @@ impl Session {
         }
     }
 
-    /// What draws the 3D view, for people.
+    /// Name of the backend that draws the 3D view.
     #[wasm_bindgen(js_name = backend3D)]
     pub fn backend_3d(&self) -> String {
         self.played.three_d_backend()
     }
 
-    /// What draws the fluoroscopic pictures, for people.
+    /// Name of the backend that draws the fluoroscopic pictures.
     pub fn backend(&self) -> Option<String> {
         self.played.backend().map(str::to_owned)
     }
 
-    /// What hands, beam and injector have done, tick by tick: the `record` of a `*.session.json` that `endowire assess` measures.
+    /// The record of instruments, beam and injector, tick by tick: the `record` of a `*.session.json`, as measured by
+    /// `endowire assess`.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "SessionRecord")]
     pub fn record(&self) -> Result<JsValue, JsError> {
         object(self.played.session.record())
     }
 
-    /// What stands above the `script` in its file `name`: of which scene it is, whose file is seen from where `folder` is, and the command that carries it out.
+    /// The text to write above the `script` in its file `name`: its scene, with a path relative to `folder`, and the
+    /// command that carries it out.
     #[wasm_bindgen(js_name = scriptHead)]
     pub fn script_head(&self, folder: &str, name: &str) -> String {
         self.played.script_head(Path::new(folder), Path::new(name))
     }
 
-    /// The text of a `*.session.json`, as `endowire play` writes it and `endowire assess` reads it: the scene's file, as seen from where `folder` is, what is
-    /// set of it, when it was recorded, if the page says so (`Date.now() / 1000`), and the `record`.
+    /// The text of a `*.session.json`, as written by `endowire play` and read by `endowire assess`: the scene's file,
+    /// relative to `folder`, its overridden keys, the time of recording, if given (`Date.now() / 1000`), and the
+    /// `record`.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(js_name = sessionFile)]
     pub fn session_file(&self, folder: &str, recorded_unix_s: Option<f64>) -> Result<String, JsError> {
         let recorded_unix_s = recorded_unix_s.map(|s| s as u64);
         serde_json::to_string(&self.played.session_file(Path::new(folder), recorded_unix_s)).map_err(thrown)
     }
 
-    /// What is to be done, if it is a training subject.
+    /// The task, if the session is a training subject.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "Task | null")]
     pub fn task(&self) -> Result<JsValue, JsError> {
         let standing = self.played.session.standing();
         object(&standing.as_ref().map(|standing| Task::of(&standing.task)))
     }
 
-    /// The score of a training subject: of all so far where it has not ended.
+    /// The score of a training subject; if it has not ended, that of the session so far.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "Score | null")]
     pub fn score(&self) -> Result<JsValue, JsError> {
         let score = self.played.session.score();
         object(&score.as_deref().map(Told::of))
     }
 
-    /// The session so far as one page of HTML that any browser shows without a network, as `endowire report` makes it of a recording: shapes in 3D, forces,
-    /// events, and these pictures of it, PNG in Base64.
+    /// A report of the session so far: one self-contained HTML page, as `endowire report` makes it of a recording,
+    /// with shapes in 3D, forces, events, and these pictures (PNG in Base64).
     ///
     /// # Errors
-    /// Before the first step; pictures that are none.
+    /// No step was carried out yet; invalid pictures.
     pub fn report(
         &self,
         #[wasm_bindgen(unchecked_param_type = "{ view: string; png: string }[]")] frames: &JsValue,
@@ -282,13 +290,13 @@ impl Session {
         endowire_report::run_page(&run).map_err(thrown)
     }
 
-    /// All motions, and what was injected, as the text of a script that `endowire run` carries out to the bit.
+    /// All motions and injections as the text of a script, which `endowire run` repeats to the bit.
     pub fn script(&self) -> String {
         self.played.session.script()
     }
 }
 
-/// A picture as JavaScript has it.
+/// Converts a picture to a JavaScript object.
 pub(crate) fn picture(image: Image) -> Result<JsValue, JsError> {
     let picture = js_sys::Object::new();
     let (width, height) = (image.width(), image.height());

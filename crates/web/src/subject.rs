@@ -1,4 +1,4 @@
-//! What a page shows of a training subject: its task at the start, and its score.
+//! Display of a training subject on a page: its task at the start, and its score.
 
 use endowire_assess::{Metric, Record, Score, Scored, Subject, Threshold};
 use serde::Serialize;
@@ -9,14 +9,14 @@ pub(crate) struct Task<'a> {
     name: &'a str,
     level: u8,
     text: &'a str,
-    /// What is to be reached, in words.
+    /// The goal, in words.
     goal: String,
-    /// What ends it early.
+    /// The limits, in words.
     limits: Vec<String>,
     counts: Vec<Counts<'a>>,
 }
 
-/// What is asked of a measure.
+/// The threshold of a measure.
 #[derive(Debug, Serialize)]
 struct Counts<'a> {
     name: &'a str,
@@ -45,7 +45,7 @@ fn counts<'a>(threshold: &'a Threshold, measures: &[Metric]) -> Counts<'a> {
     Counts { name, definition, asked: threshold.words(), points: threshold.points }
 }
 
-/// A score, as `endowire assess --json` has it, and in words.
+/// A score, as in `endowire assess --json`, and in words.
 #[derive(Debug, Serialize)]
 pub(crate) struct Told<'a> {
     #[serde(flatten)]
@@ -63,7 +63,7 @@ struct Row<'a> {
     asked: Option<String>,
     points: Option<f64>,
     passed: Option<bool>,
-    /// Whether it is kept; none where nothing was asked.
+    /// Whether the threshold is met; `None` if there is none.
     kept: Option<&'static str>,
 }
 

@@ -1,4 +1,4 @@
-//! The class `Surface` of the JavaScript package: what a file of a vessel's surface is good for.
+//! The class `Surface` of the JavaScript package: checks whether a surface file is usable as a vessel.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use wasm_bindgen::prelude::*;
 use crate::session::picture;
 use crate::{object, thrown};
 
-/// A surface that was mended, and a picture of it.
+/// A repaired surface and its picture.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Surface {
@@ -39,8 +39,8 @@ struct Hole {
 
 #[wasm_bindgen]
 impl Surface {
-    /// Reads and mends the bytes of a surface file (STL, OBJ, PLY, VTP, VTK), whose name tells the format, with so many millimetres a unit; draws it
-    /// with `side` pixels a side.
+    /// Reads and repairs the bytes of a surface file (STL, OBJ, PLY, VTP, VTK) whose unit is `unit_mm` millimetres,
+    /// and draws it with `side` pixels a side. The extension of `name` gives the format.
     ///
     /// # Errors
     /// Why it cannot be used.
@@ -49,19 +49,19 @@ impl Surface {
         Self::of(Path::new(name), bytes, unit_mm, side).map_err(thrown)
     }
 
-    /// What is known of it.
+    /// Properties of the surface.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "SurfaceReport")]
     pub fn report(&self) -> std::result::Result<JsValue, JsError> {
         object(&self.told)
     }
 
-    /// A 3D picture of it.
+    /// A 3D picture of the surface.
     ///
     /// # Errors
-    /// None in a browser that is whole.
+    /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "Picture")]
     pub fn picture(&self) -> std::result::Result<JsValue, JsError> {
         picture(self.image.clone())
@@ -116,7 +116,7 @@ mod tests {
             let [x, y] = hole.pixel.unwrap();
             assert!((0.0..128.0).contains(&x) && (0.0..128.0).contains(&y), "{hole:?}");
         }
-        // In metres it would be a thousandth of a vessel.
+        // With a wrong unit, the vessel is far too small.
         assert!(!Surface::of(Path::new("tube.stl"), &bytes, 0.01, 128).unwrap().told.hints.is_empty());
         let told = Surface::of(Path::new("tube.stl"), &bytes[..200], 1.0, 128).unwrap_err().to_string();
         assert!(told.starts_with("tube.stl"), "{told}");

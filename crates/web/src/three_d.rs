@@ -1,4 +1,4 @@
-//! The 3D view of a session: drawn by the processor at once, or by a graphics processor meanwhile.
+//! The 3D view of a session: drawn at once by the processor, or asynchronously by a graphics processor.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -8,25 +8,25 @@ use endowire_core::{Error, Result};
 use endowire_play::{Pictures, Snapshot};
 use endowire_viewer::{Drawing, Graphics, Image, Pushed, Renderer};
 
-/// What was seen when a frame was drawn: the step, the tip, and the room.
+/// State shown by a frame: the step, the tip, and the room.
 type Seen = (usize, Option<[f64; 3]>, u64);
 
-/// Draws the 3D view where it is another than the last time.
+/// Draws the 3D view when its state has changed.
 #[derive(Debug)]
 pub(crate) struct ThreeD {
     seen: Option<Seen>,
     graphics: Option<OnGraphics>,
-    /// Why a graphics processor that drew it does so no more.
+    /// Why a graphics processor no longer draws it.
     failure: Option<String>,
 }
 
-/// The view on a graphics processor.
+/// Drawing on a graphics processor.
 #[derive(Debug)]
 struct OnGraphics {
     graphics: Rc<Graphics>,
     pushed: Pushed,
     wall: Wall,
-    /// With the room that it is for.
+    /// With the revision of the room for which it was made.
     renderer: Option<(u64, Renderer)>,
     answer: Rc<RefCell<Option<Result<Image>>>>,
     /// Whether a frame is being drawn.
@@ -38,19 +38,19 @@ impl ThreeD {
         Self { seen: None, graphics: None, failure: None }
     }
 
-    /// Has a graphics processor draw it from now on; `pushed` and `wall` are the session's.
+    /// Draws on a graphics processor from now on; `pushed` and `wall` are those of the session.
     pub(crate) fn draw_by(&mut self, graphics: Rc<Graphics>, pushed: Pushed, wall: Wall) {
         let answer = Rc::default();
         self.graphics = Some(OnGraphics { graphics, pushed, wall, renderer: None, answer, waits: false });
         self.seen = None;
     }
 
-    /// Has the processor draw it from now on.
+    /// Draws on the processor from now on.
     pub(crate) fn draw_here(&mut self) {
         (self.graphics, self.seen) = (None, None);
     }
 
-    /// What draws it, for people.
+    /// Name of the backend.
     pub(crate) fn backend(&self) -> String {
         match (&self.graphics, &self.failure) {
             (Some(on), _) => on.graphics.name().to_owned(),
@@ -59,7 +59,7 @@ impl ThreeD {
         }
     }
 
-    /// The next frame: of a graphics processor that which was asked for last time, once it is there.
+    /// The next frame. From a graphics processor, it is the one requested earlier, once it has arrived.
     pub(crate) fn next(&mut self, snapshot: &Snapshot, pictures: &mut Pictures) -> Result<Option<Image>> {
         let seen = Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]));
         if let Some(on) = &mut self.graphics {
@@ -87,7 +87,7 @@ impl ThreeD {
 }
 
 impl OnGraphics {
-    /// The frame that has arrived, and whether another was asked for.
+    /// The frame that has arrived, if any, and whether another one was requested.
     fn next(&mut self, snapshot: &Snapshot, is_new: bool) -> Result<(Option<Image>, bool)> {
         let arrived = self.answer.take();
         self.waits &= arrived.is_none();

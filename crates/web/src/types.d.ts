@@ -1,7 +1,7 @@
 /** A picture: red, green, blue and alpha of each pixel, row by row from the top left. */
 export interface Picture { width: number; height: number; data: Uint8ClampedArray; }
 
-/** What a hand, a pedal or a switch does; an instrument that is not named is the one that was selected. */
+/** An input of the operator. Without a name, it applies to the selected instrument. */
 export type Input =
   | { do: "select"; instrument: string }
   | { do: "move"; instrument?: string; mm_per_s?: number; deg_per_s?: number }
@@ -17,7 +17,7 @@ export type Input =
   | { do: "turn_camera"; azimuth_deg?: number; elevation_deg?: number }
   | { do: "go_to"; step: number };
 
-/** What the operator reads. */
+/** The readout for the operator. */
 export interface Readout {
   step: number; time_s: number; demonstrates: boolean; selected: string;
   unconverged_steps: number; jumps: number; relaxations: number;
@@ -30,29 +30,29 @@ export interface Readout {
     live: boolean; mode: string; lao_deg: number; cra_deg: number; second_deg: [number, number] | null;
     magnification: number; field_mm: number; open: [number, number]; beam_s: number; dose_ugy: number;
   };
-  /** What coils fill of the scene's sac. */
+  /** Packing of the scene's sac with coils. */
   packing?: {
     coils_mm3: number; density: number; neck_coverage: number; outside_mm: number; herniated: boolean; dome_force_n: number;
   };
   subject?: {
     subject: string; distance_mm: number | null; injected_there_ml: number; packing_density?: number;
-    /** How far it is to the goal, in words: one thing each. */
+    /** How far it is to the goal, in words, one line per quantity. */
     to_go: string[];
     used: { what: string; value: number; limit: number; unit: string }[]; verdict: Verdict | null;
   };
   event: { step: number; time_s: number; kind: string; text: string } | null; events: number;
 }
 
-/** What is to be done in a training subject: in words, and what is asked of which measure. */
+/** The task of a training subject in words, and the thresholds of its measures. */
 export interface Task {
   name: string; level: number; text: string;
   goal: string; limits: string[]; counts: { name: string; definition: string; asked: string; points: number }[];
 }
 
-/** What has come of a training subject; `ended` is null where it was left before. */
+/** The result of a training subject; `ended` is null if it was left before its end. */
 export interface Verdict { passed: boolean; score: number; ended: { by: "goal" | "time" | "beam" | "contrast" | "wall_force"; time_s: number } | null; }
 
-/** The score of a training subject: numbers as `endowire assess --json` has them in `metrics`, and in words in `words` and `rows`. */
+/** The score of a training subject: numbers as in `endowire assess --json` in `metrics`, and text in `words` and `rows`. */
 export interface Score extends Verdict {
   subject: string; words: string; unjudged?: { what: string; why: string }[];
   metrics: {
@@ -62,7 +62,7 @@ export interface Score extends Verdict {
   rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null; kept: string | null }[];
 }
 
-/** What hands, beam and injector have done: a sample for each tick, rests that follow each other being one. */
+/** The record of instruments, beam and injector: one sample per tick; consecutive rests are one sample. */
 export interface SessionRecord {
   samples: {
     time_s: number; tip_mm: [number, number, number] | null; wall_force_n: number; tip_force_n: number; jumped: boolean;
@@ -74,7 +74,7 @@ export interface SessionRecord {
   beam: { time_s: number; on: boolean; frames_per_s: number; dose_ngy: number; field_mm2: number; primary_deg: number; secondary_deg: number }[];
 }
 
-/** What is known of a surface: hints in words, and its openings with their places in the picture, pixels. */
+/** Properties of a surface: hints in words, and its openings with their positions in the picture, pixels. */
 export interface SurfaceReport {
   triangles: number; size_mm: [number, number, number]; notes: string[]; hints: string[]; inlet: number | null;
   openings: { index: number; radius_mm: number; centre_mm: [number, number, number]; pixel: [number, number] | null }[];

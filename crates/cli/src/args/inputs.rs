@@ -1,4 +1,4 @@
-//! Arguments of the commands that look at what goes into a scene: vessels and devices.
+//! Arguments of the commands that examine inputs of scenes: vessels and devices.
 
 use std::path::PathBuf;
 
@@ -178,7 +178,7 @@ pub(crate) struct PassableArgs {
     pub(crate) json: bool,
 }
 
-/// A place as `x,y,z`.
+/// Parses a place `x,y,z`.
 fn parse_place(text: &str) -> Result<Vec3, String> {
     match parse_end(text) {
         Ok(CentrelineEnd::Place(place_mm)) => Ok(place_mm),

@@ -7,7 +7,7 @@ use clap::builder::PossibleValuesParser;
 
 use crate::studies::{CANDIDATES, CASES, targets};
 
-/// The methods that are compared. A wrong name is answered with the nearest right one.
+/// Parser of names of compared methods, which suggests the nearest name for an unknown one.
 fn method_names() -> PossibleValuesParser {
     PossibleValuesParser::new(CANDIDATES)
 }
@@ -69,7 +69,7 @@ pub(crate) enum CoilKind {
 }
 
 impl CoilKind {
-    /// What it is called.
+    /// Name.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Framing => "framing",
@@ -134,7 +134,7 @@ pub(crate) struct NavigationArgs {
 }
 
 impl NavigationArgs {
-    /// Whether a target is asked for.
+    /// Whether a target is requested.
     pub(crate) fn wants(&self, target: &str) -> bool {
         self.targets.is_empty() || self.targets.iter().any(|name| name == target)
     }

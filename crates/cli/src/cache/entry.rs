@@ -1,7 +1,7 @@
-//! One wall, or one centre line, in a file.
+//! Files of the cache, each with one wall or one centre line.
 //!
-//! A line of text names the format, the key follows, then what is kept in bytes that keep every bit of a number, and a hash of all that at
-//! the end.
+//! The first line names the format, the key follows, then the content in a binary format that keeps every bit of a
+//! number, and a hash of all this at the end.
 
 use std::path::Path;
 use std::time::UNIX_EPOCH;
@@ -16,20 +16,20 @@ use endowire_sweep::seal;
 const FORMAT: &str = "endowire wall 1\n";
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 2 << 30;
-/// How files of what is kept end.
+/// Extension of complete files.
 pub(super) const EXTENSION: &str = "wall";
-/// How they end until they are whole.
+/// Extension of unfinished files.
 pub(super) const UNFINISHED: &str = ".part";
 
-/// Hash of all that the bits of what is kept depend on: its recipe and the program.
+/// Hash of everything that the content depends on to the bit: its recipe and the program.
 pub(super) type Key = [u8; 32];
 
-/// What is kept, as bytes.
+/// Content that can be stored as bytes.
 pub(super) trait Kept: Sized {
-    /// Puts it behind bytes.
+    /// Appends it to bytes.
     fn extend(&self, begun: Vec<u8>) -> postcard::Result<Vec<u8>>;
 
-    /// It from these bytes, if they are its.
+    /// Decodes it; `None` if the bytes are invalid.
     fn of_bytes(bytes: &[u8]) -> Option<Self>;
 }
 
@@ -43,7 +43,7 @@ impl Kept for Wall {
     }
 }
 
-/// Its table, which keeps every bit of a number too.
+/// A centre line is stored as its table, which keeps every bit of a number too.
 impl Kept for CentrelineTree {
     fn extend(&self, mut begun: Vec<u8>) -> postcard::Result<Vec<u8>> {
         begun.extend(self.table("").into_bytes());
@@ -55,21 +55,22 @@ impl Kept for CentrelineTree {
     }
 }
 
-/// What something is made of.
+/// The inputs from which a content is computed.
 #[derive(Serialize)]
 pub(super) enum Recipe<'a> {
     Wall(&'a WallRecipe<'a>),
     Centreline(&'a CentrelineRecipe<'a>),
 }
 
-/// The key of a recipe; `None` where the program cannot tell which one it is.
+/// The key of a recipe; `None` if the program cannot identify itself.
 pub(super) fn key(recipe: &Recipe<'_>) -> Option<Key> {
     let mut hash = Sha256::new();
     for part in [FORMAT, env!("CARGO_PKG_VERSION"), env!("ENDOWIRE_GIT_REVISION")] {
         hash.update(part);
         hash.update([0]);
     }
-    // Sources at work change without a new version or revision: a program that was built anew makes its walls anew.
+    // During development, sources change without a new version or revision, so the key contains the time of the
+    // build.
     let program = std::env::current_exe().and_then(std::fs::metadata).ok()?;
     let built = program.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
     hash.update(built.as_nanos().to_le_bytes());
@@ -78,12 +79,12 @@ pub(super) fn key(recipe: &Recipe<'_>) -> Option<Key> {
     Some(hash.finalize().into())
 }
 
-/// A file's bytes.
+/// The bytes of a file.
 pub(super) fn bytes(key: &Key, kept: &impl Kept) -> postcard::Result<Vec<u8>> {
     kept.extend([FORMAT.as_bytes(), key].concat()).map(seal::sealed)
 }
 
-/// What a file holds, if it is there, whole, and that of the key.
+/// The content of a file, if it exists, is complete, and has this key.
 pub(super) fn read<T: Kept>(path: &Path, key: &Key) -> Option<T> {
     let bytes = endowire_core::file::read(path, SIZE_LIMIT).ok()?;
     T::of_bytes(seal::opened(&bytes)?.strip_prefix(FORMAT.as_bytes())?.strip_prefix(key)?)

@@ -1,7 +1,8 @@
-//! Walls that took long to make, and centre lines that were found in them, kept on disk: the next run with the same wall starts at once.
+//! A cache on disk for walls that took long to compute and centre lines extracted from them, so that the next run
+//! with the same wall starts at once.
 //!
-//! Each is found by a hash of all that it was made of, so nothing has to be told when a file or an option changes. Whatever is
-//! wrong with the cache costs time and nothing else.
+//! The key is a hash of all inputs, so nothing needs to be invalidated when a file or an option changes. A fault of
+//! the cache costs time and nothing else.
 
 mod entry;
 mod place;
@@ -20,29 +21,29 @@ use crate::output::tell;
 use endowire_sweep::seal;
 use entry::{EXTENSION, Kept, Key, Recipe};
 
-/// What takes less to make is not kept: to read it back would save nothing to speak of.
+/// Shortest computation that is worth caching: reading back a faster one would save little.
 const LEAST: Duration = Duration::from_millis(5);
 
-/// Walls and centre lines in a folder; without one, all are made.
+/// Walls and centre lines in a folder; without a folder, nothing is cached.
 pub(crate) struct Cache {
     folder: Option<PathBuf>,
-    /// Whether it was told that the folder cannot be written.
+    /// Whether the user was told that the folder cannot be written.
     told: AtomicBool,
 }
 
 impl Cache {
-    /// The user's, unless the command line asks for none.
+    /// The user's cache, unless the command line disables it.
     pub(crate) fn new(args: &CacheArgs) -> Self {
         let folder = if args.no_cache { None } else { place::folder() };
         Self { folder, told: AtomicBool::new(false) }
     }
 
-    /// Where walls are kept, if they are.
+    /// Folder of the cache, if there is one.
     pub(crate) fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
-    /// What a recipe makes, kept or made.
+    /// The result of a recipe, from the cache or computed.
     fn kept_or<T: Kept>(&self, recipe: &Recipe<'_>, make: impl FnOnce() -> Result<T>) -> Result<T> {
         let Some((folder, key)) = self.folder.as_deref().zip(entry::key(recipe)) else { return make() };
         let path = path(folder, &key);
@@ -85,7 +86,8 @@ fn path(folder: &Path, key: &Key) -> PathBuf {
     folder.join(seal::hex(key)).with_extension(EXTENSION)
 }
 
-/// Writes a file beside its place and renames it into it: others who read or write the same wall at the same time see a whole one.
+/// Writes a file under a temporary name and renames it, so that concurrent readers and writers see only complete
+/// files.
 fn write(folder: &Path, key: &Key, made: &impl Kept) -> io::Result<()> {
     let bytes = entry::bytes(key, made).map_err(io::Error::other)?;
     std::fs::create_dir_all(folder)?;

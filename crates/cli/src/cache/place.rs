@@ -1,20 +1,21 @@
-//! Where the cache is.
+//! Location of the cache.
 
 use std::env::var_os;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// Names the folder of the cache.
+/// Variable that names the folder of the cache.
 const VARIABLE: &str = "ENDOWIRE_CACHE";
 
-/// `ENDOWIRE_CACHE`, or a folder of the program's name where the system has the caches of a user; `None` where neither is known.
+/// `ENDOWIRE_CACHE`, or a folder with the program's name among the user's caches; `None` if neither is known.
 pub(super) fn folder() -> Option<PathBuf> {
     chosen(|name| var_os(name)).map(|folder| folder.join("walls"))
 }
 
 fn chosen(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let path = |name: &str| variable(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    // A relative path is for this variable alone: what the system sets must not depend on where the program was started.
+    // A relative path is allowed only in this variable: a system-wide setting must not depend on where the program
+    // was started.
     let absolute = |name: &str| path(name).filter(|path| path.is_absolute());
     path(VARIABLE).or_else(|| {
         let caches = if cfg!(windows) {

@@ -1,4 +1,4 @@
-//! How much room the cache takes.
+//! Size limit of the cache.
 
 use std::ffi::OsStr;
 use std::fs::{File, Metadata};
@@ -9,18 +9,18 @@ use std::time::{Duration, SystemTime};
 use super::entry::{EXTENSION, UNFINISHED};
 use crate::output::whole;
 
-/// Most bytes of all walls: some hundreds of them.
+/// Largest total size of all walls in bytes: some hundreds of walls.
 const MOST_BYTES: u64 = 1 << 30;
-/// A file that is unfinished for so long was left by a program that died.
+/// Age after which an unfinished file counts as left by a program that died.
 const LEFT_BEHIND: Duration = Duration::from_secs(3600);
 
-/// Notes that a wall was used: those that were not for the longest time go first.
+/// Marks a wall as used: those unused for the longest time are removed first.
 pub(super) fn touch(path: &Path) {
-    // On a disk that cannot be written nothing is removed either.
+    // On a read-only disk nothing can be removed either.
     let _ = File::options().append(true).open(path).and_then(|file| file.set_modified(SystemTime::now()));
 }
 
-/// Makes room for a file of so many bytes. Files of others in the folder are left alone.
+/// Makes room for a file of `bytes` bytes. Other files in the folder are left alone.
 pub(super) fn make(folder: &Path, bytes: u64) -> io::Result<()> {
     make_within(folder, MOST_BYTES.saturating_sub(bytes))
 }
@@ -44,7 +44,7 @@ fn make_within(folder: &Path, most_bytes: u64) -> io::Result<()> {
         if total <= most_bytes {
             break;
         }
-        // Another process may have been faster.
+        // Another process may have removed it already.
         whole::remove(&path)?;
         total -= size;
     }

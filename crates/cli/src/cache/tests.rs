@@ -8,7 +8,7 @@ fn tube() -> CentrelineTree {
     anatomy::tree("curved_tube").unwrap()
 }
 
-/// A wall that takes a multiple of [`LEAST`] to make.
+/// A wall that takes a multiple of [`LEAST`] to compute.
 fn recipe(tree: &CentrelineTree) -> WallRecipe<'_> {
     WallRecipe::Generated { tree, resolution: Resolution::EdgeMm(0.6) }
 }
@@ -23,7 +23,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Gives a file another content, with the hash at its end that fits it.
+/// Changes the content of a file and updates the hash at its end.
 fn forge(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
     use sha2::{Digest, Sha256};
     let mut bytes = std::fs::read(path).unwrap();
@@ -44,12 +44,13 @@ fn a_kept_wall_is_the_one_that_was_made_and_is_not_made_again() {
     let kept = cache.wall(&recipe(&tree)).unwrap();
     assert!(kept.mesh() == made.mesh() && kept.openings() == made.openings());
     assert_eq!((kept.report(), kept.caps()), (made.report(), made.caps()));
-    // One bit in the mesh: it comes back only if the file is what is read.
+    // Changes one bit of the mesh, which shows whether the file is read.
     forge(&file, |bytes| bytes[FORGED] ^= 1);
     assert_ne!(cache.wall(&recipe(&tree)).unwrap().mesh(), made.mesh());
 }
 
-/// A byte of the first coordinate's mantissa: after the line, the key and the two or three bytes of the number of vertices.
+/// Offset of a byte in the first coordinate's mantissa: after the first line, the key, and the two or three bytes of
+/// the number of vertices.
 const FORGED: usize = 16 + 32 + 2 + 3;
 
 #[test]
@@ -130,7 +131,7 @@ fn a_kept_centre_line_is_the_one_that_was_found_with_its_targets_and_is_that_of_
     assert_eq!(found.targets()[0].name, "opening 1");
     assert_eq!(cache.centreline(&of(1)).unwrap().targets()[0].name, "opening 0");
     assert_eq!(files(folder.path()).len(), 2);
-    // A digit in the table: it comes back only if the file is what is read.
+    // Changes a digit in the table, which shows whether the file is read.
     forge(&file, |bytes| {
         let at = 16 + 32 + "x,y,z,radius,parent,target\n".len();
         bytes[at..at + 2].copy_from_slice(b"7,");

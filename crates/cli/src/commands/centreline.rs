@@ -27,7 +27,7 @@ struct NamedRow {
     row: usize,
 }
 
-/// Finds the centre line of a surface file, writes its table where one is wanted, and tells its branches.
+/// Extracts the centre line of a surface file, writes its table if requested, and prints its branches.
 pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(&args.file)?], 0);
     let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?;
@@ -49,7 +49,7 @@ pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
     answer(&document, args.json, || text(&document))
 }
 
-/// Calls what the core calls `from`, `to` and a target by the flags of the command line.
+/// Replaces the core's names `from`, `to` and target in an error by the flags of the command line.
 pub(super) fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
         Error::Parameter { name, value, mend } if ["from", "to", "target"].contains(&name.as_str()) => {
@@ -60,7 +60,7 @@ pub(super) fn as_flag(error: Error) -> Failure {
     })
 }
 
-/// An end as it is given to `--from` and `--to`: the number of an opening, or a place `x,y,z`.
+/// Parses `--from` and `--to`: the number of an opening, or a place `x,y,z`.
 pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
     let mend = "expected the number of an opening (endowire vessel check lists them) or a place x,y,z in mm";
     let numbers: Vec<&str> = text.split(',').map(str::trim).collect();
@@ -74,7 +74,7 @@ pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
     }
 }
 
-/// The branches for a person.
+/// The branches as text.
 fn text(document: &Document) -> String {
     let mut lines = vec![
         format!("{}: {} rows, {} branches", document.file, document.rows, document.branches.len()),

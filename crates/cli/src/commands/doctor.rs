@@ -1,4 +1,4 @@
-//! `endowire doctor`: what this machine has, and what of it is used.
+//! `endowire doctor`: what this machine provides, and what of it is used.
 
 use std::path::PathBuf;
 
@@ -13,24 +13,24 @@ use crate::failure::Failure;
 use crate::output::answer;
 use crate::output::provenance::Provenance;
 
-/// What was found.
+/// The findings.
 #[derive(Serialize)]
 struct Findings {
     #[serde(flatten)]
     provenance: Provenance,
-    /// What draws frames; where a graphics processor is not used, why.
+    /// Backend that draws frames; if a graphics processor is not used, the reason.
     renderer: String,
-    /// Where a window can be opened; none without a display, or in a program without a window.
+    /// Display for windows; `None` without a display, or if the program was built without a window.
     display: Option<String>,
-    /// Whether the program has a window.
+    /// Whether the program was built with a window.
     window: bool,
-    /// Cores that batches of simulations use. One simulation uses one.
+    /// Number of cores used by batches of simulations. One simulation uses one.
     threads: usize,
-    /// Where walls are kept from run to run.
+    /// Folder of the cache.
     cache: Option<PathBuf>,
 }
 
-/// Looks at the machine.
+/// Examines the machine.
 pub(crate) fn doctor(json: bool) -> Result<(), Failure> {
     let findings = Findings {
         provenance: Provenance::of_program("doctor"),
@@ -65,7 +65,7 @@ fn text(findings: &Findings) -> String {
     )
 }
 
-/// What a small picture of both views is drawn by.
+/// Draws a small picture of both views; returns the name of the backend.
 fn renderer() -> Result<String, Failure> {
     let wall = SurfaceMesh {
         vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],

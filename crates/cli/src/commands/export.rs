@@ -1,4 +1,4 @@
-//! `endowire export`: a recorded run for other programs.
+//! `endowire export`: converts a recorded run for other programs.
 
 use endowire_core::Vec3;
 use endowire_core::device::{Stack, line_mm};
@@ -14,10 +14,10 @@ use crate::output::vtk::{PointArray, PolyData, write_series};
 use crate::output::{folder, progress, tell};
 use crate::scenes;
 
-/// Number that points of contacts have in place of an instrument's.
+/// Value that contact points have instead of an instrument's index.
 const CONTACT: f64 = -1.0;
 
-/// Writes the vessel, a file for each step, and the list of them.
+/// Writes the vessel, a file for each step, and the list of these files.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &args.set)?;
@@ -56,7 +56,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The line of each instrument that is in and of each coil that was left behind, and the contacts.
+/// The line of each inserted instrument and of each detached coil, and the contacts.
 fn step_data(
     recording: &Recording,
     row: usize,

@@ -1,4 +1,4 @@
-//! The wall that devices feel, as `endowire vessel check` writes, reports and draws it.
+//! The wall in contact with devices, as written, reported and drawn by `endowire vessel check`.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -13,16 +13,17 @@ use serde::Serialize;
 use crate::args::FeltArgs;
 use crate::failure::Failure;
 
-/// Radius of the wire that the wall is smoothed for, mm: 0.014″, the thinnest. A thicker one feels the same but for septa.
+/// Radius of the wire for which the wall is smoothed, mm: 0.014″, the thinnest. For thicker wires the wall differs
+/// only at septa.
 const RADIUS_MM: f64 = 0.178;
-/// Pixels along the picture's longer side.
+/// Number of pixels along the picture's longer side.
 const PIXELS: f64 = 1600.0;
-/// Free space around the vessel, pixels.
+/// Margin around the vessel, pixels.
 const MARGIN: f64 = 20.0;
-/// How far the given surface is looked for, mm: what is farther is drawn like it.
+/// Search radius for the given surface, mm: a larger distance is drawn as this one.
 const REACH_MM: f64 = 10.0;
 
-/// What the felt wall is like.
+/// Properties of the felt wall.
 #[derive(Serialize)]
 pub(crate) struct FeltReport {
     changed: bool,
@@ -41,7 +42,7 @@ pub(crate) struct FeltReport {
 }
 
 impl FeltReport {
-    /// Conditions the repaired `surface` and writes what is asked for; `None` where nothing is.
+    /// Conditions the repaired `surface` and writes the requested outputs; `None` if nothing is requested.
     pub(crate) fn new(surface: &SurfaceMesh, args: &FeltArgs) -> Result<Option<Self>, Failure> {
         if args.felt.is_none() && args.picture.is_none() && args.deviation_mm.is_none() {
             return Ok(None);
@@ -56,7 +57,7 @@ impl FeltReport {
             }
             other => other.into(),
         })?;
-        // As it is meshed now.
+        // No further deviation, because the mesh is already conditioned.
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let meshed = Wall::welded(&felt.mesh)?;
         let smooth = FeltMesh::new(&meshed, RADIUS_MM, &properties, &NoStore)?;
@@ -87,7 +88,7 @@ impl FeltReport {
         }))
     }
 
-    /// Lines for a person.
+    /// Lines of text.
     pub(crate) fn text(&self) -> Vec<String> {
         let mut lines = vec!["as a device feels it:".to_owned()];
         let how = if self.changed { "meshed anew" } else { "even as they are" };
@@ -106,8 +107,8 @@ impl FeltReport {
     }
 }
 
-/// Draws the felt wall along its shortest extent: grey on the given surface, red where it is inside by the limit or more, blue where
-/// it is outside.
+/// Draws the felt wall, seen along its shortest extent: grey where it agrees with the given surface, red where it is
+/// inside by the limit or more, blue where it is outside.
 fn draw(path: &Path, felt: &Conditioned<'_>, wall: &Wall, limit_mm: f64) -> Result<(), Failure> {
     let mesh = &felt.mesh;
     let query = WallQuery::new(wall)?;
@@ -169,7 +170,7 @@ fn draw(path: &Path, felt: &Conditioned<'_>, wall: &Wall, limit_mm: f64) -> Resu
     write().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
 }
 
-/// Of a distance over the limit, positive inside.
+/// Colour of a deviation relative to the limit, positive inside.
 fn colour(off: f64) -> [f64; 3] {
     let fade = 200.0 * (1.0 - off.abs().min(1.0));
     if off > 0.0 {

@@ -35,7 +35,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
     let plan = Plan::new("fluoro", &args.frames, (&args.scene, &scene), ViewChoice::Fluoro, folder, frames)?;
-    // An empty vessel needs no wall that can be felt, which takes far longer to make than a picture.
+    // An empty vessel needs no wall for contact, which takes far longer to compute than a picture.
     let mut simulation = match steps {
         0 => None,
         _ => Some(scene.simulation(&cache).map_err(in_scene)?),
@@ -78,7 +78,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     scenes::check_converged(args.scene.display(), &now.tally, taken, allowed, kept)
 }
 
-/// What is in the vessel when frames are drawn.
+/// The state in which frames are drawn.
 #[derive(Default)]
 struct Now {
     shape: Shape,
@@ -86,9 +86,9 @@ struct Now {
     coils: Vec<DetachedCoil>,
     contacts: Vec<ContactView>,
     injections: Vec<Injected>,
-    /// Where the vessel is.
+    /// Displacement of the vessel.
     displacement: Option<Displacement>,
-    /// Steps carried out, and how they went.
+    /// Number of steps carried out, and their statistics.
     steps: usize,
     tally: Tally,
 }
@@ -107,7 +107,7 @@ fn after(
     for index in 0..=steps {
         let step = run.next(simulation)?.map(Step::into_owned);
         injections.extend(Injected::begun(&run, injections.len(), frames_per_s, simulation));
-        // A condition may have ended the script before.
+        // A condition may have ended the script earlier.
         let Some(step) = step.filter(|_| index < steps) else { break };
         step.carry_out(simulation).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))

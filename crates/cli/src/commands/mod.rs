@@ -1,4 +1,4 @@
-//! One file a command.
+//! The commands, one file each.
 
 mod assess;
 mod centreline;
@@ -32,7 +32,7 @@ pub(crate) use centreline::parse_end;
 use crate::args::{Args, Command, DeviceCommand, VesselCommand};
 use crate::failure::Failure;
 
-/// Runs the command that was asked for.
+/// Runs the requested command.
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),

@@ -1,4 +1,4 @@
-//! `endowire new`: a folder with a scene to start from.
+//! `endowire new`: creates a folder with a scene to start from.
 
 use std::path::{Path, PathBuf};
 
@@ -11,9 +11,9 @@ use crate::args::NewArgs;
 use crate::failure::Failure;
 use crate::output::{tell, whole};
 
-/// `assets/devices/wire_035_hydrophilic_angled.toml`; a test compares them.
+/// A copy of `assets/devices/wire_035_hydrophilic_angled.toml`; a test compares them.
 const WIRE: &str = include_str!("../../templates/wire.toml");
-/// Triangles of a built-in vessel.
+/// Number of triangles of a built-in vessel.
 const TRIANGLES: usize = 20_000;
 
 /// A vessel for the new scene.
@@ -24,7 +24,7 @@ struct Vessel {
     pose: &'static str,
 }
 
-/// Makes the folder.
+/// Creates the folder.
 pub(crate) fn new(args: &NewArgs) -> Result<(), Failure> {
     let folder = &args.dir;
     let refuse = |what: String| Failure::Input(format!("{}: {what}", folder.display()));
@@ -58,7 +58,7 @@ pub(crate) fn new(args: &NewArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Copies or draws the vessel.
+/// Copies a vessel or generates a built-in one.
 fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, Failure> {
     let built_in =
         wanted.to_str().and_then(|name| Some((anatomy::tree(name)?, anatomy::description(name)?, name)));
@@ -68,7 +68,7 @@ fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, F
         let table = format!(
             "tree = \"vessel.csv\"       # a centre line with radii, and names of targets\ntriangles = {TRIANGLES}"
         );
-        // Openings are numbered as they are without a mesh.
+        // The numbers of openings are the same without a mesh.
         let lumen = Lumen::from(SweptVessel::new(tree, Resolution::Triangles(TRIANGLES))?);
         return Ok(Vessel { table, wall: lumen.into_wall(&NoStore)?, pose });
     }

@@ -1,9 +1,9 @@
-//! Work on several threads, a piece at a time.
+//! Parallel work on several threads.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// `work` of 0, 1, … `count` − 1, in their order, on so many threads; on all cores where that is not said.
+/// Results of `work` for 0, 1, … `count` − 1, in this order, computed on `threads` threads; by default on all cores.
 pub(super) fn in_parallel<T: Send + Sync>(
     count: usize,
     threads: Option<usize>,
@@ -17,7 +17,7 @@ pub(super) fn in_parallel<T: Send + Sync>(
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(place) = made.get(index) else { break };
-            // Each number is taken once.
+            // Cannot fail, because each index is taken once.
             let _ = place.set(work(index));
         }
     };

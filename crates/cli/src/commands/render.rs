@@ -19,7 +19,7 @@ use crate::output::recording::Recording;
 use crate::output::{progress, tell};
 use crate::scenes;
 
-/// Draws the wanted steps.
+/// Draws the requested steps.
 pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
@@ -50,7 +50,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
     let times_s = step_times(&args.dir)?;
     let ended_s = |step: usize| time_s(&times_s, step, frame_s);
-    // Of one step all frames are, which may be several, or one of each step.
+    // Either all frames show one step, or each frame shows its own step.
     let one = steps.len() == 1 && frames > 1;
     let moment = |k: usize| {
         let (step, later) = if one { (steps[0], k) } else { (steps[k], 0) };
@@ -67,7 +67,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let lengths = Lengths::read(&args.dir, &stack)?;
     let left = coils::read(&args.dir, &stack)?;
     let bar = progress::bar(frames, "frame");
-    // Steps whose tips are told.
+    // Number of steps whose tips were passed on.
     let mut told = 0;
     for k in 0..frames {
         let step = if one { steps[0] } else { steps[k] };
@@ -82,7 +82,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let contacts = recording.contacts(step);
         let shape = recording.shape(step);
         let inserted_mm = lengths.after(step, &shape)?;
-        // A step that is drawn several times rests.
+        // The device rests in a step that is drawn several times.
         let before = match step.checked_sub(1).filter(|before| *before > 0 && !one) {
             Some(before) => {
                 let shape = recording.shape(before);
@@ -91,7 +91,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             None => None,
         };
         let before = before.as_ref();
-        // A step that is drawn several times rests, and the vessel with it.
+        // The vessel rests too in a step that is drawn several times.
         let displacement = motion.as_ref().map(|motion| motion.at(ended_s(step)));
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
@@ -109,7 +109,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     studio.finish()?.tell(args.frames.json)
 }
 
-/// Says what is to be known of a recording that is drawn in this scene, in which `settings` are new.
+/// Warns about a recording that is drawn in this scene, where `settings` were added.
 fn tell_of(
     args: &RenderArgs,
     recording: &Recording,
@@ -119,7 +119,7 @@ fn tell_of(
     let (summary, dir, steps) = (&recording.summary, args.dir.display(), recording.steps());
     let hash = Provenance::of_scene(scene, settings)?;
     let changed = summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash());
-    // What is set anew is meant to differ.
+    // With new settings a difference is intended.
     if changed && settings.is_empty() {
         let path = path.display();
         tell(format_args!(
@@ -140,7 +140,7 @@ fn tell_of(
     Ok(())
 }
 
-/// Steps to draw of those that are recorded; the last of them always.
+/// The recorded steps to draw, always including the last one requested.
 fn wanted(args: &RenderArgs, recorded: usize) -> Result<Vec<usize>, Failure> {
     let last = args.to.unwrap_or(recorded).min(recorded);
     if args.every == 0 || args.from == 0 || args.from > last {
@@ -159,7 +159,8 @@ fn wanted(args: &RenderArgs, recorded: usize) -> Result<Vec<usize>, Failure> {
     Ok(steps)
 }
 
-/// When a step ended, s, in the time of its script. A run that was killed may have its last step in no row yet: it is taken to be as long as that before.
+/// End time of a step, s, in the time of its script. In a run that was killed, the last step may have no row; it is
+/// then assumed to be as long as the previous one.
 fn time_s(rows: &[(usize, f64)], step: usize, frame_s: f64) -> f64 {
     match rows.binary_search_by_key(&step, |(number, _)| *number) {
         Ok(row) => rows[row].1,

@@ -17,7 +17,7 @@ struct Document {
     solution: StaticSolution,
 }
 
-/// Solves the case and tells the solution, even where it is not an equilibrium.
+/// Solves the case and prints the solution, even if it is not an equilibrium.
 pub(crate) fn rod(args: &RodArgs) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(&args.case)?], 0);
     let case = StaticCase::from_file(&args.case)?;
@@ -85,7 +85,7 @@ fn print_reaction(end: &str, r: &Reaction) {
 }
 
 fn vector(v: &[f64; 3]) -> String {
-    // What rounds to zero is zero, without a sign.
+    // Values that round to zero are printed without a sign.
     let [x, y, z] = v.map(|c| if c.abs() < 5e-10 { 0.0 } else { c });
     format!("[{x:.9}, {y:.9}, {z:.9}]")
 }

@@ -34,7 +34,7 @@ pub(crate) fn sac(args: &SacArgs) -> Result<(), Failure> {
     answer(&document, args.json, || text(&document))
 }
 
-/// Calls what the core calls `dome` and `parent` by the flags of the command line.
+/// Replaces the core's names `dome` and `parent` in an error by the flags of the command line.
 fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
         Error::Parameter { name, value, mend } if ["dome", "parent"].contains(&name.as_str()) => {

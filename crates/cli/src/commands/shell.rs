@@ -1,4 +1,4 @@
-//! `endowire completions` and `endowire man`: for shells and manuals, from the same words as `--help`.
+//! `endowire completions` and `endowire man`: shell completions and manual pages, from the same texts as `--help`.
 
 use clap::CommandFactory;
 use clap_complete::Shell;
@@ -7,7 +7,7 @@ use crate::args::Args;
 use crate::failure::Failure;
 use crate::output::print;
 
-/// Prints what a shell completes.
+/// Prints a completion script for a shell.
 pub(crate) fn completions(shell: Shell) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Args::command(), "endowire", &mut script);

@@ -1,4 +1,4 @@
-//! `endowire subject`: what there is to train, and how the project itself does it.
+//! `endowire subject`: training subjects and their reference solutions.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -18,7 +18,7 @@ use crate::output::provenance::{Provenance, read_input};
 use crate::scenes;
 use crate::subjects::{self, ScoreDocument};
 
-/// Side of pictures, which nobody sees here, pixels.
+/// Size of the pictures, pixels; they are not shown.
 const SIDE_PX: u32 = 64;
 
 /// The document of `subject list`.
@@ -36,9 +36,9 @@ struct Row {
     subject: String,
     level: u8,
     name: String,
-    /// What is to be reached, in words.
+    /// The goal in words.
     goal: String,
-    /// The point of the centre line that is; none of a sac.
+    /// The target point of the centre line; `None` for a sac.
     target: Option<String>,
 }
 
@@ -52,14 +52,14 @@ struct Shown<'a> {
     level: u8,
     text: &'a str,
     scene: PathBuf,
-    /// What of the scene is set.
+    /// Overridden keys of the scene.
     scene_set: &'a [String],
     goal: &'a Goal,
     limits: Limits,
     thresholds: Vec<Named<'a>>,
 }
 
-/// A threshold with the measure that it is of.
+/// A threshold with its measure.
 #[derive(Serialize)]
 struct Named<'a> {
     metric: &'a str,
@@ -67,7 +67,7 @@ struct Named<'a> {
     threshold: &'a Threshold,
 }
 
-/// Runs the command that was asked for.
+/// Runs the requested command.
 pub(crate) fn subject(command: &SubjectCommand) -> Result<(), Failure> {
     match command {
         SubjectCommand::List { folder, json } => list(folder, *json),
@@ -138,7 +138,7 @@ fn text_of(shown: &Shown<'_>) -> String {
     lines.join("\n")
 }
 
-/// Does a subject by its reference script.
+/// Carries out a subject with its reference script.
 fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
     let subject = subjects::read(&args.subject)?;
     let (stem, place) = (subject.stem(), subject.path().display().to_string());
@@ -168,7 +168,7 @@ fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
     if score.verdict.passed {
         return Ok(());
     }
-    // A script that did not come to its end has said why.
+    // A script that ended early has reported why.
     let event = session.events().last().filter(|_| score.verdict.ended.is_none());
     let last = event.map_or_else(String::new, |event| format!(" ({})", event.text));
     Err(Failure::Computation(format!(

@@ -1,4 +1,4 @@
-//! `endowire verify --surfaces DIR`: a matrix of insertions into any surfaces.
+//! `endowire verify --surfaces DIR`: a matrix of insertions into arbitrary surfaces.
 
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -27,12 +27,12 @@ struct Document {
     summary: Summary,
 }
 
-/// A surface and where its wires enter.
+/// A surface and the starts of its wires.
 #[derive(Serialize)]
 struct SurfaceRow {
     name: String,
     unit_mm: f64,
-    /// As the sidecar says; absent where it does not.
+    /// As in the sidecar; absent if it does not say.
     #[serde(skip_serializing_if = "Option::is_none")]
     axes: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -46,7 +46,7 @@ struct SurfaceRow {
     skipped: Vec<String>,
 }
 
-/// Where a wire enters.
+/// Start of a wire.
 #[derive(Serialize)]
 struct Start {
     wire: String,
@@ -119,7 +119,7 @@ fn verdict(document: &Document) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Runs the cells on several threads; the rows are in the order of the cells.
+/// Runs the cells on several threads; rows are in the order of the cells.
 fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs, cache: &Cache) -> Vec<CellRow> {
     let bar = progress::bar(jobs.len(), "cell");
     let start = Instant::now();
@@ -127,7 +127,7 @@ fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs, cache: &Cache) -> Vec<C
     let rows = in_parallel(jobs.len(), args.jobs, |index| {
         let (surface, cell) = &jobs[index];
         bar.set_message(cell.name_in(surface));
-        // One cell that panics must not take the others with it.
+        // A panic in one cell must not end the others.
         let row = catch_unwind(AssertUnwindSafe(|| run(surface, cell, cache, args.limit_s, &clock)));
         bar.inc(1);
         row.unwrap_or_else(|_| {
@@ -175,10 +175,10 @@ fn surface_row(file: &SurfaceFile, surface: &Result<Surface, String>) -> Surface
     row
 }
 
-/// The table for a person.
+/// The table as text.
 fn text(document: &Document) -> String {
     let mut text = String::new();
-    // Into a string nothing fails.
+    // Writing into a string cannot fail.
     let mut line = |arguments: std::fmt::Arguments<'_>| {
         let _ = writeln!(text, "{arguments}");
     };
@@ -261,7 +261,7 @@ fn row_text(row: &CellRow, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
         row.jumps,
         row.relaxations,
         crossed,
-        // A good end needs no words: where it left or was blocked is in the JSON document.
+        // A good ending needs no message: where the tip left or was blocked is in the JSON document.
         row.message.as_ref().filter(|_| !row.ending.is_good()).map_or_else(String::new, |m| format!("  {m}")),
     ));
 }

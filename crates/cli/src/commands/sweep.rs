@@ -1,4 +1,4 @@
-//! `endowire sweep`: a scene, run many times with other values of its keys.
+//! `endowire sweep`: runs a scene many times with different values of its keys.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -19,17 +19,17 @@ use crate::output::provenance::{PROGRAM, Provenance};
 use crate::output::recorder::{Recorder, Summary};
 use crate::output::{print_json, progress, tell, whole};
 
-/// What `--json` prints.
+/// Document printed with `--json`.
 #[derive(Serialize)]
 struct Document {
     runs: usize,
-    /// Runs that have a row.
+    /// Number of runs with a row.
     done: usize,
-    /// Those that had one before.
+    /// Number of runs that had a row before.
     earlier: usize,
-    /// Those that did not do all of their script.
+    /// Number of runs that did not complete their script.
     failed: usize,
-    /// Those with steps that found no equilibrium.
+    /// Number of runs with steps that did not converge.
     unconverged: usize,
     table: Option<PathBuf>,
 }
@@ -43,7 +43,7 @@ pub(crate) fn sweep(args: &SweepArgs) -> Result<(), Failure> {
             Ok(())
         }
         (None, Some(file), Some(out)) => carry_out(args, file, out),
-        // The parser asks for both.
+        // The parser requires both.
         _ => Err(Failure::Input("give a sweep file and --out DIR".to_owned())),
     }
 }
@@ -91,7 +91,7 @@ fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure
     }
 }
 
-/// Runs that had a row before say nothing of the time that is left.
+/// Shows progress. Runs that had a row before must not affect the estimate of the remaining time.
 fn show(bar: &ProgressBar, progress: Progress) {
     let begins = bar.position() == 0;
     bar.set_length(progress.runs as u64);
@@ -104,14 +104,14 @@ fn show(bar: &ProgressBar, progress: Progress) {
     bar.set_message(told.collect::<Vec<_>>().join(", "));
 }
 
-/// Recordings of all runs: each a folder as `endowire run` makes it, and its scene beside it.
+/// Recordings of all runs: each a folder as from `endowire run`, with its scene beside it.
 struct Recordings<'a> {
     folder: PathBuf,
     store: &'a Cache,
     what: Recorded,
 }
 
-/// That of one run.
+/// The recording of one run.
 struct Recording {
     scene_file: PathBuf,
     scene: Scene,
@@ -119,7 +119,7 @@ struct Recording {
     frames: FrameWriter,
     recorder: Recorder,
     started: Instant,
-    /// When the last step was recorded.
+    /// Time at which the last step was recorded.
     recorded: Instant,
     /// Time between recordings of steps.
     steps: Duration,

@@ -1,4 +1,4 @@
-//! `endowire verify`: the reference cases, and the stress table.
+//! `endowire verify`: reference cases and the stress table.
 
 use std::time::Instant;
 
@@ -36,7 +36,7 @@ struct Document {
     deployments: Option<Vec<DeploymentRow>>,
 }
 
-/// Random commands on several instruments, and the time they took.
+/// Results of random commands on several instruments, and their run time.
 #[derive(Serialize)]
 struct Instruments {
     #[serde(flatten)]
@@ -44,7 +44,7 @@ struct Instruments {
     time_s: f64,
 }
 
-/// A stressed case and the time it took.
+/// A stress case and its run time.
 #[derive(Serialize)]
 struct Stress {
     #[serde(flatten)]
@@ -187,7 +187,7 @@ fn print_cases(document: &Document) {
     }
 }
 
-/// What became of random commands on several instruments.
+/// Prints the results of random commands on several instruments.
 fn print_instruments(rows: &[Instruments]) {
     println!();
     println!(
@@ -227,7 +227,7 @@ fn print_instruments(rows: &[Instruments]) {
     }
 }
 
-/// Combinations that stopped, and counts of all.
+/// Prints the combinations that stopped, and counts of all.
 fn print_insertions(rows: &[InsertionRow]) {
     println!();
     println!(

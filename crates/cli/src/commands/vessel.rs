@@ -1,4 +1,4 @@
-//! `endowire vessel`: surfaces of vessels, checked and made.
+//! `endowire vessel`: checks and generates surfaces of vessels.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub(crate) fn check_file(
     report_on(file, frame, septum_mm, felt, provenance, json)
 }
 
-/// Builds a wall from a tree, writes it, and reports on what was written.
+/// Generates a wall from a tree, writes it, and reports on the written file.
 pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     let built_in = args.tree.to_str().filter(|_| !args.tree.exists()).and_then(anatomy::tree);
     let (tree, provenance) = match built_in {
@@ -58,7 +58,7 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     report_on(&args.out, 1.0.into(), 1.0, &FeltArgs::default(), provenance, args.json)
 }
 
-/// Calls what the core calls by its field by the flag of the command line.
+/// Replaces the core's name of a parameter in an error by the flag of the command line.
 fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
         Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
@@ -68,7 +68,7 @@ fn as_flag(error: Error) -> Failure {
     })
 }
 
-/// Reminds of the built-in anatomies where a tree file is missing.
+/// Mentions the built-in anatomies in an error about a missing tree file.
 fn built_ins(failure: Failure) -> Failure {
     match failure {
         Failure::Input(text) => {
@@ -99,10 +99,10 @@ fn report_on(
     answer(&document, json, || text(&document))
 }
 
-/// Openings that the report for a person lists.
+/// Largest number of openings listed in the text report.
 const OPENINGS_LISTED: usize = 20;
 
-/// The report for a person.
+/// The report as text.
 fn text(document: &Document) -> String {
     let r = &document.report;
     let size: Vec<String> = (0..3).map(|k| format!("{:.1}", r.high_mm[k] - r.low_mm[k])).collect();
@@ -152,7 +152,7 @@ fn text(document: &Document) -> String {
     lines.join("\n")
 }
 
-/// What the simulation makes of the surface.
+/// Properties of the surface in the simulation.
 fn simulated(r: &CheckReport) -> Vec<String> {
     let list = |v: &[f64; 3]| format!("[{:.2}, {:.2}, {:.2}]", v[0], v[1], v[2]);
     let mut lines = vec!["as it is simulated:".to_owned()];
@@ -198,7 +198,7 @@ fn simulated(r: &CheckReport) -> Vec<String> {
     lines
 }
 
-/// Yes, or which edges stand against it.
+/// Yes, or the edges that prevent it.
 fn watertight(report: &CheckReport) -> String {
     let causes: Vec<String> =
         [(report.open_edges, "open edges"), (report.non_manifold_edges, "edges of more than two triangles")]

@@ -1,5 +1,5 @@
-//! Shapes and contacts of a run as arrays. While it goes on they grow in a folder of their own, one file each, so that a run that is
-//! killed keeps every step; at its end they are packed into shapes.npz.
+//! Shapes and contacts of a run as arrays. During the run each array grows in its own file, so that a run that is
+//! killed keeps every step; at the end they are packed into shapes.npz.
 
 use std::fs::File;
 use std::io;
@@ -11,9 +11,9 @@ use endowire_core::shape::Shape;
 use super::npz::{self, ArrayStream, Kind, Member};
 use super::whole;
 
-/// Where the arrays of a recording are at its end.
+/// File of the packed arrays.
 pub(crate) const PACKED: &str = "shapes.npz";
-/// Where they grow.
+/// Folder of the growing arrays.
 pub(crate) const GROWING: &str = "shapes.part";
 
 const fn member(name: &'static str, kind: Kind, columns: usize) -> Member {
@@ -28,11 +28,11 @@ pub(crate) const CONTACT_POSITIONS: Member = member("contact_positions_mm", Kind
 pub(crate) const CONTACT_FORCES: Member = member("contact_forces_n", Kind::F64, 3);
 pub(crate) const CONTACT_OFFSETS: Member = member("contact_offsets", Kind::I64, 1);
 
-/// All arrays, in the order they are packed.
+/// All arrays, in the order of packing.
 const MEMBERS: [Member; 7] =
     [POSITIONS, TANGENTS, FROM_TIP, OFFSETS, CONTACT_POSITIONS, CONTACT_FORCES, CONTACT_OFFSETS];
 
-/// The arrays of a run that goes on.
+/// The arrays of a running recording.
 pub(crate) struct ShapeArrays {
     folder: PathBuf,
     arrays: [ArrayStream; 7],
@@ -41,7 +41,7 @@ pub(crate) struct ShapeArrays {
 }
 
 impl ShapeArrays {
-    /// Arrays without a step, in the folder of a recording.
+    /// Empty arrays in the folder of a recording.
     pub(crate) fn new(recording: &Path) -> io::Result<Self> {
         let folder = recording.join(GROWING);
         std::fs::create_dir_all(&folder)?;
@@ -52,13 +52,13 @@ impl ShapeArrays {
         Ok(Self { folder, arrays, nodes: 0, contacts: 0 })
     }
 
-    /// Arrays without a step, in place of those that the recording has, packed or not.
+    /// Empty arrays that replace those of the recording, packed or not.
     pub(crate) fn anew(recording: &Path) -> io::Result<Self> {
         whole::remove(&recording.join(PACKED))?;
         Self::new(recording)
     }
 
-    /// The first `steps` steps of the arrays that a recording has, packed or not, to which more are added.
+    /// The first `steps` steps of the arrays of a recording, packed or not, ready for more steps.
     pub(crate) fn go_on(recording: &Path, steps: usize) -> io::Result<Self> {
         let folder = recording.join(GROWING);
         let packed = recording.join(PACKED);
@@ -86,12 +86,12 @@ impl ShapeArrays {
             open(CONTACT_FORCES, c)?,
             open(CONTACT_OFFSETS, s)?,
         ];
-        // Only now: what is packed is whole, whatever happens here.
+        // Removed last, because the packed arrays stay valid until the growing ones are complete.
         whole::remove(&packed)?;
         Ok(Self { folder, arrays, nodes, contacts })
     }
 
-    /// Adds a step, and what belongs to it by `write_more`; where one of them fails, the steps before it stay.
+    /// Adds a step, and calls `write_more` for what belongs to it. If either fails, earlier steps are kept.
     pub(crate) fn push(
         &mut self,
         shape: &Shape,
@@ -108,7 +108,7 @@ impl ShapeArrays {
             from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
             points.push_f64(report.contacts.iter().flat_map(|c| <[f64; 3]>::from(c.position_mm)))?;
             forces.push_f64(report.contacts.iter().flat_map(|c| <[f64; 3]>::from(c.total_n())))?;
-            // Last, as a step counts when its offsets are there.
+            // Written last, because a step counts once its offsets are written.
             contact_offsets.push_i64(contacts)?;
             offsets.push_i64(nodes)?;
             write_more()
@@ -121,21 +121,21 @@ impl ShapeArrays {
         pushed
     }
 
-    /// Waits until all steps are on the disk itself.
+    /// Syncs all steps to disk.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.arrays.iter().try_for_each(ArrayStream::sync)
     }
 
-    /// Packs them into shapes.npz; where that fails, the growing ones stay.
+    /// Packs the arrays into shapes.npz; if that fails, the growing ones stay.
     pub(crate) fn pack(mut self, recording: &Path) -> io::Result<()> {
         whole::write(&recording.join(PACKED), |part| npz::write(File::create(part)?, &mut self.arrays))?;
-        // An open file cannot be removed everywhere.
+        // Some systems cannot remove an open file.
         drop(self.arrays);
         remove_growing(&self.folder)
     }
 }
 
-/// Removes growing arrays and their folder, which stays if a user has put something into it.
+/// Removes growing arrays and their folder, unless it contains files of the user.
 pub(crate) fn remove_growing(folder: &Path) -> io::Result<()> {
     for member in MEMBERS {
         whole::remove(&folder.join(member.file_name()))?;

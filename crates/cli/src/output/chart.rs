@@ -1,4 +1,4 @@
-//! Charts as SVG and PNG, the same on every machine: the font is in the program.
+//! Charts as SVG and PNG, identical on every machine: the font is part of the program.
 
 use std::path::{Path, PathBuf};
 use std::sync::Once;
@@ -9,10 +9,10 @@ use plotters::style::{FontStyle, register_font};
 
 use crate::failure::Failure;
 
-/// What drawing on a backend returns.
+/// Result of drawing on a backend.
 pub(crate) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
-/// Colours that people with any colour vision can tell apart (Okabe and Ito 2008), two greys, black and brown.
+/// Colours that are distinguishable with any colour vision (Okabe and Ito 2008), two greys, black and brown.
 pub(crate) const COLOURS: [RGBColor; 11] = [
     RGBColor(0, 90, 160),
     RGBColor(90, 90, 90),
@@ -34,9 +34,9 @@ pub(crate) fn font(size: u32) -> TextStyle<'static> {
     (FAMILY, size).into_font().color(&RGBColor(30, 30, 30))
 }
 
-/// A label of a logarithmic axis.
+/// Label of a logarithmic axis.
 pub(crate) fn power(value: &f64) -> String {
-    // The axis computes its powers of ten with rounding.
+    // The axis computes powers of ten with rounding errors.
     if (0.009..9e3).contains(value) {
         format!("{}", (value * 1e4).round() / 1e4)
     } else {
@@ -44,13 +44,13 @@ pub(crate) fn power(value: &f64) -> String {
     }
 }
 
-/// A chart that draws itself on any backend.
+/// A chart that can draw itself on any backend.
 pub(crate) trait Chart {
     /// Draws on `root`, which is white.
     fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>) -> Drawn<B>;
 }
 
-/// Draws one chart into `folder` twice: NAME.svg and NAME.png.
+/// Draws a chart to two files in `folder`: NAME.svg and NAME.png.
 pub(crate) fn write(
     folder: &Path,
     name: &str,
@@ -62,11 +62,11 @@ pub(crate) fn write(
     Ok(paths.into())
 }
 
-/// Draws one chart into a file, SVG or PNG by its extension.
+/// Draws a chart to a file, SVG or PNG by its extension.
 pub(crate) fn write_file(path: &Path, size: (u32, u32), chart: &impl Chart) -> Result<(), Failure> {
     static FONT: Once = Once::new();
     FONT.call_once(|| {
-        // Only a font that cannot be read is refused, and this one is part of the program.
+        // Fails only for an invalid font, and this one is part of the program.
         let _ = register_font(FAMILY, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
     });
     match path.extension().and_then(|extension| extension.to_str()) {
@@ -85,7 +85,7 @@ pub(crate) fn write_file(path: &Path, size: (u32, u32), chart: &impl Chart) -> R
     .map_err(|e| Failure::write(path, &e))
 }
 
-/// Draws on a backend, and ends with it.
+/// Draws on a backend and completes its output.
 fn draw<B: DrawingBackend>(backend: B, path: &Path, chart: &impl Chart) -> Result<(), Failure> {
     let root = backend.into_drawing_area();
     root.fill(&WHITE)
@@ -94,7 +94,7 @@ fn draw<B: DrawingBackend>(backend: B, path: &Path, chart: &impl Chart) -> Resul
         .map_err(|e| Failure::Computation(format!("the chart {} cannot be drawn: {e}", path.display())))
 }
 
-/// Writes a picture of three bytes a pixel.
+/// Writes an RGB picture of three bytes per pixel.
 pub(crate) fn write_png(path: &Path, size: (u32, u32), rgb: &[u8]) -> std::io::Result<()> {
     let file = std::io::BufWriter::new(std::fs::File::create(path)?);
     let mut encoder = png::Encoder::new(file, size.0, size.1);

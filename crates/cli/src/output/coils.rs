@@ -1,5 +1,6 @@
-//! Coils that a script has left behind: coils.csv, beside steps.csv. Each row is a point of a coil's centre line after a step, from the end that was detached to
-//! its tip. A coil has rows of the step that detached it, and of every one after which it is another micrometre from where its last rows have it.
+//! Detached coils: coils.csv, beside steps.csv. Each row is a point of a coil's centre line after a step, from the
+//! detached end to the tip. A coil has rows for the step that detached it, and for every step after which it has
+//! moved by a micrometre from its last rows.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,21 +15,21 @@ use super::rows;
 use super::step_table::StepTable;
 use crate::failure::Failure;
 
-/// The table; there is none where nothing was detached.
+/// The table; absent if nothing was detached.
 pub(crate) const COILS: &str = "coils.csv";
-/// A coil that has moved by less lies where it was, mm.
+/// A coil that has moved by less gets no new rows, mm.
 const MOVED_MM: f64 = 1e-3;
 
-/// Where a coil lies from a step on.
+/// Position of a coil from a step on.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Left {
     step: usize,
-    /// Which of the coils that were detached it is.
+    /// Index of the coil, in order of detachment.
     number: usize,
     coil: DetachedCoil,
 }
 
-/// One line of the table.
+/// A row of the table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Row {
     step: usize,
@@ -46,19 +47,19 @@ struct Row {
 /// Writes the table of a run.
 pub(crate) struct CoilTable {
     path: PathBuf,
-    /// None before the first coil.
+    /// `None` before the first coil.
     table: Option<StepTable>,
-    /// As the last rows have them.
+    /// The coils as in their last rows.
     told: Vec<DetachedCoil>,
 }
 
 impl CoilTable {
-    /// The table of a recording in `folder` that begins.
+    /// The table of a new recording in `folder`.
     pub(crate) fn new(folder: &Path) -> Self {
         Self { path: folder.join(COILS), table: None, told: Vec::new() }
     }
 
-    /// The table of a recording that goes on after step `steps`: rows of later ones are dropped.
+    /// The table of a recording that resumes after step `steps`; rows of later steps are dropped.
     pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> Result<Self, Failure> {
         let new = Self::new(folder);
         if !new.path.exists() {
@@ -94,18 +95,18 @@ impl CoilTable {
         }
     }
 
-    /// The coils as the last rows have them.
+    /// The coils as in their last rows.
     pub(crate) fn told(&self) -> &[DetachedCoil] {
         &self.told
     }
 
-    /// Waits until all rows are on the disk itself.
+    /// Syncs all rows to disk.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.table.as_ref().map_or(Ok(()), StepTable::sync)
     }
 }
 
-/// The farthest that a node of a coil is from where it was, mm.
+/// Largest displacement of a node of a coil, mm.
 fn moved_mm(coil: &DetachedCoil, was: &DetachedCoil) -> f64 {
     let nodes = coil.shape.positions_mm.iter().zip(&was.shape.positions_mm);
     nodes.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
@@ -133,7 +134,7 @@ fn rows_of<'a>(
     })
 }
 
-/// What was left behind in a recorded run of these instruments.
+/// The detached coils of a recorded run with these instruments.
 pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Vec<Left>, Failure> {
     let path = folder.join(COILS);
     let rows: Vec<Row> = rows::read(&path)?;
@@ -150,7 +151,7 @@ pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Vec<Left>, Failure> {
     each.collect()
 }
 
-/// The coils as they lie after a step.
+/// The coils after a step.
 pub(crate) fn after(left: &[Left], step: usize) -> Vec<DetachedCoil> {
     let mut coils: Vec<DetachedCoil> = Vec::new();
     for Left { number, coil, .. } in left.iter().filter(|left| left.step <= step) {

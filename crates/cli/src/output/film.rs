@@ -1,4 +1,5 @@
-//! The frames of a recording as one moving picture, made of the files at its end: a run that went on after a kill has all of them.
+//! Animations of a recording's frames. They are made from the files at the end, so that they are complete even if the
+//! run was interrupted and resumed.
 
 use std::path::{Path, PathBuf};
 
@@ -7,11 +8,11 @@ use endowire_viewer::{Animation, Image, Pace};
 use super::{tell, whole};
 use crate::failure::Failure;
 
-/// What films are called: one for each of their kinds.
+/// File names of films, one for each format.
 pub(crate) const FILMS: [&str; 4] = ["film.gif", "film.png", "film.apng", "film.mp4"];
 
-/// Writes FOLDER/film.KIND from `frames`, which are relative to the folder, the views of a step side by side. Returns its name; none without
-/// frames.
+/// Writes FOLDER/film.KIND from `frames`, whose paths are relative to the folder, with the views of a step side by
+/// side. Returns its name; `None` without frames.
 pub(crate) fn write(
     folder: &Path,
     kind: &str,
@@ -24,7 +25,7 @@ pub(crate) fn write(
         tell(format_args!("endowire: no {name} in {}: no frame was drawn", folder.display()));
         return Ok(None);
     };
-    // The kind is told by the end of a name, so that what is not whole yet has another beginning.
+    // The extension determines the format, so an unfinished file is marked at the start of its name.
     let part = folder.join(format!("part-{name}"));
     let made = || -> endowire_core::Result<()> {
         let first = side_by_side(folder, first)?;
@@ -42,12 +43,12 @@ pub(crate) fn write(
     made.map(|()| Some(name))
 }
 
-/// The step in the name of a frame, step_NUMBER_VIEW.png.
+/// The step number in the name of a frame, step_NUMBER_VIEW.png.
 fn step_of(frame: &str) -> Option<&str> {
     frame.rsplit('/').next()?.split('_').nth(1)
 }
 
-/// The pictures of a step.
+/// The pictures of a step, side by side.
 fn side_by_side(folder: &Path, step: &[String]) -> endowire_core::Result<Image> {
     let mut paths = step.iter().map(|name| -> PathBuf { folder.join(name) });
     let first = Image::read_png(paths.next().unwrap_or_default())?;

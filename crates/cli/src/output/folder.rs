@@ -1,4 +1,5 @@
-//! The folder of a recording: held by one run at a time, and emptied of an earlier recording and of nothing else.
+//! The folder of a recording. Only one run at a time may hold it, and only files of an earlier recording are removed
+//! from it.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read};
@@ -14,22 +15,24 @@ use crate::failure::Failure;
 
 /// The table of steps.
 pub(crate) const TABLE: &str = "steps.csv";
-/// How it begins.
+/// Start of its first line.
 const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
-/// Held by the run that records. The file stays, empty: what counts is who holds it, and a program that dies lets go of it.
+/// Locked by the run that records. The empty file remains afterwards: only the lock counts, and it is released when a
+/// program dies.
 const LOCK: &str = ".endowire-lock";
 
 /// The right to record into a folder, until it is dropped.
 pub(crate) struct Claim {
-    /// None on a file system that knows no locks.
+    /// `None` on a file system without locks.
     _lock: Option<File>,
 }
 
-/// Makes a folder ready for a recording: makes it if it is not there, keeps other runs out, and takes an earlier recording away, which
-/// is said. A folder with other files is refused unless `force` is set; then only files of a recording's names are replaced.
+/// Prepares a folder for a recording: creates it if necessary, locks it, and removes an earlier recording, which is
+/// reported. A folder with other files is refused unless `force` is set; even then only files with names of a
+/// recording are replaced.
 pub(crate) fn claim(folder: &Path, force: bool) -> Result<Claim, Failure> {
     let failed = |e: io::Error| Failure::write(folder, &e);
-    // Before the lock, which would be one more file in a folder that is none of ours.
+    // Checked before locking, because the lock would add a file to a folder that is not a recording.
     let earlier = is_recording(folder);
     if let (false, false, Some(name)) = (earlier, force, first_file(folder)) {
         return Err(Failure::Input(format!(
@@ -50,12 +53,12 @@ pub(crate) fn claim(folder: &Path, force: bool) -> Result<Claim, Failure> {
     Ok(claim)
 }
 
-/// Holds the folder of a recording that goes on.
+/// Locks the folder of a recording that resumes.
 pub(crate) fn claim_again(folder: &Path) -> Result<Claim, Failure> {
     lock(folder)
 }
 
-/// Removes the frames of a recording: those of the steps that stay are drawn again.
+/// Removes the frames of a recording: those of the remaining steps are drawn again.
 pub(crate) fn remove_frames(folder: &Path) -> io::Result<()> {
     frames(&folder.join("frames"))?.iter().try_for_each(std::fs::remove_file)
 }
@@ -70,22 +73,22 @@ fn lock(folder: &Path) -> Result<Claim, Failure> {
             "--out {}: another run is recording into this folder: wait until it has ended, or give another folder",
             folder.display()
         ))),
-        // Some network file systems have no locks: better a recording without than none.
+        // Some network file systems have no locks; there the recording runs without one.
         Err(TryLockError::Error(_)) => Ok(Claim { _lock: None }),
     }
 }
 
-/// Whether `endowire run` has recorded into a folder.
+/// Whether a folder contains a recording of `endowire run`.
 pub(crate) fn is_recording(folder: &Path) -> bool {
     let begins = File::open(folder.join(TABLE)).and_then(|file| {
         let mut begins = Vec::new();
         file.take(TABLE_BEGINS.len() as u64).read_to_end(&mut begins).map(|_| begins)
     });
-    // A recording that was ended at once has an empty table, or the beginning of its first line.
+    // A recording that was interrupted at once has an empty table or an incomplete first line.
     begins.is_ok_and(|begins| TABLE_BEGINS.starts_with(&begins))
 }
 
-/// Numbers of the steps of a recording, and the times at which they end, s.
+/// Numbers of the steps of a recording, with their end times, s.
 pub(crate) fn step_times(folder: &Path) -> Result<Vec<(usize, f64)>, Failure> {
     #[derive(serde::Deserialize)]
     struct Row {
@@ -100,29 +103,29 @@ pub(crate) fn step_times(folder: &Path) -> Result<Vec<(usize, f64)>, Failure> {
         ))
     };
     let mut text = std::fs::read(&path).map_err(|e| refuse(e.to_string()))?;
-    // A run may have been killed within a row.
+    // A killed run may leave an incomplete row.
     text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
     let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
     let times = rows.map(|row| row.map(|row: Row| (row.step, row.time_s)));
     times.collect::<Result<_, _>>().map_err(|e| refuse(e.to_string()))
 }
 
-/// A file that is not ours.
+/// A file that the program did not write.
 fn first_file(folder: &Path) -> Option<std::ffi::OsString> {
     let names = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.file_name());
     names.filter(|name| name != LOCK).min()
 }
 
-/// Removes what a recording is made of, and tells its names. Frames are ours in a recording alone.
+/// Removes the files of a recording and returns their names. Frames are removed only if the folder is a recording.
 fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
     let mut removed = vec![];
-    // A film is ours in a recording alone, as frames are.
+    // Films, like frames, are removed only if the folder is a recording.
     let films = FILMS.iter().copied().filter(|_| recording);
     for name in
         [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, PACKING, arrays::PACKED].into_iter().chain(films)
     {
         let path = folder.join(name);
-        // Not the end of a link: a link itself is replaced.
+        // For a link, this is the link itself and not its target.
         if path.symlink_metadata().is_ok() {
             whole::remove(&path)?;
             removed.push(name.to_owned());
@@ -148,7 +151,7 @@ fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
     Ok(removed)
 }
 
-/// The frames of a recording, whole or not.
+/// The frames of a recording, complete or not.
 fn frames(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(vec![]) };
     let mut frames = vec![];
@@ -162,12 +165,12 @@ fn frames(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(frames)
 }
 
-/// The name of a frame of a recording.
+/// File name of a frame of a recording.
 pub(crate) fn frame_name(step: usize, view: &str) -> String {
     format!("step_{step:06}_{view}.png")
 }
 
-/// Whether [`frame_name`] gives this name, and no name that only looks like it.
+/// Whether [`frame_name`] can give exactly this name.
 fn is_frame_name(name: &str) -> bool {
     let name = name.strip_suffix(".part").unwrap_or(name);
     let Some((digits, view)) = name.strip_prefix("step_").and_then(|rest| rest.split_once('_')) else {

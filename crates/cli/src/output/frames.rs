@@ -1,4 +1,4 @@
-//! Frames: the scene's `[view]` table, the renderer it asks for, and the files.
+//! Frames: the scene's `[view]` table, its renderers, and the files.
 
 use std::io;
 use std::path::Path;
@@ -18,36 +18,36 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::scenes;
 
-/// Where the C-arm stands in a plane.
+/// Geometry of a plane of fluoroscopy.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct PlaneTold {
     primary_deg: f64,
     secondary_deg: f64,
-    /// Takes (x, y, z, 1) in mm to pixel coordinates times the depth.
+    /// Maps (x, y, z, 1), in mm, to pixel coordinates times the depth.
     camera_matrix: [[f64; 4]; 3],
-    /// Of its frames; none before the first.
+    /// Exposure of its frames; `None` before the first frame.
     exposure: Option<Exposure>,
 }
 
-/// Draws the steps of a run that the scene wants to see.
+/// Draws the frames of a run that the scene requests.
 pub(crate) struct FrameWriter {
     spec: ViewSpec,
     pushed: Pushed,
-    /// Of the vessel, if any view is asked for: else nothing is built.
+    /// Wall of the vessel; `None` if no view is requested, to save the work.
     wall: Option<Wall>,
-    /// How it moves.
+    /// Motion of the vessel.
     motion: Option<VesselMotion>,
-    /// That of the first plane, and of the second of two; none where no view is asked for: then nothing is built.
+    /// The renderers of one or two planes; empty if no view is requested, to save the work.
     planes: Vec<Renderer>,
-    /// What was in after the step before, where pulses show its way from there.
+    /// State after the previous step, if pulses show the motion since then.
     before: Option<Before>,
-    /// Whether medium flows that the renderers do not know.
+    /// Whether there are injections that the renderers do not know yet.
     injected: bool,
-    /// Where the tip was after each step, in the vessel at rest, and when, s; kept where the scene injects through it.
+    /// Material places of the tip after each step, with times, s; kept if the scene injects through it.
     tips: Vec<(f64, Vec3)>,
 }
 
-/// What was in after a step, and when.
+/// The state after a step, with its time.
 struct Before {
     shape: Shape,
     inserted_mm: Vec<f64>,
@@ -59,14 +59,14 @@ fn planes(spec: &ViewSpec, wall: &Wall) -> Result<Vec<Renderer>, Error> {
     spec.planes().iter().map(|plane| Renderer::of_wall(plane, wall)).collect()
 }
 
-/// How much of the vessel the tomogram of a renderer's patient holds, for people; nothing without one.
+/// A message on how much of the vessel lies in the patient's tomogram; `None` without a tomogram.
 pub(crate) fn tomogram_holds(renderer: &Renderer) -> Option<String> {
     let part = renderer.vessel_held()?;
     Some(format!("the tomogram (view.patient.ct) holds {:.0} % of the vessel's surface", 100.0 * part))
 }
 
 impl FrameWriter {
-    /// Prepares what the scene file asks for; without a simulation nothing is drawn.
+    /// Prepares the views that the scene file requests; nothing is drawn without a simulation.
     pub(crate) fn new(
         path: &Path,
         scene: &Scene,
@@ -88,17 +88,17 @@ impl FrameWriter {
         Ok(Self { spec, pushed, wall, motion, planes, before: None, injected: false, tips: vec![] })
     }
 
-    /// What draws, for the summary.
+    /// Name of the backend, for the summary.
     pub(crate) fn renderer(&self) -> Option<String> {
         self.planes.first().map(|r| r.backend().to_owned())
     }
 
-    /// How much of the vessel the patient's tomogram holds, for people; nothing without one.
+    /// A message on how much of the vessel lies in the patient's tomogram; `None` without a tomogram.
     pub(crate) fn held(&self) -> Option<String> {
         self.planes.first().and_then(tomogram_holds)
     }
 
-    /// Where the C-arm stands in each plane of fluoroscopy, for the summary.
+    /// Geometry of each plane of fluoroscopy, for the summary.
     pub(crate) fn planes(&self) -> Vec<PlaneTold> {
         let arms = self.planes.iter().filter_map(|plane| Some((plane.c_arm()?, plane.exposure())));
         let told = arms.map(|(arm, exposure)| {
@@ -108,23 +108,23 @@ impl FrameWriter {
         told.collect()
     }
 
-    /// Lets medium flow in the frames from the next on.
+    /// Adds an injection, from the next frame on.
     pub(crate) fn inject(&mut self, injected: &Injected) {
         self.spec.injection.push(injected.spec());
         self.injected = true;
     }
 
-    /// Frames a second; of a script without speeds also its steps.
+    /// Frames per second; steps per second of a script without speeds.
     pub(crate) fn frames_per_s(&self) -> f64 {
         self.spec.frames_per_s
     }
 
-    /// Time at the end of a step whose script has no speeds, s: that of its frame.
+    /// Time at the end of a step if the script has no speeds, s: that of its frame.
     pub(crate) fn time_s(&self, step: usize) -> f64 {
         step as f64 / self.spec.frames_per_s
     }
 
-    /// Writes the frames of step `step`, which ends at `time_s`, if they are due; the last step always is.
+    /// Writes the frames of step `step`, which ends at `time_s`, if they are due; those of the last step always are.
     pub(crate) fn step(
         &mut self,
         (step, time_s): (usize, f64),
@@ -137,13 +137,14 @@ impl FrameWriter {
         self.stood(seen, time_s).and(drawn)
     }
 
-    /// Makes one moving picture of all frames that were written, if the scene wants one; its name in the folder.
+    /// Combines all frames to a film, if the scene requests one; returns its name in the folder.
     pub(crate) fn film(&self, recorder: &Recorder) -> Result<Option<String>, Failure> {
         let Some(kind) = &self.spec.film else { return Ok(None) };
         film::write(recorder.folder(), kind, &recorder.frames, self.spec.frames_per_s)
     }
 
-    /// Notes what is in at a moment: a pulse of the next step begins on the way from there, and what a tip injects goes where it was.
+    /// Stores the state at a time: a pulse of the next step shows the motion since then, and injections at the tip
+    /// start from its position then.
     pub(crate) fn stood(
         &mut self,
         (shape, inserted_mm): (&Shape, &[f64]),
@@ -172,7 +173,8 @@ impl FrameWriter {
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
         if let (true, Some(wall)) = (self.injected, &self.wall) {
-            // What they remember is of a vessel without: masks are taken anew, as for every injection in a room.
+            // The renderers' masks show a vessel without medium; new renderers make new ones, as for every injection
+            // in a cath lab.
             self.planes = planes(&self.spec, wall)?;
             for plane in &mut self.planes {
                 self.tips.iter().try_for_each(|(then_s, place_mm)| plane.follow_tip(*then_s, *place_mm))?;
@@ -201,7 +203,7 @@ impl FrameWriter {
     }
 }
 
-/// What the system said, without the path that it said it of.
+/// The system's error, without the path.
 fn bare(error: Error) -> io::Error {
     match error {
         Error::File { source, .. } => source,

@@ -1,5 +1,5 @@
-//! Contrast medium that a script has injected: injections.csv, beside steps.csv. Each row has the place of the tip as it began, from
-//! where the medium streams.
+//! Injections of contrast medium by a script: injections.csv, beside steps.csv. Each row has the position of the tip
+//! at the start, from where the medium flows.
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 use super::rows;
 use crate::failure::Failure;
 
-/// The table; there is none where nothing was injected.
+/// The table; absent if nothing was injected.
 pub(crate) const INJECTIONS: &str = "injections.csv";
 
-/// One line of it.
+/// A row of the table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Injected {
-    /// Steps carried out before it.
+    /// Number of steps carried out before it.
     pub(crate) after_step: usize,
     time_s: f64,
     instrument: String,
@@ -29,7 +29,8 @@ pub(crate) struct Injected {
 }
 
 impl Injected {
-    /// Those of a script beyond the `known` first, which begin where the simulation is now; a script without speeds has `frames_per_s` steps a second.
+    /// The injections of a script after the first `known` ones; they begin at the current position. A script without
+    /// speeds has `frames_per_s` steps per second.
     pub(crate) fn begun(
         run: &ScriptRun<'_>,
         known: usize,
@@ -55,7 +56,7 @@ impl Injected {
         }
     }
 
-    /// What flows of it.
+    /// The injection in the pictures.
     pub(crate) fn spec(&self) -> InjectionSpec {
         InjectionSpec {
             start_s: self.time_s,
@@ -72,7 +73,7 @@ pub(crate) fn write(folder: &Path, injected: &[Injected]) -> Result<(), Failure>
     rows::write(&folder.join(INJECTIONS), injected)
 }
 
-/// What was injected in a recorded run.
+/// The injections of a recorded run.
 pub(crate) fn read(folder: &Path) -> Result<Vec<Injected>, Failure> {
     rows::read(&folder.join(INJECTIONS))
 }

@@ -1,4 +1,4 @@
-//! What each of several instruments does, step by step: instruments.csv, beside steps.csv.
+//! State of each of several instruments, step by step: instruments.csv, beside steps.csv.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -15,7 +15,7 @@ use crate::failure::Failure;
 /// The table.
 pub(crate) const INSTRUMENTS: &str = "instruments.csv";
 
-/// One line of it.
+/// A row of the table.
 #[derive(Debug, Serialize, Deserialize)]
 struct Row {
     step: usize,
@@ -30,28 +30,28 @@ struct Row {
     tip_z_mm: Option<f64>,
     push_force_n: Option<f64>,
     torque_nmm: f64,
-    /// Length beyond the instruments outside it: there the wall is felt by its radius.
+    /// Length beyond the enclosing instruments, where it touches the wall itself.
     felt_mm: f64,
     /// Its largest radius there.
     felt_radius_mm: f64,
-    /// Sum of the forces across the line by which those outside hold it and what lies in it.
+    /// Sum of the forces across the line between it and the instruments around and inside it.
     #[serde(default)]
     lateral_n: f64,
 }
 
-/// Writes the table of a run; a device alone has none.
+/// Writes the table of a run; a single device has none.
 pub(crate) struct InstrumentTable {
     table: StepTable,
 }
 
 impl InstrumentTable {
-    /// The table of a recording in `folder` that begins.
+    /// The table of a new recording in `folder`.
     pub(crate) fn new(folder: &Path, stack: &Stack) -> io::Result<Option<Self>> {
         let several = stack.is_several().then(|| StepTable::new(&folder.join(INSTRUMENTS)));
         Ok(several.transpose()?.map(|table| Self { table }))
     }
 
-    /// The table of a recording that goes on after step `steps`: rows of later ones are dropped.
+    /// The table of a recording that resumes after step `steps`; rows of later steps are dropped.
     pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> io::Result<Option<Self>> {
         let several = stack.is_several().then(|| StepTable::go_on(&folder.join(INSTRUMENTS), steps));
         Ok(several.transpose()?.map(|table| Self { table }))
@@ -88,21 +88,21 @@ impl InstrumentTable {
         self.table.flush()
     }
 
-    /// Waits until all rows are on the disk itself.
+    /// Syncs all rows to disk.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.table.sync()
     }
 }
 
-/// What of each instrument was in after the steps of a recording.
+/// Inserted lengths of the instruments after the steps of a recording.
 pub(crate) struct Lengths {
     folder: PathBuf,
-    /// By step; none of a device alone, which is as long as its line.
+    /// By step; `None` for a single device, whose length is that of the line.
     steps: Option<BTreeMap<usize, Vec<f64>>>,
 }
 
 impl Lengths {
-    /// Reads those of `stack` in the folder of a recording.
+    /// Reads the lengths of the instruments of `stack` from the folder of a recording.
     pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Self, Failure> {
         let steps = if stack.is_several() {
             let path = folder.join(INSTRUMENTS);
@@ -117,7 +117,7 @@ impl Lengths {
         Ok(Self { folder: folder.to_path_buf(), steps })
     }
 
-    /// Lengths in after a step that led to this shape, mm.
+    /// Inserted lengths after a step that led to this shape, mm.
     pub(crate) fn after(&self, step: usize, shape: &Shape) -> Result<Vec<f64>, Failure> {
         let Some(steps) = &self.steps else {
             return Ok(vec![shape.from_tip_mm.first().copied().unwrap_or(0.0)]);
@@ -129,10 +129,10 @@ impl Lengths {
     }
 }
 
-/// Lengths of the instruments of `stack` by step, mm.
+/// Inserted lengths of the instruments of `stack` by step, mm.
 fn by_step(path: &Path, stack: &Stack) -> io::Result<BTreeMap<usize, Vec<f64>>> {
     let mut text = std::fs::read(path)?;
-    // A run may have been killed within a row.
+    // A killed run may leave an incomplete row.
     text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
     let mut steps: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for row in csv::Reader::from_reader(text.as_slice()).deserialize() {

@@ -1,4 +1,5 @@
-//! A list of what a command has written into a folder, kept beside it, so that the next call replaces these files and no others.
+//! Lists the files that a command has written into a folder. The list is kept in the folder, so that the next call
+//! replaces these files and no others.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -7,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 
 use super::whole::remove;
 
-/// The list of a call that goes on.
+/// The list of a running call.
 pub(crate) struct Manifest {
     folder: PathBuf,
     path: PathBuf,
@@ -16,7 +17,7 @@ pub(crate) struct Manifest {
 }
 
 impl Manifest {
-    /// Begins a list for `command` in `folder`. What an earlier call has written there is removed, and counted.
+    /// Begins a list for `command` in `folder`. Files from an earlier call are removed, and their number is returned.
     pub(crate) fn begin(folder: &Path, command: &str) -> io::Result<(Self, usize)> {
         let path = folder.join(format!(".endowire-{command}"));
         let mut removed = 0;
@@ -30,15 +31,15 @@ impl Manifest {
         Ok((Self { folder: folder.to_owned(), path, file, names: BTreeSet::new() }, removed))
     }
 
-    /// Whether the list is in its place yet: a file that is open takes what is written to it, also without a name.
+    /// Whether the list was not removed or replaced: an open file still accepts writes after it has been deleted.
     pub(crate) fn is_there(&self) -> bool {
         let own = self.file.metadata().map(|own| own.len());
         let there = self.path.metadata().map(|there| there.len());
         own.ok().zip(there.ok()).is_some_and(|(own, there)| own == there)
     }
 
-    /// Notes a file of the folder; to be called before it is written, or a call that is killed would leave it for ever. Refuses a name that
-    /// is taken: what was there at the beginning and is not on the list of an earlier call is somebody else's.
+    /// Adds a file of the folder to the list; call this before writing the file, otherwise a killed call would leave
+    /// it for ever. Refuses the name of an existing file that was not written by an earlier call.
     pub(crate) fn add(&mut self, name: &str) -> io::Result<()> {
         if self.names.contains(name) {
             return Ok(());
@@ -55,7 +56,7 @@ impl Manifest {
     }
 }
 
-/// The files of a list that lie in the folder itself.
+/// The files of a list that lie directly in the folder.
 fn listed(path: &Path, folder: &Path) -> Vec<PathBuf> {
     let Ok(text) = std::fs::read_to_string(path) else { return vec![] };
     let is_name = |line: &&str| {
@@ -82,12 +83,12 @@ mod tests {
         for name in ["a.png", "b.png", "../outside.png", "mine.png"] {
             std::fs::write(folder.join(name), "").unwrap();
         }
-        // Another command has a list of its own.
+        // Each command has its own list.
         assert_eq!(Manifest::begin(&folder, "fluoro").unwrap().1, 0);
         assert_eq!(Manifest::begin(&folder, "render").unwrap().1, 2);
         assert!(!folder.join("a.png").exists());
         assert!(folder.join("mine.png").exists() && outer.path().join("outside.png").exists());
-        // What is not ours is not written over, and does not become ours by the trial.
+        // Files of others are not overwritten, and the attempt does not put them on the list.
         let (mut manifest, _) = Manifest::begin(&folder, "render").unwrap();
         assert!(manifest.add("a.png").is_ok() && manifest.add("a.png").is_ok(), "the twin");
         assert_eq!(manifest.add("mine.png").unwrap_err().kind(), io::ErrorKind::AlreadyExists);

@@ -1,4 +1,4 @@
-//! Everything that leaves the program: recordings, arrays, provenance, progress.
+//! All output of the program: recordings, arrays, provenance, progress.
 
 mod arrays;
 pub(crate) mod chart;
@@ -29,10 +29,10 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 
-/// What a recording tells of itself.
+/// File with the summary of a recording.
 pub(crate) const SUMMARY: &str = "summary.json";
 
-/// Prints a document and a line break on stdout. A reader that has left (`| head`) has what it wanted.
+/// Prints a document and a line break on stdout. A closed pipe (`| head`) is not an error.
 pub(crate) fn print(document: impl Display) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match writeln!(out, "{document}").and_then(|()| out.flush()) {
@@ -43,12 +43,13 @@ pub(crate) fn print(document: impl Display) -> Result<(), Failure> {
     }
 }
 
-/// Tells a person on stderr, who may have closed it: what was computed does not depend on it.
+/// Prints a message on stderr. Errors are ignored, because results do not depend on it.
 pub(crate) fn tell(text: impl Display) {
     let _ = writeln!(stderr().lock(), "{}", printable(text));
 }
 
-/// Text for a terminal: a name in it may have control characters, which would move its cursor, change its colours or its title.
+/// Makes text safe for a terminal: control characters in a name could move the cursor, or change colours or the
+/// title.
 pub(crate) fn printable(text: impl Display) -> String {
     let mut shown = String::new();
     for character in text.to_string().chars() {
@@ -66,7 +67,7 @@ pub(crate) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
     print(to_json(document)?)
 }
 
-/// Prints what a command found: one JSON document, or text for a person.
+/// Prints the result of a command: one JSON document, or text for people.
 pub(crate) fn answer(
     document: &impl Serialize,
     json: bool,

@@ -1,7 +1,8 @@
-//! Arrays for numpy: an uncompressed zip of `.npy` members, packed from files that grow while a run goes on; nothing is held in memory.
+//! Arrays for numpy: an uncompressed zip of `.npy` members, packed from files that grow during a run. Nothing is held
+//! in memory.
 //!
-//! Format: NumPy enhancement proposal 1, version 1.0. Only the 60-byte header is ours; the crates that read and write
-//! the whole format bring a parser generator for it. Only what is written here is read back.
+//! Format: NumPy enhancement proposal 1, version 1.0. Only the 60-byte header is written here, because the crates
+//! that read and write the whole format depend on a parser generator. Only files written here can be read back.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, Write};
@@ -10,7 +11,7 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
-/// Bytes of a number, of either kind.
+/// Size of a number in bytes, for both kinds.
 const NUMBER_BYTES: u64 = 8;
 
 /// Number type of an array.
@@ -22,17 +23,17 @@ pub(crate) enum Kind {
     I64,
 }
 
-/// What an array is called and made of.
+/// Name and type of an array.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Member {
     pub(crate) name: &'static str,
     pub(crate) kind: Kind,
-    /// Numbers in a row; 1 makes a one-dimensional array.
+    /// Numbers per row; 1 makes a one-dimensional array.
     pub(crate) columns: usize,
 }
 
 impl Member {
-    /// The file it grows in: bare little-endian numbers, as `numpy.fromfile` reads them.
+    /// Name of the file in which it grows: bare little-endian numbers, as read by `numpy.fromfile`.
     pub(crate) fn file_name(&self) -> String {
         let kind = match self.kind {
             Kind::F64 => "f64",
@@ -42,7 +43,8 @@ impl Member {
     }
 }
 
-/// One array that grows on disk until it is packed. What has been pushed is with the system: a program that is killed keeps it.
+/// An array that grows on disk until it is packed. Pushed numbers are handed to the system at once, so they survive
+/// if the program is killed.
 pub(crate) struct ArrayStream {
     member: Member,
     numbers: u64,
@@ -54,12 +56,12 @@ impl ArrayStream {
     pub(crate) fn new(member: Member, folder: &Path) -> io::Result<Self> {
         let path = folder.join(member.file_name());
         File::create(&path)?;
-        // Appended to, so that numbers stay in line after a file was cut.
+        // Opened for appending, so that numbers stay aligned after the file was truncated.
         let file = OpenOptions::new().read(true).append(true).open(&path)?;
         Ok(Self { member, numbers: 0, file })
     }
 
-    /// The first `numbers` of an array that is in `folder` already.
+    /// The first `numbers` numbers of an array that exists in `folder`.
     pub(crate) fn open(member: Member, folder: &Path, numbers: u64) -> io::Result<Self> {
         let file = OpenOptions::new().read(true).append(true).open(folder.join(member.file_name()))?;
         if file.metadata()?.len() < numbers * NUMBER_BYTES {
@@ -72,15 +74,15 @@ impl ArrayStream {
         Ok(Self { member, numbers, file })
     }
 
-    /// Numbers so far.
+    /// Number of numbers so far.
     pub(crate) fn len(&self) -> u64 {
         self.numbers
     }
 
-    /// Forgets all but the first numbers, and what a write that failed half way has left.
+    /// Drops all but the first numbers, including the remains of a failed write.
     pub(crate) fn truncate(&mut self, numbers: u64) {
         self.numbers = self.numbers.min(numbers);
-        // A disk that fails here as well changes nothing: only whole steps are read.
+        // An error is ignored, because only complete steps are read.
         let _ = self.file.set_len(self.numbers * NUMBER_BYTES);
     }
 
@@ -101,7 +103,7 @@ impl ArrayStream {
         Ok(())
     }
 
-    /// Waits until all is on the disk itself: then a power failure keeps it as well.
+    /// Syncs the numbers to disk, so that they survive a power failure.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.file.sync_data()
     }
@@ -140,7 +142,7 @@ pub(crate) fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result
     file.flush()
 }
 
-/// A small array that is held in memory.
+/// A small array in memory.
 pub(crate) struct Array {
     name: String,
     kind: &'static str,
@@ -149,18 +151,18 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Bytes of a shape.
+    /// An array of bytes.
     pub(crate) fn of_bytes(name: &str, shape: Vec<usize>, bytes: Vec<u8>) -> Self {
         Self { name: name.to_owned(), kind: "|u1", shape, bytes }
     }
 
-    /// Floats of a shape.
+    /// An array of floats.
     pub(crate) fn of_floats(name: &str, shape: Vec<usize>, values: impl Iterator<Item = f64>) -> Self {
         Self { name: name.to_owned(), kind: "<f8", shape, bytes: values.flat_map(f64::to_le_bytes).collect() }
     }
 }
 
-/// Packs arrays that are held in memory into a `.npz` file.
+/// Packs arrays in memory into a `.npz` file.
 pub(crate) fn write_arrays(path: &Path, arrays: &[Array]) -> io::Result<()> {
     let mut archive = ZipWriter::new(BufWriter::new(File::create(path)?));
     let options = SimpleFileOptions::default()
@@ -175,7 +177,7 @@ pub(crate) fn write_arrays(path: &Path, arrays: &[Array]) -> io::Result<()> {
     archive.finish()?.flush()
 }
 
-/// The numbers of an array of 8-byte numbers that [`write()`] has packed, as little-endian bytes.
+/// The numbers of an array of 8-byte numbers packed by [`write()`], as little-endian bytes.
 pub(crate) fn read(path: &Path, name: &str) -> io::Result<Vec<[u8; 8]>> {
     let bad = |what: String| io::Error::new(io::ErrorKind::InvalidData, what);
     let mut archive = ZipArchive::new(File::open(path)?)?;
@@ -197,7 +199,7 @@ pub(crate) fn read(path: &Path, name: &str) -> io::Result<Vec<[u8; 8]>> {
     Ok(bytes.chunks_exact(8).filter_map(|b| b.try_into().ok()).collect())
 }
 
-/// The whole numbers in the file of an array that is not packed; one that was being written is cut off.
+/// The complete numbers in the file of an array that is not packed; an incomplete last one is dropped.
 pub(crate) fn read_unpacked(folder: &Path, member: &Member) -> io::Result<Vec<[u8; 8]>> {
     let bytes = std::fs::read(folder.join(member.file_name()))?;
     Ok(bytes.chunks_exact(8).filter_map(|b| b.try_into().ok()).collect())
@@ -206,7 +208,7 @@ pub(crate) fn read_unpacked(folder: &Path, member: &Member) -> io::Result<Vec<[u
 /// Packs arrays into a `.npz` file.
 pub(crate) fn write(file: File, arrays: &mut [ArrayStream]) -> io::Result<()> {
     let mut archive = ZipWriter::new(BufWriter::new(file));
-    // Stored, with the fixed time stamp of the zip epoch: the same arrays are the same bytes.
+    // Uncompressed, with the fixed time stamp of the zip epoch, so that equal arrays give equal bytes.
     let options = SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Stored)
         .last_modified_time(zip::DateTime::default())

@@ -1,4 +1,4 @@
-//! What coils fill of the scene's sac, step by step: packing.csv, beside steps.csv.
+//! Packing of the scene's sac with coils, step by step: packing.csv, beside steps.csv.
 
 use std::io;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::failure::Failure;
 /// The table.
 pub(crate) const PACKING: &str = "packing.csv";
 
-/// One line of it.
+/// A row of the table.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Row {
     step: usize,
@@ -26,19 +26,19 @@ struct Row {
     dome_force_n: f64,
 }
 
-/// What the summary tells of it.
+/// The packing in the summary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Packed {
     /// Volume of the sac, mm³, and diameter of its neck, mm.
     pub(crate) sac_mm3: f64,
     pub(crate) neck_diameter_mm: f64,
-    /// At the end: volume of the coils over that of the sac, …
+    /// At the end: volume of the coils over the volume of the sac.
     pub(crate) density: f64,
-    /// … the part of the neck that is behind coils, …
+    /// At the end: fraction of the neck that is covered by coils.
     pub(crate) neck_coverage: f64,
-    /// … and length of coils outside the neck, mm.
+    /// At the end: length of coils outside the neck, mm.
     pub(crate) outside_mm: f64,
-    /// Steps after which loops had herniated, and the first of them.
+    /// Number of steps after which loops had herniated, and the first such step.
     pub(crate) herniated_steps: usize,
     pub(crate) first_herniated_step: Option<usize>,
 }
@@ -51,7 +51,7 @@ pub(crate) struct PackingTable {
 }
 
 impl PackingTable {
-    /// The table of a recording that goes on after step `steps`, or begins: rows of later ones are dropped.
+    /// The table of a recording that begins, or resumes after step `steps`; rows of later steps are dropped.
     pub(crate) fn go_on(folder: &Path, sac: Sac, steps: usize) -> Result<Self, Failure> {
         let path = folder.join(PACKING);
         let table = StepTable::go_on(&path, steps).map_err(|e| Failure::write(&path, &e))?;
@@ -77,12 +77,12 @@ impl PackingTable {
         self.table.flush()
     }
 
-    /// What the summary tells of it.
+    /// The packing for the summary.
     pub(crate) fn told(&self) -> Packed {
         self.told
     }
 
-    /// Waits until all rows are on the disk itself.
+    /// Syncs all rows to disk.
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.table.sync()
     }

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar of `length` steps on stderr; invisible where stderr is no terminal.
+/// A bar of `length` steps on stderr; invisible if stderr is not a terminal.
 pub(crate) fn bar(length: usize, what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(length as u64).with_prefix(what);
     if let Ok(style) =
@@ -13,7 +13,7 @@ pub(crate) fn bar(length: usize, what: &'static str) -> ProgressBar {
     bar
 }
 
-/// No bar: nobody wants to see it.
+/// An invisible bar.
 pub(crate) fn hidden() -> ProgressBar {
     ProgressBar::hidden()
 }

@@ -1,4 +1,4 @@
-//! Where a result comes from: carried by every JSON document.
+//! Provenance of results, included in every JSON document.
 
 use std::path::Path;
 
@@ -17,10 +17,10 @@ pub(crate) const PROGRAM: Program =
 pub(crate) struct Provenance {
     version: &'static str,
     git_revision: &'static str,
-    /// SHA-256 of the scene's text and of the files it names; of nothing where there is no scene.
+    /// SHA-256 of the scene's text and of the files it names; of nothing if there is no scene.
     scene_hash: String,
     seed: u64,
-    /// What of the scene was set on the command line, `KEY=VALUE`.
+    /// Keys of the scene that were set on the command line, `KEY=VALUE`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     set: Vec<String>,
 }
@@ -37,7 +37,7 @@ impl Provenance {
         }
     }
 
-    /// For a result of a scene with these settings, and of the files that it names.
+    /// For a result of a scene with these settings, and of the files that the scene names.
     pub(crate) fn of_scene(scene: &Scene, settings: &[Setting]) -> Result<Self, Failure> {
         let mut inputs = vec![scene.text().as_bytes().to_vec()];
         for path in scene.input_paths() {
@@ -46,7 +46,7 @@ impl Provenance {
         Ok(Self::new(&inputs, scene.seed).with(settings))
     }
 
-    /// The same with what was set on the command line.
+    /// The same with the settings of the command line.
     pub(crate) fn with(self, settings: &[Setting]) -> Self {
         Self { set: settings.iter().map(Setting::to_string).collect(), ..self }
     }
@@ -62,13 +62,13 @@ impl Provenance {
         &self.scene_hash
     }
 
-    /// For a result that depends on the program and its arguments alone.
+    /// For a result that depends only on the program and its arguments.
     pub(crate) fn of_program(arguments: &str) -> Self {
         Self::new(&[arguments.as_bytes()], 0)
     }
 }
 
-/// Reads an input file whole, for its hash.
+/// Reads an input file completely, for its hash.
 pub(crate) fn read_input(path: &Path) -> Result<Vec<u8>, Failure> {
     Ok(endowire_core::file::read(path, u64::MAX)?)
 }

@@ -1,5 +1,6 @@
-//! A run on disk. Every step is there as soon as it is recorded, in steps.csv and in the arrays, and summary.json follows once a second:
-//! a run that is killed leaves a recording. At the end, also at an early one, the arrays are packed and the summary is complete.
+//! Records a run on disk. Each step is written as soon as it is recorded, to steps.csv and to the arrays;
+//! summary.json is updated once a second. A run that is killed thus leaves a valid recording. At the end, also an
+//! early one, the arrays are packed and the summary is completed.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -23,44 +24,44 @@ use super::recording::Recording;
 use super::{SUMMARY, to_json, whole};
 use crate::failure::Failure;
 
-/// What `run` tells of a whole insertion: summary.json.
+/// The results of a whole insertion by `run`: summary.json.
 #[derive(Debug, Serialize)]
 pub(crate) struct Summary {
-    /// Where the result comes from.
+    /// Provenance.
     #[serde(flatten)]
     pub(crate) provenance: Provenance,
-    /// Whether the run has ended, if at a failure, and all of it is written. False while it goes on, and for ever once it is killed:
-    /// then the summary is that of a step before.
+    /// Whether the run has ended, successfully or not, and everything is written. False while it is running, and if
+    /// it was killed; the summary is then that of an earlier step.
     pub(crate) complete: bool,
     /// Name of the scene.
     pub(crate) scene: String,
-    /// The scene's file, for frames afterwards.
+    /// File of the scene, for drawing frames later.
     pub(crate) scene_file: PathBuf,
     /// Name of the method.
     pub(crate) method: &'static str,
-    /// Whether the vessel's centre line was needed, and found in its surface since the scene names none.
+    /// Whether the vessel's centre line was needed and, since the scene names none, was extracted from its surface.
     pub(crate) centreline_found: bool,
-    /// What it has come to.
+    /// Outcome of the run.
     #[serde(flatten)]
     pub(crate) outcome: RunOutcome,
-    /// What coils have filled of the scene's sac, if it has one.
+    /// Packing of the scene's sac, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) packing: Option<Packed>,
     /// Time of the simulation, s, without recording and frames.
     pub(crate) step_time_s: f64,
     /// Time of the whole run, s.
     pub(crate) wall_time_s: f64,
-    /// What drew the frames.
+    /// Backend that drew the frames.
     pub(crate) renderer: Option<String>,
     /// Planes of fluoroscopy.
     pub(crate) planes: Vec<PlaneTold>,
-    /// Frames, relative to the folder of this file.
+    /// Paths of the frames, relative to the folder of this file.
     pub(crate) frames: Vec<String>,
-    /// The moving picture of them.
+    /// File name of the film.
     pub(crate) film: Option<String>,
 }
 
-/// One line of steps.csv.
+/// A row of steps.csv.
 #[derive(Serialize)]
 struct Row {
     step: usize,
@@ -98,7 +99,7 @@ struct Row {
     time_s: f64,
 }
 
-/// How often a run that goes on writes its summary, and has the disk keep what a power failure would take.
+/// Interval at which a running recording writes its summary and syncs to disk, s.
 const CHECKPOINT_S: f64 = 1.0;
 
 /// Writes a run into a folder.
@@ -110,15 +111,15 @@ pub(crate) struct Recorder {
     arrays: ShapeArrays,
     steps: usize,
     coils: CoilTable,
-    /// Frames written so far, relative to the folder.
+    /// Frames so far, relative to the folder.
     pub(crate) frames: Vec<String>,
     checkpoint: Option<Instant>,
     _claim: Claim,
 }
 
 impl Recorder {
-    /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced. A folder that holds
-    /// other files is refused, or, with `force`, used as it is.
+    /// Starts a recording in `folder`, which is created if necessary; an earlier recording in it is replaced. A
+    /// folder with other files is refused, unless `force` is set.
     pub(crate) fn new(folder: &Path, force: bool, stack: &Stack) -> Result<Self, Failure> {
         let claim = folder::claim(folder, force)?;
         let start = || -> io::Result<_> {
@@ -140,8 +141,8 @@ impl Recorder {
         })
     }
 
-    /// Goes on with the recording in `folder` after step `steps`, where the simulation is; what was recorded of later steps is
-    /// dropped. Returns the steps that stay. Where nothing has been recorded, the recording begins with the next step.
+    /// Resumes the recording in `folder` after step `steps`, the current step of the simulation; later steps are
+    /// dropped. Returns the steps that remain. If nothing has been recorded, the recording begins with the next step.
     pub(crate) fn go_on(
         folder: &Path,
         force: bool,
@@ -202,13 +203,13 @@ impl Recorder {
         Ok((recorder, recording))
     }
 
-    /// Has it write what coils fill of the scene's sac, if it has one, from the next step on.
+    /// Also records the packing of the scene's sac, if it has one, from the next step on.
     pub(crate) fn pack(&mut self, sac: Option<Sac>) -> Result<(), Failure> {
         self.packing = sac.map(|sac| PackingTable::go_on(&self.folder, sac, self.steps)).transpose()?;
         Ok(())
     }
 
-    /// Adds one step, which ends at `time_s`; where that fails, the steps before it stay.
+    /// Records one step, which ends at `time_s`; if that fails, earlier steps are kept.
     pub(crate) fn record(
         &mut self,
         moves: &[Move],
@@ -254,7 +255,7 @@ impl Recorder {
             drag_n: report.drag_n.norm(),
             time_s,
         };
-        // The row comes last: every step of the table is in the arrays.
+        // Written last, so that every step of the table is also in the arrays.
         let write_row = || {
             if let Some(instruments) = &mut self.instruments {
                 instruments.push(row.step, moves, simulation)?;
@@ -272,17 +273,17 @@ impl Recorder {
         Ok(())
     }
 
-    /// What coils have filled of the scene's sac, if it has one.
+    /// Packing of the scene's sac, if it has one.
     pub(crate) fn packed(&self) -> Option<Packed> {
         self.packing.as_ref().map(PackingTable::told)
     }
 
-    /// Coils that were left behind, as they lie after the last step.
+    /// Detached coils after the last step.
     pub(crate) fn coils(&self) -> &[DetachedCoil] {
         self.coils.told()
     }
 
-    /// Now and then, writes the summary as it is: what a run that is killed leaves.
+    /// Writes the current summary at intervals, in case the run is killed.
     pub(crate) fn checkpoint(&mut self, summary: impl FnOnce(&Self) -> Summary) -> Result<(), Failure> {
         if self.checkpoint.is_some_and(|last| last.elapsed().as_secs_f64() < CHECKPOINT_S) {
             return Ok(());
@@ -294,7 +295,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Waits until all steps are on the disk itself.
+    /// Syncs all steps to disk.
     pub(crate) fn sync(&self) -> Result<(), Failure> {
         let instruments = || self.instruments.as_ref().map_or(Ok(()), InstrumentTable::sync);
         let packing = || self.packing.as_ref().map_or(Ok(()), PackingTable::sync);
@@ -304,7 +305,8 @@ impl Recorder {
         synced.map_err(|e| Failure::write(&self.folder, &e))
     }
 
-    /// Fails where the table of steps is not in its place any more: a file that is open takes what is written to it, also without a name.
+    /// Fails if the table of steps was removed or replaced: an open file still accepts writes after it has been
+    /// deleted.
     fn check_there(&self) -> Result<(), Failure> {
         let path = self.folder.join(folder::TABLE);
         let own = self.table.get_ref().metadata().map(|own| own.len());
@@ -317,7 +319,7 @@ impl Recorder {
         }
     }
 
-    /// Writes a frame of a step with `write`, and notes it for the summary.
+    /// Writes a frame of a step with `write`, and lists it in the summary.
     pub(crate) fn frame(
         &mut self,
         step: usize,
@@ -325,7 +327,7 @@ impl Recorder {
         write: impl FnOnce(&Path) -> io::Result<()>,
     ) -> Result<(), Failure> {
         let folder = self.folder.join("frames");
-        // Not the folder of the recording: one that has vanished took the steps before with it.
+        // The folder of the recording is not created again: if it has vanished, so have the earlier steps.
         match std::fs::create_dir(&folder) {
             Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(Failure::write(&folder, &e)),
             _ => {}
@@ -337,20 +339,20 @@ impl Recorder {
         Ok(())
     }
 
-    /// Where it is recorded.
+    /// Folder of the recording.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Steps recorded so far.
+    /// Number of steps recorded so far.
     pub(crate) fn steps(&self) -> usize {
         self.steps
     }
 
-    /// Packs shapes.npz and writes summary.json; the second also where the first cannot be written.
+    /// Packs shapes.npz and writes summary.json; the latter even if the former fails.
     pub(crate) fn finish(self, summary: &mut Summary) -> Result<(), Failure> {
         self.check_there()?;
-        // The claim ends with this function, when all is written.
+        // The lock is released at the end of this function, when everything is written.
         let Self { folder, arrays, _claim, .. } = self;
         let packed = arrays.pack(&folder).map_err(|e| Failure::write(&folder.join(arrays::PACKED), &e));
         summary.complete = packed.is_ok();
@@ -359,7 +361,7 @@ impl Recorder {
     }
 }
 
-/// The beginning of a table of steps.
+/// The first part of a table of steps.
 #[derive(Debug, PartialEq, Eq)]
 struct Kept {
     rows: usize,
@@ -367,7 +369,7 @@ struct Kept {
 }
 
 impl Kept {
-    /// Up to and with step `steps`; `None` where that was not recorded.
+    /// The part up to and including step `steps`; `None` if that step was not recorded.
     fn of(table: &[u8], steps: usize) -> Option<Self> {
         let mut bytes = 0;
         let mut rows = 0;
@@ -380,7 +382,7 @@ impl Kept {
                 _ => {
                     let step = number()?;
                     if step > steps {
-                        // It began where the state was saved.
+                        // The recording began at the step of the saved state.
                         return (step == steps + 1).then_some(Self { rows, bytes });
                     }
                     rows += 1;
@@ -412,7 +414,7 @@ mod tests {
         assert_eq!(kept(whole, 2), Some((2, 28)));
         assert_eq!(kept(whole, 3), Some((3, 34)));
         assert_eq!(kept(whole, 4), None);
-        // Killed within a row, within the head, before it.
+        // Killed within a row, within the header, and before it.
         assert_eq!(kept(&whole[..32], 2), Some((2, 28)));
         assert_eq!(kept(&whole[..32], 3), None);
         assert_eq!(kept(&whole[..9], 0), Some((0, 0)));

@@ -1,4 +1,4 @@
-//! A recorded run, read back.
+//! Reads recorded runs.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,20 +12,21 @@ use super::npz::{self, Member};
 use super::{SUMMARY, arrays};
 use crate::failure::Failure;
 
-/// The parts of summary.json that frames need.
+/// The part of summary.json that is needed for frames.
 #[derive(Debug, Deserialize)]
 pub(crate) struct RecordedSummary {
     /// File of the scene.
     pub(crate) scene_file: PathBuf,
     /// Hash of the scene's text and of the files it names.
     pub(crate) scene_hash: Option<String>,
-    /// What of the scene was set on the command line.
+    /// Keys of the scene that were set on the command line.
     #[serde(default)]
     pub(crate) set: Vec<String>,
-    /// Steps without an equilibrium; none in recordings of versions that did not count them.
+    /// Number of steps without an equilibrium; 0 in recordings of versions that did not count them.
     #[serde(default)]
     pub(crate) unconverged_steps: usize,
-    /// Whether the run has ended by itself; recordings of versions that packed them only then do not say it.
+    /// Whether the run ended by itself. The key is missing in recordings of versions that packed the arrays only in
+    /// that case.
     #[serde(default = "yes")]
     pub(crate) complete: bool,
 }
@@ -57,8 +58,8 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// Reads what `endowire run` has left in a folder, also where it was killed: then all whole steps. Where the file of the scene is
-    /// given, a summary that is damaged or lost is not missed.
+    /// Reads the recording of `endowire run` in a folder; of a run that was killed, all complete steps. If the file
+    /// of the scene is given, the summary may be damaged or missing.
     pub(crate) fn read(folder: &Path, scene: Option<&Path>) -> Result<Self, Failure> {
         let summary = match (RecordedSummary::read(&folder.join(SUMMARY)), scene) {
             (Ok(summary), _) => summary,
@@ -76,7 +77,7 @@ impl Recording {
         };
         let packed = folder.join(arrays::PACKED);
         let growing = folder.join(arrays::GROWING);
-        // Growing arrays may still lie beside packed ones, which are whole if they are there.
+        // Growing arrays may still lie beside packed ones; packed ones, if they exist, are complete.
         if !packed.exists() && growing.is_dir() {
             let bad = |e: io::Error| unreadable(&growing, &e);
             let mut recording =
@@ -116,7 +117,7 @@ impl Recording {
         })
     }
 
-    /// Checks that the arrays of a run that has ended fit one another.
+    /// Checks that the arrays of a completed run are consistent.
     fn check(&self) -> Result<(), &'static str> {
         let (nodes, contacts) = (self.positions.len(), self.contact_points.len());
         if nodes != self.tangents.len()
@@ -139,7 +140,8 @@ impl Recording {
         Ok(())
     }
 
-    /// Forgets what comes after the last step that is whole in every array: a run may be killed, and a disk lose power, anywhere.
+    /// Drops everything after the last step that is complete in every array: a kill or a power failure can cut any
+    /// file anywhere.
     fn cut_to_whole_steps(&mut self) {
         let nodes = self.positions.len().min(self.tangents.len()).min(self.from_tip.len());
         let contacts = self.contact_points.len().min(self.contact_forces.len());
@@ -151,7 +153,7 @@ impl Recording {
         let steps = whole(&self.offsets, nodes).min(whole(&self.contact_offsets, contacts));
         for offsets in [&mut self.offsets, &mut self.contact_offsets] {
             offsets.truncate(steps + 1);
-            // Not even the first number may have been written.
+            // Even the first offset may be missing.
             if steps == 0 {
                 *offsets = vec![0];
             }
@@ -206,7 +208,7 @@ mod tests {
     use super::super::arrays::ShapeArrays;
     use super::*;
 
-    /// Three steps of one, two and three nodes; the number of a node is in all that is recorded of it.
+    /// Records three steps of one, two and three nodes; all data of a node contain its number.
     fn killed(folder: &Path) -> ShapeArrays {
         std::fs::write(
             folder.join(SUMMARY),
@@ -254,13 +256,14 @@ mod tests {
         assert_eq!(seen, [true; 3]);
     }
 
-    /// Reads 2,000 damaged copies of a file of the recording in a folder, or says what is wrong; how many were refused.
+    /// Reads 2,000 damaged copies of a file of the recording in a folder, and returns how many were refused.
     fn damaged_copies(folder: &Path, file: &Path, noise: &mut Noise) -> usize {
         let whole = std::fs::read(file).unwrap();
         let mut refused = 0;
         for round in 0..2_000 {
             let bytes = damaged(&whole, noise);
-            // A new file: one that is cut and written again goes to the disk at once, which takes milliseconds.
+            // A new file is faster: one that is truncated and rewritten is synced to disk at once, which takes
+            // milliseconds.
             std::fs::remove_file(file).unwrap();
             std::fs::write(file, &bytes).unwrap();
             match Recording::read(folder, None) {

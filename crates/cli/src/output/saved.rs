@@ -1,7 +1,8 @@
-//! The state of a run in a file, from which another run goes on.
+//! Saved states of runs, from which a run can resume.
 //!
-//! One line of text names the format, one of JSON says what the state belongs to, and the state follows in bytes that keep every bit of a
-//! number. A hash of it all is at the end: a file that is not whole is told from one that is.
+//! The first line names the format, a line of JSON identifies what the state belongs to, and the state follows in a
+//! binary format that keeps every bit of a number. The file ends with a hash of all this, which reveals incomplete
+//! files.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -17,11 +18,11 @@ use super::injections::Injected;
 use super::whole;
 use crate::failure::Failure;
 
-/// The first line of a saved state, and its beginning in every version.
+/// First line of a saved state, and its beginning in every version.
 const FORMAT: &str = "endowire state 17";
 const ANY_FORMAT: &str = "endowire state ";
 
-/// What a state belongs to: hashes of all that its steps depended on.
+/// Hashes of everything that the steps up to a state depended on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Parts {
     vessel: String,
@@ -33,7 +34,7 @@ pub(crate) struct Parts {
     method: String,
 }
 
-/// What is the same in two vessels that are the same: triangles, or a centre line.
+/// Hash of the triangles or the centre line of a vessel.
 fn vessel(lumen: &Lumen) -> String {
     if let Lumen::Swept(vessel) = lumen {
         return hash(serde_json::to_vec(&(vessel.tree(), vessel.resolution())).unwrap_or_default());
@@ -46,10 +47,10 @@ fn vessel(lumen: &Lumen) -> String {
 }
 
 impl Parts {
-    /// Those of a simulation of `scene`.
+    /// The hashes for a simulation of `scene`.
     fn new(scene: &Scene, simulation: &Simulation) -> Self {
         let json = |value: Result<Vec<u8>, serde_json::Error>| hash(value.unwrap_or_default());
-        // Where nothing flows a centre line decides nothing.
+        // Without flow, results do not depend on a centre line.
         let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline(&NoStore).ok());
         let sheath = simulation.sheath();
         let place = sheath.position_mm.iter().chain(&sheath.direction);
@@ -65,7 +66,7 @@ impl Parts {
         }
     }
 
-    /// What differs from `other`, in words.
+    /// The parts that differ from `other`, in words.
     fn differing(&self, other: &Self) -> Vec<&'static str> {
         let pairs = [
             ("the vessel", &self.vessel, &other.vessel),
@@ -80,7 +81,7 @@ impl Parts {
     }
 }
 
-/// The device, or instruments with their names, friction in each other and in their valves, and what of them is in at the start.
+/// The device, or the instruments with their names, mutual friction, valve friction, and initially inserted lengths.
 fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>> {
     let stack = simulation.stack();
     if !stack.is_several() {
@@ -93,7 +94,8 @@ fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>>
     serde_json::to_vec(&each.collect::<Vec<_>>())
 }
 
-/// A script that has come to where a course says, and a hash of the steps up to there; `seen` is given each.
+/// Replays a script up to where a course says. Returns it and a hash of the steps so far; `seen` is called with each
+/// step.
 fn replayed<'a>(
     script: &'a Script,
     course: &ScriptCourse,
@@ -102,10 +104,10 @@ fn replayed<'a>(
 ) -> endowire_core::Result<(ScriptRun<'a>, String)> {
     let mut numbers = Vec::new();
     let run = script.go_on(course, |step| {
-        // Where it has a time, the vessel is elsewhere after it.
+        // The time determines the position of a moving vessel.
         numbers.extend(step.time_s.into_iter().flat_map(f64::to_le_bytes));
         numbers.extend(step.detach.into_iter().flat_map(|instrument| (instrument as u64).to_le_bytes()));
-        // No instrument has that number.
+        // No instrument has this number.
         let of_tick = step.solves.into_iter().flat_map(|solves| [u64::MAX, solves as u64]);
         numbers.extend(of_tick.flat_map(u64::to_le_bytes));
         for one in &*step.moves {
@@ -121,7 +123,7 @@ fn replayed<'a>(
         numbers.extend([one.instrument, one.after_step].into_iter().flat_map(|n| (n as u64).to_le_bytes()));
         numbers.extend([one.ml, one.ml_per_s].into_iter().flat_map(f64::to_le_bytes));
     }
-    // With another condition a line may have ended earlier.
+    // The hash covers conditions that were met, since with another condition a line may have ended earlier.
     let decided = serde_json::to_vec(&run.decided().collect::<Vec<_>>());
     numbers.extend(decided.map_err(|e| endowire_core::Error::Computation(e.to_string()))?);
     Ok((run, hash(numbers)))
@@ -131,22 +133,22 @@ fn hash(bytes: Vec<u8>) -> String {
     seal::hex(&Sha256::digest(bytes))
 }
 
-/// What is known of a run while it goes on, beside the state.
+/// Data of a running run besides the state.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Course {
     /// Steps carried out.
     pub(crate) steps: usize,
     /// Time of the simulation, s.
     pub(crate) step_time_s: f64,
-    /// How its steps went.
+    /// Statistics of the steps.
     pub(crate) tally: Tally,
-    /// What was injected.
+    /// Injections so far.
     #[serde(default)]
     pub(crate) injected: Vec<Injected>,
 }
 
 impl Course {
-    /// Of a run that begins.
+    /// For a run that begins.
     pub(crate) fn begin() -> Self {
         Self { steps: 0, step_time_s: 0.0, tally: Tally::default(), injected: vec![] }
     }
@@ -160,11 +162,11 @@ struct Header {
     course: Course,
     parts: Parts,
     script: String,
-    /// Steps of each line of the script.
+    /// Number of steps of each line of the script.
     lines: ScriptCourse,
 }
 
-/// A state that was read.
+/// A saved state that was read.
 #[derive(Debug)]
 pub(crate) struct Saved {
     path: PathBuf,
@@ -173,7 +175,7 @@ pub(crate) struct Saved {
 }
 
 impl Saved {
-    /// Reads a file that [`Saver`] has written.
+    /// Reads a file written by [`Saver`].
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let refuse = |what: &str| {
             Failure::Input(format!(
@@ -203,13 +205,13 @@ impl Saved {
         Ok(Self { path: path.to_path_buf(), header, state })
     }
 
-    /// What is known of the run up to the state.
+    /// Data of the run up to the state.
     pub(crate) fn course(&self) -> Course {
         self.header.course.clone()
     }
 
-    /// Takes the simulation of a scene, at its start, to the state, if it was saved in the same scene; the script there. `seen` is given each
-    /// step so far.
+    /// Restores the state in a simulation of the scene at its start, if it was saved in the same scene; returns the
+    /// script at that step. `seen` is called with each step so far.
     pub(crate) fn restore<'a>(
         &self,
         scene: &Scene,
@@ -256,20 +258,20 @@ impl Saved {
     }
 }
 
-/// Saving takes no more than one part in so many of a run's time.
+/// Saving takes at most one part in `SHARE` of a run's time.
 const SHARE: u32 = 10;
 
-/// Writes the state of a run into a file, again and again.
+/// Saves the state of a run to a file repeatedly.
 pub(crate) struct Saver {
     path: PathBuf,
     scene: String,
     parts: Parts,
-    /// When the last one was written, and how long that took.
+    /// Time of the last save, and its duration.
     last: Option<(Instant, Duration)>,
 }
 
 impl Saver {
-    /// For a file, which is replaced, and a simulation of `scene`.
+    /// For a simulation of `scene`; an existing file is replaced.
     pub(crate) fn new(path: &Path, scene: &Scene, simulation: &Simulation) -> Self {
         let parts = Parts::new(scene, simulation);
         Self { path: path.to_path_buf(), scene: scene.name.clone(), parts, last: None }
@@ -280,8 +282,8 @@ impl Saver {
         self.last.is_none_or(|(when, took)| when.elapsed() >= took * SHARE)
     }
 
-    /// Saves; the file is the one before or this one, whole, whenever the program or the power ends. `sync` waits until the recording is
-    /// on the disk, so that no state is ahead of it.
+    /// Saves the state. At any time the file is completely the previous or the new one, even if the program or the
+    /// power fails. `sync` syncs the recording to disk first, so that the state is never ahead of it.
     pub(crate) fn save(
         &mut self,
         simulation: &Simulation,

@@ -1,4 +1,4 @@
-//! Files of sessions of play on disk.
+//! Session files of play on disk.
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,12 @@ use super::recording::RecordedSummary;
 use super::whole;
 use crate::failure::Failure;
 
-/// Where that of a session with this script is.
+/// Path of the session file that belongs to this script.
 pub(crate) fn beside(script: &Path) -> PathBuf {
     script.with_extension("session.json")
 }
 
-/// Of which scene one is, and when it was recorded, seconds since 1970 began in UTC; none where it does not say.
+/// Scene of a session, and time of its recording, seconds since 1970-01-01 UTC, if given.
 pub(crate) fn read_head(path: &Path) -> Result<(RecordedSummary, Option<u64>), Failure> {
     #[derive(Deserialize)]
     struct Head {
@@ -35,7 +35,7 @@ pub(crate) fn read_head(path: &Path) -> Result<(RecordedSummary, Option<u64>), F
     Ok((summary, recorded_unix_s))
 }
 
-/// Writes it.
+/// Writes a session file.
 pub(crate) fn write(session: &SessionFile, path: &Path) -> Result<(), Failure> {
     let text = serde_json::to_vec(session)
         .map_err(|e| Failure::Computation(format!("the session cannot be written as JSON: {e}")))?;

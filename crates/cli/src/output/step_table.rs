@@ -1,4 +1,4 @@
-//! A table of a recording that grows step by step. A run that is killed leaves whole rows but for the last.
+//! A table of a recording that grows step by step. A killed run leaves complete rows, except for the last.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -12,12 +12,13 @@ pub(super) struct StepTable {
 }
 
 impl StepTable {
-    /// A table that begins.
+    /// A new table.
     pub(super) fn new(path: &Path) -> io::Result<Self> {
         Ok(Self { table: csv::Writer::from_writer(File::create(path)?) })
     }
 
-    /// A table that goes on after step `steps`: rows of later ones are dropped. It begins where there is none.
+    /// The table of a recording that resumes after step `steps`; rows of later steps are dropped. It is created if
+    /// missing.
     pub(super) fn go_on(path: &Path, steps: usize) -> io::Result<Self> {
         if !path.exists() {
             return Self::new(path);
@@ -43,7 +44,7 @@ impl StepTable {
         self.table.flush()
     }
 
-    /// Waits until all rows are on the disk itself.
+    /// Syncs all rows to disk.
     pub(super) fn sync(&self) -> io::Result<()> {
         self.table.get_ref().sync_data()
     }

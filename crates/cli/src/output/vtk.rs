@@ -1,6 +1,7 @@
-//! Points, lines and triangles in VTK's XML formats: `.vtp` files, and a `.pvd` that lists those of a series with their times.
+//! Points, lines and triangles in VTK's XML formats: `.vtp` files, and a `.pvd` that lists a series of them with
+//! times.
 //!
-//! Numbers are text: ParaView and 3D Slicer read it, and it gives back every bit.
+//! Numbers are written as text, which ParaView and 3D Slicer read and which keeps every bit.
 
 use std::fmt::Write as _;
 use std::io;
@@ -10,11 +11,11 @@ use endowire_core::Vec3;
 
 use super::whole;
 
-/// Points with what is told of them, and what is drawn between them.
+/// Points with their data, and the cells drawn between them.
 #[derive(Debug, Default)]
 pub(crate) struct PolyData {
     pub(crate) points_mm: Vec<Vec3>,
-    /// Points that are seen on their own.
+    /// Points that are drawn by themselves.
     pub(crate) vertices: Vec<usize>,
     pub(crate) lines: Vec<Vec<usize>>,
     pub(crate) triangles: Vec<[u32; 3]>,
@@ -25,13 +26,13 @@ pub(crate) struct PolyData {
 #[derive(Debug)]
 pub(crate) struct PointArray {
     pub(crate) name: &'static str,
-    /// 1 or 3.
+    /// Number of components, 1 or 3.
     pub(crate) components: usize,
     pub(crate) numbers: Vec<f64>,
 }
 
 impl PolyData {
-    /// Writes a `.vtp` file, there whole or not at all.
+    /// Writes a `.vtp` file, completely or not at all.
     pub(crate) fn write(&self, path: &Path) -> io::Result<()> {
         whole::write(path, |part| std::fs::write(part, self.document()))
     }
@@ -62,7 +63,7 @@ impl PolyData {
     }
 }
 
-/// Writes a `.pvd` file: times in seconds and the files that belong to them, beside it.
+/// Writes a `.pvd` file: times in seconds, with the files for them, which lie beside it.
 pub(crate) fn write_series(path: &Path, files: &[(f64, String)]) -> io::Result<()> {
     let mut text = head("Collection");
     for (time_s, name) in files {
@@ -84,7 +85,7 @@ fn numbers<T: std::fmt::Display>(text: &mut String, kind: &str, name: &str, comp
         "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"ascii\">"
     );
     for (index, number) in list.iter().enumerate() {
-        // Lines that people can read.
+        // Line breaks for readability.
         let _ = write!(text, "{}{number}", if index.is_multiple_of(3 * components) { '\n' } else { ' ' });
     }
     text.push_str("\n</DataArray>\n");

@@ -1,4 +1,4 @@
-//! A session that is a subject for trainees: it ends when its goal is reached or a limit is passed.
+//! Sessions that are training subjects: the subject ends when its goal is reached or a limit is passed.
 
 use std::sync::Arc;
 
@@ -8,14 +8,14 @@ use super::Session;
 use crate::readout::EventKind;
 
 impl Session {
-    /// The same as a subject for trainees: hands rest when it ends, and what is done later does not count.
+    /// Makes the session a training subject. Instruments stop when it ends, and later motions do not count.
     #[must_use]
     pub fn with_exam(mut self, exam: Exam) -> Self {
         self.exam = Some(exam);
         self
     }
 
-    /// Ends the subject when what was noted last ends it.
+    /// Ends the subject if the last recorded tick ends it.
     pub(super) fn examine(&mut self) {
         let Some(exam) = &mut self.exam else { return };
         let Some(ended) = exam.follow(self.telemetry.record()).and_then(|score| score.verdict.ended) else {
@@ -27,12 +27,12 @@ impl Session {
         self.happened(EventKind::Ended, text);
     }
 
-    /// How the subject stands, if there is one.
+    /// Progress of the subject, if there is one.
     pub fn standing(&self) -> Option<Standing> {
         self.exam.as_ref().map(|exam| exam.standing(self.telemetry.record()))
     }
 
-    /// The score of the subject, if there is one: of all so far where it has not ended.
+    /// The score of the subject, if there is one; if it has not ended, that of the session so far.
     pub fn score(&self) -> Option<Arc<Score>> {
         self.exam.clone().map(|exam| exam.score(self.telemetry.record()))
     }

@@ -1,6 +1,7 @@
-"""Catheters and guidewires in blood vessels: insertions stepped, drawn and learned from.
+"""Simulation of catheters and guidewires in blood vessels: insertions, pictures and learning environments.
 
-Units everywhere: millimetre, newton, second, radian; names carry them. ``endowire.gym`` has environments for Gymnasium.
+Units everywhere: millimetre, newton, second, radian; they are part of the names. ``endowire.gym`` has environments
+for Gymnasium.
 """
 
 from pathlib import Path as _Path
@@ -57,7 +58,8 @@ __all__ = [
 
 
 def assets_path() -> _Path:
-    """The folder of what comes with the package: ``scenes``, ``devices`` (the catalogue), ``vessels`` and ``subjects``.
+    """The folder of the assets in the package: ``scenes``, ``devices`` (the catalogue), ``vessels`` and ``subjects``.
 
-    ``endowire.Scene(endowire.assets_path() / "scenes" / "arch_carotid.toml")`` reads one of them."""
+    For example, ``endowire.Scene(endowire.assets_path() / "scenes" / "arch_carotid.toml")`` reads a scene.
+    """
     return _Path(__file__).parent / "assets"

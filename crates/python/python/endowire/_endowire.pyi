@@ -1,4 +1,4 @@
-"""Types of the native module. What each does is told by its docstring."""
+"""Types of the native module. Docstrings are in the module itself."""
 
 from collections.abc import Sequence
 from os import PathLike

@@ -1,4 +1,4 @@
-"""What can go wrong. Messages name the parameter, its value and how to mend it."""
+"""Exceptions. Messages name the parameter, its value and the remedy."""
 
 
 class EndowireError(Exception):
@@ -10,8 +10,8 @@ class InputError(EndowireError, ValueError):
 
 
 class ComputationError(EndowireError, RuntimeError):
-    """A computation did not reach its result on good input."""
+    """A computation failed on valid input."""
 
 
 class EndOfWay(EndowireError):
-    """The instruments can go no farther: the tip has left the vessel, or the vessel is narrower than they are."""
+    """The instruments cannot advance: the tip has left the vessel, or the vessel is narrower than they are."""

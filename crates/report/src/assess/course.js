@@ -1,4 +1,4 @@
-// A trainee's course: the score from attempt to attempt, and each measure with where it goes.
+// A trainee's course: the score over attempts, and each measure with its trend.
 const WORDS = { better: "gets better", worse: "gets worse", none: "" };
 
 function course(of, to) {
@@ -50,7 +50,7 @@ function score(of, attempts, section) {
 
 const place = (count, left, right) => k => count < 2 ? (left + right) / 2 : left + 8 + (right - left - 8) * k / (count - 1);
 
-// A curve through what was measured.
+// A curve through the measured values.
 function through(c, values, px, py, colour) {
   c.strokeStyle = colour; c.lineWidth = 1.5; c.beginPath();
   let drawn = false;

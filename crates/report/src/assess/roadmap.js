@@ -1,4 +1,4 @@
-// The roadmap: the vessel's outline as the C-arm projects it, and the tip's way over it. Rays are parallel here.
+// The roadmap: the vessel's outline as projected by the C-arm with parallel rays, and the path of the tip over it.
 const roadmap = (() => {
   const canvas = at("roadmap"), view = { primary: 0, secondary: 0, near: true };
   let outline = null;
@@ -25,7 +25,7 @@ const roadmap = (() => {
     return { scale, to: p => { const q = flat(p); return [w / 2 + scale * (q[0] - middle[0]), h / 2 + scale * (q[1] - middle[1])]; } };
   }
 
-  // All triangles with thick edges, and all once more in the colour within: what is left of the edges is the outline.
+  // All triangles with thick edges, then all again in the inner colour: what remains of the edges is the outline.
   function drawOutline(attempt, to, w, h, ratio) {
     const key = JSON.stringify([attempt.vessel, shown.attempt, view, w, h, ratio]);
     if (outline?.key === key) return outline.picture;
@@ -36,7 +36,7 @@ const roadmap = (() => {
     for (let k = 0; k < v.length; k += 3) p.push(to([v[k] / 10, v[k + 1] / 10, v[k + 2] / 10]));
     const path = new Path2D();
     for (const [i, j, k] of vessel.triangles) {
-      // Of one sense of rotation, so that overlapping triangles do not cut holes into each other.
+      // With equal orientation, so that overlapping triangles do not cut holes into each other.
       const turns = (p[j][0] - p[i][0]) * (p[k][1] - p[i][1]) - (p[j][1] - p[i][1]) * (p[k][0] - p[i][0]) > 0;
       path.moveTo(...p[i]); path.lineTo(...p[turns ? j : k]); path.lineTo(...p[turns ? k : j]); path.closePath();
     }
@@ -49,7 +49,7 @@ const roadmap = (() => {
   function drawWay(c, attempt, to) {
     const { tip_mm: tips, wrong, piece_s } = attempt.timeline, now = Math.min(tips.length - 1, Math.ceil(shown.time_s / piece_s) - 1);
     c.lineJoin = c.lineCap = "round";
-    // What comes later is faint and below.
+    // The later path is faint and drawn first.
     for (const later of [true, false]) {
       for (let k = 1; k < tips.length; k++) {
         if (!tips[k] || !tips[k - 1] || (k > now) !== later) continue;
@@ -60,7 +60,7 @@ const roadmap = (() => {
     }
     c.globalAlpha = 1;
     drawTip(c, tips[Math.max(0, now)], to, COLOURS[0]);
-    // The instrument that is to arrive, where that is not the foremost one.
+    // The instrument that must arrive, unless it is the foremost one.
     const others = attempt.timeline.arriving_mm;
     c.strokeStyle = COLOURS[1]; c.lineWidth = 1.6; c.setLineDash([5, 3]); c.beginPath();
     others.slice(0, now + 1).forEach((tip, k) => { if (tip) others[k - 1] ? c.lineTo(...to(tip)) : c.moveTo(...to(tip)); });
@@ -85,7 +85,7 @@ const roadmap = (() => {
     c.fillText(attempt.target, x + (left ? -r - 4 : r + 4), y + 4);
   }
 
-  // A number for each thing that stood out, where the tip was then; those at one place stand beside each other.
+  // A number for each event, at the position of the tip; those at the same position are drawn side by side.
   function drawNoticed(c, attempt, to) {
     const { tip_mm: tips, piece_s } = attempt.timeline, taken = [];
     c.textAlign = "center"; c.font = "bold 10px system-ui, sans-serif";
@@ -119,14 +119,14 @@ const roadmap = (() => {
     drawScale(c, scale, w, h);
   }
 
-  // The angles as they are called in the lab.
+  // The angles in clinical notation.
   function pose(primary, secondary) {
     const side = Math.round(primary), up = Math.round(secondary);
     const words = [side && `${side > 0 ? "LAO" : "RAO"} ${Math.abs(side)}`, up && `${up > 0 ? "CRA" : "CAU"} ${Math.abs(up)}`].filter(Boolean);
     return words.join(" ") || "AP";
   }
 
-  // A button for each pose that was used, the one with the most beam first.
+  // A button for each pose that was used, in order of decreasing beam time.
   function choose(attempt) {
     const used = new Map(), beam = attempt.timeline.beam || [];
     beam.forEach((state, k) => {

@@ -1,11 +1,11 @@
-// The time line: beam and contrast medium, what each hand does, and forces, over one axis of time.
+// The timeline: beam and contrast medium, motion of each instrument, and forces, over a common axis of time.
 const timeline = (() => {
   const canvas = at("line"), RIGHT = 12, FOOT = 24, GAP = 12, HEAD = 24;
-  // Room for numbers on the left; less on a phone.
+  // Space for numbers on the left; less on a phone.
   const left = w => w < 520 ? 44 : 74;
   let lanes = [], LEFT = left(1000);
 
-  // What is drawn of an attempt: lanes with a height and a painter.
+  // The lanes of an attempt, each with a height and a drawing function.
   function lanesOf({ timeline: t, instruments, limits }) {
     const all = [{ high: 30, name: t.beam ? "beam" : "beam: not recorded", draw: beam, mark: t.beam && turns(t.beam) ? "▲ C-arm turned" : "" }];
     if (t.injections.length) all.push({ high: 26, name: "contrast", draw: contrast });
@@ -24,7 +24,7 @@ const timeline = (() => {
     return all;
   }
 
-  // Forces of less than 0.1 N in thousandths: their digits are what is read.
+  // Forces below 0.1 N are shown in millinewtons, for readable digits.
   function inUnit(lane) {
     const small = lane.curves.every(curve => curve.of.every(v => v < 0.1));
     lane.unit = small ? "mN" : "N";
@@ -55,7 +55,7 @@ const timeline = (() => {
       const from = px(one.time_s), wide = Math.max(3, px(Math.min(t.end_s, one.time_s + one.volume_ml / one.rate_ml_per_s)) - from), text = `${short(one.volume_ml)} ml`;
       c.fillStyle = COLOURS[2]; c.fillRect(from, lane.top + 2, wide, lane.high - 4);
       if (from < free) continue;
-      // To the left where there is no room on the right.
+      // To the left if there is no space on the right.
       const room = from + wide + 3 + c.measureText(text).width < px(t.end_s);
       c.fillStyle = "#1c2228"; c.textAlign = room ? "left" : "right";
       c.fillText(text, room ? from + wide + 3 : from - 3, lane.top + lane.high / 2 + 4);
@@ -105,7 +105,7 @@ const timeline = (() => {
     }
   }
 
-  // What stood out: a shade while it lasts, and its number above.
+  // Events: shaded while they last, with their number above.
   function noticed(c, attempt, px, h) {
     let free = 0;
     c.textAlign = "center"; c.font = "bold 10px system-ui, sans-serif";

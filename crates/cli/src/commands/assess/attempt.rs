@@ -1,4 +1,4 @@
-//! A session that was measured, with the scene in which it was recorded.
+//! Measured sessions, with the scenes in which they were recorded.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,14 +14,14 @@ use crate::output::recording::RecordedSummary;
 use crate::output::{SUMMARY, session as session_file};
 use crate::{scenes, subjects};
 
-/// What came of a session.
+/// A measured session.
 pub(super) struct Attempt {
     pub(super) session: PathBuf,
     pub(super) recorded_unix_s: Option<u64>,
-    /// Number of its scene among the [`Places`].
+    /// Index of its scene among the [`Places`].
     pub(super) place: usize,
     pub(super) target: Option<String>,
-    /// What was done; of a subject until its end.
+    /// The record; for a subject, up to its end.
     pub(super) record: Record,
     pub(super) way: Option<Way>,
     pub(super) metrics: Vec<Metric>,
@@ -31,31 +31,31 @@ pub(super) struct Attempt {
 /// A scene in which sessions were recorded.
 pub(super) struct Place {
     pub(super) path: PathBuf,
-    /// What of it was set.
+    /// Overridden keys of the scene.
     pub(super) set: Vec<String>,
     pub(super) scene: Scene,
 }
 
-/// Each scene once, however many sessions were recorded in it.
+/// The scenes, each read only once for all its sessions.
 pub(super) struct Places<'a> {
-    /// The scene that is given in place of those that sessions name.
+    /// The scene given on the command line, which overrides those named by sessions.
     given: Option<&'a Path>,
     pub(super) cache: Cache,
     all: Vec<Place>,
 }
 
 impl<'a> Places<'a> {
-    /// None yet.
+    /// Without scenes yet.
     pub(super) fn new(args: &'a AssessArgs) -> Self {
         Self { given: args.scene.as_deref(), cache: Cache::new(&args.cache), all: vec![] }
     }
 
-    /// That of an attempt.
+    /// The scene of an attempt.
     pub(super) fn of(&self, attempt: &Attempt) -> &Place {
         &self.all[attempt.place]
     }
 
-    /// Number of the scene of a session, which is read if it is not known.
+    /// Index of the scene of a session; the scene is read if necessary.
     fn find(&mut self, summary: &RecordedSummary) -> Result<usize, Failure> {
         let path = self.given.unwrap_or(&summary.scene_file);
         let known = self.all.iter().position(|one| one.path == path && one.set == summary.set);
@@ -72,7 +72,7 @@ impl<'a> Places<'a> {
     }
 }
 
-/// What a session or a run says of its scene, and when it was recorded, if it says so; a run does not.
+/// The scene of a session or a run, and the time of the recording, if known; a run does not contain it.
 fn read_head(session: &Path) -> Result<(RecordedSummary, Option<u64>), Failure> {
     if session.is_dir() {
         Ok((RecordedSummary::read(&session.join(SUMMARY))?, None))
@@ -118,12 +118,12 @@ fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> R
     })
 }
 
-/// Where the script goes in the end, if it says so.
+/// The target of the last script line that has one.
 fn target(scene: &Scene) -> Option<String> {
     scene.script.iter().rev().find_map(|line| line.until.as_ref()?.target.clone())
 }
 
-/// Scores sessions by a subject; where that comes from, and what came of them.
+/// Scores sessions by a subject; returns the provenance and the attempts.
 pub(super) fn scored(
     subject: &Subject,
     files: &[PathBuf],
@@ -156,7 +156,7 @@ pub(super) fn scored(
     Ok((provenance, attempts))
 }
 
-/// Refuses a session that was recorded in another scene than the subject's.
+/// Refuses a session that was recorded in a scene other than the subject's.
 fn check_scene(
     session: &Path,
     recorded: &RecordedSummary,
@@ -165,7 +165,7 @@ fn check_scene(
 ) -> Result<(), Failure> {
     let same = match (recorded.scene_file.canonicalize(), scene.canonicalize()) {
         (Ok(recorded), Ok(scene)) => recorded == scene,
-        // A scene that has gone elsewhere cannot be told from the subject's.
+        // A scene that was moved or deleted can only be compared by its file name.
         _ => recorded.scene_file.file_name() == scene.file_name(),
     };
     let set: Vec<String> = settings.iter().map(ToString::to_string).collect();

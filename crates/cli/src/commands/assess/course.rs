@@ -1,4 +1,4 @@
-//! Attempts in their order, and the course of those at one task.
+//! Order of attempts, and courses of those at one task.
 
 use std::path::Path;
 
@@ -7,18 +7,18 @@ use serde::Serialize;
 
 use super::attempt::{Attempt, Places};
 
-/// What attempts are ordered by.
+/// Order of attempts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum OrderedBy {
-    /// When they were recorded.
+    /// By time of recording.
     Recorded,
-    /// The command line: not all say when they were recorded.
+    /// As on the command line, because some have no time of recording.
     Given,
 }
 
 impl OrderedBy {
-    /// For people.
+    /// In words.
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Recorded => "in the order in which they were recorded",
@@ -33,16 +33,16 @@ pub(super) struct CourseOf<'a> {
     pub(super) scene: &'a str,
     pub(super) target: Option<&'a str>,
     pub(super) ordered_by: OrderedBy,
-    /// The sessions, the first one first.
+    /// The sessions, in order.
     pub(super) sessions: Vec<&'a Path>,
-    /// Their numbers among all attempts.
+    /// Their indices among all attempts.
     #[serde(skip)]
     pub(super) attempts: Vec<usize>,
     #[serde(flatten)]
     pub(super) course: Course,
 }
 
-/// Puts attempts into the order in which they were recorded, if all of them say when; sessions of one second stay as they were given.
+/// Sorts attempts by time of recording, if all of them have one; those of the same second keep their order.
 pub(super) fn order(attempts: &mut [Attempt]) {
     if ordered_by(attempts.iter()) == OrderedBy::Recorded {
         attempts.sort_by_key(|attempt| attempt.recorded_unix_s);
@@ -54,7 +54,7 @@ fn ordered_by<'a>(attempts: impl IntoIterator<Item = &'a Attempt>) -> OrderedBy 
     if all { OrderedBy::Recorded } else { OrderedBy::Given }
 }
 
-/// The courses of all tasks that were done more than once.
+/// The courses of all tasks that were attempted more than once.
 pub(super) fn courses<'a>(attempts: &'a [Attempt], places: &'a Places<'_>) -> Vec<CourseOf<'a>> {
     let mut tasks: Vec<Vec<usize>> = vec![];
     for (number, attempt) in attempts.iter().enumerate() {

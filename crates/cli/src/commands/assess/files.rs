@@ -1,21 +1,21 @@
-//! Which sessions are meant: files, folders of runs, and folders that hold sessions.
+//! Finds sessions: session files, folders of runs, and folders that contain sessions.
 
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
-/// What a folder of a run has.
+/// A file in every folder of a run.
 const STEPS: &str = "steps.csv";
-/// How files of sessions end.
+/// Ending of session files.
 const ENDING: &str = ".session.json";
 
-/// The sessions in the order given; those of a folder by their names.
+/// The sessions in the order given; those of a folder sorted by name.
 pub(super) fn of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut all = vec![];
     for path in named {
         let within = if path.is_dir() && !path.join(STEPS).exists() { sessions_in(path)? } else { vec![] };
         if within.is_empty() {
-            // What is none of both its reader tells.
+            // The reader reports anything else as an error.
             all.push(path.clone());
         }
         all.extend(within);
@@ -33,7 +33,7 @@ fn sessions_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(paths)
 }
 
-/// The file by whose bytes a session is known.
+/// The file whose bytes identify a session.
 pub(super) fn content(session: &Path) -> PathBuf {
     if session.is_dir() { session.join(STEPS) } else { session.to_path_buf() }
 }

@@ -1,4 +1,4 @@
-//! `endowire assess`: what sessions and recorded runs are scored by, and how a trainee gets on.
+//! `endowire assess`: measures and scores of sessions and recorded runs, and the progress of a trainee.
 
 mod attempt;
 mod course;
@@ -20,7 +20,7 @@ use crate::subjects;
 use attempt::{Attempt, Places};
 use course::{CourseOf, courses};
 
-/// The document of what was assessed.
+/// The output document.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
@@ -37,11 +37,11 @@ enum Told<'a> {
     Several { sessions: Vec<Session<'a>>, courses: &'a [CourseOf<'a>] },
 }
 
-/// What is told of a session.
+/// The results of a session.
 #[derive(Serialize)]
 struct Session<'a> {
     session: &'a Path,
-    /// Seconds since 1970 began in UTC; none where the session does not say.
+    /// Time of the recording, seconds since 1970-01-01 UTC; `None` if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     recorded_unix_s: Option<u64>,
     #[serde(flatten)]
@@ -49,7 +49,7 @@ struct Session<'a> {
     noticed: Vec<Noticed>,
 }
 
-/// Its measures, alone or beside what a subject asks of them.
+/// Measures alone, or with a subject's thresholds.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum By<'a> {
@@ -57,7 +57,7 @@ enum By<'a> {
     Measures { scene: &'a str, target: Option<&'a str>, metrics: &'a [Metric] },
 }
 
-/// Measures each session, scores it where a subject is given, and tells the values.
+/// Measures each session, scores it if a subject is given, and prints the results.
 pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     if !(args.within_mm > 0.0 && args.within_mm.is_finite()) {
         return Err(Failure::Input(format!("--within-mm {}: must be a length above 0", args.within_mm)));
@@ -87,7 +87,7 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     answer(&Document { provenance, told }, args.json, || text::of(&attempts, &courses))
 }
 
-/// What is told of an attempt.
+/// The results of an attempt.
 fn told<'a>(attempt: &'a Attempt, places: &'a Places<'_>) -> Session<'a> {
     let by = match &attempt.score {
         Some(score) => By::Subject(score),

@@ -1,4 +1,4 @@
-//! What the page of assessed sessions shows.
+//! Data of the page of assessed sessions.
 
 use endowire_assess::{Better, Course, Group, Noticed, Threshold, Timeline, noticed};
 use endowire_core::Vec3;
@@ -11,10 +11,10 @@ use super::course::{CourseOf, OrderedBy};
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 
-/// Pieces of time of all sessions together, and the fewest and most of one.
+/// Numbers of time intervals: of all sessions together, and the smallest and largest of one session.
 const PIECES: (usize, usize, usize) = (30_000, 300, 1500);
 
-/// The document in the page.
+/// The document of the page.
 #[derive(Serialize)]
 pub(super) struct Page<'a> {
     title: String,
@@ -24,7 +24,7 @@ pub(super) struct Page<'a> {
     sessions: Vec<Shown>,
 }
 
-/// A course with the numbers of its sessions on the page.
+/// A course with the indices of its sessions on the page.
 #[derive(Serialize)]
 struct CourseShown<'a> {
     scene: &'a str,
@@ -44,12 +44,12 @@ struct Shown {
     target_mm: Option<Vec3>,
     within_mm: Option<f64>,
     recorded_unix_s: Option<u64>,
-    /// Number of its vessel.
+    /// Index of its vessel.
     vessel: usize,
-    /// Angles of the C-arm where no beam was recorded.
+    /// Angles of the C-arm if no beam was recorded.
     pose: [f64; 2],
     instruments: Vec<String>,
-    /// Number of the instrument whose tip is to arrive; none where the foremost one is.
+    /// Index of the instrument whose tip must arrive; `None` for the foremost tip.
     arriving: Option<usize>,
     limits: endowire_assess::Limits,
     verdict: Option<String>,
@@ -60,7 +60,7 @@ struct Shown {
     timeline: Timeline,
 }
 
-/// A measure with what was asked of it.
+/// A measure with its threshold.
 #[derive(Serialize)]
 struct Measure {
     name: &'static str,
@@ -71,11 +71,11 @@ struct Measure {
     definition: &'static str,
     asked: Option<String>,
     passed: Option<bool>,
-    /// Why it cannot be judged.
+    /// Why the threshold cannot be judged.
     unjudged: Option<&'static str>,
 }
 
-/// Gathers the page of attempts and their courses.
+/// The page of attempts and their courses.
 pub(super) fn of<'a>(
     attempts: &[Attempt],
     courses: &'a [CourseOf<'_>],
@@ -110,7 +110,7 @@ pub(super) fn of<'a>(
     })
 }
 
-/// The subject, or the scenes.
+/// Title: the subject, or the scenes.
 fn title(attempts: &[Attempt], places: &Places<'_>) -> String {
     if let Some(score) = attempts.first().and_then(|first| first.score.as_ref()) {
         return score.subject.clone();

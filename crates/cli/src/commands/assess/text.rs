@@ -1,4 +1,4 @@
-//! What was assessed, for a person at a terminal.
+//! Assessments as text.
 
 use std::fmt::Write;
 
@@ -8,10 +8,10 @@ use super::attempt::Attempt;
 use super::course::CourseOf;
 use crate::subjects;
 
-/// Most sessions whose values stand beside each other; of more the first and the last ones do.
+/// Largest number of sessions shown side by side; of more, only the first and the last ones are shown.
 const COLUMNS: usize = 8;
 
-/// Scores of sessions, or their measures; below those of several what became of them.
+/// Scores or measures of sessions; several sessions are followed by their courses.
 pub(super) fn of(attempts: &[Attempt], courses: &[CourseOf<'_>]) -> String {
     let scores = attempts.iter().filter_map(|attempt| {
         let score = attempt.score.as_ref()?;
@@ -34,7 +34,7 @@ pub(super) fn of(attempts: &[Attempt], courses: &[CourseOf<'_>]) -> String {
     parts.join("\n\n")
 }
 
-/// A course: which sessions, the score, and a row for each measure with what became of it.
+/// A course: its sessions, the score, and a row for each measure with its change.
 fn of_course(attempts: &[Attempt], course: &CourseOf<'_>) -> String {
     let to = course.target.map_or_else(String::new, |target| format!(", {target}"));
     let mut text =
@@ -52,11 +52,11 @@ fn of_course(attempts: &[Attempt], course: &CourseOf<'_>) -> String {
     text
 }
 
-/// What became of something from one attempt to the next.
+/// The change from one attempt to the next.
 fn went(per_attempt: Option<f64>, trend: Trend) -> String {
     let change = per_attempt.filter(|change| *change != 0.0);
     let change = change.map_or_else(String::new, |change| {
-        // Three digits that count, whatever the size.
+        // Three significant digits.
         let digits = (2.0 - change.abs().log10().floor()).clamp(0.0, 6.0) as usize;
         format!("  {change:+.digits$} each")
     });
@@ -64,7 +64,7 @@ fn went(per_attempt: Option<f64>, trend: Trend) -> String {
     format!("{change}{trend}")
 }
 
-/// A row for each measure, and a column for each session.
+/// A table with a row for each measure, and a column for each session.
 fn table(attempts: &[&Attempt], went: impl Fn(usize) -> String) -> String {
     let mut text = String::new();
     let Some(first) = attempts.first() else { return text };

@@ -1,4 +1,4 @@
-//! The methods that are compared, core's and the field's, started in one way.
+//! Starts all compared methods, of the core and from the literature, in the same way.
 
 use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, WallProperties};
@@ -12,15 +12,16 @@ use endowire_verify::{at_end, unit_rod};
 
 use crate::studies::{PRINTED, TRIANGLE};
 
-/// Tolerance of `kirchhoff` that compares with those of the others in an insertion. They may leave a force of 0.01 EI/L² out of balance
-/// in all ([`endowire_methods::InsertionOptions`]); this is the part of the largest force that may be left at a node, and walls push with up to
-/// 24 EI/L² in these scenes.
+/// Tolerance of `kirchhoff` that is comparable with those of the others in an insertion. They may leave a total force
+/// of 0.01 EI/L² out of balance ([`endowire_methods::InsertionOptions`]); this is the fraction of the largest force
+/// that may remain at a node, and walls push with up to 24 EI/L² in these scenes.
 pub(crate) const INSERTION_TOLERANCE: f64 = 1e-4;
 
-/// A device in a vessel, moved by `method` on elements of `element_mm`, with the method's own tolerance.
+/// Creates a simulation of a device in a vessel by `method`, with elements of `element_mm` and the method's own
+/// tolerance.
 ///
 /// # Errors
-/// What the method or the simulation refuses.
+/// Those of the method or the simulation.
 pub(crate) fn insertion(
     method: &str,
     element_mm: f64,
@@ -33,7 +34,7 @@ pub(crate) fn insertion(
     insertion_within(method, (element_mm, tolerance), wall, properties, device, sheath)
 }
 
-/// The same, where `kirchhoff` is given a tolerance.
+/// The same with a tolerance for `kirchhoff`.
 pub(crate) fn insertion_within(
     method: &str,
     (element_mm, tolerance): (f64, f64),
@@ -45,7 +46,7 @@ pub(crate) fn insertion_within(
     let mut choice = named(method)?.with_element_mm(element_mm);
     match &mut choice {
         AnyMethod::Kirchhoff(options) => options.tolerance = tolerance,
-        // Wall stiffness is per node in Li et al.: the same wall as the others' is the modulus times the element.
+        // Li et al. define wall stiffness per node: the modulus times the element length gives the same wall.
         AnyMethod::Li2011Dense(options) | AnyMethod::Li2011Banded(options) => {
             options.wall_stiffness_n_per_mm = properties.modulus_n_per_mm2 * element_mm;
         }
@@ -54,10 +55,10 @@ pub(crate) fn insertion_within(
     Simulation::builder(wall, device, sheath).properties(properties).method(&choice).build()
 }
 
-/// The method of a candidate: one by name, or the paper's in another reading.
+/// The method of a candidate: by name, or a variant of the paper's method.
 ///
 /// # Errors
-/// A name that is no candidate's.
+/// An unknown name.
 pub(crate) fn named(candidate: &str) -> Result<AnyMethod> {
     let readings = match candidate {
         TRIANGLE => Some(TangentReading::Unit),
@@ -74,13 +75,14 @@ pub(crate) fn named(candidate: &str) -> Result<AnyMethod> {
     }
 }
 
-/// Most inputs of a static solve by the paper's method with unit tangents, over which the load grows evenly in the first ones; and the
-/// motion of the tip, over the length, with which an input is the last.
+/// Limits of a static solve by the paper's method with unit tangents: the largest number of inputs, the number of
+/// initial inputs over which the load grows linearly, and the tip motion, relative to the length, below which an
+/// input is the last.
 const STATIC_INPUTS: (usize, usize) = (200, 10);
 const STATIC_MOTION: f64 = 1e-10;
 
-/// Tip and inputs of a cantilever by the paper's method with unit tangents: each input is one linear solve about the tangents that the one
-/// before has left.
+/// Tip and number of inputs of a cantilever by the paper's method with unit tangents. Each input is one linear solve
+/// with the tangents of the previous one.
 fn unit_cantilever(
     mut chain: Chain,
     force: Vec3,
@@ -104,21 +106,21 @@ fn unit_cantilever(
     Err(Error::Computation(format!("li2011: no equilibrium after {} inputs", STATIC_INPUTS.0)))
 }
 
-/// Out-of-balance force of a static solve on n elements, in EI/L² over 1/n²: below what the elements get wrong.
+/// Out-of-balance force of a static solve on n elements, in EI/L² times 1/n²: below the discretisation error.
 const STATIC_TOLERANCE: f64 = 0.5;
 
 /// Tip and iterations of a cantilever of unit length and stiffness along x under the dead load (0, −a, 0).
 ///
 /// # Errors
-/// A solve that came to no equilibrium.
+/// A solve without an equilibrium.
 pub(crate) fn cantilever(method: &str, elements: usize, a: f64) -> Result<(Vec3, usize)> {
     match method {
         "kirchhoff" => {
             let mut case = unit_rod(elements);
             case.load = vec![at_end(LoadKind::Force, [0.0, -a, 0.0])];
-            // The error of these elements is of order 4, that of the others of order 2: so is what may be out of balance. As
-            // theirs, it is shared out to the nodes. The solver's own tolerance is relative to the force a and the moment at most a
-            // in the rod, of which it allows the sum.
+            // The error of these elements is of order 4, that of the others of order 2; the out-of-balance force is
+            // chosen accordingly and, as theirs, shared among the nodes. The solver's own tolerance is relative to
+            // the sum of the force a and the moment, at most a, in the rod.
             let n = elements as f64;
             let out_of_balance = (STATIC_TOLERANCE / (n * n)).powi(2);
             case.solver.tolerance = (out_of_balance / n / (2.0 * a)).max(case.solver.tolerance);

@@ -1,4 +1,4 @@
-//! The scenes of the comparison, and what is true in them.
+//! Scenes of the comparison, and their reference solutions.
 
 use std::time::{Duration, Instant};
 
@@ -11,16 +11,16 @@ use endowire_core::{Error, Result, Vec3};
 
 use super::candidate;
 
-/// What one run of a method gave.
+/// Result of one run of a method.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Run {
-    /// Distance from the truth, in the case's unit.
+    /// Error against the reference, in the case's unit.
     pub(crate) error: f64,
     /// Time of the computation alone, s.
     pub(crate) time_s: f64,
-    /// Iterations as the method counts them.
+    /// Iterations, as the method counts them.
     pub(crate) iterations: u64,
-    /// Steps that did not meet the method's own convergence test.
+    /// Number of steps that failed the method's own convergence test.
     pub(crate) unconverged: usize,
 }
 
@@ -37,7 +37,7 @@ pub(crate) enum Case {
     Insertion(Box<Scene>),
 }
 
-/// A vessel, a device and a way in.
+/// A vessel, a device and a sheath.
 pub(crate) struct Scene {
     wall: Wall,
     sheath: Sheath,
@@ -48,30 +48,30 @@ pub(crate) struct Scene {
     truth: Truth,
 }
 
-/// What an insertion is compared with.
+/// The reference of an insertion.
 enum Truth {
-    /// The exact tip.
+    /// The exact tip position.
     Tip(Vec3),
-    /// Our converged solution: the whole shape.
+    /// The whole shape of our converged solution.
     Shape(Shape),
 }
 
-/// How the truth of a case was found.
+/// Description of the reference of a case.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct TruthNote {
-    /// The case.
+    /// Name of the case.
     pub(crate) case: String,
-    /// What it is.
+    /// The reference in words.
     pub(crate) truth: String,
-    /// Root mean square change in mm when its elements were halved for the last time.
+    /// Root mean square change, mm, at the last halving of its elements.
     pub(crate) last_change_mm: Option<f64>,
 }
 
-/// Elements at the end of the insertion of the truth's mesh.
+/// Number of elements of the reference mesh at the end of the insertion.
 const TRUTH_ELEMENTS: usize = 400;
 
 impl Case {
-    /// Builds a case, its truth included.
+    /// Creates a case with its reference.
     pub(crate) fn new(name: &'static str) -> Result<(Self, TruthNote)> {
         let exact = |case: &str, text: &str| TruthNote {
             case: case.to_owned(),
@@ -209,7 +209,7 @@ pub(crate) fn rms_distance(shape: &Shape, truth: &Shape) -> (f64, f64) {
     ((sum / shape.len() as f64).sqrt(), largest)
 }
 
-/// The point at an arc length from the tip, cubic between nodes.
+/// The point at an arc length from the tip, by cubic interpolation between nodes.
 pub(crate) fn point_at(shape: &Shape, from_tip_mm: f64) -> Vec3 {
     let (x, t, s) = (&shape.positions_mm, &shape.tangents, &shape.from_tip_mm);
     if shape.len() < 2 {

@@ -1,4 +1,4 @@
-//! Who is on the Pareto front, and how much faster than the others.
+//! Pareto fronts of the methods, and their relative speed.
 
 use serde::Serialize;
 
@@ -7,21 +7,21 @@ use super::Row;
 /// The front of one case.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Front {
-    /// The case.
+    /// Name of the case.
     pub(crate) case: String,
-    /// Rows that no other row of the case beats in both error and time: method and resolution, by falling time.
+    /// Rows that no other row of the case beats in both error and time: method and resolution, by decreasing time.
     pub(crate) rows: Vec<(String, usize)>,
     /// Methods with such rows.
     pub(crate) methods: Vec<String>,
-    /// The least error of the other methods on the front: below it the first of `methods` is alone.
+    /// Smallest error of the other methods on the front; below it the first of `methods` is alone.
     pub(crate) alone_below: Option<f64>,
-    /// The error at which times are compared, in the case's unit.
+    /// Error at which times are compared, in the case's unit.
     pub(crate) at_error: f64,
-    /// Time of each method that reaches it, s, fastest first: interpolated between its rows on logarithmic scales.
+    /// Time at which each method reaches this error, s, fastest first; interpolated logarithmically between its rows.
     pub(crate) time_s: Vec<(String, f64)>,
 }
 
-/// The front of `rows`, which are all of one case.
+/// The front of `rows`, all of one case.
 pub(crate) fn front(case: &str, rows: &[&Row], at_error: f64) -> Front {
     let points: Vec<(&Row, f64, f64)> = rows
         .iter()
@@ -55,7 +55,7 @@ pub(crate) fn front(case: &str, rows: &[&Row], at_error: f64) -> Front {
     Front { case: case.to_owned(), rows, methods, alone_below, at_error, time_s }
 }
 
-/// Least time at which a method is known to have at most `at_error`, from its (error, time) by rising resolution.
+/// Smallest time in which a method has at most `at_error`, from its (error, time) by increasing resolution.
 fn time_at(points: &[(f64, f64)], at_error: f64) -> Option<f64> {
     let mut least: Option<f64> = None;
     let mut consider = |time: f64| least = Some(least.map_or(time, |t: f64| t.min(time)));
@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(found.rows, [("b".to_owned(), 2), ("a".to_owned(), 2), ("a".to_owned(), 1)]);
         assert_eq!(found.methods, ["b", "a"]);
         assert_eq!(found.alone_below, Some(1e-4));
-        // Half way on both logarithmic scales.
+        // The middle on both logarithmic scales.
         assert!((found.time_s[0].1 - 2.0).abs() < 1e-12, "{:?}", found.time_s);
         assert_eq!(front("c", &all[..1], 1e-3).time_s, []);
     }

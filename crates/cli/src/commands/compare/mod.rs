@@ -1,7 +1,7 @@
-//! `endowire compare`: run time against error, method by method, on the same scenes.
+//! `endowire compare`: run time against error, method by method, in the same scenes.
 //!
-//! Every case runs with every method at several resolutions. Rows are written as they are found, and those already in the folder
-//! are not run again; nor is the truth of a case that has all its rows.
+//! Every case runs with every method at several resolutions. Rows are written as soon as they are computed; those
+//! that already exist in the folder are not repeated, and neither is the reference of a case that is complete.
 
 pub(crate) mod candidate;
 pub(crate) mod case;
@@ -22,22 +22,23 @@ use crate::studies::{CANDIDATES, CASES};
 use case::{Case, TruthNote};
 use front::Front;
 
-/// One measured cell.
+/// One measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Row {
-    /// The case.
+    /// Name of the case.
     pub(crate) case: String,
-    /// The method.
+    /// Name of the method.
     pub(crate) method: String,
-    /// Elements of the whole device inserted.
+    /// Number of elements of the whole inserted device.
     pub(crate) resolution: usize,
-    /// Error in the case's unit: of the tip over the length, or root mean square in mm. None where there is no result.
+    /// Error in the case's unit: of the tip, relative to the length, or root mean square in mm. `None` without a
+    /// result.
     pub(crate) error: Option<f64>,
     /// Median time of one solve or one whole insertion, s.
     pub(crate) time_s: Option<f64>,
-    /// Iterations as the method counts them.
+    /// Iterations, as the method counts them.
     pub(crate) iterations: Option<u64>,
-    /// Why there is no result, or what is to be known of it.
+    /// Why there is no result, or a remark.
     #[serde(default)]
     pub(crate) note: String,
 }
@@ -52,21 +53,21 @@ struct Document {
     files: Vec<PathBuf>,
 }
 
-/// Least time spent on the repeats of a fast cell, s, and their most.
+/// Smallest total time of the repetitions of a fast measurement, s, and the range of their number.
 const REPEAT_FOR_S: f64 = 0.2;
 const REPEATS: std::ops::RangeInclusive<usize> = 3..=101;
-/// Longest time for the repeats of a cell with all that goes before each, which is not timed, s.
+/// Largest time of the repetitions including untimed preparation, s.
 const REPEAT_WITHIN_S: f64 = 1.0;
-/// A cell that takes longer than this part of the limit is not repeated.
+/// A measurement that takes longer than this fraction of the limit is not repeated.
 const ONCE: f64 = 0.1;
-/// Growth of time with a doubled resolution that is taken for granted: a cell that would pass the limit is not begun.
+/// Assumed growth of time for doubled resolution: a measurement that would exceed the limit is skipped.
 const GROWTH: f64 = 8.0;
-/// Words by which a note tells that there was not enough time.
+/// Marks notes about an exceeded time limit.
 const LIMIT: &str = "limit of";
-/// Most elements.
+/// Largest number of elements.
 const MOST_ELEMENTS: usize = 1000;
 
-/// Runs what is missing and writes tables and picture.
+/// Runs missing measurements, and writes tables and picture.
 pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {
     if !(args.limit_s.is_finite() && args.limit_s > 0.0) {
         return Err(Failure::Input(format!("--limit-s {}: give a time above 0", args.limit_s)));
@@ -110,7 +111,7 @@ pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {
     finish(args, &cases, found)
 }
 
-/// Fronts, picture and document.
+/// Writes fronts, picture and document.
 fn finish(
     args: &CompareArgs,
     cases: &[(&'static str, &'static str, f64)],
@@ -137,7 +138,7 @@ fn finish(
     answer(&document, args.json, || text(&document, cases))
 }
 
-/// Numbers of elements at which a method runs a case: those asked for, by rising number, or its own.
+/// Numbers of elements for a method in a case: those requested, in increasing order, or its defaults.
 fn resolutions(case: &str, method: &str, asked: &[usize]) -> Vec<usize> {
     if !asked.is_empty() {
         let mut asked = asked.to_vec();
@@ -155,7 +156,7 @@ fn resolutions(case: &str, method: &str, asked: &[usize]) -> Vec<usize> {
     }
 }
 
-/// Runs one cell, as often as its time allows. What goes wrong is told in the row.
+/// Measures one cell, repeated as often as time allows. Failures are reported in the row.
 fn measure(
     case: &Case,
     name: &str,
@@ -217,7 +218,7 @@ fn measure(
     row
 }
 
-/// What is in the folder, and grows.
+/// The rows in the folder.
 struct Found {
     table: PathBuf,
     rows: Vec<Row>,
@@ -239,7 +240,7 @@ impl Found {
         self.rows.iter().filter(move |row| row.case == case && row.method == method)
     }
 
-    /// The row before a resolution.
+    /// The row at the next coarser resolution.
     fn coarser(&self, case: &str, method: &str, resolution: usize) -> Option<&Row> {
         self.of(case, method).filter(|row| row.resolution < resolution).max_by_key(|row| row.resolution)
     }
@@ -272,7 +273,7 @@ fn read<T: DeserializeOwned>(table: &Path) -> Result<Vec<T>, Failure> {
 
 fn write<T: Serialize>(table: &Path, rows: &[T]) -> Result<(), Failure> {
     let save = || -> std::io::Result<()> {
-        // Whole or not at all, so that an interrupt leaves a table to go on from.
+        // Written atomically, so that an interrupt leaves a valid table.
         let part = table.with_extension("part");
         let mut writer = csv::Writer::from_path(&part)?;
         for row in rows {
@@ -284,7 +285,7 @@ fn write<T: Serialize>(table: &Path, rows: &[T]) -> Result<(), Failure> {
     save().map_err(|e| Failure::write(table, &e))
 }
 
-/// The tables for a person.
+/// The tables as text.
 fn text(document: &Document, cases: &[(&'static str, &'static str, f64)]) -> String {
     let mut lines = Vec::new();
     for (name, unit, _) in cases {

@@ -1,4 +1,4 @@
-//! The work–precision picture: error against time, one panel a case.
+//! The work–precision picture: error against time, one panel per case.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ const TITLES: [(&str, &str); 5] = [
     ("arch", "insertion into the aortic arch"),
 ];
 
-/// Rows and the cases they belong to.
+/// Rows and their cases.
 struct Picture<'a> {
     rows: &'a [Row],
     cases: &'a [(&'static str, &'static str, f64)],
@@ -37,7 +37,7 @@ pub(super) fn write(
     chart::write(folder, "compare", SIZE, &Picture { rows, cases })
 }
 
-/// Colour and mark of a method: ours stands out, the others differ also without colour.
+/// Colour and marker of a method: ours stands out, and the others are distinguishable without colour too.
 fn style(method: &str) -> (RGBColor, usize, u32) {
     let index = CANDIDATES.iter().position(|name| *name == method).unwrap_or(0);
     let width = if index == 0 { 4 } else { 2 };
@@ -94,7 +94,7 @@ fn panel_of<B: DrawingBackend>(
         .x_label_formatter(&chart::power)
         .y_label_formatter(&chart::power)
         .draw()?;
-    // Ours last, so that it lies on top.
+    // Ours is drawn last, on top.
     for method in CANDIDATES.iter().rev() {
         let (colour, mark, width) = style(method);
         let line = points(rows, case, method);

@@ -1,15 +1,15 @@
-//! Annotations in the form of COCO (Lin et al., ECCV 2014): images, categories, and masks as uncompressed run lengths.
+//! Annotations in COCO format (Lin et al., ECCV 2014): images, categories, and masks as uncompressed run lengths.
 
 use endowire_viewer::{DeviceLabel, Labels, Mask, Pushed};
 use serde::{Deserialize, Serialize};
 
-/// What a mask is of.
+/// Category of a mask.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Category {
     id: u32,
     name: &'static str,
     supercategory: &'static str,
-    /// Names of the points that annotations of it have, and which of them are joined.
+    /// Names of the keypoints of its annotations, and how they are connected.
     #[serde(flatten)]
     points: Option<Points>,
 }
@@ -26,7 +26,8 @@ const CATHETER: u32 = 3;
 const PART: u32 = 4;
 const COIL: u32 = 5;
 
-/// All categories: microwires are guidewires, all that has a lumen is a catheter, and a coil is one on its pusher and without.
+/// All categories. Microwires count as guidewires, everything with a lumen as a catheter, and a coil as such both on
+/// its pusher and detached.
 pub(super) fn categories() -> [Category; 5] {
     let tip = Points { keypoints: ["tip"], skeleton: [] };
     [
@@ -51,16 +52,16 @@ pub(super) struct ImageRow {
     pub(super) device: Option<String>,
     pub(super) instruments: Vec<String>,
     pub(super) step: usize,
-    /// Whether the step found an equilibrium; one that was drawn by a version that did not tell is taken to have.
+    /// Whether the step converged; true for pictures of versions that did not record it.
     #[serde(default = "yes")]
     pub(super) converged: bool,
-    /// When the step ended, in the time of the script and of a vessel that moves.
+    /// End time of the step, in the time of the script and of a moving vessel.
     pub(super) step_time_s: f64,
-    /// Time of injections.
+    /// Time for injections.
     pub(super) time_s: f64,
-    /// 0, or 1 of the second plane of a pair.
+    /// 0, or 1 for the second plane of a pair.
     pub(super) plane: usize,
-    /// Picture of the other plane.
+    /// Id of the picture of the other plane.
     pub(super) pair: Option<usize>,
     pub(super) primary_deg: f64,
     pub(super) secondary_deg: f64,
@@ -73,7 +74,7 @@ fn yes() -> bool {
     true
 }
 
-/// One thing in a picture.
+/// One object in a picture.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Annotation {
     id: usize,
@@ -87,33 +88,34 @@ pub(super) struct Annotation {
     instrument: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     material: Option<String>,
-    /// What the device's file calls a part.
+    /// Name of the part in the device file.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     part: Option<String>,
-    /// Column, row, and whether it is seen (2) or behind a blade (1), of the tip; zeros where it is not in the picture.
+    /// Column, row, and visibility of the tip: visible (2) or behind a collimator blade (1); zeros if it is outside
+    /// the picture.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     keypoints: Option<[f64; 3]>,
-    /// Points that are in the picture.
+    /// Number of keypoints in the picture.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     num_keypoints: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     tip_mm: Option<[f64; 3]>,
 }
 
-/// Height and width, and lengths of runs down the columns.
+/// Height and width, and run lengths in column order.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct RunLengths {
     size: [u32; 2],
     counts: Vec<u32>,
 }
 
-/// Most annotations of a picture: numbers of annotations are those of their picture times it, and more. They begin at 1: the evaluation of
-/// pycocotools takes 0 for no match.
+/// Largest number of annotations per picture. The id of an annotation is that of its picture times this number, plus
+/// at least 1; it is never 0, which pycocotools takes for no match.
 const MOST: usize = 1000;
 
-/// What is seen in a picture; things that no pixel shows are left out.
+/// The annotations of a picture; objects without a visible pixel are left out.
 ///
-/// `drawn` are the numbers and names of the instruments that the devices are, or were before they were detached.
+/// `drawn` are the indices and names of the instruments that the devices are, or were before they were detached.
 pub(super) fn annotations(
     image: usize,
     labels: &Labels,
@@ -171,7 +173,7 @@ pub(super) fn annotations(
     rows
 }
 
-/// The tip where it is in the picture.
+/// The tip as a keypoint, if it is in the picture.
 fn keypoint(device: &DeviceLabel, size_px: [u32; 2]) -> [f64; 3] {
     let inside = |pixel: &[f64; 2]| (0..2).all(|k| (0.0..=f64::from(size_px[k])).contains(&pixel[k]));
     match device.tip_px.filter(inside) {

@@ -1,4 +1,4 @@
-//! One scene with one device, and all that its script does.
+//! One scene with one device, and the states of its script.
 
 use std::path::Path;
 
@@ -21,39 +21,39 @@ use crate::scenes;
 /// A time before all injections, s.
 const LONG_BEFORE_S: f64 = -1e6;
 
-/// What is in after a step.
+/// The state after a step.
 pub(super) struct FrameTime {
     pub(super) step: usize,
-    /// Whether it found an equilibrium.
+    /// Whether the step converged.
     pub(super) converged: bool,
-    /// When it ended.
+    /// End time of the step.
     pub(super) step_time_s: f64,
-    /// From when on times of injections are told, s: the end of the step where the script injects, else 0.
+    /// Origin of the times of injections: the end of the step if the script injects, otherwise 0.
     pub(super) time_s: f64,
     pub(super) shape: Shape,
     pub(super) inserted_mm: Vec<f64>,
     pub(super) contacts: Vec<ContactView>,
-    /// Coils that were left behind.
+    /// Detached coils.
     pub(super) coils: Vec<DetachedCoil>,
-    /// Where the vessel is, if it moves.
+    /// Displacement of the vessel, if it moves.
     pub(super) displacement: Option<Displacement>,
 }
 
-/// A scene with a device, carried out.
+/// A scene with a device whose script was carried out.
 pub(super) struct Course {
     pub(super) scene: String,
     pub(super) device: Option<String>,
     pub(super) instruments: Vec<String>,
     pub(super) view: ViewSpec,
-    /// What all poses have in common; it draws nothing itself.
+    /// Source of data shared by the renderers of all poses; it draws nothing itself.
     pub(super) renderer: Renderer,
     pub(super) pushed: Pushed,
-    /// By step; the first is before the script.
+    /// One per step; the first is before the script.
     pub(super) moments: Vec<FrameTime>,
 }
 
 impl Course {
-    /// Carries a scene out, of which `first` is the first shot. A step that fails ends it; what came before is kept.
+    /// Carries out a scene, whose first shot is `first`. A step that fails ends it; earlier states are kept.
     pub(super) fn run(
         spec: &Spec,
         first: usize,
@@ -77,7 +77,7 @@ impl Course {
             let contacts = contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() });
             moments.push(FrameTime {
                 step: moments.len(),
-                // Before the first there is nothing to find.
+                // There is nothing to solve before the first step.
                 converged: moments.is_empty() || report.converged,
                 step_time_s,
                 time_s: if script.injects() { step_time_s } else { 0.0 },
@@ -121,8 +121,8 @@ impl Course {
         })
     }
 
-    /// Where the tip was when, in the vessel at rest, up to a moment; nothing where none injects. Time goes on where lines of the script
-    /// inject; elsewhere the instruments rest at a moment for all times.
+    /// Times and material places of the tip up to a state; empty if nothing is injected at the tip. If script lines
+    /// inject, time advances with the steps; otherwise the instruments are at rest for all times.
     pub(super) fn way_of_tip(&self, moment: &FrameTime) -> Vec<(f64, Vec3)> {
         if !self.view.injects_at_tip() {
             return vec![];
@@ -133,7 +133,7 @@ impl Course {
             Some((one.time_s, self.pushed.tip_at_rest_mm(&one.shape, &one.inserted_mm, displacement)?))
         });
         let mut way: Vec<(f64, Vec3)> = on_the_way.collect();
-        // Before all of it, so that nothing is left of what another picture was told.
+        // Begins before all times, so that data of other pictures have no effect.
         if let Some(&(_, first_mm)) = way.first() {
             way.insert(0, (LONG_BEFORE_S, first_mm));
         }
@@ -141,7 +141,7 @@ impl Course {
     }
 }
 
-/// A scene with what is set, and with another device if one is given.
+/// A scene with settings, and with another device if one is given.
 fn scene(file: &Path, device: Option<&Path>, settings: &[Setting]) -> Result<Scene, Failure> {
     let bad = |text: String| Failure::Input(text).at(file.display());
     let Some(device) = device else { return scenes::read(file, settings) };
@@ -156,13 +156,13 @@ fn scene(file: &Path, device: Option<&Path>, settings: &[Setting]) -> Result<Sce
         toml::Value::from(device.to_string_lossy().into_owned()),
     )]);
     let key = Key::parse("device")?;
-    // The device comes first: what is set may be of its parts.
+    // The device comes first, because settings may refer to its parts.
     let with_device = [&[Setting { key, value: named.into() }], settings].concat();
     scenes::with_any_device(file, &with_device)
 }
 
-/// The view of a scene with the keys of the specification in their places. Where another device takes the place of the scene's, what the
-/// scene says its own is made of is left out.
+/// The view of a scene with the keys of the specification. If another device replaces the scene's own, the materials
+/// of the latter are left out.
 fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<ViewSpec, Failure> {
     let bad = |e: serde_json::Error| Failure::Input(format!("view: {e}")).at(file.display());
     let mut of_scene = ViewSpec::of_scene(scene, file)?;
@@ -173,7 +173,7 @@ fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<V
     merge(&mut table, &spec.view);
     let mut view: ViewSpec = serde_json::from_value(table).map_err(bad)?;
     view.views = vec![View::Fluoro];
-    // Moments are drawn at random: what was before one is not before it.
+    // States are drawn at random, so the previous picture is not the previous state.
     view.detector.lag = 0.0;
     view.c_arm.pose = None;
     if view.exposure.is_some() && spec.vary.kvp.is_some() {

@@ -1,8 +1,8 @@
-//! Numbers drawn from a seed and a place: whatever order and number of threads, the same.
+//! Random numbers that depend only on a seed and a place in the dataset, not on order or number of threads.
 
 use endowire_core::random::{self, splitmix64};
 
-/// What is drawn.
+/// Kinds of drawn quantities.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum What {
     Primary,
@@ -14,7 +14,7 @@ pub(super) enum What {
     Time,
 }
 
-/// Random words of a place in a dataset.
+/// Random numbers for a place in a dataset.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Draw {
     seed: u64,
@@ -25,12 +25,12 @@ impl Draw {
         Self { seed: splitmix64(seed, 0) }
     }
 
-    /// Those of one thing in a row of them.
+    /// The random numbers of the item with this index.
     pub(super) fn of(self, index: usize) -> Self {
         Self { seed: splitmix64(self.seed ^ splitmix64(index as u64 + 1, 0), 0) }
     }
 
-    /// A word.
+    /// A random word.
     pub(super) fn word(self, what: What) -> u64 {
         splitmix64(self.seed.wrapping_add(splitmix64(what as u64 + 1, 0)), 0)
     }
@@ -40,7 +40,7 @@ impl Draw {
         random::unit(self.word(what))
     }
 
-    /// A number between two.
+    /// A number between two limits.
     pub(super) fn within(self, what: What, [low, high]: [f64; 2]) -> f64 {
         low + (high - low) * self.unit(what)
     }

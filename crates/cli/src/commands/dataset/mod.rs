@@ -1,8 +1,8 @@
-//! `endowire dataset`: labelled pictures of many scenes, devices, poses, doses and moments.
+//! `endowire dataset`: labelled pictures of many scenes, devices, poses, doses and states.
 //!
-//! A *course* is a scene with a device, carried out once; a *shot* is a pose of a course, with its moments. Shots are drawn by all
-//! cores; each keeps a list of what it has written, so that a call that was ended goes on where it was. Everything that is
-//! drawn at random depends on the seed and on the number of the shot alone.
+//! A *course* is a scene with a device, carried out once; a *shot* is a pose of a course, with its pictures. Shots
+//! are drawn on all cores. Each keeps a list of its files, so that an interrupted call can resume. Everything random
+//! depends only on the seed and the number of the shot.
 
 mod coco;
 mod course;
@@ -44,16 +44,16 @@ struct Info {
     provenance: Provenance,
 }
 
-/// What was written: the JSON document on stdout.
+/// The JSON document on stdout.
 #[derive(Debug, Serialize)]
 struct Written {
     #[serde(flatten)]
     provenance: Provenance,
     folder: PathBuf,
     pictures: usize,
-    /// Pictures of this call; the others were there.
+    /// Number of pictures drawn by this call; the others existed.
     drawn: usize,
-    /// Pictures of steps that found no equilibrium.
+    /// Number of pictures of steps that did not converge.
     unconverged: usize,
     courses: usize,
     simulation_time_s: f64,
@@ -61,7 +61,7 @@ struct Written {
     pictures_per_s: f64,
 }
 
-/// Draws what is not there yet.
+/// Draws the pictures that are missing.
 pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let spec = Spec::read(&args.spec)?;
     let provenance = provenance(args, &spec)?;
@@ -99,7 +99,7 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let bar = progress::bar(open.len(), "pose");
     open.par_iter().try_for_each(|&shot| {
         if let Some(course) = &courses[shot / spec.poses] {
-            // What cannot be written now could be when the folder was claimed.
+            // A computation error rather than bad input: the folder was writable at the start.
             shot::draw(&spec, course, shot, folder).map_err(Failure::into_computation)?;
         }
         bar.inc(1);
@@ -146,9 +146,9 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the dataset is made of.
+/// Provenance of the dataset.
 fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
-    // Parts of devices that are given are those of other files.
+    // If devices are given, settings of parts refer to other files.
     let of_scene = if spec.devices.is_empty() { args.set.set.as_slice() } else { &[] };
     let mut paths = vec![args.spec.clone()];
     for scene in &spec.scenes {
@@ -165,7 +165,8 @@ fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
 const FOLDERS: [&str; 3] = ["images", "arrays", "parts"];
 const ANNOTATIONS: &str = "annotations.json";
 
-/// Takes a folder for a dataset; one that holds another, or somebody's files where those of a dataset go, is refused.
+/// Claims a folder for a dataset; it is refused if it contains another dataset, or foreign files with names of a
+/// dataset.
 fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     let path = folder.join("dataset.json");
     let told = to_json(provenance)?;
@@ -192,7 +193,7 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is in the places of a dataset in a folder that is none.
+/// The first path of a dataset that already exists in a folder which is not a dataset.
 fn taken(folder: &Path) -> Option<PathBuf> {
     let mut places = FOLDERS.iter().chain([&ANNOTATIONS, &"dataset.json"]).map(|name| folder.join(name));
     let is_taken = |path: &PathBuf| match std::fs::read_dir(path) {
@@ -202,7 +203,7 @@ fn taken(folder: &Path) -> Option<PathBuf> {
     places.find(is_taken)
 }
 
-/// Writes the annotations of all shots; how many pictures are of steps without an equilibrium.
+/// Writes the annotations of all shots; returns the number of pictures of steps that did not converge.
 fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<usize, Failure> {
     let info = Info { description: "endowire: simulated fluoroscopy", provenance: provenance.clone() };
     let mut document = Document { info, images: vec![], categories: categories(), annotations: vec![] };

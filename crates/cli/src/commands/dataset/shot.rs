@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::output::npz::{Array, write_arrays};
 use crate::output::whole;
 
-/// What a shot has written, kept beside the pictures until all are there.
+/// The list of a shot's files, kept until the dataset is complete.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Part {
     pub(super) images: Vec<ImageRow>,
@@ -22,18 +22,18 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// That of a list, if it is there and whole.
+    /// Reads a list; `None` if it is missing or incomplete.
     pub(super) fn read(path: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(path).ok()?).ok()
     }
 }
 
-/// Where the list of a shot is.
+/// Path of the list of a shot.
 pub(super) fn list(folder: &Path, shot: usize) -> PathBuf {
     folder.join("parts").join(format!("{shot:06}.json"))
 }
 
-/// Whether a shot is there: its list, and the files that it names.
+/// Whether a shot is complete: its list, and the files that it names.
 pub(super) fn is_whole(folder: &Path, shot: usize) -> bool {
     let there = |image: &ImageRow| {
         [&image.file_name, &image.arrays].into_iter().all(|file| folder.join(file).is_file())
@@ -41,7 +41,7 @@ pub(super) fn is_whole(folder: &Path, shot: usize) -> bool {
     Part::read(&list(folder, shot)).is_some_and(|part| part.images.iter().all(there))
 }
 
-/// Draws the pictures of shot number `shot`, pose number `pose` of a course.
+/// Draws the pictures of shot number `shot`, one pose of a course.
 pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> Result<Part, Failure> {
     let draw = drawn(spec, shot);
     let views = planes(spec, &course.view, shot);
@@ -108,12 +108,12 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
     Ok(part)
 }
 
-/// What a shot is drawn from.
+/// The random numbers of a shot.
 fn drawn(spec: &Spec, shot: usize) -> Draw {
     Draw::new(spec.seed).of(shot)
 }
 
-/// The views of a shot's planes, those of its course but for what is drawn.
+/// The views of a shot's planes: those of its course with the drawn parameters.
 pub(super) fn planes(spec: &Spec, of_course: &ViewSpec, shot: usize) -> Vec<ViewSpec> {
     let (vary, draw) = (&spec.vary, drawn(spec, shot));
     let mut view = of_course.clone();
@@ -135,7 +135,7 @@ pub(super) fn planes(spec: &Spec, of_course: &ViewSpec, shot: usize) -> Vec<View
 fn label_arrays(labels: &Labels) -> Vec<Array> {
     let [width, height] = labels.size_px.map(|n| n as usize);
     let bytes = |name: &str, data: Vec<u8>| Array::of_bytes(name, vec![height, width], data);
-    // One after the other: an instrument in another is not hidden by it.
+    // Separate masks, because an instrument does not hide the one inside it.
     let masks = labels.devices.iter().flat_map(|device| device.mask.image().into_data());
     let mut arrays = vec![
         Array::of_bytes("masks", vec![labels.devices.len(), height, width], masks.collect()),

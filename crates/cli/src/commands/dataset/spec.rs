@@ -1,4 +1,4 @@
-//! What a dataset is made of: a TOML file.
+//! Specifications of datasets, in TOML.
 
 use std::path::{Path, PathBuf};
 
@@ -9,51 +9,52 @@ use serde_json::{Map, Value};
 
 use crate::failure::Failure;
 
-/// Most pictures of one dataset.
+/// Largest number of pictures of a dataset.
 const MOST_PICTURES: usize = 10_000_000;
 
-/// A specification. Paths start from its folder.
+/// A specification. Paths are relative to its folder.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Spec {
-    /// Seed of all that is drawn.
+    /// Seed of all random numbers.
     #[serde(default = "one")]
     pub(super) seed: u64,
     /// Scene files: vessels, sheaths, scripts and views.
     pub(super) scenes: Vec<PathBuf>,
-    /// Device files, each in place of the device of every scene that has one alone; absent: the scenes' own.
+    /// Device files, each of which replaces the device of every scene with a single one; by default the scenes' own
+    /// devices are used.
     #[serde(default)]
     pub(super) devices: Vec<PathBuf>,
-    /// Poses drawn for each scene with each device.
+    /// Number of poses per scene and device.
     #[serde(default = "eight")]
     pub(super) poses: usize,
-    /// Moments drawn for each pose: a picture each, or one of each plane.
+    /// Number of states per pose, with one picture each, or one per plane.
     #[serde(default = "sixteen")]
     pub(super) moments: usize,
-    /// Positioner primary angle of the second plane from that of the first; absent: one plane.
+    /// Primary angle of the second plane relative to the first, degrees; absent for a single plane.
     pub(super) biplane_deg: Option<f64>,
-    /// Ranges that are drawn from.
+    /// Ranges of random parameters.
     #[serde(default)]
     pub(super) vary: Vary,
-    /// Keys of `[view]` that take the place of the scenes'.
+    /// Keys that override those of the scenes' `[view]`.
     #[serde(default)]
     pub(super) view: Map<String, Value>,
 }
 
-/// Ranges, even between their ends.
+/// Ranges of uniform distributions.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Vary {
-    /// Of a pose.
+    /// Drawn for each pose.
     pub(super) primary_deg: [f64; 2],
     pub(super) secondary_deg: [f64; 2],
-    /// Of a pose, one of these; absent: the scene's.
+    /// Chosen from this list for each pose; by default the scene's.
     pub(super) kvp: Option<Vec<f64>>,
-    /// Of a pose, even on a logarithmic scale; absent: usual for the mode.
+    /// Drawn for each pose on a logarithmic scale; by default the usual dose of the mode.
     pub(super) dose_ngy: Option<[f64; 2]>,
-    /// Of a picture: time of injections.
+    /// Drawn for each picture: time of injections.
     pub(super) time_s: [f64; 2],
-    /// Of a picture: part of the script that has been carried out.
+    /// Drawn for each picture: fraction of the script that has been carried out.
     pub(super) progress: [f64; 2],
 }
 
@@ -83,7 +84,7 @@ fn sixteen() -> usize {
 }
 
 impl Spec {
-    /// Reads and checks a file.
+    /// Reads and checks a specification.
     pub(super) fn read(path: &Path) -> Result<Self, Failure> {
         let (mut spec, _): (Self, String) = from_toml(path)?;
         spec.check().map_err(|failure| failure.at(path.display()))?;
@@ -105,7 +106,7 @@ impl Spec {
         Ok(spec)
     }
 
-    /// Pictures of each plane.
+    /// Number of pictures per state, one for each plane.
     pub(super) fn views(&self) -> usize {
         if self.biplane_deg.is_some() { 2 } else { 1 }
     }
@@ -156,7 +157,7 @@ impl Spec {
         }
     }
 
-    /// Refuses keys of `[view]` that the pictures of a dataset would not show.
+    /// Refuses keys of `[view]` that have no effect on the pictures of a dataset.
     fn check_view(&self) -> Result<(), Failure> {
         for (keys, mend) in [
             (&["biplane_deg"][..], "a dataset has biplane_deg beside its seed"),

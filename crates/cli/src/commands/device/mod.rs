@@ -1,4 +1,4 @@
-//! `endowire device`: what device files say, as tables and pictures.
+//! `endowire device`: device files as tables and pictures.
 
 mod picture;
 mod table;
@@ -44,22 +44,22 @@ struct Row {
     name: String,
     kind: Option<Kind>,
     length_mm: f64,
-    /// Smallest and largest.
+    /// Smallest and largest value.
     outer_diameter_mm: [f64; 2],
     /// Of the softest and the stiffest section.
     bending_stiffness_nmm2: [f64; 2],
-    /// Length with a shape of its own.
+    /// Length with a curved rest shape.
     shaped_mm: f64,
 }
 
-/// Reads a device file, and checks what the core leaves to the viewer: its materials.
+/// Reads a device file, and checks its materials, which the core does not know.
 fn read(path: &Path) -> Result<DeviceFile, Failure> {
     let file = DeviceFile::read(path)?;
     device_parts(&file).map_err(|e| Failure::from(e).at(path.display()))?;
     Ok(file)
 }
 
-/// Shows one device, and draws it into `out`.
+/// Shows one device, and draws it into `out` if given.
 pub(crate) fn show(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(path)?], 0);
     let device = read(path)?;
@@ -80,7 +80,7 @@ pub(crate) fn show(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Fa
     answer(&document, json, || text_of_one(&document))
 }
 
-/// Lists the devices of a folder, and draws them all into `out`.
+/// Lists the devices of a folder, and draws them into `out` if given.
 pub(crate) fn list(folder: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
     let paths = scenes::files(folder)?;
     if paths.is_empty() {
@@ -147,7 +147,7 @@ fn text_of_all(devices: &[Row]) -> String {
     columns(&head, rows)
 }
 
-/// A kind for people.
+/// A kind in words.
 fn words(kind: Kind) -> &'static str {
     match kind {
         Kind::Guidewire => "guidewire",

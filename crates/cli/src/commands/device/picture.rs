@@ -1,4 +1,4 @@
-//! The shapes of devices at rest, each in its plane, to one scale.
+//! Rest shapes of devices, each in its plane, at one scale.
 
 use std::path::Path;
 
@@ -11,27 +11,27 @@ use super::table::diameters;
 use crate::failure::Failure;
 use crate::output::chart::{self, COLOURS};
 
-/// Shortest end of a device that is drawn, mm.
+/// Smallest length at the end of a device that is drawn, mm.
 const LEAST_SHOWN_MM: f64 = 40.0;
-/// Straight shaft behind a shaped end, mm.
+/// Length of straight shaft drawn behind a shaped end, mm.
 const SHAFT_MM: f64 = 15.0;
-/// Shaft below a tip that turns back, mm.
+/// Length of shaft drawn below a tip that turns back, mm.
 const BELOW_MM: f64 = 8.0;
-/// Points along a device: alone as smooth as pixels are, on a sheet few enough that it stays small.
+/// Number of points along a device: smooth for a single one, fewer on a sheet to keep its file small.
 const POINTS_ALONE: f64 = 150.0;
 const POINTS_ON_SHEET: f64 = 90.0;
-/// Scale of a sheet: a French is a pixel and more.
+/// Scale of a sheet: a French is more than a pixel.
 const SHEET_PX_PER_MM: f64 = 4.0;
 /// Lengths of scale bars, mm.
 const BARS_MM: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-/// Widths and heights in pixels: of a panel, of the picture of one device, of what is around a shape.
+/// Sizes in pixels: of a panel, of the picture of one device, of the margin around a shape.
 const PANEL_PX: i32 = 430;
 const ONE_PX: (u32, u32) = (1000, 1100);
 const MARGIN_PX: i32 = 24;
 const CAPTION_PX: i32 = 90;
 const LEGEND_PX: i32 = 110;
 
-/// The material of a part that names none.
+/// Label of a part without a material.
 const UNNAMED: &str = "no material given";
 
 /// The end of one device, in the plane of its shape: across and along its shaft, which points up.
@@ -44,7 +44,7 @@ struct Drawing {
 
 /// The centre line of a part.
 struct Stretch {
-    /// Of its outermost layer.
+    /// Material of its outermost layer.
     material: String,
     diameter_mm: f64,
     points_mm: Vec<[f64; 2]>,
@@ -65,7 +65,7 @@ pub(super) fn one(path: &Path, device: &DeviceFile) -> Result<(), Failure> {
     chart::write_file(path, ONE_PX, &Picture { drawings: vec![drawing], columns: 1, scale })
 }
 
-/// Draws many, under the names of their files.
+/// Draws several devices, labelled with their file names.
 pub(super) fn sheet(path: &Path, names: &[String], devices: &[DeviceFile]) -> Result<(), Failure> {
     let drawing = |(name, device): (&String, _)| Drawing::new(name.clone(), device, POINTS_ON_SHEET);
     let drawings: Vec<Drawing> = names.iter().zip(devices).map(drawing).collect();
@@ -81,7 +81,7 @@ impl Drawing {
         let device = &file.device;
         let rest_shape = |end_mm: f64| device.rest_shape(end_mm, end_mm / points);
         let mut shown_mm = (device.shaped_mm() + SHAFT_MM).max(LEAST_SHOWN_MM);
-        // A tip that hangs beside the shaft is drawn beside it.
+        // Includes the shaft beside a tip that turns back.
         let low_mm = rest_shape(shown_mm).positions_mm.iter().map(|p| p.z).fold(0.0, f64::min);
         if low_mm < 0.0 {
             shown_mm += BELOW_MM - low_mm;
@@ -97,7 +97,7 @@ impl Drawing {
         for part in file.parts.iter().rev().filter(|part| part.from_tip_mm[0] < shown_mm) {
             let next = stretch(part, &shape, &points);
             match drawing.parts.last_mut() {
-                // One line, without seams: the point between two parts is in both.
+                // Continues the line without a gap: the point between two parts belongs to both.
                 Some(last) if last.looks_like(&next) => {
                     last.points_mm.extend(next.points_mm.into_iter().skip(1));
                 }
@@ -113,14 +113,15 @@ impl Drawing {
         drawing
     }
 
-    /// Pixels a millimetre with which it fills a room.
+    /// Pixels per millimetre at which it fills a space.
     fn fitting(&self, room_px: [f64; 2]) -> f64 {
         let along = |axis: usize| room_px[axis] / (self.high_mm[axis] - self.low_mm[axis]).max(1.0);
         along(0).min(along(1))
     }
 }
 
-/// Points of a shape in the plane of its shaft and of its point farthest off the shaft's axis, and how far it leaves that plane, mm.
+/// Points of a shape in the plane through its shaft and its point farthest from the shaft's axis, and the largest
+/// distance from that plane, mm.
 fn in_plane(shape: &Shape) -> (Vec<[f64; 2]>, f64) {
     let off_axis = shape.positions_mm.iter().map(|p| [p.x, p.y]);
     let [x, y] =
@@ -136,7 +137,7 @@ fn caption(file: &DeviceFile, off_plane_mm: f64) -> String {
     let device = &file.device;
     let [mm, ..] = diameters([2.0 * device.min_radius_mm(), 2.0 * device.max_radius_mm()]);
     let size = format!("{mm} mm, {:.0} cm", device.length_mm() / 10.0);
-    // What a tenth of a millimetre off its plane does is not seen.
+    // A deviation below 0.1 mm from the plane is not visible.
     if off_plane_mm < 0.1 { size } else { format!("{size}, {off_plane_mm:.0} mm off plane") }
 }
 
@@ -144,7 +145,7 @@ fn caption(file: &DeviceFile, off_plane_mm: f64) -> String {
 fn stretch(part: &Part, shape: &Shape, points: &[[f64; 2]]) -> Stretch {
     let [begin, end] = part.from_tip_mm;
     let material = part.coat.as_ref().map(|coat| &coat.material).or(part.material.as_ref());
-    // Points stand at the ends of parts but for rounding.
+    // The points lie at the ends of parts up to rounding.
     let inside = |from_tip_mm: f64| (begin - 1e-6..=end + 1e-6).contains(&from_tip_mm);
     let own = shape.from_tip_mm.iter().zip(points).filter(|(from_tip_mm, _)| inside(**from_tip_mm));
     Stretch {
@@ -158,19 +159,19 @@ fn stretch(part: &Part, shape: &Shape, points: &[[f64; 2]]) -> Stretch {
 struct Picture {
     drawings: Vec<Drawing>,
     columns: usize,
-    /// Pixels a millimetre.
+    /// Pixels per millimetre.
     scale: f64,
 }
 
 impl Picture {
-    /// Heights of the rows of a sheet: of the tallest in each.
+    /// Heights of the rows of a sheet, each that of its tallest device.
     fn rows_px(&self) -> Vec<i32> {
         let tallest = |row: &[Drawing]| row.iter().map(|d| d.high_mm[1] - d.low_mm[1]).fold(0.0, f64::max);
         let height = |row| (tallest(row) * self.scale).ceil() as i32 + CAPTION_PX + 2 * MARGIN_PX;
         self.drawings.chunks(self.columns).map(height).collect()
     }
 
-    /// Materials in the order in which they come.
+    /// Materials in order of occurrence.
     fn materials(&self) -> Vec<&str> {
         let mut materials: Vec<&str> = vec![];
         for part in self.drawings.iter().flat_map(|drawing| &drawing.parts) {
@@ -197,7 +198,7 @@ impl chart::Chart for Picture {
     }
 }
 
-/// The colour of a material, by its place in the legend.
+/// Colour of a material, by its position in the legend.
 fn colour(materials: &[&str], material: &str) -> RGBColor {
     let index = materials.iter().position(|name| *name == material).unwrap_or(0);
     COLOURS[index % COLOURS.len()]
@@ -214,7 +215,7 @@ fn panel_of<B: DrawingBackend>(
     panel.draw(&Text::new(title.clone(), (MARGIN_PX, 18), chart::font(28)))?;
     let grey = chart::font(24).color(&RGBColor(90, 90, 90));
     panel.draw(&Text::new(size.clone(), (MARGIN_PX, 52), grey))?;
-    // In the middle, with the shaft at the lower edge.
+    // Centred, with the shaft at the lower edge.
     let middle_mm = (drawing.low_mm[0] + drawing.high_mm[0]) / 2.0;
     let at = |[x, y]: [f64; 2]| {
         let across = f64::from(width) / 2.0 + (x - middle_mm) * scale;
@@ -229,7 +230,7 @@ fn panel_of<B: DrawingBackend>(
     Ok(())
 }
 
-/// A bar of the scale, and the colours of the materials.
+/// Draws the scale bar, and the colours of the materials.
 fn legend_of<B: DrawingBackend>(
     legend: &DrawingArea<B, Shift>,
     scale: f64,

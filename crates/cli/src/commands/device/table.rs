@@ -1,9 +1,9 @@
-//! Parts of a device as rows of a table.
+//! Parts of a device as table rows.
 
 use endowire_core::device::{Part, Section};
 use serde::Serialize;
 
-/// One part. Pairs are its values towards the tip and at its other end.
+/// One part. Pairs are its values at the end towards the tip and at the other end.
 #[derive(Debug, Serialize)]
 pub(super) struct PartRow {
     part: String,
@@ -14,15 +14,15 @@ pub(super) struct PartRow {
     inner_diameter_mm: Option<[f64; 2]>,
     bending_stiffness_nmm2: [f64; 2],
     torsional_stiffness_nmm2: [f64; 2],
-    /// That of the arc next to the tip, where there are several.
+    /// If the part has several arcs, that of the arc next to the tip.
     rest_curvature_per_mm: [f64; 2],
-    /// Arcs of its shape at rest.
+    /// Number of arcs of its rest shape.
     arcs: usize,
-    /// Angle that the part is bent by at rest, arc by arc.
+    /// Total bending angle of its rest shape, summed over the arcs.
     bend_deg: f64,
-    /// Sections that stand for it.
+    /// Number of sections that represent it.
     sections: usize,
-    /// Largest differences of the sections from the taper that they stand for; of EI, relative.
+    /// Largest deviations of the sections from the taper that they represent; relative for EI.
     cut_radius_error_mm: f64,
     cut_stiffness_error: f64,
     material: Option<String>,
@@ -70,7 +70,7 @@ impl PartRow {
         }
     }
 
-    /// A curvature as radius and angle, with its direction where it leaves the first plane.
+    /// A curvature as radius and angle, with its direction if it leaves the first plane.
     fn bend(&self) -> String {
         if self.arcs > 1 {
             let mean_per_mm = self.bend_deg.to_radians() / (self.to_mm - self.from_mm);
@@ -103,13 +103,13 @@ impl PartRow {
     }
 }
 
-/// Angle that a section is bent by at rest, rad.
+/// Bending angle of a section at rest, rad.
 fn bend_rad(section: &Section) -> f64 {
     let [first, second] = section.rest_curvature_per_mm;
     first.hypot(second) * section.length_mm
 }
 
-/// The table for people.
+/// The table as text.
 pub(super) fn text(parts: &[PartRow]) -> String {
     let head = [
         "part",
@@ -156,13 +156,13 @@ pub(super) fn diameters(mm: [f64; 2]) -> [String; 3] {
     [in_unit(1.0, 3), in_unit(3.0, 1), in_unit(1.0 / 25.4, 4)]
 }
 
-/// Two values, or one where they read alike.
+/// Two values, or one if both have the same text.
 pub(super) fn range(values: [f64; 2], significant: i32) -> String {
     let [a, b] = values.map(|value| digits(value, significant));
     if a == b { a } else { format!("{a}–{b}") }
 }
 
-/// A positive number with so many significant digits, and all of those before the point.
+/// A positive number with `significant` digits, and with all digits before the decimal point.
 fn digits(value: f64, significant: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -171,7 +171,7 @@ fn digits(value: f64, significant: i32) -> String {
     format!("{value:.*}", (significant - before).clamp(0, 9) as usize)
 }
 
-/// Lines of columns; the last column is as wide as it likes.
+/// Aligned columns; the last column has any width.
 pub(super) fn columns(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let head: Vec<String> = head.iter().map(|text| (*text).to_owned()).collect();
     let lines: Vec<Vec<String>> = std::iter::once(head).chain(rows).collect();

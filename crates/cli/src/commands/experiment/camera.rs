@@ -1,4 +1,4 @@
-//! Frames of both views of a simulation, taken by number.
+//! Numbered frames of both views of a simulation.
 
 use std::path::{Path, PathBuf};
 
@@ -12,24 +12,24 @@ use crate::failure::Failure;
 pub(super) struct Camera {
     renderer: Renderer,
     stem: PathBuf,
-    /// What was drawn.
+    /// Paths of the frames.
     pub(super) frames: Vec<PathBuf>,
 }
 
 impl Camera {
-    /// A camera with the views, angles and sizes of `spec`; whatever its views are, both are drawn.
+    /// A camera with the angles and sizes of `spec`, which draws both views.
     pub(super) fn new(folder: &Path, stem: &str, spec: ViewSpec, wall: &Wall) -> Result<Self, Failure> {
         std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
         let spec = ViewSpec { views: vec![View::ThreeD, View::Fluoro], ..spec };
         Ok(Self { renderer: Renderer::of_wall(&spec, wall)?, stem: folder.join(stem), frames: Vec::new() })
     }
 
-    /// How often it was taken.
+    /// Number of times it was used.
     pub(super) fn taken(&self) -> usize {
         self.frames.len() / 2
     }
 
-    /// Draws the present state.
+    /// Draws the current state.
     pub(super) fn take(&mut self, simulation: &Simulation) -> Result<(), Failure> {
         let device = simulation.device();
         let view =

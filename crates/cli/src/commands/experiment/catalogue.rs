@@ -1,4 +1,4 @@
-//! Navigation with devices of the catalogue: which instruments, and what the hands do one after another.
+//! Navigation with devices of the catalogue: the instruments, and the stages of the procedure.
 
 use std::path::Path;
 
@@ -8,25 +8,25 @@ use endowire_core::vessel::CentrelineTree;
 
 use crate::failure::Failure;
 
-/// Where a part of the way ends.
+/// End of a stage.
 #[derive(Clone, Copy)]
 pub(super) enum Until {
-    /// The tip is no more than so much before the end of the way to the target, mm.
+    /// The tip is at most this far before the end of the way, mm.
     BeforeTarget(f64),
-    /// The tip is no more than so much before a target on the way, mm.
+    /// The tip is at most this far before a target on the way, mm.
     Before(&'static str, f64),
 }
 
-/// A part of the way: who leads, who follows how far behind (mm), and where it ends.
+/// A stage: the leading instrument, the followers with their distances behind it (mm), and its end.
 pub(super) struct Stage {
     lead: usize,
     followers: &'static [(usize, f64)],
     until: Until,
-    /// Instruments that are turned in a search; none follows the centre line.
+    /// Instruments that are rotated in a search; `None` to follow the centre line.
     searched: Option<&'static [usize]>,
 }
 
-/// A vessel, instruments from the innermost outwards, and the parts of the way.
+/// A vessel, instruments from the innermost outwards, and the stages of the procedure.
 pub(super) struct Procedure {
     pub(super) anatomy: &'static str,
     pub(super) targets: &'static [&'static str],
@@ -35,7 +35,7 @@ pub(super) struct Procedure {
     pub(super) stages: Vec<Stage>,
 }
 
-/// The wire leads with its floppy part out, and the catheter follows over it.
+/// The wire leads with its floppy part exposed, and the catheter follows over it.
 fn over_the_wire() -> Vec<Stage> {
     vec![
         Stage { lead: 0, followers: &[(1, 100.0)], until: Until::BeforeTarget(6.0), searched: None },
@@ -43,9 +43,10 @@ fn over_the_wire() -> Vec<Stage> {
     ]
 }
 
-/// The catheter goes past the branches into the ascending aorta with the wire in it, where its limb turns back, and is pulled back until its
-/// tip is in the branch's mouth, no more than `hooked_mm` before the target. There it is held while the wire goes out of it to the target. A catheter that is bent back is not simply
-/// pushed after it, which would drive its knee into the ascending aorta: it is turned, pushed and pulled.
+/// The catheter passes the branches into the ascending aorta, where its limb turns back, with the wire inside it. It
+/// is then pulled back until its tip is in the ostium of the branch, at most `hooked_mm` before the target, and held
+/// there while the wire advances to the target. A bent catheter is not simply pushed after the wire, which would
+/// drive its knee into the ascending aorta: it is rotated, pushed and pulled.
 fn pulled_back(hooked_mm: f64) -> Vec<Stage> {
     let (past, hooked) = (Until::Before("ascending aorta", 40.0), Until::BeforeTarget(hooked_mm));
     vec![
@@ -56,7 +57,7 @@ fn pulled_back(hooked_mm: f64) -> Vec<Stage> {
     ]
 }
 
-/// The cobra hooks the coeliac trunk, the microwire goes on with the microcatheter behind it.
+/// The cobra catheter hooks the coeliac trunk, then the microwire leads and the microcatheter follows.
 fn coaxial() -> Vec<Stage> {
     let trunk = Until::Before("coeliac trunk", 6.0);
     vec![
@@ -66,8 +67,8 @@ fn coaxial() -> Vec<Stage> {
     ]
 }
 
-/// Every vessel with its instruments and targets. Where branches leave the rising part of the arch, a wire from below would have to turn
-/// back: they are hooked with a Simmons catheter.
+/// All vessels with their instruments and targets. Branches from the ascending part of the arch are hooked with a
+/// Simmons catheter, since a wire from below would have to turn back.
 pub(super) fn procedures() -> Vec<Procedure> {
     let vertebral = |anatomy, targets| Procedure {
         anatomy,
@@ -101,7 +102,7 @@ pub(super) fn procedures() -> Vec<Procedure> {
 }
 
 impl Procedure {
-    /// The instruments, from the files of a folder.
+    /// The instruments, read from the files in a folder.
     pub(super) fn stack(&self, folder: &Path) -> Result<Stack, Failure> {
         let each = self.devices.iter().map(|name| {
             let device = DeviceFile::read(&folder.join(format!("{name}.toml")))?.device;
@@ -110,14 +111,14 @@ impl Procedure {
         Ok(Stack::new(each.collect::<Result<_, Failure>>()?)?)
     }
 
-    /// What they are called, for the table.
+    /// Names of the instruments, for the table.
     pub(super) fn instruments(&self) -> String {
         self.devices.join(" + ")
     }
 }
 
 impl Stage {
-    /// The hand for it on the way to a target; none where the tree has no such way.
+    /// The controller of a stage on the way to a target; `None` if the tree has no such way.
     pub(super) fn controller(
         &self,
         tree: &CentrelineTree,

@@ -1,9 +1,10 @@
-//! `endowire experiment coil`: coils that fill the sac of an aneurysm.
+//! `endowire experiment coil`: packing the sac of an aneurysm with coils.
 //!
-//! A microcatheter stands in a sac, and coils are pushed out of it and detached, one after another: first one that frames the sac, then softer ones of
-//! smaller loops that fill and finish it. The vessel is the side-wall aneurysm of the program, made larger or smaller to a sac of the volume that is
-//! asked for. What is measured are packing density against length, the force of the hand, how far the catheter is kicked back, and loops outside the neck.
-//! Lamano et al., Int. J. CARS 9 (2014), measured the force of the hand: framing coils most, finishing coils least.
+//! A microcatheter lies in a sac, and coils are pushed out of it and detached one after another: first a framing
+//! coil, then softer ones with smaller loops that fill and finish the sac. The vessel is the built-in side-wall
+//! aneurysm, scaled to the requested volume of the sac. The experiment measures packing density against length, push
+//! force, kick-back of the catheter, and loops outside the neck. Lamano et al., Int. J. CARS 9 (2014), measured push
+//! forces: largest for framing coils, smallest for finishing coils.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -22,51 +23,52 @@ use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
 
-/// Volume of the sac of the anatomy, mm³ (`endowire vessel sac`), its middle and the artery beside it, and where the catheter's tip is; mm.
+/// Volume of the sac of the anatomy, mm³ (`endowire vessel sac`), its centre, the artery beside it, and the position
+/// of the catheter's tip, mm.
 const SAC_MM3: f64 = 178.4;
 const DOME_MM: [f64; 3] = [2.0, 5.81, 36.0];
 const ARTERY_MM: [f64; 3] = [2.0, 0.0, 36.0];
 const TIP_MM: [f64; 3] = [2.0, 4.4, 36.4];
-/// Diameter of the largest ball in it, and edge of its triangles, mm.
+/// Diameter of the largest inscribed sphere, and edge length of its triangles, mm.
 const BALL_MM: f64 = 6.9;
 const EDGE_MM: f64 = 0.5;
 /// Modulus of the wall, N/mm².
 const MODULUS_N_PER_MM2: f64 = 1.0;
-/// A microcatheter of 1.7 F, softer at its end than any wire: radius, lumen and stiffness.
+/// A 1.7 F microcatheter with a very soft end: outer and inner radius, mm, and bending stiffness, N·mm².
 const CATHETER: (f64, f64, f64) = (0.28, 0.2, 0.8);
-/// The coil's pusher is longer than any way here, mm.
+/// Length of a coil's pusher, longer than any way here, mm.
 const PUSHER_MM: f64 = 60.0;
-/// A coil is pushed out until its end is this far beyond the catheter's tip, mm.
+/// Distance beyond the catheter's tip to which the end of a coil is pushed, mm.
 const BEYOND_MM: f64 = 0.6;
-/// Smallest and largest sac, mm³.
+/// Smallest and largest volume of a sac, mm³.
 const SACS_MM3: (f64, f64) = (5.0, 2000.0);
-/// Most coils: instruments of a stack, less the catheter.
+/// Largest number of coils: instruments of a stack, less the catheter.
 const MOST_COILS: usize = 15;
 
 #[derive(Debug, Serialize)]
 struct Row {
-    /// Number of the coil and what it is for.
+    /// Number and kind of the coil.
     coil: String,
     inserted_mm: f64,
     /// Packing density.
     packing: f64,
-    /// Force of the hand on the coil.
+    /// Push force on the coil.
     push_force_n: f64,
-    /// That on the catheter; none where it jumps.
+    /// Push force on the catheter; `None` where it jumps.
     catheter_force_n: Option<f64>,
-    /// How far the catheter's tip is from where it was before this coil.
+    /// Distance of the catheter's tip from its position before this coil.
     kick_back_mm: f64,
     dome_force_n: f64,
     neck_coverage: f64,
     outside_mm: f64,
     herniated: bool,
-    /// Deepest place of loops in each other or of one in the wall.
+    /// Largest penetration of loops into each other or into the wall.
     max_penetration_mm: f64,
-    /// Places where axes are nearer than half the distance of touch.
+    /// Number of places where axes are closer than half the touching distance.
     crossings: usize,
     jumped: bool,
     converged: bool,
-    /// Since the start.
+    /// Time since the start.
     time_s: f64,
 }
 
@@ -76,14 +78,14 @@ struct Document {
     provenance: Provenance,
     sac: Sac,
     rows: Vec<Row>,
-    /// After each coil that was detached.
+    /// One per detached coil.
     largest_void_mm: Vec<f64>,
     frames: Vec<PathBuf>,
-    /// Why it ended early, if it did.
+    /// Why the run ended early, if it did.
     failure: Option<String>,
 }
 
-/// Pushes, detaches and measures, coil by coil.
+/// Pushes, detaches and measures coil by coil.
 pub(super) fn coil(args: &CoilArgs) -> Result<(), Failure> {
     check(args)?;
     let (mut simulation, sac) = begin(args)?;
@@ -150,11 +152,11 @@ fn check(args: &CoilArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// No sac was packed more densely than that.
+/// Largest packing density that was ever reached.
 const MOST_PACKING: f64 = 0.5;
 
 impl CoilKind {
-    /// Outer diameter, diameter of its stock wire, mm, and that of its loops over that of the sac.
+    /// Outer diameter and diameter of the stock wire, mm, and diameter of the loops relative to that of the sac.
     fn wound(self) -> (f64, f64, f64) {
         match self {
             Self::Framing => (0.3175, 0.0508, 0.9),
@@ -163,7 +165,7 @@ impl CoilKind {
         }
     }
 
-    /// A coil of this length for a sac of that diameter, mm.
+    /// A coil of this length for a sac of this diameter, mm.
     fn device(self, length_mm: f64, sac_mm: f64) -> endowire_core::Result<Device> {
         let (diameter_mm, wire_mm, loops) = self.wound();
         let loop_mm = loops * sac_mm;
@@ -186,17 +188,17 @@ impl CoilKind {
     }
 }
 
-/// What a coil is called.
+/// Name of a coil.
 fn name(args: &CoilArgs, number: usize) -> String {
     format!("{} {}", number + 1, args.coils[number].name())
 }
 
-/// How much larger than the anatomy the vessel is.
+/// Scale factor of the vessel relative to the anatomy.
 fn scale(args: &CoilArgs) -> f64 {
     (args.volume_mm3 / SAC_MM3).cbrt()
 }
 
-/// Steps of a coil.
+/// Number of steps per coil.
 fn steps(args: &CoilArgs) -> usize {
     ((args.length_mm + BEYOND_MM) / args.step_mm).ceil() as usize
 }
@@ -250,7 +252,7 @@ fn begin(args: &CoilArgs) -> Result<(Simulation, Sac), Failure> {
     Ok((simulation, sac))
 }
 
-/// Pushes a coil through the catheter and out, tells each step, and detaches it.
+/// Pushes a coil through the catheter and out, records each step, and detaches the coil.
 fn push(
     (args, number): (&CoilArgs, usize),
     simulation: &mut Simulation,
@@ -267,7 +269,7 @@ fn push(
         let command = Command::advance(advance_mm);
         simulation.step_together(&[Move { instrument: number, command }]).map(drop)
     };
-    // In the catheter it touches nothing: there it is brought in one step.
+    // Within the catheter it touches nothing, so that one step suffices.
     moved(simulation, covered_mm)?;
     for _ in 0..count {
         moved(simulation, (args.length_mm + BEYOND_MM) / count as f64)?;
@@ -299,7 +301,7 @@ fn push(
     simulation.detach(number).map(drop)
 }
 
-/// Packing density against the length of all coils.
+/// Draws packing density against the total length of coils.
 fn picture(args: &CoilArgs, rows: &[Row], folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let line = |number: usize| {
         let (name, before_mm) = (name(args, number), args.length_mm * number as f64);
@@ -317,7 +319,7 @@ fn picture(args: &CoilArgs, rows: &[Row], folder: &Path) -> Result<Vec<PathBuf>,
     lines.write(folder, "coil")
 }
 
-/// The table for a person: a row for each coil.
+/// The table as text, with a row for each coil.
 fn table(args: &CoilArgs, document: &Document) -> String {
     let sac = &document.sac;
     let mut lines = vec![

@@ -1,8 +1,8 @@
 //! `endowire experiment deformation`: the paper's experiment 4, Table 2.
 //!
-//! A wire is pushed into the curved tube of figure 5 by increments h on segments l, and its shape is compared with a ground truth.
-//! The paper's truth is a real catheter in a plastic tube, whose points it does not print. Here it is our own converged
-//! solution, with its convergence shown, or a user's measured points.
+//! A wire is pushed into the curved tube of figure 5 by increments h on segments l, and its shape is compared with a
+//! reference. The paper's reference is a real catheter in a plastic tube, whose points are not published. Here it is
+//! our own solution, shown to be converged, or measured points of the user.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -24,7 +24,7 @@ use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{answer, progress};
 
-/// A cell of the paper's Table 2: segment length l in mm, h/l as 1 over, RMS mm, maximum mm, run time s.
+/// A cell of the paper's Table 2: segment length l in mm, l/h, RMS mm, maximum mm, run time s.
 type Cell = (f64, u32, f64, f64, f64);
 /// The whole table.
 const TABLE_2: [Cell; 15] = [
@@ -44,15 +44,15 @@ const TABLE_2: [Cell; 15] = [
     (2.0, 3, 1.24, 2.13, 3.5),
     (3.0, 3, 1.62, 2.22, 2.1),
 ];
-/// Length pushed in, mm: through most of the bend. The paper does not print it.
+/// Inserted length, mm: through most of the bend. The paper does not give it.
 const INSERTED_MM: f64 = 200.0;
-/// Meshes of the truth, mm, and its increment.
+/// Element lengths of the reference, mm, and its increment.
 const TRUTH_MM: [f64; 3] = [1.0, 0.5, 0.25];
 const TRUTH_STEP_MM: f64 = 1.0;
 /// A 0.035″ wire.
 const RADIUS_MM: f64 = 0.445;
 const STIFFNESS_NMM2: f64 = 10.0;
-/// Edge of the tube's triangles, mm.
+/// Edge length of the tube's triangles, mm.
 const EDGE_MM: f64 = 0.8;
 
 #[derive(Debug, Serialize)]
@@ -67,18 +67,18 @@ struct Row {
     paper_rms_mm: f64,
     paper_max_mm: f64,
     paper_time_s: f64,
-    /// The paper's time over ours.
+    /// The paper's time divided by ours.
     speedup: f64,
     /// Linear solves, or iterations as the method counts them, of all steps.
     iterations: u64,
     steps: usize,
-    /// Steps that did not meet the method's own convergence test.
+    /// Number of steps that failed the method's own convergence test.
     unconverged: usize,
-    /// Length of the polygon of nodes over what is inserted, less 1.
+    /// Length of the polygon of nodes divided by the inserted length, minus 1.
     length_off: f64,
 }
 
-/// Change of the truth from one of its meshes to the next.
+/// Change of the reference from one mesh to the next.
 #[derive(Debug, Serialize)]
 struct Refinement {
     from_mm: f64,
@@ -98,13 +98,13 @@ struct Document {
     frames: Vec<PathBuf>,
 }
 
-/// A method over all cells that were asked for.
+/// Totals of a method over all requested cells.
 #[derive(Debug, Serialize)]
 struct Total {
     method: String,
     time_s: f64,
     paper_time_s: f64,
-    /// The paper's time over ours.
+    /// The paper's time divided by ours.
     speedup: f64,
 }
 
@@ -115,7 +115,7 @@ struct Tube {
     wire: Device,
 }
 
-/// What an insertion has come to.
+/// Result of an insertion.
 struct Inserted {
     simulation: Simulation,
     time_s: f64,
@@ -125,7 +125,7 @@ struct Inserted {
 }
 
 impl Tube {
-    /// The whole insertion.
+    /// Carries out the whole insertion.
     fn insert(&self, method: &str, l_mm: f64, h_mm: f64) -> Result<Inserted, Failure> {
         let mut simulation = candidate::insertion(
             method,
@@ -174,7 +174,7 @@ impl Row {
     }
 }
 
-/// Runs the grid and prints it beside the paper's.
+/// Runs all cells and prints them beside the paper's.
 pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
     let cells = cells(args)?;
     let tree = anatomy::tree("curved_tube").ok_or_else(|| Failure::Input("no curved_tube".to_owned()))?;
@@ -217,7 +217,7 @@ pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
             let inserted = tube.insert(method, l_mm, l_mm / f64::from(l_over_h))?;
             rows.push(Row::new(method, cell, &inserted, &truth));
             bar.inc(1);
-            // The last cell of the table is the one that is drawn.
+            // The last cell of the table is drawn.
             if let Some(folder) = args.out.as_ref().filter(|_| rows.len() == begin + cells.len()) {
                 let spec = ViewSpec { size_px: [640, 640], ..ViewSpec::default() };
                 let mut camera =
@@ -248,7 +248,7 @@ impl Total {
     }
 }
 
-/// Error against increment, a line for each method and segment.
+/// Error against increment, one line for each method and segment length.
 fn picture(rows: &[Row]) -> Lines {
     let mut lines: Vec<Line> = Vec::new();
     let mut add = |method: &str, l_mm: f64, point: (f64, f64)| {
@@ -273,7 +273,7 @@ fn picture(rows: &[Row]) -> Lines {
     }
 }
 
-/// The cells of Table 2 that are asked for.
+/// The requested cells of Table 2.
 fn cells(args: &DeformationArgs) -> Result<Vec<Cell>, Failure> {
     if let Some(l) = args.l_mm.iter().find(|l| TABLE_2.iter().all(|cell| cell.0 != **l)) {
         return Err(Failure::Input(format!("--l-mm {l}: the paper has 1, 2 and 3")));
@@ -296,7 +296,7 @@ struct Point {
     z_mm: f64,
 }
 
-/// Measured points from the sheath to the tip, as a polyline that begins at the sheath's mouth.
+/// Measured points from the sheath to the tip, as a polyline that begins at the mouth of the sheath.
 fn measured(path: &Path) -> Result<Shape, Failure> {
     let unusable = |reason: String| Failure::Input(format!("{}: {reason}", path.display()));
     let mut reader = csv::Reader::from_path(path).map_err(|e| unusable(e.to_string()))?;
@@ -326,7 +326,7 @@ fn measured(path: &Path) -> Result<Shape, Failure> {
         from_tip += chord(i).norm();
         from_tip_mm[i] = from_tip;
     }
-    // Each node between the directions of its two chords.
+    // The tangent at a node is the mean direction of its two chords.
     let tangents = (0..n)
         .map(|i| {
             let before = chord(i.max(1) - 1).normalize();

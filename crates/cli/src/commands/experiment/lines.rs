@@ -1,4 +1,4 @@
-//! One chart of lines with a legend beside it: what an experiment has measured, and what the paper has.
+//! A line chart with a legend: results of an experiment and of the paper.
 
 use std::path::{Path, PathBuf};
 
@@ -12,18 +12,18 @@ use crate::output::chart;
 const SIZE: (u32, u32) = (1150, 600);
 /// Width of the legend and height of its rows, in pixels.
 const LEGEND: (i32, i32) = (270, 26);
-/// Part of a logarithmic axis that is left free before the first and after the last value.
+/// Margin factor of a logarithmic axis before the first and after the last value.
 const LOG_ROOM: f64 = 1.4;
-/// Each line of a method is lighter than the one before by this part.
+/// Amount by which each line of a method is lighter than the previous one.
 const LIGHTER: f64 = 0.32;
-/// Lines of fewer points have a mark at each.
+/// Lines with fewer points have a marker at each.
 const MARKED: usize = 60;
-/// The method of lines that the paper prints: they are grey.
+/// Name of the method for lines from the paper, which are grey.
 pub(super) const PAPER: &str = "Li et al. 2011";
-/// Colours of [`chart::COLOURS`] for the paper and for methods in the order of their lines.
+/// Indices in [`chart::COLOURS`] for the paper and for the methods in order of their lines.
 const COLOURS: [usize; 8] = [1, 0, 3, 4, 6, 7, 5, 8];
 
-/// A line: the method, which gives its colour, what else tells it apart, and its points.
+/// A line: the method, which determines its colour, a further label, and its points.
 pub(super) struct Line {
     pub(super) method: String,
     pub(super) of: String,
@@ -47,7 +47,7 @@ impl Lines {
         chart::write(folder, name, SIZE, self)
     }
 
-    /// Least and largest of one coordinate over all lines.
+    /// Smallest and largest value of one coordinate over all lines.
     fn range(&self, value: fn(&(f64, f64)) -> f64) -> (f64, f64) {
         let all = self.lines.iter().flat_map(|line| line.points.iter().map(value));
         all.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)))

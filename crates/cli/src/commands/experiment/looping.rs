@@ -1,7 +1,8 @@
 //! `endowire experiment loop`: the paper's experiment 3, figure 4.
 //!
-//! A wire with a soft tip is pushed on in a tube after its tip was stopped, so that the soft part turns back and a loop grows. The
-//! tube is closed by a half sphere, in which the tip is stopped; the paper does not say what stopped its catheter.
+//! A wire with a soft tip is pushed on in a tube after its tip was stopped, so that the soft part turns back and a
+//! loop grows. The tube is closed by a half sphere, which stops the tip; the paper does not say what stopped its
+//! catheter.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::{Path, PathBuf};
@@ -22,16 +23,16 @@ use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
 
-/// The tube: inner radius and length of its straight part, edge of its triangles; mm.
+/// Inner radius and length of the tube's straight part, edge length of its triangles; mm.
 const TUBE_RADIUS_MM: f64 = 15.0;
 const TUBE_MM: f64 = 140.0;
 const EDGE_MM: f64 = 2.0;
-/// Where the sheath is beside the axis, mm: nothing is ever in the middle.
+/// Offset of the sheath from the axis, mm: real devices are never exactly centred.
 const OFFSET_MM: f64 = 3.0;
-/// Increment, mm, and pushed in all.
+/// Increment and total inserted length, mm.
 const STEP_MM: f64 = 1.0;
 const INSERTED_MM: f64 = 260.0;
-/// Advances after the tip was stopped at which pictures are taken, mm: four, as in the paper's figure 4.
+/// Advances after the stop of the tip at which pictures are taken, mm: four, as in the paper's figure 4.
 const PICTURES_MM: [f64; 4] = [15.0, 40.0, 65.0, 90.0];
 const ELEMENT_MM: f64 = 3.0;
 
@@ -41,9 +42,9 @@ struct Row {
     inserted_mm: f64,
     /// Advance since the tip was stopped.
     advance_mm: f64,
-    /// How far the tip is behind the farthest point of the wire, along the tube.
+    /// Distance of the tip behind the farthest point of the wire, along the tube.
     loop_depth_mm: f64,
-    /// Extent of the wire across the tube in the part beyond the tip.
+    /// Extent across the tube of the part of the wire beyond the tip.
     loop_width_mm: f64,
     /// Angle between the tip and the direction of insertion.
     turned_deg: f64,
@@ -89,10 +90,10 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
     }
 }
 
-/// Steps of the whole insertion.
+/// Number of steps of the whole insertion.
 const STEPS: usize = (INSERTED_MM / STEP_MM) as usize;
 
-/// Pushes the wire by one method. The inner error is that of a step, before which all is kept.
+/// Pushes the wire by one method. The inner error is that of a step; results of earlier steps are kept.
 fn push(
     method: &str,
     wall: &Wall,
@@ -139,7 +140,7 @@ fn measure(method: &str, simulation: &Simulation, stopped_at: &mut Option<f64>) 
     let x = &shape.positions_mm;
     let tip = x[x.len() - 1];
     let farthest = x.iter().map(|x| x.z).fold(0.0, f64::max);
-    // The tip is stopped at its first contact in the end of the tube.
+    // The tip counts as stopped at its first contact in the end of the tube.
     if stopped_at.is_none() && tip.z > TUBE_MM && !report.contacts.is_empty() {
         *stopped_at = Some(report.inserted_mm);
     }
@@ -158,7 +159,7 @@ fn measure(method: &str, simulation: &Simulation, stopped_at: &mut Option<f64>) 
     }
 }
 
-/// A tube about the z axis from the origin, its far end a half sphere.
+/// A tube along the z axis from the origin, closed at its far end by a half sphere.
 fn closed_tube() -> SurfaceMesh {
     let around = (TAU * TUBE_RADIUS_MM / EDGE_MM).round() as u32;
     let mut rings: Vec<(f64, f64)> = Vec::new();
@@ -172,7 +173,7 @@ fn closed_tube() -> SurfaceMesh {
     let mut mesh = SurfaceMesh::default();
     for (k, (radius, z)) in rings.iter().enumerate() {
         for j in 0..around {
-            // Every other ring is turned by half an edge.
+            // Every other ring is rotated by half an edge.
             let angle = TAU * (f64::from(j) + 0.5 * (k % 2) as f64) / f64::from(around);
             mesh.vertices_mm.push(Vec3::new(radius * angle.cos(), radius * angle.sin(), *z));
         }

@@ -18,7 +18,7 @@ use crate::args::ExperimentCommand;
 use crate::failure::Failure;
 use crate::output::to_json;
 
-/// Runs the experiment that was asked for.
+/// Runs the requested experiment.
 pub(crate) fn experiment(command: &ExperimentCommand) -> Result<(), Failure> {
     match command {
         ExperimentCommand::Timing(args) => timing::timing(args),

@@ -1,7 +1,9 @@
 //! `endowire experiment navigation`: the paper's experiment 2, figure 3.
 //!
-//! A straight wire is pushed into the aortic arch and the hepatic arteries by the paper's method and by ours ([`straight`](super::straight)), and a
-//! shaped wire of ours is steered to every named target by a hand that follows the centre line ([`FollowPath`]); with `--catalogue`, several instruments of the catalogue by hands that follow or search ([`catalogue`]).
+//! A straight wire is pushed into the aortic arch and the hepatic arteries by the paper's method and by ours
+//! ([`straight`](super::straight)). A shaped wire is steered by our method to every named target by a controller that
+//! follows the centre line ([`FollowPath`]). With `--catalogue`, several instruments of the catalogue are steered by
+//! controllers that follow or search ([`catalogue`]).
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -24,7 +26,8 @@ use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
 use crate::studies::{ARCH_TARGETS, HEPATIC_TARGETS, targets};
 
-/// An anatomy, its targets in the order of their rows in the centre-line table, and how its wall and wire are made.
+/// An anatomy, its targets in the order of their rows in the centre-line table, and the properties of its wall and
+/// wire.
 pub(super) struct Anatomy {
     pub(super) name: &'static str,
     targets: &'static [&'static str],
@@ -55,11 +58,11 @@ const ANATOMIES: [Anatomy; 2] = [
         primary_deg: 0.0,
     },
 ];
-/// Most commands for one target.
+/// Largest number of commands for one target.
 const COMMANDS: usize = 800;
-/// How far before the way's end the tip has arrived, mm.
+/// Distance before the end of the way at which the tip has arrived, mm.
 const ARRIVED_MM: f64 = 6.0;
-/// Every so many commands there is a frame.
+/// Number of commands between frames.
 const FRAME_EVERY: usize = 50;
 
 #[derive(Debug, Serialize)]
@@ -69,7 +72,7 @@ pub(super) struct Row {
     method: &'static str,
     pub(super) success: bool,
     pub(super) commands: usize,
-    /// Times that the wire was pulled back.
+    /// Number of times the wire was pulled back.
     retries: usize,
     /// Length of the way.
     path_mm: f64,
@@ -79,16 +82,17 @@ pub(super) struct Row {
     pub(super) largest_push_n: f64,
     pub(super) largest_wall_force_n: f64,
     pub(super) largest_penetration_mm: f64,
-    /// Steps that did not meet the method's own convergence test.
+    /// Number of steps that failed the method's own convergence test.
     pub(super) unconverged: usize,
-    /// Of straight wires: distance of the tips of both methods when the first of them leaves the vessel, and the largest on the way, mm.
+    /// For straight wires: distance between the tips of both methods when the first of them leaves the vessel, and
+    /// the largest distance before, mm.
     pub(super) tip_apart_mm: Option<f64>,
     pub(super) largest_tip_apart_mm: Option<f64>,
-    /// Time of steps and hand, without frames.
+    /// Time of steps and controller, without frames.
     pub(super) time_s: f64,
-    /// Why it ended, where it did not arrive.
+    /// Why it ended, if it did not arrive.
     pub(super) note: String,
-    /// What is steered.
+    /// The steered instruments.
     instruments: String,
 }
 
@@ -175,7 +179,7 @@ fn publish(args: &NavigationArgs, rows: Vec<Row>, frames: Vec<PathBuf>) -> Resul
 }
 
 impl Row {
-    /// Of a way that has not been begun.
+    /// The row of a way that has not been started.
     pub(super) fn new(
         anatomy: &'static str,
         target: &'static str,
@@ -205,7 +209,7 @@ impl Row {
         }
     }
 
-    /// Has a hand steer, and tells what it came to; whether it arrived.
+    /// Steers by a controller and records the result; returns whether it arrived.
     fn drive(
         &mut self,
         simulation: &mut Simulation,
@@ -239,7 +243,7 @@ impl Row {
         Ok(false)
     }
 
-    /// How far the tip is from the end of the way.
+    /// Sets the distance of the tip from the end of the way.
     pub(super) fn end(&mut self, simulation: &Simulation, path: &CentrelinePath) {
         let tip = simulation.shape().tip_mm().unwrap_or_default();
         self.from_target_mm = (tip - path.end_mm()).norm();
@@ -283,7 +287,7 @@ fn steer(
     Ok(row)
 }
 
-/// Carries a procedure out with the hands of its parts, one after another.
+/// Carries out a procedure with the controllers of its stages, one after another.
 fn carry_out(
     procedure: &Procedure,
     target: &'static str,

@@ -1,7 +1,8 @@
-//! A straight wire, pushed into an anatomy and never turned: by the paper's method and by the exact rod, with the same hand.
+//! A straight wire, pushed into an anatomy without rotation by the paper's method and by the exact rod, with the same
+//! commands.
 //!
-//! The paper's method has neither rest shape nor twist, so that all its hand can do is to push and to pull. Where a straight wire of the
-//! exact rod ends, it must end too.
+//! The paper's method has neither rest shape nor twist, so its wire can only be pushed and pulled. It should end
+//! where a straight wire of the exact rod ends.
 
 use std::path::Path;
 use std::time::Instant;
@@ -14,15 +15,15 @@ use super::navigation::{Anatomy, Row, camera};
 use crate::commands::compare::candidate;
 use crate::failure::Failure;
 
-/// The paper's method and ours, with their segments, mm. A node of the paper's method is all that feels the wall between its neighbours, so
-/// that segments are as short as the crests at forks.
+/// The paper's method and ours, with their segment lengths, mm. In the paper's method only nodes touch the wall, so
+/// that segments must be as short as the crests at forks.
 pub(super) const METHODS: [(&str, f64); 2] = [("li2011-banded", 1.0), ("kirchhoff", 3.0)];
-/// One push, mm.
+/// Increment, mm.
 const STEP_MM: f64 = 1.0;
-/// Most of the wire that is pushed in, mm.
+/// Largest inserted length, mm.
 const MOST_MM: f64 = 600.0;
 
-/// A straight wire in an anatomy by one of [`METHODS`], and what it has met on its way.
+/// A straight wire in an anatomy by one of [`METHODS`], and the results on its way.
 struct Wire {
     simulation: Simulation,
     steps: usize,
@@ -33,7 +34,7 @@ struct Wire {
     time_s: f64,
     /// Opening through which it has left.
     left: Option<usize>,
-    /// Why it can go no farther.
+    /// Why it cannot advance further.
     failure: Option<String>,
 }
 
@@ -66,7 +67,7 @@ impl Wire {
         })
     }
 
-    /// One push, unless it has ended.
+    /// Carries out one push, unless it has ended.
     fn push(&mut self) {
         if self.left.is_some() || self.failure.is_some() {
             return;
@@ -92,13 +93,13 @@ impl Wire {
 /// Both wires at the end of their way.
 pub(super) struct Straight {
     wires: [Wire; 2],
-    /// Distance of their tips where the first of them ends, and the largest on the way, mm.
+    /// Distance between their tips where the first of them ends, and the largest distance before, mm.
     apart_mm: f64,
     largest_apart_mm: f64,
 }
 
 impl Straight {
-    /// Pushes both wires by the same hand until the first has ended, and then the other to its own end.
+    /// Pushes both wires by the same commands until the first has ended, and then the other to its end.
     pub(super) fn push(anatomy: &Anatomy, made: &GeneratedWall) -> Result<Self, Failure> {
         let mut wires = [Wire::new(anatomy, made, METHODS[0])?, Wire::new(anatomy, made, METHODS[1])?];
         let (mut apart_mm, mut largest_apart_mm) = (0.0, 0.0f64);
@@ -114,7 +115,7 @@ impl Straight {
         Ok(Self { wires, apart_mm, largest_apart_mm })
     }
 
-    /// The rows of a target, which ends in the opening `end`; frames of those that arrive.
+    /// The rows of a target, which ends in the opening `end`; draws frames of the wires that arrive.
     pub(super) fn rows(
         &self,
         (anatomy, target, end): (&Anatomy, &'static str, usize),

@@ -1,11 +1,12 @@
 //! `endowire experiment timing`: the paper's experiment 1, Table 1.
 //!
-//! A wire of n nodes is advanced through the curved tube by both solves at once. Two times are taken at the full
-//! length, each the median over the timed increments: building and solving the linear system (steps 4 and 5 of
-//! Algorithm 1), which is where dense and banded differ, and one whole calculation (steps 2 to 6, with collision
-//! detection and read-outs), which is what the paper's column counts.
+//! A wire of n nodes is advanced through the curved tube by both solves simultaneously. Two times are measured at the
+//! full length, each as the median over the timed increments: building and solving the linear system (steps 4 and 5
+//! of Algorithm 1), in which dense and banded differ, and one whole calculation (steps 2 to 6, with collision
+//! detection and read-outs), which the paper reports.
 //!
-//! A method that cannot be brought into position within the time limit says so in its row, and larger numbers of nodes are not begun.
+//! If a method cannot be brought into position within the time limit, its row says so, and larger numbers of nodes
+//! are skipped.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -30,7 +31,7 @@ use crate::studies::CANDIDATES;
 const PAPER_MS: [(usize, f64); 5] = [(50, 9.2), (100, 15.4), (150, 24.8), (200, 36.7), (300, 58.4)];
 /// Length at which the calculations are timed, mm: past the bend of the curved tube.
 const INSERTED_MM: f64 = 220.0;
-/// Increment of the approach, mm, and of the timed calculations.
+/// Increments of the approach and of the timed calculations, mm.
 const APPROACH_MM: f64 = 2.0;
 const TIMED_MM: f64 = 0.2;
 /// A 0.035″ wire of medium stiffness.
@@ -38,14 +39,14 @@ const RADIUS_MM: f64 = 0.445;
 const STIFFNESS_NMM2: f64 = 20.0;
 /// Largest distance between the nodes of the two solves, mm.
 const AGREEMENT_MM: f64 = 1e-8;
-/// Most nodes.
+/// Largest number of nodes.
 const MOST_NODES: usize = 10_000;
-/// Up to so many nodes the dense solve takes the whole way by itself; bringing 1,000 nodes into position would take minutes, so
-/// that beyond it solves what the banded one has come to.
+/// Largest number of nodes for which the dense solve carries out the whole way itself. Bringing 1,000 nodes into
+/// position would take minutes; beyond this limit it solves the states of the banded one.
 const MOST_FOLLOWED: usize = 500;
-/// The paper's frames a second with 300 nodes.
+/// The paper's frames per second with 300 nodes.
 const PAPER_FPS: f64 = 17.0;
-/// Most timed calculations: those that the tube has room for.
+/// Largest number of timed calculations: those for which the tube has room.
 const MOST_REPEATS: usize = 100;
 
 #[derive(Debug, Serialize)]
@@ -61,17 +62,17 @@ struct Document {
 struct Row {
     method: &'static str,
     nodes: usize,
-    /// Median time to build and solve the linear system, ms; of the whole calculation where there is no one system. None
-    /// where the method was not timed, as the note says.
+    /// Median time to build and solve the linear system, ms; of the whole calculation if there is no single system.
+    /// `None` if the method was not timed, as the note says.
     median_ms: Option<f64>,
-    /// Median time of one whole calculation, collision detection and read-outs included, ms.
+    /// Median time of one whole calculation, including collision detection and read-outs, ms.
     step_ms: Option<f64>,
-    /// The paper's time of one calculation, ms, where it has one.
+    /// The paper's time of one calculation, ms, if published.
     paper_ms: Option<f64>,
-    /// Of the two solves of the paper's method: largest distance, over the whole insertion, between a node and the same
-    /// node of li2011-banded, mm.
+    /// For the two solves of the paper's method: largest distance, over the whole insertion, between a node and the
+    /// same node of li2011-banded, mm.
     max_difference_mm: Option<f64>,
-    /// Why a method was not timed, or what is to be known of it.
+    /// Why a method was not timed, or a remark.
     note: String,
 }
 
@@ -163,23 +164,24 @@ impl Row {
     }
 }
 
-/// The paper's time with so many nodes, ms.
+/// The paper's time with this number of nodes, ms.
 fn paper_ms(nodes: usize) -> Option<f64> {
     PAPER_MS.iter().find(|(n, _)| *n == nodes).map(|(_, ms)| *ms)
 }
 
-/// The methods asked for, in the order of the table.
+/// The requested methods, in the order of the table.
 fn methods(asked: &[String]) -> Vec<&'static str> {
     let is_asked = |name: &&str| asked.iter().any(|wanted| wanted == "all" || wanted == name);
     CANDIDATES.into_iter().filter(is_asked).collect()
 }
 
-/// Element length with which `nodes` nodes, the sheath's too, are inserted; the timed increments stay within one element.
+/// Element length with which `nodes` nodes, including that of the sheath, are inserted; the timed increments stay
+/// within one element.
 fn element_mm(nodes: usize, repeats: usize) -> f64 {
     (INSERTED_MM + 0.5 * TIMED_MM * repeats as f64) / (nodes - 1) as f64
 }
 
-/// A method without a linear system to be timed by itself. What goes wrong is told in the row.
+/// Times a method without a linear system of its own. Failures are reported in the row.
 fn time_other(
     method: &'static str,
     nodes: usize,
@@ -222,7 +224,7 @@ fn time_other(
     Ok(Row { median_ms, step_ms: median_ms, ..Row::untimed(method, nodes, note) })
 }
 
-/// Both solves of the paper's method over the same insertion, timed at its end; the dense one only if asked for.
+/// Both solves of the paper's method over the same insertion, timed at its end; the dense one only if requested.
 fn time_paper(
     nodes: usize,
     args: &TimingArgs,
@@ -293,7 +295,7 @@ fn time_paper(
     Ok(rows)
 }
 
-/// Times of the linear system alone, and how far the nodes of the two solves are apart.
+/// Times of the linear system alone, and the distance between the nodes of the two solves.
 #[derive(Default)]
 struct Solves {
     dense_ms: Vec<f64>,
@@ -301,7 +303,7 @@ struct Solves {
     difference_mm: f64,
 }
 
-/// Both solves of the same chain, at least once and not longer than the limit.
+/// Times both solves of the same chain at least once, within the time limit.
 fn time_solves(chain: &Chain, repeats: usize, dense: bool, limit_s: f64) -> Solves {
     let (mut x, mut dense_x, mut t) = (Vec::new(), Vec::new(), Vec::new());
     let mut workspace = banded::Workspace::default();
@@ -323,7 +325,7 @@ fn time_solves(chain: &Chain, repeats: usize, dense: bool, limit_s: f64) -> Solv
     solves
 }
 
-/// Largest distance of a point from the same point of another chain; 0 where one is empty.
+/// Largest distance between corresponding points of two chains; 0 if one is empty.
 fn largest_distance(a: &[Vec3], b: &[Vec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
@@ -339,7 +341,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
-/// Time of a whole calculation against the number of nodes.
+/// Draws the time of a whole calculation against the number of nodes.
 fn picture(rows: &[Row]) -> Lines {
     let mut lines = vec![Line {
         method: PAPER.to_owned(),
@@ -363,7 +365,7 @@ fn picture(rows: &[Row]) -> Lines {
     }
 }
 
-/// The table for a person.
+/// The table as text.
 fn table(rows: &[Row]) -> String {
     let mut lines = vec![format!(
         "{:>5}  {:<15} {:>12} {:>12} {:>10} {:>16}",
@@ -402,7 +404,7 @@ fn table(rows: &[Row]) -> String {
     lines.join("\n")
 }
 
-/// Both solves are one method: their nodes must agree.
+/// Checks that both solves agree, since they are the same method.
 fn check_agreement(rows: &[Row]) -> Result<(), Failure> {
     for row in rows {
         let Some(difference) = row.max_difference_mm else { continue };

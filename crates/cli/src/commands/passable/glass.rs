@@ -1,23 +1,23 @@
-//! A vessel as of glass, seen from a side: clear where it is seen straight on, dark where it is seen along.
+//! A vessel drawn as if made of glass: clear where its wall faces the viewer, dark at its rim.
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
-/// Directions about the patient's long axis that are tried for the widest view.
+/// Number of viewing directions about the patient's long axis that are tried.
 const DIRECTIONS: usize = 36;
-/// Part of a panel that the vessel fills.
+/// Fraction of a panel that the vessel fills.
 const FILL: f64 = 0.9;
-/// Lengths of scale bars, mm, of which the longest in a fourth of the panel is taken.
+/// Lengths of scale bars, mm; the longest that fits in a quarter of the panel is used.
 const BARS_MM: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-/// How much of the light a wall takes that is seen straight on, and along.
+/// Absorbed fraction of light where the wall is seen face-on, and edge-on.
 const STRAIGHT_ON: f64 = 0.04;
 const ALONG: f64 = 0.5;
-/// How quickly it changes from one to the other.
+/// Exponent of the transition between them.
 const RIM: i32 = 3;
-/// Parts of a pixel, each way.
+/// Subpixels in each direction.
 const FINE: usize = 2;
 
-/// From where a vessel is seen, without perspective.
+/// A parallel projection of a vessel.
 pub(super) struct Side {
     right: Vec3,
     up: Vec3,
@@ -28,7 +28,7 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// The side from which a way is seen at its widest: any about z, or from above.
+    /// The projection that shows a way at its widest, among directions about z and from above.
     pub(super) fn fitting(vessel: &SurfaceMesh, way: &[Vec3], size_px: [usize; 2]) -> Self {
         let about = (0..DIRECTIONS).map(|k| {
             let (sin, cos) = (std::f64::consts::PI * k as f64 / DIRECTIONS as f64).sin_cos();
@@ -51,7 +51,7 @@ impl Side {
         Self { right, up, towards, middle: right * x + up * y, px_per_mm, size_px }
     }
 
-    /// The place of a point, in pixels.
+    /// Position of a point, in pixels.
     fn place(&self, point: &Vec3) -> [f64; 2] {
         let offset = point - self.middle;
         let half = self.size_px.map(|px| 0.5 * px as f64);
@@ -64,7 +64,7 @@ impl Side {
         (x.round() as i32, y.round() as i32)
     }
 
-    /// A length that is good to show, mm, and in pixels.
+    /// A suitable length for a scale bar, mm, and in pixels.
     pub(super) fn scale_bar(&self) -> (f64, i32) {
         let longest_mm = 0.25 * self.size_px[0] as f64 / self.px_per_mm;
         let bar_mm = BARS_MM.into_iter().rev().find(|mm| *mm <= longest_mm).unwrap_or(BARS_MM[0]);
@@ -72,10 +72,10 @@ impl Side {
     }
 }
 
-/// How much of the light a vessel takes, pixel by pixel.
+/// Absorption by a vessel, pixel by pixel.
 pub(super) struct Glass {
     width: usize,
-    /// What is left of the light at each part of a pixel, row by row.
+    /// Transmitted fraction of light at each subpixel, row by row.
     left: Vec<f64>,
 }
 
@@ -98,7 +98,7 @@ impl Glass {
         glass
     }
 
-    /// Lays a triangle over what is there: at each point of the grid that is in it, by barycentric coordinates.
+    /// Adds a triangle: at each grid point inside it, by barycentric coordinates.
     fn lay(&mut self, [a, b, c]: [[f64; 2]; 3], takes: [f64; 3]) {
         let cross = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
             (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
@@ -124,7 +124,7 @@ impl Glass {
         }
     }
 
-    /// Pixels that take light, and how much.
+    /// Pixels with absorption, and its amount.
     pub(super) fn pixels(&self) -> impl Iterator<Item = ((i32, i32), f64)> {
         let (width, height) = (self.width / FINE, self.left.len() / self.width / FINE);
         (0..width * height).filter_map(move |k| {
@@ -151,7 +151,7 @@ mod tests {
         assert_eq!((side.pixel(&way[0]), side.pixel(&way[1])), ((5, 95), (95, 5)));
         assert_eq!(side.scale_bar(), (2.0, 18));
         let pixels: Vec<_> = Glass::of(&square, &side).pixels().collect();
-        // Ninety pixels each way, of its two triangles each place in one but for those between them.
+        // Ninety pixels in each direction. Each point is in one of the two triangles, except on their common edge.
         assert!((8000..8400).contains(&pixels.len()), "{}", pixels.len());
         assert!(pixels.iter().filter(|(_, takes)| (takes - STRAIGHT_ON).abs() < 1e-9).count() > 7900);
         let along = Side { towards: Vec3::x(), ..side };

@@ -1,4 +1,4 @@
-//! `endowire vessel passable`: whether a device can follow a way.
+//! `endowire vessel passable`: checks whether a device can follow a way.
 
 mod glass;
 mod picture;
@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
 
-/// Rows of the table for a person, evenly along the way.
+/// Number of table rows, evenly spaced along the way.
 const ROWS: usize = 20;
 
 #[derive(Serialize)]
@@ -33,7 +33,7 @@ struct Document {
     found: Passable,
 }
 
-/// Looks at a device on its way to a target in a surface, and tells what it finds there.
+/// Checks a device on its way to a target in a surface, and prints the result.
 pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
     let mut inputs = vec![read_input(&args.file)?, read_input(&args.device)?];
     if let Some(table) = &args.centreline {
@@ -43,7 +43,7 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
     args.picture.as_deref().map_or(Ok(()), check_name)?;
     let wall = || Ok::<_, Failure>(Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?);
     let (way, wall) = match &args.centreline {
-        // What is not looked at need not be mended.
+        // Without a picture the surface is not needed, so it is not repaired.
         Some(table) => {
             let way = way_in_table(&CentrelineTree::read(table)?, &args.to)?;
             (way, args.picture.as_ref().map(|_| wall()).transpose()?)
@@ -91,7 +91,7 @@ fn way_in_table(tree: &CentrelineTree, to: &str) -> Result<CentrelinePath, Failu
     })
 }
 
-/// Refuses a picture that is no PNG: a vessel of a hundred thousand pixels is no drawing of lines.
+/// Refuses a picture format other than PNG: a vessel of a hundred thousand pixels is not suited to SVG.
 fn check_name(path: &Path) -> Result<(), Failure> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("png") => Ok(()),
@@ -104,7 +104,7 @@ fn name_of(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// The way that is found in the surface.
+/// The way extracted from the surface.
 fn way_in_surface(args: &PassableArgs, wall: &Wall) -> Result<CentrelinePath, Failure> {
     let opening = args.to.strip_prefix("opening ").unwrap_or(&args.to);
     let to = parse_end(opening).map_err(|mend| {
@@ -117,7 +117,7 @@ fn way_in_surface(args: &PassableArgs, wall: &Wall) -> Result<CentrelinePath, Fa
     found.tree.path_to(row).ok_or_else(|| Failure::Input("--to: is where the way begins".into()))
 }
 
-/// What was found, in a word or some.
+/// The result in a few words.
 fn word(found: &Passable) -> String {
     match found.passage {
         Passage::Passes => "passes".to_owned(),
@@ -127,7 +127,7 @@ fn word(found: &Passable) -> String {
     }
 }
 
-/// The table for a person.
+/// The table as text.
 fn text(document: &Document) -> String {
     let found = &document.found;
     let passage = word(found);

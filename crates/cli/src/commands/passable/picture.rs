@@ -1,4 +1,5 @@
-//! The way of a device through a vessel as one picture: coloured by the room that it has, beside room and bends along it.
+//! Picture of the way of a device through a vessel, coloured by clearance, beside plots of clearance and bends along
+//! it.
 
 use std::path::Path;
 
@@ -11,31 +12,31 @@ use super::glass::{Glass, Side};
 use crate::failure::Failure;
 use crate::output::chart::{self, COLOURS};
 
-/// A radius that a curve shows, mm.
+/// A radius plotted as a curve, mm.
 type Radius = fn(&WayPoint) -> f64;
 
-/// Size in pixels, of which the vessel takes so many on the left and its legend so many below it.
+/// Size in pixels, and the parts of it for the vessel on the left and the legend below it.
 const SIZE: (u32, u32) = (1700, 1000);
 const VESSEL_PX: i32 = 760;
 const LEGEND_PX: i32 = 150;
 const TITLE_PX: i32 = 60;
-/// Clearances, in radii of the device, and their colours: none, what is tight, as much as the device is thick, plenty.
+/// Clearances, in radii of the device, and their colours: none, tight, as much as the device is thick, plenty.
 const SCALE: [(f64, RGBColor); 4] = [
     (0.0, RGBColor(200, 30, 30)),
     (0.1, RGBColor(240, 150, 0)),
     (1.0, RGBColor(0, 158, 115)),
     (3.0, RGBColor(0, 90, 160)),
 ];
-/// Height of the plot of radii over the largest: its legend covers none.
+/// Height of the plot of radii relative to the largest, so that its legend covers no curve.
 const HEADROOM: f64 = 1.25;
-/// What is straighter is drawn so, mm.
+/// Radius above which the way is drawn as straight, mm.
 const STRAIGHT_MM: f64 = 1000.0;
 const LUMEN: RGBColor = COLOURS[1];
 const DEVICE: RGBColor = COLOURS[0];
 const NARROWEST: RGBColor = RGBColor(200, 30, 30);
 const SHARPEST: RGBColor = RGBColor(120, 60, 110);
 
-/// What is drawn.
+/// Data of the picture.
 struct Picture<'a> {
     title: String,
     found: &'a Passable,
@@ -43,7 +44,7 @@ struct Picture<'a> {
     glass: Glass,
 }
 
-/// Draws what was found in a vessel.
+/// Draws the result for a vessel.
 pub(super) fn write(
     path: &Path,
     title: String,
@@ -57,7 +58,7 @@ pub(super) fn write(
     chart::write_file(path, SIZE, &Picture { title, found, side, glass })
 }
 
-/// The colour of a clearance.
+/// Colour of a clearance.
 fn colour(point: &WayPoint) -> RGBColor {
     on_scale(point.clearance_mm / point.device_radius_mm)
 }
@@ -70,7 +71,7 @@ fn on_scale(radii: f64) -> RGBColor {
     RGBColor(mix(from.0, to.0), mix(from.1, to.1), mix(from.2, to.2))
 }
 
-/// A colour thinned with white: pieces that share their edges leave no stripes there, as clear ones would.
+/// A colour mixed with white. Transparent pieces would leave stripes at shared edges; opaque ones do not.
 fn lighter(RGBColor(red, green, blue): RGBColor) -> RGBColor {
     let thin = |level: u8| (255.0 - 0.4 * (255.0 - f64::from(level))).round() as u8;
     RGBColor(thin(red), thin(green), thin(blue))
@@ -98,7 +99,7 @@ impl Picture<'_> {
         let at = |point: &WayPoint| self.side.pixel(&point.position_mm.into());
         let way = &self.found.way;
         for pair in way.windows(2) {
-            // Beyond where the tip comes to, it is a way that is not gone.
+            // The way beyond the position that the tip reaches is thin.
             let width = if pair[1].arc_mm <= self.found.reaches_mm { 6 } else { 2 };
             let line = [at(&pair[0]), at(&pair[1])];
             panel.draw(&PathElement::new(line, colour(&pair[1]).stroke_width(width)))?;
@@ -112,7 +113,7 @@ impl Picture<'_> {
         mark_sharpest(panel, at(&self.found.sharpest))
     }
 
-    /// What marks and colours are, and the scale of the vessel.
+    /// Draws the legend of markers and colours, and the scale bar.
     fn draw_legend<B: DrawingBackend>(&self, legend: &DrawingArea<B, Shift>) -> chart::Drawn<B> {
         let found = self.found;
         let narrow = &found.narrowest;
@@ -152,7 +153,7 @@ impl Picture<'_> {
             RGBColor(20, 20, 20).stroke_width(4),
         ))?;
         legend.draw(&Text::new(format!("{bar_mm} mm"), (right - bar_px, 92), chart::font(17)))?;
-        // Room in radii of the device, in fourths of the bar where the scale has its colours.
+        // Clearance in radii of the device; the colours of the scale are at quarters of the bar.
         let (from, width) = (36, 330);
         for x in 0..width {
             let place = f64::from(x) / f64::from(width) * (SCALE.len() - 1) as f64;
@@ -174,7 +175,7 @@ impl Picture<'_> {
         ))
     }
 
-    /// Lumen and device along the way.
+    /// Draws lumen and device along the way.
     fn draw_room<B: DrawingBackend>(&self, panel: &DrawingArea<B, Shift>) -> chart::Drawn<B> {
         let found = self.found;
         let top_mm = found.way.iter().map(|p| p.lumen_radius_mm.max(p.device_radius_mm)).fold(0.0, f64::max);
@@ -218,7 +219,7 @@ impl Picture<'_> {
         legend_of(&mut plot)
     }
 
-    /// Bends along the way, and what the device bears of them.
+    /// Draws bends along the way, and those that the device allows.
     fn draw_bends<B: DrawingBackend>(&self, panel: &DrawingArea<B, Shift>) -> chart::Drawn<B> {
         let found = self.found;
         let least = |of: fn(&WayPoint) -> f64| found.way.iter().map(of).fold(STRAIGHT_MM, f64::min);
@@ -255,27 +256,27 @@ impl Picture<'_> {
         legend_of(&mut plot)
     }
 
-    /// A place of the picture in a panel of it.
+    /// Converts a position in the picture to one in a panel.
     fn in_panel<B: DrawingBackend>(&self, panel: &DrawingArea<B, Shift>, (x, y): (i32, i32)) -> (i32, i32) {
         let (left, top) = panel.get_base_pixel();
         (x - left, y - top)
     }
 }
 
-/// What marks a place.
+/// Draws a marker at a position.
 type Mark<B> = fn(&DrawingArea<B, Shift>, (i32, i32)) -> chart::Drawn<B>;
 
-/// A ring, at the narrowest place.
+/// A ring at the narrowest place.
 fn mark_narrowest<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, at: (i32, i32)) -> chart::Drawn<B> {
     panel.draw(&Circle::new(at, 10, NARROWEST.stroke_width(4)))
 }
 
-/// A triangle, at the sharpest bend.
+/// A triangle at the sharpest bend.
 fn mark_sharpest<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, at: (i32, i32)) -> chart::Drawn<B> {
     panel.draw(&TriangleMarker::new(at, 12, SHARPEST.filled()))
 }
 
-/// What stands for a curve of a colour in the legend of a plot.
+/// Legend symbol of a curve.
 fn key(colour: RGBColor, width: u32) -> impl Fn((i32, i32)) -> PathElement<(i32, i32)> {
     move |(x, y)| PathElement::new([(x, y), (x + 26, y)], colour.stroke_width(width))
 }
@@ -293,7 +294,7 @@ where
         .draw()
 }
 
-/// A radius for a person.
+/// A radius as text.
 fn length(mm: f64) -> String {
     if mm < STRAIGHT_MM { format!("{mm:.1} mm") } else { "straight".to_owned() }
 }

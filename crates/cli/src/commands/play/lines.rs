@@ -1,4 +1,4 @@
-//! The protocol: one line of JSON a command, one line of JSON an answer, on stdin and stdout or a socket.
+//! The line protocol: each command and each answer is one line of JSON, on stdin and stdout or a socket.
 
 use std::io::{self, BufRead, Read};
 use std::path::PathBuf;
@@ -10,18 +10,18 @@ use serde::{Deserialize, Serialize};
 use super::live::Message;
 use crate::output::print;
 
-/// Longest line that is read, bytes.
+/// Length limit of a line, bytes.
 const LONGEST: u64 = 65_536;
 
-/// What is asked of the program and not of the session.
+/// Commands to the program rather than to the session.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Order {
-    /// Asks for the readout alone.
+    /// Requests the readout.
     Read {},
-    /// Lets so many sixtieths of a second go by.
+    /// Advances by ticks of 1/60 s.
     Wait { ticks: u32 },
-    /// Writes both views side by side, or the whole window.
+    /// Writes both views side by side, or the whole window, to a file.
     Picture {
         file: PathBuf,
         #[serde(default)]
@@ -31,14 +31,14 @@ pub(crate) enum Order {
     Quit {},
 }
 
-/// One line.
+/// A line of the protocol.
 #[derive(Debug)]
 pub(crate) enum Line {
     Input(Input),
     Order(Order),
 }
 
-/// What a line asks for, or what is wrong with it.
+/// Parses a line, or returns the reason why it is invalid.
 fn parse(text: &str) -> Result<Line, String> {
     #[derive(Deserialize)]
     struct Name {
@@ -62,15 +62,15 @@ struct Answer<'a> {
     readout: &'a Readout,
 }
 
-/// The answer as a line: what is read now, and what was wrong.
+/// The answer as a line: the current readout, and the error, if any.
 pub(crate) fn answer(done: Result<(), String>, readout: &Readout) -> String {
     let error = done.err();
     let answer = Answer { ok: error.is_none(), error: error.as_deref(), readout };
     serde_json::to_string(&answer).unwrap_or_else(|e| format!("{{\"ok\":false,\"error\":\"{e}\"}}"))
 }
 
-/// Reads lines until the end and has each answered before the next. `allowed` may refuse or change what a line asks for; `tell` says
-/// whether its answer was heard.
+/// Reads lines until the end; each is answered before the next is read. `allowed` may refuse or change a line; `tell`
+/// returns whether its answer was received.
 pub(crate) fn read(
     mut from: impl BufRead,
     to: &Sender<Message>,
@@ -93,7 +93,7 @@ pub(crate) fn read(
     }
 }
 
-/// The next line, or why it is none; nothing at the end. A line that is too long is passed over.
+/// The next line, or why it is invalid; `None` at the end. A line that is too long is skipped.
 fn next_line(from: &mut impl BufRead) -> io::Result<Option<Result<String, String>>> {
     let mut bytes = Vec::new();
     from.by_ref().take(LONGEST).read_until(b'\n', &mut bytes)?;

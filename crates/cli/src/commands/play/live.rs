@@ -1,5 +1,5 @@
-//! A session on a clock: physics on one thread, sixty times a second, pictures on another. Physics never waits for pictures: they take the
-//! newest moment when they are ready for it.
+//! A session in real time: one thread for the physics, sixty ticks per second, another for pictures. The physics
+//! never waits for pictures; whenever the drawing thread is ready, it takes the newest state.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,28 +17,28 @@ use super::record::Record;
 use crate::commands::run::interrupts;
 use crate::failure::Failure;
 
-/// Frames a second of fluoroscopy.
+/// Interval between frames of fluoroscopy: 30 per second.
 const FRAME: Duration = Duration::from_nanos(33_333_333);
-/// The 3D view is drawn each so many frames: it helps, and the live picture leads.
+/// Interval, in frames, between 3D views: the live picture has priority.
 const THREE_D_EVERY: u64 = 4;
-/// Beyond this the clock has been stopped, and what was missed is not made up for.
+/// Delay after which the clock counts as stopped; missed ticks are then dropped.
 const LATE: Duration = Duration::from_millis(100);
 
-/// What the session's thread hears.
+/// Messages to the thread of the session.
 #[derive(Debug)]
 #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) enum Message {
     /// From the window.
     Input(Input),
-    /// A line of the protocol or what is wrong with it, and who waits for its answer.
+    /// A line of the protocol, or why it is invalid, with the receiver of its answer.
     Line(std::result::Result<Line, String>, Sender<String>),
-    /// The standard input has ended.
+    /// Standard input has ended.
     Ended,
     /// The window was closed.
     Quit,
 }
 
-/// A moment, and when the oldest input came in that no earlier picture shows.
+/// The state to draw, with the time of the oldest input that no earlier picture shows.
 #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) struct FrameTime {
     pub(crate) snapshot: Snapshot,
@@ -46,11 +46,11 @@ pub(crate) struct FrameTime {
     pub(crate) step_ms: f64,
 }
 
-/// The newest moment, until it is taken.
+/// The newest state, until it is taken.
 #[derive(Default)]
 pub(crate) struct Newest {
     moment: Mutex<Option<FrameTime>>,
-    /// What exposure control has brought.
+    /// Dose chosen by exposure control.
     delivered: Mutex<Option<Delivered>>,
     there: Condvar,
     ended: AtomicBool,
@@ -69,7 +69,7 @@ impl Newest {
         self.there.notify_one();
     }
 
-    /// The newest moment, when there is one; none at the end.
+    /// Waits for the newest state; `None` at the end.
     fn take(&self) -> Option<FrameTime> {
         let mut place = locked(&self.moment);
         loop {
@@ -90,37 +90,37 @@ impl Newest {
     }
 }
 
-/// What is shown of a moment.
+/// Data of one frame on the screen.
 #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) struct Shown<'a> {
     pub(crate) moment: &'a FrameTime,
-    /// Of each plane.
+    /// One for each plane.
     pub(crate) fluoro: &'a [Image],
     pub(crate) three_d: Option<&'a Image>,
-    /// What kept a picture from being drawn.
+    /// Why a picture could not be drawn.
     pub(crate) failure: Option<&'a str>,
-    /// None where there is no clock.
+    /// `None` without a clock.
     pub(crate) frame_ms: Option<f64>,
 }
 
-/// How fast it went.
+/// Timing of a session.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(crate) struct Pace {
-    /// Length of the session, s.
+    /// Duration of the session, s.
     pub(crate) wall_time_s: f64,
-    /// Ticks a second.
+    /// Ticks per second.
     pub(crate) ticks_per_s: f64,
-    /// Ticks that came too late to be made up for.
+    /// Number of ticks dropped because they were too late.
     pub(crate) ticks_missed: u64,
-    /// Time of a tick in which hands moved, ms: median, 95 % and longest.
+    /// Time of a tick with motion, ms: median, 95 % and longest.
     pub(crate) step_ms: [f64; 3],
-    /// Live fluoroscopic frames.
+    /// Number of live fluoroscopic frames.
     pub(crate) frames: usize,
-    /// Live fluoroscopic frames a second, while the beam was on.
+    /// Live fluoroscopic frames per second of beam-on time.
     pub(crate) frames_per_s: f64,
     /// Time of such a frame, ms: median, 95 % and longest.
     pub(crate) frame_ms: [f64; 3],
-    /// From an input to the picture that shows it, ms: median, 95 % and longest.
+    /// Latency from an input to the picture that shows it, ms: median, 95 % and longest.
     pub(crate) input_to_picture_ms: [f64; 3],
 }
 
@@ -147,13 +147,13 @@ impl fmt::Display for Pace {
 
 #[cfg(feature = "window")]
 impl Pace {
-    /// With times from an input to the window that shows it.
+    /// Sets the latencies from inputs to the window.
     pub(crate) fn presented(self, inputs_ms: Vec<f64>) -> Self {
         Self { input_to_picture_ms: spread(inputs_ms), ..self }
     }
 }
 
-/// Median, 95 % and largest of some times, ms.
+/// Median, 95 % and largest of times, ms.
 fn spread(mut times: Vec<f64>) -> [f64; 3] {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times.get((times.len().saturating_sub(1) as f64 * share) as usize).copied();
@@ -191,7 +191,7 @@ pub(crate) fn physics(
                 Ok(Message::Ended) => goes_on &= !ends_with_stdin,
                 Ok(Message::Input(input)) => {
                     input_at.get_or_insert_with(Instant::now);
-                    // What is refused is an event of the session.
+                    // A refused input becomes an event of the session.
                     let _ = session.apply(&input);
                 }
                 Ok(Message::Line(line, reply)) => {
@@ -235,7 +235,7 @@ fn said(line: std::result::Result<Line, String>, session: &mut Session) -> std::
     }
 }
 
-/// Times of pictures.
+/// Times of the frames.
 #[derive(Default)]
 pub(crate) struct Frames {
     frames_ms: Vec<f64>,
@@ -256,7 +256,8 @@ impl Frames {
     }
 }
 
-/// Draws moments on this thread until the session ends, and has each shown; sharp pictures of a room that has changed are made on another.
+/// Draws states on this thread until the session ends, and passes each frame to `show`; sharp pictures after a change
+/// of the room are computed on another thread.
 pub(crate) fn draw(pictures: Pictures, newest: &Newest, show: impl FnMut(&Shown<'_>)) -> Frames {
     let (to, jobs) = mpsc::channel::<Sharpening>();
     let (done, back) = mpsc::channel();
@@ -268,7 +269,7 @@ pub(crate) fn draw(pictures: Pictures, newest: &Newest, show: impl FnMut(&Shown<
                 }
             }
         });
-        // The other thread ends when nobody can give it more to do.
+        // The other thread ends when its channel is closed.
         draw_with(pictures, newest, (to, back), show)
     })
 }
@@ -297,7 +298,7 @@ fn draw_with(
         let live = snapshot.lab.is_live();
         let frame_ms = ms(clock.elapsed());
         match pictures.sharpenings(snapshot) {
-            // Whoever makes them has gone at the end alone.
+            // Sending fails only at the end, when the other thread is gone.
             Ok(all) => all.into_iter().for_each(|one| drop(to.send(one))),
             Err(error) => failure = Some(error.to_string()),
         }
@@ -333,7 +334,7 @@ fn draw_with(
     times
 }
 
-/// The same without a window: what is drawn is thrown away.
+/// The same without a window: frames are discarded.
 pub(crate) fn without_window(
     session: Session,
     pictures: Pictures,
@@ -349,7 +350,7 @@ pub(crate) fn without_window(
     done.map(|(session, pace)| (session, frames.into_pace(pace)))
 }
 
-/// Ends the pictures when the session has.
+/// Stops the drawing thread after the session has ended.
 #[cfg(feature = "window")]
 pub(crate) fn end(newest: &Newest) {
     newest.end();

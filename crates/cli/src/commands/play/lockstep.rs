@@ -1,4 +1,4 @@
-//! A session in which time goes by as inputs say: the same lines, the same bits.
+//! A session whose time advances only by its inputs: the same lines give the same bits.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,13 +14,13 @@ use super::record::Record;
 use crate::commands::run::interrupts;
 use crate::failure::Failure;
 
-/// How soon an interrupt is heard.
+/// Interval at which interrupts are checked.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// What became of a line.
+/// Result of a line.
 type Done = Result<(), String>;
 
-/// Answers lines until their end.
+/// Answers lines until they end.
 pub(crate) fn run(
     mut session: Session,
     mut pictures: Pictures,
@@ -33,7 +33,7 @@ pub(crate) fn run(
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) | Ok(Message::Ended | Message::Quit) => break,
             Ok(Message::Input(input)) => {
-                // What is refused is an event of the session.
+                // A refused input becomes an event of the session.
                 let _ = session.apply(&input);
             }
             Ok(Message::Line(line, reply)) => {
@@ -61,7 +61,7 @@ pub(crate) fn run(
     Ok(session)
 }
 
-/// Lets time go by until an interrupt ends it; what was done is recorded meanwhile.
+/// Advances by ticks unless interrupted, and saves the record at intervals.
 fn wait(
     ticks: u32,
     session: &mut Session,

@@ -1,4 +1,4 @@
-//! `endowire play`: instruments moved by hand.
+//! `endowire play`: interactive sessions.
 
 mod lines;
 mod live;
@@ -34,19 +34,19 @@ pub(crate) use record::Record;
 pub(crate) use socket::Address;
 pub(crate) use solves::Solves;
 
-/// What `--json` prints.
+/// Document printed with `--json`.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
     pace: live::Pace,
     #[serde(flatten)]
     went: Went,
-    /// Of a subject.
+    /// Score of a subject.
     #[serde(skip_serializing_if = "Option::is_none")]
     score: Option<&'a Score>,
 }
 
-/// Opens a session in the way that was asked for, and records what was done.
+/// Opens a session in the requested mode, and records it.
 pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     match subjects::if_meant(&args.scene)? {
         Some(subject) => play_in(&in_subject(args, &subject)?, Some(subject)),
@@ -54,7 +54,7 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     }
 }
 
-/// The same arguments with what a subject says in place of its name.
+/// The same arguments with the scene and settings of a subject.
 fn in_subject(args: &PlayArgs, subject: &Subject) -> Result<PlayArgs, Failure> {
     if let Some(setting) = args.set.set.first() {
         return Err(Failure::Input(format!(
@@ -80,7 +80,7 @@ fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
     if let Solves(Some(solves)) = args.solves {
         session = session.with_ticks(solves).map_err(in_scene)?;
     }
-    // Who does a subject by hand is not shown how, unless that was asked for.
+    // A trainee who does a subject is not shown its script, unless requested.
     if subject.is_none() || args.watch || args.after_script || args.script.is_some() {
         session = session.with_script(script);
     }
@@ -124,7 +124,7 @@ fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A session of a scene at its start, with the script that belongs to it.
+/// A session at the start of a scene, with the scene's script.
 pub(crate) fn open(
     scene: &Scene,
     path: &Path,
@@ -135,7 +135,7 @@ pub(crate) fn open(
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let mut view = ViewSpec::of_scene(scene, path)?;
     let simulation = scene.simulation(cache).map_err(in_scene)?;
-    // Kept by the cache before the session asks for it.
+    // Computed here, so that the cache stores it before the session needs it.
     simulation.lumen().wall(cache).map_err(in_scene)?;
     let script = scene.steps(simulation.stack(), cache).map_err(in_scene)?;
     scenes::let_medium_flow(&mut view, scene, cache).map_err(in_scene)?;
@@ -145,7 +145,7 @@ pub(crate) fn open(
     Ok((session.with_sac(sac), script))
 }
 
-/// Tells what is to be done, if it is a subject.
+/// Prints the task, if the session is a subject.
 fn tell_task(session: &Session) {
     if let Some(standing) = session.standing() {
         let task = &standing.task;
@@ -153,14 +153,14 @@ fn tell_task(session: &Session) {
     }
 }
 
-/// Tells what has come of it.
+/// Prints the score, if the session is a subject.
 fn tell_score(session: &Session) {
     if let Some(score) = session.score() {
         tell(subjects::text(&score));
     }
 }
 
-/// The session with its script on its way, or carried out, if that was asked for.
+/// Starts or carries out the session's script, if requested.
 fn begun(mut session: Session, args: &PlayArgs) -> endowire_core::Result<Session> {
     if args.watch || args.after_script {
         session.apply(&Input::Script {})?;
@@ -172,7 +172,7 @@ fn begun(mut session: Session, args: &PlayArgs) -> endowire_core::Result<Session
     Ok(session)
 }
 
-/// Has lines read on a thread of their own: from a file, or from stdin.
+/// Reads lines on another thread, from a file or from stdin.
 fn read_inputs(file: Option<&Path>, to: mpsc::Sender<Message>) -> Result<(), Failure> {
     let lines: Box<dyn Read + Send> = match file {
         Some(path) => Box::new(
@@ -182,7 +182,7 @@ fn read_inputs(file: Option<&Path>, to: mpsc::Sender<Message>) -> Result<(), Fai
     };
     std::thread::spawn(move || {
         lines::read(BufReader::new(lines), &to, Ok, lines::to_stdout);
-        // Nobody may listen any more.
+        // Fails if the receiver is gone, which does not matter.
         let _ = to.send(Message::Ended);
     });
     Ok(())

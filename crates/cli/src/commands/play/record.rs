@@ -1,4 +1,4 @@
-//! What hands have done, on disk.
+//! Saves a session to disk.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -12,7 +12,7 @@ use crate::output::provenance::Provenance;
 use crate::output::{session as session_file, tell, to_json, whole};
 use crate::subjects::ScoreDocument;
 
-/// How often a session that goes on is written.
+/// Interval between saves of a running session.
 const EVERY: Duration = Duration::from_secs(2);
 
 /// The file of a session's script.
@@ -21,15 +21,15 @@ pub(crate) struct Record {
     head: String,
     scene: PathBuf,
     set: Vec<String>,
-    /// Where the score comes from, of a subject.
+    /// Provenance of the score, for a subject.
     provenance: Option<Provenance>,
-    /// When it began, of a session that goes by the clock.
+    /// Start time, for a session in real time.
     recorded_unix_s: Option<u64>,
     written: Instant,
 }
 
 impl Record {
-    /// A record in a file of what is done in a scene with these settings.
+    /// A record at `path` of a session in a scene with these settings.
     pub(crate) fn new(path: PathBuf, scene: &Path, settings: &[Setting]) -> Self {
         let head = script_head(scene, settings, &path);
         let set = settings.iter().map(ToString::to_string).collect();
@@ -37,24 +37,25 @@ impl Record {
         Self { path, head, scene, set, provenance: None, recorded_unix_s: None, written: Instant::now() }
     }
 
-    /// The same of a session that goes by the clock, from now on. One in which time goes by as inputs say has the same bytes at any time.
+    /// Marks the session as one in real time that starts now. A session whose time advances by inputs has no date, so
+    /// that its file always has the same bytes.
     pub(crate) fn by_the_clock(self) -> Self {
-        // A clock that stands before 1970 does not know the day.
+        // A clock set before 1970 does not know the date.
         let since = SystemTime::now().duration_since(UNIX_EPOCH).ok();
         Self { recorded_unix_s: since.map(|since| since.as_secs()), ..self }
     }
 
-    /// The same of a subject: its score is written too.
+    /// Marks the session as a subject, whose score is written too.
     pub(crate) fn scored(self, provenance: Provenance) -> Self {
         Self { provenance: Some(provenance), ..self }
     }
 
-    /// The folder that the script goes into.
+    /// Folder of the script.
     pub(crate) fn folder(&self) -> &Path {
         self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
     }
 
-    /// Writes the session now and then: what a kill leaves.
+    /// Saves the session at intervals, in case the program is killed.
     pub(crate) fn keep(&mut self, session: &Session) -> Result<(), Failure> {
         if self.written.elapsed() < EVERY {
             return Ok(());
@@ -70,7 +71,7 @@ impl Record {
         whole::write_bytes(&self.path, text.as_bytes()).map_err(|e| Failure::write(&self.path, &e))
     }
 
-    /// Writes the whole session, with what it is assessed by, and says where.
+    /// Saves the whole session, with the files for assessment, and reports the path.
     pub(crate) fn finish(&self, session: &Session) -> Result<(), Failure> {
         self.write(session)?;
         let of_session = SessionFile {

@@ -1,5 +1,6 @@
-//! The protocol on a socket. Who connects shows with a first line that he may: a token that only this call has told. Web pages can send
-//! requests to any port of the machine that shows them, and so can its other users; they do not know it.
+//! The protocol on a socket. A client must send as first line a token that is printed only by this call. Web pages
+//! can send requests to any port of the machine on which they are shown, and so can its other users; they do not know
+//! the token.
 
 use std::fmt::Write as _;
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -15,16 +16,16 @@ use super::live::Message;
 use crate::failure::Failure;
 use crate::output::tell;
 
-/// Random bytes of a token: too many to be guessed.
+/// Random bytes of a token: too many to guess.
 const TOKEN_BYTES: usize = 16;
-/// Longest first line, bytes: the token as hexadecimal digits and a line break.
+/// Length limit of the first line, bytes: the token as hexadecimal digits and a line break.
 const LONGEST_TOKEN: u64 = 2 * TOKEN_BYTES as u64 + 2;
-/// Most connections at the same time.
+/// Largest number of simultaneous connections.
 const MOST: usize = 64;
-/// How long a connection may take to show the token. Each holds a thread.
+/// Time limit for sending the token. Each connection occupies a thread.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Where `--listen` listens: a port of this machine alone, or an address.
+/// The address of `--listen`: a port of this machine, or a full address.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Address(SocketAddr);
 
@@ -41,7 +42,7 @@ impl FromStr for Address {
 }
 
 impl Address {
-    /// The address, if no other machine reaches it or `remote` allows that.
+    /// The address, if it is reachable only from this machine or `remote` is set.
     pub(super) fn allowed(self, remote: bool) -> Result<SocketAddr, Failure> {
         if self.0.ip().is_loopback() || remote {
             return Ok(self.0);
@@ -54,7 +55,7 @@ impl Address {
     }
 }
 
-/// Takes lines from programs that connect and know the token. They may write pictures into `folder` and nowhere else.
+/// Accepts lines from clients that know the token. They may write pictures only into `folder`.
 pub(super) fn listen(address: SocketAddr, folder: &Path, to: &Sender<Message>) -> Result<(), Failure> {
     let failed = |e: io::Error| Failure::Input(format!("--listen {address}: {e}"));
     std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
@@ -66,7 +67,8 @@ pub(super) fn listen(address: SocketAddr, folder: &Path, to: &Sender<Message>) -
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let (token, folder, to) = (Arc::clone(&token), Arc::clone(&folder), to.clone());
-            // Each has a token of its own beside that of this thread. What is too many is hung up on, and so is what gets no thread.
+            // Each connection has a clone of the token beside that of this thread. Connections beyond the limit, or
+            // without a thread, are closed.
             if Arc::strong_count(&token) <= MOST + 1 {
                 let _ = std::thread::Builder::new().spawn(move || serve(stream, &token, &folder, &to));
             }
@@ -85,11 +87,11 @@ fn token() -> io::Result<String> {
     }))
 }
 
-/// Answers one program until it leaves; the session goes on.
+/// Answers one client until it disconnects; the session continues.
 fn serve(stream: TcpStream, token: &str, folder: &Path, to: &Sender<Message>) {
     let Ok(mut back) = stream.try_clone() else { return };
     let mut lines = BufReader::new(stream);
-    // One packet a line: what waits to be joined by more comes a twentieth of a second late.
+    // One packet per line: several small writes would be delayed by about 0.05 s.
     let mut answer = |line: &str| back.write_all(format!("{line}\n").as_bytes()).is_ok();
     match opened(&mut lines, token) {
         Ok(true) => lines::read(lines, to, |line| confined(line, folder), answer),
@@ -98,7 +100,7 @@ fn serve(stream: TcpStream, token: &str, folder: &Path, to: &Sender<Message>) {
                 "the first line must be the token that endowire play has printed on its standard error";
             answer(&serde_json::json!({ "ok": false, "error": error }).to_string());
         }
-        // Who says nothing is told nothing.
+        // A client that sends nothing gets no answer.
         Err(_) => {}
     }
 }
@@ -114,7 +116,7 @@ fn opened(lines: &mut BufReader<TcpStream>, token: &str) -> io::Result<bool> {
     Ok(first.trim_ascii_end() == token.as_bytes())
 }
 
-/// A line of a program that connects: its pictures have names, and lie in the session's folder.
+/// Restricts a line of a client: its pictures have bare names, and lie in the session's folder.
 fn confined(line: Line, folder: &Path) -> Result<Line, String> {
     match line {
         Line::Order(Order::Picture { file, window }) => {
@@ -125,7 +127,7 @@ fn confined(line: Line, folder: &Path) -> Result<Line, String> {
     }
 }
 
-/// Where a picture of that name lies in a folder.
+/// Path of a picture with this name in a folder.
 fn inside(file: &Path, folder: &Path) -> Result<PathBuf, String> {
     let refused = |what: &str| format!("picture: file = {:?}: {what}", file.display().to_string());
     let mut parts = file.components();

@@ -1,4 +1,4 @@
-//! How much is solved in a sixtieth of a second.
+//! Limit of linear solves per tick.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use endowire_play::TICK_SOLVES;
 
-/// Linear solves of a tick; none where each ends in equilibrium.
+/// Linear solves per tick; `None` if each tick ends in equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Solves(pub(super) Option<usize>);
 

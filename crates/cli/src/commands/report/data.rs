@@ -1,4 +1,4 @@
-//! What a page is given of a recording.
+//! Data of a page from a recording.
 
 use std::path::Path;
 
@@ -12,11 +12,11 @@ use crate::failure::Failure;
 use crate::output::instruments::Lengths;
 use crate::output::recording::Recording;
 
-/// Most bytes of all frames together, and most frames.
+/// Largest total size of all frames in bytes, and largest number of frames.
 const MOST_FRAME_BYTES: usize = 2_000_000;
 const MOST_FRAMES: usize = 24;
 
-/// Gathers what was recorded in `folder`.
+/// Gathers the data recorded in `folder`.
 pub(super) fn collect(
     folder: &Path,
     recording: &Recording,
@@ -24,7 +24,7 @@ pub(super) fn collect(
     vessel: &SurfaceMesh,
 ) -> Result<Run, Failure> {
     let path = folder.join("summary.json");
-    // A damaged summary is no reason to show nothing.
+    // Without a valid summary, the rest is still shown.
     let summary = std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let summary: Value = summary.unwrap_or(Value::Null);
     let rows = rows(folder)?;
@@ -43,11 +43,11 @@ fn rows(folder: &Path) -> Result<Vec<Row>, Failure> {
     let path = folder.join("steps.csv");
     let unreadable = |e: csv::Error| Failure::Input(format!("{}: {e}", path.display()));
     let mut reader = csv::Reader::from_path(&path).map_err(unreadable)?;
-    // The last row of a run that was killed may be cut.
+    // The last row of a killed run may be incomplete.
     Ok(reader.deserialize().map_while(Result::ok).collect())
 }
 
-/// Steps in 3D: all, or as many as fit, the last one among them.
+/// Shapes of all steps, or of as many as fit, including the last.
 fn steps(folder: &Path, recording: &Recording, stack: &Stack) -> Result<Vec<Moment>, Failure> {
     let count = recording.steps();
     let nodes: usize = (1..=count).map(|step| recording.shape(step).len()).sum();
@@ -70,7 +70,7 @@ fn events(rows: &[Row], summary: &Value) -> Vec<Event> {
     if let (Some(step), Some(reason)) =
         (summary["failure"]["step"].as_u64(), summary["failure"]["reason"].as_str())
     {
-        // Earlier versions told no kind.
+        // Earlier versions did not write the kind.
         let kind = serde_json::from_value::<EndedBy>(summary["failure"]["kind"].clone());
         let blocked = reason.starts_with("blocked");
         let what = kind.map_or(if blocked { "blocked" } else { "ended" }, EndedBy::name);
@@ -88,7 +88,7 @@ fn events(rows: &[Row], summary: &Value) -> Vec<Event> {
     events
 }
 
-/// Frames of the run, evenly chosen, as far as they fit.
+/// Frames of the run, evenly spaced, as many as fit.
 fn frames(folder: &Path) -> Vec<Frame> {
     let Ok(entries) = std::fs::read_dir(folder.join("frames")) else { return Vec::new() };
     let mut paths: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
@@ -96,7 +96,7 @@ fn frames(folder: &Path) -> Vec<Frame> {
     let every = paths.len().div_ceil(MOST_FRAMES).max(1);
     let mut left = MOST_FRAME_BYTES;
     let mut frames = Vec::new();
-    // From the end: the last frame is the one that is wanted most.
+    // Counted from the end, because the last frame is the most important one.
     for path in paths.iter().rev().step_by(every) {
         let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
         let Some((step, view)) = name.strip_prefix("step_").and_then(|rest| rest.split_once('_')) else {

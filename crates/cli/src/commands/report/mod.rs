@@ -1,4 +1,5 @@
-//! `endowire report`: a recorded run, or the tables of an experiment, as one page that any browser shows, without a network.
+//! `endowire report`: a recorded run, or the tables of an experiment, as one HTML page that any browser shows without
+//! a network.
 
 mod data;
 mod tables;
@@ -30,7 +31,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a recorded run shows.
+/// The page data of a recorded run.
 fn run(args: &ReportArgs) -> Result<Run, Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     if recording.steps() == 0 {

@@ -1,4 +1,4 @@
-//! A page of tables: what an experiment, a comparison or a sweep has left in a folder.
+//! Pages of tables: results of an experiment, a comparison or a sweep in a folder.
 
 use std::path::{Path, PathBuf};
 
@@ -8,11 +8,11 @@ use serde_json::Value;
 
 use crate::failure::Failure;
 
-/// Most rows of a table that a page shows, most pictures, and most bytes of all of them.
+/// Largest number of table rows on a page, largest number of pictures, and their largest total size in bytes.
 const MOST_ROWS: usize = 2000;
 const MOST_PICTURES: usize = 24;
 const MOST_PICTURE_BYTES: usize = 2_500_000;
-/// Columns that say where a result comes from: for the foot of the page.
+/// Columns with the provenance, shown at the foot of the page.
 const SOURCE: [&str; 4] = ["version", "git_revision", "scene_hash", "seed"];
 
 /// The document in the page.
@@ -29,13 +29,14 @@ struct Table {
     name: String,
     columns: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// Rows of the file.
+    /// Number of rows in the file.
     count: usize,
-    /// Columns that are shown over each other at first: across and up; none where the page has no reason to choose.
+    /// Columns of the initial chart, horizontal and vertical; `None` without an obvious choice.
     chart: Option<[String; 2]>,
 }
 
-/// Gathers the tables (CSV, or the runs of a sweep), pictures (PNG) and sources (JSON) of a folder; none where it has no table.
+/// Gathers the tables (CSV, or the runs of a sweep), pictures (PNG) and sources (JSON) of a folder; `None` if it has
+/// no table.
 pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
     let files = |extension: &str| -> Vec<PathBuf> {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -74,7 +75,8 @@ pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
     Ok(Some(Tables { name: stem(folder), tables, pictures, source }))
 }
 
-/// The runs of a sweep, and where all of them come from: what that says, and columns without a value, are not in the table.
+/// The runs of a sweep, and their common provenance. The latter, and columns without values, are left out of the
+/// table.
 fn of_sweep(sweep: endowire_sweep::Table) -> (Table, Vec<(String, Value)>) {
     let endowire_sweep::Table { columns, mut rows, runs } = sweep;
     let mut source = Vec::new();
@@ -86,7 +88,7 @@ fn of_sweep(sweep: endowire_sweep::Table) -> (Table, Vec<(String, Value)>) {
         if let (true, Some(value)) = (SOURCE.contains(&column.as_str()), same) {
             source.push((column.clone(), Value::from(value.as_str())));
         } else if column == "scene_hash" {
-            // Each run's own, which the table of the sweep has.
+            // Different for each run; it is in the table of the sweep itself.
         } else if rows.iter().any(|row| !row[index].is_empty()) {
             shown.push(index);
         }
@@ -95,7 +97,7 @@ fn of_sweep(sweep: endowire_sweep::Table) -> (Table, Vec<(String, Value)>) {
     rows.truncate(MOST_ROWS);
     let rows = rows.into_iter().map(|row| shown.iter().map(|&index| row[index].clone()).collect()).collect();
     let columns: Vec<String> = shown.iter().map(|&index| columns[index].clone()).collect();
-    // The first axis comes after the number of the run.
+    // The first axis follows the number of the run.
     let up = ["push_force_n", "steps"].into_iter().find(|name| columns.iter().any(|column| column == name));
     let chart = columns.get(1).cloned().zip(up).map(|(across, up)| [across, up.to_owned()]);
     let name = if count < runs { format!("runs so far of {runs}") } else { "runs".to_owned() };

@@ -1,4 +1,4 @@
-//! A run that goes on: its steps, and all that is kept of them.
+//! A run in progress: its steps and their recording.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +18,7 @@ use crate::output::provenance::Provenance;
 use crate::output::recorder::{Recorder, Summary};
 use crate::output::saved::{Course, Saver};
 
-/// What has come of a run.
+/// The state of a run.
 pub(super) struct SoFar<'a> {
     pub(super) scene: &'a Scene,
     pub(super) scene_file: &'a Path,
@@ -55,13 +55,13 @@ impl SoFar<'_> {
         }
     }
 
-    /// Notes that the next step was not done since it was to end.
+    /// Records that the next step was not carried out because of an interrupt.
     fn interrupt(&mut self, reason: &str) {
         let (step, reason) = (self.course.steps + 1, reason.to_owned());
         self.failure = Some(StepFailure { step, reason, kind: EndedBy::Interrupted });
     }
 
-    /// Notes that the step after so many was not done.
+    /// Records that the step after `after` steps failed.
     fn fail(&mut self, after: usize, error: &endowire_core::Error) {
         self.failure = Some(StepFailure::new(after + 1, error));
     }
@@ -77,21 +77,21 @@ impl SoFar<'_> {
         Ok(())
     }
 
-    /// Draws what the scene wants to see of a step.
+    /// Draws the frames of a step that the scene requests.
     fn draw(&mut self, now: (usize, f64), last: bool, recorder: &mut Recorder) -> Result<(), Failure> {
         let lengths_mm = self.simulation.report().lengths_mm();
         self.frames.step(now, last, (self.simulation.shape(), &lengths_mm), recorder)
     }
 }
 
-/// A run and where it is recorded.
+/// A run and its recording.
 pub(super) struct Going<'a> {
     pub(super) so_far: SoFar<'a>,
     pub(super) recorder: Recorder,
     pub(super) saver: Option<Saver>,
-    /// At the end of each step, s.
+    /// End time of each step, s.
     pub(super) times_s: Vec<f64>,
-    /// Whether a step was taken that could not be recorded.
+    /// Whether the simulation is one step ahead of the recording, because that step could not be recorded.
     pub(super) ahead: bool,
 }
 
@@ -99,12 +99,12 @@ pub(super) struct Going<'a> {
 pub(super) struct Ended {
     pub(super) summary: Summary,
     pub(super) simulation: Simulation,
-    /// Whether all that was recorded is written.
+    /// Whether the recording was written completely.
     pub(super) written: Result<(), Failure>,
 }
 
 impl Going<'_> {
-    /// Writes what there is before the first step.
+    /// Records the state before the first step.
     pub(super) fn begin(&mut self) -> Result<(), Failure> {
         self.inject();
         injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
@@ -112,7 +112,7 @@ impl Going<'_> {
         self.save()
     }
 
-    /// Carries out `next` and all steps after it, until one fails.
+    /// Carries out `next` and all later steps, until one fails.
     pub(super) fn carry_out(
         &mut self,
         mut next: Option<Step<'static>>,
@@ -133,7 +133,7 @@ impl Going<'_> {
         }
     }
 
-    /// Carries out a step and records it; the next one, if there is one and nothing failed.
+    /// Carries out and records a step; returns the next one, unless there is none or something failed.
     fn step(&mut self, step: &Step<'_>) -> Option<Step<'static>> {
         let before = self.so_far.course.steps;
         if let Err(error) = self.so_far.simulate(step) {
@@ -172,7 +172,7 @@ impl Going<'_> {
         if self.saver.as_ref().is_some_and(Saver::is_due) { self.save() } else { Ok(()) }
     }
 
-    /// Notes what begins to flow at the end of the last step; whether anything does.
+    /// Adds the injections that begin at the end of the last step; returns whether there are any.
     fn inject(&mut self) -> bool {
         let SoFar { hand, simulation, frames, course, .. } = &mut self.so_far;
         let begun = Injected::begun(hand, course.injected.len(), frames.frames_per_s(), simulation);
@@ -193,11 +193,11 @@ impl Going<'_> {
         saver.save(simulation, (script, hand.course()), course, || self.recorder.sync())
     }
 
-    /// Writes what is not written yet.
+    /// Writes the remaining data.
     pub(super) fn end(mut self) -> Ended {
         let saved = if self.ahead { Ok(()) } else { self.save() };
         if self.so_far.failure.is_some() && self.recorder.steps() > 0 {
-            // The picture of the end is a help; the first failure is the one to tell.
+            // This last picture is optional: its error would hide the first failure.
             let now = (self.recorder.steps(), self.times_s.last().copied().unwrap_or_default());
             let _ = self.so_far.draw(now, true, &mut self.recorder);
         }

@@ -77,7 +77,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     };
     recorder.pack(sac)?;
 
-    // From here on something is recorded: whatever happens, it is kept.
+    // From here on data are recorded and must be kept, whatever happens.
     let so_far = SoFar {
         scene: &scene,
         scene_file: &args.scene,
@@ -101,7 +101,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     told::tell_end(args, &folder, going.end())
 }
 
-/// Whether there is a state to go on from. A job script has the same line for its first call.
+/// Whether there is a state to resume from. If not, the run starts from the beginning, so that a job script can
+/// always use the same command.
 fn is_there(path: &Path) -> bool {
     let there = path.symlink_metadata().is_ok();
     if !there {
@@ -113,12 +114,13 @@ fn is_there(path: &Path) -> bool {
     there
 }
 
-/// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
+/// Removes the state of an earlier run, which must not be used if this run ends before saving its own.
 fn forget_state(path: &Path) -> Result<(), Failure> {
     whole::remove(path).map_err(|e| Failure::write(path, &e))
 }
 
-/// Draws the frames of a recording that goes on once more, with what was injected: the detector remembers those before. `times_s` are those of all steps so far.
+/// Draws again the frames of a recording that resumes, with its injections, since the detector remembers earlier
+/// frames. `times_s` are the end times of all steps so far.
 fn draw_again(
     frames: &mut FrameWriter,
     (earlier, injected): (Option<&Recording>, &[Injected]),
@@ -150,13 +152,13 @@ fn draw_again(
     Ok(())
 }
 
-/// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once. The same flag for all
-/// who ask.
+/// The flag set by Ctrl-C or by a request to terminate: the current step is finished and recorded. A second request
+/// ends the program at once. All callers share the flag.
 pub(crate) fn interrupts() -> &'static AtomicBool {
     static FLAG: AtomicBool = AtomicBool::new(false);
     static HEARD: Once = Once::new();
     HEARD.call_once(|| {
-        // Without a handler an interrupt ends the program at once, as elsewhere.
+        // Without a handler, an interrupt ends the program at once.
         let _ = ctrlc::set_handler(|| {
             if FLAG.swap(true, Ordering::Relaxed) {
                 std::process::exit(1);

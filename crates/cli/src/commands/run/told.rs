@@ -1,4 +1,4 @@
-//! What a person is told of a run.
+//! Messages about a run.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::output::recorder::Summary;
 use crate::output::{print_json, tell};
 use crate::scenes::check_converged;
 
-/// Tells what a run has come to, and fails as it has failed.
+/// Prints the result of a run, and fails if the run has failed.
 pub(super) fn tell_end(args: &RunArgs, folder: &Path, ended: Ended) -> Result<(), Failure> {
     let Ended { summary, simulation, written } = ended;
     for line in summary.outcome.until.iter().filter(|line| line.met.is_none()) {
@@ -40,7 +40,7 @@ pub(super) fn tell_end(args: &RunArgs, folder: &Path, ended: Ended) -> Result<()
     }
 }
 
-/// What a person wants to see while it goes on.
+/// Text of the progress bar.
 pub(super) fn live(report: &StepReport, tally: &Tally) -> String {
     let mut line = format!("{:.1} mm in, push {:.3} N", report.inserted_mm, report.push_force_n);
     if tally.jumps > 0 {
@@ -55,7 +55,7 @@ pub(super) fn live(report: &StepReport, tally: &Tally) -> String {
     line
 }
 
-/// How a run ended, where it is not by the end of its script alone.
+/// How a run ended, unless it simply reached the end of its script.
 fn ended(outcome: &RunOutcome) -> Option<String> {
     let ended_by = outcome.ended_by.filter(|ended_by| *ended_by != EndedBy::Script)?;
     let last = outcome.until.last().filter(|_| outcome.failure.is_none());
@@ -74,7 +74,7 @@ fn ended(outcome: &RunOutcome) -> Option<String> {
     })
 }
 
-/// The summary for a person, for stderr: stdout is for documents.
+/// The summary as text, for stderr: stdout is for documents.
 fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
     let outcome = &summary.outcome;
     let tip = outcome.tip_mm.unwrap_or_default();

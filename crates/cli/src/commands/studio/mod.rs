@@ -1,4 +1,4 @@
-//! Frames with the wishes of the command line: of a recording, or of a scene.
+//! Frames of a recording or a scene, with the options of the command line.
 
 mod plane;
 mod wishes;
@@ -25,48 +25,48 @@ use crate::output::{print_json, tell, to_json};
 use crate::scenes;
 use plane::{Plane, write_dicom};
 
-/// One moment to draw.
+/// One state to draw.
 pub(super) struct Still<'a> {
-    /// Begins the names of its files.
+    /// Beginning of its file names.
     pub(super) name: String,
     pub(super) moment: FrameTime,
     pub(super) shape: &'a Shape,
-    /// Length in of the device, or of each instrument, mm.
+    /// Inserted length of the device, or of each instrument, mm.
     pub(super) inserted_mm: &'a [f64],
-    /// Coils that were left behind.
+    /// Detached coils.
     pub(super) coils: &'a [DetachedCoil],
     pub(super) contacts: &'a [ContactView],
-    /// Where the vessel is, if it moves.
+    /// Displacement of the vessel, if it moves.
     pub(super) displacement: Option<&'a Displacement>,
-    /// What was recorded before, where pulses show the way from there.
+    /// The previous state, if pulses show the motion since then.
     pub(super) before: Option<Seen<'a>>,
 }
 
-/// What was written: the JSON document of `render` and `fluoro`.
+/// The JSON document of `render` and `fluoro`.
 #[derive(Debug, Serialize)]
 pub(super) struct Written {
-    /// What drew.
+    /// Backend that drew the frames.
     pub(super) renderer: String,
     /// Folder of the frames.
     pub(super) folder: PathBuf,
-    /// Every file, relative to the folder where it lies there.
+    /// All files; those in the folder with relative paths.
     pub(super) files: Vec<PathBuf>,
-    /// How the steps before them went, where any were carried out.
+    /// Statistics of the steps before the frames, if any were carried out.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub(super) went: Option<Went>,
 }
 
-/// How steps went.
+/// Statistics of steps.
 #[derive(Debug, Serialize)]
 pub(super) struct Went {
-    /// How many.
+    /// Number of steps.
     pub(super) steps: usize,
     #[serde(flatten)]
     pub(super) tally: Tally,
 }
 
 impl Written {
-    /// Says what was written: the document on stdout, or a line beside it.
+    /// Prints the result: a JSON document on stdout, or a line of text.
     pub(super) fn tell(&self, json: bool) -> Result<(), Failure> {
         if json {
             return print_json(self);
@@ -79,7 +79,7 @@ impl Written {
     }
 }
 
-/// Frames to be drawn as the command line wishes, checked before anything is carried out or drawn.
+/// The frames to draw with the options of the command line, checked before anything is computed.
 pub(super) struct Plan<'a> {
     args: &'a FrameArgs,
     spec: ViewSpec,
@@ -91,7 +91,8 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Plans `frames` frames, or those of a turn whose speed is given, of a scene in `folder`, where they replace those of an earlier call of the same command.
+    /// Plans `frames` frames, or those of a turn with a given speed, of a scene. They go to `folder`, where they
+    /// replace those of an earlier call of the same command.
     pub(super) fn new(
         command: &str,
         args: &'a FrameArgs,
@@ -122,17 +123,17 @@ impl<'a> Plan<'a> {
         Ok(Self { args, spec, pushed, folder, frames, pace, manifest })
     }
 
-    /// The same with frames at these moments in place of so many a second.
+    /// Sets the times of the frames, instead of a constant rate.
     pub(super) fn at(self, times_s: &[f64]) -> Self {
         Self { pace: Pace::of(times_s, self.spec.frames_per_s), ..self }
     }
 
-    /// Frames to draw.
+    /// Number of frames to draw.
     pub(super) fn frames(&self) -> usize {
         self.frames
     }
 
-    /// Frames a second.
+    /// Frames per second.
     pub(super) fn frames_per_s(&self) -> f64 {
         self.spec.frames_per_s
     }
@@ -142,7 +143,7 @@ impl<'a> Plan<'a> {
 pub(super) struct Studio<'a> {
     plan: Plan<'a>,
     wall: Wall,
-    /// That of fluoroscopy and of the 3D view, and the second of two.
+    /// The plane of fluoroscopy and of the 3D view, and the second plane, if there is one.
     planes: Vec<Plane>,
     drawn: usize,
     animation: Option<Animation>,
@@ -150,7 +151,7 @@ pub(super) struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    /// Prepares the frames of a vessel in which medium flows beside that of the scene.
+    /// Prepares the frames of a vessel; `injections` are added to those of the scene.
     pub(super) fn new(
         mut plan: Plan<'a>,
         wall: Wall,
@@ -168,12 +169,12 @@ impl<'a> Studio<'a> {
         Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
     }
 
-    /// Whether each moment before one that is drawn counts.
+    /// Whether states before the one that is drawn matter.
     pub(super) fn follows_tip(&self) -> bool {
         self.plan.spec.injects_at_tip()
     }
 
-    /// Tells where the instruments are at a moment that is not drawn.
+    /// Passes on the position of the instruments in a state that is not drawn.
     pub(super) fn follow_tip(
         &mut self,
         Seen { shape, inserted_mm, time_s }: Seen<'_>,
@@ -185,19 +186,19 @@ impl<'a> Studio<'a> {
         Ok(())
     }
 
-    /// What part of the way from the first frame to the last the next one is.
+    /// Position of the next frame between the first and the last, 0 to 1.
     fn part(&self) -> f64 {
         self.drawn as f64 / self.plan.frames.max(2).saturating_sub(1) as f64
     }
 
-    /// Draws a moment and writes what is wanted of it.
+    /// Draws a state and writes the requested files.
     pub(super) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
         let drawn = self.draw_all(still);
         self.check_there()?;
         drawn
     }
 
-    /// Fails where the folder of the frames has gone, which is the reason then for whatever else has failed.
+    /// Fails if the folder of the frames has vanished, which explains any other failure.
     fn check_there(&self) -> Result<(), Failure> {
         if self.plan.manifest.is_there() {
             return Ok(());
@@ -249,7 +250,7 @@ impl<'a> Studio<'a> {
         Ok(())
     }
 
-    /// The 3D view of a camera that goes around.
+    /// The 3D view of an orbiting camera.
     fn orbited(
         &self,
         orbit_deg: f64,
@@ -264,7 +265,7 @@ impl<'a> Studio<'a> {
         Ok(orbiting.render_at(views, still.moment)?.three_d)
     }
 
-    /// The frames of the first plane, beside each other, and in the moving picture.
+    /// Writes the frames of the first plane, separately and side by side, and adds them to the animation.
     fn write(&mut self, still: &Still, frames: &Frames) -> Result<(), Failure> {
         for (view, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
@@ -293,7 +294,7 @@ impl<'a> Studio<'a> {
         Ok(())
     }
 
-    /// Labels and arrays of a plane.
+    /// Writes labels and arrays of a plane.
     fn write_data(&mut self, still: &Still, plane: usize, views: &[DeviceView]) -> Result<(), Failure> {
         let ending = self.planes[plane].ending;
         if self.plan.args.labels {
@@ -323,14 +324,14 @@ impl<'a> Studio<'a> {
         Ok(())
     }
 
-    /// A file of the folder, noted.
+    /// Path of a file in the folder, which is added to the list.
     fn file(&mut self, name: &str) -> Result<PathBuf, Failure> {
         self.plan.manifest.add(name).map_err(|e| Failure::write(&self.plan.folder, &e))?;
         self.files.push(name.into());
         Ok(self.plan.folder.join(name))
     }
 
-    /// Ends animation and series.
+    /// Completes animation and DICOM series.
     pub(super) fn finish(mut self) -> Result<Written, Failure> {
         let ended = self.end();
         self.check_there()?;
@@ -361,7 +362,7 @@ impl<'a> Studio<'a> {
     }
 }
 
-/// Arrays of a frame by name: what there is of them.
+/// The available arrays of a frame, with names.
 fn maps<'a>(paths: &'a PathLengths, line: &'a Vec<f32>) -> Vec<(String, &'a Vec<f32>)> {
     let mut maps = vec![("line_integral".to_owned(), line)];
     for (name, map) in [
@@ -379,7 +380,7 @@ fn maps<'a>(paths: &'a PathLengths, line: &'a Vec<f32>) -> Vec<(String, &'a Vec<
     maps
 }
 
-/// Masks of a frame: the vessel, each of several instruments, and each part of one.
+/// Masks of a frame, with names: the vessel, each of several instruments, and each of several parts.
 fn masks(labels: &Labels) -> Vec<(String, &Mask)> {
     let mut named: Vec<(String, &Mask)> =
         labels.vessel.iter().map(|mask| ("mask_vessel".to_owned(), mask)).collect();

@@ -1,4 +1,4 @@
-//! One plane of fluoroscopy: what draws it, and its frames for DICOM.
+//! One plane of fluoroscopy: its renderer, and its frames for DICOM.
 
 use std::path::{Path, PathBuf};
 
@@ -10,22 +10,22 @@ use endowire_viewer::{
 
 /// A plane.
 pub(super) struct Plane {
-    /// Ends the names of its files.
+    /// Ending of its file names.
     pub(super) ending: &'static str,
     pub(super) renderer: Renderer,
-    /// Where the C-arm stands in the first frame, as said and as it is.
+    /// Pose of the C-arm in the first frame, as specified and as computed.
     start: CArmSpec,
     arm: Option<CArm>,
-    /// Of the first frame.
+    /// Exposure of the first frame.
     exposure: Option<Exposure>,
-    /// Devices in the first frame: those of the masks of a C-arm that turns.
+    /// Devices in the first frame, which the masks of a rotating C-arm show.
     first: Option<Vec<DeviceView>>,
-    /// Its frames, where they are kept.
+    /// Its frames, if they are kept.
     series: Vec<Image>,
 }
 
 impl Plane {
-    /// Those of a view, each with its renderer.
+    /// The planes of a view, each with its renderer.
     pub(super) fn all(spec: &ViewSpec, wall: &Wall) -> Result<Vec<Self>> {
         let endings = ["", "_b"].into_iter();
         let plane = |(spec, ending): (ViewSpec, &'static str)| {
@@ -36,8 +36,8 @@ impl Plane {
         spec.planes().into_iter().zip(endings).map(plane).collect()
     }
 
-    /// Turns the C-arm by so much from where it stood first, if it is to turn. Masks of a subtraction are then of the first frame's devices, as
-    /// those of a run without medium that turned alike before.
+    /// Rotates the C-arm by `turn_deg` from its initial pose, if given. Subtraction masks then show the devices of
+    /// the first frame, as if from an earlier run without medium and with the same rotation.
     pub(super) fn turn(&mut self, views: &[DeviceView], turn_deg: Option<f64>) -> Result<()> {
         let Some(turn_deg) = turn_deg else { return Ok(()) };
         let first = self.first.get_or_insert_with(|| views.to_vec());
@@ -54,7 +54,7 @@ impl Plane {
         self.series.push(frame);
     }
 
-    /// What a DICOM file says of the frames, which turned by `turn_deg` from one to the next.
+    /// DICOM attributes of the frames, which rotate by `turn_deg` from one to the next.
     fn angiogram(&self, turn_deg: f64, pace: &Pace) -> Result<Angiogram<'_>> {
         let spec = self.renderer.spec();
         let none = || Error::parameter("view.views", "without fluoro", "add \"fluoro\"");
@@ -70,7 +70,7 @@ impl Plane {
     }
 }
 
-/// Writes the frames of one plane, or of two that refer to each other, and tells the files.
+/// Writes the frames of one plane, or of two that refer to each other; returns the files.
 pub(super) fn write_dicom(planes: &[Plane], path: &Path, turn_deg: f64, pace: &Pace) -> Result<Vec<PathBuf>> {
     match planes {
         [first, second] => {
@@ -87,7 +87,7 @@ pub(super) fn write_dicom(planes: &[Plane], path: &Path, turn_deg: f64, pace: &P
     }
 }
 
-/// The file of the second plane: `run.dcm` has `run_b.dcm` beside it.
+/// Path for the second plane: `run_b.dcm` beside `run.dcm`.
 fn beside(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("_b");

@@ -1,4 +1,4 @@
-//! What the command line wishes of frames.
+//! Options of the command line for frames.
 
 use endowire_core::input::nearest;
 use endowire_viewer::{View, ViewSpec};
@@ -8,13 +8,13 @@ use crate::args::{FrameArgs, ViewChoice};
 use crate::failure::Failure;
 use crate::scenes::of_scene_and_view;
 
-/// A hundred turns.
+/// Largest rotation: a hundred turns.
 const MOST_TURN_DEG: f64 = 36_000.0;
-/// Frames of a turn, and its speeds.
+/// Largest number of frames of a turn, and range of its speed.
 const MOST_FRAMES: f64 = 100_000.0;
 const DEG_PER_S: [f64; 2] = [0.01, 1e4];
 
-/// Frames of a turn of the C-arm whose speed is given, the first and the last included.
+/// Number of frames of a C-arm turn with a given speed, including the first and the last.
 pub(super) fn frames_of_turn(args: &FrameArgs, frames_per_s: f64) -> Result<Option<usize>, Failure> {
     let (Some(turn), Some(speed)) = (args.turn, args.deg_per_s) else { return Ok(None) };
     let [low, high] = DEG_PER_S;
@@ -31,7 +31,7 @@ pub(super) fn frames_of_turn(args: &FrameArgs, frames_per_s: f64) -> Result<Opti
     Ok(Some(frames as usize))
 }
 
-/// Refuses what cannot be drawn.
+/// Refuses options that are incompatible.
 pub(super) fn check(args: &FrameArgs, spec: &ViewSpec, frames: usize) -> Result<(), Failure> {
     if let (Some(turn), 1) = (args.turn, frames) {
         let text = format!(
@@ -58,7 +58,7 @@ pub(super) fn check(args: &FrameArgs, spec: &ViewSpec, frames: usize) -> Result<
     Ok(())
 }
 
-/// A `[view]` table with the wishes of the command line.
+/// A `[view]` table with the options of the command line.
 pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) -> Result<ViewSpec, Failure> {
     let choice = args.view.or(spec.views.is_empty().then_some(default));
     if let Some(choice) = choice {
@@ -89,7 +89,7 @@ pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) 
     let mut table = serde_json::to_value(&spec).map_err(|e| failed(e.to_string()))?;
     for set in set {
         let (key, value) = set.split_once('=').ok_or_else(|| failed(format!("{set}: say KEY=VALUE")))?;
-        // The document that the table is kept in has no such numbers, and no key takes them.
+        // JSON, which holds the table, has no such numbers, and no key accepts them.
         if value.trim().parse::<f64>().is_ok_and(|v| !v.is_finite()) {
             return Err(failed(format!("view.{} = {}: must be a finite number", key.trim(), value.trim())));
         }
@@ -105,7 +105,7 @@ pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) 
             place = members.entry(part).or_insert(Value::Null);
         }
         *place = value;
-        // One by one, so that the message names the one at fault.
+        // Checked one by one, so that the message names the faulty one.
         let fits = serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| e.to_string());
         fits.map_err(|e| failed(format!("{set}: {e}{}", nearest(&e))))?;
     }

@@ -1,7 +1,8 @@
-"""Environments for Gymnasium 1.0 and later, composed of parts that can be replaced.
+"""Environments for Gymnasium 1.0 and later, composed of replaceable parts.
 
-``import endowire.gym`` registers ``endowire/CurvedTube-v0``, ``AorticArch``, ``ArchVariety``, ``BasicWireNav``, ``DualDeviceNav``, ``CathSim`` and ``Navigation``; ``gymnasium.make`` and
-``gymnasium.make_vec`` take every part of a `Task` as a keyword.
+``import endowire.gym`` registers ``endowire/CurvedTube-v0``, ``AorticArch``, ``ArchVariety``, ``BasicWireNav``,
+``DualDeviceNav``, ``CathSim`` and ``Navigation``; ``gymnasium.make`` and ``gymnasium.make_vec`` accept every part of
+a `Task` as a keyword.
 """
 
 from gymnasium import register as _register

@@ -1,8 +1,9 @@
-"""Aortic arches of type I, a new one for each episode, with a variety like that of the task ArchVariety of stEVE_bench (MIT licence).
+"""Aortic arches of type I, a new one for each episode, with the variety of the task ArchVariety of stEVE_bench (MIT
+licence).
 
-Written anew from its numbers: points, directions, lengths of tangents and diameters with their standard deviations, and the scales. The
-sampling is our own, so a seed gives another arch here than there. Arches that no wall can be made for, because branches run into each
-other or bend tighter than they are wide, are drawn again: nearly half of them.
+This is a new implementation of its parameters: points, directions, lengths of tangents and diameters with their
+standard deviations, and the scales. The sampling differs, so a seed gives a different arch than there. Arches without
+a valid wall, because branches intersect or bend tighter than they are wide, are drawn again: nearly half of them.
 """
 
 from __future__ import annotations
@@ -18,16 +19,17 @@ from .vessels import Site
 
 Array = NDArray[np.float64]
 
-#: Distance of points of the centre line, mm.
+#: Spacing of points of the centre line, mm.
 _SPACING_MM = 4.0
-#: Height up to which the carotid arteries are drawn, mm, and where the subclavian arteries end to the sides, before scaling.
+#: Height at which the carotid arteries end, mm, and lateral position at which the subclavian arteries end, before
+#: scaling.
 _TOP_MM, _RIGHT_MM, _LEFT_MM = 230.0, -57.0, 59.0
-#: Draws of an arch before giving up.
+#: Largest number of attempts to draw an arch.
 _MOST_DRAWS = 20
 
 
 class _Knot:
-    """A point of a course: position, tangent, diameter and its slope, mm."""
+    """A control point of a course: position, tangent, diameter and its slope, mm."""
 
     def __init__(self, position_mm: Array, tangent: Array, diameter_mm: float, slope: float) -> None:
         self.position_mm, self.tangent, self.diameter_mm, self.slope = (
@@ -39,7 +41,7 @@ class _Knot:
 
 
 def _course(knots: list[_Knot]) -> Array:
-    """The cubic Hermite curve through knots by chord length, shape (n, 4): position and radius, mm."""
+    """The cubic Hermite curve through knots, parametrised by chord length, shape (n, 4): position and radius, mm."""
     pieces = []
     for begin, end in zip(knots, knots[1:], strict=False):
         chord = float(np.linalg.norm(end.position_mm - begin.position_mm))
@@ -61,7 +63,7 @@ def _hermite(begin: _Knot, end: _Knot, chord: float, t: Array) -> Array:
 
 
 class _Draw:
-    """Normal numbers of one arch."""
+    """Normally distributed numbers for one arch."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
@@ -92,11 +94,11 @@ def _aorta(draw: _Draw) -> Array:
         ((-4, -6, -0.5), (0.8, 1, 0.7), (1.4, 0.15)),
         ((3, 4, -8), (0.3, 0.3, 0.5), (1.6, 0.15)),
     ]
-    # Each diameter grows from the one before.
+    # Each diameter builds on the previous one.
     growth = [(17, 1), (3, 0.7), (4, 0.7), (5, 0.7)]
     slopes = [(0.02, 0.005), (0.02, 0.005), (0.07, 0.008), (0.0, 0.0)]
     diameters = np.cumsum([draw.number(*each) for each in growth])
-    # The course runs from the descending aorta to the heart; a tangent of (3, 4, -8) leads down there.
+    # The course runs from the descending aorta to the heart; a tangent of (3, 4, -8) points downwards there.
     knots = [
         _Knot(draw.point(*place), draw.tangent(*tangent), float(diameter), draw.number(*slope))
         for place, tangent, diameter, slope in zip(places, tangents, diameters, slopes, strict=True)
@@ -157,8 +159,9 @@ def _left_subclavian(draw: _Draw, start: Array) -> Array:
 
 
 def arch(rng: np.random.Generator) -> tuple[Array, int]:
-    """The centre line of an arch of type I: a table of shape (n, 5) as `Vessel.generate` takes it, rooted in the descending aorta, and the
-    number of its first rows that are the aorta's."""
+    """The centre line of an arch of type I: a table of shape (n, 5) for `Vessel.generate`, with its root in the
+    descending aorta, and the number of its first rows that belong to the aorta.
+    """
     draw = _Draw(rng)
     width, height = rng.choice(np.linspace(0.7, 1.3, 61), size=2)
     aorta = _aorta(draw)
@@ -166,14 +169,14 @@ def arch(rng: np.random.Generator) -> tuple[Array, int]:
     count = len(aorta)
 
     def add(course: Array, parent: int) -> int:
-        # Its first point is its parent's.
+        # The first point belongs to the parent.
         nonlocal count
         parents = np.append(parent, np.arange(count, count + len(course) - 2))
         rows.append(np.column_stack([course[1:], parents]))
         count += len(course) - 1
         return count - 1
 
-    # Branches come off at lengths from the end at the heart.
+    # Positions of the branches, as lengths from the end at the heart.
     from_heart_mm = np.cumsum([draw.number(36, 5), draw.number(16, 4), draw.number(28, 3)])
     along_mm = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(aorta[:, :3], axis=0), axis=1)))
     trunk_row, carotid_row, subclavian_row = (
@@ -192,13 +195,15 @@ def arch(rng: np.random.Generator) -> tuple[Array, int]:
 
 
 class ArchVariety:
-    """An arch of type I for each episode, drawn with edges of about ``edge_mm``; devices feel the surface that the centre line says.
+    """An arch of type I for each episode, drawn with triangle edges of about ``edge_mm``; devices touch the exact
+    surface of the centre line.
 
-    With ``count``, there are so many, made from ``seed`` when they first come, and kept; each can be drawn. With None there is a new one for each
-    episode, which takes no mesh to be felt: of one in twenty none comes, and a picture of it raises InputError or ComputationError.
+    With ``count``, there are that many arches, generated from ``seed`` when first needed, and kept; each is equally
+    likely. With None, each episode has a new one. Contact needs no mesh of it; about one in twenty cannot be meshed,
+    and a picture of such an arch raises InputError or ComputationError.
     """
 
-    #: What the widest and highest arches reach.
+    #: Bounds of the widest and highest arches.
     bounds_mm = np.array([[-110.0, -120.0, -10.0], [110.0, 110.0, 320.0]])
 
     def __init__(self, count: int | None = None, edge_mm: float = 4.0, seed: int = 0) -> None:
@@ -206,14 +211,14 @@ class ArchVariety:
         self._kept: dict[int, Site] = {}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ArchVariety:
-        # What it keeps never changes, and environments of one task share it.
+        # The cached arches are immutable, and environments of one task share them.
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
         return ArchVariety, (self.count, self.edge_mm, self.seed)
 
     def sample(self, rng: np.random.Generator) -> Site:
-        """A new arch from ``rng``, or one of those that ``seed`` makes."""
+        """A new arch from ``rng``, or one of those generated from ``seed``."""
         if self.count is None:
             return self._make(rng)
         number = int(rng.integers(self.count))
@@ -232,7 +237,7 @@ class ArchVariety:
                 last = refused
                 continue
             line = Centreline(table)
-            # Targets are in branches, beyond the aorta's own lumen.
+            # Targets are in branches, outside the lumen of the aorta.
             within = np.linalg.norm(line.positions_mm[:, None] - line.positions_mm[None, :aorta], axis=2)
             beyond = (within > line.radii_mm[:aorta]).all(axis=1)
             targets = beyond[1:] & beyond[line.parents[1:]]

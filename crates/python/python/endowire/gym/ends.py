@@ -1,4 +1,4 @@
-"""When an episode ends."""
+"""Conditions that end an episode."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 class End(Protocol):
-    """One reason for an episode to end. A simulation that fails ends it too."""
+    """A condition that ends an episode. A failure of the simulation ends it too."""
 
-    #: Whether the task itself ends (terminated), or only the watching (truncated).
+    #: Whether the condition is an outcome of the task (terminated) or only a limit (truncated).
     terminates: bool
 
     def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
-        """Whether it holds, for all environments, shape (n,)."""
+        """Whether the condition holds, for all environments, shape (n,)."""
         ...
 
 
@@ -41,7 +41,7 @@ class LeftVessel:
 
 
 class StepLimit:
-    """So many steps were made."""
+    """The number of steps has reached its limit."""
 
     terminates = False
 
@@ -53,7 +53,7 @@ class StepLimit:
 
 
 class ForceLimit:
-    """A contact presses harder than it may."""
+    """The force of a contact exceeds its limit."""
 
     terminates = True
 
@@ -65,10 +65,12 @@ class ForceLimit:
 
 
 class Laborious:
-    """The last step took more iterations of the method than so many: one of the few states whose steps take seconds, in place of a thousandth.
+    """The last step took more iterations of the method than the limit. This happens in rare states whose steps take
+    seconds instead of a millisecond.
 
-    For learning alone: the others of a vector wait for such an environment. A wire that snaps takes some hundreds of iterations, and a limit as low ends
-    most episodes just before they arrive: of seventeen of a hand that follows the way in ArchVariety, eleven arrive, and with a limit of 200 less than half.
+    Use it only for learning, where all environments of a vector wait for the slowest. A wire that snaps takes some
+    hundreds of iterations: a limit that low ends most episodes just before they arrive. Of seventeen episodes of
+    `policies.Steered("follow_path")` in ArchVariety eleven arrive, and fewer than half with a limit of 200.
     """
 
     terminates = False

@@ -1,4 +1,4 @@
-"""One environment."""
+"""A single environment."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .task import Task
 
 
 class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
-    """A task as an environment of Gymnasium."""
+    """A task as a Gymnasium environment."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 8}
 
@@ -38,11 +38,12 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
-        """Moves each instrument by a push and a turn, shape (n_instruments, 2): parts of the task's limits, from -1 to 1, or velocities, mm/s and
-        rad/s, as ``task.actions`` says; what is beyond the limits is clipped to them.
+        """Advances and rotates each instrument by an action of shape (n_instruments, 2). Depending on
+        ``task.actions``, its values are fractions of the task's limits, from -1 to 1, or velocities, mm/s and rad/s;
+        they are clipped to the limits.
 
-        Raises InputError for an action of another shape, and for one that is not finite, and ResetNeeded of Gymnasium before the first `reset`;
-        then nothing has moved.
+        Raises InputError for an action of another shape or with values that are not finite, and Gymnasium's
+        ResetNeeded before the first `reset`; then nothing has moved.
         """
         moved = np.asarray(action, dtype=float)
         if moved.shape != self.action_space.shape:
@@ -57,7 +58,7 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
         return self._observation(), reward, bool(terminated[0]), bool(truncated[0]), self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The picture of the task's view, shape (height, width, 3), with ``render_mode="rgb_array"``."""
+        """The picture of the task's view, shape (height, width, 3), if ``render_mode="rgb_array"``."""
         return picture(self._episodes, 0) if self.render_mode == "rgb_array" else None
 
     def _observation(self) -> dict[str, NDArray[Any]]:

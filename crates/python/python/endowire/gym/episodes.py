@@ -1,4 +1,4 @@
-"""Episodes that run side by side: what the environments of a vector have in common. A single environment is a vector of one."""
+"""Parallel episodes: the common part of the environments of a vector. A single environment is a vector of one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .scaling import shown
 from .task import Task
 from .vessels import Site
 
-#: Frames of an episode, at most: each has a noise of its own.
+#: Largest number of frames of an episode; each frame has its own noise.
 _FRAMES = 1 << 20
 
 
@@ -34,44 +34,46 @@ class Episodes:
         self._lengths_mm = np.array([instrument.length_mm for instrument in task.instruments])
         #: The simulations.
         self.batch: Batch = Batch([])
-        #: The site of each.
+        #: The site of each environment.
         self.sites: list[Site] = []
-        #: Where the tip shall go, mm, shape (n, 3).
+        #: Target positions, mm, shape (n, 3).
         self.target_mm = np.zeros((n, 3))
-        #: Where it is, mm, shape (n, 3).
+        #: Tip positions, mm, shape (n, 3).
         self.tip_mm = np.zeros((n, 3))
-        #: Way along the centre line to the target, mm, shape (n,), now and before the last step.
+        #: Path length along the centre line to the target, mm, shape (n,), now and before the last step.
         self.way_mm, self.way_before_mm = np.zeros(n), np.zeros(n)
-        #: The same when the episode began, shape (n,).
+        #: The same at the beginning of the episode, shape (n,).
         self.way_begun_mm = np.zeros(n)
-        #: The way from the root of the centre line to the target, of each.
+        #: The path from the root of the centre line to the target, for each environment.
         self.paths: list[Path | None] = [None] * n
-        #: Whether the tip is at the target, shape (n,).
+        #: Whether the tip has reached the target, shape (n,).
         self.reached = np.zeros(n, dtype=bool)
-        #: Steps made, shape (n,).
+        #: Number of steps, shape (n,).
         self.steps = np.zeros(n, dtype=int)
-        #: Steps after which no contact pressed harder than the task's limit, shape (n,).
+        #: Number of steps after which no contact force exceeded the task's limit, shape (n,).
         self.safe_steps = np.zeros(n, dtype=int)
-        #: The largest force of the wall at a contact, and that at the tip, N, shape (n, 2): now, and in the episode.
+        #: The largest wall force at a contact, and the sum of those at the tip, N, shape (n, 2): current values, and
+        #: maxima of the episode.
         self.force_n, self.largest_force_n = np.zeros((n, 2)), np.zeros((n, 2))
-        #: How far the tip has gone in the episode, mm, shape (n,): the sum of its ways from step to step.
+        #: Distance that the tip has travelled in the episode, mm, shape (n,): summed over the steps.
         self.path_length_mm = np.zeros(n)
-        #: Whether it was over when `ended` was asked last, shape (n,).
+        #: Whether the episode was over at the last call of `ended`, shape (n,).
         self._over = np.zeros(n, dtype=bool)
-        #: When the episode began, s of the machine's clock, shape (n,).
+        #: Start of the episode, s of the machine's clock, shape (n,).
         self._begun_s = np.zeros(n)
-        #: Number of the frame that shows it, shape (n,): seeds the noise of pictures.
+        #: Frame number, shape (n,): seeds the noise of pictures.
         self.frame = np.zeros(n, dtype=np.int64)
-        #: Last velocities within the limits, mm/s and rad/s, shape (n, n_instruments, 2); one that was no number leaves that before it.
+        #: Last velocities, clipped to the limits, mm/s and rad/s, shape (n, n_instruments, 2); NaN keeps the previous
+        #: value.
         self.action = np.zeros((n, instruments, 2))
-        #: What is noted of each episode, where the task is assessed.
+        #: Records of the episodes, if the task is assessed.
         self.records: list[Record | None] = [None] * n
-        #: What went wrong in the last step: exceptions by environment.
+        #: Failures in the last step: exceptions by environment.
         self.failures: dict[int, EndowireError] = {}
         self._ways = Ways(n)
 
     def begin(self, generators: dict[int, np.random.Generator]) -> None:
-        """Begins episodes of these environments; everything random comes from their generators."""
+        """Begins episodes of these environments; all random numbers come from their generators."""
         sampled = {k: self.task.vessels.sample(rng) for k, rng in generators.items()}
         starts = {k: self.task.start(site) for k, site in sampled.items()}
         if not self.sites:
@@ -79,7 +81,7 @@ class Episodes:
             self.sites = [sampled[k] for k in sorted(sampled)]
         for k, rng in generators.items():
             site, simulation = sampled[k], starts[k].copy()
-            # A shaped tip comes out of the sheath at any roll.
+            # A shaped tip leaves the sheath at a random roll angle.
             simulation.step(rotate_rad=[rng.uniform(0.0, 2.0 * np.pi) for _ in self.task.instruments])
             self.batch.replace(k, simulation)
             self.sites[k] = site
@@ -98,26 +100,27 @@ class Episodes:
             self.way_before_mm[k] = self.way_begun_mm[k] = self.way_mm[k]
 
     def step(self, velocities: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
-        """Moves those environments by velocities, mm/s and rad/s, shape (n, n_instruments, 2), clipped to the limits; the others wait. Where one is NaN the
-        simulation refuses it, and that is its failure.
+        """Moves the selected environments by velocities, mm/s and rad/s, shape (n, n_instruments, 2), clipped to the
+        limits; the others wait. A simulation refuses NaN, which counts as its failure.
 
-        Raises ResetNeeded of Gymnasium before the first `begin`.
+        Raises Gymnasium's ResetNeeded before the first `begin`.
         """
         self.check_begun("step")
         velocities = np.clip(velocities, -self._limits, self._limits)
         done = moving & ~np.isnan(velocities).any(axis=(1, 2))
         self.action = np.where(done[:, None, None], velocities, self.action)
         moves, behind = velocities * self.task.control_period_s, self.batch.behind
-        # Hands that are ahead by as far as they go in a step wait.
+        # An instrument whose commanded motion is ahead by a full step waits.
         most = self._limits * self.task.control_period_s
         moves = np.clip(moves, np.minimum(-most - behind, 0.0), np.maximum(most - behind, 0.0))
-        # Nothing is pushed in beyond its end or pulled out of the sheath, also not when the instruments have followed the hands.
+        # No instrument is pushed in beyond its end or pulled out of the sheath, even if it has not yet followed its
+        # commands.
         inserted_mm = self.batch.inserted_mm + behind[..., 0]
         moves[..., 0] = np.clip(moves[..., 0], -inserted_mm, self._lengths_mm - inserted_mm)
         moves[~moving] = 0.0
         solves = self.task.solves
         stopped = self.batch.step(moves) if solves is None else self.batch.tick(moves, solves)
-        # Where the way ends an instrument stays, and may be pulled back.
+        # Where the way ends an instrument stays, but can be pulled back.
         self.failures = {k: failure for k, failure in stopped.items() if not isinstance(failure, EndOfWay)}
         self.steps += moving
         if self.task.assessed:
@@ -134,12 +137,12 @@ class Episodes:
         self.path_length_mm += np.where(moving, np.linalg.norm(self.tip_mm - tip_before_mm, axis=1), 0.0)
 
     def check_begun(self, what: str) -> None:
-        """Raises ResetNeeded of Gymnasium where no episode has begun: there is nothing to step or to draw."""
+        """Raises Gymnasium's ResetNeeded if no episode has begun, since there is nothing to step or draw."""
         if not self.sites:
             raise ResetNeeded(f"reset comes before {what}: call reset once first")
 
     def observe(self) -> dict[str, NDArray[Any]]:
-        """All parts of the observations, within their spaces."""
+        """All observations, clipped to their spaces."""
         observed = {}
         for name, part in self._shown.items():
             space = self._spaces[name]
@@ -152,11 +155,11 @@ class Episodes:
         return observed
 
     def rewards(self) -> NDArray[np.float64]:
-        """The sum of all parts of the reward, shape (n,)."""
+        """The sum of all rewards, shape (n,)."""
         return sum((part.reward(self) for part in self.task.rewards), np.zeros(len(self.sites)))
 
     def ended(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Terminated and truncated, shape (n,); one that failed is truncated."""
+        """Terminated and truncated, shape (n,); failed episodes are truncated."""
         n = len(self.sites)
         terminated, truncated = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         for end in self.task.ends:
@@ -166,7 +169,9 @@ class Episodes:
         return terminated, truncated
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """Information beside the observations, a row for each environment; call it after `ended`, which says which episodes are over."""
+        """Further information, one row per environment; call it after `ended`, which determines the episodes that are
+        over.
+        """
         failed = np.array([str(self.failures.get(k, "")) for k in range(len(self.sites))], dtype=object)
         safety = np.where(self.steps > 0, self.safe_steps / np.maximum(self.steps, 1), 1.0)
         info = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
@@ -178,9 +183,10 @@ class Episodes:
             "largest_wall_force_n": self.largest_force_n[:, 0].copy(),
             "largest_tip_force_n": self.largest_force_n[:, 1].copy(),
         }
-        # Every force of the episode below the task's limit; the tip's is a sum of contacts, and may be above where none of them is.
+        # Whether all forces in the episode were below the task's limit. The tip force is a sum over contacts and can
+        # exceed it even if no single contact does.
         is_safe = (self.largest_force_n <= self.task.force_limit_n).all(axis=1)
-        # A clock's time is that of no seed: it is given for episodes that are over.
+        # Run time is not reproducible, so it is given only for episodes that are over.
         took_s = np.where(self._over, perf_counter() - self._begun_s, 0.0)
         info |= {"safe_success": self.reached & is_safe, "wall_time_s": took_s}
         if self.task.assessed:

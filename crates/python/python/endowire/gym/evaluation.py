@@ -1,4 +1,4 @@
-"""How well a policy does: episodes of stated seeds, and how sure the share of those that arrived is."""
+"""Evaluation of policies: episodes with given seeds, and the confidence interval of the success rate."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from .task import Task
 
 @dataclass(frozen=True)
 class Outcome:
-    """How an episode ended."""
+    """Result of an episode."""
 
     seed: int
     reached: bool
     steps: int
-    #: Way to the target that was left, mm.
+    #: Remaining path length to the target, mm.
     way_mm: float
-    #: Part of the steps after which no contact pressed harder than the task's limit.
+    #: Fraction of the steps after which no contact force exceeded the task's limit.
     safety: float
-    #: What went wrong, or nothing.
+    #: Error message of a failure, if there was one.
     failure: str
-    #: How far the tip went, mm: the sum of its ways from step to step.
+    #: Distance that the tip travelled, mm: summed over the steps.
     path_length_mm: float
-    #: The largest force of the wall at a contact, and the largest sum of those at the tip, N.
+    #: The largest wall force at a contact, and the largest sum of those at the tip, N.
     largest_wall_force_n: float
     largest_tip_force_n: float
-    #: Whether it arrived, and none of these was above the task's limit.
+    #: Whether it arrived, and none of these forces exceeded the task's limit.
     safe_success: bool
-    #: Time that the episode took on this machine, s: of environments side by side that of all of them.
+    #: Run time of the episode on this machine, s; parallel environments share it.
     wall_time_s: float = field(compare=False)
 
 
 def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8) -> list[Outcome]:
-    """One episode of each seed, the same as that of an environment reset with it, in the order of the seeds; none of none.
+    """Runs one episode for each seed, in order of the seeds; each equals that of an environment reset with the seed.
 
     Raises InputError for ``num_envs`` below 1.
     """
@@ -87,9 +87,11 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
 
 
 def table(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """What episodes come to, as a document of JSON: shares with their intervals (`interval`), means, and a row for each episode.
+    """A summary of episodes for JSON: rates with their confidence intervals (`interval`), means, and a row for each
+    episode.
 
-    Contrast medium is a column of such tables; no action injects any, and it is 0 ml. Raises InputError where there is no episode.
+    Contrast medium is a usual column of such tables; it is 0 ml here, since no action injects any. Raises InputError
+    if there is no episode.
     """
     n = len(outcomes)
     shares = {
@@ -111,9 +113,9 @@ def table(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def interval(successes: int, episodes: int, z: float = 1.959964) -> tuple[float, float]:
-    """The interval of Wilson (1927) for a share, of 95 % by default: it holds near 0 and 1, too.
+    """The confidence interval of Wilson (1927) for a success rate, 95 % by default; it is valid near 0 and 1, too.
 
-    Raises InputError where there is no episode, and for successes that are not among them.
+    Raises InputError if there is no episode, and for an invalid number of successes.
     """
     if episodes < 1:
         raise InputError(f"episodes = {episodes}: must be 1 or more, a share of none is not known")

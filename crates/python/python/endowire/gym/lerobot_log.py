@@ -1,8 +1,8 @@
-"""Episodes as a data set of `LeRobot <https://github.com/huggingface/lerobot>`_, for policies that learn from what was done: numbers as
+"""Episodes as a data set of `LeRobot <https://github.com/huggingface/lerobot>`_, for imitation learning: numbers as
 Parquet, fluoroscopic pictures as mp4, in the layout of LeRobotDataset v3.0.
 
-Import it where pyarrow and PyAV are installed: ``pip install "endowire[lerobot]"``. Each episode has files of its own, so that what is
-written is whole whenever the program ends.
+It requires pyarrow and PyAV: ``pip install "endowire[lerobot]"``. Each episode has its own files, so that everything
+written is valid whenever the program ends.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from .. import InputError
 from .lerobot_numbers import LEVELS, Numbers, of_levels, of_rows, together
 from .logs import new_folder, watched
 
-#: Files in a folder, at most.
+#: Largest number of files in a folder.
 _CHUNK = 1000
-#: How LeRobot calls places of files.
+#: LeRobot's templates of file paths.
 _FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
-#: Parts of frames per second that mp4 can tell.
+#: Resolution of frame rates in mp4.
 _FINEST_RATE = 10_000
-#: Key frames follow one another so closely that a single frame is read quickly; crf 18 leaves the noise of pictures.
+#: Distance of key frames, small so that a single frame is read quickly; crf 18 preserves the noise of pictures.
 _CODEC, _OPTIONS = "libx264", {"g": "2", "crf": "18", "threads": "1"}
-#: What is recorded of each step beside observation and action.
+#: Data recorded for each step besides observation and action.
 _OF_STEP = {"next.reward": "float32", "next.done": "bool", "next.truncated": "bool", "next.success": "bool"}
-#: Where each step is.
+#: Indices of each step.
 _PLACE = {
     "timestamp": "float32",
     **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), "int64"),
@@ -42,12 +42,13 @@ _PLACE = {
 
 
 class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Writes each episode of an environment into the data set ``folder``, which must be new or empty; an episode is whole with the next
-    `reset` or `close`.
+    """Writes each episode of an environment to the data set ``folder``, which must be new or empty; an episode is
+    complete after the next `reset` or `close`.
 
-    A frame is an observation and what was done then: ``observation.state``, all numbers of the observation one after another;
-    ``observation.images.NAME`` for its pictures (``NAME_0`` and so on where there are several planes); ``action``, velocities within their limits;
-    ``next.reward``, ``next.done``, ``next.truncated`` and ``next.success``, what came of it. ``task`` says in words what is to be done.
+    A frame contains an observation and the action that followed: ``observation.state``, all numbers of the
+    observation concatenated; ``observation.images.NAME`` for its pictures (``NAME_0`` and so on for several planes);
+    ``action``, velocities clipped to their limits; and the results ``next.reward``, ``next.done``, ``next.truncated``
+    and ``next.success``. ``task`` describes the task in words.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         if wrong:
             raise InputError(f"observations = {wrong[0]!r}: a name of a part must have no /")
         self._vectors = [name for name, space in spaces.items() if space.dtype != np.uint8]
-        #: Part of the observation and plane of each film.
+        #: Observation part and plane of each film.
         self._films: dict[str, tuple[str, int]] = {}
         for name in (name for name in spaces if name not in self._vectors):
             planes, *size = spaces[name].shape
@@ -146,11 +147,11 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         return features
 
     def _rate(self) -> float:
-        """Frames per second, a whole number where it is one."""
+        """Frames per second, as an integer if possible."""
         return self._fps.numerator if self._fps.denominator == 1 else float(self._fps)
 
     def _file(self, template: str, **names: str) -> Path:
-        """A file of the episode at hand; its folder is there."""
+        """Path of a file of the current episode; its folder is created."""
         chunk, file = divmod(self._episodes, _CHUNK)
         path = self.folder / template.format(chunk_index=chunk, file_index=file, **names)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -171,7 +172,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         film.mux(stream.encode(av.VideoFrame.from_ndarray(colours, format="rgb24")))
 
     def _end(self) -> None:
-        """Writes the episode at hand, if anything was done in it."""
+        """Writes the current episode, unless it has no steps."""
         if not self._rows:
             return
         count = len(self._rows)
@@ -201,7 +202,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._rows, self._writers, self._levels = [], {}, {}
 
     def _tell_episode(self, count: int, stats: dict[str, Numbers]) -> None:
-        """The row of an episode in `meta/episodes`."""
+        """Writes the row of an episode in `meta/episodes`."""
         chunk, file = divmod(self._episodes, _CHUNK)
         row: dict[str, Any] = {"episode_index": self._episodes, "tasks": [self._task], "length": count}
         row |= {"data/chunk_index": chunk, "data/file_index": file}
@@ -217,8 +218,8 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         pyarrow.parquet.write_table(table, self._file(f"meta/episodes/{_FILE}.parquet"))
 
     def _tell_all(self) -> None:
-        """What holds of all episodes so far."""
-        # The index of a table of pandas is what LeRobot looks tasks up by.
+        """Writes the data about all episodes so far."""
+        # LeRobot looks up tasks by the index of a pandas table.
         column = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object"}
         index = {"index_columns": ["task"], "columns": [{**column, "metadata": None}], "column_indexes": []}
         tasks = pyarrow.table({"task_index": [0], "task": [self._task]})
@@ -247,6 +248,6 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def _column(values: NDArray[Any], dtype: str, length: int) -> pyarrow.Array:
-    """Numbers of all frames; of several for each a list."""
+    """Numbers of all frames; lists if a frame has several."""
     flat = pyarrow.array(values.astype(dtype).ravel())
     return flat if length == 1 else pyarrow.FixedSizeListArray.from_arrays(flat, length)

@@ -1,6 +1,7 @@
-"""What LeRobot keeps of the numbers of an episode and of all, to normalise by: extremes, mean, standard deviation, quantiles, and of how many.
+"""Statistics of an episode and of all episodes in LeRobot's format, for normalisation: extremes, mean, standard
+deviation, quantiles and count.
 
-Of all episodes together extremes, mean and deviation are exact, quantiles means weighted by lengths, as LeRobot has them.
+Over all episodes, extremes, mean and deviation are exact; quantiles are means weighted by lengths, as in LeRobot.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Numbers of one feature by their kind.
+#: Statistics of one feature, by kind.
 Numbers = dict[str, NDArray[Any]]
 
-#: Levels of a picture of 8 bits.
+#: Number of levels of an 8-bit picture.
 LEVELS = 256
 
 _QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 
 
 def of_rows(values: NDArray[Any]) -> Numbers:
-    """Of numbers with a row for each frame."""
+    """Statistics of numbers with one row per frame."""
     rows = values.reshape(len(values), -1).astype(np.float64)
     quantiles = dict(zip(_QUANTILES, np.quantile(rows, list(_QUANTILES.values()), axis=0), strict=True))
     numbers = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0)}
@@ -28,7 +29,9 @@ def of_rows(values: NDArray[Any]) -> Numbers:
 
 
 def of_levels(levels: NDArray[np.int64], frames: int) -> Numbers:
-    """Of grey pictures in which each level came so often; white is 1, and each of three colours is alike."""
+    """Statistics of grey pictures from a histogram of their levels; white is 1, and the three colour channels are
+    equal.
+    """
     brightness, total = np.arange(LEVELS) / (LEVELS - 1.0), levels.sum()
     mean = brightness @ levels / total
     up_to, found = np.cumsum(levels), np.flatnonzero(levels)
@@ -41,7 +44,7 @@ def of_levels(levels: NDArray[np.int64], frames: int) -> Numbers:
 
 
 def together(before: Numbers | None, own: Numbers) -> Numbers:
-    """Of earlier episodes and one more."""
+    """Combines the statistics of earlier episodes and of one more."""
     if before is None:
         return own
     counts = before["count"], own["count"]

@@ -1,4 +1,4 @@
-"""What logs of episodes have in common: the environment that they watch and the folder that they write into."""
+"""Common code of episode logs: the environment that they watch and the folder that they write to."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .environment import InsertionEnv
 
 
 def watched(env: Any) -> InsertionEnv:
-    """The environment of endowire within its wrappers.
+    """The endowire environment inside its wrappers.
 
     Raises InputError for a vector, and for an environment of another package.
     """
@@ -22,9 +22,9 @@ def watched(env: Any) -> InsertionEnv:
 
 
 def new_folder(folder: str | PathLike[str]) -> Path:
-    """The folder, which need not be there yet.
+    """The folder of a log; it may be missing.
 
-    Raises InputError for one that is not empty, whose files a log would replace.
+    Raises InputError for a folder that is not empty, whose files a log would replace.
     """
     path = Path(folder)
     if path.exists() and any(path.iterdir()):

@@ -1,7 +1,7 @@
-"""What is observed: parts of a dictionary, each with its space. All work on all environments of a vector at once.
+"""Observations: parts of a dictionary, each with its space. All parts handle all environments of a vector at once.
 
-Parts are in mm, N and N·mm; a part that has a ``unit`` can be shown scaled to numbers of about 1 (`scaling`), which is what a task shows unless it says
-``observed="physical"``.
+Values are in mm, N and N·mm. A part with a ``unit`` can be scaled to numbers of about 1 (`scaling`); a task does this
+unless ``observed="physical"``.
 """
 
 from __future__ import annotations
@@ -31,13 +31,15 @@ class Observation(Protocol):
 
 
 def _place(task: Task, *shape: int) -> spaces.Box:
-    """Positions within the box of the vessels, mm."""
+    """The space of positions within the bounding box of the vessels, mm."""
     low, high = (np.broadcast_to(corner, (*shape, 3)).astype(np.float32) for corner in task.vessels.bounds_mm)
     return spaces.Box(low, high, dtype=np.float32)
 
 
 def _of_vessels(task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions are scaled from the middle of the box of the vessels, in half of its longest side: alike in all directions."""
+    """Centre and scale of positions: the centre of the vessels' bounding box, and half of its longest side, equal in
+    all directions.
+    """
     low, high = task.vessels.bounds_mm
     return (low + high) / 2.0, np.full(3, (high - low).max() / 2.0)
 
@@ -85,14 +87,18 @@ class Shape:
 
 
 class Roadmap:
-    """What a roadmap shows of the way ahead, seen from the tip of the device, shape (3 len(ahead_mm) + 6,), numbers of about 1.
+    """The path ahead as in a roadmap, seen from the tip of the device, shape (3 len(ahead_mm) + 6,), numbers of about
+    1.
 
-    For each length ahead of the place of the way nearest to the tip, the point there, from the tip and in parts of that length: towards the side to which
-    the tip is bent, across that, and along the device behind its bend. Then the tip itself, seen so from where its bend ends ``bend_mm`` behind it
-    (bent to the side, along); the way that is left in 100 mm; the distance from the way in the vessel's radii; the vessel's radius in 10 mm; and how much
-    more is inserted than has become way, in 50 mm. It is of the innermost instrument.
+    For each length in ``ahead_mm``, it contains the point this far ahead of the nearest point on the path, relative
+    to the tip and as fractions of that length. Coordinates are: towards the side to which the tip is bent, across
+    that, and along the device behind its bend. These follow: the tip relative to the end of its bend, ``bend_mm``
+    behind it (to the side, along); the remaining path length in 100 mm; the distance from the path in the vessel's
+    radii; the vessel's radius in 10 mm; and the inserted length minus the progress along the path, in 50 mm. It
+    refers to the innermost instrument.
 
-    A policy that has it knows the centre line to the target, as an operator does with a roadmap; parts without it do not.
+    A policy with this observation knows the centre line to the target, as an operator does with a roadmap; without it
+    a policy does not.
     """
 
     def __init__(self, ahead_mm: tuple[float, ...] = (5.0, 10.0, 20.0, 40.0), bend_mm: float = 16.0) -> None:
@@ -117,7 +123,7 @@ class Roadmap:
         ahead = path.at_mm(at_mm + self.ahead_mm)
         along = root - behind
         if not along.any():
-            # What is in is still within its bend: the way tells where the device goes.
+            # If the inserted length is still within the bend, the path gives the direction of the device.
             along = ahead[0] - path.at_mm(np.array([at_mm - 5.0]))[0]
         along = along / np.linalg.norm(along)
         bent = tip - root - (tip - root) @ along * along
@@ -134,7 +140,7 @@ class Roadmap:
 
 
 class Hands:
-    """Inserted length in mm and turn of the tail as cosine and sine, shape (n_instruments, 3)."""
+    """Inserted length in mm, and rotation of the tail as cosine and sine, shape (n_instruments, 3)."""
 
     def space(self, task: Task) -> spaces.Box:
         lengths = [[instrument.length_mm, 1.0, 1.0] for instrument in task.instruments]
@@ -143,7 +149,7 @@ class Hands:
         return spaces.Box(low, high, dtype=np.float32)
 
     def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lengths are scaled to parts of the instrument."""
+        """Lengths are scaled to fractions of the instrument's length."""
         lengths = np.array([[instrument.length_mm, 1.0, 1.0] for instrument in task.instruments])
         return np.zeros_like(lengths), lengths
 
@@ -153,9 +159,10 @@ class Hands:
 
 
 class Forces:
-    """Push force in N and torque in N·mm of each hand, and the largest force of a contact in N: shape (2 n_instruments + 1,).
+    """Push force in N and torque in N·mm of each instrument, and the largest force of a contact in N: shape (2
+    n_instruments + 1,).
 
-    Values beyond ``largest`` are shown as it, and a push force that jumps as 0.
+    Values are clipped to ``largest``, and a push force that jumps is shown as 0.
     """
 
     def __init__(self, largest: float = 100.0) -> None:
@@ -165,7 +172,7 @@ class Forces:
         return spaces.Box(-self.largest, self.largest, (2 * len(task.instruments) + 1,), dtype=np.float32)
 
     def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Newtons and newton millimetres are of about 1 as they are."""
+        """Newtons and newton millimetres are about 1 without scaling."""
         return np.zeros(1), np.ones(1)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
@@ -176,7 +183,7 @@ class Forces:
 
 
 class LastAction:
-    """The action before, within its limits and in the task's own unit of actions, shape (n_instruments, 2)."""
+    """The previous action, clipped to its limits and in the task's unit of actions, shape (n_instruments, 2)."""
 
     def space(self, task: Task) -> spaces.Box:
         return task.action_space()
@@ -186,10 +193,10 @@ class LastAction:
 
 
 class Fluoroscopy:
-    """The fluoroscopic picture of one plane or more, 8 bits, shape (planes, height, width).
+    """The fluoroscopic picture of one or more planes, 8 bits, shape (planes, height, width).
 
-    ``planes`` are the primary and secondary angles of the C-arm in degrees; ``view`` has further keys of `[view]` of a scene file.
-    The detector has no lag: environments share it.
+    ``planes`` are the primary and secondary angles of the C-arm in degrees; ``view`` has further keys of `[view]` of
+    a scene file. The detector has no lag, because environments share it.
     """
 
     def __init__(

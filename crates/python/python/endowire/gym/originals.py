@@ -1,7 +1,8 @@
-"""Vessels of the tasks of stEVE_bench, read from its own files where a user has them, and stand-ins where not.
+"""Vessels of the tasks of stEVE_bench, read from its own files if the user has them, and substitutes otherwise.
 
-DualDeviceNav is a surface (OBJ) and centre lines of 3D Slicer (``*.mrk.json``), BasicWireNav the model 0011_H_AO_H of the Vascular Model
-Repository: a surface (``Meshes/*.vtp``) and paths of SimVascular (``Paths/*.pth``). Neither comes with this package.
+DualDeviceNav is a surface (OBJ) with centre lines of 3D Slicer (``*.mrk.json``). BasicWireNav is the model
+0011_H_AO_H of the Vascular Model Repository: a surface (``Meshes/*.vtp``) with paths of SimVascular
+(``Paths/*.pth``). Neither is part of this package.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from .vessels import Site
 
 Array = NDArray[np.float64]
 
-#: Radius of a path of SimVascular, which has none, mm.
+#: Assumed radius of a SimVascular path, which contains none, mm.
 _PATH_RADIUS_MM = 5.0
 
 
 class OriginalVessel:
-    """A vessel in every episode that was read from the files of a task."""
+    """A fixed vessel that was read from the files of a task."""
 
     def __init__(self, site: Site) -> None:
         self.site = site
@@ -41,10 +42,10 @@ class OriginalVessel:
 def dual_device_nav(folder: str | PathLike[str]) -> OriginalVessel:
     """The vessel of DualDeviceNav from the folder ``data/dualdevicenav`` of stEVE_bench.
 
-    Raises InputError for files that are missing or not of their kind.
+    Raises InputError for missing or invalid files.
     """
     root = Path(folder)
-    # Turned by 90° about y, then by −90° about z, as there.
+    # Rotated by 90° about y, then by −90° about z, as in the original.
     turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
     surface = Vessel.read(root / "vessel_architecture_collision.obj")
     vessel = Vessel.from_arrays(surface.vertices_mm @ turn.T, surface.triangles)
@@ -61,21 +62,21 @@ def dual_device_nav(folder: str | PathLike[str]) -> OriginalVessel:
 def basic_wire_nav(folder: str | PathLike[str]) -> OriginalVessel:
     """The vessel of BasicWireNav from the folder of the model 0011_H_AO_H of the Vascular Model Repository.
 
-    Raises InputError for files that are missing or not of their kind.
+    Raises InputError for missing or invalid files.
     """
     root = Path(folder)
     angle = np.deg2rad(133.0)
     turn = np.array(
         [[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]]
     )
-    # Centimetres there.
+    # The files are in centimetres.
     surface = Vessel.read(_files(root / "Meshes", "*.vtp")[0], unit_mm=10.0)
     vessel = Vessel.from_arrays(surface.vertices_mm @ turn.T, surface.triangles)
     turn *= 10.0
     curves = {}
     for path in _files(root / "Paths", "*.pth"):
         points_mm = _simvascular_path(path) @ turn.T
-        # Paths begin and end outside.
+        # Paths begin and end outside the vessel.
         points_mm = points_mm[vessel.contains(points_mm)]
         if len(points_mm) > 1:
             curves[path.stem] = np.column_stack([points_mm, np.full(len(points_mm), _PATH_RADIUS_MM)])
@@ -98,7 +99,7 @@ def _files(folder: Path, pattern: str) -> list[Path]:
 
 
 def _slicer_curve(path: Path) -> Array:
-    """Points and radii of a curve of 3D Slicer, shape (n, 4)."""
+    """Points and radii of a 3D Slicer curve, shape (n, 4)."""
     try:
         markup = json.loads(path.read_text())["markups"][0]
         points = np.array([point["position"] for point in markup["controlPoints"]], dtype=float)
@@ -109,7 +110,7 @@ def _slicer_curve(path: Path) -> Array:
 
 
 def _simvascular_path(path: Path) -> Array:
-    """Points of a path of SimVascular, shape (n, 3), in its own unit."""
+    """Points of a SimVascular path, shape (n, 3), in its own unit."""
     _, _, points = path.read_text().partition("<path_points>")
     number = r'"\s*([-+.\deE]+)\s*"'
     found = re.findall(rf"<pos\s+x={number}\s+y={number}\s+z={number}", points)
@@ -119,9 +120,10 @@ def _simvascular_path(path: Path) -> Array:
 
 
 def joined(curves: list[Array], start_mm: Array) -> tuple[Array, list[int]]:
-    """Curves as one tree, shape (n, 5), from the end that is nearest to a point; and the curve that each row is of.
+    """Joins curves to one tree, shape (n, 5), that starts at the end nearest to a point; also returns the curve of
+    each row.
 
-    Curve after curve, the one whose end is nearest to what there is comes off there.
+    In each step, the curve whose end is nearest to the tree so far is attached there.
     """
     left = dict(enumerate(curves))
     rows, owners = np.zeros((0, 5)), []
@@ -133,7 +135,7 @@ def joined(curves: list[Array], start_mm: Array) -> tuple[Array, list[int]]:
         k, end = ends[best]
         parent = int(np.argmin(off[best])) if len(rows) else -1
         curve = left.pop(k)[:: 1 if end == 0 else -1]
-        # A point twice would be a segment without length.
+        # A repeated point would be a segment of length zero.
         if parent >= 0 and np.allclose(curve[0, :3], rows[parent, :3]):
             curve = curve[1:]
         keep = np.append(True, np.linalg.norm(np.diff(curve[:, :3], axis=0), axis=1) > 1e-9)[: len(curve)]

@@ -1,4 +1,4 @@
-"""Pictures for people."""
+"""Pictures for display."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from .episodes import Episodes
 
 
 def check_mode(render_mode: str | None) -> None:
-    """Raises InputError for a mode of rendering that there is not."""
+    """Raises InputError for an unknown render mode."""
     if render_mode not in (None, "rgb_array"):
         window = "; gymnasium.wrappers.HumanRendering shows its pictures in a window" * (render_mode == "human")
         raise InputError(f"render_mode = {render_mode!r}: give rgb_array, or none{window}")
 
 
 def picture(episodes: Episodes, k: int) -> NDArray[np.uint8]:
-    """Environment ``k`` in its task's view, shape (height, width, 3): in 3D where that is asked for, else in fluoroscopy.
+    """Environment ``k`` in its task's view, shape (height, width, 3): in 3D if that is requested, otherwise
+    fluoroscopy.
 
-    Raises ResetNeeded of Gymnasium before the first reset.
+    Raises Gymnasium's ResetNeeded before the first reset.
     """
     episodes.check_begun("render")
     renderer = episodes.sites[k].renderer({**episodes.task.view, "bits": 8})

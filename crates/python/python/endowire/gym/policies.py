@@ -1,4 +1,4 @@
-"""What acts in an environment without learning: what a policy that learns is compared with."""
+"""Policies without learning, as baselines."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ if TYPE_CHECKING:
 
 
 class Policy(Protocol):
-    """Says what to do next."""
+    """Chooses actions."""
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
-        """Velocities for all environments, shape (n, n_instruments, 2): mm/s and rad/s. An episode begins where ``episodes.steps`` is 0."""
+        """Velocities for all environments, shape (n, n_instruments, 2): mm/s and rad/s. ``episodes.steps`` is 0 at
+        the start of an episode.
+        """
         ...
 
 
 class Straight:
-    """Pushes on at the fastest and never turns."""
+    """Pushes at the largest speed and never rotates."""
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         action = np.zeros_like(episodes.action)
@@ -31,7 +33,7 @@ class Straight:
 
 
 class Uniform:
-    """Random velocities, uniform from ``slowest_mm_s`` to the limit of a push and within the limits of a turn."""
+    """Random velocities, uniform from ``slowest_mm_s`` to the push limit and within the rotation limits."""
 
     def __init__(self, seed: int = 0, slowest_mm_s: float = -10.0) -> None:
         self.rng, self.slowest_mm_s = np.random.default_rng(seed), slowest_mm_s
@@ -42,10 +44,11 @@ class Uniform:
 
 
 class Steered:
-    """The library's hands, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of `Controller`, on copies of the
-    simulations. Where a hand gives up its instruments stay.
+    """The library's controllers, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of
+    `Controller`, on copies of the simulations. If a controller gives up, its instruments stay.
 
-    Their commands of 2 mm and 0.35 rad at most are within a step's limits at 7.5 Hz and 35 mm/s. Raises InputError for another ``kind``.
+    Their commands of at most 2 mm and 0.35 rad are within a step's limits at 7.5 Hz and 35 mm/s. Raises InputError
+    for another ``kind``.
     """
 
     def __init__(self, kind: str = "search_ahead") -> None:
@@ -61,7 +64,7 @@ class Steered:
             if episodes.steps[k] == 0:
                 path = episodes.paths[k]
                 assert path is not None
-                # The end of an episode is the task's to tell: the hand goes on to the end of its way.
+                # The task decides when an episode ends, so the controller continues to the end of its path.
                 self._hands[k] = self.make(path.table_mm, arrived_mm=0.0)
             move = self._hands[k].next(episodes.batch.simulation(k))
             if move is not None:

@@ -1,6 +1,7 @@
-"""Episodes as recordings of `Rerun <https://rerun.io>`_: the vessel, the instruments, the target and what steps tell, to be looked at step by step.
+"""Episodes as recordings of `Rerun <https://rerun.io>`_: the vessel, the instruments, the target and the data of each
+step, to be viewed step by step.
 
-Import it where rerun-sdk is installed: ``pip install "endowire[rerun]"``.
+It requires rerun-sdk: ``pip install "endowire[rerun]"``.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from .logs import new_folder, watched
 
 
 class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Writes each episode of an environment as ``episode_000000.rrd`` and so on in ``folder``, which must be new or empty; a file is whole with the
-    next `reset` or `close`.
+    """Writes each episode of an environment as ``episode_000000.rrd`` and so on in ``folder``, which must be new or
+    empty; a file is complete after the next `reset` or `close`.
 
-    Lengths are in mm. Beside steps there is the time of the task, s. Raises InputError for a folder that holds something, and for what is no
-    single environment of endowire.
+    Lengths are in mm. Data have a step and the time of the task, s. Raises InputError for a folder that is not empty,
+    and for anything but a single endowire environment.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], folder: str | PathLike[str]) -> None:
@@ -86,7 +87,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         line_mm, from_tip_mm = simulation.positions_mm, simulation.from_tip_mm
         lengths_mm = simulation.inserted_mm
         for k, (instrument, mm) in enumerate(zip(task.instruments, lengths_mm, strict=True)):
-            # An instrument reaches as far from the sheath as it is in; the line is that of the farthest.
+            # An instrument covers its inserted length from the sheath; the line is that of the foremost one.
             own = line_mm[from_tip_mm >= lengths_mm.max() - mm - 1e-9]
             radius_mm = max(section["radius_mm"] for section in instrument.sections)
             strips = [own] if len(own) > 1 else []

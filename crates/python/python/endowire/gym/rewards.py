@@ -1,4 +1,4 @@
-"""What a step is worth: parts that add up. All work on all environments of a vector at once."""
+"""Rewards: parts that are added up. All parts handle all environments of a vector at once."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Reward(Protocol):
 
 
 class Reached:
-    """So much when the target is reached."""
+    """A reward for reaching the target."""
 
     def __init__(self, worth: float = 1.0) -> None:
         self.worth = worth
@@ -30,7 +30,7 @@ class Reached:
 
 
 class EachStep:
-    """So much for every step."""
+    """A reward for every step."""
 
     def __init__(self, worth: float = -0.005) -> None:
         self.worth = worth
@@ -40,7 +40,7 @@ class EachStep:
 
 
 class Approach:
-    """So much for every millimetre by which the way to the target along the centre line has become shorter."""
+    """A reward for every millimetre by which the path length to the target along the centre line decreases."""
 
     def __init__(self, worth_per_mm: float = 0.001) -> None:
         self.worth_per_mm = worth_per_mm
@@ -50,23 +50,25 @@ class Approach:
 
 
 class Progress:
-    """So much for the whole way to the target, and for each part of it as it becomes shorter; taken back where it becomes longer.
+    """A reward for the whole path to the target, given in proportion as the remaining path gets shorter, and taken
+    back as it gets longer.
 
-    It is the difference of a potential, the way that is left over that at the episode's beginning (Ng, Harada and Russell, ICML 1999, without discount):
-    what an episode has in all hangs on where it begins and ends alone, and no detour is worth anything.
+    It is the difference of a potential, the remaining path length relative to that at the start (Ng, Harada and
+    Russell, ICML 1999, without discount): the total of an episode depends only on its first and last state, and
+    detours gain nothing.
     """
 
     def __init__(self, worth: float = 1.0) -> None:
         self.worth = worth
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
-        # A way that begins at the target has no parts.
+        # Avoids a division by zero if the episode starts at the target.
         whole_mm = np.maximum(episodes.way_begun_mm, episodes.task.threshold_mm)
         return self.worth * (episodes.way_before_mm - episodes.way_mm) / whole_mm
 
 
 class Distance:
-    """So much for every millimetre between tip and target."""
+    """A reward for every millimetre between tip and target."""
 
     def __init__(self, worth_per_mm: float = -0.001) -> None:
         self.worth_per_mm = worth_per_mm
@@ -76,7 +78,7 @@ class Distance:
 
 
 class ContactForce:
-    """So much for every newton by which the largest force of a contact is beyond a limit."""
+    """A reward for every newton by which the largest contact force exceeds a limit."""
 
     def __init__(self, worth_per_n: float = -0.1, limit_n: float = 1.0) -> None:
         self.worth_per_n, self.limit_n = worth_per_n, limit_n

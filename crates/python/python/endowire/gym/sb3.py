@@ -1,6 +1,7 @@
-"""A vector of environments as `stable-baselines3 <https://stable-baselines3.readthedocs.io>`_ has them, and its models as policies.
+"""Vector environments for `stable-baselines3 <https://stable-baselines3.readthedocs.io>`_, and its models as
+policies.
 
-Import it where stable-baselines3 is installed: ``pip install "endowire[learn]"``.
+It requires stable-baselines3: ``pip install "endowire[learn]"``.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from .task import Task
 class SB3VecEnv(VecEnv):
     """``num_envs`` environments of a task, stepped in one call.
 
-    Actions are parts of the limits of the task's own, from -1 to 1, shape (num_envs, n_instruments, 2). As stable-baselines3 wants it, an environment
-    whose episode ends begins the next at once: what it shows is the first observation of that, the last of the one that has ended is
-    ``infos[k]["terminal_observation"]``. Environment k has the seed ``seed + k``, and an episode with it is that of `InsertionEnv`.
+    Actions are fractions of the task's limits, from -1 to 1, shape (num_envs, n_instruments, 2). As stable-baselines3
+    requires, an environment whose episode ends is reset at once: it returns the first observation of the new episode,
+    and the last one of the old episode is ``infos[k]["terminal_observation"]``. Environment k has the seed ``seed +
+    k``, with the same episodes as `InsertionEnv`.
     """
 
     def __init__(self, task: Task, num_envs: int, seed: int | None = None) -> None:
         self.task = task
-        #: What parts of a task and policies look at.
+        #: The episodes, for parts of a task and policies.
         self.episodes = Episodes(task, num_envs)
         self._limits = task.limits()
         self.render_mode = None
@@ -50,13 +52,13 @@ class SB3VecEnv(VecEnv):
         return self.episodes.observe()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Takes the actions of the next `step_wait`."""
+        """Stores the actions for the next `step_wait`."""
         self._velocities = np.asarray(actions, dtype=float) * self._limits
 
     def step_wait(
         self,
     ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Moves all."""
+        """Steps all environments."""
         self.episodes.step(self._velocities, np.ones(self.num_envs, dtype=bool))
         rewards = self.episodes.rewards().astype(np.float32)
         terminated, truncated = self.episodes.ended()
@@ -73,10 +75,10 @@ class SB3VecEnv(VecEnv):
         return observed, rewards, over, infos
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Does nothing, because no resources are held."""
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The same of all: environments have nothing of their own."""
+        """The attribute, the same for all environments."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
@@ -88,7 +90,7 @@ class SB3VecEnv(VecEnv):
         raise NotImplementedError(f"{method_name}: environments have no methods of their own")
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """None is."""
+        """False for all environments."""
         return [False for _ in self._get_indices(indices)]
 
     def _infos(self) -> list[dict[str, Any]]:
@@ -97,7 +99,9 @@ class SB3VecEnv(VecEnv):
 
 
 class Learned:
-    """A model of stable-baselines3 as a `Policy`, without its noise; ``normalize`` is what its observations were normalised with."""
+    """A model of stable-baselines3 as a deterministic `Policy`; ``normalize`` is the normalisation of its
+    observations.
+    """
 
     def __init__(self, model: BaseAlgorithm, normalize: VecNormalize | None = None) -> None:
         assert isinstance(model.action_space, spaces.Box)

@@ -1,4 +1,4 @@
-"""Observations as numbers of about 1, which policies learn from as they are."""
+"""Scaling of observations to numbers of about 1, suitable for learning."""
 
 from __future__ import annotations
 
@@ -14,40 +14,42 @@ if TYPE_CHECKING:
     from .episodes import Episodes
     from .task import Task
 
-#: What is beyond so many units is shown as so many: a wire in a jam presses with any force.
+#: Scaled values are clipped to this magnitude: a jammed wire can have any force.
 _MOST = 10.0
 
 
 @runtime_checkable
 class HasUnit(Protocol):
-    """A part of the observations that can be scaled."""
+    """An observation that can be scaled."""
 
     def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """What is shown as 0, and how far from it what is shown as 1, for each number or for the last axis."""
+        """Offset and scale, for each number or for the last axis."""
         ...
 
 
 class Scaled:
-    """A part of the observations of a task in its units."""
+    """An observation of a task, scaled."""
 
     def __init__(self, part: Observation, middle: NDArray[np.float64], unit: NDArray[np.float64]) -> None:
         self.part, self.middle, self.unit = part, middle, unit
 
     def space(self, task: Task) -> spaces.Box:
-        """That of the part in its units, at most ten of them."""
+        """The space of the scaled observation, clipped to ±10."""
         physical = self.part.space(task)
         ends = [(end - self.middle) / self.unit for end in (physical.low, physical.high)]
         low, high = (np.clip(end, -_MOST, _MOST).astype(np.float32) for end in ends)
         return spaces.Box(low, high, dtype=np.float32)
 
     def observe(self, episodes: Episodes) -> NDArray[Any]:
-        """The part in its units."""
+        """The scaled observation."""
         scaled: NDArray[Any] = (self.part.observe(episodes) - self.middle) / self.unit
         return scaled
 
 
 def shown(task: Task) -> dict[str, Observation]:
-    """The parts of a task's observations as it shows them, by the names that they have then: a part that is scaled is not in mm, and its name does not say so."""
+    """The observations of a task as it shows them, by name. A scaled observation is not in mm, and its name has no
+    unit.
+    """
     if task.observed == "physical":
         return dict(task.observations)
     parts: dict[str, Observation] = {}

@@ -1,4 +1,4 @@
-"""Where the tip shall go."""
+"""Choice of targets."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ from .vessels import Site
 
 
 class TargetSampler(Protocol):
-    """Gives each episode its target."""
+    """Chooses the target of each episode."""
 
     def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
-        """A point in the vessel, mm, shape (3,); all that is random in it comes from ``rng``. In ``start`` nothing is inserted."""
+        """A point in the vessel, mm, shape (3,); all random numbers come from ``rng``. In ``start`` nothing is
+        inserted.
+        """
         ...
 
 
 class CentrelineTarget:
-    """A point of the centre line where the site has targets, all alike likely, at least so far from the sheath along the way."""
+    """A random point of the centre line where the site allows targets, uniformly distributed, at least a given path
+    length from the sheath.
+    """
 
     def __init__(self, least_mm: float = 50.0) -> None:
         self.least_mm = least_mm
@@ -56,7 +60,7 @@ class FixedTarget:
 
 
 class NamedTarget:
-    """One of these named points of a generated vessel, all alike likely."""
+    """A random one of these named points of a generated vessel."""
 
     def __init__(self, *names: str) -> None:
         self.names = names

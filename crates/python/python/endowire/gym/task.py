@@ -1,4 +1,4 @@
-"""What an environment is made of: every part may be replaced."""
+"""Tasks: the replaceable parts of environments."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def _ends() -> list[ends.End]:
 
 
 def _check_above_zero(name: str, value: float) -> None:
-    # NaN is above nothing.
+    # NaN is not greater than anything.
     if not isinstance(value, (int, float, np.number)) or not 0.0 < value < np.inf:
         raise InputError(f"{name} = {value!r}: must be a number above 0")
 
 
 @dataclass(eq=False)
 class Task:
-    """Instruments in a vessel, a target, and what is observed, worth and the end."""
+    """Instruments in a vessel, a target, observations, rewards and conditions of the end."""
 
     instruments: Sequence[Instrument]
     vessels: VesselSource
@@ -50,21 +50,23 @@ class Task:
     observations: Mapping[str, observations.Observation] = field(default_factory=_observations)
     rewards: Sequence[rewards.Reward] = field(default_factory=_rewards)
     ends: Sequence[ends.End] = field(default_factory=_ends)
-    #: How near the tip comes to a target that it reaches, mm.
+    #: Distance from the target at which the tip has reached it, mm.
     threshold_mm: float = 5.0
-    #: Force of a contact beyond which a step is not safe, N.
+    #: Contact force above which a step counts as unsafe, N.
     force_limit_n: float = 1.5
     #: Time between two actions, s.
     control_period_s: float = 1.0 / 7.5
-    #: Linear solves of a step, so that none takes long: what the instruments have not followed in them the next step goes on with (``info["behind_mm"]``), and hands
-    #: that are ahead by as far as they go in a step wait.
-    #: None: each step goes on to the equilibrium, however long that takes.
+    #: Limit of linear solves per step, so that no step takes long. The remaining motion is continued in the next step
+    #: (``info["behind_mm"]``), and an instrument that is a full step behind its commands gets no further ones. None:
+    #: each step continues to the equilibrium, however long that takes.
     solves: int | None = None
-    #: Fastest push in mm/s and turn in rad/s of a hand.
+    #: Largest advance speed in mm/s and rotation speed in rad/s of an instrument.
     speed_limits: tuple[float, float] = (35.0, 3.14)
-    #: What an action of an environment is: parts of these limits, from -1 to 1, which policies learn from as they are; or velocities, mm/s and rad/s.
+    #: Unit of actions: fractions of these limits, from -1 to 1, which are suitable for learning; or velocities, mm/s
+    #: and rad/s.
     actions: Literal["scaled", "physical"] = "scaled"
-    #: What observations are: scaled to numbers of about 1 (see `scaling`; names lose the unit they end with, ``tip_mm`` is ``tip``), or in mm, N and N·mm.
+    #: Unit of observations: scaled to numbers of about 1 (see `scaling`; names lose the unit at their end, ``tip_mm``
+    #: becomes ``tip``), or in mm, N and N·mm.
     observed: Literal["scaled", "physical"] = "scaled"
     #: Keys of `[vessel.wall]` of a scene file.
     wall: Mapping[str, Any] = field(default_factory=dict)
@@ -74,9 +76,10 @@ class Task:
     coupling: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[view]` of a scene file for `render()`.
     view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
-    #: Whether ``info["assessment"]`` tells the measures of an episode that is over, as `endowire.assess` does of a recorded run.
+    #: Whether ``info["assessment"]`` contains the measures of an episode that is over, as `endowire.assess` gives
+    #: them for a recorded run.
     assessed: bool = False
-    #: What the vessel stands in for, where it is not that of the task's name; reported in ``info["stand_in"]``.
+    #: The original vessel that this one replaces, if it is a substitute; reported in ``info["stand_in"]``.
     stand_in: str = ""
 
     def __post_init__(self) -> None:
@@ -97,25 +100,27 @@ class Task:
             raise InputError(f"solves = {self.solves!r}: give a whole number of at least one, or None")
 
     def limits(self) -> NDArray[np.float64]:
-        """Fastest push in mm/s and turn in rad/s of each instrument, shape (n_instruments, 2)."""
+        """Largest advance speed in mm/s and rotation speed in rad/s of each instrument, shape (n_instruments, 2)."""
         return np.tile(np.asarray(self.speed_limits, dtype=float), (len(self.instruments), 1))
 
     def action_unit(self) -> NDArray[np.float64]:
-        """The velocities that an action of 1 is, mm/s and rad/s, shape (n_instruments, 2)."""
+        """The velocities that an action of 1 stands for, mm/s and rad/s, shape (n_instruments, 2)."""
         limits = self.limits()
         return limits if self.actions == "scaled" else np.ones_like(limits)
 
     def action_space(self) -> spaces.Box:
-        """A push and a turn of each instrument, shape (n_instruments, 2), as `actions` says."""
+        """The space of actions: advance and rotation of each instrument, shape (n_instruments, 2), in the unit of
+        `actions`.
+        """
         high = (self.limits() / self.action_unit()).astype(np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
     def observation_spaces(self) -> dict[str, spaces.Box]:
-        """The space of each part of the observations, as `observed` says."""
+        """The space of each observation, in the unit of `observed`."""
         return {name: part.space(self) for name, part in shown(self).items()}
 
     def start(self, site: Site) -> Simulation:
-        """The simulation of a site with nothing inserted, made once: copy it."""
+        """The simulation of a site with nothing inserted. It is created once and cached: copy it."""
         if self not in site.starts:
             site.starts[self] = Simulation(
                 site.vessel,

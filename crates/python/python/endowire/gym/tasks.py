@@ -1,4 +1,4 @@
-"""The tasks behind the registered ids."""
+"""The tasks of the registered ids."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .vessels import FixedVessel
 
 
 def hooked_wire() -> Instrument:
-    """A guidewire of 0.035" with a soft tip bent by 72° about a radius of 12.1 mm."""
+    """A guidewire of 0.035" with a soft tip, bent by 72° with a radius of 12.1 mm."""
     return Instrument(
         [
             {
@@ -34,10 +34,12 @@ def hooked_wire() -> Instrument:
 
 
 def curved_tube(**parts: Any) -> Task:
-    """The hooked wire in a tube that bends by 180°, 200 steps: five times as many as a straight push to its end takes.
+    """The hooked wire in a tube that bends by 180°, 200 steps: five times as many as a straight push to its end
+    takes.
 
-    Elements of 7.5 mm and contact points four radii apart are enough in a tube without crests: after 1700 random steps in 15 episodes the tip is within
-    0.002 mm of that with elements of 5 mm and points 1.5 radii apart, in two thirds of the time.
+    Elements of 7.5 mm and contact points four radii apart are enough in a tube without crests: after 1700 random
+    steps in 15 episodes, the tip differs by less than 0.002 mm from that with elements of 5 mm and points 1.5 radii
+    apart, in two thirds of the time.
     """
     vessels = FixedVessel(Vessel.generate("curved_tube", edge_mm=1.5))
     method = {"name": "kirchhoff", "element_mm": 7.5, "contact_spacing_radii": 4.0}
@@ -53,11 +55,13 @@ def aortic_arch(**parts: Any) -> Task:
 
 
 def arch_variety(**parts: Any) -> Task:
-    """The wire of ArchVariety (see `arches`) from the descending aorta into the branches of one of fifty arches of type I; friction 0.1.
+    """The wire of ArchVariety (see `arches`) from the descending aorta into the branches of one of fifty arches of
+    type I; friction 0.1.
 
-    Its wire has a soft tip: ratios of stiffness, sizes and the shape are those of the original, stiffness in its units of kPa. The wall is
-    felt as it is meshed: half of it within 0.02 mm of the arch that was drawn, 99 of 100 places within 0.2 mm. Its method is the fast accuracy: elements of
-    7.5 mm with contact points four radii apart, which it had, take the same time, as most of it goes into steps in which the wire snaps.
+    Its wire has a soft tip: ratios of stiffness, sizes and the shape are those of the original, with stiffness in its
+    units of kPa. Contact uses the meshed wall: half of it is within 0.02 mm of the exact arch, 99 % within 0.2 mm.
+    The method uses the accuracy "fast". Elements of 7.5 mm with contact points four radii apart, as in earlier
+    versions, take the same time, because most of it is spent on steps in which the wire snaps.
     """
     tip = {
         "length_mm": 15.205,
@@ -76,7 +80,7 @@ def arch_variety(**parts: Any) -> Task:
             "target_mm": observations.Target(),
             "last_action": observations.LastAction(),
         },
-        # As the original has it.
+        # As in the original.
         "rewards": [rewards.Reached(), rewards.EachStep(), rewards.Approach()],
         "wall": {"friction": 0.1, "deviation_mm": 0.0},
         "method": {"name": "kirchhoff", "accuracy": "fast"},
@@ -85,18 +89,21 @@ def arch_variety(**parts: Any) -> Task:
 
 
 def basic_wire_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
-    """The wire of ArchVariety in the vessel of BasicWireNav, read from the folder ``data``; without one in the built-in arch instead."""
+    """The wire of ArchVariety in the vessel of BasicWireNav, read from the folder ``data``; by default in the
+    built-in arch instead.
+    """
     if data is not None:
         return arch_variety(**{"vessels": originals.basic_wire_nav(data), **parts})
     return arch_variety(**_stand_in("BasicWireNav", "the model 0011_H_AO_H: give its folder as data", parts))
 
 
 def dual_device_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
-    """A microwire in a microcatheter in the vessel of DualDeviceNav, read from the folder ``data`` (``data/dualdevicenav`` of
-    stEVE_bench); without one in the built-in arch instead.
+    """A microwire in a microcatheter in the vessel of DualDeviceNav, read from the folder ``data``
+    (``data/dualdevicenav`` of stEVE_bench); by default in the built-in arch instead.
 
-    Ratios of stiffness and sizes are those of the original. The wire is twice as long, or its tail would slip into the catheter's. Elements of
-    7.5 mm are enough for instruments as soft: pushed into the built-in arch for 180 mm tips are within 0.01 mm of those with elements of 1.25 mm.
+    Ratios of stiffness and sizes are those of the original. The wire is twice as long, otherwise its tail would slip
+    into the catheter's. Elements of 7.5 mm are enough for such soft instruments: pushed into the built-in arch for
+    180 mm, tips differ by less than 0.01 mm from those with elements of 1.25 mm.
     """
 
     def device(
@@ -118,7 +125,7 @@ def dual_device_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Ta
         "instruments": [wire, catheter],
         "coupling": {"names": ["wire", "catheter"]},
         "wall": {"friction": 0.001},
-        # Of a wire of 0.18 mm no more points than of one twice as thick: it takes two thirds of the time.
+        # A wire of 0.18 mm gets no more contact points than one twice as thick, which takes two thirds of the time.
         "method": {"name": "kirchhoff", "accuracy": "fast", "contact_spacing_radii": 4.0},
     }
     if data is not None:
@@ -128,7 +135,9 @@ def dual_device_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Ta
 
 
 def cath_sim(**parts: Any) -> Task:
-    """Navigation in the arch after CathSim: its wire's size and tip, its reward and end, 300 steps, no friction; its arch is the built-in one."""
+    """Navigation in an arch as in CathSim: with its wire's size and tip, its reward and end, 300 steps and no
+    friction, but in the built-in arch.
+    """
     tip = {
         "length_mm": 8.0,
         "radius_mm": 0.5,
@@ -143,15 +152,16 @@ def cath_sim(**parts: Any) -> Task:
         "ends": [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit(300)],
         "threshold_mm": 4.0,
         "control_period_s": 0.012,
-        # The fastest that its actuators move the wire without a load.
+        # The largest speed of its actuators without a load.
         "speed_limits": (714.0, 20.0),
     }
     return Task(**{**defaults, **_stand_in("CathSim", "its phantom, which is not free: give vessels", parts)})
 
 
 def navigation(vessel: str = "aortic_arch", target: str | None = None, **parts: Any) -> Task:
-    """A shaped wire to the named targets of a built-in vessel (``aortic_arch``, ``aortic_arch_ii``, ``aortic_arch_iii`` or ``hepatic``): all of them,
-    or one. No contact may press harder than 1.5 N: an episode ends there. ``info["safety"]`` tells the share of steps without.
+    """A shaped wire to the named targets of a built-in vessel (``aortic_arch``, ``aortic_arch_ii``,
+    ``aortic_arch_iii`` or ``hepatic``): to all of them, or to one. An episode ends if a contact force exceeds 1.5 N.
+    ``info["safety"]`` is the fraction of safe steps.
     """
     is_fine = vessel == "hepatic"
     made = Vessel.generate(vessel, edge_mm=1.1 if is_fine else 3.0)
@@ -181,7 +191,7 @@ def navigation(vessel: str = "aortic_arch", target: str | None = None, **parts: 
 
 
 def _stand_in(task: str, original: str, parts: dict[str, Any]) -> dict[str, Any]:
-    """The built-in arch in place of an original, unless ``parts`` have vessels; warns of it."""
+    """The built-in arch instead of an original, unless ``parts`` contain vessels; warns about it."""
     if "vessels" in parts:
         return parts
     warnings.warn(f"{task}: the built-in aortic_arch stands in for {original}", stacklevel=2)
@@ -212,8 +222,9 @@ def make_vector_env(
     max_episode_steps: int | None = None,
     **parts: Any,
 ) -> InsertionVectorEnv:
-    """The vector environment of a task of `TASKS`; keywords replace its parts. An episode is truncated after ``max_episode_steps``, as
-    `gymnasium.make` has it for one."""
+    """The vector environment of a task of `TASKS`; keywords replace its parts. An episode is truncated after
+    ``max_episode_steps``, as by `gymnasium.make` for a single one.
+    """
     made = TASKS[task](**parts)
     if max_episode_steps is not None:
         made.ends = [*made.ends, ends.StepLimit(max_episode_steps)]

@@ -1,4 +1,4 @@
-"""Many environments in one: stepped on all cores, in one call."""
+"""Vector environments: many environments stepped in one call on all cores."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ from .task import Task
 
 
 class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32], NDArray[Any]]):
-    """``num_envs`` environments of a task. Environment k does to the bit what `InsertionEnv` does with the same seed.
+    """``num_envs`` environments of a task. Environment k has the same bits as `InsertionEnv` with the same seed.
 
-    An environment whose episode has ended begins a new one in the next step, whose action it does not look at (AutoresetMode.NEXT_STEP).
-    A failure of one environment is reported in ``info["failure"]`` and truncates its episode; the others go on.
+    An environment whose episode has ended begins a new one in the next step and ignores the action
+    (AutoresetMode.NEXT_STEP). A failure of one environment is reported in ``info["failure"]`` and truncates its
+    episode; the others continue.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 8, "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -48,7 +49,7 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
             seeds = (
                 [seed + k for k in range(self.num_envs)]
                 if isinstance(seed, (int, np.integer))
-                # One more than is wanted is enough to tell that there are too many, if they ever end.
+                # One more than needed shows that there are too many, even for an infinite sequence.
                 else list(islice(seed, self.num_envs + 1))
             )
             if len(seeds) != self.num_envs:
@@ -69,9 +70,10 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     ) -> tuple[
         dict[str, NDArray[Any]], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Moves all as `InsertionEnv.step` moves one: shape (num_envs, n_instruments, 2).
+        """Steps all environments like `InsertionEnv.step`; the action has shape (num_envs, n_instruments, 2).
 
-        Raises InputError for actions of another shape, and ResetNeeded of Gymnasium before the first `reset`; then nothing has moved.
+        Raises InputError for actions of another shape, and Gymnasium's ResetNeeded before the first `reset`; then
+        nothing has moved.
         """
         moved = np.asarray(actions, dtype=float)
         if moved.shape != self.action_space.shape:
@@ -88,7 +90,7 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
         return self._episodes.observe(), rewards, terminated, truncated, self._info()
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """The pictures of all environments, with ``render_mode="rgb_array"``."""
+        """The pictures of all environments, if ``render_mode="rgb_array"``."""
         if self.render_mode != "rgb_array":
             return None
         return tuple(picture(self._episodes, k) for k in range(self.num_envs))

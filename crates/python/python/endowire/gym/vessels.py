@@ -1,4 +1,4 @@
-"""Where vessels come from: one that stays, or a new one for each episode."""
+"""Sources of vessels: a fixed one, or a new one for each episode."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 class Site:
-    """A vessel with its centre line and the sheath through which instruments come: the keywords ``opening``, ``depth_mm``,
-    ``position_mm`` and ``direction`` of `endowire.Simulation`.
+    """A vessel with its centre line and the sheath: the keywords ``opening``, ``depth_mm``, ``position_mm`` and
+    ``direction`` of `endowire.Simulation`.
 
-    It never changes, but keeps what is made for it: copies share it, and pickles leave it behind.
+    It is immutable except for caches of derived objects, which copies share and pickles leave out.
     """
 
     def __init__(
@@ -32,14 +32,14 @@ class Site:
         targets: NDArray[np.bool_] | None = None,
     ) -> None:
         self.vessel, self.centreline, self.sheath = vessel, centreline, dict(sheath)
-        #: Whether targets may lie on each segment of the centre line; anywhere if None.
+        #: Whether targets may lie on each segment of the centre line; None allows all.
         self.targets = targets
-        #: Simulations with nothing inserted, by task: made once and copied for each episode.
+        #: Cached simulations with nothing inserted, by task, to be copied for each episode.
         self.starts: WeakKeyDictionary[Task, Simulation] = WeakKeyDictionary()
         self._renderers: dict[str, Renderer] = {}
 
     def renderer(self, view: Mapping[str, Any]) -> Renderer:
-        """What draws the vessel as a table `[view]` says, made once."""
+        """The cached renderer of the vessel for a `[view]` table."""
         key = json.dumps(view, sort_keys=True)
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.vessel, dict(view))
@@ -53,13 +53,13 @@ class Site:
 
 
 class VesselSource(Protocol):
-    """Gives each episode its vessel."""
+    """Chooses the vessel of each episode."""
 
-    #: Box around all vessels it gives, mm: least and largest coordinates, shape (2, 3).
+    #: Bounding box of all its vessels, mm: smallest and largest coordinates, shape (2, 3).
     bounds_mm: NDArray[np.float64]
 
     def sample(self, rng: np.random.Generator) -> Site:
-        """The site of an episode; all that is random in it comes from ``rng``."""
+        """The site of an episode; all random numbers come from ``rng``."""
         ...
 
 
@@ -67,10 +67,11 @@ class FixedVessel:
     """The same vessel in every episode."""
 
     def __init__(self, vessel: Vessel, centreline: NDArray[np.float64] | None = None, **sheath: Any) -> None:
-        """A vessel with the centre line it was made from, or another one (x, y, z, radius, parent; shape (n, 5)). In one of a surface alone it is found
-        in the lumen, from the sheath's ``opening`` if that is given.
+        """A vessel with the centre line it was made from, or another one (x, y, z, radius, parent; shape (n, 5)). If
+        the vessel is only a surface, the centre line is extracted from its lumen, starting at the sheath's
+        ``opening`` if given.
 
-        Raises InputError for a surface in which none is found.
+        Raises InputError for a surface without an extractable centre line.
         """
         if centreline is None and vessel.centreline_found and "opening" in sheath:
             vessel = vessel.with_centreline(sheath["opening"])

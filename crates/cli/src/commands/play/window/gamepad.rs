@@ -1,4 +1,4 @@
-//! Listens to gamepads on a thread of its own, by gilrs, and tells the window how the first of them is held.
+//! Listens to gamepads on another thread, through gilrs, and sends the state of the first one to the window.
 
 use std::time::Duration;
 
@@ -10,10 +10,10 @@ use super::Told;
 
 use crate::output::tell;
 
-/// How soon a window that was closed is noticed.
+/// Interval at which the thread checks whether the window was closed.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Tells the window of each change until it is closed.
+/// Sends each change to the window until it is closed.
 pub(super) fn listen(window: EventLoopProxy<Told>) {
     std::thread::spawn(move || {
         let mut gilrs = match Gilrs::new() {
@@ -29,7 +29,7 @@ pub(super) fn listen(window: EventLoopProxy<Told>) {
                     return;
                 }
             }
-            // What has come in by then is one change.
+            // Events that have arrived by then are combined to one change.
             if gilrs.next_event_blocking(Some(PATIENCE)).is_some() {
                 while gilrs.next_event().is_some() {}
             }
@@ -37,7 +37,7 @@ pub(super) fn listen(window: EventLoopProxy<Told>) {
     });
 }
 
-/// How a gamepad is held now.
+/// The current state of a gamepad.
 fn held(pad: &Gamepad<'_>) -> Pad {
     let down = Button::ALL.into_iter().filter(|button| pad.is_pressed(key(*button))).collect();
     let [up, right] = [Axis::LeftStickY, Axis::RightStickX].map(|axis| f64::from(pad.value(axis)));

@@ -1,4 +1,4 @@
-//! The window: a thin shell that turns keys and mouse into inputs and shows what was drawn.
+//! The window: it translates keys and mouse into inputs and shows the frames.
 
 #[cfg(feature = "gamepad")]
 mod gamepad;
@@ -32,30 +32,30 @@ use crate::output::tell;
 use screen::Layout;
 use text::{Canvas, Writer};
 
-/// Width, with one plane and with two, and height of the window when it opens.
+/// Initial width, with one plane and with two, and height of the window.
 const WIDTHS: [u32; 2] = [1280, 1720];
 const HEIGHT: u32 = 860;
-/// Turn of the 3D view by a drag, degrees a pixel.
+/// Rotation of the 3D view by a drag, degrees per pixel.
 const DEG_PER_PX: f64 = 0.4;
 
-/// What the window is told by other threads.
+/// Messages from other threads.
 #[derive(Debug)]
 enum Told {
-    /// A picture is there.
+    /// A new picture.
     Picture,
-    /// How a gamepad is held that is connected, with its name; none when it has gone.
+    /// State of the connected gamepad, with its name; `None` after it was disconnected.
     #[cfg(feature = "gamepad")]
     Gamepad(Option<(String, endowire_play::Pad)>),
     /// The session has ended.
     Ended,
 }
 
-/// What the window and the thread that draws for it share.
+/// Data shared with the thread that draws.
 #[derive(Default)]
 struct Shared {
     size: [AtomicUsize; 2],
     help: AtomicBool,
-    /// Name of the gamepad that is connected.
+    /// Name of the connected gamepad.
     gamepad: Mutex<Option<String>>,
     picture: Mutex<Option<Picture>>,
 }
@@ -63,7 +63,7 @@ struct Shared {
 /// The newest picture of the whole window.
 struct Picture {
     canvas: Canvas,
-    /// When the oldest input came in that it is the first to show.
+    /// Time of the oldest input that it is the first to show.
     input_at: Option<Instant>,
     /// Width of the fluoroscopic field at the isocentre, mm.
     field_mm: f64,
@@ -74,17 +74,17 @@ struct Shell {
     shared: Arc<Shared>,
     to: Sender<Message>,
     keys: Keys,
-    /// How the gamepad is held.
+    /// State of the gamepad.
     #[cfg(feature = "gamepad")]
     pad: endowire_play::Pad,
     surface: Option<softbuffer::Surface<OwnedDisplayHandle, Arc<Window>>>,
-    /// Planes of fluoroscopy.
+    /// Number of planes of fluoroscopy.
     planes: usize,
     cursor: [f64; 2],
     dragging: bool,
     /// Width of the fluoroscopic field at the isocentre, mm.
     field_mm: f64,
-    /// From inputs to the pictures that show them, ms.
+    /// Latencies from inputs to the pictures that show them, ms.
     inputs_ms: Vec<f64>,
     failure: Option<String>,
 }
@@ -133,7 +133,7 @@ pub(super) fn run(
         let simulating = scope.spawn(move || {
             let done = live::physics(session, &messages, newest, record, false);
             live::end(newest);
-            // A window that is gone need not be told.
+            // Fails if the window is gone, which does not matter.
             let _ = proxy.send_event(Told::Ended);
             done
         });
@@ -143,7 +143,7 @@ pub(super) fn run(
         let (session, pace) = simulating.join().map_err(|_| failed("the simulation stopped"))??;
         let frames = drawing.join().map_err(|_| failed("the pictures stopped"))?;
         if let Some(reason) = shell.failure {
-            // What was done is kept all the same.
+            // The session is recorded nevertheless.
             tell(format_args!("endowire: the window was closed: {reason}"));
         }
         shown.map_err(|e| no_display(e.to_string()))?;
@@ -151,7 +151,7 @@ pub(super) fn run(
     })
 }
 
-/// Draws whole windows on this thread, and has each shown.
+/// Draws whole windows on this thread, and shows each.
 fn draw(
     pictures: Pictures,
     newest: &Newest,
@@ -175,7 +175,7 @@ fn draw(
     })
 }
 
-/// Writes the window of a moment as a PNG file, at the size with which it opens. It is drawn in memory: no display is needed.
+/// Writes the window for a state as a PNG file, at its initial size. It is drawn in memory, so no display is needed.
 pub(super) fn write(
     file: &Path,
     snapshot: Snapshot,
@@ -194,7 +194,7 @@ pub(super) fn write(
     write_png(file, (width, HEIGHT), &rgb).map_err(|e| failed(e.to_string()))
 }
 
-/// What F1 shows: keys, and those of a gamepad where one is connected.
+/// Lines of the help on F1: keys, and those of a gamepad if one is connected.
 fn help(gamepad: bool) -> Vec<screen::Help> {
     #[cfg(feature = "gamepad")]
     let of_pad = endowire_play::PAD;
@@ -204,7 +204,7 @@ fn help(gamepad: bool) -> Vec<screen::Help> {
     KEYS.iter().copied().chain(of_window).chain(of_pad.iter().copied().filter(|_| gamepad)).collect()
 }
 
-/// What UI Events call a key: winit has its names.
+/// The name of a key in UI Events: winit uses the same names.
 fn name(code: KeyCode) -> String {
     format!("{code:?}")
 }
@@ -235,7 +235,7 @@ impl Shell {
         }
     }
 
-    /// Puts the newest picture into the window.
+    /// Shows the newest picture in the window.
     fn present(&mut self) -> Result<(), String> {
         let Some(surface) = &mut self.surface else { return Ok(()) };
         let mut picture = self.shared.picture.lock().unwrap_or_else(PoisonError::into_inner);
@@ -265,7 +265,7 @@ impl Shell {
         }
     }
 
-    /// A gamepad is held otherwise; one that has gone is held by nobody.
+    /// Handles a change of the gamepad; a disconnected one is at rest.
     #[cfg(feature = "gamepad")]
     fn held(&mut self, now: Option<(String, endowire_play::Pad)>) {
         let (name, now) = now.unzip();
@@ -276,7 +276,8 @@ impl Shell {
         self.send(inputs);
     }
 
-    /// A drag moves what it began on: the table under the live picture, or the camera of the 3D view.
+    /// Handles a drag: it moves the table on the live picture, or the camera on the 3D view, depending on where it
+    /// began.
     fn dragged(&mut self, x: f64, y: f64) {
         let by = [x - self.cursor[0], y - self.cursor[1]];
         let size = [0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed));
@@ -288,7 +289,7 @@ impl Shell {
         }
         self.send([match plane {
             Some(plane) => {
-                // The picture goes with the mouse.
+                // The picture follows the mouse.
                 let mm_per_px = self.field_mm / layout.side.max(1) as f64;
                 let second = plane == 1;
                 Input::Table { right_mm: -by[0] * mm_per_px, down_mm: -by[1] * mm_per_px, second }

@@ -1,4 +1,4 @@
-//! What stands where in the window: the live picture, the 3D view, what the hands feel, help.
+//! Layout of the window: the live picture, the 3D view, forces, help.
 
 use endowire_play::{InstrumentReadout, Readout};
 use endowire_viewer::{Image, Mode, PixelFormat};
@@ -14,15 +14,15 @@ const FAINT: u32 = 0x86_9098;
 pub(super) const WARN: u32 = 0xff_5a4a;
 const LIVE: u32 = 0xff_c020;
 pub(super) const CHOSEN: u32 = 0x5a_c8fa;
-/// Height of what is below the pictures, and of a line of text, at the usual size.
+/// Height of the panel below the pictures, and of a line of text, at the usual size.
 const PANEL_PX: usize = 172;
-/// A hand that is ahead of its device by less than this, mm, is not shown to be.
+/// Smallest lag of a device behind its commanded motion that is shown, mm.
 const LAG_MM: f64 = 0.05;
 
-/// Keys, and what they do.
+/// A key and its effect.
 pub(super) type Help = (&'static str, &'static str);
 
-/// Where the pictures are: side of the live ones, which begin at the left, and corner and size of the 3D view.
+/// Layout of the pictures: side of the live ones, which start at the left, and corner and size of the 3D view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Layout {
     planes: usize,
@@ -34,7 +34,7 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn of([width, height]: [usize; 2], planes: usize) -> Self {
         let panel = PANEL_PX.min(height / 3);
-        // The 3D view has two parts of five in width, or one where there are two planes.
+        // The 3D view gets at least two fifths of the width, or one fifth with two planes.
         let most = if planes > 1 { width * 2 / 5 } else { width * 3 / 5 };
         let side = (height - panel).min(most);
         let left = planes * side;
@@ -47,14 +47,14 @@ impl Layout {
         (0..self.planes).map(move |plane| [plane * side, 0])
     }
 
-    /// The plane whose picture is at a place in the window.
+    /// The plane whose picture is at a position in the window.
     pub(super) fn plane_at(&self, x: f64, y: f64) -> Option<usize> {
         let plane = (x / self.side.max(1) as f64) as usize;
         (plane < self.planes && y < self.side as f64).then_some(plane)
     }
 }
 
-/// Draws all of a window, with help where it is wanted and the name of a gamepad where one is connected.
+/// Draws the whole window, with help if requested and the name of a gamepad if one is connected.
 pub(super) fn compose(
     writer: &mut Writer,
     shown: &Shown<'_>,
@@ -99,12 +99,12 @@ pub(super) fn compose(
     canvas
 }
 
-/// Planes of fluoroscopy.
+/// Number of planes of fluoroscopy.
 pub(super) fn planes(readout: &Readout) -> usize {
     1 + usize::from(readout.lab.second_deg.is_some())
 }
 
-/// What a cath lab writes into the pictures.
+/// Writes the usual annotations of a cath lab onto the pictures.
 fn over_picture(writer: &mut Writer, canvas: &mut Canvas, readout: &Readout, layout: Layout) {
     let lab = &readout.lab;
     let mode = match lab.mode {
@@ -194,13 +194,13 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
     }
 }
 
-/// A force with its unit: those of microwires and coils are millinewtons.
+/// A force with its unit: those of microwires and coils are in millinewtons.
 fn force(newtons: f64) -> String {
     if newtons.abs() >= 0.1 {
         return format!("{newtons:.3} N");
     }
     let text = format!("{:.1} mN", 1000.0 * newtons);
-    // Rounding leaves no minus before a zero.
+    // Rounding must not leave a minus sign before zero.
     if text == "-0.0 mN" { "0.0 mN".to_owned() } else { text }
 }
 
@@ -214,7 +214,7 @@ fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help]) {
     }
 }
 
-/// Text that can be read on black and white.
+/// Draws text that is legible on black and white.
 fn shadowed(
     writer: &mut Writer,
     canvas: &mut Canvas,
@@ -227,7 +227,7 @@ fn shadowed(
     writer.write(canvas, [x, y], size, colour, text);
 }
 
-/// The colour of a picture's first pixel: its background.
+/// The background colour of a picture: that of its first pixel.
 fn background(image: &Image) -> u32 {
     image.pixel(0, 0).map_or(BACK, |bytes| match bytes {
         [red, green, blue, _] => u32::from(*red) << 16 | u32::from(*green) << 8 | u32::from(*blue),
@@ -235,7 +235,7 @@ fn background(image: &Image) -> u32 {
     })
 }
 
-/// Paints a picture, larger or smaller, with values between its pixels.
+/// Paints a picture, scaled with interpolation.
 fn paint(canvas: &mut Canvas, image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) {
     let (columns, rows) = (image.width() as usize, image.height() as usize);
     let places = |length: usize, pixels: usize| -> Vec<(usize, usize, u32)> {

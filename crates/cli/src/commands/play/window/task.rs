@@ -1,4 +1,4 @@
-//! What a trainee reads of a subject: the task at first and the score at the end over the 3D view, and how it stands below.
+//! Display of a subject: the task at first and the score at the end over the 3D view, and the progress below.
 
 use endowire_assess::{Score, Standing, Subject, Threshold};
 
@@ -6,25 +6,25 @@ use super::screen::{CHOSEN, TEXT, WARN};
 use super::text::{Canvas, Writer};
 use crate::subjects::verdict;
 
-/// Size of letters, their width and the distance of lines, pixels.
+/// Font size, width of a letter and line spacing, pixels.
 const LETTER_PX: u32 = 15;
 const COLUMN_PX: usize = 9;
 const LINE_PX: usize = 22;
 const MARGIN_PX: usize = 12;
 const BACK: u32 = 0x08_0c10;
-/// Parts of a limit from which on it is shown as a warning.
+/// Fraction of a limit from which on it is shown as a warning.
 const NEARLY: f64 = 0.8;
 
 /// A line and its colour.
 type Line = (u32, String);
 
-/// Where it is written: task and score over the 3D view, how it stands in the panel below, each a corner and a size.
+/// Places of the texts, each a corner and a size: task and score over the 3D view, progress in the panel below.
 pub(super) struct Places {
     pub(super) over: ([usize; 2], [usize; 2]),
     pub(super) below: ([usize; 2], [usize; 2]),
 }
 
-/// Writes what is to be read of a subject, as far as there is room; `begun` once an instrument has moved.
+/// Shows the texts of a subject, as far as there is room; `begun` is set once an instrument has moved.
 pub(super) fn show(
     writer: &mut Writer,
     canvas: &mut Canvas,
@@ -40,7 +40,7 @@ pub(super) fn show(
     }
 }
 
-/// Writes lines into a box, which is no higher than they are.
+/// Writes lines into a box that is at most as high as they are.
 fn write(
     writer: &mut Writer,
     canvas: &mut Canvas,
@@ -92,7 +92,8 @@ fn score_lines(score: &Score) -> Vec<Line> {
     std::iter::once(head).chain(rows).chain([end]).collect()
 }
 
-/// A text in lines of so many letters, words kept whole; one that begins with a blank is a row of a table, and is cut.
+/// Breaks a text into lines of `columns` letters between words. A text that begins with a blank is a table row and is
+/// truncated instead.
 fn wrapped(text: &str, columns: usize) -> Vec<String> {
     if text.starts_with(' ') {
         return vec![text.chars().take(columns).collect()];

@@ -1,10 +1,10 @@
-//! Text in a picture of pixels.
+//! Text in pixel pictures.
 
 use std::collections::HashMap;
 
 use ab_glyph::{Font, FontRef, ScaleFont, point};
 
-/// A picture in memory, 0x00RRGGBB a pixel.
+/// A picture in memory; each pixel is 0x00RRGGBB.
 pub(super) struct Canvas {
     pub(super) size: [usize; 2],
     pub(super) pixels: Vec<u32>,
@@ -15,7 +15,7 @@ impl Canvas {
         Self { size, pixels: vec![0; size[0] * size[1]] }
     }
 
-    /// Fills a rectangle, as far as it is in the picture.
+    /// Fills a rectangle, clipped to the picture.
     pub(super) fn fill(&mut self, [x, y]: [usize; 2], [width, height]: [usize; 2], colour: u32) {
         let right = (x + width).min(self.size[0]);
         for row in y..(y + height).min(self.size[1]) {
@@ -25,7 +25,7 @@ impl Canvas {
         }
     }
 
-    /// Lets a colour shine through by a share.
+    /// Blends a colour into a pixel by a fraction.
     fn blend(&mut self, x: usize, y: usize, colour: u32, share: f32) {
         if x >= self.size[0] || y >= self.size[1] {
             return;
@@ -39,7 +39,7 @@ impl Canvas {
     }
 }
 
-/// A drawn glyph: its corner from the pen, its width, shares of its pixels, and how far the pen goes.
+/// A rasterised glyph: offset of its corner from the pen, width, coverage of its pixels, and advance of the pen.
 struct Glyph {
     corner: [i64; 2],
     width: usize,
@@ -47,20 +47,20 @@ struct Glyph {
     advance: f32,
 }
 
-/// Draws text, and remembers its glyphs.
+/// Draws text and caches its glyphs.
 pub(super) struct Writer {
     font: FontRef<'static>,
     glyphs: HashMap<(char, u32), Glyph>,
 }
 
 impl Writer {
-    /// With the font that is in the program: a bare machine has none. None where it cannot be read.
+    /// Uses the font that is part of the program, since a bare machine has none. `None` if it cannot be read.
     pub(super) fn new() -> Option<Self> {
         let font = FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).ok()?;
         Some(Self { font, glyphs: HashMap::new() })
     }
 
-    /// Writes a line with its left end and base line there; where it ends.
+    /// Writes a line from a position on its base line; returns where it ends.
     pub(super) fn write(
         &mut self,
         canvas: &mut Canvas,
