@@ -158,7 +158,7 @@ fn beam(record: &Record) -> Vec<Noticed> {
 }
 
 fn against_wall(record: &Record) -> Vec<Noticed> {
-    let held = record.injections.iter().filter(|one| record.is_against_wall(one));
+    let held = record.injections.iter().filter(|one| record.is_against_wall(one)).take(MOST);
     let told = held.map(|one| {
         let text = format!("{} ml injected with the tip held by a wall", one.volume_ml);
         Noticed::at(NoticedKind::AgainstWall, one.time_s, text)

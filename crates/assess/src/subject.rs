@@ -94,7 +94,7 @@ impl Threshold {
         let Some(metric) = metrics.iter().find(|metric| metric.name == self.metric) else {
             let nearest = nearest_name(metrics.iter().map(|metric| metric.name), &self.metric);
             let mend = format!(
-                "is no measure; did you mean {:?}? `endowire assess` tells all of them",
+                "is no measure; did you mean {:?}? `endowire assess` lists all of them",
                 nearest.unwrap_or_default()
             );
             return Err(Error::parameter(format!("{key}.metric"), format!("{:?}", self.metric), mend));
@@ -108,6 +108,11 @@ impl Threshold {
             return Err(Error::parameter(format!("{key}.{wrong}"), other, mend));
         }
         match limit {
+            // What is better when lower counts or measures something, which is never below 0.
+            Some(limit) if metric.better == Better::Lower && limit < 0.0 => {
+                let mend = format!("{} is never below 0, and no session would pass: give 0 or more", metric.name);
+                return Err(Error::parameter(format!("{key}.{right}"), limit, mend));
+            }
             Some(limit) if limit.is_finite() => {}
             Some(limit) => {
                 return Err(Error::parameter(format!("{key}.{right}"), limit, "must be a finite number"));
@@ -118,7 +123,7 @@ impl Threshold {
             }
         }
         if !(0.0..=LARGEST).contains(&self.points) {
-            let mend = format!("must be a number from 0 to {LARGEST}; 0 has it told alone");
+            let mend = format!("must be a number from 0 to {LARGEST}; with 0 it is only reported");
             return Err(Error::parameter(format!("{key}.points"), self.points, mend));
         }
         Ok(())

@@ -97,7 +97,7 @@ impl Verdict {
         let how = if self.passed { "passed" } else { "not passed" };
         let end = match self.ended {
             Some(ended) => format!("{} after {:.1} s", ended.by.words(), ended.time_s),
-            None => "left before the goal was reached".to_owned(),
+            None => "the session ended before the goal was reached".to_owned(),
         };
         format!("{how}, {:.0} of 100: {end}", self.score)
     }

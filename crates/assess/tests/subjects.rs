@@ -231,6 +231,7 @@ fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
         ),
         ("at_most = 1.0", "", "threshold[0].at_most = none: which value of wall_force_n"),
         ("at_most = 1.0", "at_most = nan", "threshold[0].at_most = NaN"),
+        ("at_most = 1.0", "at_most = -1.0", "threshold[0].at_most = -1: wall_force_n is never below 0"),
         ("points = 3", "points = -1.0", "threshold[0].points = -1: must be a number from 0"),
         (
             "\"total_s\"",

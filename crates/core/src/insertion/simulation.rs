@@ -193,9 +193,9 @@ impl Simulation {
         self.method.check_detach(&surroundings!(self, self.time_s), instrument)
     }
 
-    /// Replaces the fields in which the device lies. The next step or tick follows the equilibrium from the old fields to the new ones; a command
-    /// without motion is enough. The length inside the sheath and detached coils do not feel fields. A [`State`] contains none: a restored simulation
-    /// keeps its own.
+    /// Replaces the fields in which the device lies. The next step follows the equilibrium from the old fields to the
+    /// new ones, also in a command without motion; a tick applies the new fields at once. The length inside the sheath
+    /// and detached coils do not feel fields. A [`State`] contains none: a restored simulation keeps its own.
     ///
     /// # Errors
     /// A method that supports no fields; a field that acts on none of the instruments.

@@ -6,7 +6,7 @@ use crate::output::{Image, PixelFormat};
 use crate::spec::CameraSpec;
 use crate::three_d::Camera;
 use crate::three_d::scale_bar::{self, INK};
-use crate::three_d::solids::{ARROW_PX, ContactView, FORCE};
+use crate::three_d::solids::{ContactView, FORCE, largest_and_px_per_n};
 use crate::three_d::text::{ROWS, columns, text};
 
 const WHITE: [u8; 4] = [255; 4];
@@ -54,15 +54,16 @@ pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, co
 
 /// An arrow as long as that of the largest force, with its magnitude.
 fn legend(image: &mut Image, contacts: &[ContactView]) {
-    let strongest = contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max);
-    if strongest == 0.0 {
+    let (strongest, px_per_n) = largest_and_px_per_n(contacts);
+    // An arrow of less than a pixel is none.
+    if strongest * px_per_n < 1.0 {
         return;
     }
     let label =
         if strongest < 0.1 { format!("{:.2} mN", 1e3 * strongest) } else { format!("{strongest:.2} N") };
     let dot = dot(image);
     let longer = f64::from(image.width().max(image.height()));
-    let length = (ARROW_PX * longer / 640.0).round() as u32;
+    let length = (strongest * px_per_n * longer / 640.0).round() as u32;
     let wide = length.max(columns(&label) * dot);
     let [left, bottom] =
         [image.width().saturating_sub(wide + 8 * dot), image.height().saturating_sub(8 * dot)];

@@ -20,7 +20,10 @@ const LEAST_WIDTH_PX: f64 = 2.4;
 const DOT_PX: f64 = 3.2;
 const SHAFT_PX: f64 = 1.1;
 /// Length of the longest arrow, pixels in a frame of 640.
-pub(crate) const ARROW_PX: f64 = 60.0;
+const ARROW_PX: f64 = 60.0;
+/// Smallest force with an arrow of that length, N: those of coils are tenths of a millinewton, and the rounding of a
+/// device at rest shall have no arrow.
+const LEAST_LONG_N: f64 = 5e-5;
 /// Number of pieces of an edge of the beam.
 const BEAM_PIECES: u32 = 48;
 const CONTACT: [u8; 4] = [236, 132, 20, 255];
@@ -121,9 +124,15 @@ fn cap(end: Section, outwards: f64, sections: &mut Vec<Section>) {
     }
 }
 
+/// The largest force of contacts, N, and the length of an arrow per newton, pixels in a frame of 640.
+pub(crate) fn largest_and_px_per_n(contacts: &[ContactView]) -> (f64, f64) {
+    let largest_n = contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max);
+    (largest_n, ARROW_PX / largest_n.max(LEAST_LONG_N))
+}
+
 /// Dots at contacts of devices with the wall, and arrows along their forces.
 fn contacts(camera: &Camera, contacts: &[ContactView], vertices: &mut Vec<Vertex>) {
-    let strongest = contacts.iter().map(|c| c.force_n.norm()).fold(0.0, f64::max);
+    let (_, px_per_n) = largest_and_px_per_n(contacts);
     let scale = f64::from(camera.size_px[0].max(camera.size_px[1])) / 640.0;
     for contact in contacts {
         let at = contact.position_mm;
@@ -135,8 +144,7 @@ fn contacts(camera: &Camera, contacts: &[ContactView], vertices: &mut Vec<Vertex
         sections.push(dot(along));
         cap(dot(along), 1.0, &mut sections);
         tube(camera, &sections, vertices);
-        let length =
-            px(camera, &at, ARROW_PX * scale) * contact.force_n.norm() / strongest.max(f64::MIN_POSITIVE);
+        let length = px(camera, &at, px_per_n * scale) * contact.force_n.norm();
         let shaft = px(camera, &at, SHAFT_PX * scale);
         if length < 4.0 * shaft {
             continue;
@@ -230,4 +238,23 @@ fn perpendicular(t: &Vec3) -> Vec3 {
         Vec3::z()
     };
     t.cross(&least).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_arrow_is_that_of_the_largest_force_unless_it_is_rounding() {
+        let of = |largest_n: f64| {
+            let contact =
+                |force_n: f64| ContactView { position_mm: Vec3::zeros(), force_n: Vec3::x() * force_n };
+            let (found_n, px_per_n) = largest_and_px_per_n(&[contact(0.5 * largest_n), contact(largest_n)]);
+            assert_eq!(found_n, largest_n);
+            px_per_n * largest_n
+        };
+        assert!((of(0.3) - ARROW_PX).abs() < 1e-12 && (of(2e-4) - ARROW_PX).abs() < 1e-12);
+        assert!(of(1e-7) < 1.0 && of(0.0) == 0.0);
+        assert_eq!(largest_and_px_per_n(&[]).0, 0.0);
+    }
 }

@@ -59,8 +59,7 @@ def arch_variety(**parts: Any) -> Task:
     type I; friction 0.1.
 
     Its wire has a soft tip: ratios of stiffness, sizes and the shape are those of the original, with stiffness in its
-    units of kPa. Contact uses the meshed wall: half of it is within 0.02 mm of the exact arch, 99 % within 0.2 mm.
-    The method uses the accuracy "fast". Elements of 7.5 mm with contact points four radii apart, as in earlier
+    units of kPa. Contact uses the exact surface of the arch's centre line; the mesh is for pictures. The method uses the accuracy "fast". Elements of 7.5 mm with contact points four radii apart, as in earlier
     versions, take the same time, because most of it is spent on steps in which the wire snaps.
     """
     tip = {

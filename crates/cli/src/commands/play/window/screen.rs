@@ -144,7 +144,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         instrument(writer, canvas, one, y, chosen);
     }
     let lab = &readout.lab;
-    let mut beam = format!(
+    let beam = format!(
         "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {} (most {})",
         (lab.beam_s / 60.0).floor(),
         lab.beam_s % 60.0,
@@ -152,10 +152,6 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         readout.contacts,
         force(readout.wall_force_n)
     );
-    if let Some(packing) = &readout.packing {
-        let (full, out_mm) = (100.0 * packing.density, packing.outside_mm);
-        beam += &format!("   sac {full:.1} % full, {out_mm:.1} mm of coils outside");
-    }
     let y = top + 28 + 26 * readout.instruments.len() + 8;
     writer.write(canvas, [12, y], 15, TEXT, &beam);
     let frame = |ms: f64| format!("   {:.1} ms a step   {ms:.1} ms a frame", shown.moment.step_ms);
@@ -166,7 +162,13 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         gamepad.map_or_else(String::new, |name| format!("   gamepad: {name}")),
     ]
     .concat();
-    writer.write(canvas, [12, y + 24], 15, FAINT, &times);
+    let x = readout.packing.as_ref().map_or(12, |packing| {
+        // Rounding must not leave a minus sign before zero.
+        let full = (1e3 * packing.density).round() / 10.0 + 0.0;
+        let sac = format!("sac {full:.1} % full, {:.1} mm of coils outside   ", packing.outside_mm);
+        writer.write(canvas, [12, y + 24], 15, TEXT, &sac)
+    });
+    writer.write(canvas, [x, y + 24], 15, FAINT, &times);
     let told = shown.failure.map(str::to_owned).or_else(|| {
         let recent = |event: &&endowire_play::Event| readout.time_s - event.time_s < 6.0;
         readout.event.as_ref().filter(recent).map(|event| event.text.clone())
