@@ -110,7 +110,8 @@ impl Threshold {
         match limit {
             // What is better when lower counts or measures something, which is never below 0.
             Some(limit) if metric.better == Better::Lower && limit < 0.0 => {
-                let mend = format!("{} is never below 0, and no session would pass: give 0 or more", metric.name);
+                let mend =
+                    format!("{} is never below 0, and no session would pass: give 0 or more", metric.name);
                 return Err(Error::parameter(format!("{key}.{right}"), limit, mend));
             }
             Some(limit) if limit.is_finite() => {}

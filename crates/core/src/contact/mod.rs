@@ -30,7 +30,7 @@ pub use drag::Drag;
 pub(crate) use friction::stick_mm;
 pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place, SETTLED};
 pub use moved::MovedWall;
-pub(crate) use pairs::{Pressing, RodPlace, Rubs};
+pub(crate) use pairs::{PairForce, Pressing, RodPlace, Rubs};
 pub use pairs::{SelfContact, Skin, Touching};
 pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;

@@ -38,7 +38,7 @@ pub struct Newton<const C: usize> {
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
     /// Shift of the last shifted step, reduced in each iteration since.
-    pub(super) last_shift: f64,
+    pub(crate) last_shift: f64,
     pub(super) factor: Factors<C>,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
@@ -155,7 +155,7 @@ impl<const C: usize> Newton<C> {
         let mut progress = Progress::default();
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
-        self.last_shift = 0.0;
+        self.last_shift = options.last_shift;
         // Whether the last state was an equilibrium except for contacts or lagged friction.
         let mut renewed = false;
         loop {

@@ -8,7 +8,7 @@ pub struct NewtonOptions {
     /// Largest number of iterations (steps).
     pub max_iterations: usize,
     /// Largest number of linear solves, including those for contacts and shifts within iterations. No iteration
-    /// begins once they are used up; the last one may exceed the limit slightly.
+    /// begins once they are used up; the last one may exceed the limit, by a hundred where contacts of coils change.
     pub max_solves: usize,
     /// Residual, relative to the force scale, below which a state is an equilibrium.
     pub tolerance: f64,
@@ -17,11 +17,21 @@ pub struct NewtonOptions {
     pub max_turn: f64,
     /// Whether to find a minimum (or any equilibrium, as continuation does).
     pub minimum: bool,
+    /// Shift of the last step of a solution that this one continues, 0 if there is none: shifts are tried from an
+    /// eighth of it on.
+    pub last_shift: f64,
 }
 
 impl Default for NewtonOptions {
     fn default() -> Self {
-        Self { max_iterations: 500, max_solves: usize::MAX, tolerance: 1e-10, max_turn: 1.4, minimum: true }
+        Self {
+            max_iterations: 500,
+            max_solves: usize::MAX,
+            tolerance: 1e-10,
+            max_turn: 1.4,
+            minimum: true,
+            last_shift: 0.0,
+        }
     }
 }
 

@@ -1,9 +1,14 @@
-//! Finding the pairs at a base, and keeping those of the base before.
+//! Finding the pairs at a base, and keeping the forces of those of the base before, also from part to part.
+//!
+//! From part to part a pair is known by how far its two points are from the end of the last rod. There the tip of the
+//! line and the coils behind it keep their places when a hand pushes.
+
+use serde::{Deserialize, Serialize};
 
 use super::curve::{Curve, Place};
 use super::gap::Gap;
 use super::rubbing::Rub;
-use super::{KNOWN, LOOKED_AT, Pair, SelfContact};
+use super::{KNOWN, LOOKED_AT, Pair, SelfContact, Site, tree};
 use crate::contact::force::PENALTY;
 use crate::rod::{ElementData, RodState};
 
@@ -13,7 +18,74 @@ const SAME: f64 = 2.0;
 /// Two minima this close along the rod, in touching distances, are one.
 const TWICE: f64 = 1e-3;
 
+/// A pair of the base before.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Remembered {
+    site: usize,
+    /// Arc length of the nearest point of the stretch, mm.
+    arc_mm: f64,
+    force_n: f64,
+    rub: Rub,
+}
+
+/// The force of a pair at the end of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PairForce {
+    /// Distances of the site and of the nearest point of the stretch from the end of the last rod, along all rods, mm.
+    from_end_mm: [f64; 2],
+    force_n: f64,
+}
+
+impl PairForce {
+    /// Whether its numbers are finite: a file may contain anything.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.force_n.is_finite() && self.from_end_mm.iter().all(|mm| mm.is_finite())
+    }
+}
+
 impl SelfContact {
+    /// Stores the forces at the base.
+    pub(crate) fn keep(&self, into: &mut Vec<PairForce>) {
+        into.clear();
+        let whole_mm = self.tree.length();
+        into.extend(self.pairs.iter().filter(|pair| pair.force_n > 0.0).map(|pair| {
+            let place = self.sites[pair.site].place;
+            let from_end_mm = [self.tree.arc(place.element, place.xi), pair.arc_mm].map(|arc| whole_mm - arc);
+            PairForce { from_end_mm, force_n: pair.force_n }
+        }));
+    }
+
+    /// Begins with the forces of an earlier part; call it after [`Self::renew`].
+    pub(crate) fn recall(&mut self, elements: &[ElementData], kept: &[PairForce]) {
+        self.before.clear();
+        self.is_recalled = true;
+        if kept.is_empty() {
+            return;
+        }
+        let mut whole_mm = 0.0;
+        let starts_mm = elements.iter().map(|element| {
+            let length_mm = tree::arc_mm(element);
+            whole_mm += length_mm;
+            whole_mm - length_mm
+        });
+        let starts_mm: Vec<f64> = starts_mm.collect();
+        let arc_mm = |site: &Site| {
+            let Place { element, xi } = site.place;
+            starts_mm[element] + xi * elements[element].length
+        };
+        for PairForce { from_end_mm, force_n } in kept {
+            let [here_mm, other_mm] = from_end_mm.map(|mm| whole_mm - mm);
+            let next = self.sites.partition_point(|site| arc_mm(site) < here_mm);
+            let around = next.saturating_sub(1)..(next + 1).min(self.sites.len());
+            let off_mm = |site: &usize| (arc_mm(&self.sites[*site]) - here_mm).abs();
+            if let Some(site) = around.min_by(|a, b| off_mm(a).total_cmp(&off_mm(b))) {
+                let (arc_mm, force_n, rub) = (other_mm, *force_n, Rub::default());
+                self.before.push(Remembered { site, arc_mm, force_n, rub });
+            }
+        }
+        self.before.sort_by_key(|pair| pair.site);
+    }
+
     /// Makes a state the base, and finds the pairs there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.aimed = false;
@@ -21,6 +93,7 @@ impl SelfContact {
         self.checked.1 = f64::NAN;
         self.base.copy_from(state);
         self.is_placed = false;
+        let is_recalled = std::mem::take(&mut self.is_recalled);
         if self.look_whether_clear(elements, state) {
             self.pairs.clear();
             return;
@@ -31,7 +104,13 @@ impl SelfContact {
         let mut near = std::mem::take(&mut self.near);
         self.tree.near(reach_mm, self.apart_mm(), &mut near);
         self.counters.elements += near.len() as u64;
-        std::mem::swap(&mut self.before, &mut self.pairs);
+        if !is_recalled {
+            self.before.clear();
+            self.before.extend(self.pairs.iter().map(|pair| {
+                let Pair { site, arc_mm, force_n, rub, .. } = *pair;
+                Remembered { site, arc_mm, force_n, rub }
+            }));
+        }
         let mut pairs = std::mem::take(&mut self.pairs);
         pairs.clear();
         let curve = Curve { elements, state, skins: &self.skins, closed: self.closed };

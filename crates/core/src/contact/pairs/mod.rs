@@ -45,6 +45,8 @@ use curve::{Curve, Place};
 pub use forces::Touching;
 pub(crate) use forces::{Pressing, RodPlace};
 use gap::Gap;
+pub(crate) use memory::PairForce;
+use memory::Remembered;
 pub(crate) use rubbing::Rubs;
 use rubbing::{Rub, Rubbing};
 use tree::Tree;
@@ -160,8 +162,10 @@ pub struct SelfContact {
     base: RodState,
     near: Vec<(usize, usize)>,
     pairs: Vec<Pair>,
-    /// Pairs of the previous base, for their forces.
-    before: Vec<Pair>,
+    /// Forces of the previous base.
+    before: Vec<Remembered>,
+    /// Whether these are of an earlier part, and there has been no base yet.
+    is_recalled: bool,
     /// Whether forces have a target.
     aimed: bool,
     /// The last state tested at which nothing was near, if so.
@@ -204,6 +208,7 @@ impl SelfContact {
         self.largest_radius_mm = known.iter().map(|skin| skin.radius_mm).fold(0.0, f64::max);
         self.pairs.clear();
         self.before.clear();
+        self.is_recalled = false;
         self.aimed = false;
         self.checked.1 = f64::NAN;
         self.clear = None;

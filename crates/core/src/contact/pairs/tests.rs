@@ -126,6 +126,38 @@ fn a_crossing_is_felt_the_same_wherever_sites_lie() {
 }
 
 #[test]
+fn forces_are_those_of_the_same_points_after_the_rod_was_pushed() {
+    let (elements, state) = along(coil(0.5, 0.19), 13.0, 40);
+    let mut touching = contact(&elements, 0.1);
+    touching.look_at_base(&elements, &state);
+    for (k, pair) in touching.pairs.iter_mut().enumerate() {
+        pair.force_n = 1.0 + (0.01 * k as f64).sin();
+    }
+    let (was, mut kept) = (touching.pairs.clone(), Vec::new());
+    touching.keep(&mut kept);
+    assert_eq!(kept.len(), was.len());
+    // Away from the base, whose end is another one.
+    let sum_n = |pairs: &[Pair], first: usize| {
+        let inside = pairs.iter().filter(|pair| pair.gap.at.iter().all(|place| place.element >= first));
+        inside.map(|pair| pair.force_n).sum::<f64>()
+    };
+    // The same rod, and one with two elements less at its base.
+    for less in [0, 2] {
+        let elements = &elements[less..];
+        let state = state.part(less..41);
+        let mut next = contact(elements, 0.1);
+        next.recall(elements, &kept);
+        next.look_at_base(elements, &state);
+        let (was_n, is_n) = (sum_n(&was, 6 + less), sum_n(&next.pairs, 6));
+        assert!(was_n > 10.0 && (is_n / was_n - 1.0).abs() < 1e-3, "{is_n} and {was_n}");
+    }
+    // Counter-check: without them there are none.
+    let mut next = contact(&elements, 0.1);
+    next.look_at_base(&elements, &state);
+    assert_eq!(sum_n(&next.pairs, 0), 0.0);
+}
+
+#[test]
 fn a_thick_part_is_not_felt_beyond_its_shoulder() {
     // A rod, thick up to x = 5, and another across it on its thin part, this far beyond the shoulder and above the axis.
     let forces = |beyond: f64, high: f64| {

@@ -6,6 +6,7 @@
 
 use super::curve::Curve;
 use crate::Vec3;
+use crate::rod::ElementData;
 
 /// An element, or its displacement: four control points.
 pub(super) type Controls = [Vec3; 4];
@@ -67,6 +68,11 @@ fn halves((at, range): &Stretch) -> [Stretch; 2] {
     [(2 * at + 1, range.start..middle), (2 * at + 2, middle..range.end)]
 }
 
+/// Arc length of an element, mm; that of a gap between rods keeps them apart.
+pub(super) fn arc_mm(element: &ElementData) -> f64 {
+    if element.is_break() { APART_MM } else { element.length }
+}
+
 impl Tree {
     /// Places the hierarchy at the rods, without a motion.
     pub(super) fn place(&mut self, curve: &Curve<'_>) {
@@ -81,7 +87,7 @@ impl Tree {
         let mut end = 0.0;
         for e in 0..n {
             let begin = end;
-            end += if curve.is_break(e) { APART_MM } else { curve.length_mm(e) };
+            end += arc_mm(&curve.elements[e]);
             self.arcs.push([begin, end]);
             self.breaks.push(curve.is_break(e));
         }
@@ -128,7 +134,7 @@ impl Tree {
     }
 
     /// Total length.
-    fn length(&self) -> f64 {
+    pub(super) fn length(&self) -> f64 {
         self.arcs.last().map_or(0.0, |last| last[1])
     }
 

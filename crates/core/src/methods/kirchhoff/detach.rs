@@ -68,6 +68,7 @@ impl<const C: usize> Workspace<C> {
         state.known.keep_last(points, line_mm(lengths(&hands)) - self.mesh.from_tip_mm[0]);
         state.forces.drain(..state.forces.len().saturating_sub(points));
         state.inner_friction.clear();
+        state.pairs.clear();
         state.correction.clear();
         state.report.inserted_mm = mesh.from_tip_mm[0];
         if let Some(told) = state.report.instruments.get_mut(instrument) {

@@ -107,6 +107,44 @@ fn farthest_mm(coil: &DetachedCoil, was: &DetachedCoil) -> f64 {
 }
 
 #[test]
+fn ticks_of_a_few_solves_go_on_beside_a_coil() {
+    let mut simulation = two_coils(0.1, true);
+    advance(&mut simulation, &[0], OUT_MM).unwrap();
+    simulation.detach(0).unwrap();
+    let pushed = |mm: f64| [Move { instrument: 1, command: Command::advance(mm) }];
+    for _ in 0..26 {
+        simulation.step_together(&pushed(0.5)).unwrap();
+    }
+    assert!(simulation.touching().iter().any(|touch| touch.rods == [0, 1]));
+    let from_mm = simulation.report().lengths_mm()[1];
+    // Forces of pairs and the shift go on from tick to tick: found anew in each, they would take all solves of it.
+    let behind_mm = |of: &Simulation| of.report().behind.get(1).map_or(0.0, |command| command.advance_mm);
+    let mut most_mm = 0.0f64;
+    for _ in 0..60 {
+        simulation.tick(&pushed(0.02), 4, None).unwrap();
+        most_mm = most_mm.max(behind_mm(&simulation));
+    }
+    assert!(most_mm < 0.5, "{most_mm}");
+    for _ in 0..60 {
+        simulation.tick(&[], 4, None).unwrap();
+    }
+    assert_eq!(behind_mm(&simulation), 0.0);
+    assert!((simulation.report().lengths_mm()[1] - from_mm - 1.2).abs() < 1e-9);
+    // They are part of the state.
+    simulation.tick(&pushed(0.1), 2, None).unwrap();
+    let saved = serde_json::to_string(&simulation.state()).unwrap();
+    let mut again = two_coils(0.1, true);
+    again.restore(&serde_json::from_str::<State>(&saved).unwrap()).unwrap();
+    for of in [&mut again, &mut simulation] {
+        for _ in 0..5 {
+            of.tick(&pushed(0.02), 2, None).unwrap();
+        }
+    }
+    let text = |of: &Simulation| serde_json::to_string(&of.state()).unwrap();
+    assert!(text(&again) == text(&simulation));
+}
+
+#[test]
 fn what_presses_on_a_coil_is_what_holds_it() {
     let mut simulation = two_coils(0.0, true);
     advance(&mut simulation, &[0], OUT_MM).unwrap();

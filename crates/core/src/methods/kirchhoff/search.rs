@@ -62,6 +62,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) most: usize,
     /// Largest number of linear solves.
     pub(super) most_solves: usize,
+    /// Shift of the last step of an earlier tick, for the first solution.
+    pub(super) last_shift: f64,
     /// Newton iterations taken.
     pub(super) iterations: usize,
     /// Linear solves taken.
@@ -129,6 +131,7 @@ impl<const C: usize> Search<'_, '_, C> {
             max_iterations: most.min(self.most.saturating_sub(self.iterations)),
             max_solves: self.most_solves.saturating_sub(self.solves),
             tolerance: self.tolerance,
+            last_shift: std::mem::take(&mut self.last_shift),
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);

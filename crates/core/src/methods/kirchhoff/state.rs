@@ -9,7 +9,7 @@ use super::hands::Hand;
 use super::joined::Coils;
 use super::mesh::Fineness;
 use super::step_control::Stride;
-use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce};
+use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
@@ -27,6 +27,8 @@ pub struct KirchhoffState {
     /// without friction.
     pub(super) inner_friction: Vec<InnerFriction>,
     pub(super) known: KnownPoints,
+    /// Forces of loops and coils on each other.
+    pub(super) pairs: Vec<PairForce>,
     pub(super) correction: Correction,
     /// Step size of the next part of a command.
     pub(super) stride: Stride,
@@ -61,6 +63,8 @@ pub(super) struct UnderWay {
     pub(super) state: KirchhoffState,
     /// The neighbourhood of its prediction.
     pub(super) neighbourhood: Neighbourhood,
+    /// Shift of the last step.
+    pub(super) shift: f64,
     /// Newton iterations taken.
     pub(super) iterations: usize,
 }
@@ -99,6 +103,7 @@ impl KirchhoffState {
             forces: Vec::new(),
             inner_friction: Vec::new(),
             known: KnownPoints::default(),
+            pairs: Vec::new(),
             correction: Correction::default(),
             coils: Coils::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
@@ -134,6 +139,7 @@ impl KirchhoffState {
         self.forces.clear();
         self.inner_friction.clear();
         self.known.clear();
+        self.pairs.clear();
         self.correction.clear();
     }
 
@@ -194,6 +200,11 @@ impl KirchhoffState {
         self.coils
             .iter()
             .try_for_each(|coil| coil.check(belongs.stack, felt, (sets, belongs.inner_friction)))?;
+        if let Ticking::Solving(under_way) = &self.tick
+            && !(0.0..f64::INFINITY).contains(&under_way.shift)
+        {
+            return Err(other("tick.shift", under_way.shift, "must be finite and at least 0"));
+        }
         let part_mm = self.stride.part_mm;
         if !(part_mm.is_finite() && part_mm > 0.0) {
             return Err(other("stride.part_mm", part_mm, "a way that is longer than 0"));
@@ -215,7 +226,8 @@ impl KirchhoffState {
         }
         let mut inner_friction =
             self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
-        if !(r.is_finite() && inner_friction.all(f64::is_finite)) {
+        let is_finite = r.is_finite() && self.pairs.iter().all(PairForce::is_finite);
+        if !(is_finite && inner_friction.all(f64::is_finite)) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
         }
         Ok(())

@@ -15,7 +15,7 @@ use super::state::{KirchhoffState, UnderWay};
 use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
-use crate::contact::{Rubs, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{PairForce, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
@@ -181,11 +181,12 @@ impl<const C: usize> Tools<C> {
         }
     }
 
-    /// Begins a part for loops and coils, with their friction; returns whether the tip would be pushed through one.
+    /// Begins a part for loops and coils, with their friction and the forces by which they are pressed; returns whether the tip would be pushed through one.
     fn begin_loops(
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
+        pressed: &[PairForce],
         (mesh, rod): (&Mesh, &RodState),
     ) -> bool {
         let (stack, motions) = (environment.surroundings.stack, &self.guess.motions);
@@ -196,6 +197,7 @@ impl<const C: usize> Tools<C> {
             least_n: least_force_n(stack.softest_nmm2()),
         };
         self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
+        self.loops.recall(&mesh.elements, pressed);
         self.loops.begin_friction(rod, advances_mm(mesh, stack, motions), friction);
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
         self.loops.blocks_its_tip(&mesh.elements, rod, advance_mm)
@@ -204,6 +206,7 @@ impl<const C: usize> Tools<C> {
     /// Stores what the next sub-step starts with, and removes the coils from the line.
     fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
+        self.loops.keep(&mut after.pairs);
         self.cache.keep(&mut after.known);
         let coils = &start.state.coils;
         after.coils = match self.joined.is_empty() {
@@ -248,7 +251,9 @@ impl<const C: usize> Tools<C> {
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
-        let in_its_own_way = options.self_contact && self.begin_loops(environment, start, (mesh, rod));
+        let pressed = &resumed.map_or(start.state, |resumed| &resumed.state).pairs;
+        let in_its_own_way =
+            options.self_contact && self.begin_loops(environment, start, pressed, (mesh, rod));
         let softest_nmm2 = surroundings.stack.softest_nmm2();
         let (cache, friction) = (&mut self.cache, &mut self.friction);
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
@@ -291,6 +296,7 @@ impl<const C: usize> Tools<C> {
             effort,
             most: most.min(options.max_iterations),
             most_solves: attempt.solves,
+            last_shift: resumed.map_or(0.0, |resumed| resumed.shift),
             iterations: 0,
             solves: 0,
             slides: 0,

@@ -270,6 +270,7 @@ impl<const C: usize> Tools<C> {
             part_mm: part.part_mm,
             state: KirchhoffState { correction, stride, tick, report, ..to.clone() },
             neighbourhood: self.newton.neighbourhood.clone(),
+            shift: self.newton.last_shift,
             iterations: iterations.min(MOST_NEAR - 1),
         }
     }
