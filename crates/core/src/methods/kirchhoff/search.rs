@@ -73,8 +73,9 @@ pub(super) struct Search<'a, 'b, const C: usize> {
 }
 
 impl<const C: usize> Search<'_, '_, C> {
-    /// Searches. The report is not converged if nothing was found; with friction it may be unsettled.
-    pub(super) fn run(&mut self) -> NewtonReport {
+    /// Searches, with the drag of the blood if that flows. The report is not converged if nothing was found; with
+    /// friction it may be unsettled.
+    pub(super) fn run(&mut self, flow: Option<&BloodFlow>) -> NewtonReport {
         if self.effort == Effort::Flight {
             self.most = LONGEST;
         }
@@ -82,11 +83,12 @@ impl<const C: usize> Search<'_, '_, C> {
             self.contact.hold_friction();
             self.with_loops(SelfContact::hold_friction);
         }
-        self.on()
+        let found = self.on();
+        self.dragged(found, flow)
     }
 
     /// Iterates from an equilibrium with the drag at its start to one with its own, if blood flows.
-    pub(super) fn dragged(&mut self, mut found: NewtonReport, flow: Option<&BloodFlow>) -> NewtonReport {
+    fn dragged(&mut self, mut found: NewtonReport, flow: Option<&BloodFlow>) -> NewtonReport {
         let Some(flow) = flow else { return found };
         for _ in 0..DRAG_RENEWALS {
             if !found.converged || self.contact.renew_drag(flow, self.elements, self.state) < DRAG_CHANGED {

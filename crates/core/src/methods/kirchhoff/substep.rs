@@ -15,7 +15,7 @@ use super::state::{KirchhoffState, UnderWay};
 use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
-use crate::contact::{PairForce, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{Rubs, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
@@ -185,8 +185,7 @@ impl<const C: usize> Tools<C> {
     fn begin_loops(
         &mut self,
         environment: &Environment<'_>,
-        start: Start<'_>,
-        pressed: &[PairForce],
+        (start, resumed): (Start<'_>, Option<&UnderWay>),
         (mesh, rod): (&Mesh, &RodState),
     ) -> bool {
         let (stack, motions) = (environment.surroundings.stack, &self.guess.motions);
@@ -197,6 +196,7 @@ impl<const C: usize> Tools<C> {
             least_n: least_force_n(stack.softest_nmm2()),
         };
         self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
+        let pressed = &resumed.map_or(start.state, |resumed| &resumed.state).pairs;
         self.loops.recall(&mesh.elements, pressed);
         self.loops.begin_friction(rod, advances_mm(mesh, stack, motions), friction);
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
@@ -251,9 +251,8 @@ impl<const C: usize> Tools<C> {
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
-        let pressed = &resumed.map_or(start.state, |resumed| &resumed.state).pairs;
         let in_its_own_way =
-            options.self_contact && self.begin_loops(environment, start, pressed, (mesh, rod));
+            options.self_contact && self.begin_loops(environment, (start, resumed), (mesh, rod));
         let softest_nmm2 = surroundings.stack.softest_nmm2();
         let (cache, friction) = (&mut self.cache, &mut self.friction);
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
@@ -301,8 +300,7 @@ impl<const C: usize> Tools<C> {
             solves: 0,
             slides: 0,
         };
-        let found = search.run();
-        let found = search.dragged(found, surroundings.flow);
+        let found = search.run(surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
         let unsettled = search.unsettled().max(lagging);
         let (taken, slides) = ((search.iterations, search.solves), search.slides);
