@@ -57,8 +57,6 @@ impl SelfContact {
 
     /// Begins with the forces of an earlier part; call it after [`Self::renew`].
     pub(crate) fn recall(&mut self, elements: &[ElementData], kept: &[PairForce]) {
-        self.before.clear();
-        self.is_recalled = true;
         if kept.is_empty() {
             return;
         }
@@ -93,9 +91,9 @@ impl SelfContact {
         self.checked.1 = f64::NAN;
         self.base.copy_from(state);
         self.is_placed = false;
-        let is_recalled = std::mem::take(&mut self.is_recalled);
         if self.look_whether_clear(elements, state) {
             self.pairs.clear();
+            self.before.clear();
             return;
         }
         self.place_tree(elements);
@@ -104,15 +102,12 @@ impl SelfContact {
         let mut near = std::mem::take(&mut self.near);
         self.tree.near(reach_mm, self.apart_mm(), &mut near);
         self.counters.elements += near.len() as u64;
-        if !is_recalled {
-            self.before.clear();
-            self.before.extend(self.pairs.iter().map(|pair| {
-                let Pair { site, arc_mm, force_n, rub, .. } = *pair;
-                Remembered { site, arc_mm, force_n, rub }
-            }));
-        }
+        // At the first base of a part there are no pairs, but perhaps recalled forces.
+        self.before.extend(self.pairs.drain(..).map(|pair| {
+            let Pair { site, arc_mm, force_n, rub, .. } = pair;
+            Remembered { site, arc_mm, force_n, rub }
+        }));
         let mut pairs = std::mem::take(&mut self.pairs);
-        pairs.clear();
         let curve = Curve { elements, state, skins: &self.skins, closed: self.closed };
         self.site_positions.clear();
         self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
@@ -132,6 +127,7 @@ impl SelfContact {
         });
         self.counters.pairs += self.pairs.len() as u64;
         self.remember();
+        self.before.clear();
     }
 
     /// Finds the pairs of the sites of element `a` with element `b`: minima within `b` of the distance from a site.

@@ -162,10 +162,8 @@ pub struct SelfContact {
     base: RodState,
     near: Vec<(usize, usize)>,
     pairs: Vec<Pair>,
-    /// Forces of the previous base.
+    /// Forces for the next base: recalled ones of an earlier part, or those of the previous base while pairs are sought.
     before: Vec<Remembered>,
-    /// Whether these are of an earlier part, and there has been no base yet.
-    is_recalled: bool,
     /// Whether forces have a target.
     aimed: bool,
     /// The last state tested at which nothing was near, if so.
@@ -208,7 +206,6 @@ impl SelfContact {
         self.largest_radius_mm = known.iter().map(|skin| skin.radius_mm).fold(0.0, f64::max);
         self.pairs.clear();
         self.before.clear();
-        self.is_recalled = false;
         self.aimed = false;
         self.checked.1 = f64::NAN;
         self.clear = None;

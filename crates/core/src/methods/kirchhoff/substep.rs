@@ -181,7 +181,8 @@ impl<const C: usize> Tools<C> {
         }
     }
 
-    /// Begins a part for loops and coils, with their friction and the forces by which they are pressed; returns whether the tip would be pushed through one.
+    /// Begins a part for loops and coils, with their friction and the forces by which they are pressed; returns whether
+    /// the tip would be pushed through one.
     fn begin_loops(
         &mut self,
         environment: &Environment<'_>,
