@@ -11,6 +11,8 @@ use crate::way::Way;
 const MOST_OF_TIME: f64 = 0.95;
 /// Shortest path, mm, with which a path length is compared.
 const SHORTEST_MM: f64 = 1.0;
+/// Shortest time, s, over which the speed of a hand is a mean: a single tick of a wheel is no pace.
+const PACE_S: f64 = 0.5;
 
 const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
 const RAFII: &str = "Rafii-Tari et al. 2017: motion and forces of hands and catheters";
@@ -206,6 +208,27 @@ fn reversals(record: &Record, hand: usize) -> usize {
     signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
 }
 
+/// Fastest push of an instrument, mm/s: the largest of its mean speeds over the shortest runs of steps that take at
+/// least [`PACE_S`]; `None` if the record is shorter.
+fn push_speed_mm_per_s(record: &Record, hand: usize) -> Option<f64> {
+    let advance_mm = |sample: &crate::Sample| sample.hands.get(hand).map_or(0.0, |hand| hand.advance_mm);
+    let steps: Vec<(f64, f64)> =
+        record.timed().map(|(took_s, sample)| (took_s, advance_mm(sample).max(0.0))).collect();
+    let (mut first, mut took_s, mut pushed_mm) = (0, 0.0, 0.0);
+    let mut fastest: Option<f64> = None;
+    for (step_s, step_mm) in &steps {
+        (took_s, pushed_mm) = (took_s + step_s, pushed_mm + step_mm);
+        while took_s - steps[first].0 >= PACE_S {
+            (took_s, pushed_mm) = (took_s - steps[first].0, pushed_mm - steps[first].1);
+            first += 1;
+        }
+        if took_s >= PACE_S {
+            fastest = Some(fastest.unwrap_or(0.0).max(pushed_mm / took_s));
+        }
+    }
+    fastest
+}
+
 fn safety(record: &Record) -> Vec<Metric> {
     let of =
         |name, unit, value, definition, study| lower(Group::Safety, (name, unit), value, definition, study);
@@ -232,6 +255,7 @@ fn safety(record: &Record) -> Vec<Metric> {
         .zip(beam_on_idle_s(record))
         .map(|(on_s, on_idle_s)| (record.end_s() - idle_s - (on_s - on_idle_s)).max(0.0));
     let jumps = samples.iter().filter(|sample| sample.jumped).count();
+    let paces = (0..record.hand_count()).filter_map(|hand| push_speed_mm_per_s(record, hand));
     vec![
         of("wall_force_n", "N", Some(most(&|s| s.wall_force_n)), "largest sum of wall forces", RAFII),
         of(
@@ -266,6 +290,13 @@ fn safety(record: &Record) -> Vec<Metric> {
             BOYLE,
         ),
         of("moving_without_beam_s", "s", blind_s, "time with a hand moving and the beam off", BOYLE),
+        of(
+            "push_speed_mm_per_s",
+            "mm/s",
+            paces.fold(None, |fastest: Option<f64>, pace| Some(fastest.unwrap_or(0.0).max(pace))),
+            "fastest push of a hand, as a mean over half a second or the step that takes longer",
+            RAFII,
+        ),
     ]
 }
 

@@ -88,6 +88,8 @@ fn each_measure_is_what_it_says() {
         ("hand_torque_nmm", 0.0),
         ("jumps", 1.0),
         ("moving_without_beam_s", 5.0),
+        // 90 mm in two seconds.
+        ("push_speed_mm_per_s", 45.0),
         ("wrong_branches", 1.0),
         ("time_in_trunk_s", 10.0),
         ("arrived", 1.0),

@@ -170,6 +170,8 @@ fn a_session_of_two_instruments_is_measured_as_by_hand() {
         ("catheter_ahead_s", 1.0),
         // From 4.5 s on.
         ("moving_without_beam_s", 1.5),
+        // The catheter: 100 mm in the fourth second.
+        ("push_speed_mm_per_s", 100.0),
         ("wrong_branches", 0.0),
         ("time_in_trunk_s", 6.0),
         ("arrived", 1.0),
@@ -247,6 +249,8 @@ fn a_folder_of_a_run_is_measured_as_by_hand() {
         ("jumps", Some(1.0)),
         ("catheter_ahead_s", None),
         ("moving_without_beam_s", None),
+        // 44 mm in the last two seconds.
+        ("push_speed_mm_per_s", Some(22.0)),
         ("wrong_branches", Some(0.0)),
         ("time_in_trunk_s", None),
         ("arrived", Some(0.0)),

@@ -22,6 +22,8 @@ enum Fault {
     Delay,
     /// Pushes harder than there is way.
     Pushing,
+    /// Pushes now and then much faster, and rests after it.
+    Haste,
     /// The pedal stays down.
     Beam,
     /// Injects again and again.
@@ -56,6 +58,12 @@ fn course(from_mm: f64, to_mm: f64, dice: &mut Dice) -> Vec<f64> {
     all
 }
 
+/// The same course in the same time, but the way of the last eight of 32 ticks is gone in the first of them.
+fn hasty(arcs: &[f64]) -> Vec<f64> {
+    let at = |k: usize| if k % 32 < 24 { k } else { (k / 32 * 32 + 31).min(arcs.len() - 1) };
+    (0..arcs.len()).map(|k| arcs[at(k)]).collect()
+}
+
 fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
     let (right, wrong) = (path(tree, "left carotid"), path(tree, "innominate"));
     let mut dice = Dice(splitmix64(seed, 7));
@@ -88,6 +96,7 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
         });
     };
     for (line, arcs) in ways {
+        let arcs = if fault == Fault::Haste { hasty(&arcs) } else { arcs };
         for (k, arc_mm) in arcs.into_iter().enumerate() {
             let shake = if fault == Fault::Tremor { 2.5 * (tremble.roll() - 0.5) } else { 0.0 };
             let more_n = if fault == Fault::Pushing && k % 10 < 4 { 0.4 + 0.2 * tremble.roll() } else { 0.0 };
@@ -154,7 +163,7 @@ fn every_measure_tells_the_trainees_apart_that_it_should_and_no_others() {
     };
     let clean = group(Fault::None);
     assert!(values(&clean, "arrived").iter().all(|arrived| *arrived == 1.0));
-    let expected: [Expected; 6] = [
+    let expected: [Expected; 7] = [
         (
             Fault::Tremor,
             &["tip_path_mm", "path_ratio", "reversals", "retracted_mm"],
@@ -172,6 +181,12 @@ fn every_measure_tells_the_trainees_apart_that_it_should_and_no_others() {
             &["wall_force_n", "wall_force_95_n", "wall_impulse_ns", "hand_force_n"],
             &[],
             &["total_s", "idle_s", "tip_path_mm", "contrast_ml", "spectral_arc_length", "beam_on_s"],
+        ),
+        (
+            Fault::Haste,
+            &["push_speed_mm_per_s"],
+            &[],
+            &["total_s", "tip_path_mm", "contrast_ml", "wall_force_n", "beam_on_s", "reversals"],
         ),
         (
             Fault::Beam,
