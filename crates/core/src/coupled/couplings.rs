@@ -30,19 +30,30 @@ impl<const C: usize> Couplings<C> {
         self.numbers.clear();
     }
 
-    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`; their nodes are not neighbours.
-    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
-        let (i, j) = if i <= j { (i, j) } else { (j, i) };
+    /// Adds the derivatives in `N` unknowns of each of two nodes, rows of the first and columns of the second, where
+    /// `first` is the number of the first of these unknowns in its node. The nodes are not neighbours.
+    pub(crate) fn add_block<const N: usize>(
+        &mut self,
+        (one, other): (usize, usize),
+        first: usize,
+        values: &[[f64; N]; N],
+    ) {
+        debug_assert!(one.abs_diff(other) > 1, "nodes {one} and {other} are coupled in the band");
         let block = Self::BLOCK;
-        let nodes = (i / block, j / block);
-        debug_assert!(nodes.0 + 1 < nodes.1, "entry ({i}, {j}) lies in the band");
+        let nodes = (one.min(other), one.max(other));
         let next = self.nodes.len();
         let number = *self.numbers.entry(nodes).or_insert(next);
         if number == next {
             self.nodes.push(nodes);
             self.values.resize((next + 1) * block * block, 0.0);
         }
-        self.values[number * block * block + i % block * block + j % block] += value;
+        let entries = &mut self.values[number * block * block..(number + 1) * block * block];
+        for (a, row) in values.iter().enumerate() {
+            for (b, value) in row.iter().enumerate() {
+                let (row, column) = if one < other { (a, b) } else { (b, a) };
+                entries[(first + row) * block + first + column] += value;
+            }
+        }
     }
 
     /// Entry `(i, j)`; zero outside the blocks.

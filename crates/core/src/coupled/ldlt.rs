@@ -194,23 +194,37 @@ impl CoupledFactor {
         for column in self.blocks.chunk_by(|a, b| a.column == b.column) {
             for c in 0..block {
                 for b in column {
-                    let entry = |r: usize| match b.source {
+                    let begin = self.values.len();
+                    let shifted = match b.source {
                         Source::Own(node) => {
-                            let (i, j) = (node * block + c, node * block + r);
-                            matrix.row(i)[r] + if i == j { factor * shift.diagonal[i] } else { 0.0 }
+                            let i = node * block + c;
+                            self.values.extend_from_slice(&matrix.row(i)[c..block]);
+                            Some((0, shift.diagonal[i]))
                         }
-                        Source::Next(node, below) => {
-                            let (a, b) = if below { (c, r) } else { (r, c) };
-                            let i = node * block + a;
-                            matrix.row(i)[block + b] + if a == b { factor * shift.next[i] } else { 0.0 }
+                        Source::Next(node, true) => {
+                            let i = node * block + c;
+                            self.values.extend_from_slice(&matrix.row(i)[block..]);
+                            Some((c, shift.next[i]))
                         }
-                        Source::Coupling(number, below) => {
-                            let (a, b) = if below { (c, r) } else { (r, c) };
-                            couplings.entries(number)[a * block + b]
+                        Source::Next(node, false) => {
+                            let rows = (0..block).map(|r| matrix.row(node * block + r)[block + c]);
+                            self.values.extend(rows);
+                            Some((c, shift.next[node * block + c]))
+                        }
+                        Source::Coupling(number, true) => {
+                            let row = c * block..(c + 1) * block;
+                            self.values.extend_from_slice(&couplings.entries(number)[row]);
+                            None
+                        }
+                        Source::Coupling(number, false) => {
+                            let entries = couplings.entries(number);
+                            self.values.extend((0..block).map(|r| entries[r * block + c]));
+                            None
                         }
                     };
-                    let first = if b.row == b.column { c } else { 0 };
-                    self.values.extend((first..block).map(entry));
+                    if let Some((at, unit)) = shifted {
+                        self.values[begin + at] += factor * unit;
+                    }
                 }
             }
         }

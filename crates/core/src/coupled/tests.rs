@@ -29,9 +29,9 @@ fn random<const C: usize>(nodes: usize, seed: u64) -> (BandMatrix<C>, Couplings<
         }
     }
     for (i, j) in pairs {
-        for (a, b) in (0..block).flat_map(|a| (0..block).map(move |b| (a, b))) {
-            couplings.add(j * block + b, i * block + a, draw());
-        }
+        let mut values = [[0.0; C]; C];
+        values[..block].iter_mut().for_each(|row| row[..block].fill_with(&mut draw));
+        couplings.add_block((j, i), 0, &values);
     }
     (band, couplings)
 }

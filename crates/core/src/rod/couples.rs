@@ -3,7 +3,7 @@
 //! The points are Σ cᵢ qᵢ with q = (x₀, h t₀, x₁, h t₁) of each element, as in [`super::points`], and an energy of both is given by its
 //! derivatives in the eight. Tangents turn on a sphere: at second order tᵢ moves by −½|δ|² tᵢ as well.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Matrix3x2};
 
 use super::assembly::Assembly;
 use super::element::ElementData;
@@ -30,45 +30,76 @@ pub struct Couple {
     pub hessian: [[Matrix3<f64>; PLACES]; PLACES],
 }
 
-/// A degree of freedom: its row, which of the eight vectors it moves, and in which direction.
-type Way = (usize, usize, Vec3);
+/// Unknowns of a node on which a point depends: its position, and the rotation of its tangent along u and v.
+const OWN: usize = 5;
+
+/// A node on which one of two points depends.
+struct End {
+    node: usize,
+    /// Which of the eight vectors is its position; the next one is its tangent.
+    place: usize,
+    /// What that tangent moves by as it turns along u and v of the node's triad: h u, h v.
+    turns: Matrix3x2<f64>,
+    /// h t.
+    tangent: Vec3,
+}
 
 impl<const C: usize> Assembly<C> {
     /// Adds the energy of two points.
     pub(super) fn add_coupled(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple) {
-        let ways = ways::<C>(elements, state, couple);
-        for (row, place, way) in &ways {
-            self.residual[*row] += way.dot(&couple.gradient[*place]);
+        let l = Layout::<C>;
+        let ends = couple.ends(elements, state);
+        for End { node, place, turns, .. } in &ends {
+            let (force, turning) = (couple.gradient[*place], turns.tr_mul(&couple.gradient[place + 1]));
+            (0..3).for_each(|a| self.residual[l.position(*node) + a] += force[a]);
+            (0..2).for_each(|a| self.residual[l.tangent(*node) + a] += turning[a]);
         }
         if !self.hessian {
             return;
         }
-        for (k, (column, right, along)) in ways.iter().enumerate() {
-            for (row, left, way) in &ways[..=k] {
-                let value = way.dot(&(couple.hessian[*left][*right] * along));
-                self.add_entry(*row, *column, value);
-            }
-        }
-        let l = Layout::<C>;
-        for (side, e) in couple.sides() {
-            for (node, place) in [(e, 4 * side + 1), (e + 1, 4 * side + 3)] {
-                let back = elements[e].length * couple.carried[place].dot(&state.frames[node].t);
-                for row in [l.tangent(node), l.tangent(node) + 1] {
-                    self.matrix.add(row, row, -back);
-                }
+        for (k, one) in ends.iter().enumerate() {
+            self.add_own(one, couple);
+            for other in &ends[k + 1..] {
+                self.add_between(one, other, &couple.between(one, other));
             }
         }
     }
 
-    /// Adds to an entry of the matrix, in or outside the band.
-    fn add_entry(&mut self, i: usize, j: usize, value: f64) {
-        let block = Layout::<C>::BLOCK;
-        if (i / block).abs_diff(j / block) <= 1 {
-            self.matrix.add(i, j, value);
-        } else {
-            self.couplings.add(i, j, value);
+    /// Adds the derivatives in the unknowns of one node.
+    fn add_own(&mut self, end: &End, couple: &Couple) {
+        let l = Layout::<C>;
+        let block = couple.between(end, end);
+        let rows = own_rows::<C>(end.node);
+        for a in 0..OWN {
+            for b in a..OWN {
+                self.matrix.add(rows[a], rows[b], block[a][b]);
+            }
+        }
+        let back = couple.carried[end.place + 1].dot(&end.tangent);
+        for row in [l.tangent(end.node), l.tangent(end.node) + 1] {
+            self.matrix.add(row, row, -back);
         }
     }
+
+    /// Adds the derivatives in the unknowns of one node and of another, in or outside the band.
+    fn add_between(&mut self, one: &End, other: &End, block: &[[f64; OWN]; OWN]) {
+        if one.node.abs_diff(other.node) > 1 {
+            let first = Layout::<C>.position(0);
+            return self.couplings.add_block((one.node, other.node), first, block);
+        }
+        let (rows, columns) = (own_rows::<C>(one.node), own_rows::<C>(other.node));
+        for (row, values) in rows.iter().zip(block) {
+            for (column, value) in columns.iter().zip(values) {
+                self.matrix.add(*row, *column, *value);
+            }
+        }
+    }
+}
+
+/// The rows of a node's position and tangent.
+fn own_rows<const C: usize>(node: usize) -> [usize; OWN] {
+    let first = Layout::<C>.position(node);
+    [0, 1, 2, 3, 4].map(|a| first + a)
 }
 
 impl Couple {
@@ -83,32 +114,39 @@ impl Couple {
         }
     }
 
-    /// The two points, numbered, and their elements.
-    fn sides(&self) -> impl Iterator<Item = (usize, usize)> {
-        [self.first, self.second].into_iter().enumerate()
+    /// The nodes on which the two points depend.
+    fn ends(&self, elements: &[ElementData], state: &RodState) -> [End; 4] {
+        [0, 1, 2, 3].map(|k| {
+            let element = if k < 2 { self.first } else { self.second };
+            let node = element + k % 2;
+            let (frame, h) = (&state.frames[node], elements[element].length);
+            let turns = Matrix3x2::from_columns(&[frame.u * h, frame.v * h]);
+            End { node, place: 2 * k, turns, tangent: frame.t * h }
+        })
     }
-}
 
-/// The unknowns of both elements.
-fn ways<const C: usize>(elements: &[ElementData], state: &RodState, couple: &Couple) -> [Way; 20] {
-    let l = Layout::<C>;
-    let mut ways = [(0, 0, Vec3::zeros()); 20];
-    let mut count = 0;
-    let mut put = |way: Way| {
-        ways[count] = way;
-        count += 1;
-    };
-    for (side, e) in couple.sides() {
-        let h = elements[e].length;
-        for (end, node) in [e, e + 1].into_iter().enumerate() {
-            let place = 4 * side + 2 * end;
-            for (a, axis) in [Vec3::x(), Vec3::y(), Vec3::z()].into_iter().enumerate() {
-                put((l.position(node) + a, place, axis));
+    /// Second derivatives in the unknowns of one end and of the same or a later one.
+    fn between(&self, one: &End, other: &End) -> [[f64; OWN]; OWN] {
+        let (i, j) = (one.place, other.place);
+        let turned = self.hessian[i][j + 1] * other.turns;
+        // Of one end alone the derivative in tangent and position stands above the diagonal.
+        let across = if i == j { turned.transpose() } else { one.turns.tr_mul(&self.hessian[i + 1][j]) };
+        let both = one.turns.tr_mul(&(self.hessian[i + 1][j + 1] * other.turns));
+        let mut block = [[0.0; OWN]; OWN];
+        for a in 0..3 {
+            for b in 0..3 {
+                block[a][b] = self.hessian[i][j][(a, b)];
             }
-            let frame = &state.frames[node];
-            put((l.tangent(node), place + 1, frame.u * h));
-            put((l.tangent(node) + 1, place + 1, frame.v * h));
+            for b in 0..2 {
+                block[a][3 + b] = turned[(a, b)];
+                block[3 + b][a] = across[(b, a)];
+            }
         }
+        for a in 0..2 {
+            for b in 0..2 {
+                block[3 + a][3 + b] = both[(a, b)];
+            }
+        }
+        block
     }
-    ways
 }

@@ -38,7 +38,7 @@ const WINDOW: f64 = 2.0;
 /// Largest number of steps to the minimum.
 const STEPS: usize = 40;
 /// Length of a step, in touching distances, after which the descent ends: the next would be its square.
-const SHORT: f64 = 1e-9;
+const SHORT: f64 = 1e-7;
 /// Smallest Hessian of a minimum, as a fraction of the stiffness of straight lines.
 const CONVEX: f64 = 1e-3;
 
