@@ -29,9 +29,10 @@ fn random<const C: usize>(nodes: usize, seed: u64) -> (BandMatrix<C>, Couplings<
         }
     }
     for (i, j) in pairs {
-        let mut values = [[0.0; C]; C];
-        values[..block].iter_mut().for_each(|row| row[..block].fill_with(&mut draw));
-        couplings.add_block((j, i), 0, &values);
+        // The last unknowns of both nodes, in both orders of these.
+        let values: [[f64; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| draw()));
+        let nodes = if j % 2 == 0 { (j, i) } else { (i, j) };
+        couplings.add_block(nodes, block - 6, &values);
     }
     (band, couplings)
 }
