@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use crate::Vec3;
 use crate::rod::quadrature::hermite;
 
+/// Angle by which an element may bend, rad: a ring of six elements, 60° each, has a push force off by 0.4 %, one of four
+/// by 4 %; at contacts the error is larger.
+pub(crate) const COARSE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_3;
+
 /// The inserted part of a device, from the sheath to the tip.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shape {
@@ -27,6 +31,11 @@ impl Shape {
     /// Whether there are no nodes.
     pub fn is_empty(&self) -> bool {
         self.positions_mm.is_empty()
+    }
+
+    /// Largest angle between the directions at two neighbouring nodes, rad: by how much an element bends.
+    pub fn largest_turn_rad(&self) -> f64 {
+        largest_turn_rad(self.tangents.iter())
     }
 
     /// Allocates for up to `nodes` nodes.
@@ -72,6 +81,13 @@ impl Shape {
     pub fn tip_mm(&self) -> Option<Vec3> {
         self.positions_mm.last().copied()
     }
+}
+
+/// Largest angle between successive directions, rad.
+pub(crate) fn largest_turn_rad<'a>(tangents: impl Iterator<Item = &'a Vec3> + Clone) -> f64 {
+    let pairs = tangents.clone().zip(tangents.skip(1));
+    // Exact for small angles too, where the cosine is not.
+    pairs.map(|(a, b)| libm::atan2(a.cross(b).norm(), a.dot(b))).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -151,7 +151,7 @@ fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
 
 /// How far beyond an opening a tip may go, mm.
 pub fn leave_mm(opening: &Opening) -> f64 {
-    opening.beyond_mm - LEFT_MM
+    (opening.beyond_mm - LEFT_MM).max(0.0)
 }
 
 /// The opening beyond whose plane `x` lies, within its extension, and the distance beyond it, mm.

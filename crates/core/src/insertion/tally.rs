@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Simulation, WallForce};
+use crate::shape::COARSE_TURN_RAD;
 
 /// Statistics over the steps of a run, whatever carries it out.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -22,6 +23,9 @@ pub struct Tally {
     pub max_penetration_mm: f64,
     /// The maximum of each of these forces.
     pub max_wall_force: WallForce,
+    /// Largest angle by which an element bends in any step, degrees ([`Shape::largest_turn_rad`](crate::shape::Shape::largest_turn_rad)).
+    #[serde(default)]
+    pub max_turn_deg: f64,
 }
 
 impl Tally {
@@ -43,10 +47,11 @@ impl Tally {
         most.sum_n = most.sum_n.max(force.sum_n);
         most.largest_n = most.largest_n.max(force.largest_n);
         most.tip_n = most.tip_n.max(force.tip_n);
+        self.max_turn_deg = self.max_turn_deg.max(simulation.shape().largest_turn_rad().to_degrees());
     }
 
-    /// Irregularities in words: "3 of 60 steps without an equilibrium, the first step 12; 1 jump". `None` if there
-    /// were none.
+    /// Irregularities in words: "3 of 60 steps without an equilibrium, the first step 12; 1 jump", and whether elements
+    /// are coarse. `None` if there were none.
     pub fn remarks(&self, steps: usize) -> Option<String> {
         let mut remarks = Vec::new();
         if let Some(first) = self.first_unconverged_step {
@@ -59,6 +64,12 @@ impl Tally {
         }
         if self.relaxations > 0 {
             remarks.push(several(self.relaxations, "last resort"));
+        }
+        if self.max_turn_deg > COARSE_TURN_RAD.to_degrees() {
+            let turn_deg = self.max_turn_deg;
+            remarks.push(format!(
+                "elements bend by up to {turn_deg:.0}°: compare with shorter ones (method.element_mm)"
+            ));
         }
         (!remarks.is_empty()).then(|| remarks.join("; "))
     }
@@ -80,6 +91,8 @@ mod tests {
         };
         let told = "3 of 60 steps without an equilibrium, the first step 12; 1 jump; 2 last resorts";
         assert_eq!(tally.remarks(60).unwrap(), told);
-        assert_eq!(Tally { jumps: 2, ..Tally::default() }.remarks(9).unwrap(), "2 jumps");
+        let coarse = Tally { max_turn_deg: 75.0, ..Tally::default() }.remarks(9).unwrap();
+        assert!(coarse.contains("bend by up to 75°") && coarse.contains("method.element_mm"), "{coarse}");
+        assert_eq!(Tally { jumps: 2, max_turn_deg: 45.0, ..Tally::default() }.remarks(9).unwrap(), "2 jumps");
     }
 }

@@ -2,17 +2,30 @@
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use super::SurfaceMesh;
+use super::generate::any_perpendicular;
 use super::topology::{EdgeTable, EdgeUse, NONE};
 use crate::Vec3;
 
 /// Length of the straight extension of an opening, mm, if nothing is in the way.
 const MOST_BEYOND_MM: f64 = 32.0;
-/// Smallest length of the extension, mm, even if something is.
+/// Length of the extensions of two openings, mm, that round free space about both need not allow, if they do not meet.
 const LEAST_BEYOND_MM: f64 = 3.0;
 /// Radius of the free space around an extension's axis, in radii of the opening.
 const FREE_RADII: f64 = 1.1;
+/// Part of the way to what is in front of an opening that its extension may take.
+const HALFWAY: f64 = 0.5;
+/// Distance from a rim, in radii of the opening, within which the wall is the vessel's own: it may curl over its rim.
+const OWN_RIM: f64 = 0.25;
+/// Smallest length of an extension, as a fraction of its opening's radius: it is closed by a cap of its own.
+const FLAT: f64 = 0.01;
+/// Circles on each disc of an extension, and points on each, with which two extensions are compared.
+const CIRCLES: usize = 3;
+const AROUND: usize = 24;
+/// Discs of an extension that are compared.
+const DISCS: usize = 5;
 /// Smallest radius of the default opening for devices, as a fraction of the widest one's: narrower ones are branches.
 const TRUNK: f64 = 0.4;
 
@@ -68,6 +81,31 @@ impl Opening {
         (beyond_mm, (offset - self.direction * beyond_mm).norm())
     }
 
+    /// How far its rim, which may be oblique, reaches beyond its plane, mm.
+    pub(super) fn rim_mm(&self, mesh: &SurfaceMesh) -> f64 {
+        let at = |v: &u32| self.beyond_and_aside_mm(&mesh.vertices_mm[*v as usize]).0;
+        self.boundary.iter().map(at).fold(0.0, f64::max)
+    }
+
+    /// Whether a sample point of another opening's round extension of this length lies in its own.
+    fn meets(&self, other: &Self, length_mm: f64) -> bool {
+        let u = any_perpendicular(&other.direction);
+        let v = other.direction.cross(&u);
+        let is_inside = |x: &Vec3| {
+            let (along, aside) = self.beyond_and_aside_mm(x);
+            along > 0.0 && along < length_mm && aside < self.radius_mm
+        };
+        let place = |n: usize| {
+            let (disc, circle, k) = (n / (CIRCLES * AROUND), n / AROUND % CIRCLES, n % AROUND);
+            let angle = TAU * k as f64 / AROUND as f64;
+            let radius_mm = other.radius_mm * circle as f64 / (CIRCLES - 1) as f64;
+            let along_mm = length_mm * disc as f64 / (DISCS - 1) as f64;
+            let across = u * libm::cos(angle) + v * libm::sin(angle);
+            other.centre_mm + other.direction * along_mm + across * radius_mm
+        };
+        (0..DISCS * CIRCLES * AROUND).any(|n| is_inside(&place(n)))
+    }
+
     /// The triangles that close the opening: a fan around its centre, facing out.
     pub fn cap(&self, mesh: &SurfaceMesh) -> impl Iterator<Item = [Vec3; 3]> {
         let at = |k: usize| mesh.vertices_mm[self.boundary[k % self.boundary.len()] as usize];
@@ -96,8 +134,9 @@ pub(super) fn places(mesh: &SurfaceMesh) -> impl Iterator<Item = Vec3> {
     mesh.vertices_mm.iter().copied().chain(centres)
 }
 
-/// Shortens the extensions of openings so that they meet neither each other nor these sample points of the wall.
-pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, openings: &mut [Opening]) {
+/// Shortens the extensions of openings, whose rims reach so far beyond their planes, so that they meet neither each
+/// other nor these sample points of the wall. Round free space is kept about each where there is room for it.
+pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, rims_mm: &[f64], openings: &mut [Opening]) {
     let mut beyond = vec![MOST_BEYOND_MM; openings.len()];
     for (i, a) in openings.iter().enumerate() {
         for (j, b) in openings.iter().enumerate().skip(i + 1) {
@@ -107,28 +146,45 @@ pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, openings: &mut [Openi
             if apart(a, b, MOST_BEYOND_MM) >= least {
                 continue;
             }
-            let (mut low, mut high) = (0.0, MOST_BEYOND_MM);
-            for _ in 0..20 {
-                let middle = 0.5 * (low + high);
-                if apart(a, b, middle) < least { high = middle } else { low = middle }
+            let mut length_mm = longest(MOST_BEYOND_MM, |length| apart(a, b, length) >= least);
+            if length_mm < LEAST_BEYOND_MM {
+                let is_free = |length: f64| !a.meets(b, length) && !b.meets(a, length);
+                length_mm = length_mm.max(longest(LEAST_BEYOND_MM, is_free));
             }
-            beyond[i] = low.min(beyond[i]);
-            beyond[j] = low.min(beyond[j]);
+            beyond[i] = length_mm.min(beyond[i]);
+            beyond[j] = length_mm.min(beyond[j]);
         }
     }
     for x in wall {
-        for (opening, beyond) in openings.iter().zip(&mut beyond) {
+        for ((opening, rim_mm), beyond) in openings.iter().zip(rims_mm).zip(&mut beyond) {
             let free = FREE_RADII * opening.radius_mm;
             let (along, aside) = opening.beyond_and_aside_mm(&x);
+            let before = along - rim_mm;
+            let from_rim = (aside - opening.radius_mm).hypot(before);
+            let is_own = before <= 0.0 || from_rim <= OWN_RIM * opening.radius_mm;
             // Rims may be oblique.
-            if along > free && along < *beyond + free && aside < free {
-                *beyond = along - free;
+            if aside < free && (along > free || !is_own) {
+                let half = if is_own { 0.0 } else { HALFWAY * before };
+                *beyond = (along - free).max(half).min(*beyond);
             }
         }
     }
     for (opening, beyond) in openings.iter_mut().zip(beyond) {
-        opening.beyond_mm = beyond.max(LEAST_BEYOND_MM);
+        opening.beyond_mm = beyond.max(FLAT * opening.radius_mm);
     }
+}
+
+/// The largest length up to this one that is allowed, if all shorter ones are.
+fn longest(most: f64, allowed: impl Fn(f64) -> bool) -> f64 {
+    if allowed(most) {
+        return most;
+    }
+    let (mut low, mut high) = (0.0, most);
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        if allowed(middle) { low = middle } else { high = middle }
+    }
+    low
 }
 
 /// Smallest distance between the straight extensions of this length of two openings, mm: Ericson, *Real-Time
@@ -342,7 +398,7 @@ mod tests {
         let beyond = |mesh: &SurfaceMesh, turned: f64| {
             let mut pair =
                 [opening(-5.0, Vec3::new(turned, 0.0, 1.0)), opening(5.0, Vec3::new(-turned, 0.0, 1.0))];
-            keep_apart(places(mesh), &mut pair);
+            keep_apart(places(mesh), &[0.0; 2], &mut pair);
             pair.map(|o| o.beyond_mm)
         };
         let nothing = SurfaceMesh::default();
@@ -359,5 +415,30 @@ mod tests {
         let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 0.5, 10.0)], triangles: Vec::new() };
         let [first, second] = beyond(&vessel, 0.0);
         assert!((first - 8.9).abs() < 1e-12 && second == MOST_BEYOND_MM, "{first} {second}");
+        // Half a millimetre in front of it: half of that, since an extension through the vessel would be felt in it.
+        let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 0.5, 0.5)], triangles: Vec::new() };
+        assert_eq!(beyond(&vessel, 0.0), [0.25, MOST_BEYOND_MM]);
+        // The vessel's own wall at the rim is not in the way.
+        let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 1.05, 0.1)], triangles: Vec::new() };
+        assert_eq!(beyond(&vessel, 0.0), [MOST_BEYOND_MM; 2]);
+    }
+
+    #[test]
+    fn what_is_drawn_out_of_openings_that_face_each_other_meets_in_the_middle() {
+        let opening = |x: f64, direction: Vec3| Opening {
+            index: 0,
+            centre_mm: Vec3::x() * x,
+            radius_mm: 1.0,
+            direction,
+            boundary: Vec::new(),
+            beyond_mm: MOST_BEYOND_MM,
+        };
+        for (gap, most) in [(1.0, 0.5), (4.0, 2.0), (7.0, LEAST_BEYOND_MM)] {
+            let mut pair = [opening(0.0, Vec3::x()), opening(gap, -Vec3::x())];
+            keep_apart(places(&SurfaceMesh::default()), &[0.0; 2], &mut pair);
+            for found in pair.map(|o| o.beyond_mm) {
+                assert!(found <= most && found > 0.99 * most, "{found} of a gap of {gap}");
+            }
+        }
     }
 }

@@ -215,7 +215,8 @@ impl Wall {
         let mut boundary = opening::boundary(&mesh, table);
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
-        opening::keep_apart(opening::places(&mesh), &mut boundary.openings);
+        let rims_mm: Vec<f64> = boundary.openings.iter().map(|opening| opening.rim_mm(&mesh)).collect();
+        opening::keep_apart(opening::places(&mesh), &rims_mm, &mut boundary.openings);
         let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
         Self { mesh, openings: boundary.openings, caps, report }
     }

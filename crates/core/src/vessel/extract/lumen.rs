@@ -66,6 +66,18 @@ impl<'a> Lumen<'a> {
         }
     }
 
+    /// Whether the straight way between two positions in the lumen leaves it through an opening.
+    pub(super) fn leaves(&self, from: &Vec3, to: &Vec3) -> bool {
+        self.wall.openings().iter().any(|opening| {
+            let [before, after] = [from, to].map(|x| opening.beyond_and_aside_mm(x).0);
+            if (before > 0.0) == (after > 0.0) {
+                return false;
+            }
+            let there = from + (to - from) * (before / (before - after));
+            opening.beyond_and_aside_mm(&there).1 < opening.radius_mm
+        })
+    }
+
     /// Distance to the wall along a unit vector, mm; `None` if the path leaves through an opening.
     pub(super) fn free_mm(&self, from: &Vec3, direction: &Vec3) -> Option<f64> {
         self.query.first_met(from, direction, self.size_mm).map(|(mm, _)| mm)

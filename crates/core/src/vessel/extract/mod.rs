@@ -178,7 +178,7 @@ fn found_ways(lumen: &Lumen<'_>, root: Sphere, ends: &[Sphere]) -> Vec<Option<Ve
         for sphere in [root].iter().chain(ends).copied().chain(lumen.spheres(spacing)) {
             spheres.push(sphere);
         }
-        let ways = Ways::from(0, &spheres);
+        let ways = Ways::from(0, &spheres, lumen);
         for (k, way) in found.iter_mut().enumerate() {
             if way.is_none() {
                 let numbers = ways.to(k + 1);

@@ -147,3 +147,33 @@ fn openings_of_another_piece_are_told() {
     let error = ExtractedCentreline::of(&wall, None, &[missed]).unwrap_err().to_string();
     assert!(error.contains("no way inside the vessel leads there"), "{error}");
 }
+
+#[test]
+fn a_way_does_not_cross_the_gap_of_a_ring_that_is_cut_open() {
+    use std::f64::consts::TAU;
+    let (ring_mm, tube_mm, rows, columns) = (30.0, 4.0, 160u32, 24u32);
+    // The ends are 4.7 mm apart.
+    let whole = TAU - 4.7 / ring_mm;
+    let place = |i: u32, j: u32| {
+        let (along, around) =
+            (whole * f64::from(i) / f64::from(rows), TAU * f64::from(j) / f64::from(columns));
+        let out = Vec3::new(along.cos(), along.sin(), 0.0);
+        out * (ring_mm + tube_mm * around.cos()) + Vec3::z() * (tube_mm * around.sin())
+    };
+    let vertices_mm = (0..=rows).flat_map(|i| (0..columns).map(move |j| place(i, j))).collect();
+    let number = |i: u32, j: u32| i * columns + j % columns;
+    let quad = |(i, j): (u32, u32)| {
+        let [a, b] = [number(i, j), number(i, j + 1)];
+        let [c, d] = [number(i + 1, j), number(i + 1, j + 1)];
+        [[a, c, b], [b, c, d]]
+    };
+    let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+    let mesh = crate::vessel::SurfaceMesh { vertices_mm, triangles: places.flat_map(quad).collect() };
+    let wall = Wall::from_surface(&mesh).unwrap();
+    let found = ExtractedCentreline::of(&wall, Some(CentrelineEnd::Opening(0)), &[]).unwrap();
+    let [branch] = found.tree.branches()[..] else { panic!("{found:?}") };
+    assert!((branch.length_mm - whole * ring_mm).abs() < 2.0, "{branch:?}");
+    // Nor do the felt extensions of its ends meet.
+    let reach: f64 = wall.openings().iter().map(|opening| opening.beyond_mm).sum();
+    assert!(reach > 4.0 && reach < 4.7, "{reach}");
+}

@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::lumen::{Sphere, Spheres};
+use super::lumen::{Lumen, Sphere, Spheres};
 
 /// The shortest paths from one sphere to all others.
 pub(super) struct Ways {
@@ -37,11 +37,13 @@ impl PartialOrd for Reached {
 }
 
 impl Ways {
-    pub(super) fn from(first: usize, spheres: &Spheres) -> Self {
+    pub(super) fn from(first: usize, spheres: &Spheres, lumen: &Lumen<'_>) -> Self {
         let all = &spheres.all;
         let mut beside: Vec<Vec<usize>> = vec![Vec::new(); all.len()];
         for (k, sphere) in all.iter().enumerate() {
-            for other in spheres.overlapping(sphere).filter(|&other| other != k) {
+            let is_beside =
+                |other: &usize| *other != k && !lumen.leaves(&sphere.centre_mm, &all[*other].centre_mm);
+            for other in spheres.overlapping(sphere).filter(is_beside) {
                 beside[k].push(other);
                 beside[other].push(k);
             }

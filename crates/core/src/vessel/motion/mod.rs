@@ -56,12 +56,15 @@ impl VesselMotion {
         let each = modes.iter().enumerate();
         let modes = each.map(|(index, mode)| mode.check(&format!("vessel.motion[{index}]")));
         let modes = modes.collect::<Result<Vec<_>>>()?;
-        let steepest = modes.iter().map(Mode::steepest).sum::<f64>();
+        // One turn of the whole vessel, however large, and displacements of the whole leave all lengths as they are.
+        let is_rigid =
+            !modes.iter().any(Mode::fades) && modes.iter().filter(|mode| mode.turns()).count() <= 1;
+        let steepest = if is_rigid { 0.0 } else { modes.iter().map(Mode::steepest).sum::<f64>() };
         // NaN is rejected too.
         if steepest.is_nan() || steepest >= STEEPEST {
             let mend = format!(
                 "neighbouring points of the vessel would move apart by up to so much of their distance: it must stay below {STEEPEST}; \
-                 move less, or fade over a longer way (fade_mm)"
+                 move or turn less (a turn alone counts as 2 sin of half its angle), or fade over a longer way (fade_mm)"
             );
             return Err(Error::parameter("vessel.motion", number(steepest), mend));
         }

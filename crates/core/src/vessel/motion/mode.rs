@@ -193,6 +193,16 @@ impl Mode {
         self.waveform != Waveform::Steady
     }
 
+    /// Whether it moves only a part of the vessel.
+    pub(super) fn fades(&self) -> bool {
+        self.fade.is_some()
+    }
+
+    /// Whether it turns.
+    pub(super) fn turns(&self) -> bool {
+        self.turn.is_some()
+    }
+
     /// w v at an amplitude.
     pub(super) fn at(&self, amplitude: f64) -> Affine {
         let turned = self.turn.map(|(centre, axis, angle)| {

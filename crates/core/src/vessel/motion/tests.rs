@@ -150,7 +150,7 @@ fn what_makes_no_sense_is_refused_with_its_key() {
         (&|m| m.displacement_mm = [0.0; 3], "nothing moves"),
         (&|m| m.turn = Some(Turn { axis: [0.0; 3], ..turn(1.0) }), "vessel.motion[1].turn.axis"),
         (&|m| m.turn = Some(turn(f64::INFINITY)), "vessel.motion[1].turn.angle_deg"),
-        (&|m| m.turn = Some(turn(40.0)), "below 0.5"),
+        (&|m| (m.turn, m.within) = (Some(turn(40.0)), Some(around(20.0, 60.0))), "below 0.5"),
         (&|m| m.still = Some(around(1.0, 0.0)), "vessel.motion[1].still.fade_mm"),
         (&|m| m.within = Some(around(1.0, 30.0)), "fade over a longer way"),
     ];
@@ -159,4 +159,20 @@ fn what_makes_no_sense_is_refused_with_its_key() {
     }
     let both = told(&|m| (m.still, m.within) = (Some(around(1.0, 90.0)), Some(around(1.0, 90.0))));
     assert!(both.contains("keep one of the two"), "{both}");
+}
+
+#[test]
+fn a_whole_vessel_may_turn_by_any_angle_and_keeps_its_lengths() {
+    let turned = |angle_deg: f64, within: Option<Around>| {
+        let one = MotionMode { turn: Some(turn(angle_deg)), within, ..mode(Waveform::Steady) };
+        VesselMotion::new(&[one])
+    };
+    let field = turned(170.0, None).unwrap().unwrap().at(0.0);
+    assert_eq!(field.stretch(), 1.0);
+    for x in places(5) {
+        assert!((field.material(&field.place(&x)) - x).norm() < 1e-10, "{x}");
+    }
+    // A part of it may not.
+    let refused = turned(30.0, Some(around(20.0, 60.0))).unwrap_err().to_string();
+    assert!(refused.contains("vessel.motion") && refused.contains("turn less"), "{refused}");
 }

@@ -185,7 +185,7 @@ fn openings(axes: &[Axis], ends: &[TreeEnd]) -> Vec<Opening> {
             place.position + (u * libm::cos(angle) + v * libm::sin(angle)) * place.radius[0]
         })
     });
-    opening::keep_apart(walls, &mut openings);
+    opening::keep_apart(walls, &vec![0.0; ends.len()], &mut openings);
     openings
 }
 
