@@ -20,15 +20,32 @@ const UNITS: [(&str, f64); 5] = [
 /// Usual diagonals of vessels, mm.
 const USUAL_MM: RangeInclusive<f64> = 20.0..=1500.0;
 
-/// Hints for the user on a wall that was read with `unit_mm`, one sentence each: on a possibly wrong unit, and on
-/// openings that face each other.
+/// Space in front of an opening, in radii of it, below which the vessel lies right in front.
+const TIGHT_RADII: f64 = 0.1;
+
+/// Hints for the user on a wall that was read with `unit_mm`, one sentence each: on a possibly wrong unit, on openings
+/// that face each other, and on openings with the vessel right in front.
 ///
 /// # Errors
 /// [`Error::Mesh`](crate::Error::Mesh) if the wall cannot be queried.
 pub fn wall_hints(wall: &Wall, unit_mm: f64) -> Result<Vec<String>> {
     let (low, high) = wall.mesh().used_bounds_mm().unwrap_or_default();
     let unit = unit_hint((high - low).norm(), survey::median_half_lumen_mm(wall)?, unit_mm);
-    Ok(unit.into_iter().chain(facing_hints(wall.openings())).collect())
+    let openings = facing_hints(wall.openings()).chain(tight_hints(wall.openings()));
+    Ok(unit.into_iter().chain(openings).collect())
+}
+
+/// One sentence for each opening without room in front of it.
+fn tight_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
+    let tight = openings.iter().filter(|opening| opening.beyond_mm < TIGHT_RADII * opening.radius_mm);
+    tight.map(|opening| {
+        format!(
+            "the vessel itself lies right in front of opening {}, at {}: its wall may be felt through the opening; cut the surface \
+             farther back there, or move apart what touches",
+            opening.index,
+            crate::error::vector(&opening.centre_mm)
+        )
+    })
 }
 
 /// One sentence for each pair of openings that face each other.
@@ -88,6 +105,20 @@ fn rounded(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_opening_with_the_vessel_right_in_front_is_told() {
+        let opening = |beyond_mm: f64| Opening {
+            index: 3,
+            centre_mm: crate::Vec3::x(),
+            radius_mm: 3.0,
+            direction: crate::Vec3::x(),
+            boundary: Vec::new(),
+            beyond_mm,
+        };
+        let told: Vec<String> = tight_hints(&[opening(0.2), opening(1.0)]).collect();
+        assert!(told.len() == 1 && told[0].contains("in front of opening 3, at [1, 0, 0]"), "{told:?}");
+    }
 
     #[test]
     fn odd_sizes_get_a_guess_and_usual_ones_none() {

@@ -83,6 +83,18 @@ impl<'a> Lumen<'a> {
         self.query.first_met(from, direction, self.size_mm).map(|(mm, _)| mm)
     }
 
+    /// A larger sphere in the middle of the lumen that holds the centre of this one; this one if there is none. Ways
+    /// pass by the small sphere about a place near the wall, or do not meet it.
+    pub(super) fn about(&self, sphere: &Sphere) -> Sphere {
+        let place = sphere.centre_mm;
+        let found = self.nearest(&place).and_then(|near| {
+            let inward = (place - near.point_mm).try_normalize(OFF * self.size_mm)?;
+            self.sphere_about_chord(&near.point_mm, &inward)
+        });
+        let holds = |about: &Sphere| (about.centre_mm - place).norm() < about.radius_mm;
+        found.filter(|about| about.radius_mm > sphere.radius_mm && holds(about)).unwrap_or(*sphere)
+    }
+
     /// Spheres in the middle of the lumen, the largest first: about chords across it from positions all over the
     /// wall, at most `spacing` of their radii apart.
     pub(super) fn spheres(&self, spacing: f64) -> Vec<Sphere> {

@@ -26,7 +26,7 @@ const SPACINGS: [f64; 3] = [0.5, 0.25, 0.125];
 pub enum CentrelineEnd {
     /// An opening of the wall, by its index.
     Opening(usize),
-    /// A position in the lumen, mm.
+    /// A position in the lumen, mm; the line ends in the middle of the lumen there.
     Place(Vec3),
 }
 
@@ -156,10 +156,10 @@ fn end(lumen: &Lumen<'_>, end: &CentrelineEnd, key: &str) -> Result<Sphere> {
         CentrelineEnd::Place(place) => place,
     };
     let radius_mm = lumen.clearance_mm(&centre_mm);
-    if radius_mm > 0.0 {
-        return Ok(Sphere { centre_mm, radius_mm });
-    }
+    let sphere = Sphere { centre_mm, radius_mm };
     match *end {
+        CentrelineEnd::Place(_) if radius_mm > 0.0 => Ok(lumen.about(&sphere)),
+        CentrelineEnd::Opening(_) if radius_mm > 0.0 => Ok(sphere),
         // The middle of an irregular rim may be outside the lumen; nearby points are not.
         CentrelineEnd::Opening(number) => Ok(Sphere { centre_mm, radius_mm: openings[number].radius_mm }),
         CentrelineEnd::Place(place) => Err(Error::parameter(

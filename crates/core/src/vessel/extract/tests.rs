@@ -116,6 +116,11 @@ fn places_inside_are_ends_too_and_others_are_refused() {
     let tree = of(place(0.0, 0.0, 20.0), place(1.0, 0.0, 60.0)).unwrap().tree;
     assert!((tree.branches()[0].length_mm - 40.0).abs() < 1.5, "{:?}", tree.branches());
     assert_eq!(tree.target("place 1").unwrap().row, tree.nodes().len() - 1);
+    // Near the wall: the way to the middle of the lumen there, and no detour.
+    for to in [place(0.0, 3.9, 60.0), place(-2.0, -2.0, 60.0)] {
+        let tree = of(place(0.0, -3.8, 20.0), to).unwrap().tree;
+        assert!((tree.branches()[0].length_mm - 40.0).abs() < 2.0, "{:?}", tree.branches());
+    }
     for (from, to, told) in [
         (place(0.0, 0.0, 20.0), place(8.0, 0.0, 60.0), "to = [8, 0, 60]: is not inside"),
         (place(0.0, 0.0, -5.0), place(0.0, 0.0, 60.0), "from = [0, 0, -5]: is not inside"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import torch
 from gymnasium import spaces
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
@@ -99,17 +100,33 @@ class SB3VecEnv(VecEnv):
 
 
 class Learned:
-    """A model of stable-baselines3 as a deterministic `Policy`; ``normalize`` is the normalisation of its
-    observations.
+    """A model of stable-baselines3 as a `Policy`; ``normalize`` is the normalisation of its observations.
+
+    It takes the mean of its actions or, given a ``seed``, draws them as it did in learning: a tip that is stuck where
+    the mean action leads nowhere then comes free. Actions that are drawn depend on all environments that act
+    together, so episodes repeat one by one.
     """
 
-    def __init__(self, model: BaseAlgorithm, normalize: VecNormalize | None = None) -> None:
+    def __init__(
+        self, model: BaseAlgorithm, normalize: VecNormalize | None = None, seed: int | None = None
+    ) -> None:
         assert isinstance(model.action_space, spaces.Box)
         self.model, self.normalize, self._high = model, normalize, model.action_space.high
+        self._drawn = None if seed is None else torch.Generator().manual_seed(seed).get_state()
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         observed: Any = episodes.observe()
         if self.normalize is not None:
             observed = self.normalize.normalize_obs(observed)
-        actions, _ = self.model.predict(observed, deterministic=True)
-        return np.asarray(actions, dtype=float) / self._high * episodes.task.limits()
+        return self._actions(observed) / self._high * episodes.task.limits()
+
+    def _actions(self, observed: Any) -> NDArray[np.float64]:
+        if self._drawn is None:
+            actions, _ = self.model.predict(observed, deterministic=True)
+            return np.asarray(actions, dtype=float)
+        # The model draws from the generator of all of torch, which is lent to it.
+        with torch.random.fork_rng(devices=[]):
+            torch.random.set_rng_state(self._drawn)
+            actions, _ = self.model.predict(observed, deterministic=False)
+            self._drawn = torch.random.get_rng_state()
+        return np.asarray(actions, dtype=float)
