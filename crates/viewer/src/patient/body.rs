@@ -79,6 +79,28 @@ mod tests {
     }
 
     #[test]
+    fn bodies_of_all_sizes_that_a_scene_may_give_are_made_and_closed() {
+        let vessel = (Vec3::new(-40.0, -50.0, 0.0), Vec3::new(40.0, 30.0, 300.0));
+        for width_mm in [100.0, 105.0, 110.0, 113.0, 120.0, 330.0, 800.0] {
+            for depth_mm in [80.0, 215.0, 600.0] {
+                for (spine_mm, diaphragm_mm) in [
+                    (None, None),
+                    (Some([500.0, -500.0]), Some(-400.0)),
+                    (Some([-500.0, 500.0]), Some(900.0)),
+                ] {
+                    let spec =
+                        TorsoSpec { width_mm, depth_mm, spine_mm, diaphragm_mm, ..TorsoSpec::default() };
+                    let body = Body::new(&spec, vessel);
+                    for mesh in [&body.skin, &body.bones, &body.marrow, &body.lungs] {
+                        assert!(mesh.vertices_mm.iter().all(|v| v.iter().all(|x| x.is_finite())), "{spec:?}");
+                    }
+                    check_closed(&body.skin).unwrap_or_else(|e| panic!("{spec:?}: {e}"));
+                }
+            }
+        }
+    }
+
+    #[test]
     fn what_is_not_wanted_is_not_there() {
         let spec = TorsoSpec { spine: false, ribs: false, lungs: false, ..TorsoSpec::default() };
         let body = Body::new(&spec, (Vec3::zeros(), Vec3::repeat(100.0)));

@@ -17,6 +17,9 @@ const BELOW_MM: [f64; 2] = [260.0, 600.0];
 const LEAST_CHEST_MM: f64 = 190.0;
 /// Thickness of the chest's wall.
 const CHEST_WALL_MM: f64 = 22.0;
+/// Smallest extent of the mediastinum to one side, and largest as a fraction of the body's width.
+const LEAST_SIDE_MM: f64 = 34.0;
+const MOST_SIDE: f64 = 0.3;
 /// Half width and half depth of the ring of the first ribs.
 const FIRST_RIB_MM: [f64; 2] = [56.0, 44.0];
 /// Half width and half depth of the neck.
@@ -63,8 +66,8 @@ impl Trunk {
     pub(super) fn new(spec: &TorsoSpec, low: Vec3, high: Vec3) -> Self {
         let spine = spec.spine_mm.unwrap_or([(low.x + high.x) / 2.0, high.y + BEHIND_MM]);
         let half_depth = spec.depth_mm / 2.0;
-        // The vessel is kept outside the lungs, within reason.
-        let side = |reach: f64| (reach + 8.0).clamp(34.0, 0.3 * spec.width_mm);
+        // The vessel is kept outside the lungs, within reason: in a slim body the lungs keep their place.
+        let side = |reach: f64| (reach + 8.0).max(LEAST_SIDE_MM).min(MOST_SIDE * spec.width_mm);
         let diaphragm = spec.diaphragm_mm.unwrap_or(low.z + (high.z - low.z) / 3.0);
         let apex = (high.z - 10.0).max(diaphragm + LEAST_CHEST_MM);
         // A vessel below the diaphragm does not widen what is above it.
