@@ -85,6 +85,26 @@ fn iodine_in_the_picture_is_what_was_injected_from_the_first_frame_on() {
 }
 
 #[test]
+fn what_comes_out_at_the_end_of_a_vessel_is_downstream_of_it_only() {
+    // The mouth of a sheath at the lower end of the descending aorta.
+    let of = |at_mm: Option<[f64; 3]>| {
+        let view = far(view("aortic_arch", 80.0, 0.6, injection(20.0, at_mm)));
+        let mut renderer = Renderer::of_wall(&view, &wall("arch")).unwrap();
+        let paths = renderer.path_lengths_at(&[], 1.0).unwrap();
+        let arm = renderer.c_arm().unwrap();
+        // The row of 50 mm above that end, three aortas wide.
+        let row = arm.project(&endowire_core::Vec3::new(0.0, 0.0, 50.0))[1] as usize;
+        let above = paths.contrast_mm[..row * paths.width as usize].iter().fold(0.0_f32, |m, mm| m.max(*mm));
+        let below = paths.contrast_mm[row * paths.width as usize..].iter().fold(0.0_f32, |m, mm| m.max(*mm));
+        [above, below]
+    };
+    let [above, below] = of(Some([0.0, 0.0, 2.0]));
+    assert!(above < 1e-3 && below > 1.0, "{above} {below}");
+    let [above, _] = of(None);
+    assert!(above > 1.0, "the twin: from the inlet, {above}");
+}
+
+#[test]
 fn neighbouring_pixels_of_a_lumen_differ_by_little() {
     for (name, view) in scenes() {
         let wall = wall(name);

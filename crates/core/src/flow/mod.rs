@@ -33,7 +33,7 @@ mod drag;
 mod tree;
 
 pub use drag::drag_n_per_mm;
-pub use tree::{FlowNode, flow_nodes};
+pub use tree::{FlowNode, check_place, flow_nodes};
 
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;

@@ -5,6 +5,7 @@
 //! Sciences 12, 1926). The inflow of a sac comes back: it has a share of its own, and the other branches divide the
 //! whole.
 
+use super::OUTSIDE_RADII;
 use crate::vessel::{CentrelineNode, CentrelineTree};
 use crate::{Error, Result, Vec3, error};
 
@@ -140,9 +141,61 @@ pub fn flow_nodes(
     Ok(nodes)
 }
 
+/// Refuses a place so far from the tree that no blood of it flows there; `key` gave the place.
+///
+/// # Errors
+/// [`Error::Parameter`] with the nearest stretch of the tree, relative to its radius, and how far away it is.
+pub fn check_place(tree: &CentrelineTree, place_mm: Vec3, key: &str) -> Result<()> {
+    let points = tree.nodes();
+    // Distance and radius of the stretch from a point's parent, and its nearest place.
+    let stretch = |point: &CentrelineNode| {
+        let from = point.parent.map_or(point, |parent| &points[parent]);
+        let way = point.position_mm - from.position_mm;
+        let along = (place_mm - from.position_mm).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
+        let along = along.clamp(0.0, 1.0);
+        let nearest_mm = from.position_mm + way * along;
+        let radius_mm = from.radius_mm + (point.radius_mm - from.radius_mm) * along;
+        ((place_mm - nearest_mm).norm(), radius_mm, nearest_mm)
+    };
+    let in_radii = |one: &(f64, f64, Vec3)| one.0 / one.1;
+    let nearest = points.iter().map(stretch).min_by(|a, b| in_radii(a).total_cmp(&in_radii(b)));
+    match nearest {
+        Some((away_mm, radius_mm, nearest_mm)) if away_mm > OUTSIDE_RADII * radius_mm => {
+            let mend = format!(
+                "is {away_mm:.1} mm from the centre line at {}, where the vessel has a radius of {radius_mm:.1} mm: give a place in \
+                 the vessel, in mm, at most {OUTSIDE_RADII} radii from its centre line",
+                error::vector(&nearest_mm)
+            );
+            Err(Error::parameter(key, error::vector(&place_mm), mend))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The inlet end: the widest, or of several about as wide the one nearest to the head.
 fn supplying(points: &[CentrelineNode], ends: impl Iterator<Item = usize> + Clone) -> Option<usize> {
     let widest = ends.clone().map(|i| points[i].radius_mm).fold(0.0, f64::max);
     let wide = ends.filter(|&i| points[i].radius_mm >= ABOUT_AS_WIDE * widest);
     wide.max_by(|&a, &b| points[a].position_mm.z.total_cmp(&points[b].position_mm.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_outside_the_vessel_is_refused_and_one_between_two_points_is_not() {
+        let node = |x: f64, radius_mm: f64, parent| CentrelineNode {
+            position_mm: Vec3::new(x, 0.0, 0.0),
+            radius_mm,
+            parent,
+        };
+        let tree = CentrelineTree::new(vec![node(0.0, 10.0, None), node(200.0, 5.0, Some(0))]).unwrap();
+        let asked = |x: f64, y: f64| check_place(&tree, Vec3::new(x, y, 0.0), "at_mm");
+        assert!(asked(100.0, 0.0).is_ok() && asked(100.0, 14.9).is_ok() && asked(-19.0, 0.0).is_ok());
+        let refused = asked(100.0, 15.1).unwrap_err().to_string();
+        assert!(refused.starts_with("at_mm = [100, 15.1, 0]: is 15.1 mm from the centre line"), "{refused}");
+        assert!(refused.contains("radius of 7.5 mm"), "{refused}");
+        assert!(asked(900.0, 0.0).is_err());
+    }
 }

@@ -19,6 +19,9 @@ use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 /// Smallest volume of a cell, relative to that of the centre line: one invisible in the image must not make the time
 /// step vanish.
 const LEAST_PART: f64 = 0.25;
+/// Most blood that tissue can take, in its volumes per second. The carotid body, which no other tissue exceeds, takes 20
+/// millilitres a minute per millilitre, kidneys take 4.
+const MOST_PERFUSED_PER_S: f64 = 20.0 / 60.0;
 /// Fraction of a heartbeat in systole.
 const SYSTOLE: f64 = 0.35;
 
@@ -91,7 +94,7 @@ impl Flow {
         if spec.injection.is_empty() {
             return Ok(None);
         }
-        let given = spec.flow.tree.as_deref().map(read).transpose()?;
+        let given = spec.flow.tree.as_deref().map(read_tree).transpose()?;
         let Some(tree) = given.as_ref().or(spec.flow.centreline.as_deref()) else {
             let mend = "contrast medium flows along a centre line; give view.flow.tree";
             return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
@@ -171,6 +174,16 @@ impl Flow {
         self.injections.iter().any(|one| one.at_tip)
     }
 
+    /// The ends of the tree behind which tissue is drawn, with its radius, mm. An end that carries more blood than this
+    /// tissue can take is a large vessel that was cut: it leads on, and its medium leaves the picture.
+    pub(super) fn supplying_ends(&self) -> impl Iterator<Item = (usize, &Node, f64)> {
+        let radius_mm = self.tissue_mm.unwrap_or(0.0);
+        let most = MOST_PERFUSED_PER_S * std::f64::consts::PI * 4.0 / 3.0 * radius_mm.powi(3);
+        let ends = self.nodes.iter().enumerate().filter(|(_, node)| node.is_end);
+        let supplies = move |node: &Node| node.share * self.mean_inflow_mm3_per_s <= most;
+        ends.filter(move |(_, node)| supplies(node)).map(move |(end, node)| (end, node, radius_mm))
+    }
+
     /// Records the tip position at a time, in the vessel at rest. Frames do so themselves.
     pub(crate) fn follow_tip(&self, time_s: f64, place_mm: Vec3) {
         if self.follows_tip() {
@@ -220,7 +233,8 @@ impl Flow {
     }
 }
 
-fn read(path: &Path) -> Result<CentrelineTree> {
+/// Reads the table of a centre line that `view.flow.tree` names.
+pub(crate) fn read_tree(path: &Path) -> Result<CentrelineTree> {
     CentrelineTree::read(path).map_err(|error| match error {
         Error::File { path, source } => {
             Error::parameter("view.flow.tree", path.display(), source.to_string())
@@ -369,6 +383,21 @@ mod tests {
         assert_eq!(first(&tree(9.0, 9.0)), 120.0);
         assert_eq!(first(&tree(9.1, 9.0)), 120.0);
         assert_eq!(first(&tree(12.0, 9.0)), 0.0, "the twin: a wider lower end supplies");
+    }
+
+    #[test]
+    fn an_end_that_carries_more_than_tissue_can_take_is_cut_and_supplies_none() {
+        let ends = |inflow_ml_per_s: f64, tissue_mm: Option<f64>| {
+            let spec = FlowSpec { inflow_ml_per_s, tissue_mm, split_exponent: 3.0, ..FlowSpec::default() };
+            let flow = Flow::in_cones(&tree(), &spec, &[injection(None)]).unwrap();
+            flow.supplying_ends().map(|(_, node, _)| node.radius_mm).collect::<Vec<_>>()
+        };
+        // A ball of 25 mm takes 21.8 ml/s; the branches of radii 4 and 2 get 8/9 and 1/9 of the inflow.
+        assert_eq!(ends(80.0, Some(25.0)), [2.0]);
+        let mut both = ends(20.0, Some(25.0));
+        both.sort_by(f64::total_cmp);
+        assert_eq!(both, [2.0, 4.0], "the twin: both can be taken");
+        assert!(ends(400.0, Some(25.0)).is_empty() && ends(20.0, None).is_empty());
     }
 
     #[test]

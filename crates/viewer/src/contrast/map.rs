@@ -45,7 +45,7 @@ pub(crate) struct Shares {
     /// Pixels inside the wall, ascending, and the ends of their shares.
     pixels: Vec<(u32, u32)>,
     shares: Vec<(u32, f32)>,
-    /// Ends of the tree, with the pixels that see the tissue behind: length, mm, per mm³ of medium.
+    /// Ends of the tree that supply tissue, with the pixels that see it: length, mm, per mm³ of medium.
     tissue: Vec<(usize, Vec<(u32, f32)>)>,
 }
 

@@ -8,5 +8,5 @@ mod tissue;
 mod transport;
 mod volumes;
 
-pub(crate) use flow::Flow;
+pub(crate) use flow::{Flow, read_tree};
 pub(crate) use map::{ContrastMap, Medium, Shares};

@@ -24,15 +24,14 @@ const ASIDE: f64 = 1.0;
 const CLOUD: f64 = 0.25;
 const REACH: f64 = 3.5;
 
-/// Ends of the tree, with the pixels that see the tissue behind: length, mm, per mm³ of medium.
+/// Ends of the tree that supply tissue, with the pixels that see it: length, mm, per mm³ of medium.
 pub(super) fn tissue(
     flow: &Flow,
     c_arm: &CArm,
     displacement: Option<&Displacement>,
 ) -> Vec<(usize, Vec<(u32, f32)>)> {
-    let Some(radius_mm) = flow.tissue_mm else { return vec![] };
-    let ends = flow.nodes.iter().enumerate().filter(|(_, node)| node.is_end);
-    ends.map(|(end, node)| {
+    let ends = flow.supplying_ends();
+    ends.map(|(end, node, radius_mm)| {
         let before = node.upstream.map_or(node.position_mm, |up| flow.nodes[up].position_mm);
         let onwards = (node.position_mm - before).try_normalize(0.0).unwrap_or_default();
         let clouds = arterioles(node.position_mm, onwards, radius_mm, end as u64);

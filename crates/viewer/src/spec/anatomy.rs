@@ -114,7 +114,9 @@ pub struct FlowSpec {
     /// Mean residence time of contrast medium in the tissue behind an end of the tree, 0.01 to 1000: it washes out
     /// exponentially.
     pub tissue_s: f64,
-    /// Radius of that tissue, 1 to 200; absent: it is not drawn.
+    /// Radius of that tissue, 1 to 200; absent: it is not drawn. None is drawn behind an end that carries more blood
+    /// than tissue of this size can take (20 ml a minute per ml): that is a large vessel which was cut, and its medium
+    /// leaves the picture.
     pub tissue_mm: Option<f64>,
     /// Spreading of a bolus: its standard deviation in time is this times the square root of the transit time, s^½; 0
     /// to 10.

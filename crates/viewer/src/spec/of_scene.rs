@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use endowire_core::flow::check_place;
 use endowire_core::input::parse_toml;
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
@@ -12,6 +13,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::ViewSpec;
+use crate::contrast::read_tree;
 
 /// The viewer's part of a scene file.
 #[derive(Deserialize)]
@@ -54,7 +56,25 @@ impl ViewSpec {
         Ok(())
     }
 
-    /// The same with only the surface given, without a store.
+    /// Refuses injections at a place outside the vessel. This is for the places that a file gives: a tip injects
+    /// wherever it is.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for such a place, and the errors of the table of the centre line.
+    pub fn check_places(&self) -> Result<()> {
+        let mut places =
+            self.injection.iter().enumerate().filter_map(|(i, one)| Some((i, one.at_mm?))).peekable();
+        if places.peek().is_none() {
+            return Ok(());
+        }
+        let given = self.flow.tree.as_deref().map(read_tree).transpose()?;
+        let Some(tree) = given.as_ref().or(self.flow.centreline.as_deref()) else { return Ok(()) };
+        places.try_for_each(|(number, at_mm)| {
+            check_place(tree, at_mm.into(), &format!("view.injection[{number}].at_mm"))
+        })
+    }
+
+    /// As [`Self::take_centreline`], with only the surface given, without a store.
     ///
     /// # Errors
     /// A surface from which no centre line can be computed.
