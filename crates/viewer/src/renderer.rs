@@ -170,8 +170,7 @@ impl Renderer {
         }
         let contacts = std::mem::take(&mut self.contacts);
         let frames = self.with_fallback(|setup, engines, fluoro, kept| {
-            let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
-            let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
+            let solids = Solids { devices: &devices, contacts: &contacts, c_arm: setup.shown_arm.as_ref() };
             if engines.three_d.is_none() {
                 engines.three_d = setup.camera.as_ref().map(|camera| cpu::three_d(camera, setup.wall_now()));
             }

@@ -28,6 +28,8 @@ pub(crate) struct Setup {
     /// tissue.
     pub(crate) lumen: bool,
     pub(crate) c_arm: Option<CArm>,
+    /// The C-arm that the 3D view shows, whether or not fluoroscopy is wanted.
+    pub(crate) shown_arm: Option<CArm>,
     pub(crate) camera: Option<Camera>,
 }
 
@@ -119,6 +121,7 @@ impl Setup {
             flow: None,
             lumen: true,
             c_arm: None,
+            shown_arm: None,
             camera: None,
         };
         if spec.views.is_empty() {
@@ -150,12 +153,14 @@ impl Setup {
             };
             setup.flow = flow(spec, &filled, other)?;
         }
-        let beam: Vec<_> = match &setup.c_arm {
-            Some(c_arm) if spec.camera.c_arm => {
-                // Source and detector are a metre apart: in a frame containing both the vessel would be a speck.
-                c_arm.field_corners_mm(c_arm.sod_mm()).to_vec()
-            }
-            _ => vec![],
+        if spec.wants(View::ThreeD) && spec.camera.c_arm {
+            let own = || CArm::new(&spec.c_arm, spec.size_px, &wall);
+            setup.shown_arm = Some(setup.c_arm.clone().map_or_else(own, Ok)?);
+        }
+        let beam: Vec<_> = match &setup.shown_arm {
+            // Source and detector are a metre apart: in a frame containing both the vessel would be a speck.
+            Some(c_arm) => c_arm.field_corners_mm(c_arm.sod_mm()).to_vec(),
+            None => vec![],
         };
         setup.camera =
             spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, &wall, &beam));

@@ -197,3 +197,18 @@ fn devices_that_are_not_finite_are_refused_by_name() {
         assert!(renderer.render(&[]).is_ok(), "a refused device spoils nothing");
     }
 }
+
+#[test]
+fn the_c_arm_is_in_a_3d_view_without_fluoroscopy_too() {
+    let wall = sphere(30.0, 16, Vec3::zeros());
+    let spec = |views: Vec<View>, c_arm: bool| {
+        let mut spec = ViewSpec { views, size_px: [200, 200], backend: Backend::Cpu, ..ViewSpec::default() };
+        spec.camera.c_arm = c_arm;
+        spec
+    };
+    let frame = |spec: &ViewSpec| Renderer::new(spec, &wall).unwrap().render(&[]).unwrap();
+    let alone = frame(&spec(vec![View::ThreeD], true));
+    let both = frame(&spec(vec![View::ThreeD, View::Fluoro], true));
+    assert!(alone.fluoro.is_none() && alone.three_d == both.three_d);
+    assert!(alone.three_d != frame(&spec(vec![View::ThreeD], false)).three_d, "the twin");
+}

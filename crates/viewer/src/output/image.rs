@@ -112,9 +112,11 @@ impl Image {
     /// Writes the image as a PNG file.
     ///
     /// # Errors
-    /// [`Error::File`] naming `path` if the file cannot be written.
+    /// [`Error::Parameter`] for a name that ends like that of another kind of picture; [`Error::File`] naming `path` if
+    /// the file cannot be written.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
+        check_png_name(path)?;
         let failed = |error| Error::file(path, std::io::Error::other(error));
         let mut writer = self.png_encoder(path)?.write_header().map_err(failed)?;
         writer.write_image_data(&self.data).map_err(failed)?;
@@ -160,9 +162,39 @@ impl Image {
     }
 }
 
+/// Endings of the names of pictures that are not PNG.
+const OTHER_KINDS: [&str; 9] = ["jpg", "jpeg", "gif", "bmp", "tif", "tiff", "webp", "svg", "pdf"];
+
+/// Refuses a name by which other programs would take a PNG for something else.
+fn check_png_name(path: &Path) -> Result<()> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    if OTHER_KINDS.iter().any(|other| other.eq_ignore_ascii_case(ending)) {
+        let mend = format!("the picture is written as PNG: name it {}", path.with_extension("png").display());
+        return Err(Error::parameter("picture", path.display(), mend));
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_of_another_kind_of_picture_is_refused_and_says_which_to_take() {
+        let folder = std::env::temp_dir().join(format!("endowire-kinds-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let image = Image::new(1, 1, PixelFormat::Gray8, vec![9]);
+        for name in ["a.jpg", "a.JPEG", "a.tiff", "a.svg"] {
+            let refused = image.write_png(folder.join(name)).unwrap_err();
+            assert!(refused.is_input() && refused.to_string().contains("a.png"), "{refused}");
+            assert!(!folder.join(name).exists(), "{name}");
+        }
+        // The twins: names of unfinished files, and without an ending.
+        for name in ["a.png", "a.png.part", "a"] {
+            image.write_png(folder.join(name)).unwrap();
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 
     #[test]
     fn a_png_reads_back_as_it_was_written() {

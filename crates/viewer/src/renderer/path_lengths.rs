@@ -49,7 +49,9 @@ impl Renderer {
         let fraction = self.setup.spec.xray.contrast_fraction as f32;
         let mut contrast_mm = vec![];
         if fraction > 0.0 || !injected.is_empty() {
-            let filling = |i: usize| lumen[i] - devices_mm.iter().map(|map| map.1[i]).sum::<f32>();
+            // A device may fill all of the lumen on a ray, and be longer there by rounding, or at the edge of a vessel,
+            // where its length is a mean over the pixel and that of the lumen is not.
+            let filling = |i: usize| (lumen[i] - devices_mm.iter().map(|map| map.1[i]).sum::<f32>()).max(0.0);
             contrast_mm = (0..pixels).map(|i| fraction * filling(i)).collect();
             for medium in injected {
                 let i = medium.pixel as usize;

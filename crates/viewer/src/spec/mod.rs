@@ -154,8 +154,7 @@ pub struct CameraSpec {
     /// Whether letters at the borders show directions (L left, R right, H head, F feet, A front, P back), and a
     /// legend the largest force.
     pub markers: bool,
-    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then moves back to show
-    /// the field at the isocentre.
+    /// Whether the beam of the C-arm is drawn; the camera then moves back to show the field at the isocentre.
     pub c_arm: bool,
 }
 

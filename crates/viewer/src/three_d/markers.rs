@@ -5,6 +5,7 @@ use endowire_core::Vec3;
 use crate::output::{Image, PixelFormat};
 use crate::spec::CameraSpec;
 use crate::three_d::Camera;
+use crate::three_d::room::Room;
 use crate::three_d::scale_bar::{self, INK};
 use crate::three_d::solids::{ContactView, FORCE, largest_and_px_per_n};
 use crate::three_d::text::{ROWS, columns, text};
@@ -24,7 +25,12 @@ fn letter(direction: &Vec3) -> &'static str {
 }
 
 /// Letters in the middles of the borders of an image with these directions of columns and rows.
-pub(crate) fn draw(image: &mut Image, [right, up]: [Vec3; 2]) {
+pub(crate) fn draw(image: &mut Image, directions: [Vec3; 2]) {
+    let mut room = Room::new(image);
+    letters(image, directions, &mut room);
+}
+
+fn letters(image: &mut Image, [right, up]: [Vec3; 2], room: &mut Room) {
     let dot = 2 * dot(image);
     let ink = if image.format() == PixelFormat::Rgba8 { INK } else { WHITE };
     let [width, height] = [image.width(), image.height()];
@@ -37,23 +43,27 @@ pub(crate) fn draw(image: &mut Image, [right, up]: [Vec3; 2]) {
         ([middle[0], 2 * dot], up),
         ([middle[0], far[1]], -up),
     ] {
-        text(image, at, dot, letter(&direction), ink);
+        if room.take(at, [across, down]) {
+            text(image, at, dot, letter(&direction), ink);
+        }
     }
 }
 
-/// Annotates a 3D frame as its camera specifies: scale, directions, and the largest of these contact forces.
+/// Annotates a 3D frame as its camera specifies: scale, directions, and the largest of these contact forces, as far as
+/// there is room.
 pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, contacts: &[ContactView]) {
+    let mut room = Room::new(image);
     if spec.scale_bar {
-        scale_bar::draw(image, camera);
+        scale_bar::draw(image, camera, &mut room);
     }
     if spec.markers {
-        draw(image, camera.right_and_up());
-        legend(image, contacts);
+        letters(image, camera.right_and_up(), &mut room);
+        legend(image, contacts, &mut room);
     }
 }
 
 /// An arrow as long as that of the largest force, with its magnitude.
-fn legend(image: &mut Image, contacts: &[ContactView]) {
+fn legend(image: &mut Image, contacts: &[ContactView], room: &mut Room) {
     let (strongest, px_per_n) = largest_and_px_per_n(contacts);
     // An arrow of less than a pixel is none.
     if strongest * px_per_n < 1.0 {
@@ -67,6 +77,10 @@ fn legend(image: &mut Image, contacts: &[ContactView]) {
     let wide = length.max(columns(&label) * dot);
     let [left, bottom] =
         [image.width().saturating_sub(wide + 8 * dot), image.height().saturating_sub(8 * dot)];
+    // The text, and the arrow with its head.
+    if !room.take([left, bottom.saturating_sub(10 * dot)], [wide, 12 * dot]) {
+        return;
+    }
     image.fill([left, bottom.saturating_sub(dot)], [length, dot], FORCE);
     for back in 0..3 * dot {
         let x = left + length.saturating_sub(back);
@@ -74,4 +88,35 @@ fn legend(image: &mut Image, contacts: &[ContactView]) {
         image.fill([x, bottom.saturating_sub(dot + half)], [1, 2 * half + dot], FORCE);
     }
     text(image, [left, bottom.saturating_sub(10 * dot)], dot, &label, INK);
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::vessel::SurfaceMesh;
+
+    use super::*;
+
+    #[test]
+    fn annotations_of_a_small_frame_do_not_cover_each_other() {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        };
+        let contact = ContactView { position_mm: Vec3::repeat(5.0), force_n: Vec3::x() * 0.05 };
+        let pixels = |side: u32, contacts: &[ContactView]| {
+            let spec = CameraSpec::default();
+            let camera = Camera::new(&spec, [side; 2], &wall, &[]);
+            let white = vec![255; 4 * (side * side) as usize];
+            let mut image = Image::new(side, side, PixelFormat::Rgba8, white);
+            annotate(&mut image, &camera, &spec, contacts);
+            image.into_data()
+        };
+        // There is no room for a legend beside the scale.
+        assert!(pixels(64, &[contact]) == pixels(64, &[]));
+        assert!(pixels(320, &[contact]) != pixels(320, &[]), "the twin: there is");
+        let ink = pixels(64, &[]).chunks_exact(4).filter(|pixel| *pixel != [255; 4]).count();
+        assert!(ink > 40, "{ink} pixels of a scale and of letters");
+        // Smaller than a letter.
+        assert!(pixels(4, &[contact]).iter().all(|byte| *byte == 255));
+    }
 }

@@ -3,6 +3,7 @@
 mod camera;
 mod markers;
 mod mesh;
+mod room;
 mod scale_bar;
 mod solids;
 mod style;
