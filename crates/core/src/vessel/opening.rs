@@ -160,7 +160,7 @@ pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, rims_mm: &[f64], open
             let free = FREE_RADII * opening.radius_mm;
             let (along, aside) = opening.beyond_and_aside_mm(&x);
             let before = along - rim_mm;
-            let from_rim = (aside - opening.radius_mm).hypot(before);
+            let from_rim = libm::hypot(aside - opening.radius_mm, before);
             let is_own = before <= 0.0 || from_rim <= OWN_RIM * opening.radius_mm;
             // Rims may be oblique.
             if aside < free && (along > free || !is_own) {
