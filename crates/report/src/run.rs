@@ -184,10 +184,10 @@ pub fn events(rows: &[Row]) -> Vec<Event> {
             happened("not converged", format!("at {:.1} mm: the step found no equilibrium", row.inserted_mm));
         }
         if row.relaxations > 0 {
-            let left = row.imbalance.unwrap_or_default();
-            let text =
-                format!("at {:.1} mm: left to come to rest, {left:.1e} out of balance", row.inserted_mm);
-            happened("last resort", text);
+            // What is not recorded, or is nothing, is not told as a number.
+            let left = row.imbalance.filter(|left| *left > 0.0);
+            let left = left.map_or_else(String::new, |left| format!(", {left:.1e} out of balance"));
+            happened("last resort", format!("at {:.1} mm: left to come to rest{left}", row.inserted_mm));
         }
         out = row.left_through;
     }
@@ -203,4 +203,36 @@ pub struct Frame {
     pub view: String,
     /// The picture as PNG, in Base64.
     pub png: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_that_came_to_rest_in_balance_is_told_without_a_number() {
+        let row = |imbalance: Option<f64>| Row {
+            step: 3,
+            inserted_mm: 12.0,
+            push_force_n: 0.0,
+            torque_nmm: 0.0,
+            bend_mj: 0.0,
+            twist_mj: 0.0,
+            wall_mj: 0.0,
+            max_penetration_mm: 0.0,
+            jumped: false,
+            left_through: None,
+            converged: true,
+            relaxations: 1,
+            imbalance,
+            wall_force_sum_n: None,
+            wall_force_largest_n: None,
+            wall_force_tip_n: None,
+        };
+        for imbalance in [None, Some(0.0)] {
+            assert_eq!(events(&[row(imbalance)])[0].text, "at 12.0 mm: left to come to rest");
+        }
+        let twin = &events(&[row(Some(2e-4))])[0].text;
+        assert_eq!(twin, "at 12.0 mm: left to come to rest, 2.0e-4 out of balance");
+    }
 }

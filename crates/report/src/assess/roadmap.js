@@ -85,20 +85,34 @@ const roadmap = (() => {
     c.fillText(attempt.target, x + (left ? -r - 4 : r + 4), y + 4);
   }
 
-  // A number for each event, at the position of the tip; those at the same position are drawn side by side.
-  function drawNoticed(c, attempt, to) {
+  // The free place for a number that is nearest to a point: to its right, then around it, ever farther out.
+  function placeAt([x, y], taken, w, h) {
+    for (let ring = 14; ring < Math.max(w, h); ring += 6) {
+      const many = Math.ceil(ring / 3);
+      for (let k = 0; k < many; k++) {
+        const angle = Math.PI * (k % 2 ? -1 : 1) * Math.ceil(k / 2) * 2 / many;
+        const at = [x + ring * Math.cos(angle), y + ring * Math.sin(angle)];
+        const inside = at[0] > 9 && at[1] > 9 && at[0] < w - 9 && at[1] < h - 9;
+        if (inside && taken.every(([a, b]) => Math.hypot(a - at[0], b - at[1]) >= 17)) return at;
+      }
+    }
+    return [x, y];
+  }
+
+  // A number for each event, beside the position of the tip, with a line to it.
+  function drawNoticed(c, attempt, to, w, h) {
     const { tip_mm: tips, piece_s } = attempt.timeline, taken = [];
     c.textAlign = "center"; c.font = "bold 10px system-ui, sans-serif";
     attempt.noticed.forEach((one, number) => {
       const tip = tips[Math.max(0, Math.min(tips.length - 1, Math.ceil(one.from_s / piece_s) - 1))];
       if (!tip) return;
-      let [x, y] = to(tip);
-      x += 14;
-      while (taken.some(([a, b]) => Math.hypot(a - x, b - y) < 16)) x += 17;
+      const point = to(tip), [x, y] = placeAt(point, taken, w, h);
       taken.push([x, y]);
+      c.strokeStyle = RED; c.lineWidth = 1; c.beginPath(); c.moveTo(...point); c.lineTo(x, y); c.stroke();
       c.fillStyle = RED; c.beginPath(); c.arc(x, y, 8, 0, 7); c.fill();
       c.fillStyle = "#fff"; c.fillText(number + 1, x, y + 3.5);
     });
+    canvas.dataset.numbers = taken.map(place => place.map(x => x.toFixed(1)).join(",")).join(" ");
     c.font = "11px system-ui, sans-serif";
   }
 
@@ -115,7 +129,7 @@ const roadmap = (() => {
     c.drawImage(drawOutline(attempt, to, w, h, window.devicePixelRatio || 1), 0, 0, w, h);
     drawWay(c, attempt, to);
     drawTarget(c, attempt, to, scale, w);
-    drawNoticed(c, attempt, to);
+    drawNoticed(c, attempt, to, w, h);
     drawScale(c, scale, w, h);
   }
 

@@ -105,16 +105,24 @@ const timeline = (() => {
     }
   }
 
+  // Places of the numbers of events: where they begin, side by side where there is no room, and within the canvas.
+  function places(from, w) {
+    const APART = 17, RADIUS = 9, xs = [];
+    from.forEach((x, k) => { xs[k] = Math.max(x, k ? xs[k - 1] + APART : RADIUS); });
+    for (let k = xs.length - 1; k >= 0; k--) xs[k] = Math.min(xs[k], k + 1 < xs.length ? xs[k + 1] - APART : w - RADIUS);
+    return xs;
+  }
+
   // Events: shaded while they last, with their number above.
-  function noticed(c, attempt, px, h) {
-    let free = 0;
+  function noticed(c, attempt, px, w, h) {
+    const xs = places(attempt.noticed.map(one => px(one.from_s)), w);
+    canvas.dataset.numbers = xs.map(x => x.toFixed(1)).join(" ");
     c.textAlign = "center"; c.font = "bold 10px system-ui, sans-serif";
     attempt.noticed.forEach((one, number) => {
-      const from = px(one.from_s), x = Math.max(free, from);
+      const from = px(one.from_s), x = xs[number];
       c.fillStyle = RED; c.globalAlpha = 0.1; c.fillRect(from, HEAD - 8, Math.max(1.5, px(one.to_s) - from), h - FOOT - HEAD + 12); c.globalAlpha = 1;
       c.beginPath(); c.arc(x, 9, 8, 0, 7); c.fill();
       c.fillStyle = "#fff"; c.fillText(number + 1, x, 12.5);
-      free = x + 17;
     });
     c.font = "11px system-ui, sans-serif";
   }
@@ -125,7 +133,7 @@ const timeline = (() => {
     const px = across(t, w);
     axis(c, t, px, w, h);
     for (const lane of lanes) { head(c, lane); lane.draw ? lane.draw(c, lane, attempt, px) : curves(c, lane, attempt, px, w); }
-    noticed(c, attempt, px, h);
+    noticed(c, attempt, px, w, h);
     c.strokeStyle = "#1c2228"; c.lineWidth = 1; c.beginPath(); c.moveTo(px(shown.time_s), HEAD - 8); c.lineTo(px(shown.time_s), h - FOOT + 6); c.stroke();
     now(attempt);
   }
