@@ -164,6 +164,11 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         ("\"scene.toml\"", "\"nix.toml\"", "spec.toml: scenes = [\"nix.toml\"]"),
         ("devices = [", "devices = [\"nix.toml\", ", "spec.toml: devices = [\"nix.toml\"]"),
         ("[view]\n", "[view]\nviews = [\"3d\"]\n", "view.views = [\"3d\"]"),
+        (
+            "[view]\n",
+            "[view]\nxray.mode = \"dsa\"\n",
+            "view.xray.mode = \"dsa\": pictures are of single moments",
+        ),
         ("[view]\n", "[view]\nc_arm.pose = \"LAO 30\"\n", "view.c_arm.pose = \"LAO 30\""),
     ] {
         std::fs::write(&spec, whole.replace(from, to)).unwrap();
@@ -278,6 +283,46 @@ fn a_dataset_leaves_the_files_of_others() {
     std::fs::write(out.join("notes.txt"), "mine").unwrap();
     told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
     assert_eq!(files(&out)["notes.txt"], b"mine");
+}
+
+#[test]
+fn a_recording_is_not_mixed_with_a_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = specification(folder.path(), "");
+    let (scene, run) = (folder.path().join("scene.toml"), folder.path().join("run"));
+    let views = ["--set", "view.views=[]", "--quiet"];
+    let ran = endowire(&[&["run", text(&scene), "--out", text(&run)], &views[..]].concat(), "2");
+    assert!(ran.status.success(), "{}", said(&ran));
+    let before = files(&run);
+    let refused = endowire(&["dataset", text(&spec), "--out", text(&run)], "2");
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("holds a recording of endowire run"), "{}", said(&refused));
+    assert!(files(&run) == before);
+}
+
+#[test]
+fn a_scene_of_subtractions_gives_the_same_live_pictures_as_one_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = specification(folder.path(), "");
+    let scene = folder.path().join("scene.toml");
+    let live = std::fs::read_to_string(&scene).unwrap();
+    // The first picture of a scene in a mode, and what is said.
+    let picture = |mode: &str| {
+        let xray = "[view.xray]\n";
+        assert!(live.contains(xray));
+        std::fs::write(&scene, live.replace(xray, &format!("{xray}mode = {mode:?}\n"))).unwrap();
+        let out = folder.path().join(mode);
+        let output = endowire(&["dataset", text(&spec), "--out", text(&out)], "2");
+        assert!(output.status.success(), "{}", said(&output));
+        (bytes(out.join("images/0000000.png")), said(&output))
+    };
+    let (fluoro, quiet) = picture("fluoro");
+    let (dsa, told) = picture("dsa");
+    assert!(dsa == fluoro);
+    assert!(
+        told.contains("live fluoroscopy, whatever view.xray.mode") && !quiet.contains("whatever"),
+        "{told}"
+    );
 }
 
 #[test]

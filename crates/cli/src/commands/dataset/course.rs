@@ -7,7 +7,7 @@ use endowire_core::insertion::{DetachedCoil, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::{Key, Scene, Setting};
-use endowire_viewer::{ContactView, Pushed, Renderer, View, ViewSpec};
+use endowire_viewer::{ContactView, Mode, Pushed, Renderer, View, ViewSpec};
 use serde_json::{Map, Value};
 
 use super::shot;
@@ -105,8 +105,8 @@ impl Course {
         if let (Some(remarks), true) = (tally.remarks(moments.len() - 1), tally.unconverged_steps > 0) {
             tell(format_args!("endowire: {}: {remarks}", file.display()));
         }
-        view.injection.extend(injected.iter().map(Injected::spec));
         scenes::let_medium_flow(&mut view, &scene, cache).map_err(failed)?;
+        view.injection.extend(injected.iter().map(Injected::spec));
         scenes::tell_found_centreline(file, &scene);
         view.validate().map_err(failed)?;
         let views = shot::planes(spec, &view, first);
@@ -176,6 +176,14 @@ fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<V
     // States are drawn at random, so the previous picture is not the previous state.
     view.detector.lag = 0.0;
     view.c_arm.pose = None;
+    if let Mode::Dsa | Mode::Roadmap = view.xray.mode {
+        // What such a picture shows depends on the moments before it.
+        view.xray.mode = Mode::Fluoro;
+        tell(format_args!(
+            "endowire: {}: pictures of a dataset are live fluoroscopy, whatever view.xray.mode of the scene is",
+            file.display()
+        ));
+    }
     if view.exposure.is_some() && spec.vary.kvp.is_some() {
         let text = "vary.kvp and [view.exposure] both say the voltage: leave out one of them";
         return Err(Failure::Input(text.to_owned()).at(file.display()));

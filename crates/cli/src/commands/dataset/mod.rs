@@ -20,6 +20,7 @@ use serde_json::Value;
 use crate::args::DatasetArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::folder::refuse_recording;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{print_json, progress, tell, to_json, whole};
 use crate::scenes;
@@ -168,6 +169,7 @@ const ANNOTATIONS: &str = "annotations.json";
 /// Claims a folder for a dataset; it is refused if it contains another dataset, or foreign files with names of a
 /// dataset.
 fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
+    refuse_recording(folder)?;
     let path = folder.join("dataset.json");
     let told = to_json(provenance)?;
     if let Ok(text) = std::fs::read_to_string(&path) {

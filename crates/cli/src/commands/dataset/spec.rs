@@ -174,6 +174,14 @@ impl Spec {
                 return Err(Failure::Input(format!("view.{} = {value}: {mend}", keys.join("."))));
             }
         }
+        let mode = self.view.get("xray").and_then(|xray| xray.get("mode"));
+        let mode = mode.filter(|mode| mode.as_str().is_some_and(|mode| ["dsa", "roadmap"].contains(&mode)));
+        if let Some(mode) = mode {
+            return Err(Failure::Input(format!(
+                "view.xray.mode = {mode}: pictures are of single moments drawn at random, and this mode shows what was added since \
+                 another: give \"fluoro\" or \"cine\", or leave the key out"
+            )));
+        }
         Ok(())
     }
 }
