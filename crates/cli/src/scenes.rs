@@ -9,7 +9,8 @@ use endowire_viewer::ViewSpec;
 
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::recording::RecordedSummary;
+use crate::output::provenance::Provenance;
+use crate::output::recording::{RecordedNames, RecordedSummary};
 use crate::output::tell;
 
 /// Reads a scene with overridden keys.
@@ -49,7 +50,58 @@ pub(crate) fn of_recording(
     Ok((path, scene))
 }
 
-/// The same with the script of a file, if one is given, instead of the scene's own.
+/// Tables of a scene that decide how a run goes.
+const OF_THE_RUN: [&str; 2] = ["script", "method"];
+
+/// Refuses settings that change nothing of a recorded run.
+pub(crate) fn check_recorded(settings: &[Setting]) -> Result<(), Failure> {
+    match settings.iter().find(|setting| OF_THE_RUN.contains(&setting.key.begins())) {
+        Some(setting) => Err(Failure::Input(format!(
+            "--set {setting}: the run is recorded, and its {} has no effect any more: leave it out, or run the scene again (endowire \
+             run)",
+            setting.key.begins()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// How the scene file `path` in which a recording is shown differs from that of its run in `dir`; `given` is that file if
+/// it was named. Nothing is said of a scene or a script that cannot be read any more.
+pub(crate) fn other_than_recorded(
+    summary: &RecordedSummary,
+    dir: &Path,
+    given: Option<&Path>,
+    path: &Path,
+) -> Result<Option<String>, Failure> {
+    let Some(recorded) = &summary.scene_hash else { return Ok(None) };
+    let told = RecordedNames::read(dir);
+    // Without the settings of now, which are meant to differ, and with the script of the run.
+    let Ok((_, mut as_it_was)) = of_recording(summary, given, &[]) else { return Ok(None) };
+    if let Some(script) = &told.script_file
+        && as_it_was.take_script(script).is_err()
+    {
+        return Ok(None);
+    }
+    if Provenance::of_scene(&as_it_was, &[])?.scene_hash() == recorded {
+        return Ok(None);
+    }
+    let name = told.scene.filter(|name| *name != as_it_was.name);
+    let (path, dir) = (path.display(), dir.display());
+    Ok(Some(match (given, name) {
+        (Some(_), Some(name)) => format!(
+            "--scene {path}: this is the scene {:?}, and the run in {dir} was recorded in {name:?}: vessel and devices are those of \
+             {path}",
+            as_it_was.name
+        ),
+        (Some(_), None) => format!(
+            "--scene {path}: it or a file it names is not as it was when the run in {dir} was recorded: vessel and devices are those \
+             of {path}"
+        ),
+        (None, _) => format!("{path} or a file it names has changed since the run in {dir} was recorded"),
+    }))
+}
+
+/// Reads a scene with overridden keys, and with the script of a file, if one is given, instead of its own.
 pub(crate) fn with_script(
     path: &Path,
     settings: &[Setting],
@@ -67,15 +119,19 @@ pub(crate) fn with_script(
     Ok(scene)
 }
 
-/// Lets contrast medium flow along the vessel's centre line. It is extracted if there is medium and the scene names
-/// none.
+/// Lets contrast medium flow along the vessel's centre line, from the places that the scene gives, which must be in the
+/// vessel. The centre line is extracted if there is medium and the scene names none.
 pub(crate) fn let_medium_flow(
     view: &mut ViewSpec,
     scene: &Scene,
     store: &Cache,
 ) -> endowire_core::Result<()> {
     let flows = !view.injection.is_empty() || scene.script.iter().any(|line| line.inject.is_some());
-    if flows { view.take_centreline(scene, store) } else { Ok(()) }
+    if !flows {
+        return Ok(());
+    }
+    view.take_centreline(scene, store)?;
+    view.check_places()
 }
 
 /// Reports that the centre line was extracted from the surface, if one was needed and the scene names none.
@@ -95,7 +151,7 @@ const TOP: [&str; 9] =
     ["vessel", "device", "instrument", "sheath", "method", "script", "view", "seed", "name"];
 
 /// Splits texts `KEY=VALUE` for frames into those of the scene, and those of its table `view`, whose keys are
-/// relative to that table.
+/// relative to that table. A key of one of several tables, as `injection[0].at_mm`, is set in the scene.
 pub(crate) fn of_scene_and_view(texts: &[String]) -> Result<(Vec<Setting>, Vec<&str>), Failure> {
     let (mut of_scene, mut of_view) = (Vec::new(), Vec::new());
     for text in texts {
@@ -104,6 +160,8 @@ pub(crate) fn of_scene_and_view(texts: &[String]) -> Result<(Vec<Setting>, Vec<&
         // `device` is a key of the view too, a list.
         if TOP.contains(&first) && key != "device" {
             of_scene.push(text.parse()?);
+        } else if key.contains('[') {
+            of_scene.push(format!("view.{text}").parse()?);
         } else {
             of_view.push(text.as_str());
         }
@@ -152,12 +210,16 @@ mod tests {
             "device=[]",
             "device.part[0].length_mm=6",
             "seed = 3",
+            "injection[0].at_mm=[1, 2, 3]",
         ];
         let texts = texts.map(str::to_owned);
         let (of_scene, of_view) = of_scene_and_view(&texts).unwrap();
         assert_eq!(of_view, ["c_arm.sid_mm=1000", "device=[]"]);
         let keys: Vec<String> = of_scene.iter().map(|setting| setting.key.to_string()).collect();
-        assert_eq!(keys, ["vessel.wall.friction", "device.part[0].length_mm", "seed"]);
+        assert_eq!(
+            keys,
+            ["vessel.wall.friction", "device.part[0].length_mm", "seed", "view.injection[0].at_mm"]
+        );
     }
 
     #[test]

@@ -20,7 +20,12 @@ const CONTACT: f64 = -1.0;
 /// Writes the vessel, a file for each step, and the list of these files.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
-    let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &args.set)?;
+    scenes::check_recorded(&args.set)?;
+    let given = args.scene.as_deref();
+    let (path, scene) = scenes::of_recording(&recording.summary, given, &args.set)?;
+    if let Some(other) = scenes::other_than_recorded(&recording.summary, &args.dir, given, &path)? {
+        tell(format_args!("endowire: {other}"));
+    }
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let stack = scene.stack().map_err(in_scene)?;
     let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;

@@ -11,6 +11,7 @@ use super::studio::{Plan, Still, Studio, Went};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::folder::refuse_recording;
 use crate::output::injections::Injected;
 use crate::output::progress;
 use crate::scenes;
@@ -24,6 +25,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     if !args.time.is_finite() {
         return Err(Failure::Input(format!("--time {}: must be finite", args.time)));
     }
+    args.out.as_deref().map_or(Ok(()), refuse_recording)?;
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
     let scene = scenes::read(&args.scene, &settings)?;
     let cache = Cache::new(&args.frames.cache);
@@ -53,8 +55,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     };
     let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
     let injections = now.injections.iter().map(Injected::spec);
-    let mut studio =
-        Studio::new(plan, wall, injections, (&scene, &cache)).map_err(|e| e.at(args.scene.display()))?;
+    let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
     scenes::tell_found_centreline(&args.scene, &scene);
     for k in 0..frames {
         let time_s = args.time + k as f64 / frames_per_s;

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use endowire_core::vessel::VesselMotion;
-use endowire_methods::{Scene, Setting};
 use endowire_viewer::{FrameTime, Seen};
 
 use super::studio::{Plan, Still, Studio};
@@ -11,10 +10,9 @@ use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::coils;
-use crate::output::folder::step_times;
+use crate::output::folder::{refuse_recording, step_times};
 use crate::output::injections::{self, Injected};
 use crate::output::instruments::Lengths;
-use crate::output::provenance::Provenance;
 use crate::output::recording::Recording;
 use crate::output::{progress, tell};
 use crate::scenes;
@@ -22,16 +20,18 @@ use crate::scenes;
 /// Draws the requested steps.
 pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
+    args.out.as_deref().map_or(Ok(()), refuse_recording)?;
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
+    scenes::check_recorded(&settings)?;
     let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &settings)?;
-    tell_of(args, &recording, (&path, &scene), &settings)?;
+    tell_of(args, &recording, &path)?;
     if recording.steps() == 0 {
         return Err(Failure::Input(format!(
             "{}: the run has recorded no step; run its scene again (endowire run)",
             args.dir.display()
         )));
     }
-    let steps = wanted(args, recording.steps())?;
+    let steps = wanted(args, &recording)?;
     let frames = match (steps.len(), args.count.map(|count| count as usize)) {
         (1, count) => count.unwrap_or(1),
         (several, None) if args.frames.deg_per_s.is_none() => several,
@@ -59,8 +59,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
-    let mut studio =
-        Studio::new(plan, wall, injections, (&scene, &cache)).map_err(|e| e.at(path.display()))?;
+    let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
     scenes::tell_found_centreline(&path, &scene);
     let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
@@ -109,22 +108,12 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     studio.finish()?.tell(args.frames.json)
 }
 
-/// Warns about a recording that is drawn in this scene, where `settings` were added.
-fn tell_of(
-    args: &RenderArgs,
-    recording: &Recording,
-    (path, scene): (&Path, &Scene),
-    settings: &[Setting],
-) -> Result<(), Failure> {
+/// Warns about a recording that is drawn in this scene.
+fn tell_of(args: &RenderArgs, recording: &Recording, path: &Path) -> Result<(), Failure> {
     let (summary, dir, steps) = (&recording.summary, args.dir.display(), recording.steps());
-    let hash = Provenance::of_scene(scene, settings)?;
-    let changed = summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash());
-    // With new settings a difference is intended.
-    if changed && settings.is_empty() {
-        let path = path.display();
-        tell(format_args!(
-            "endowire: {path} or a file it names has changed since the run in {dir} was recorded"
-        ));
+    let given = args.scene.as_deref();
+    if let Some(other) = scenes::other_than_recorded(summary, &args.dir, given, path)? {
+        tell(format_args!("endowire: {other}"));
     }
     if !summary.complete {
         tell(format_args!(
@@ -140,12 +129,16 @@ fn tell_of(
     Ok(())
 }
 
-/// The recorded steps to draw, always including the last one requested.
-fn wanted(args: &RenderArgs, recorded: usize) -> Result<Vec<usize>, Failure> {
-    let last = args.to.unwrap_or(recorded).min(recorded);
-    if args.every == 0 || args.from == 0 || args.from > last {
+/// The recorded steps to draw, always including the last one requested. A run that goes on may be asked for steps that
+/// it has not reached.
+fn wanted(args: &RenderArgs, recording: &Recording) -> Result<Vec<usize>, Failure> {
+    let recorded = recording.steps();
+    let to = args.to.unwrap_or(recorded);
+    let last = to.min(recorded);
+    let beyond = to > recorded && recording.summary.complete;
+    if args.every == 0 || args.from == 0 || args.from > last || beyond {
         return Err(Failure::Input(format!(
-            "--from {} --to {last} --every {}: {} has steps 1 to {}",
+            "--from {} --to {to} --every {}: {} has steps 1 to {}",
             args.from,
             args.every,
             args.dir.display(),

@@ -186,6 +186,7 @@ impl endowire_sweep::Recorder for Recording {
             complete: false,
             scene: self.scene.name.clone(),
             scene_file: std::path::absolute(&self.scene_file).unwrap_or(self.scene_file),
+            script_file: None,
             method: self.scene.method.name(),
             centreline_found: self.scene.finds_centreline(),
             outcome: outcome.clone(),

@@ -88,6 +88,18 @@ pub(crate) fn is_recording(folder: &Path) -> bool {
     begins.is_ok_and(|begins| TABLE_BEGINS.starts_with(&begins))
 }
 
+/// Refuses a folder that contains a recording: other files would mix with those of the run.
+pub(crate) fn refuse_recording(folder: &Path) -> Result<(), Failure> {
+    if !is_recording(folder) {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "--out {}: holds a recording of endowire run, and these files would mix with its own: give a new folder, such as {}",
+        folder.display(),
+        folder.join("pictures").display()
+    )))
+}
+
 /// Numbers of the steps of a recording, with their end times, s.
 pub(crate) fn step_times(folder: &Path) -> Result<Vec<(usize, f64)>, Failure> {
     #[derive(serde::Deserialize)]

@@ -37,6 +37,9 @@ pub(crate) struct Summary {
     pub(crate) scene: String,
     /// File of the scene, for drawing frames later.
     pub(crate) scene_file: PathBuf,
+    /// File of its script, if that is not the scene's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) script_file: Option<PathBuf>,
     /// Name of the method.
     pub(crate) method: &'static str,
     /// Whether the vessel's centre line was needed and, since the scene names none, was extracted from its surface.

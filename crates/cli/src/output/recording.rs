@@ -39,6 +39,23 @@ impl RecordedSummary {
     }
 }
 
+/// What a summary.json says of its scene for messages; empty if there is none.
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct RecordedNames {
+    /// Name of the scene.
+    pub(crate) scene: Option<String>,
+    /// File of its script, if that was another.
+    pub(crate) script_file: Option<PathBuf>,
+}
+
+impl RecordedNames {
+    /// Those of the recording in a folder.
+    pub(crate) fn read(folder: &Path) -> Self {
+        let text = std::fs::read(folder.join(SUMMARY)).unwrap_or_default();
+        serde_json::from_slice(&text).unwrap_or_default()
+    }
+}
+
 fn yes() -> bool {
     true
 }

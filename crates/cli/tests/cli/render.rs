@@ -220,15 +220,63 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
         (still(&["--set", "detector.seed=-1"]), &["detector.seed=-1", "u64"]),
         (still(&["--mode", "roadmap"]), &["view.xray.mode = roadmap", "give a [[view.injection]]"]),
     ];
+    check_refused(&cases);
+}
+
+/// Each call is refused with exit code 2 and these words.
+fn check_refused(cases: &[(Vec<&str>, &[&str])]) {
     for (args, words) in cases {
-        let output = endowire(&args);
+        let output = endowire(args);
         let said = said(&output);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
         assert!(!said.contains("panicked"), "{args:?}: {said}");
-        for word in words {
+        for word in *words {
             assert!(said.contains(word), "{args:?}: `{word}` is missing in: {said}");
         }
     }
+}
+
+#[test]
+fn what_would_change_nothing_or_mix_with_a_recording_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, run) = recorded(folder.path());
+    let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
+    let cases: [(Vec<&str>, &[&str]); 10] = [
+        (vec!["render", text(&run), "--to", "500"], &["--to 500", "steps 1 to 106"]),
+        (
+            vec!["render", text(&run), "--view", "fluoro", "--orbit", "90"],
+            &["--orbit 90: belongs to the 3D view", "--view both"],
+        ),
+        (
+            vec!["render", text(&run), "--view", "3d", "--from", "106", "--orbit", "90"],
+            &["--orbit 90: one frame is drawn"],
+        ),
+        (
+            vec!["render", text(&run), "--set", "script[0].step_mm=3"],
+            &["--set script[0].step_mm=3: the run is recorded", "run the scene again"],
+        ),
+        (
+            still(&["--size", "128", "--set", "size_px=[64,64]"]),
+            &["--set size_px=[64,64]: --size gives the same: leave out one"],
+        ),
+        (
+            still(&["--set", "patient.torso.width_mm=200", "--set", "xray.tissue_mm=100"]),
+            &["--set xray.tissue_mm=100", "the scene has a body (view.patient)"],
+        ),
+        // What was given on the command line is not blamed on the file.
+        (still(&["--size", "5000"]), &["endowire: --size: view.size_px = [5000, 5000]"]),
+        (
+            still(&["--set", "c_arm.sod_mm=2000"]),
+            &["endowire: --set c_arm.sod_mm=2000: view.c_arm.sod_mm = 2000"],
+        ),
+        // Files of a run are not mixed with others.
+        (vec!["render", text(&run), "--out", text(&run)], &["--out", "holds a recording of endowire run"]),
+        (
+            [&still(&["--out"])[..], &[text(&run)]].concat(),
+            &["--out", "holds a recording of endowire run", "pictures"],
+        ),
+    ];
+    check_refused(&cases);
 }
 
 #[test]
@@ -283,4 +331,58 @@ fn frames_leave_the_files_of_others() {
         assert!(draw().status.success());
     }
     assert_eq!(png_size(&frame), (24, 16));
+}
+
+#[test]
+fn places_of_injections_are_in_the_vessel() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("arch.toml");
+    let small = [("size_px = [640, 640]", "size_px = [48, 48]\nbackend = \"cpu\"")];
+    std::fs::write(&scene, scene_text("arch_angiography.toml", &small)).unwrap();
+    let draw = |at_mm: &str| {
+        let (set, out) = (format!("injection[0].at_mm={at_mm}"), folder.path().join("out"));
+        endowire(&[
+            "fluoro",
+            text(&scene),
+            "--steps",
+            "0",
+            "--time",
+            "0.4",
+            "--set",
+            &set,
+            "--out",
+            text(&out),
+        ])
+    };
+    let refused = draw("[900, 0, 10]");
+    let told = said(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{told}");
+    assert!(
+        told.contains("view.injection[0].at_mm = [900, 0, 10]: is ") && told.contains("mm from"),
+        "{told}"
+    );
+    // The twins: in the ascending aorta, and a number that is not there.
+    let drawn = draw("[-38, -54, 140]");
+    assert!(drawn.status.success(), "{}", said(&drawn));
+    let set = "injection[1].at_mm=[0, 0, 0]";
+    let none =
+        endowire(&["fluoro", text(&scene), "--steps", "0", "--set", set, "--out", text(folder.path())]);
+    assert!(none.status.code() == Some(2) && said(&none).contains("injection[1]"), "{}", said(&none));
+}
+
+#[test]
+fn a_single_subtraction_of_nothing_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, _) = recorded(folder.path());
+    let draw = |more: &[&str]| {
+        let out = folder.path().join("out");
+        let output =
+            endowire(&[&["fluoro", text(&scene), "--steps", "3", "--out", text(&out)], more].concat());
+        assert!(output.status.success(), "{}", said(&output));
+        said(&output)
+    };
+    assert!(draw(&["--mode", "dsa"]).contains("view.xray.mode = dsa: the picture is empty"));
+    // The twins: several frames, and another mode.
+    assert!(!draw(&["--mode", "dsa", "--count", "2"]).contains("empty"));
+    assert!(!draw(&["--mode", "cine"]).contains("empty"));
 }

@@ -39,6 +39,89 @@ fn a_page_is_whole_and_names_where_it_comes_from() {
     assert!(said(&none).contains("recorded run"), "{}", said(&none));
 }
 
+/// The document in a page of a run.
+fn data(page: &Path) -> serde_json::Value {
+    let text = std::fs::read_to_string(page).unwrap();
+    let (_, data) = text.split_once("const data = ").unwrap();
+    serde_json::from_str(data.split_once(";\n").unwrap().0).unwrap()
+}
+
+#[test]
+fn a_page_in_another_scene_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = page(folder.path());
+    let run = folder.path().join("run");
+    let report = |scene: &Path| {
+        let output = endowire().arg("report").arg(&run).arg("--scene").arg(scene).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        (said(&output), data(&page)["summary"]["other_scene"].clone())
+    };
+    let other = folder.path().join("other.toml");
+    std::fs::write(&other, scene_text("loop.toml", &[])).unwrap();
+    let (told, shown) = report(&other);
+    assert!(told.contains("other.toml: this is the scene \"loop\", and the run in"), "{told}");
+    assert!(shown.as_str().unwrap().contains("recorded in \"curved_tube\""), "{shown}");
+    // Changed, and not another.
+    let short = std::fs::read_to_string(folder.path().join("short.toml")).unwrap();
+    std::fs::write(&other, format!("# a remark\n{short}")).unwrap();
+    assert!(report(&other).0.contains("is not as it was when the run in"));
+    // The twin: the same scene elsewhere.
+    std::fs::write(&other, short).unwrap();
+    let (told, shown) = report(&other);
+    assert!(!told.contains("other.toml") && shown.is_null(), "{told} {shown}");
+    // A run with the script of another file is in its scene too.
+    let script = folder.path().join("script.toml");
+    std::fs::write(&script, "[[script]]\nadvance_mm = 10.0\nstep_mm = 2.0\n").unwrap();
+    let scene = folder.path().join("short.toml");
+    let files = ["run".as_ref(), scene.as_os_str(), "--script".as_ref(), script.as_os_str()];
+    let again = endowire().args(files).arg("--quiet").arg("--out").arg(&run).output().unwrap();
+    assert_eq!(again.status.code(), Some(0), "{}", said(&again));
+    let output = endowire().arg("report").arg(&run).output().unwrap();
+    assert!(!said(&output).contains("has changed"), "{}", said(&output));
+}
+
+#[test]
+fn pages_fit_into_narrow_windows_and_tell_an_interrupted_run_as_one() {
+    let Some(browser) = browser() else {
+        eprintln!("skipped: there is no Chromium to open the page in");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let page = page(folder.path());
+    let summary = folder.path().join("run/summary.json");
+    let mut told: serde_json::Value = serde_json::from_slice(&std::fs::read(&summary).unwrap()).unwrap();
+    let steps = told["steps"].as_u64().unwrap();
+    (told["ended_by"], told["converged"]) = ("interrupted".into(), false.into());
+    told["failure"] =
+        serde_json::json!({"step": steps + 1, "reason": "interrupted in it", "kind": "interrupted"});
+    told["renderer"] = "a_name_without_a_space_".repeat(12).into();
+    std::fs::write(&summary, told.to_string()).unwrap();
+    assert_eq!(
+        endowire().arg("report").arg(folder.path().join("run")).output().unwrap().status.code(),
+        Some(0)
+    );
+    // The page tells how wide it is.
+    let text = std::fs::read_to_string(&page).unwrap();
+    let script = "<script>document.documentElement.dataset.wide = document.documentElement.scrollWidth + \" \" + innerWidth</script>";
+    std::fs::write(&page, text.replace("</body>", &format!("{script}</body>"))).unwrap();
+    for width in [1280, 500] {
+        let size = format!("--window-size={width},900");
+        let url = format!("file://{}", page.display());
+        let document = shown_in(browser, folder.path(), &url, &["--dump-dom", &size]);
+        let (_, rest) = document.split_once("data-wide=\"").unwrap();
+        let [wide, window] = rest.split('"').next().unwrap().split_once(' ').map(|(a, b)| [a, b]).unwrap();
+        let [wide, window] = [wide, window].map(|px| px.parse::<u32>().unwrap());
+        assert!(wide <= window, "{wide} of {window} pixels");
+        assert!(
+            document.contains(&format!("interrupted before the end of step {}", steps + 1)),
+            "{document}"
+        );
+        assert!(
+            document.contains(&format!("<td>all {steps}</td>")) && !document.contains("<td>converged</td>")
+        );
+    }
+}
+
 #[test]
 fn an_experiment_has_a_page_of_its_tables() {
     let folder = tempfile::tempdir().unwrap();
@@ -122,10 +205,15 @@ fn browser() -> Option<&'static str> {
 
 /// Runs the browser on a page.
 fn shown(browser: &str, folder: &Path, url: &str, what: &str) -> String {
+    shown_in(browser, folder, url, &["--window-size=1000,900", what])
+}
+
+/// Runs the browser on a page with these options.
+fn shown_in(browser: &str, folder: &Path, url: &str, options: &[&str]) -> String {
     let mut command = Command::new(browser);
-    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1000,900"]);
+    command.args(["--headless", "--no-sandbox", "--disable-gpu"]).args(options);
     let profile = format!("--user-data-dir={}", folder.join("profile").display());
-    let output = command.args([&profile, what, url]).output().unwrap();
+    let output = command.args([&profile, url]).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     String::from_utf8(output.stdout).unwrap()
 }
@@ -165,4 +253,62 @@ fn a_browser_draws_the_page_soon_and_follows_the_slider() {
     }
     let differ = pictures[0].iter().zip(&pictures[1]).filter(|(a, b)| a != b).count();
     assert!(differ > 500, "{differ} values differ");
+}
+
+#[test]
+fn numbers_of_what_stood_out_are_in_the_picture_and_beside_the_tip() {
+    let Some(browser) = browser() else {
+        eprintln!("skipped: there is no Chromium to open the page in");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    // The device snaps in the last two samples of several, at one place, and forces are largest there.
+    let sample = |k: u32| {
+        let (force_n, jumped) = if k >= 19 { (0.3, k % 2 == 1 || k == 20) } else { (0.1, false) };
+        serde_json::json!({
+            "time_s": f64::from(k), "tip_mm": [0.0, 0.0, 50.0], "wall_force_n": force_n, "tip_force_n": 0.5 * force_n, "jumped": jumped,
+            "hands": [{"advance_mm": 5.0, "rotate_rad": 0.0, "inserted_mm": 50.0, "push_force_n": 0.1, "torque_nmm": 0.0}],
+        })
+    };
+    let samples: Vec<serde_json::Value> = (1..=20).map(sample).collect();
+    let document = serde_json::json!({
+        "scene_file": crate::common::scene("curved_tube.toml"), "set": [],
+        "record": {"samples": samples, "injections": [], "beam": null},
+    });
+    let (session, page) = (folder.path().join("one.session.json"), folder.path().join("page.html"));
+    std::fs::write(&session, document.to_string()).unwrap();
+    let told = endowire().arg("assess").arg(&session).arg("--page").arg(&page).output().unwrap();
+    assert_eq!(told.status.code(), Some(0), "{}", said(&told));
+    let text = std::fs::read_to_string(&page).unwrap();
+    let script = "<script>for (const id of [\"line\", \"roadmap\"]) document.documentElement.dataset[id] = document.getElementById(id).clientWidth</script>";
+    std::fs::write(&page, text.replace("</body>", &format!("{script}</body>"))).unwrap();
+    let url = format!("file://{}", page.display());
+    let dom = shown_in(browser, folder.path(), &url, &["--dump-dom", "--window-size=420,900"]);
+    let value = |begins: &str| {
+        let (_, rest) = dom.split_once(begins).unwrap_or_else(|| panic!("{begins} in {dom}"));
+        rest.split('"').next().unwrap().to_owned()
+    };
+    let width = |id: &str| value(&format!("data-{id}=\"")).parse::<f64>().unwrap();
+    let of = |id: &str| {
+        let (_, canvas) = dom.split_once(&format!("<canvas id=\"{id}\"")).unwrap();
+        let (_, numbers) = canvas.split_once("data-numbers=\"").unwrap();
+        numbers.split('"').next().unwrap().to_owned()
+    };
+    let at: Vec<f64> = of("line").split(' ').map(|x| x.parse().unwrap()).collect();
+    assert!(at.len() >= 3, "{at:?}");
+    assert!(at.iter().all(|x| (9.0..=width("line") - 8.9).contains(x)), "{at:?} of {}", width("line"));
+    assert!(at.windows(2).all(|pair| pair[1] - pair[0] > 16.9), "{at:?}");
+    // All are of one place: none is far from the others, and none covers another.
+    let numbers = of("roadmap");
+    let near: Vec<[f64; 2]> = numbers
+        .split(' ')
+        .map(|at| at.split_once(',').map(|(x, y)| [x, y].map(|v| v.parse().unwrap())).unwrap())
+        .collect();
+    for (k, one) in near.iter().enumerate() {
+        assert!((9.0..width("roadmap") - 9.0).contains(&one[0]), "{numbers}");
+        for other in &near[..k] {
+            let apart = (one[0] - other[0]).hypot(one[1] - other[1]);
+            assert!((16.9..60.0).contains(&apart), "{numbers}");
+        }
+    }
 }

@@ -13,6 +13,9 @@ use crate::output::recording::Recording;
 use crate::output::{tell, whole};
 use crate::scenes;
 
+/// Key of the page's summary with a warning that the vessel is not that of the run.
+const OTHER_SCENE: &str = "other_scene";
+
 /// Writes the page of a folder.
 pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
     let page = match run(args) {
@@ -38,9 +41,19 @@ fn run(args: &ReportArgs) -> Result<Run, Failure> {
         let text = "the run has recorded no step; run its scene again (endowire run)";
         return Err(Failure::Input(text.to_owned()).at(args.dir.display()));
     }
-    let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &args.set)?;
+    scenes::check_recorded(&args.set)?;
+    let given = args.scene.as_deref();
+    let (path, scene) = scenes::of_recording(&recording.summary, given, &args.set)?;
+    let other = scenes::other_than_recorded(&recording.summary, &args.dir, given, &path)?;
+    if let Some(other) = &other {
+        tell(format_args!("endowire: {other}"));
+    }
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let stack = scene.stack().map_err(in_scene)?;
     let vessel = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;
-    data::collect(&args.dir, &recording, &stack, vessel.mesh())
+    let mut run = data::collect(&args.dir, &recording, &stack, vessel.mesh())?;
+    if let (Some(summary), Some(other)) = (run.summary.as_object_mut(), other) {
+        summary.insert(OTHER_SCENE.to_owned(), other.into());
+    }
+    Ok(run)
 }

@@ -1,6 +1,6 @@
 //! A run in progress: its steps and their recording.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -22,6 +22,8 @@ use crate::output::saved::{Course, Saver};
 pub(super) struct SoFar<'a> {
     pub(super) scene: &'a Scene,
     pub(super) scene_file: &'a Path,
+    /// File of the script, if it is not the scene's own.
+    pub(super) script_file: Option<&'a Path>,
     pub(super) script: &'a Script,
     pub(super) provenance: Provenance,
     pub(super) started: Instant,
@@ -41,7 +43,8 @@ impl SoFar<'_> {
             provenance: self.provenance.clone(),
             complete: false,
             scene: self.scene.name.clone(),
-            scene_file: std::path::absolute(self.scene_file).unwrap_or_else(|_| self.scene_file.to_owned()),
+            scene_file: anywhere(self.scene_file),
+            script_file: self.script_file.map(anywhere),
             method: self.scene.method.name(),
             centreline_found: self.scene.finds_centreline(),
             outcome: RunOutcome::new(&self.simulation, &self.hand, steps, tally, failure),
@@ -82,6 +85,11 @@ impl SoFar<'_> {
         let lengths_mm = self.simulation.report().lengths_mm();
         self.frames.step(now, last, (self.simulation.shape(), &lengths_mm), recorder)
     }
+}
+
+/// A path for other working directories.
+fn anywhere(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// A run and its recording.

@@ -81,6 +81,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let so_far = SoFar {
         scene: &scene,
         scene_file: &args.scene,
+        script_file: args.script.as_deref(),
         script: &script,
         provenance,
         started,

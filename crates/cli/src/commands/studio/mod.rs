@@ -10,8 +10,8 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Animation, ContactView, DeviceView, FrameTime, Frames, InjectionSpec, Labels, Mask, Pace, PathLengths,
-    Pushed, Renderer, Seen, View, ViewSpec,
+    Animation, ContactView, DeviceView, FrameTime, Frames, InjectionSpec, Labels, Mask, Mode, Pace,
+    PathLengths, Pushed, Renderer, Seen, View, ViewSpec,
 };
 use serde::Serialize;
 
@@ -82,6 +82,8 @@ impl Written {
 /// The frames to draw with the options of the command line, checked before anything is computed.
 pub(super) struct Plan<'a> {
     args: &'a FrameArgs,
+    /// File of the scene.
+    scene_file: PathBuf,
     spec: ViewSpec,
     pushed: Pushed,
     folder: PathBuf,
@@ -104,7 +106,7 @@ impl<'a> Plan<'a> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         args.animate.as_deref().map_or(Ok(()), Animation::check_name)?;
         let spec = wishes::wished(ViewSpec::of_scene(scene, path)?, args, default)?;
-        spec.validate().map_err(in_scene)?;
+        spec.validate().map_err(|e| in_options(args, path, e.into()))?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
         let frames = wishes::frames_of_turn(args, spec.frames_per_s)?.unwrap_or(frames);
         wishes::check(args, &spec, frames)?;
@@ -120,7 +122,8 @@ impl<'a> Plan<'a> {
             ));
         }
         let pace = Pace::even(spec.frames_per_s);
-        Ok(Self { args, spec, pushed, folder, frames, pace, manifest })
+        let scene_file = path.to_owned();
+        Ok(Self { args, scene_file, spec, pushed, folder, frames, pace, manifest })
     }
 
     /// Sets the times of the frames, instead of a constant rate.
@@ -136,6 +139,14 @@ impl<'a> Plan<'a> {
     /// Frames per second.
     pub(super) fn frames_per_s(&self) -> f64 {
         self.spec.frames_per_s
+    }
+}
+
+/// The failure with its place: the option that gave the value, or else the scene file.
+fn in_options(args: &FrameArgs, scene_file: &Path, failure: Failure) -> Failure {
+    match wishes::at_fault(args, &failure.to_string()) {
+        Some(option) => failure.at(option),
+        None => failure.at(scene_file.display()),
     }
 }
 
@@ -156,17 +167,33 @@ impl<'a> Studio<'a> {
         mut plan: Plan<'a>,
         wall: Wall,
         injections: impl IntoIterator<Item = InjectionSpec>,
-        (scene, store): (&Scene, &Cache),
+        seen: (&Scene, &Cache),
     ) -> Result<Self, Failure> {
-        plan.spec.injection.extend(injections);
-        if plan.spec.wants(View::Fluoro) {
-            scenes::let_medium_flow(&mut plan.spec, scene, store)?;
-        }
-        let planes = Plane::all(&plan.spec, &wall)?;
+        let planes = Self::prepare(&mut plan, &wall, injections, seen);
+        let planes = planes.map_err(|e| in_options(plan.args, &plan.scene_file, e.into()))?;
         if let Some(held) = planes.first().and_then(|plane| tomogram_holds(&plane.renderer)) {
             tell(format_args!("endowire: {held}"));
         }
         Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
+    }
+
+    /// The planes of a plan, to which `injections` are added.
+    fn prepare(
+        plan: &mut Plan<'a>,
+        wall: &Wall,
+        injections: impl IntoIterator<Item = InjectionSpec>,
+        (scene, store): (&Scene, &Cache),
+    ) -> endowire_core::Result<Vec<Plane>> {
+        let mut injections = injections.into_iter().peekable();
+        if plan.spec.wants(View::Fluoro) {
+            scenes::let_medium_flow(&mut plan.spec, scene, store)?;
+            // The script of a recording may be that of another file.
+            if injections.peek().is_some() {
+                plan.spec.take_centreline(scene, store)?;
+            }
+        }
+        plan.spec.injection.extend(injections);
+        Plane::all(&plan.spec, wall)
     }
 
     /// Whether states before the one that is drawn matter.
@@ -191,8 +218,24 @@ impl<'a> Studio<'a> {
         self.drawn as f64 / self.plan.frames.max(2).saturating_sub(1) as f64
     }
 
+    /// A message if the only frame is a subtraction of nothing.
+    fn empty(&self, time_s: f64) -> Option<String> {
+        let spec = &self.plan.spec;
+        let subtracts = spec.wants(View::Fluoro) && spec.xray.mode == Mode::Dsa && self.plan.frames == 1;
+        let injected = spec.injection.iter().any(|one| one.start_s < time_s);
+        (subtracts && !injected).then(|| {
+            format!(
+                "view.xray.mode = dsa: the picture is empty: a subtraction shows what was added since its first frame, this is the only \
+                 one, and nothing is injected before {time_s} s: draw several frames, or one during an injection"
+            )
+        })
+    }
+
     /// Draws a state and writes the requested files.
     pub(super) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
+        if let Some(empty) = self.empty(still.moment.time_s) {
+            tell(format_args!("endowire: {empty}"));
+        }
         let drawn = self.draw_all(still);
         self.check_there()?;
         drawn

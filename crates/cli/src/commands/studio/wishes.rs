@@ -31,19 +31,87 @@ pub(super) fn frames_of_turn(args: &FrameArgs, frames_per_s: f64) -> Result<Opti
     Ok(Some(frames as usize))
 }
 
+/// Options of their own for keys of `[view]`.
+const OPTIONS: [(&str, &str); 6] = [
+    ("--size", "size_px"),
+    ("--bits", "bits"),
+    ("--mode", "xray.mode"),
+    ("--pose", "c_arm.pose"),
+    ("--biplane", "biplane_deg"),
+    ("--view", "views"),
+];
+
+/// The options that are given, with the keys of `[view]` that they set.
+fn given(args: &FrameArgs) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let is_given = [
+        args.size.is_some(),
+        args.bits.is_some(),
+        args.mode.is_some(),
+        args.pose.is_some(),
+        args.biplane.is_some(),
+        args.view.is_some(),
+    ];
+    OPTIONS.into_iter().zip(is_given).filter(|(_, given)| *given).map(|(option, _)| option)
+}
+
+/// The key of `[view]` that a text `KEY=VALUE` sets, written from that table or from the top of the scene.
+fn key_of_view(text: &str) -> &str {
+    let key = text.split('=').next().unwrap_or_default().trim();
+    key.strip_prefix("view.").unwrap_or(key)
+}
+
+/// The option that set the key which a message is about; `None` if the value is the scene file's own.
+pub(super) fn at_fault(args: &FrameArgs, message: &str) -> Option<String> {
+    let told = message.strip_prefix("view.")?;
+    let is_about = |key: &str| {
+        let rest = told.strip_prefix(key).filter(|_| !key.is_empty());
+        rest.is_some_and(|rest| rest.starts_with([' ', '.', '[']))
+    };
+    let set = args.set.iter().rev().find(|text| is_about(key_of_view(text)));
+    let option = || given(args).find(|(_, key)| is_about(key)).map(|(option, _)| option.to_owned());
+    set.map(|text| format!("--set {text}")).or_else(option)
+}
+
+/// Refuses keys that are set twice, and those that have no effect.
+fn check_set(args: &FrameArgs, spec: &ViewSpec) -> Result<(), Failure> {
+    let patient = spec.patient.torso.is_some() || spec.patient.ct.is_some();
+    for text in &args.set {
+        let key = key_of_view(text);
+        if let Some((option, _)) = given(args).find(|(_, other)| *other == key) {
+            let text = format!("--set {text}: {option} gives the same: leave out one of the two");
+            return Err(Failure::Input(text));
+        }
+        if key == "xray.tissue_mm" && patient {
+            let text = format!(
+                "--set {text}: is the thickness of a slab, and the scene has a body (view.patient) in its place: leave it out, or \
+                 set patient={{}} for the slab"
+            );
+            return Err(Failure::Input(text));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses options that are incompatible.
 pub(super) fn check(args: &FrameArgs, spec: &ViewSpec, frames: usize) -> Result<(), Failure> {
-    if let (Some(turn), 1) = (args.turn, frames) {
-        let text = format!(
-            "--turn {turn}: one frame is drawn; say how many with --count, or --deg-per-s, or draw several steps"
-        );
-        return Err(Failure::Input(text));
-    }
+    check_set(args, spec)?;
     for (key, turn) in [("--orbit", args.orbit), ("--turn", args.turn)] {
         if let Some(turn) = turn.filter(|turn| !(-MOST_TURN_DEG..=MOST_TURN_DEG).contains(turn)) {
             let text = format!("{key} {turn:e}: give -{MOST_TURN_DEG} to {MOST_TURN_DEG} degrees");
             return Err(Failure::Input(text));
         }
+    }
+    for (key, turn) in [("--turn", args.turn), ("--orbit", args.orbit)] {
+        if let (Some(turn), 1) = (turn, frames) {
+            let text = format!(
+                "{key} {turn}: one frame is drawn; say how many with --count, or draw several steps (or a --turn with --deg-per-s)"
+            );
+            return Err(Failure::Input(text));
+        }
+    }
+    if let (Some(orbit), false) = (args.orbit, spec.wants(View::ThreeD)) {
+        let text = format!("--orbit {orbit}: belongs to the 3D view: use --view 3d or --view both");
+        return Err(Failure::Input(text));
     }
     let of_fluoro = args.dicom.is_some()
         || args.labels
