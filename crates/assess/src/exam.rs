@@ -7,7 +7,8 @@ use endowire_core::{Error, Result};
 use serde::Serialize;
 
 use crate::groups::assess;
-use crate::reach::{Reach, SAME_ML, Site};
+use crate::injection::{exceeds_s, flowed_ml};
+use crate::reach::{Reach, Site};
 use crate::record::Record;
 use crate::score::{Score, Verdict};
 use crate::subject::Subject;
@@ -23,7 +24,7 @@ pub enum EndedBy {
     Time,
     /// The beam was on for longer than `limits.beam_s`.
     Beam,
-    /// More than `limits.contrast_ml` was injected.
+    /// More than `limits.contrast_ml` has flowed.
     Contrast,
     /// The wall forces were larger than `limits.wall_force_n`.
     WallForce,
@@ -74,7 +75,7 @@ pub struct Standing {
     pub task: Arc<Subject>,
     /// Distance from the tip to the target, mm; `None` while the tip is outside the vessel, and for a sac.
     pub distance_mm: Option<f64>,
-    /// Contrast medium injected at the target so far, ml.
+    /// Contrast medium that has flowed at the target so far, ml.
     pub injected_there_ml: f64,
     /// Volume of the coils in the sac over the volume of the sac; `None` if there is no sac.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -160,13 +161,16 @@ impl Exam {
         Score::new(&self.subject, record, &assess(record, self.way()), ended)
     }
 
-    /// Progress at the end of a record that was followed.
+    /// Progress at the end of a record that was followed; once the subject has ended, that at its end.
     pub fn standing(&self, record: &Record) -> Standing {
         let limits = &self.subject.limits;
+        let verdict = self.score.as_ref().map(|score| score.verdict);
+        let ended = verdict.and_then(|verdict| verdict.ended);
+        let end_s = ended.map_or_else(|| record.end_s(), |ended| ended.time_s);
         let used = [
-            ("time", record.end_s(), limits.time_s, "s"),
-            ("beam", record.beam_on_s(0.0, record.end_s()).unwrap_or(0.0), limits.beam_s, "s"),
-            ("contrast", injected_ml(record, 0.0, f64::INFINITY), limits.contrast_ml, "ml"),
+            ("time", end_s, limits.time_s, "s"),
+            ("beam", record.beam_on_s(0.0, end_s).unwrap_or(0.0), limits.beam_s, "s"),
+            ("contrast", flowed_ml(&record.injections, end_s), limits.contrast_ml, "ml"),
             ("largest wall force", self.wall_force_n, limits.wall_force_n, "N"),
         ];
         let used = used
@@ -181,7 +185,7 @@ impl Exam {
             packing_density: last.and_then(|sample| sample.packing).map(|packed| packed.density),
             to_go: vec![],
             used: used.collect(),
-            verdict: self.score.as_ref().map(|score| score.verdict),
+            verdict,
             score: self.score.clone(),
         };
         standing.to_go = standing.to_go_words();
@@ -206,7 +210,10 @@ impl Exam {
             ),
             (
                 EndedBy::Contrast,
-                limits.contrast_ml.and_then(|most| exceeded_s(record, most)).filter(in_sample),
+                limits
+                    .contrast_ml
+                    .and_then(|most| exceeds_s(record.injections.iter(), most))
+                    .filter(in_sample),
             ),
             (EndedBy::Beam, limits.beam_s.and_then(|most| record.beam_used_up_s(most)).filter(in_sample)),
             (EndedBy::Time, limits.time_s.filter(in_sample)),
@@ -215,20 +222,4 @@ impl Exam {
         let ended = ends.into_iter().filter_map(|(by, time_s)| Some(Ended { by, time_s: time_s? }));
         ended.min_by(|a, b| a.time_s.total_cmp(&b.time_s))
     }
-}
-
-/// Contrast medium injected between two times, ml.
-pub(crate) fn injected_ml(record: &Record, from_s: f64, to_s: f64) -> f64 {
-    let injected = record.injections.iter().filter(|one| (from_s..=to_s).contains(&one.time_s));
-    injected.map(|one| one.volume_ml).fold(0.0, |sum, ml| sum + ml)
-}
-
-/// Time at which the injected volume exceeded `most_ml`, s.
-fn exceeded_s(record: &Record, most_ml: f64) -> Option<f64> {
-    let mut sum_ml = 0.0;
-    let over = record.injections.iter().find(|one| {
-        sum_ml += one.volume_ml;
-        sum_ml > most_ml + SAME_ML
-    });
-    over.map(|one| one.time_s)
 }

@@ -1,10 +1,10 @@
 //! The measures, group by group. All values come from the record: nothing is simulated again.
 
-use endowire_core::Vec3;
-
+use crate::injection::flowed_ml;
 use crate::metric::{Better, Group, Metric};
 use crate::record::{REST_MM, Record};
 use crate::smoothness::{spectral_arc_length, speeds, submovements};
+use crate::total::total;
 use crate::way::Way;
 
 /// Fraction of the time in which forces are at most the 95th percentile.
@@ -29,8 +29,6 @@ fn lower(
     definition: &'static str,
     study: &'static str,
 ) -> Metric {
-    // Turns −0, the sum of nothing, into 0.
-    let value = value.map(|value| value + 0.0);
     Metric { name, group, value, unit, better: Better::Lower, definition, study }
 }
 
@@ -58,13 +56,13 @@ fn rests(record: &Record) -> impl Iterator<Item = (f64, f64)> {
 
 /// Time during which no instrument is moved, s.
 fn idle_s(record: &Record) -> f64 {
-    rests(record).map(|(from, to)| to - from).sum()
+    total(rests(record).map(|(from, to)| to - from))
 }
 
 /// Time during which no instrument is moved and the beam is on, s; `None` if the beam was not recorded.
 fn beam_on_idle_s(record: &Record) -> Option<f64> {
     record.beam.as_ref()?;
-    rests(record).map(|(from, to)| record.beam_on_s(from, to)).sum()
+    Some(total(rests(record).filter_map(|(from, to)| record.beam_on_s(from, to))))
 }
 
 fn time(record: &Record) -> Vec<Metric> {
@@ -87,7 +85,7 @@ fn radiation(record: &Record) -> Vec<Metric> {
     let of = |name, unit, value, definition| lower(Group::Radiation, (name, unit), value, definition, REVIEW);
     let sum = |each: fn(&crate::BeamState) -> f64| {
         let on = record.beam_stretches()?.filter(|(state, _)| state.on);
-        Some(on.map(|(state, end_s)| each(state) * (end_s - state.time_s)).fold(0.0, |sum, of| sum + of))
+        Some(total(on.map(|(state, end_s)| each(state) * (end_s - state.time_s))))
     };
     let frames = sum(|state| state.frames_per_s);
     let kerma = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3);
@@ -111,60 +109,58 @@ fn radiation(record: &Record) -> Vec<Metric> {
             "air kerma at the detector times the open area, summed over frames",
         ),
         of("runs", "1", runs, "how often the beam was switched on"),
-        of("frames", "1", frames, "frames while the beam was on"),
+        of("frames", "1", frames.map(f64::round), "frames while the beam was on, as a whole number"),
         of("field_cm2", "cm²", field, "mean open area at the detector while the beam was on"),
         of("c_arm_moves", "1", moves, "changes of the C-arm's angles"),
     ]
 }
 
 fn contrast(record: &Record) -> Vec<Metric> {
-    let of =
-        |name, unit, value, definition| lower(Group::Contrast, (name, unit), Some(value), definition, REVIEW);
-    let volume = record.injections.iter().map(|one| one.volume_ml).sum();
+    let of = |name, unit, value, definition| lower(Group::Contrast, (name, unit), value, definition, REVIEW);
+    let end_s = record.end_s();
     let fastest = record.injections.iter().map(|one| one.rate_ml_per_s).fold(0.0, f64::max);
-    let against = record.injections.iter().filter(|one| record.is_against_wall(one));
-    let at_wall = against.map(|one| one.volume_ml).sum();
+    let each = record.injections.iter().map(|one| Some((one.flowed_ml(end_s), record.is_against_wall(one)?)));
+    let against: Option<Vec<(f64, bool)>> = each.collect();
+    let at_wall = against.map(|all| total(all.into_iter().filter(|one| one.1).map(|one| one.0)));
+    let count = record.injections.len() as f64;
     vec![
-        of("contrast_ml", "ml", volume, "contrast medium injected"),
-        of("injections", "1", record.injections.len() as f64, "how often it was injected"),
-        of("largest_rate_ml_per_s", "ml/s", fastest, "fastest injection"),
+        of(
+            "contrast_ml",
+            "ml",
+            Some(flowed_ml(&record.injections, end_s)),
+            "contrast medium that has flowed",
+        ),
+        of("injections", "1", Some(count), "how often it was injected"),
+        of("largest_rate_ml_per_s", "ml/s", Some(fastest), "fastest injection"),
         of(
             "against_wall_ml",
             "ml",
             at_wall,
-            "medium of injections that began with the tip held by a wall with more than 1 mN",
+            "medium of injections that began with the tip that it leaves held by a wall with more than 1 mN",
         ),
     ]
-}
-
-/// Positions of the foremost tip, in order.
-fn tips(record: &Record) -> Vec<Vec3> {
-    record.samples.iter().filter_map(|sample| sample.tip_mm).collect()
-}
-
-/// Positions of the foremost tip to be compared with the centre line, in order.
-fn on_centreline(record: &Record) -> Vec<Vec3> {
-    record.samples.iter().filter_map(crate::Sample::on_centreline_mm).collect()
 }
 
 fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let of =
         |name, unit, value, definition, study| lower(Group::Motion, (name, unit), value, definition, study);
-    let tips = tips(record);
-    let path_mm: f64 = tips.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
-    let ends = tips.first().zip(tips.last());
-    let shortest_mm = way.zip(ends).map(|(way, (from, to))| way.length_mm(from, to));
+    let path = record.path_of_tip();
+    let path_mm = total(path.windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()));
+    let mut tips = record.samples.iter().filter_map(|sample| sample.tip_mm);
+    let first = tips.next();
+    let ends = first.zip(tips.next_back().or(first));
+    let shortest_mm = way.zip(ends).map(|(way, (from, to))| way.length_mm(&from, &to));
     let ratio = shortest_mm.filter(|mm| *mm >= SHORTEST_MM).map(|mm| path_mm / mm);
-    let speeds = speeds(record);
+    let speeds = speeds(&path);
     let moving_s = record.end_s() - idle_s(record);
     let (count, mean_s) = submovements(&speeds);
     let hands = || record.samples.iter().flat_map(|sample| sample.hands.iter().enumerate());
     let most = record.hand_count();
     let reversals: usize = (0..most).map(|hand| reversals(record, hand)).sum();
-    let turned: f64 = hands().map(|(_, hand)| hand.rotate_rad.abs()).sum();
-    let retracted: f64 = hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)).sum();
+    let turned = total(hands().map(|(_, hand)| hand.rotate_rad.abs()));
+    let retracted = total(hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)));
     vec![
-        of("tip_path_mm", "mm", Some(path_mm), "way of the foremost tip", RAFII),
+        of("tip_path_mm", "mm", Some(path_mm), "way of the foremost tip, without what undo does", RAFII),
         of(
             "path_ratio",
             "1",
@@ -241,14 +237,14 @@ fn safety(record: &Record) -> Vec<Metric> {
         left_s -= took_s;
         left_s <= 0.0
     });
-    let impulse: f64 = record.timed().map(|(took_s, sample)| sample.wall_force_n * took_s).sum();
+    let impulse = total(record.timed().map(|(took_s, sample)| sample.wall_force_n * took_s));
     let hand_n = most(&|sample| {
         let forces = sample.hands.iter().filter_map(|hand| hand.push_force_n);
         forces.map(f64::abs).fold(0.0, f64::max)
     });
     let torque = most(&|sample| sample.hands.iter().map(|hand| hand.torque_nmm.abs()).fold(0.0, f64::max));
     let several = samples.iter().any(|sample| sample.hands.len() > 1);
-    let ahead_s: f64 = record.timed().filter(|(_, sample)| sample.is_ahead()).map(|(s, _)| s).sum();
+    let ahead_s = total(record.timed().filter(|(_, sample)| sample.is_ahead()).map(|(s, _)| s));
     let idle_s = idle_s(record);
     let blind_s = record
         .beam_on_s(0.0, record.end_s())
@@ -302,11 +298,16 @@ fn safety(record: &Record) -> Vec<Metric> {
 
 fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let wrong = way.map(|way| {
-        let branches: Vec<Option<usize>> =
-            on_centreline(record).iter().map(|tip| way.wrong_branch(tip)).collect();
-        let first = branches.first().is_some_and(Option::is_some);
-        let entered = branches.windows(2).filter(|pair| pair[1].is_some() && pair[0] != pair[1]).count();
-        (entered + usize::from(first)) as f64
+        let known = record.samples.iter().filter_map(|one| Some((one.undone, one.on_centreline_mm()?)));
+        let branches: Vec<(bool, Option<usize>)> =
+            known.map(|(undone, tip)| (undone, way.wrong_branch(&tip))).collect();
+        let first = branches.first().is_some_and(|first| first.1.is_some());
+        // Undo may put a tip into a branch that it has left.
+        let entered = |pair: &&[(bool, Option<usize>)]| {
+            let [(_, before), (undone, now)] = [pair[0], pair[1]];
+            now.is_some() && before != now && !undone
+        };
+        (branches.windows(2).filter(entered).count() + usize::from(first)) as f64
     });
     let up_s = way.and_then(|way| {
         let past = |sample: &&crate::Sample| {

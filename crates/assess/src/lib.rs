@@ -20,10 +20,12 @@
 // Scores must have the same bits on every machine.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod check;
 mod course;
 mod exam;
 mod goal;
 mod groups;
+mod injection;
 mod metric;
 mod note;
 mod noticed;
@@ -36,6 +38,7 @@ mod spectrum;
 mod stretch;
 mod subject;
 mod timeline;
+mod total;
 mod unjudged;
 mod way;
 mod words;
@@ -44,10 +47,11 @@ pub use course::{Attempt, Course, Line, MetricLine, Trend};
 pub use exam::{Ended, EndedBy, Exam, Standing, Used};
 pub use goal::{Goal, PackingGoal, PlaceGoal};
 pub use groups::assess;
+pub use injection::{Injection, Outlet};
 pub use metric::{Better, Group, Metric};
 pub use noticed::{Noticed, NoticedKind, noticed};
 pub use reach::Site;
-pub use record::{BEAM, BeamState, Hand, Injection, Packed, Record, Sample};
+pub use record::{BEAM, BeamState, Hand, Packed, Record, Sample};
 pub use score::{Score, Scored, Verdict};
 pub use session::SessionFile;
 pub use subject::{Limits, Subject, Threshold};

@@ -44,12 +44,30 @@ impl Record {
             tip_force_n: force.tip_n,
             jumped: report.jumped && !rests,
             packing: packing.map(|Packing { density, outside_mm, .. }| Packed { density, outside_mm }),
+            undone: false,
         };
         match self.samples.last_mut() {
-            Some(last) if rests && Sample { time_s: last.time_s, ..sample.clone() } == *last => {
+            Some(last)
+                if rests
+                    && Sample { time_s: last.time_s, undone: last.undone, ..sample.clone() } == *last =>
+            {
                 last.time_s = time_s;
             }
             _ => self.samples.push(sample),
         }
+    }
+
+    /// Records the same where the session has gone to another of its states since the last step, as by undo.
+    pub fn note_elsewhere(
+        &mut self,
+        time_s: f64,
+        moves: &[Move],
+        simulation: &Simulation,
+        packing: Option<Packing>,
+    ) {
+        let known = self.samples.len();
+        self.note(time_s, moves, simulation, packing);
+        // Without a new sample, that state is the same.
+        self.samples[known..].iter_mut().for_each(|sample| sample.undone = true);
     }
 }

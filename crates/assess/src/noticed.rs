@@ -12,7 +12,7 @@ const MOST: usize = 3;
 /// instrument ahead of the one inside it.
 const IDLE_S: f64 = 2.0;
 const UNSEEN_S: f64 = 0.5;
-/// Motions at most this far apart count as one, s: a step of a script happens at once, when its time is over.
+/// Motions at most this far apart count as one, s: a hand pauses between two pushes.
 const APART_S: f64 = 0.5;
 /// Shortest pull-back that is reported, mm.
 const PULLED_MM: f64 = 10.0;
@@ -158,7 +158,7 @@ fn beam(record: &Record) -> Vec<Noticed> {
 }
 
 fn against_wall(record: &Record) -> Vec<Noticed> {
-    let held = record.injections.iter().filter(|one| record.is_against_wall(one)).take(MOST);
+    let held = record.injections.iter().filter(|one| record.is_against_wall(one) == Some(true)).take(MOST);
     let told = held.map(|one| {
         let text = format!("{} ml injected with the tip held by a wall", one.volume_ml);
         Noticed::at(NoticedKind::AgainstWall, one.time_s, text)

@@ -4,13 +4,10 @@ use endowire_core::error::nearest_name;
 use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result};
 
-use crate::exam::injected_ml;
 use crate::goal::{Goal, PackingGoal, PlaceGoal};
+use crate::injection::{Injection, flowed_ml, reaches_s};
 use crate::record::{Record, Sample};
 use crate::way::Way;
-
-/// Volumes that differ by less count as equal, ml: sums are rounded.
-pub(crate) const SAME_ML: f64 = 1e-9;
 
 /// Where the goal of a subject lies.
 #[derive(Debug, Clone, Copy, Default)]
@@ -21,6 +18,8 @@ pub struct Site<'a> {
     pub instruments: &'a [String],
     /// Whether the scene has a sac whose packing is recorded.
     pub has_sac: bool,
+    /// Whether all instruments are known to be solid: medium then leaves through the sheath alone.
+    pub all_solid: bool,
 }
 
 /// Progress towards a goal.
@@ -31,6 +30,7 @@ pub(crate) struct Reach {
     pub(crate) way: Option<Way>,
     /// Time since which the tip has been at the target, s.
     there_since_s: Option<f64>,
+    /// Medium that has flowed at the target since then, ml.
     pub(crate) injected_there_ml: f64,
 }
 
@@ -38,6 +38,10 @@ impl Reach {
     /// Looks up a goal at a site. Errors name the key that does not fit.
     pub(crate) fn new(goal: &Goal, site: &Site<'_>) -> Result<Self> {
         let way = match goal {
+            Goal::Place(PlaceGoal { inject_ml: Some(ml), .. }) if site.all_solid => {
+                let mend = "no instrument has a lumen through which medium can be injected there: give inner_radius_mm to one in the scene, or leave this out";
+                return Err(Error::parameter("goal.inject_ml", ml, mend));
+            }
             Goal::Place(goal) => Some(way_to(goal, site)?),
             Goal::Packing(_) if site.has_sac => None,
             Goal::Packing(PackingGoal { packing_density }) => {
@@ -54,6 +58,12 @@ impl Reach {
             Goal::Packing(goal) if record.samples.iter().all(|sample| sample.packing.is_none()) => {
                 let mend = "the record does not tell what coils fill: it is of another scene, or of an earlier version; record it again";
                 Err(Error::parameter("goal.packing_density", goal.packing_density, mend))
+            }
+            Goal::Place(PlaceGoal { inject_ml: Some(ml), .. })
+                if record.injections.iter().any(|one| one.outlet.is_none()) =>
+            {
+                let mend = "the record does not tell where medium was injected: it is of an earlier version; record it again";
+                Err(Error::parameter("goal.inject_ml", ml, mend))
             }
             Goal::Place(PlaceGoal { instrument: Some(name), .. }) => {
                 let hand = self.way.as_ref().and_then(|way| way.instrument);
@@ -94,15 +104,22 @@ impl Reach {
             return None;
         }
         let since_s = *self.there_since_s.get_or_insert(so_s);
-        self.injected_there_ml = injected_ml(record, since_s, sample.time_s);
-        let Some(asked_ml) = goal.inject_ml else { return Some(so_s) };
-        let there = record.injections.iter().filter(|one| (since_s..=sample.time_s).contains(&one.time_s));
-        let mut sum_ml = 0.0;
-        let last = there.into_iter().find(|one| {
-            sum_ml += one.volume_ml;
-            sum_ml >= asked_ml - SAME_ML
-        });
-        last.map(|one| one.time_s.max(so_s))
+        let there = || record.injections.iter().filter(|one| one.time_s >= since_s && self.leaves_there(one));
+        let injected_there_ml = flowed_ml(there(), sample.time_s);
+        let flowed_s = goal.inject_ml.map(|asked_ml| reaches_s(there(), asked_ml));
+        self.injected_there_ml = injected_there_ml;
+        match flowed_s {
+            None => Some(so_s),
+            Some(flowed_s) => {
+                flowed_s.map(|time_s| time_s.max(so_s)).filter(|time_s| *time_s <= sample.time_s)
+            }
+        }
+    }
+
+    /// Whether medium leaves at the target: as near to it as the tip must come.
+    fn leaves_there(&self, injection: &Injection) -> bool {
+        let target = self.way.as_ref().and_then(Way::target_mm).zip(injection.outlet.as_ref());
+        target.is_some_and(|((target_mm, within_mm), outlet)| (outlet.at_mm - target_mm).norm() <= within_mm)
     }
 }
 

@@ -6,8 +6,17 @@ use std::path::Path;
 use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::check;
+use crate::injection::{Injection, Outlet};
+use crate::session::SessionFile;
+use crate::total::total;
+
 /// Name of the beam log, beside steps.csv or a session's script; absent if the beam was not recorded.
 pub const BEAM: &str = "beam.csv";
+
+/// Other tables of a folder of a run.
+const STEPS: &str = "steps.csv";
+const INJECTIONS: &str = "injections.csv";
 
 /// Motions below these count as rest: advance, mm, and rotation, rad.
 pub(crate) const REST_MM: f64 = 1e-9;
@@ -17,6 +26,7 @@ pub(crate) const AGAINST_WALL_N: f64 = 1e-3;
 
 /// Motion of one instrument in a step, and its state after the step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Hand {
     /// Advance; negative when pulled back.
     pub advance_mm: f64,
@@ -40,6 +50,7 @@ pub struct Hand {
 
 /// Packing of a sac with coils.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Packed {
     /// Volume of the coils in the sac over the volume of the sac.
     pub density: f64,
@@ -49,6 +60,7 @@ pub struct Packed {
 
 /// The record of one step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Time of its end, since the start.
     pub time_s: f64,
@@ -69,6 +81,16 @@ pub struct Sample {
     /// Packing of the vessel's sac; `None` if there is no sac.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub packing: Option<Packed>,
+    /// Whether the session went to another of its states before this step, as by undo: from the tip of the sample
+    /// before to this one leads no motion.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub undone: bool,
+}
+
+/// Whether a flag is left out of a session file.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_false(flag: &bool) -> bool {
+    !*flag
 }
 
 impl Sample {
@@ -99,24 +121,13 @@ impl Sample {
     }
 }
 
-/// An injection of contrast medium.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Injection {
-    /// Time of its begin.
-    pub time_s: f64,
-    /// Volume.
-    pub volume_ml: f64,
-    /// Flow rate.
-    pub rate_ml_per_s: f64,
-}
-
 /// State of the beam and the C-arm from a time on: a row of beam.csv.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamState {
     /// Time since the start, increasing from row to row.
     pub time_s: f64,
-    /// Whether the pedal is down.
+    /// Whether the pedal is down: `true` or `false`.
     pub on: bool,
     /// Frame rate while the pedal is down.
     pub frames_per_s: f64,
@@ -132,6 +143,7 @@ pub struct BeamState {
 
 /// The record of a procedure.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Record {
     /// Names of the instruments, innermost first; empty if they were not recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -146,29 +158,39 @@ pub struct Record {
 
 impl Record {
     /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv and, if they exist,
-    /// instruments.csv, injections.csv, packing.csv and beam.csv.
+    /// instruments.csv, injections.csv, packing.csv and beam.csv. Hands rest after the last step of a run until all
+    /// medium has flowed.
     ///
     /// # Errors
-    /// [`Error::Content`] naming a file that is missing or invalid.
+    /// [`Error::Content`] naming a file that is missing or invalid, with the key and value that are impossible.
     pub fn read(path: &Path) -> Result<Self> {
-        if !path.is_file() {
-            return Self::of_folder(path);
+        if path.is_file() {
+            SessionFile::read(path).map(|session| session.record)
+        } else {
+            Self::of_folder(path)
         }
-        let bytes = std::fs::read(path).map_err(|error| not_a_session(path, &error))?;
-        Self::from_session(&bytes, path)
     }
 
     /// Reads a session from the bytes of its file; `path` is for messages.
     ///
     /// # Errors
-    /// [`Error::Content`] if it is not a session.
+    /// [`Error::Content`] if it is not a session, or has an impossible value.
     pub fn from_session(bytes: &[u8], path: &Path) -> Result<Self> {
-        #[derive(Deserialize)]
-        struct Session {
-            record: Record,
+        SessionFile::parse(bytes, path).map(|session| session.record)
+    }
+
+    /// Refuses impossible values.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] with key and value.
+    pub(crate) fn check(&self) -> Result<()> {
+        check::samples(&self.samples)?;
+        check::injections(&self.injections)?;
+        match &self.beam {
+            // Nothing was recorded, so neither was a state of the beam.
+            Some(beam) if !(beam.is_empty() && self.samples.is_empty()) => check::beam(beam),
+            _ => Ok(()),
         }
-        let session: Session = serde_json::from_slice(bytes).map_err(|error| not_a_session(path, &error))?;
-        Ok(session.record)
     }
 
     /// Largest number of instruments in a sample.
@@ -177,7 +199,7 @@ impl Record {
     }
 
     fn of_folder(folder: &Path) -> Result<Self> {
-        let steps: Vec<Step> = rows(&folder.join("steps.csv"))?;
+        let steps: Vec<Step> = rows(&folder.join(STEPS))?;
         let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();
         let mut instruments: Vec<String> = vec![];
         for row in optional::<InstrumentRow>(&folder.join("instruments.csv"))?.unwrap_or_default() {
@@ -189,18 +211,34 @@ impl Record {
         let packing = optional::<PackingRow>(&folder.join("packing.csv"))?.unwrap_or_default();
         let mut packing: BTreeMap<usize, Packed> =
             packing.into_iter().map(|row| (row.step, row.packed())).collect();
-        let injections = optional::<InjectionRow>(&folder.join("injections.csv"))?.unwrap_or_default();
         let samples = steps.into_iter().map(|step| {
             let alone = || vec![step.hand()];
             let packing = packing.remove(&step.step);
             Sample { packing, ..step.sample(hands.remove(&step.step).unwrap_or_else(alone)) }
         });
-        Ok(Self {
-            instruments,
-            samples: samples.collect(),
-            injections: injections.into_iter().map(InjectionRow::injection).collect(),
-            beam: optional(&folder.join(BEAM))?,
-        })
+        let samples: Vec<Sample> = samples.collect();
+        let injections = optional::<InjectionRow>(&folder.join(INJECTIONS))?.unwrap_or_default();
+        let injections: Vec<Injection> = injections.into_iter().map(InjectionRow::injection).collect();
+        let beam: Option<Vec<BeamState>> = optional(&folder.join(BEAM))?;
+        let in_file = |name: &str, checked: Result<()>| {
+            checked.map_err(|error| Error::content(&folder.join(name), error.to_string()))
+        };
+        in_file(STEPS, check::samples(&samples))?;
+        in_file(INJECTIONS, check::injections(&injections))?;
+        in_file(BEAM, beam.as_deref().map_or(Ok(()), check::beam))?;
+        Ok(Self { instruments, samples, injections, beam }.flowed_out())
+    }
+
+    /// The record with a rest at its end, if medium still flows there: a run ends with its last step, but not what it
+    /// has injected.
+    fn flowed_out(mut self) -> Self {
+        let end_s = self.injections.iter().map(Injection::end_s).fold(0.0, f64::max);
+        if let Some(last) = self.samples.last().filter(|last| last.time_s < end_s) {
+            let rests = |hand: &Hand| Hand { advance_mm: 0.0, rotate_rad: 0.0, ..*hand };
+            let hands = last.hands.iter().map(rests).collect();
+            self.samples.push(Sample { time_s: end_s, hands, jumped: false, ..last.clone() });
+        }
+        self
     }
 
     /// Each sample with its duration, s.
@@ -213,6 +251,23 @@ impl Record {
         })
     }
 
+    /// The path of the foremost tip: times, s, and places. Where the session went to another of its states, as by undo,
+    /// the path goes on from where the tip was: what follows is shifted by the distance that no hand has moved it.
+    pub(crate) fn path_of_tip(&self) -> Vec<(f64, Vec3)> {
+        let mut path: Vec<(f64, Vec3)> = Vec::new();
+        let (mut shift, mut undone) = (Vec3::zeros(), false);
+        for sample in &self.samples {
+            undone |= sample.undone;
+            let Some(tip) = sample.tip_mm else { continue };
+            if let Some((_, last)) = path.last().filter(|_| undone) {
+                shift = last - tip;
+            }
+            undone = false;
+            path.push((sample.time_s, tip + shift));
+        }
+        path
+    }
+
     /// Duration of the procedure, s.
     pub(crate) fn end_s(&self) -> f64 {
         self.samples.last().map_or(0.0, |last| last.time_s)
@@ -222,8 +277,7 @@ impl Record {
     pub(crate) fn beam_on_s(&self, from_s: f64, to_s: f64) -> Option<f64> {
         let on = self.beam_stretches()?.filter(|(state, _)| state.on);
         let each = on.map(|(state, end_s)| (end_s.min(to_s) - state.time_s.max(from_s)).max(0.0));
-        // Starts from 0, because the sum of nothing would be −0.
-        Some(each.fold(0.0, |sum, s| sum + s))
+        Some(total(each))
     }
 
     /// Time at which the beam has been on for `limit_s`, s; `None` if it has not, or was not recorded.
@@ -237,17 +291,26 @@ impl Record {
         })
     }
 
-    /// Whether an injection began with the tip pressed against a wall.
-    pub(crate) fn is_against_wall(&self, injection: &Injection) -> bool {
+    /// Wall force at the tip that an injection leaves, when it began, N. An earlier version recorded only that at the
+    /// foremost tip; `None` if the medium may have left another one.
+    fn outlet_force_n(&self, injection: &Injection) -> Option<f64> {
+        let recorded = injection.outlet.as_ref().and_then(|outlet| outlet.tip_force_n);
         let during = self.samples.iter().find(|sample| sample.time_s >= injection.time_s);
-        during.or(self.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
+        let sample = during.or(self.samples.last());
+        let foremost = sample.filter(|sample| sample.hands.len() <= 1).map(|sample| sample.tip_force_n);
+        recorded.or(foremost)
+    }
+
+    /// Whether an injection began with the tip that it leaves pressed against a wall; `None` if it was not recorded.
+    pub(crate) fn is_against_wall(&self, injection: &Injection) -> Option<bool> {
+        self.outlet_force_n(injection).map(|force_n| force_n > AGAINST_WALL_N)
     }
 
     /// The record up to `time_s`, which lies in the sample of this index.
     pub(crate) fn until(&self, sample: usize, time_s: f64) -> Self {
         let mut samples = self.samples[..=sample].to_vec();
         samples[sample].time_s = time_s;
-        let injections = self.injections.iter().filter(|one| one.time_s <= time_s).copied().collect();
+        let injections = self.injections.iter().filter(|one| one.time_s <= time_s).cloned().collect();
         let states =
             |beam: &Vec<BeamState>| beam.iter().filter(|one| one.time_s <= time_s).copied().collect();
         let beam = self.beam.as_ref().map(states);
@@ -296,7 +359,7 @@ impl Step {
             advance_mm: self.advance_mm,
             rotate_rad: self.rotate_rad,
             inserted_mm: self.inserted_mm,
-            push_force_n: Some(self.push_force_n),
+            push_force_n: self.push_force_n.is_finite().then_some(self.push_force_n),
             torque_nmm: self.torque_nmm,
             ..Hand::default()
         }
@@ -313,6 +376,7 @@ impl Step {
             tip_force_n: self.wall_force_tip_n,
             jumped: self.jumped,
             packing: None,
+            undone: false,
         }
     }
 }
@@ -358,19 +422,23 @@ impl PackingRow {
 #[derive(Debug, Deserialize)]
 struct InjectionRow {
     time_s: f64,
+    instrument: String,
     volume_ml: f64,
     rate_ml_per_s: f64,
+    tip_x_mm: f64,
+    tip_y_mm: f64,
+    tip_z_mm: f64,
+    #[serde(default)]
+    tip_force_n: Option<f64>,
 }
 
 impl InjectionRow {
     fn injection(self) -> Injection {
-        let Self { time_s, volume_ml, rate_ml_per_s } = self;
-        Injection { time_s, volume_ml, rate_ml_per_s }
+        let Self { time_s, instrument, volume_ml, rate_ml_per_s, tip_force_n, .. } = self;
+        let at_mm = Vec3::new(self.tip_x_mm, self.tip_y_mm, self.tip_z_mm);
+        let outlet = Some(Outlet { instrument: Some(instrument), at_mm, tip_force_n });
+        Injection { time_s, volume_ml, rate_ml_per_s, outlet }
     }
-}
-
-fn not_a_session(path: &Path, error: &dyn std::fmt::Display) -> Error {
-    Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
 }
 
 fn optional<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Option<Vec<T>>> {
@@ -379,10 +447,29 @@ fn optional<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Option<Vec<T>>>
 
 /// Reads the rows of a table. An incomplete last row, left by a run that was killed, is dropped.
 fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>> {
-    let mend = "give the folder of a recorded run (endowire run)";
-    let refuse = |error: String| Error::content(path, format!("{error}; {mend}"));
-    let mut text = std::fs::read(path).map_err(|error| refuse(error.to_string()))?;
+    let mut text = std::fs::read(path).map_err(|error| {
+        Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
+    })?;
     text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
-    let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
-    rows.collect::<std::result::Result<_, _>>().map_err(|error| refuse(error.to_string()))
+    let mut reader = csv::Reader::from_reader(text.as_slice());
+    let columns = reader.headers().cloned().unwrap_or_default();
+    let rows: std::result::Result<_, _> = reader.into_deserialize().collect();
+    rows.map_err(|error| Error::content(path, format!("{}; {}", wrong_row(&error, &columns), mend(path))))
+}
+
+/// What is wrong with a row: its line, its column if that is known, and the reason.
+fn wrong_row(error: &csv::Error, columns: &csv::StringRecord) -> String {
+    let csv::ErrorKind::Deserialize { pos, err } = error.kind() else { return error.to_string() };
+    let line = pos.as_ref().map_or_else(String::new, |pos| format!("line {}: ", pos.line()));
+    let column = err.field().and_then(|field| columns.get(usize::try_from(field).ok()?));
+    let column = column.map_or_else(String::new, |name| format!("{name}: "));
+    format!("{line}{column}{}", err.kind())
+}
+
+/// The remedy for a table with an invalid row.
+fn mend(path: &Path) -> &'static str {
+    if path.file_name().is_some_and(|name| name == BEAM) {
+        return "a row of this log has time_s, on (true or false), frames_per_s, dose_ngy, field_mm2, primary_deg and secondary_deg";
+    }
+    "give the folder of a recorded run (endowire run)"
 }

@@ -6,6 +6,7 @@ use crate::exam::{Ended, EndedBy};
 use crate::metric::Metric;
 use crate::record::Record;
 use crate::subject::{Limits, Subject, Threshold};
+use crate::total::total;
 use crate::unjudged::{Unjudged, limits, why_absent};
 
 /// The score when all thresholds are met.
@@ -67,7 +68,7 @@ impl Score {
         let metrics: Vec<Scored> = metrics.iter().map(scored).collect();
         let points = |of: &dyn Fn(&Scored) -> bool| -> f64 {
             let counted = metrics.iter().filter(|one| of(one)).filter_map(|one| one.threshold.as_ref());
-            counted.map(|threshold| threshold.points).sum()
+            total(counted.map(|threshold| threshold.points))
         };
         let (all, kept) = (points(&|_| true), points(&|one| one.passed == Some(true)));
         let reached = ended.is_some_and(|ended| ended.by == EndedBy::Goal);

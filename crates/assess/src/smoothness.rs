@@ -1,6 +1,7 @@
 //! Smoothness of the tip's motion, from its speed at regular times.
 
-use crate::record::Record;
+use endowire_core::Vec3;
+
 use crate::spectrum::amplitudes;
 
 /// Sampling interval, s: hands do not move at more than 10 Hz.
@@ -15,10 +16,8 @@ const MOST: usize = 1_728_000;
 const MOVING_MM_PER_S: f64 = 2.0;
 const SHORTEST_S: f64 = 0.1;
 
-/// Speed of the tip at regular times, mm/s; the tip moves straight between samples.
-pub(crate) fn speeds(record: &Record) -> Vec<f64> {
-    let places = record.samples.iter().filter_map(|sample| Some((sample.time_s, sample.tip_mm?)));
-    let places: Vec<_> = places.collect();
+/// Speed of a tip at regular times, mm/s, from its places in order of time, s; it moves straight between them.
+pub(crate) fn speeds(places: &[(f64, Vec3)]) -> Vec<f64> {
     let (Some(first), Some(last)) = (places.first(), places.last()) else { return vec![] };
     let count = (((last.0 - first.0) / STEP_S).floor() as usize).min(MOST);
     let mut next = 0;

@@ -83,6 +83,29 @@ fn one() -> f64 {
     1.0
 }
 
+/// The largest possible value of a measure, if it has one.
+fn largest(metric: &str) -> Option<f64> {
+    match metric {
+        "arrived" | "packing_density" => Some(1.0),
+        "spectral_arc_length" => Some(0.0),
+        _ => None,
+    }
+}
+
+impl Limits {
+    /// The limit of a measure, with its key: no session goes on beyond it.
+    fn of(&self, metric: &str) -> Option<(&'static str, f64)> {
+        let (key, limit) = match metric {
+            "total_s" => ("limits.time_s", self.time_s),
+            "beam_on_s" => ("limits.beam_s", self.beam_s),
+            "contrast_ml" => ("limits.contrast_ml", self.contrast_ml),
+            "wall_force_n" => ("limits.wall_force_n", self.wall_force_n),
+            _ => return None,
+        };
+        limit.map(|limit| (key, limit))
+    }
+}
+
 impl Threshold {
     /// Whether a value meets the threshold.
     pub(crate) fn holds(&self, value: f64) -> bool {
@@ -106,6 +129,15 @@ impl Threshold {
         if let Some(other) = other {
             let mend = format!("of {} {} is better: give {right}", metric.name, metric.better.words());
             return Err(Error::parameter(format!("{key}.{wrong}"), other, mend));
+        }
+        if let Some((most, least)) =
+            largest(metric.name).zip(self.at_least).filter(|(most, least)| least > most)
+        {
+            let mend = format!(
+                "{} is never above {most}, and no session would pass: give that or less",
+                metric.name
+            );
+            return Err(Error::parameter(format!("{key}.at_least"), least, mend));
         }
         match limit {
             // What is better when lower counts or measures something, which is never below 0.
@@ -202,6 +234,13 @@ impl Subject {
                 let mend = "has a threshold already: keep one of the two";
                 let key = format!("threshold[{index}].metric");
                 return Err(Error::parameter(key, format!("{:?}", threshold.metric), mend));
+            }
+            let limit = limits.of(&threshold.metric).zip(threshold.at_most);
+            if let Some(((limit, ends_at), most)) = limit.filter(|((_, ends_at), most)| most > ends_at) {
+                let mend = format!(
+                    "is never missed, since {limit} = {ends_at} ends the subject before: give at most that, or raise the limit"
+                );
+                return Err(Error::parameter(format!("threshold[{index}].at_most"), most, mend));
             }
         }
         Ok(())

@@ -3,7 +3,8 @@
 use endowire_core::Vec3;
 use serde::Serialize;
 
-use crate::record::{BeamState, Injection, Record, Sample};
+use crate::injection::Injection;
+use crate::record::{BeamState, Record, Sample};
 use crate::way::Way;
 
 /// Shortest interval, s: hands do little that is faster.

@@ -25,6 +25,9 @@ pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
         return if record.beam.is_none() { NO_BEAM } else { "the beam was never on" };
     }
     match metric.name {
+        "against_wall_ml" => {
+            "the force at the tip that injected was not recorded: the record is of an earlier version; record it again"
+        }
         "catheter_ahead_s" => "there is one instrument alone",
         "packing_density" | "coil_outside_mm" => {
             "no sac is packed: the scene has none, or it was not recorded"

@@ -96,7 +96,7 @@ impl Verdict {
     pub fn words(&self) -> String {
         let how = if self.passed { "passed" } else { "not passed" };
         let end = match self.ended {
-            Some(ended) => format!("{} after {:.1} s", ended.by.words(), ended.time_s),
+            Some(ended) => format!("{} after {:.2} s", ended.by.words(), ended.time_s),
             None => "the session ended before the goal was reached".to_owned(),
         };
         format!("{how}, {:.0} of 100: {end}", self.score)

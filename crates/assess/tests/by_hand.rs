@@ -5,7 +5,7 @@
 #[path = "common/fork.rs"]
 mod fork;
 
-use endowire_assess::{BeamState, Group, Hand, Injection, Record, Sample, Way, assess};
+use endowire_assess::{BeamState, Group, Hand, Injection, Outlet, Record, Sample, Way, assess};
 use endowire_core::Vec3;
 use fork::tree;
 
@@ -43,8 +43,8 @@ fn record() -> Record {
             sample(10.0, [100.0, 48.0], 48.0, 0.2),
         ],
         injections: vec![
-            Injection { time_s: 0.5, volume_ml: 4.0, rate_ml_per_s: 2.0 },
-            Injection { time_s: 4.5, volume_ml: 6.0, rate_ml_per_s: 3.0 },
+            Injection { time_s: 0.5, volume_ml: 4.0, rate_ml_per_s: 2.0, outlet: None },
+            Injection { time_s: 4.5, volume_ml: 6.0, rate_ml_per_s: 3.0, outlet: None },
         ],
         beam: Some(vec![on(0.0, true, 0.0), on(2.0, false, 0.0), on(6.0, true, 30.0), on(8.0, false, 30.0)]),
         ..Record::default()
@@ -105,6 +105,70 @@ fn each_measure_is_what_it_says() {
     let told: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
     assert_eq!(told.len(), by_hand.len() + 4);
     assert!(Group::ALL.iter().all(|group| metrics.iter().any(|metric| metric.group == *group)));
+}
+
+#[test]
+fn medium_is_measured_as_it_has_flowed_and_at_the_tip_that_it_leaves() {
+    let value = |record: &Record, name: &str| {
+        assess(record, None).iter().find(|metric| metric.name == name).unwrap().value
+    };
+    // 2 ml/s from 8 s on, of which two seconds are left.
+    let mut late = record();
+    late.injections[1] = Injection { time_s: 8.0, volume_ml: 6.0, rate_ml_per_s: 2.0, outlet: None };
+    assert_eq!(value(&late, "contrast_ml"), Some(4.0 + 4.0));
+    assert_eq!((value(&late, "injections"), value(&late, "against_wall_ml")), (Some(2.0), Some(4.0)));
+    // The foremost tip is held by the wall, and the one that injects is not: medium goes by its own.
+    let leaves = |instrument: &str, tip_force_n: f64| {
+        Some(Outlet {
+            instrument: Some(instrument.to_owned()),
+            at_mm: Vec3::zeros(),
+            tip_force_n: Some(tip_force_n),
+        })
+    };
+    let mut two = record();
+    two.samples.iter_mut().for_each(|sample| sample.hands.push(Hand::default()));
+    two.injections[0].outlet = leaves("catheter", 0.05);
+    two.injections[1].outlet = leaves("catheter", 0.0);
+    assert_eq!(value(&two, "against_wall_ml"), Some(4.0));
+    // Of two instruments it must be recorded.
+    two.injections[0].outlet = None;
+    assert_eq!(value(&two, "against_wall_ml"), None);
+}
+
+#[test]
+fn undo_is_no_motion_of_the_tip() {
+    // Pushed to 30 mm, taken back to 10 mm, and pushed again to 40 mm: 30 and 30 mm.
+    let mut samples = vec![
+        sample(1.0, [0.0, 0.0], 0.0, 0.0),
+        sample(2.0, [30.0, 0.0], 30.0, 0.0),
+        sample(3.0, [10.0, 0.0], 0.0, 0.0),
+        sample(4.0, [40.0, 0.0], 30.0, 0.0),
+    ];
+    let value = |samples: &[Sample], name: &str| {
+        let record = Record { samples: samples.to_vec(), ..Record::default() };
+        let way = Way::to_target(&tree(), "left", 5.0).unwrap().unwrap();
+        assess(&record, Some(&way)).iter().find(|metric| metric.name == name).unwrap().value
+    };
+    assert_eq!(value(&samples, "tip_path_mm"), Some(80.0), "the twin: pulled back by the wall");
+    samples[2].undone = true;
+    for (name, by_hand) in [
+        ("tip_path_mm", 60.0),
+        ("path_ratio", 60.0 / 40.0),
+        ("tip_speed_mm_per_s", 30.0),
+        ("submovements", 2.0),
+        ("retracted_mm", 0.0),
+    ] {
+        assert_eq!(value(&samples, name), Some(by_hand), "{name}");
+    }
+    // Taken back into the wrong branch that was left: entered once.
+    let mut branch = vec![
+        sample(1.0, [100.0, -20.0], 20.0, 0.0),
+        sample(2.0, [100.0, 0.0], -20.0, 0.0),
+        sample(3.0, [100.0, -20.0], 0.0, 0.0),
+    ];
+    assert_eq!(value(&branch, "wrong_branches"), Some(2.0), "the twin: gone there");
+    branch[2].undone = true;
+    assert_eq!(value(&branch, "wrong_branches"), Some(1.0));
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn tree() -> CentrelineTree {
 
 fn exam(goal: &str, has_sac: bool) -> Result<Exam, String> {
     let (tree, instruments) = (tree(), ["wire", "catheter"].map(str::to_owned));
-    let site = Site { tree: Some(&tree), instruments: &instruments, has_sac };
+    let site = Site { tree: Some(&tree), instruments: &instruments, has_sac, ..Site::default() };
     Exam::new(subject(goal)?, &site).map_err(|error| error.to_string())
 }
 

@@ -6,7 +6,7 @@
 mod beam;
 
 use beam::beam;
-use endowire_assess::{Hand, Injection, NoticedKind, Record, Sample, Way, noticed};
+use endowire_assess::{Hand, Injection, NoticedKind, Outlet, Record, Sample, Way, noticed};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -23,6 +23,13 @@ fn way() -> Way {
     let left = Target { name: "left".to_owned(), row: 2 };
     let tree = CentrelineTree::new(nodes).unwrap().with_targets(vec![left]).unwrap();
     Way::to_target(&tree, "left", 5.0).unwrap().unwrap()
+}
+
+/// Through the catheter, whose tip the wall holds with this force.
+fn injection(time_s: f64, volume_ml: f64, tip_force_n: f64) -> Injection {
+    let instrument = Some("catheter".to_owned());
+    let outlet = Outlet { instrument, at_mm: Vec3::zeros(), tip_force_n: Some(tip_force_n) };
+    Injection { time_s, volume_ml, rate_ml_per_s: 2.0, outlet: Some(outlet) }
 }
 
 /// One sample a second, at the ends of these stretches of the tip, with what the wire's hand pushed.
@@ -58,10 +65,7 @@ fn record() -> Record {
     Record {
         instruments: ["wire", "catheter"].map(str::to_owned).to_vec(),
         samples: samples.collect(),
-        injections: vec![
-            Injection { time_s: 0.5, volume_ml: 4.0, rate_ml_per_s: 2.0 },
-            Injection { time_s: 3.5, volume_ml: 6.0, rate_ml_per_s: 3.0 },
-        ],
+        injections: vec![injection(0.5, 4.0, 0.0), injection(3.5, 6.0, 0.01)],
         beam: Some(vec![beam(0.0, true), beam(7.5, false)]),
     }
 }

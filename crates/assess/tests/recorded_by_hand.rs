@@ -112,13 +112,16 @@ fn session() -> String {
             [([57.0, 0.0, 157.0, 0.2, -0.4], [100.0, -47.0]), ([-20.0, 0.0, 90.0, 0.0, 0.0], [100.0, -10.0])],
         ),
     ];
-    let injection = |time_s: f64, volume_ml: f64, rate_ml_per_s: f64| json!({"time_s": time_s, "volume_ml": volume_ml, "rate_ml_per_s": rate_ml_per_s});
+    let injection = |time_s: f64, volume_ml: f64, rate_ml_per_s: f64, tip_force_n: f64| {
+        let outlet = json!({"instrument": "catheter", "at_mm": [10.0, 0.0, 0.0], "tip_force_n": tip_force_n});
+        json!({"time_s": time_s, "volume_ml": volume_ml, "rate_ml_per_s": rate_ml_per_s, "outlet": outlet})
+    };
     json!({
         "scene_file": "a.toml", "set": [],
         "record": {
             "instruments": ["wire", "catheter"],
             "samples": samples,
-            "injections": [injection(1.5, 5.0, 2.5), injection(4.2, 3.0, 6.0)],
+            "injections": [injection(1.5, 5.0, 2.5, 0.0), injection(4.2, 3.0, 6.0, 0.002)],
             "beam": [beam(0.0, true, 0.0), beam(3.0, true, 30.0), beam(4.5, false, 30.0)],
         },
     })
@@ -139,13 +142,14 @@ fn a_session_of_two_instruments_is_measured_as_by_hand() {
         ("kerma_ugy", 1.35),
         ("kerma_area_ugycm2", 270.0),
         ("runs", 1.0),
-        ("frames", 33.75),
+        // 4.5 s × 7.5 frames a second, in whole frames.
+        ("frames", 34.0),
         ("field_cm2", 200.0),
         ("c_arm_moves", 1.0),
         ("contrast_ml", 8.0),
         ("injections", 2.0),
         ("largest_rate_ml_per_s", 6.0),
-        // The second injection begins in the fourth sample, with 2 mN at the tip; the first one in a sample with none.
+        // The second injection begins with 2 mN at the catheter's tip; the first one with none.
         ("against_wall_ml", 3.0),
         // From 20 mm: 80 mm along the trunk, 47 mm into the branch, which is the way itself.
         ("tip_path_mm", 127.0),
@@ -263,4 +267,87 @@ fn a_folder_of_a_run_is_measured_as_by_hand() {
     let speeds: Vec<f64> = [vec![4.0; 20], vec![22.0; 40]].concat();
     let (told, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
     assert!((told - expected).abs() < 1e-9, "{told}, by sums {expected}");
+}
+
+#[test]
+fn a_run_goes_on_until_what_it_has_injected_has_flowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let late = INJECTIONS.replace("1,2.5,device,2,1", "3,5,device,2,1");
+    for (name, text) in [("steps.csv", STEPS), ("injections.csv", &late)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let record = Record::read(folder.path()).unwrap();
+    let metrics = assess(&record, Some(&way("left")));
+    assert_eq!((value(&metrics, "total_s"), value(&metrics, "idle_s")), (Some(7.0), Some(2.0)));
+    assert_eq!((value(&metrics, "contrast_ml"), value(&metrics, "tip_path_mm")), (Some(2.0), Some(48.0)));
+    let outlet = record.injections[0].outlet.as_ref().unwrap();
+    assert_eq!((outlet.instrument.as_deref(), outlet.at_mm.x), (Some("device"), 10.0));
+}
+
+const BEAM: &str = "time_s,on,frames_per_s,dose_ngy,field_mm2,primary_deg,secondary_deg\n0,true,15,30,40000,0,0\n4,false,15,30,40000,0,0\n";
+
+/// Reads the folder of a run with this log of the beam.
+fn with_beam(beam: &str) -> Result<Record, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("steps.csv", STEPS), ("beam.csv", beam)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    Record::read(folder.path()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_log_of_the_beam_that_cannot_be_is_refused_by_key_and_value() {
+    assert_eq!(with_beam(BEAM).unwrap().beam.unwrap().len(), 2, "the twin");
+    let header = BEAM.lines().next().unwrap();
+    for (log, told) in [
+        (String::new(), "beam = empty: no state of the beam"),
+        (format!("{header}\n"), "beam = empty: no state of the beam"),
+        (BEAM.replace(",30,", ",-30,"), "beam[0].dose_ngy = -30: must be a finite number of 0 or more"),
+        (BEAM.replace(",30,", ",nan,"), "beam[0].dose_ngy = NaN: must be a finite number"),
+        (BEAM.replace("\n0,true", "\n-100,true"), "beam[0].time_s = -100: must be"),
+        (
+            BEAM.replace("\n0,true", "\n5,true"),
+            "beam[1].time_s = 4: comes after 5: put beam in order of time",
+        ),
+        (BEAM.replace("40000", "-1"), "beam[0].field_mm2 = -1: must be"),
+        (BEAM.replace("true", "yes"), "line 2: on: "),
+        (BEAM.replace("true", "1"), "a row of this log has time_s, on (true or false), frames_per_s"),
+        (BEAM.replace("dose_ngy", "dose"), "unknown field `dose`"),
+    ] {
+        let error = with_beam(&log).unwrap_err();
+        assert!(error.contains("beam.csv: ") && error.contains(told), "{error}\n{told}");
+        assert!(!error.contains("give the folder of a recorded run"), "{error}");
+    }
+}
+
+#[test]
+fn a_session_that_cannot_be_is_refused_by_key_and_value() {
+    let read = |text: &str| Record::from_session(text.as_bytes(), Path::new("a.session.json"));
+    let whole: Value = serde_json::from_str(&session()).unwrap();
+    assert!(read(&whole.to_string()).is_ok(), "the twin");
+    for (pointer, value, told) in [
+        ("/record/samples/2/time_s", json!(0.0), "record.samples[2].time_s = 0: comes after 2"),
+        ("/record/samples/2/wall_force_n", json!(-5.0), "record.samples[2].wall_force_n = -5: must be"),
+        ("/record/injections/0/volume_ml", json!(-5.0), "record.injections[0].volume_ml = -5: must be"),
+        ("/record/injections/1/rate_ml_per_s", json!(0.0), "record.injections[1].rate_ml_per_s = 0: must be"),
+        ("/record/injections/1/outlet/tip_force_n", json!(-1.0), "injections[1].outlet.tip_force_n = -1"),
+        ("/record/beam/0/dose_ngy", json!(-1.0), "record.beam[0].dose_ngy = -1: must be"),
+        ("/record/beam", json!([]), "record.beam = empty"),
+        ("/recorded", json!(1), "unknown field `recorded`"),
+        ("/record/samples/0/hands/0/pushed", json!(1), "unknown field `pushed`"),
+        ("/record/injections/0/through", json!("wire"), "unknown field `through`"),
+    ] {
+        let mut other = whole.clone();
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        match other.pointer_mut(pointer) {
+            Some(known) => *known = value,
+            None => other.pointer_mut(parent).unwrap()[key] = value,
+        }
+        let error = read(&other.to_string()).unwrap_err().to_string();
+        assert!(error.starts_with("a.session.json: ") && error.contains(told), "{error}\n{told}");
+    }
+    // Nothing was recorded, of the beam either.
+    let empty =
+        r#"{"scene_file": "a.toml", "set": [], "record": {"samples": [], "injections": [], "beam": []}}"#;
+    assert!(read(empty).is_ok());
 }

@@ -8,7 +8,7 @@ mod beam;
 use std::path::Path;
 
 use beam::beam;
-use endowire_assess::{EndedBy, Exam, Hand, Injection, Record, Sample, Score, Site, Subject};
+use endowire_assess::{EndedBy, Exam, Hand, Injection, Outlet, Record, Sample, Score, Site, Subject};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -75,8 +75,18 @@ fn pushed(force_n: impl Fn(usize) -> f64) -> Record {
 /// The subject on the line, with a wire in a catheter and no sac.
 fn at_site(subject: Subject) -> Result<Exam, String> {
     let (tree, instruments) = (tree(), ["wire", "catheter"].map(str::to_owned));
-    let site = Site { tree: Some(&tree), instruments: &instruments, has_sac: false };
+    let site = Site { tree: Some(&tree), instruments: &instruments, ..Site::default() };
     Exam::new(subject, &site).map_err(|error| error.to_string())
+}
+
+/// An injection of 5 ml/s that leaves the catheter's tip at this length of the line.
+fn injection(time_s: f64, volume_ml: f64, at_mm: f64) -> Injection {
+    let outlet = Outlet {
+        instrument: Some("catheter".to_owned()),
+        at_mm: Vec3::new(at_mm, 0.0, 0.0),
+        tip_force_n: Some(0.0),
+    };
+    Injection { time_s, volume_ml, rate_ml_per_s: 5.0, outlet: Some(outlet) }
 }
 
 fn exam(subject: Subject) -> Exam {
@@ -111,9 +121,10 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert_eq!(end(&rough), Some((EndedBy::WallForce, 4.0)));
 
     // What is told alone need not be kept, and what was not measured is not kept.
-    let told = subject(&[("at_least = -100.0", "at_least = 100.0")]).unwrap();
+    let told = subject(&[("at_least = -100.0", "at_least = -0.5")]).unwrap();
     assert!(exam(told).score(&pushed(|_| 0.5)).verdict.passed);
-    let of_beam = subject(&[("\"total_s\"", "\"beam_on_s\"")]).unwrap();
+    let of_beam = [("\"total_s\"", "\"beam_on_s\""), ("at_most = 20.0", "at_most = 12.0")];
+    let of_beam = subject(&of_beam).unwrap();
     let unseen = exam(of_beam.clone()).score(&pushed(|_| 0.5));
     assert_eq!((unseen.verdict.passed, unseen.verdict.score), (false, 75.0));
     // It is not missed either, and the reason is told: the limit of the beam has the same.
@@ -145,27 +156,98 @@ fn limits_end_it_when_they_are_passed() {
     assert_eq!(end(&score(&slow)), Some((EndedBy::Time, 30.0)));
     slow.beam = Some(vec![beam(0.0, true), beam(4.0, false), beam(6.0, true)]);
     assert_eq!(end(&score(&slow)), Some((EndedBy::Beam, 14.0)));
-    let ml = |time_s, volume_ml| Injection { time_s, volume_ml, rate_ml_per_s: 5.0 };
+    let ml = |time_s, volume_ml| injection(time_s, volume_ml, 0.0);
     slow.injections = vec![ml(2.0, 8.0), ml(9.0, 2.0), ml(11.0, 1.0)];
     assert_eq!(end(&score(&slow)), Some((EndedBy::Contrast, 11.0)));
-    let contrast = score(&slow).metrics.iter().find(|one| one.metric.name == "contrast_ml").unwrap().clone();
-    assert_eq!(contrast.metric.value, Some(11.0));
+    let contrast = |record: &Record| {
+        let score = score(record);
+        score.metrics.iter().find(|one| one.metric.name == "contrast_ml").unwrap().metric.value.unwrap()
+    };
+    assert!((contrast(&slow) - 10.0).abs() < 1e-9);
+    // The limit is passed when medium flows beyond it, not when the injector is started.
+    slow.injections = vec![ml(1.0, 20.0)];
+    assert_eq!(end(&score(&slow)), Some((EndedBy::Contrast, 3.0)));
+    assert!((contrast(&slow) - 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_is_used_stands_still_once_it_has_ended() {
+    let mut record = pushed(|_| 0.5);
+    record.beam = Some(vec![beam(0.0, true)]);
+    let mut followed = exam(subject(&[]).unwrap());
+    assert!(followed.follow(&record).is_some());
+    let used =
+        |record: &Record| followed.standing(record).used.iter().map(|one| one.value).collect::<Vec<_>>();
+    let at_the_end = used(&record);
+    assert_eq!(at_the_end, [10.0, 10.0, 0.0, 0.5]);
+    record.samples.push(Sample { time_s: 25.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
+    record.injections.push(injection(12.0, 5.0, 97.0));
+    assert_eq!(used(&record), at_the_end);
+}
+
+#[test]
+fn a_score_of_nothing_has_no_sign() {
+    // The goal is reached, and no threshold is met.
+    let one = FILE.find("[[threshold]]").unwrap();
+    let text = format!("{}[[threshold]]\nmetric = \"hand_force_n\"\nat_most = 0.001\n", &FILE[..one]);
+    let mut record = pushed(|_| 0.5);
+    record.samples[3].hands[0].push_force_n = Some(0.5);
+    let strict = Subject::from_toml(&text, Path::new("subjects/end.toml")).unwrap();
+    let score = exam(strict).score(&record);
+    assert!(score.verdict.score == 0.0 && score.verdict.score.is_sign_positive());
+    assert_eq!(score.verdict.words(), "not passed, 0 of 100: the goal is reached after 10.00 s");
 }
 
 #[test]
 fn contrast_medium_counts_where_the_tip_is_at_its_target() {
     let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
-    let ml = |time_s, volume_ml| Injection { time_s, volume_ml, rate_ml_per_s: 5.0 };
+    let ml = |time_s, volume_ml| injection(time_s, volume_ml, 97.0);
     let mut record = pushed(|_| 0.5);
     record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
+    // The goal is reached once all of it has flowed, 4 ml at 5 ml/s.
     for (injections, expected) in [
         (vec![ml(3.0, 4.0)], None),
-        (vec![ml(12.0, 4.0)], Some((EndedBy::Goal, 12.0))),
-        (vec![ml(12.0, 3.0), ml(15.0, 1.0)], Some((EndedBy::Goal, 15.0))),
+        (vec![ml(12.0, 4.0)], Some((EndedBy::Goal, 12.8))),
+        (vec![ml(12.0, 3.0), ml(15.0, 1.0)], Some((EndedBy::Goal, 15.2))),
+        (vec![ml(19.5, 4.0)], None),
     ] {
         record.injections = injections;
         assert_eq!(end(&exam(asked.clone()).score(&record)), expected);
     }
+}
+
+#[test]
+fn contrast_medium_counts_where_it_leaves_and_not_where_the_foremost_tip_is() {
+    let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
+    let mut record = pushed(|_| 0.5);
+    record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
+    let scored = |record: &Record| {
+        let mut followed = exam(asked.clone());
+        let ended = followed.follow(record).and_then(|score| end(score));
+        (ended, followed.standing(record).injected_there_ml)
+    };
+    record.injections = vec![injection(12.0, 4.0, 96.0)];
+    assert_eq!(scored(&record), (Some((EndedBy::Goal, 12.8)), 4.0), "the twin");
+    // The wire is there, and the catheter 50 mm behind it; or all goes through the sheath.
+    record.injections = vec![injection(12.0, 4.0, 50.0)];
+    assert_eq!(scored(&record), (None, 0.0));
+    let sheath = Outlet { instrument: None, at_mm: Vec3::zeros(), tip_force_n: Some(0.0) };
+    record.injections[0].outlet = Some(sheath);
+    assert_eq!(scored(&record), (None, 0.0));
+    assert!(exam(asked.clone()).check(&record).is_ok());
+    // A record of an earlier version does not say where.
+    record.injections[0].outlet = None;
+    let error = exam(asked.clone()).check(&record).unwrap_err().to_string();
+    assert!(
+        error.contains("goal.inject_ml = 4: the record does not tell where medium was injected"),
+        "{error}"
+    );
+    // Where all instruments are solid it cannot be done.
+    let (tree, instruments) = (tree(), ["wire".to_owned()]);
+    let site = Site { tree: Some(&tree), instruments: &instruments, all_solid: true, ..Site::default() };
+    let error = Exam::new(asked, &site).unwrap_err().to_string();
+    assert!(error.contains("end.toml: goal.inject_ml = 4: no instrument has a lumen"), "{error}");
+    assert!(Exam::new(subject(&[]).unwrap(), &site).is_ok(), "nothing is injected");
 }
 
 #[test]
@@ -232,6 +314,21 @@ fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
         ("at_most = 1.0", "", "threshold[0].at_most = none: which value of wall_force_n"),
         ("at_most = 1.0", "at_most = nan", "threshold[0].at_most = NaN"),
         ("at_most = 1.0", "at_most = -1.0", "threshold[0].at_most = -1: wall_force_n is never below 0"),
+        (
+            "at_most = 20.0",
+            "at_most = 300.0",
+            "threshold[1].at_most = 300: is never missed, since limits.time_s = 30 ends the subject before",
+        ),
+        (
+            "at_most = 1.0",
+            "at_most = 2.5",
+            "threshold[0].at_most = 2.5: is never missed, since limits.wall_force_n = 2",
+        ),
+        (
+            "\"spectral_arc_length\"\nat_least = -100.0",
+            "\"arrived\"\nat_least = 2.0",
+            "threshold[2].at_least = 2: arrived is never above 1, and no session would pass",
+        ),
         ("points = 3", "points = -1.0", "threshold[0].points = -1: must be a number from 0"),
         (
             "\"total_s\"",

@@ -125,6 +125,7 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
         time_s: 2.0 + f64::from(k),
         volume_ml: 6.0 + unit(splitmix64(seed, 4)),
         rate_ml_per_s: 6.0,
+        outlet: None,
     };
     record.injections = (0..boluses).map(bolus).collect();
     record

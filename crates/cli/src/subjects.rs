@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use endowire_assess::{Exam, Score, Scored, Site, Subject, Threshold};
 use endowire_core::error::nearest_name;
 use endowire_methods::{Scene, Setting};
+use endowire_play::lumens;
+use endowire_viewer::ViewSpec;
 use serde::Serialize;
 
 use crate::cache::Cache;
@@ -67,15 +69,16 @@ pub(crate) fn settings(subject: &Subject) -> Result<Vec<Setting>, Failure> {
     parsed.collect::<Result<_, _>>().map_err(|error| Failure::from(error).at(subject.path().display()))
 }
 
-/// The exam of a subject in its scene.
-pub(crate) fn exam(subject: Subject, scene: &Scene, cache: &Cache) -> Result<Exam, Failure> {
+/// The exam of a subject in its scene, which was read from a file.
+pub(crate) fn exam(subject: Subject, (scene, path): (&Scene, &Path), cache: &Cache) -> Result<Exam, Failure> {
     let place = subject.path().display().to_string();
     let in_subject = |error: endowire_core::Error| Failure::from(error).at(&place);
     // Only a target point needs the centre line, which may have to be extracted first.
     let tree = subject.goal.target().map(|_| scene.centreline(cache)).transpose().map_err(in_subject)?;
     let stack = scene.stack().map_err(in_subject)?;
     let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
-    let site = Site { tree, instruments: &instruments, has_sac: scene.vessel.sac.is_some() };
+    let all_solid = !lumens(&stack, &ViewSpec::of_scene(scene, path)?).contains(&true);
+    let site = Site { tree, instruments: &instruments, has_sac: scene.vessel.sac.is_some(), all_solid };
     Ok(Exam::new(subject, &site)?)
 }
 

@@ -1,7 +1,7 @@
 //! Playback of a script in a session: its steps in real time, and its injections as their lines begin.
 
 use endowire_core::Result;
-use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
+use endowire_core::insertion::{Command, Injection, Move, Script, ScriptRun, Simulation};
 
 use crate::hand::Motion;
 use crate::history::Done;
@@ -30,8 +30,11 @@ pub(crate) struct Demonstration {
 /// What comes next.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Next {
-    /// Nothing in this tick.
-    Later,
+    /// Nothing more in this tick: the next step is under way.
+    Later {
+        /// Whether nothing moves in it.
+        rests: bool,
+    },
     /// The end of the script.
     End,
     /// A step.
@@ -39,6 +42,8 @@ pub(crate) enum Next {
         step: Done,
         /// Whether it is the first step of its line.
         begins: bool,
+        /// Time from its end to the end of the tick, s.
+        ago_s: f64,
     },
 }
 
@@ -61,7 +66,9 @@ impl Demonstration {
         let took_s = if step.time_s.is_some() { step.duration_s } else { usual_s(&step.moves) }.max(LEAST_S);
         let end_s = self.done_s + took_s;
         if end_s * TICKS_PER_S > self.ticks as f64 + EARLY {
-            return Ok(Next::Later);
+            let rests =
+                step.moves.iter().all(|one| one.command == Command::default()) && step.detach.is_none();
+            return Ok(Next::Later { rests });
         }
         let motions =
             step.moves.iter().map(shown).filter(|one| one.advance_mm != 0.0 || one.rotate_deg != 0.0);
@@ -71,7 +78,8 @@ impl Demonstration {
         self.done_s = end_s;
         let lines = self.run.course().motions.len();
         let begins = std::mem::replace(&mut self.lines, lines) != lines;
-        Ok(Next::Step { step, begins })
+        let ago_s = (self.ticks as f64 / TICKS_PER_S - end_s).max(0.0);
+        Ok(Next::Step { step, begins, ago_s })
     }
 
     /// Injections of lines that have begun since the last call.

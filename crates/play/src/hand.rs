@@ -32,17 +32,6 @@ impl Motion {
         let command = Command { advance_mm: self.advance_mm, rotate_rad: self.rotate_deg.to_radians() };
         Move { instrument: self.instrument, command }
     }
-
-    /// Adds it to the motions of the same tick.
-    pub(crate) fn add_to(self, motions: &mut Vec<Self>) {
-        match motions.iter_mut().find(|one| one.instrument == self.instrument) {
-            Some(one) => {
-                one.advance_mm += self.advance_mm;
-                one.rotate_deg += self.rotate_deg;
-            }
-            None => motions.push(self),
-        }
-    }
 }
 
 /// The hand on one instrument.

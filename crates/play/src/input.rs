@@ -3,6 +3,27 @@
 use endowire_viewer::{Mode, Pose};
 use serde::{Deserialize, Serialize};
 
+/// The names of all inputs, as `do` has them.
+pub const INPUTS: [&str; 17] = [
+    "select",
+    "move",
+    "nudge",
+    "stop",
+    "pedal",
+    "inject",
+    "detach",
+    "c_arm",
+    "turn_c_arm",
+    "table",
+    "zoom",
+    "collimate",
+    "turn_camera",
+    "script",
+    "undo",
+    "redo",
+    "go_to",
+];
+
 /// One input. As JSON, it is an object whose `do` names it: `{"do": "move", "instrument": "wire", "mm_per_s": 20}`.
 ///
 /// Without a name, an input applies to the selected instrument.
@@ -45,8 +66,8 @@ pub enum Input {
         /// Imaging mode while it is pressed; unchanged if absent.
         mode: Option<Mode>,
     },
-    /// Injects contrast medium at the tip of the outermost inserted instrument; of several instruments, only those
-    /// with a lumen count.
+    /// Injects contrast medium at the tip of the outermost inserted instrument with a lumen, otherwise at the mouth of
+    /// the sheath.
     Inject {
         /// Volume, ml.
         ml: f64,
@@ -58,12 +79,12 @@ pub enum Input {
         /// Name of the instrument.
         instrument: Option<String>,
     },
-    /// Turns the C-arm to these angles.
+    /// Turns the C-arm to these angles: at most 120° to the sides, 60° cranially and caudally.
     CArm {
         /// In clinical notation: "LAO 40 CRA 10".
         pose: Pose,
     },
-    /// Turns the C-arm by these angles.
+    /// Turns the C-arm by these angles, as far as it goes.
     TurnCArm {
         /// Towards LAO, degrees.
         #[serde(default)]
@@ -80,7 +101,7 @@ pub enum Input {
         /// Downwards in the picture, mm at the isocentre.
         #[serde(default)]
         down_mm: f64,
-        /// Whether the picture of the second plane is meant.
+        /// Whether the picture of the second plane is meant; refused without one.
         #[serde(default)]
         second: bool,
     },

@@ -15,6 +15,8 @@ const MAGNIFICATION: [f64; 2] = [0.5, 8.0];
 /// Largest angles of a C-arm, degrees: LAO and RAO, cranial and caudal.
 const MOST_LAO_DEG: f64 = 120.0;
 const MOST_CRA_DEG: f64 = 60.0;
+/// Longest motion of the table in one input, mm: longer than a patient.
+const MOST_TABLE_MM: f64 = 10_000.0;
 /// Smallest fraction of the field that the collimator leaves open.
 const LEAST_SHARE: f64 = 0.1;
 /// Frames per second, as in interventional fluoroscopy.
@@ -189,13 +191,12 @@ impl Lab {
         Ok(())
     }
 
-    /// Injects `ml` from `time_s` on, at `at_mm` in the vessel with this wall, or at the inlet; returns the
-    /// injection.
+    /// Injects `ml` from `time_s` on, at `at_mm` in the vessel at rest with this wall; returns the injection.
     pub(crate) fn inject(
         &mut self,
         wall: &Wall,
         (ml, ml_per_s): (f64, f64),
-        at_mm: Option<Vec3>,
+        at_mm: Vec3,
         time_s: f64,
     ) -> Result<InjectionSpec> {
         for (name, value) in [("ml", ml), ("ml_per_s", ml_per_s)] {
@@ -208,7 +209,7 @@ impl Lab {
             start_s: time_s,
             duration_s: ml / ml_per_s,
             rate_ml_per_s: ml_per_s,
-            at_mm: at_mm.map(Into::into),
+            at_mm: Some(at_mm.into()),
             at_tip: false,
         };
         self.flow_again([].into_iter(), vec![bolus.clone()])?;
@@ -238,11 +239,20 @@ impl Lab {
     }
 
     pub(crate) fn pose(&mut self, pose: Pose) -> Result<()> {
-        self.angles([pose.primary_deg(), pose.secondary_deg()])
+        let angles_deg = [pose.primary_deg(), pose.secondary_deg()];
+        for (angle_deg, most_deg) in angles_deg.into_iter().zip([MOST_LAO_DEG, MOST_CRA_DEG]) {
+            if angle_deg.abs() > most_deg {
+                let mend = format!(
+                    "is out of reach: give at most {MOST_LAO_DEG}° LAO or RAO, and {MOST_CRA_DEG}° CRA or CAU"
+                );
+                return Err(Error::parameter("pose", String::from(pose), mend));
+            }
+        }
+        self.angles(angles_deg)
     }
 
     pub(crate) fn turn_c_arm(&mut self, by_deg: [f64; 2]) -> Result<()> {
-        finite(["lao_deg", "cra_deg"], by_deg)?;
+        turns(["lao_deg", "cra_deg"], by_deg)?;
         let [lao, cra] = self.fluoro.c_arm.angles_deg();
         self.angles([lao + by_deg[0], cra + by_deg[1]])
     }
@@ -255,10 +265,16 @@ impl Lab {
 
     /// Moves the centre of the field of view over the patient, within the bounds of the vessel, along the picture of
     /// the first or the second plane.
+    ///
+    /// # Errors
+    /// A distance that is too large; the second plane where there is none.
     pub(crate) fn table(&mut self, [right_mm, down_mm]: [f64; 2], second: bool) -> Result<()> {
-        finite(["right_mm", "down_mm"], [right_mm, down_mm])?;
-        let plane = if second { self.second_deg() } else { None };
-        let angles_deg = plane.unwrap_or_else(|| self.fluoro.c_arm.angles_deg());
+        within(["right_mm", "down_mm"], [right_mm, down_mm], MOST_TABLE_MM)?;
+        let plane = if second { self.second_deg() } else { Some(self.fluoro.c_arm.angles_deg()) };
+        let Some(angles_deg) = plane else {
+            let mend = "there is one plane alone: leave it out, or give view.biplane_deg in the scene";
+            return Err(Error::parameter("second", true, mend));
+        };
         let [lao, cra] = angles_deg.map(f64::to_radians);
         let right = Vec3::new(lao.cos(), lao.sin(), 0.0);
         let detector = Vec3::new(lao.sin(), -lao.cos(), 0.0) * cra.cos() + Vec3::z() * cra.sin();
@@ -299,7 +315,7 @@ impl Lab {
     }
 
     pub(crate) fn turn_camera(&mut self, by_deg: [f64; 2]) -> Result<()> {
-        finite(["azimuth_deg", "elevation_deg"], by_deg)?;
+        turns(["azimuth_deg", "elevation_deg"], by_deg)?;
         let camera: &mut CameraSpec = &mut self.three_d.camera;
         let azimuth = camera.azimuth_deg.unwrap_or(25.0) + by_deg[0];
         camera.azimuth_deg = Some((azimuth + 180.0).rem_euclid(360.0) - 180.0);
@@ -328,9 +344,17 @@ fn collimate(spec: &mut ViewSpec, open: [f64; 2]) {
         seen_mm.filter(|_| open != [1.0; 2]).map(|seen| open.map(|share| share * seen));
 }
 
-fn finite(names: [&str; 2], values: [f64; 2]) -> Result<()> {
-    match names.into_iter().zip(values).find(|(_, value)| !(-360.0..=360.0).contains(value)) {
+/// Refuses angles of more than a turn.
+fn turns(names: [&str; 2], values_deg: [f64; 2]) -> Result<()> {
+    within(names, values_deg, 360.0)
+}
+
+/// Refuses values that are not at most `most` in either direction.
+fn within(names: [&str; 2], values: [f64; 2], most: f64) -> Result<()> {
+    match names.into_iter().zip(values).find(|(_, value)| !(-most..=most).contains(value)) {
         None => Ok(()),
-        Some((name, value)) => Err(Error::parameter(name, value, "must be a number from -360 to 360")),
+        Some((name, value)) => {
+            Err(Error::parameter(name, value, format!("must be a number from -{most} to {most}")))
+        }
     }
 }

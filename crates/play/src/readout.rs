@@ -146,7 +146,7 @@ pub struct Readout {
     pub tip_mm: Option<[f64; 3]>,
     /// Number of wall contacts.
     pub contacts: usize,
-    /// Largest wall force at one contact, N.
+    /// Sum of the magnitudes of all wall forces, N, as limited and measured of a subject.
     pub wall_force_n: f64,
     /// The cath lab.
     pub lab: LabReadout,
@@ -156,7 +156,7 @@ pub struct Readout {
     /// Progress of the subject, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<Standing>,
-    /// The last event.
+    /// The last event. It stays until another happens: `events` tells whether one has.
     pub event: Option<Event>,
     /// Number of events so far.
     pub events: usize,

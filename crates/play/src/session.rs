@@ -2,11 +2,11 @@
 
 mod exam;
 
-use endowire_assess::Exam;
+use endowire_assess::{Exam, Injection, Outlet};
 use endowire_core::insertion::{Command, DetachedCoil, InstrumentReport, Packing, Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, NoStore, Sac};
-use endowire_core::{Error, PhysicalEnd, Result, Vec3};
+use endowire_core::{Error, PhysicalEnd, Result};
 use endowire_viewer::{ContactView, FrameTime, ViewSpec};
 
 use crate::TICKS_PER_S;
@@ -15,6 +15,7 @@ use crate::hand::{Hand, Motion};
 use crate::history::{Done, History, Injected, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
+use crate::lumens::lumens;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 use crate::telemetry::Telemetry;
 
@@ -23,6 +24,11 @@ const MOST_EVENTS: usize = 1000;
 /// Limit of linear solves per tick for display ([`Session::with_ticks`]): some milliseconds for a wire in arteries.
 /// Most ticks take three or four.
 pub const TICK_SOLVES: usize = 60;
+
+/// The current packing of a sac, if there is one.
+fn packing(sac: Option<&(Sac, Option<Packing>)>) -> Option<Packing> {
+    sac.and_then(|(_, packing)| *packing)
+}
 
 /// The kind of event for an error.
 fn kind_of(error: &Error) -> EventKind {
@@ -290,21 +296,23 @@ impl Session {
         let before = self.history.steps();
         self.history.go_to(step, &mut self.simulation)?;
         self.pack();
+        self.telemetry.go_elsewhere();
         let again = self.history.inject_again(before, self.time_s());
         self.lab.flow_again(self.history.undone_injections().map(|one| &one.flow), again)
     }
 
+    /// Injects through an instrument, or through the sheath if there is none or it is not inserted. Pictures, script and
+    /// record all take the place where the medium leaves from its [`Outlet`].
     fn inject(&mut self, instrument: Option<usize>, ml: f64, ml_per_s: f64) -> Result<()> {
-        // The position of medium is a material place, in the vessel at rest.
-        let displacement = self.simulation.displacement();
-        let at_rest =
-            |tip: Vec3| displacement.as_ref().map_or(tip, |displacement| displacement.material(&tip));
-        let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one)).map(at_rest);
+        let outlet = Outlet::of(&self.simulation, instrument);
+        let instrument = instrument.filter(|_| outlet.instrument.is_some());
         let time_s = self.time_s();
-        let flow = self.lab.inject(self.simulation.lumen().wall(&NoStore)?, (ml, ml_per_s), at_mm, time_s)?;
+        let wall = self.simulation.lumen().wall(&NoStore)?;
+        let flow = self.lab.inject(wall, (ml, ml_per_s), outlet.at_mm, time_s)?;
         let after_step = self.history.steps();
         self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
-        self.telemetry.inject(time_s, ml, ml_per_s);
+        let (volume_ml, rate_ml_per_s) = (ml, ml_per_s);
+        self.telemetry.inject(Injection { time_s, volume_ml, rate_ml_per_s, outlet: Some(outlet) });
         Ok(())
     }
 
@@ -315,15 +323,18 @@ impl Session {
     /// Advances by 1/60 s. Instruments that move carry out one step; a script that is played carries out the steps
     /// that end in this tick.
     pub fn tick(&mut self) {
+        // The beam state of a tick is that at its beginning.
+        let begun_s = self.time_s();
+        self.telemetry.beam(self.lab.beam(begun_s));
         self.ticks += 1;
         self.lab.tick();
         if let Some(shown) = self.demonstration.take_if(|shown| !shown.paused) {
-            let mut motions = Vec::new();
-            self.demonstration = self.show(shown, &mut motions);
+            self.demonstration = self.show(shown);
             self.moving = false;
-            self.note(&motions);
+            self.examine();
             return;
         }
+        self.telemetry.rest_until(begun_s, (&self.simulation, packing(self.sac.as_ref())));
         let lengths_mm = self.hands_mm();
         let instruments = self.simulation.stack().instruments();
         let mut motions = Vec::new();
@@ -337,7 +348,8 @@ impl Session {
         if !motions.is_empty() {
             let step = Done { motions: motions.clone(), solves: self.solves, ..Self::resting() };
             let done = self.step(step, !self.moving);
-            self.note(if done { &motions } else { &[] });
+            self.note(self.time_s(), if done { &motions } else { &[] });
+            self.examine();
             self.moving = true;
             return;
         }
@@ -346,7 +358,8 @@ impl Session {
             self.step(Done { solves: self.solves, ..Self::resting() }, false);
         }
         self.moving = false;
-        self.note(&[]);
+        self.note(self.time_s(), &[]);
+        self.examine();
     }
 
     /// Commanded inserted length of each instrument, mm; the device may not have followed yet.
@@ -357,14 +370,9 @@ impl Session {
         lengths_mm
     }
 
-    /// Records the motions of this tick.
-    fn note(&mut self, motions: &[Motion]) {
-        let time_s = self.time_s();
-        // The beam state of a tick is that at its beginning.
-        let beam = self.lab.beam((time_s - 1.0 / TICKS_PER_S).max(0.0));
-        let packing = self.sac.as_ref().and_then(|(_, packing)| *packing);
-        self.telemetry.tick(time_s, motions, (&self.simulation, packing), beam);
-        self.examine();
+    /// Records a step that ends at `time_s`, with these motions.
+    fn note(&mut self, time_s: f64, motions: &[Motion]) {
+        self.telemetry.step(time_s, motions, (&self.simulation, packing(self.sac.as_ref())));
     }
 
     /// The record of instruments, beam and injector so far, for assessment; it includes undone steps and rests.
@@ -372,9 +380,9 @@ impl Session {
         self.telemetry.record()
     }
 
-    /// Carries out the steps of a script in this tick and adds their motions to `done`; returns the script if it
-    /// continues.
-    fn show(&mut self, mut shown: Demonstration, done: &mut Vec<Motion>) -> Option<Demonstration> {
+    /// Carries out and records the steps of a script that end in this tick; returns the script if it continues. A step
+    /// takes the time since the one before it, in which its motion is even, so that it is measured as one of a run.
+    fn show(&mut self, mut shown: Demonstration) -> Option<Demonstration> {
         shown.tick();
         loop {
             let next = shown.next(&self.simulation);
@@ -384,18 +392,23 @@ impl Session {
                 }
             }
             match next {
-                Ok(Next::Later) => return Some(shown),
+                Ok(Next::Later { rests }) => {
+                    if rests {
+                        self.note(self.time_s(), &[]);
+                    }
+                    return Some(shown);
+                }
                 Ok(Next::End) => {
                     self.happened(EventKind::Script, "the script is at its end".to_owned());
                     return None;
                 }
-                Ok(Next::Step { step, begins }) => {
+                Ok(Next::Step { step, begins, ago_s }) => {
                     let moves = !step.motions.is_empty() || step.detach.is_some();
                     let motions = step.motions.clone();
                     if (moves || moves_by_itself(&self.simulation)) && !self.step(step, begins) {
                         return None;
                     }
-                    motions.into_iter().for_each(|motion| motion.add_to(done));
+                    self.note(self.time_s() - ago_s, &motions);
                 }
                 Err(error) => {
                     self.happened(EventKind::Refused, error.to_string());
@@ -474,6 +487,12 @@ impl Session {
         self.demonstration.as_ref().is_some_and(|shown| !shown.paused)
     }
 
+    /// Whether medium is being injected.
+    pub fn is_injecting(&self) -> bool {
+        let time_s = self.time_s();
+        self.telemetry.record().injections.iter().any(|one| one.end_s() > time_s)
+    }
+
     /// Number of steps carried out, without undone ones.
     pub fn steps(&self) -> usize {
         self.history.steps()
@@ -528,7 +547,6 @@ impl Session {
     pub fn readout(&self) -> Readout {
         let report = self.simulation.report();
         let spec = self.lab.fluoro();
-        let forces = report.contacts.iter().map(|contact| contact.total_n().norm());
         Readout {
             step: self.history.steps(),
             went: self.history.went(),
@@ -538,7 +556,7 @@ impl Session {
             instruments: self.instruments(),
             tip_mm: self.simulation.shape().tip_mm().map(Into::into),
             contacts: report.contacts.len(),
-            wall_force_n: forces.fold(0.0, f64::max),
+            wall_force_n: self.simulation.wall_force().sum_n,
             lab: LabReadout {
                 live: self.lab.is_live(),
                 mode: spec.xray.mode,
@@ -551,7 +569,7 @@ impl Session {
                 beam_s: self.lab.beam_s(),
                 dose_ugy: self.lab.dose_ugy(),
             },
-            packing: self.sac.as_ref().and_then(|(_, packing)| *packing),
+            packing: packing(self.sac.as_ref()),
             subject: self.standing(),
             event: self.events.last().cloned(),
             events: self.events_in_all,
@@ -585,15 +603,8 @@ impl Session {
 
     /// The instrument through which contrast medium is injected: the outermost inserted one with a lumen.
     fn injects_through(&self) -> Option<usize> {
-        let stack = self.simulation.stack();
-        // The lumen of a single device may be given by the view alone.
-        let in_view =
-            !stack.is_several() && self.lab.fluoro().device.iter().any(|part| part.inner_radius_mm > 0.0);
-        let opens = |one: &usize| {
-            let sections = stack.instruments()[*one].device.sections();
-            in_view || sections.iter().all(|section| section.inner_radius_mm.is_some())
-        };
+        let open = lumens(self.simulation.stack(), self.lab.fluoro());
         let in_it = |one: &usize| self.simulation.tip_of_mm(*one).is_some();
-        (0..stack.instruments().len()).rev().filter(opens).find(in_it)
+        (0..open.len()).rev().filter(|one| open[*one]).find(in_it)
     }
 }

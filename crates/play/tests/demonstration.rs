@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use endowire_assess::{Group, Record, assess};
 use endowire_core::insertion::{Injection, Simulation};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
@@ -170,4 +171,66 @@ fn what_has_no_times_is_shown_as_fast_as_keys_move_and_what_is_not_there_is_refu
     assert!((24..=25).contains(&ticks) && session.steps() == 2, "{ticks}");
     let refused = self::session("script = []\n").apply(&Input::Script {}).unwrap_err().to_string();
     assert!(refused.contains("none to show"), "{refused}");
+}
+
+/// The measures of a record that need no beam, by name.
+fn measured(record: &Record) -> Vec<(&'static str, Option<f64>)> {
+    let of_beam = |name: &str| name.contains("beam") || ["runs", "frames", "c_arm_moves"].contains(&name);
+    let all =
+        assess(record, None).into_iter().filter(|one| !of_beam(one.name) && one.group != Group::Radiation);
+    all.map(|one| (one.name, one.value)).collect()
+}
+
+#[test]
+fn what_is_shown_is_measured_as_what_is_run() {
+    let mut session = session(SCRIPT);
+    session.apply(&Input::Script {}).unwrap();
+    shown(&mut session);
+    let scene = scene(SCRIPT);
+    let mut simulation = scene.simulation(&NoStore).unwrap();
+    let mut run = scene.steps(simulation.stack(), &NoStore).unwrap().into_run();
+    let (mut record, mut time_s) = (Record::default(), 0.0);
+    while let Some(step) = run.next(&simulation).unwrap().map(|step| step.into_owned()) {
+        if !step.moves.is_empty() {
+            simulation.step_together(&step.moves).unwrap();
+        }
+        run.carried_out();
+        time_s += step.duration_s;
+        record.note(time_s, &step.moves, &simulation, None);
+    }
+    for ((name, value), (_, of_run)) in measured(session.record()).into_iter().zip(measured(&record)) {
+        // The script injects; the run here has no injector.
+        if name == "contrast_ml" || name == "injections" || name == "largest_rate_ml_per_s" {
+            continue;
+        }
+        let (value, of_run) = (value.unwrap_or(-1.0), of_run.unwrap_or(-1.0));
+        assert!(
+            (value - of_run).abs() < 1e-6 * of_run.abs().max(1.0),
+            "{name}: {value}, of the run {of_run}"
+        );
+    }
+    let idle_s = measured(session.record()).iter().find(|one| one.0 == "idle_s").unwrap().1.unwrap();
+    assert!((idle_s - 0.5).abs() < 1e-6, "the rest alone: {idle_s}");
+}
+
+#[test]
+fn a_step_that_a_hand_cuts_short_was_a_rest() {
+    // One step of two seconds.
+    let slow =
+        "[[script]]\ninstrument = \"catheter\"\nadvance_mm = 4.0\nstep_mm = 4.0\nspeed_mm_per_s = 2.0\n";
+    let mut session = session(slow);
+    session.apply(&Input::Script {}).unwrap();
+    (0..60).for_each(|_| session.tick());
+    assert!(session.record().samples.is_empty(), "the step is under way");
+    push(&mut session, 30);
+    let samples = &session.record().samples;
+    assert!(
+        (samples[0].time_s - 1.0).abs() < 1e-9 && samples[0].hands[0].advance_mm == 0.0,
+        "{:?}",
+        samples[0]
+    );
+    assert!((samples[1].time_s - 61.0 / 60.0).abs() < 1e-9 && samples[1].hands[0].advance_mm > 0.0);
+    let pace =
+        measured(session.record()).iter().find(|one| one.0 == "push_speed_mm_per_s").unwrap().1.unwrap();
+    assert!((pace - 20.0).abs() < 1e-6, "{pace}");
 }

@@ -359,6 +359,115 @@ fn what_was_undone_is_done_again_with_the_same_bits_until_something_else_is_done
     assert_eq!((session.steps(), flowing(&session)), (80, all));
 }
 
+/// Where the last injection leaves: in the pictures, and in the record with the name of the instrument.
+fn leaves(session: &Session) -> (Vec3, Option<String>, Vec3) {
+    let flow = session.snapshot().lab.fluoro().injection.last().cloned().unwrap();
+    let outlet = session.record().injections.last().unwrap().outlet.clone().unwrap();
+    (flow.at_mm.unwrap().into(), outlet.instrument, outlet.at_mm)
+}
+
+#[test]
+fn pictures_and_record_know_where_medium_leaves() {
+    let (_, mut session) = session("arch_vertebral.toml");
+    let inject = Input::Inject { ml: 1.0, ml_per_s: 5.0 };
+    go(&mut session, "catheter", -100.0, 60);
+    session.apply(&inject).unwrap();
+    // Without an instrument that has a lumen it is the sheath, whose mouth is far from the root of the aorta.
+    let mouth_mm = session.simulation().sheath().position_mm;
+    assert_eq!(leaves(&session), (mouth_mm, None, mouth_mm));
+    go(&mut session, "catheter", 60.0, 60);
+    go(&mut session, "wire", 60.0, 120);
+    session.apply(&inject).unwrap();
+    let tip_mm = session.simulation().tip_of_mm(1).unwrap();
+    assert_eq!(leaves(&session), (tip_mm, Some("catheter".to_owned()), tip_mm));
+    assert!((session.simulation().shape().tip_mm().unwrap() - tip_mm).norm() > 50.0, "the wire is ahead");
+}
+
+#[test]
+fn a_tip_held_by_the_wall_is_that_which_medium_leaves() {
+    // The wire is pushed against the wall far ahead of its catheter, which lies in the lumen.
+    let (_, mut session) = session("arch_vertebral.toml");
+    let held = |session: &mut Session| {
+        session.apply(&Input::Inject { ml: 1.0, ml_per_s: 5.0 }).unwrap();
+        session.record().injections.last().unwrap().outlet.clone().unwrap().tip_force_n.unwrap()
+    };
+    let pushed = (0..400).any(|_| {
+        go(&mut session, "wire", 60.0, 1);
+        session.simulation().wall_force().tip_n > 1e-3
+    });
+    assert!(pushed && held(&mut session) < 1e-3, "{:?}", session.simulation().wall_force());
+    // The twin: the force at a tip that is the foremost one is that of the record of the steps.
+    let outlet = endowire_assess::Outlet::of(session.simulation(), Some(0));
+    assert_eq!(outlet.tip_force_n, Some(session.simulation().wall_force().tip_n));
+}
+
+#[test]
+fn a_readout_tells_the_force_on_the_wall_that_is_limited() {
+    let (_, mut session) = session("arch_innominate.toml");
+    let several = (0..600).any(|_| {
+        go(&mut session, "device", 60.0, 1);
+        session.simulation().wall_force().largest_n < 0.9 * session.simulation().wall_force().sum_n
+    });
+    assert!(several, "more than one contact");
+    let last = session.record().samples.last().unwrap().wall_force_n;
+    assert_eq!(session.readout().wall_force_n, last);
+}
+
+#[test]
+fn what_is_taken_back_is_no_motion_of_the_tip() {
+    let (_, mut session) = session("curved_tube.toml");
+    let path_mm = |session: &Session| {
+        let measured = endowire_assess::assess(session.record(), None);
+        measured.iter().find(|one| one.name == "tip_path_mm").unwrap().value.unwrap()
+    };
+    go(&mut session, "device", 60.0, 60);
+    let pushed_mm = path_mm(&session);
+    session.apply(&Input::Stop {}).unwrap();
+    session.tick();
+    go(&mut session, "device", 60.0, 60);
+    let twice_mm = path_mm(&session);
+    assert!(twice_mm > 1.5 * pushed_mm, "the twin: what hands do is");
+    session.apply(&Input::Undo {}).unwrap();
+    (0..30).for_each(|_| session.tick());
+    assert_eq!(path_mm(&session), twice_mm);
+    assert_eq!(session.record().samples.iter().filter(|sample| sample.undone).count(), 1);
+    // Where nothing is taken back, nothing is marked.
+    session.apply(&Input::GoTo { step: session.steps() }).unwrap();
+    session.tick();
+    assert_eq!(session.record().samples.iter().filter(|sample| sample.undone).count(), 1);
+}
+
+#[test]
+fn the_room_refuses_what_it_cannot_do() {
+    let (_, mut session) = session("curved_tube.toml");
+    let mut refused = |input: Input| session.apply(&input).unwrap_err().to_string();
+    let table = |right_mm: f64, second: bool| Input::Table { right_mm, down_mm: 0.0, second };
+    for (input, told) in [
+        (
+            Input::CArm { pose: "LAO 130".parse().unwrap() },
+            "pose = LAO 130: is out of reach: give at most 120°",
+        ),
+        (Input::CArm { pose: "CAU 70".parse().unwrap() }, "60° CRA or CAU"),
+        (table(1e9, false), "right_mm = 1000000000: must be a number from -10000 to 10000"),
+        (table(1.0, true), "second = true: there is one plane alone"),
+    ] {
+        let error = refused(input);
+        assert!(error.contains(told), "{error}\n{told}");
+    }
+    // A key that is held goes as far as the C-arm does.
+    (0..20).for_each(|_| session.apply(&Input::TurnCArm { lao_deg: 20.0, cra_deg: 0.0 }).unwrap());
+    assert_eq!(session.readout().lab.lao_deg, 120.0);
+    assert_eq!(session.readout().lab.cra_deg, 0.0);
+    session.apply(&table(500.0, false)).unwrap();
+}
+
+#[test]
+fn a_session_without_a_tick_knows_its_beam() {
+    let (_, session) = session("curved_tube.toml");
+    let measured = endowire_assess::assess(session.record(), None);
+    assert_eq!(measured.iter().find(|one| one.name == "beam_on_s").unwrap().value, Some(0.0));
+}
+
 #[test]
 fn hands_stop_at_the_ends_and_limits_warn() {
     let (path, scene) = scene("curved_tube.toml");
@@ -416,6 +525,7 @@ fn pictures_follow_the_pedal() {
     session.apply(&Input::TurnCamera { azimuth_deg: 40.0, elevation_deg: 0.0 }).unwrap();
     assert_ne!(pictures.three_d(&session.snapshot()).unwrap(), three_d);
     // Contrast medium is seen, and then leaves.
+    go(&mut session, "device", 60.0, 240);
     show(&mut session, &mut pictures, Input::Pedal { down: true, mode: Some(Mode::Dsa) });
     show(&mut session, &mut pictures, Input::Inject { ml: 15.0, ml_per_s: 15.0 });
     (0..60).for_each(|_| session.tick());

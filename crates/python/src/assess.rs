@@ -55,7 +55,7 @@ fn scored(path: &Path, subject: &Path, centreline: Option<&Path>) -> endowire_co
     let (subject, record) = (Subject::read(subject)?, Record::read(path)?);
     let tree = centreline.map(CentrelineTree::read).transpose()?;
     let has_sac = record.samples.iter().any(|sample| sample.packing.is_some());
-    let site = Site { tree: tree.as_ref(), instruments: &record.instruments, has_sac };
+    let site = Site { tree: tree.as_ref(), instruments: &record.instruments, has_sac, ..Site::default() };
     let exam = Exam::new(subject, &site)?;
     exam.check(&record)?;
     Ok(exam.score(&record))

@@ -97,7 +97,7 @@ function happened(now) {
   if (recent) return place({ text: now.event.text, warns: true });
   if (notice.text && performance.now() < notice.until) return place(notice);
   const sac = now.packing ? `, sac ${(100 * now.packing.density).toFixed(1)} % full` : "";
-  const contacts = `${now.contacts} contacts, at most ${newtons(now.wall_force_n)}${sac}`;
+  const contacts = `${now.contacts} contacts, ${newtons(now.wall_force_n)} in all${sac}`;
   place({ text: now.demonstrates ? "the script is shown: move to take over" : `step ${now.step}, ${contacts}`, warns: false });
 }
 

@@ -12,7 +12,7 @@ use endowire_core::vessel::{CentrelineTree, NoStore, Wall};
 use endowire_core::{Error, Result};
 use endowire_methods::Setting;
 use endowire_play::{
-    Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, TICK_SOLVES, script_head,
+    Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, TICK_SOLVES, lumens, script_head,
 };
 use endowire_report::{Frame, Recorder, Run, Series, Vessel, events};
 use endowire_viewer::{Backend, Graphics, Image, PixelFormat, Pushed, ViewSpec};
@@ -65,6 +65,7 @@ impl Played {
         let view = view(opened.view(&scene)?, &**files)?;
         let names: Vec<String> =
             simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
+        let all_solid = !lumens(simulation.stack(), &view).contains(&true);
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
         let session = Session::new(simulation, view, side_px, Limits::default())?;
@@ -75,7 +76,8 @@ impl Played {
         let Opened { scene: scene_path, settings, subject } = opened;
         if let Some(subject) = subject {
             let tree = subject.goal.target().map(|_| scene.centreline(&NoStore)).transpose()?;
-            let site = Site { tree, instruments: &names, has_sac: scene.vessel.sac.is_some() };
+            let has_sac = scene.vessel.sac.is_some();
+            let site = Site { tree, instruments: &names, has_sac, all_solid };
             session = session.with_exam(Exam::new(subject, &site)?);
         }
         let first = session.snapshot();

@@ -62,15 +62,18 @@ export interface Score extends Verdict {
   rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null; kept: string | null }[];
 }
 
-/** The record of instruments, beam and injector: one sample per tick; consecutive rests are one sample. */
+/** The record of instruments, beam and injector: one sample per tick or step of a script; consecutive rests are one sample. */
 export interface SessionRecord {
   samples: {
     time_s: number; tip_mm: [number, number, number] | null; wall_force_n: number; tip_force_n: number; jumped: boolean;
     hands: { advance_mm: number; rotate_rad: number; inserted_mm: number; push_force_n: number | null; torque_nmm: number; tip_mm?: [number, number, number] }[];
-    packing?: { density: number; outside_mm: number };
+    packing?: { density: number; outside_mm: number }; undone?: boolean;
   }[];
   instruments?: string[];
-  injections: { time_s: number; volume_ml: number; rate_ml_per_s: number }[];
+  injections: {
+    time_s: number; volume_ml: number; rate_ml_per_s: number;
+    outlet?: { instrument?: string; at_mm: [number, number, number]; tip_force_n?: number };
+  }[];
   beam: { time_s: number; on: boolean; frames_per_s: number; dose_ngy: number; field_mm2: number; primary_deg: number; secondary_deg: number }[];
 }
 

@@ -22,6 +22,8 @@ pub(crate) enum SubjectCommand {
         /// Subject file (TOML), or the name of one in assets/subjects
         #[arg(value_name = "NAME|FILE")]
         subject: PathBuf,
+        #[command(flatten)]
+        cache: CacheArgs,
         /// Print it as one JSON document on stdout
         #[arg(long)]
         json: bool,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use endowire_assess::{Goal, Limits, Subject, Threshold};
-use endowire_play::{Input, Limits as Warnings};
+use endowire_play::{Input, Limits as Warnings, Session};
 use endowire_viewer::Mode;
 use serde::Serialize;
 
@@ -13,8 +13,8 @@ use crate::cache::Cache;
 use crate::commands::play::{self, Record};
 use crate::commands::run::interrupts;
 use crate::failure::Failure;
-use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
+use crate::output::{answer, tell};
 use crate::scenes;
 use crate::subjects::{self, ScoreDocument};
 
@@ -40,6 +40,18 @@ struct Row {
     goal: String,
     /// The target point of the centre line; `None` for a sac.
     target: Option<String>,
+}
+
+impl Row {
+    fn of(subject: Subject) -> Self {
+        Self {
+            subject: subject.stem(),
+            level: subject.level,
+            goal: subject.goal.words(),
+            target: subject.goal.target().map(str::to_owned),
+            name: subject.name,
+        }
+    }
 }
 
 /// The document of `subject show`.
@@ -71,7 +83,7 @@ struct Named<'a> {
 pub(crate) fn subject(command: &SubjectCommand) -> Result<(), Failure> {
     match command {
         SubjectCommand::List { folder, json } => list(folder, *json),
-        SubjectCommand::Show { subject, json } => show(subject, *json),
+        SubjectCommand::Show { subject, cache, json } => show(subject, &Cache::new(cache), *json),
         SubjectCommand::Run(args) => run(args),
     }
 }
@@ -82,27 +94,31 @@ fn list(folder: &Path, json: bool) -> Result<(), Failure> {
         return Err(Failure::Input(format!("{}: has no subject files (.toml)", folder.display())));
     }
     let inputs = paths.iter().map(|path| read_input(path)).collect::<Result<Vec<_>, _>>()?;
-    let mut subjects = vec![];
+    let (mut subjects, mut refused) = (vec![], vec![]);
     for path in &paths {
-        let subject = Subject::read(path)?;
-        subjects.push(Row {
-            subject: subject.stem(),
-            level: subject.level,
-            goal: subject.goal.words(),
-            target: subject.goal.target().map(str::to_owned),
-            name: subject.name,
-        });
+        match Subject::read(path) {
+            Ok(subject) => subjects.push(Row::of(subject)),
+            Err(error) => refused.push(error),
+        }
     }
     subjects.sort_by_key(|row| row.level);
     let document = Listed { provenance: Provenance::new(&inputs, 0), folder: folder.to_path_buf(), subjects };
     answer(&document, json, || {
         let row = |row: &Row| format!("{}  {:<22} {}", row.level, row.subject, row.name);
         document.subjects.iter().map(row).collect::<Vec<_>>().join("\n")
-    })
+    })?;
+    // The others are listed; each that is none is told.
+    let Some(last) = refused.pop() else { return Ok(()) };
+    refused.iter().for_each(|error| tell(format_args!("endowire: {error}")));
+    Err(last.into())
 }
 
-fn show(which: &Path, json: bool) -> Result<(), Failure> {
+fn show(which: &Path, cache: &Cache, json: bool) -> Result<(), Failure> {
     let subject = subjects::read(which)?;
+    // What does not fit its scene is refused here as in `run`.
+    let path = subject.resolve(&subject.scene);
+    let scene = scenes::read(&path, &subjects::settings(&subject)?)?;
+    subjects::exam(subject.clone(), (&scene, &path), cache)?;
     let document = Shown {
         provenance: Provenance::new(&[read_input(subject.path())?], 0),
         subject: subject.stem(),
@@ -147,7 +163,7 @@ fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
     let settings = subjects::settings(&subject)?;
     let scene = scenes::with_script(&path, &settings, reference.as_deref())?;
     let cache = Cache::new(&args.cache);
-    let exam = subjects::exam(subject, &scene, &cache)?;
+    let exam = subjects::exam(subject, (&scene, &path), &cache)?;
     let (session, script) = play::open(&scene, &path, &cache, SIDE_PX, Warnings::default())?;
     let mut session = session.with_script(script).with_exam(exam);
     let begun = [Input::Pedal { down: true, mode: Some(Mode::Fluoro) }, Input::Script {}];
@@ -156,7 +172,12 @@ fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
         .try_for_each(|input| session.apply(input))
         .map_err(|error| Failure::from(error).at(&place))?;
     let interrupted = interrupts();
-    while session.demonstrates() && !interrupted.load(Ordering::Relaxed) {
+    let goes_on = |session: &Session| {
+        // A script may end with an injection, which is over once its medium has flowed.
+        let is_open = || session.standing().is_some_and(|standing| standing.verdict.is_none());
+        session.demonstrates() || session.is_injecting() && is_open()
+    };
+    while goes_on(&session) && !interrupted.load(Ordering::Relaxed) {
         session.tick();
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&stem));

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use endowire_assess::Outlet;
 use endowire_core::insertion::{Injection, ScriptRun, Simulation};
 use endowire_viewer::InjectionSpec;
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,9 @@ pub(crate) struct Injected {
     tip_x_mm: f64,
     tip_y_mm: f64,
     tip_z_mm: f64,
+    /// Sum of the wall forces at the tip; absent in recordings of earlier versions.
+    #[serde(default)]
+    tip_force_n: Option<f64>,
 }
 
 impl Injected {
@@ -53,6 +57,7 @@ impl Injected {
             tip_x_mm: tip.x,
             tip_y_mm: tip.y,
             tip_z_mm: tip.z,
+            tip_force_n: Outlet::of(simulation, Some(injection.instrument)).tip_force_n,
         }
     }
 

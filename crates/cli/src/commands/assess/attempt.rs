@@ -132,7 +132,7 @@ pub(super) fn scored(
     let path = subject.resolve(&subject.scene);
     let settings = subjects::settings(subject)?;
     let scene = scenes::read(&path, &settings)?;
-    let exam = subjects::exam(subject.clone(), &scene, &places.cache)?;
+    let exam = subjects::exam(subject.clone(), (&scene, &path), &places.cache)?;
     let provenance = Provenance::of_scene(&scene, &settings)?;
     let place = places.add(Place { path: path.clone(), set: subject.set.clone(), scene });
     let mut attempts = vec![];

@@ -145,7 +145,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     }
     let lab = &readout.lab;
     let beam = format!(
-        "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {} (most {})",
+        "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {}, {} in all",
         (lab.beam_s / 60.0).floor(),
         lab.beam_s % 60.0,
         lab.dose_ugy,
@@ -187,7 +187,7 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
         format!("{mark} {:<12} {:>7.1} mm in  {:>8.0}°", one.name, one.inserted_mm, one.rotation_deg);
     let x = writer.write(canvas, [12, y], 16, colour, &length);
     let push = one.push_force_n.map_or_else(|| "--".to_owned(), force);
-    let force = format!("  push {push:>9}  torque {:>7.3} N·mm", one.torque_nmm);
+    let force = format!("  push {push:>9}  torque {:>7} N·mm", signed(format!("{:.3}", one.torque_nmm)));
     let colour = if one.warns { WARN } else { TEXT };
     let x = writer.write(canvas, [x, y], 16, colour, &force);
     let x = if one.warns { writer.write(canvas, [x + 20, y], 16, WARN, "LIMIT") } else { x };
@@ -201,9 +201,13 @@ fn force(newtons: f64) -> String {
     if newtons.abs() >= 0.1 {
         return format!("{newtons:.3} N");
     }
-    let text = format!("{:.1} mN", 1000.0 * newtons);
-    // Rounding must not leave a minus sign before zero.
-    if text == "-0.0 mN" { "0.0 mN".to_owned() } else { text }
+    format!("{} mN", signed(format!("{:.1}", 1000.0 * newtons)))
+}
+
+/// A rounded number without a minus sign before zero.
+fn signed(number: String) -> String {
+    let is_zero = !number.contains(|c: char| ('1'..='9').contains(&c));
+    number.strip_prefix('-').filter(|_| is_zero).map(str::to_owned).unwrap_or(number)
 }
 
 fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help]) {
@@ -296,5 +300,13 @@ mod tests {
         assert_eq!(canvas.pixels.iter().filter(|pixel| **pixel != 0).count(), 25);
         let end = writer.write(&mut canvas, [2, 8], 15, 0xff_0000, "wire 12.5 mm");
         assert!(end > 50 && canvas.pixels.iter().any(|pixel| pixel & 0xff_0000 != 0));
+    }
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(signed("-0.000".to_owned()), "0.000");
+        assert_eq!(signed("-0.001".to_owned()), "-0.001");
+        assert_eq!(signed("0.000".to_owned()), "0.000");
+        assert_eq!((force(-1e-9).as_str(), force(-0.25).as_str()), ("0.0 mN", "-0.250 N"));
     }
 }
