@@ -91,7 +91,7 @@ fn what_cannot_be_assessed_is_refused_by_name() {
     let empty = folder.path().join("empty");
     std::fs::create_dir(&empty).unwrap();
     for (args, named) in [
-        (vec![text(&empty)], "steps.csv"),
+        (vec![text(&empty)], "empty: holds neither a run (steps.csv) nor sessions (*.session.json): give"),
         // A folder that holds sessions stands for them.
         (vec![text(folder.path())], "nothing.session.json"),
         (vec![text(&nothing)], "nothing.session.json"),

@@ -110,6 +110,25 @@ fn a_session_begins_where_a_script_ends_or_watches_it() {
 }
 
 #[test]
+fn a_record_is_a_script_and_a_scene_is_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = folder.path().join("monday.session.json");
+    std::fs::write(&session, "{}").unwrap();
+    let output = play("curved_tube.toml", &session, &["--headless"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said.contains("monday.session.json: must end in .toml"), "{said}");
+    assert_eq!(std::fs::read_to_string(&session).unwrap(), "{}", "it is left as it was");
+    let output = endowire().args(["play", "nothing.toml", "--headless"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said.contains("nothing.toml: there is no such file: give a scene") && said.lines().count() == 1,
+        "{said}"
+    );
+}
+
+#[test]
 fn a_script_file_has_scripts_alone() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("script.toml");

@@ -235,6 +235,74 @@ fn who_pushes_on_in_a_wrong_branch_is_stopped() {
     assert_eq!(metric(&score, "wall_force_n")["passed"], json!(false));
 }
 
+/// A subject in a shipped scene, in a file of its own.
+fn own_subject(folder: &Path, text: &str) -> PathBuf {
+    let file = folder.join("own.toml");
+    let scenes = assets().join("scenes").display().to_string();
+    let head = "name = \"a\"\nlevel = 1\ntext = \"b\"\n";
+    std::fs::write(&file, format!("{head}{}", text.replace("SCENES", &scenes))).unwrap();
+    file
+}
+
+#[test]
+fn medium_counts_at_the_tip_that_it_leaves_and_once_it_has_flowed() {
+    let folder = tempfile::tempdir().unwrap();
+    // The wire is at the target, and its catheter behind it in the aorta.
+    let reference = folder.path().join("ahead.toml");
+    let script = "[[script]]\ninstrument = \"wire\"\nadvance_mm = 60.0\nstep_mm = 2.0\n\
+        with = [{ instrument = \"catheter\", advance_mm = 60.0, step_mm = 2.0 }]\n\
+        [[script]]\ninstrument = \"wire\"\nadvance_mm = 180.0\nstep_mm = 2.0\n\
+        until = { tip_within_mm = 10, target = \"left subclavian\" }\n\
+        [[script]]\ninject = { ml = 6, ml_per_s = 6, through = \"catheter\" }\n";
+    let subject = |inject: &str| {
+        own_subject(
+            folder.path(),
+            &format!(
+                "scene = \"SCENES/arch_vertebral.toml\"\n\
+                 set = [\"vessel.centreline=../vessels/aortic_arch.csv\"]\nreference = \"ahead.toml\"\n\
+                 [goal]\ntarget = \"left subclavian\"\ntip_within_mm = 12.0\n{inject}"
+            ),
+        )
+    };
+    let run = |subject: &Path| {
+        let out = folder.path().join("out");
+        endowire().args(["subject", "run", text(subject), "--json", "--out", text(&out)]).output().unwrap()
+    };
+    std::fs::write(&reference, script).unwrap();
+    assert!(run(&subject("")).status.success(), "the twin: the wire is there");
+    let output = run(&subject("inject_ml = 5.0\n"));
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let score: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&score["passed"], &score["ended"]), (&json!(false), &Value::Null));
+    // The medium was waited for, though the script ends with it.
+    assert!((metric(&score, "contrast_ml")["value"].as_f64().unwrap() - 6.0).abs() < 1e-6, "{score}");
+}
+
+#[test]
+fn what_does_not_fit_its_scene_is_refused_when_it_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let carotid = "scene = \"SCENES/arch_carotid.toml\"\n";
+    let goal = "[goal]\ntarget = \"left carotid\"\ntip_within_mm = 10.0\n";
+    for (content, told) in [
+        (format!("{carotid}{}", goal.replace("left carotid", "left carotis")), "goal.target"),
+        (format!("{carotid}{goal}instrument = \"catheter\"\n"), "goal.instrument"),
+        (format!("{carotid}set = [\"vessel.wall.frictoin=0.1\"]\n{goal}"), "frictoin"),
+        (format!("{carotid}{goal}inject_ml = 5.0\n"), "goal.inject_ml = 5: no instrument has a lumen"),
+    ] {
+        let file = own_subject(folder.path(), &content);
+        let output = endowire().args(["subject", "show", text(&file)]).output().unwrap();
+        assert!(output.status.code() == Some(2) && said(&output).contains(told), "{told}: {}", said(&output));
+    }
+    let file = own_subject(folder.path(), &format!("{carotid}{goal}"));
+    assert!(endowire().args(["subject", "show", text(&file)]).output().unwrap().status.success(), "the twin");
+    // One that cannot be read leaves the others in the list.
+    std::fs::write(folder.path().join("bad.toml"), "level = 9\n").unwrap();
+    let output = endowire().args(["subject", "list", text(folder.path())]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("own"), "{output:?}");
+    assert!(said(&output).contains("bad.toml: "), "{}", said(&output));
+}
+
 #[test]
 fn what_is_no_subject_or_does_not_belong_to_it_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();

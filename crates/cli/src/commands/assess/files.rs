@@ -13,10 +13,17 @@ const ENDING: &str = ".session.json";
 pub(super) fn of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut all = vec![];
     for path in named {
-        let within = if path.is_dir() && !path.join(STEPS).exists() { sessions_in(path)? } else { vec![] };
-        if within.is_empty() {
-            // The reader reports anything else as an error.
+        if !path.is_dir() || path.join(STEPS).exists() {
+            // The reader reports what is wrong with it.
             all.push(path.clone());
+            continue;
+        }
+        let within = sessions_in(path)?;
+        if within.is_empty() {
+            return Err(Failure::Input(format!(
+                "{}: holds neither a run ({STEPS}) nor sessions (*{ENDING}): give the folder of endowire run, or a session of endowire play",
+                path.display()
+            )));
         }
         all.extend(within);
     }

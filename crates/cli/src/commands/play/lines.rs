@@ -4,7 +4,8 @@ use std::io::{self, BufRead, Read};
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 
-use endowire_play::{Input, Readout};
+use endowire_core::error::nearest_name;
+use endowire_play::{INPUTS, Input, Readout};
 use serde::{Deserialize, Serialize};
 
 use super::live::Message;
@@ -31,6 +32,9 @@ pub(crate) enum Order {
     Quit {},
 }
 
+/// Their names, as `do` has them.
+const ORDERS: [&str; 4] = ["wait", "picture", "read", "quit"];
+
 /// A line of the protocol.
 #[derive(Debug)]
 pub(crate) enum Line {
@@ -46,11 +50,29 @@ fn parse(text: &str) -> Result<Line, String> {
         name: String,
     }
     let Name { name } = serde_json::from_str(text).map_err(|e| format!("no command: {e}"))?;
-    match name.as_str() {
-        "read" | "wait" | "picture" | "quit" => serde_json::from_str(text).map(Line::Order),
-        _ => serde_json::from_str(text).map(Line::Input),
+    let wrong = |e: serde_json::Error| format!("{name}: {e}");
+    if ORDERS.contains(&name.as_str()) {
+        let order = serde_json::from_str(text).map_err(wrong)?;
+        return checked(order).map(Line::Order);
     }
-    .map_err(|e| format!("{name}: {e}"))
+    if INPUTS.contains(&name.as_str()) {
+        return serde_json::from_str(text).map(Line::Input).map_err(wrong);
+    }
+    let all: Vec<&str> = INPUTS.into_iter().chain(ORDERS).collect();
+    let nearest = nearest_name(all.iter().copied(), &name).unwrap_or_default();
+    Err(format!("{name}: is no command: did you mean {nearest:?}? There are {}", all.join(", ")))
+}
+
+/// Refuses a picture in a file that would not say what it is.
+fn checked(order: Order) -> Result<Order, String> {
+    match &order {
+        Order::Picture { file, .. }
+            if !file.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) =>
+        {
+            Err(format!("picture: file = {:?}: must end in .png", file.display().to_string()))
+        }
+        _ => Ok(order),
+    }
 }
 
 /// The answer to a line.
@@ -109,4 +131,31 @@ fn next_line(from: &mut impl BufRead) -> io::Result<Option<Result<String, String
 
 pub(crate) fn to_stdout(line: &str) -> bool {
     print(line).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_command_is_told_all_that_there_are() {
+        let told = parse("{\"do\": \"weit\"}").unwrap_err();
+        assert!(told.starts_with("weit: is no command: did you mean \"wait\"?"), "{told}");
+        for name in INPUTS.into_iter().chain(ORDERS) {
+            assert!(told.contains(name), "{name}");
+            // Each is known, whatever keys it needs.
+            let told = parse(&format!("{{\"do\": \"{name}\"}}")).err().unwrap_or_default();
+            assert!(!told.contains("unknown variant") && !told.contains("no command"), "{told}");
+        }
+        // Those of a session are all of them.
+        let told = serde_json::from_str::<Input>("{\"do\": \"x\"}").unwrap_err().to_string();
+        assert_eq!(told.matches('`').count() / 2, INPUTS.len() + 1, "{told}");
+    }
+
+    #[test]
+    fn a_picture_is_a_png() {
+        let picture = |file: &str| parse(&format!("{{\"do\": \"picture\", \"file\": \"{file}\"}}"));
+        assert!(picture("a.png").is_ok() && picture("a.PNG").is_ok());
+        assert_eq!(picture("a.jpg").unwrap_err(), "picture: file = \"a.jpg\": must end in .png");
+    }
 }

@@ -48,6 +48,19 @@ struct Document<'a> {
 
 /// Opens a session in the requested mode, and records it.
 pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
+    if let Some(record) = args.record.as_ref().filter(|file| file.extension().is_none_or(|end| end != "toml"))
+    {
+        return Err(Failure::Input(format!(
+            "--record {}: must end in .toml: it is a script, and the session is written beside it as .session.json",
+            record.display()
+        )));
+    }
+    if args.scene.extension().is_some() && !args.scene.exists() {
+        return Err(Failure::Input(format!(
+            "{}: there is no such file: give a scene, as of assets/scenes, or a subject, as endowire subject list has them",
+            args.scene.display()
+        )));
+    }
     match subjects::if_meant(&args.scene)? {
         Some(subject) => play_in(&in_subject(args, &subject)?, Some(subject)),
         None => play_in(args, None),
@@ -88,7 +101,7 @@ fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
         args.record.clone().unwrap_or_else(|| Path::new("out").join(&scene.name).join("played.toml"));
     let mut record = Record::new(record, &args.scene, &args.set.set);
     if let Some(subject) = subject {
-        session = session.with_exam(subjects::exam(subject, &scene, &cache)?);
+        session = session.with_exam(subjects::exam(subject, (&scene, &args.scene), &cache)?);
         record = record.scored(Provenance::of_scene(&scene, &args.set.set)?);
     }
     let session = begun(session, args).map_err(in_scene)?;
