@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{EnergyDensity, Field, MaterialPoint, at_most};
+use super::{EnergyDensity, Field, FieldSpec, MaterialPoint, at_most};
 use crate::device::LENGTH_LIMIT_MM;
 use crate::error::in_range;
 use crate::{Error, Result, Vec3};
@@ -14,6 +14,8 @@ use crate::{Error, Result, Vec3};
 pub struct Magnet {
     instrument: usize,
     from_tip_mm: (f64, f64),
+    moment_am2: f64,
+    field_t: Vec3,
     /// −(m/l) B, mJ/mm.
     by_tangent: Vec3,
 }
@@ -40,7 +42,7 @@ impl Magnet {
         at_most("magnet.moment_am2", moment_am2.abs(), MOMENT_LIMIT_AM2)?;
         at_most("magnet.field_t", field_t.norm(), FIELD_LIMIT_T)?;
         let by_tangent = field_t * (-MJ * moment_am2 / (end - start));
-        Ok(Self { instrument, from_tip_mm: (start, end), by_tangent })
+        Ok(Self { instrument, from_tip_mm: (start, end), moment_am2, field_t, by_tangent })
     }
 }
 
@@ -52,5 +54,10 @@ impl Field for Magnet {
     fn density(&self, point: &MaterialPoint) -> EnergyDensity {
         let value = self.by_tangent.dot(&point.tangent);
         EnergyDensity { value, by_tangent: self.by_tangent, ..EnergyDensity::default() }
+    }
+
+    fn spec(&self) -> Option<FieldSpec> {
+        let Self { instrument, from_tip_mm: (start_mm, end_mm), moment_am2, field_t, .. } = *self;
+        Some(FieldSpec::Magnet { instrument, start_mm, end_mm, moment_am2, field_t: field_t.into() })
     }
 }

@@ -80,6 +80,11 @@ pub trait Field: Debug + Send + Sync {
 
     /// Energy per length of a point.
     fn density(&self, point: &MaterialPoint) -> EnergyDensity;
+
+    /// Its numbers, from which it can be made again, if it is one of those that scenes name.
+    fn spec(&self) -> Option<FieldSpec> {
+        None
+    }
 }
 
 /// Checks that a size is a number from 0 to a limit.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Field, Magnet, Weight};
-use crate::{Result, Vec3};
+use crate::device::{LENGTH_SLACK_MM, Stack};
+use crate::{Error, Result, Vec3};
 
 /// One of the fields that are there, by its numbers: `[[field]]` of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,7 +20,7 @@ pub enum FieldSpec {
         /// Where the magnet begins, from the tip, mm.
         #[serde(default)]
         start_mm: f64,
-        /// Where it ends, from the tip, mm.
+        /// Where it ends, from the tip, mm; within the instrument.
         end_mm: f64,
         /// Its dipole moment towards the tip, A·m².
         moment_am2: f64,
@@ -50,5 +51,24 @@ impl FieldSpec {
                 Arc::new(Weight::new(instrument, Vec3::from(force_n_per_mm))?)
             }
         })
+    }
+
+    /// Checks that it acts on one of these instruments, and within its length. `name` is its own in errors.
+    ///
+    /// # Errors
+    /// An instrument that is not there; a magnet that ends beyond its instrument.
+    pub fn check(&self, name: &str, stack: &Stack) -> Result<()> {
+        let (Self::Magnet { instrument, .. } | Self::Weight { instrument, .. }) = *self;
+        let Some(held) = stack.instruments().get(instrument) else {
+            let mend = format!("there are {}, the innermost is 0", stack.instruments().len());
+            return Err(Error::parameter(format!("{name}.instrument"), instrument, mend));
+        };
+        match *self {
+            Self::Magnet { end_mm, .. } if end_mm > held.device.length_mm() + LENGTH_SLACK_MM => {
+                let mend = format!("must be within the instrument, {} mm", held.device.length_mm());
+                Err(Error::parameter(format!("{name}.end_mm"), end_mm, mend))
+            }
+            _ => Ok(()),
+        }
     }
 }

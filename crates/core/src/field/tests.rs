@@ -251,3 +251,34 @@ fn what_cannot_be_a_magnet_or_a_weight_is_refused() {
         Weight::new(0, Vec3::x() * f64::INFINITY).unwrap_err().to_string().contains("weight.force_n_per_mm")
     );
 }
+
+#[test]
+fn fields_are_made_again_from_their_numbers() {
+    let mut wire = simulation(Device::uniform(100.0, 0.3, STIFFNESS).unwrap(), 2.0);
+    let fields = || {
+        let magnet = Magnet::new(0, 0.5..MAGNET_MM, 4.3e-3, Vec3::new(0.01, 0.02, -0.03)).unwrap();
+        let weight = Weight::new(0, Vec3::new(0.0, 1e-6, -1e-5)).unwrap();
+        [Arc::new(magnet) as Arc<dyn Field>, Arc::new(weight)]
+    };
+    wire.set_fields(fields()).unwrap();
+    let [before, now] = wire.fields();
+    assert!(before.is_empty() && now.len() == 2);
+    let again: Vec<_> = now.iter().map(|field| field.spec().unwrap().field().unwrap()).collect();
+    assert_eq!(format!("{again:?}"), format!("{now:?}"));
+    wire.step(Command::advance(10.0)).unwrap();
+    assert_eq!(wire.fields().map(<[_]>::len), [2, 2]);
+    assert!(Curved.spec().is_none());
+}
+
+#[test]
+fn a_field_beyond_the_instruments_is_refused_by_key() {
+    let mut wire = simulation(Device::uniform(100.0, 0.3, STIFFNESS).unwrap(), 2.0);
+    let refused =
+        |wire: &mut Simulation, field: Arc<dyn Field>| wire.set_fields([field]).unwrap_err().to_string();
+    let long = refused(&mut wire, Arc::new(Magnet::new(0, 0.0..100.1, 4.3e-3, Vec3::x()).unwrap()));
+    assert_eq!(long, "field[0].end_mm = 100.1: must be within the instrument, 100 mm");
+    let other = refused(&mut wire, Arc::new(Weight::new(3, -Vec3::x() * 1e-5).unwrap()));
+    assert_eq!(other, "field[0].instrument = 3: there are 1, the innermost is 0");
+    wire.set_fields([Arc::new(Magnet::new(0, 0.0..100.0, 4.3e-3, Vec3::x()).unwrap()) as Arc<dyn Field>])
+        .unwrap();
+}

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{EnergyDensity, Field, MaterialPoint, at_most};
+use super::{EnergyDensity, Field, FieldSpec, MaterialPoint, at_most};
 use crate::{Result, Vec3};
 
 /// A dead force per length of all of an instrument: its weight in blood.
@@ -36,5 +36,10 @@ impl Field for Weight {
     fn density(&self, point: &MaterialPoint) -> EnergyDensity {
         let value = -self.force_n_per_mm.dot(&point.position_mm);
         EnergyDensity { value, by_position: -self.force_n_per_mm, ..EnergyDensity::default() }
+    }
+
+    fn spec(&self) -> Option<FieldSpec> {
+        let force_n_per_mm = self.force_n_per_mm.into();
+        Some(FieldSpec::Weight { instrument: self.instrument, force_n_per_mm })
     }
 }

@@ -198,21 +198,35 @@ impl Simulation {
     /// and detached coils do not feel fields. A [`State`] contains none: a restored simulation keeps its own.
     ///
     /// # Errors
-    /// A method that supports no fields; a field that acts on none of the instruments.
+    /// A method that supports no fields; a field that acts on none of the instruments; a magnet that ends beyond its
+    /// instrument.
     pub fn set_fields(&mut self, fields: impl IntoIterator<Item = Arc<dyn Field>>) -> Result<()> {
         let fields: Fields = fields.into_iter().collect();
         if !fields.is_empty() && !self.method.takes_fields() {
             let mend = "this method knows no fields: use kirchhoff";
             return Err(Error::parameter("fields", fields.len(), mend));
         }
-        let instruments = self.scene.stack.instruments().len();
-        let acts = |field: &Arc<dyn Field>| (0..instruments).any(|index| !field.acts_on(index).is_empty());
-        if let Some(index) = fields.iter().position(|field| !acts(field)) {
-            let mend = format!("acts on none of the {instruments} instruments: the innermost is 0");
-            return Err(Error::parameter(format!("field[{index}]"), format!("{:?}", fields[index]), mend));
-        }
+        fields.iter().enumerate().try_for_each(|(index, field)| self.check_field(index, &**field))?;
         self.fields = fields;
         Ok(())
+    }
+
+    fn check_field(&self, index: usize, field: &dyn Field) -> Result<()> {
+        let name = format!("field[{index}]");
+        if let Some(spec) = field.spec() {
+            return spec.check(&name, &self.scene.stack);
+        }
+        let instruments = self.scene.stack.instruments().len();
+        if (0..instruments).any(|instrument| !field.acts_on(instrument).is_empty()) {
+            return Ok(());
+        }
+        let mend = format!("acts on none of the {instruments} instruments: the innermost is 0");
+        Err(Error::parameter(name, format!("{field:?}"), mend))
+    }
+
+    /// The fields in which the device was when it last came to rest, and those to which the next step leads.
+    pub fn fields(&self) -> [&[Arc<dyn Field>]; 2] {
+        [&self.fields_before, &self.fields]
     }
 
     /// Ends long steps of this simulation and its later clones with [`Error::Stopped`] once `stop` returns true. It is called between the sub-steps of a
