@@ -67,6 +67,7 @@ impl Secondary {
     /// # Errors
     /// Values out of range, by key; a shape with a radius below the part's own; one with too many arcs.
     pub(super) fn arcs(&self, place: &str, length_mm: f64, radius_mm: f64) -> Result<Vec<Arc>> {
+        let part = place;
         let place = format!("{place}.secondary");
         let arcs = match self {
             Self::Helix { diameter_mm, pitch_mm } => {
@@ -95,7 +96,14 @@ impl Secondary {
                     }
                 }
                 check_count(&place, length_mm / (ball_mm * CAGE_STEP))?;
-                curve(&place, &cage(length_mm, ball_mm, tilt_deg.to_radians(), turn_deg / 360.0))?
+                let points_mm = cage(length_mm, ball_mm, tilt_deg.to_radians(), turn_deg / 360.0);
+                if points_mm.len() < 3 {
+                    let mend = format!(
+                        "is too short for loops of {diameter_mm} mm: make the part longer or its shape narrower"
+                    );
+                    return Err(Error::parameter(format!("{part}.length_mm"), length_mm, mend));
+                }
+                curve(&place, &points_mm)?
             }
             Self::Curve { points_mm } => curve(&place, points_mm)?,
         };
@@ -288,6 +296,8 @@ mod tests {
         assert!(refused(complex(2.0, -1.0, 90.0)).contains("tilt_deg = -1"));
         assert!(refused(complex(2.0, 60.0, 200.0)).contains("turn_deg = 200"));
         assert!(refused(complex(0.5, 60.0, 40.0)).contains("arcs"));
+        let short = complex(4.0, 60.0, 40.0).arcs("part \"a\"", 1e-5, 0.15).unwrap_err().to_string();
+        assert!(short.contains("\"a\".length_mm = 0.00001: is too short for loops of 4 mm"), "{short}");
         assert!(refused(Secondary::Curve { points_mm: vec![[0.0; 3]; 2] }).contains("2 points"));
         assert!(refused(Secondary::Curve { points_mm: vec![[0.0; 3]; 3] }).contains("two places"));
         let back = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.1, 0.0]];

@@ -15,6 +15,7 @@ use serde::Deserialize;
 
 use super::part::{INCH_MM, MODULUS_LIMIT_MPA};
 use super::quantity::{Ends, Way, one_of, second_moment_mm4};
+use super::{LEAST_STIFFNESS_NMM2, RADIUS_LIMIT_MM, STIFFNESS_LIMIT_NMM2};
 use crate::{Error, Result};
 
 /// A `winding` table of the file.
@@ -53,7 +54,7 @@ impl Winding {
             Way { key: "wire_diameter_inch", given: given(self.wire_diameter_inch), factor: INCH_MM },
         ];
         let thinnest_mm = outer_mm.0[0].min(outer_mm.0[1]);
-        let Some(wire) = one_of(&place, ways, f64::MAX)? else {
+        let Some(wire) = one_of(&place, ways, 2.0 * RADIUS_LIMIT_MM)? else {
             let name = format!("{place}.wire_diameter_mm");
             return Err(Error::parameter(name, "absent", "give wire_diameter_mm or wire_diameter_inch"));
         };
@@ -78,6 +79,13 @@ impl Winding {
             |radius_mm: f64| pitch_mm * stiffness_nmm2 / (std::f64::consts::PI * (2.0 * radius_mm - wire_mm));
         let torsion_nmm2 = Ends(outer_mm.0.map(torsion));
         let bending_nmm2 = Ends(torsion_nmm2.0.map(|gj| 2.0 * gj / (2.0 + self.poisson_ratio)));
+        let range = LEAST_STIFFNESS_NMM2..=STIFFNESS_LIMIT_NMM2;
+        if let Some(found) = bending_nmm2.0.iter().find(|found| !range.contains(found)) {
+            let mend = format!(
+                "gives a bending stiffness of {found:.1e} N·mm², and must give one of {LEAST_STIFFNESS_NMM2} to {STIFFNESS_LIMIT_NMM2}: take another wire, modulus or pitch"
+            );
+            return Err(Error::parameter(format!("{place}.{}", wire.key), wire.given, mend));
+        }
         Ok(Wound { bending_nmm2, torsion_nmm2 })
     }
 }
@@ -138,5 +146,10 @@ mod tests {
         assert!(refused(Winding { poisson_ratio: 0.6, ..platinum(0.001) }).contains("poisson_ratio = 0.6"));
         assert!(refused(Winding { modulus_gpa: f64::NAN, ..platinum(0.001) }).contains("modulus_gpa"));
         assert!(refused(Winding { pitch_mm: Some(0.01), ..platinum(0.001) }).contains("pitch_mm = 0.01"));
+        // A limit that can be read, and the key that makes it too soft.
+        let endless = refused(Winding { wire_diameter_inch: Some(f64::INFINITY), ..platinum(0.001) });
+        assert!(endless.contains("wire_diameter_inch = inf") && endless.len() < 120, "{endless}");
+        let soft = refused(platinum(1e-4));
+        assert!(soft.contains("winding.wire_diameter_inch = 0.0001: gives a bending stiffness of"), "{soft}");
     }
 }
