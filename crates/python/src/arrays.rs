@@ -9,9 +9,9 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyFloat, PyInt, PyList, PySequence, PyString, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PySequence, PyString, PyTuple};
 
 use crate::error::refuse;
 
@@ -41,9 +41,11 @@ pub(crate) fn points<'py>(
 /// copied.
 const MOST_NUMBERS: usize = 100_000_000;
 /// Largest number of items of any other sequence, including nested ones. `range(10**12)` needs no memory either.
-const MOST_ITEMS: usize = 10_000_000;
+pub(crate) const MOST_ITEMS: usize = 10_000_000;
+/// Lengths may be below 0 by rounding, mm.
+const ROUNDING_MM: f64 = 1e-6;
 /// Deepest nesting of sequences; numpy has no more dimensions.
-const DEEPEST: usize = 64;
+pub(crate) const DEEPEST: usize = 64;
 
 /// Numbers of anything array-like, of any shape, so that errors about the shape can name the argument.
 pub(crate) struct Numbers<'py>(PyArrayLikeDyn<'py, f64, AllowTypeChange>);
@@ -93,7 +95,7 @@ fn count(object: &Bound<'_, PyAny>, left: &mut usize, depth: usize) -> PyResult<
     Ok(())
 }
 
-fn too_many(what: &str, items: usize, most: usize) -> PyErr {
+pub(crate) fn too_many(what: &str, items: usize, most: usize) -> PyErr {
     refuse(what, format!("{items} items and more"), &format!("at most {most} are taken at once"))
 }
 
@@ -118,17 +120,42 @@ impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for List<T> {
     }
 }
 
-/// The numbers of a one-dimensional array; all must be finite.
-pub(crate) fn numbers(name: &str, list: &Numbers<'_>) -> PyResult<Vec<f64>> {
+/// Arc lengths from the tip: the numbers of a one-dimensional array.
+pub(crate) fn lengths_mm(name: &str, list: &Numbers<'_>) -> PyResult<Vec<f64>> {
     let view = list.as_array();
     if view.ndim() != 1 {
         return Err(misshapen(name, view.shape(), "must have the shape (n,)"));
     }
-    let finite = |(index, number): (usize, &f64)| match number.is_finite() {
-        true => Ok(*number),
-        false => Err(refuse(&format!("{name}[{index}]"), number, "must be a finite number")),
+    let length = |(index, length_mm): (usize, &f64)| match length_mm.is_finite() && *length_mm >= -ROUNDING_MM
+    {
+        true => Ok(length_mm.max(0.0)),
+        false => Err(refuse(&format!("{name}[{index}]"), length_mm, "must be a finite number of 0 or more")),
     };
-    view.iter().enumerate().map(finite).collect()
+    view.iter().enumerate().map(length).collect()
+}
+
+/// A place or a direction: three finite numbers.
+pub(crate) fn place(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
+    let wanted = "must have the shape (3,): x, y and z";
+    let Ok(numbers) = object.extract::<Numbers<'_>>() else {
+        return Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", object.repr()?)));
+    };
+    let view = numbers.as_array();
+    match view.iter().copied().collect::<Vec<f64>>()[..] {
+        [x, y, z] if view.ndim() == 1 => {
+            finite(name, [x, y, z])?;
+            Ok([x, y, z])
+        }
+        _ => Err(misshapen(name, view.shape(), wanted)),
+    }
+}
+
+/// Refuses rows with numbers that are not finite.
+pub(crate) fn finite<const N: usize>(name: &str, row: [f64; N]) -> PyResult<()> {
+    match row.iter().all(|number| number.is_finite()) {
+        true => Ok(()),
+        false => Err(refuse(name, format!("{row:?}"), "every number must be finite")),
+    }
 }
 
 /// The rows of a table with `N` columns.
@@ -140,13 +167,34 @@ pub(crate) fn rows<const N: usize>(name: &str, table: &Numbers<'_>) -> PyResult<
     Ok(view.rows().into_iter().map(|row| std::array::from_fn(|k| row[k])).collect())
 }
 
+/// The same, and `default` if absent.
+pub(crate) fn natural_or<T: TryFrom<i64>>(
+    name: &str,
+    object: Option<&Bound<'_, PyAny>>,
+    default: T,
+) -> PyResult<T> {
+    object.map_or(Ok(default), |object| natural(name, object))
+}
+
 /// The error for an array of the wrong shape.
 pub(crate) fn misshapen(name: &str, shape: &[usize], mend: &str) -> PyErr {
     refuse(name, format!("an array of shape {shape:?}"), mend)
 }
 
-/// A count or an index, 0 or more. It is taken as a signed integer, so that the error about a negative one names the
+/// A count or an index, 0 or more. It is taken as any object, so that the error about one that is none names the
 /// argument.
-pub(crate) fn natural<T: TryFrom<i64>>(name: &str, number: i64) -> PyResult<T> {
+pub(crate) fn natural<T: TryFrom<i64>>(name: &str, object: &Bound<'_, PyAny>) -> PyResult<T> {
+    let number = match object.extract::<i64>() {
+        // Python takes True for 1.
+        Ok(number) if !object.is_instance_of::<PyBool>() => number,
+        Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => {
+            let mend = if object.lt(0)? { "must be 0 or more" } else { "is too large a number" };
+            return Err(refuse(name, object.str()?, mend));
+        }
+        _ => {
+            let wanted = "must be a whole number of 0 or more";
+            return Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", object.repr()?)));
+        }
+    };
     T::try_from(number).map_err(|_| refuse(name, number, "must be 0 or more"))
 }

@@ -1,16 +1,18 @@
 //! Many simulations, stepped in parallel.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use endowire_core::Error;
 use endowire_core::insertion::{self, InstrumentReport, Move};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{List, Numbers, array, natural, numbers, points};
+use crate::arrays::{List, Numbers, array, lengths_mm, natural, points};
 use crate::error::{exception, refuse};
-use crate::forked::on_own_threads;
+use crate::interrupt::{signalled, stoppable_beside};
 use crate::record::Record;
 use crate::report::push_force_n;
 use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
@@ -24,11 +26,19 @@ pub(crate) struct Batch {
     inner: Mutex<Members>,
 }
 
-#[derive(Clone)]
 struct Members {
     batch: insertion::Batch,
     /// The start of each simulation.
     starts: Vec<Arc<Py<Start>>>,
+    /// Ends their long steps: threads of parallel work are not told of signals.
+    stop: Arc<AtomicBool>,
+}
+
+impl Clone for Members {
+    /// The copy is stopped on its own.
+    fn clone(&self) -> Self {
+        Self::new(self.batch.simulations().to_vec(), self.starts.clone())
+    }
 }
 
 impl Batch {
@@ -71,15 +81,33 @@ impl Batch {
     ) -> PyResult<Bound<'py, PyDict>> {
         let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
         let moves = crate::moves::moves(moves, Some(count), hands)?;
-        let told = self.with(py, |members| on_own_threads(|| work(&mut members.batch, &moves)));
-        let told = told?.map_err(exception)?;
+        let told = self.work(py, |members| work(&mut members.batch, &moves))?.map_err(exception)?;
         let failures = PyDict::new(py);
         for (index, told) in told.into_iter().enumerate() {
-            if let Err(failed) = told {
-                failures.set_item(index, exception(failed).into_value(py))?;
+            match told {
+                Ok(()) => {}
+                // No simulation has failed: the caller wants to stop.
+                Err(stopped @ Error::Stopped) => return Err(exception(stopped)),
+                Err(failed) => failures.set_item(index, exception(failed).into_value(py))?,
             }
         }
         Ok(failures)
+    }
+
+    /// Runs long `work` on the members, which a signal ends. Threads are used only for several, since a program may have
+    /// to fork.
+    fn work<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Members) -> T + Send) -> PyResult<T> {
+        py.detach(|| {
+            let mut members: MutexGuard<'_, Members> =
+                self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let stop = Arc::clone(&members.stop);
+            let members = &mut *members;
+            stop.store(false, Ordering::Relaxed);
+            match members.starts.len() {
+                0 | 1 => Ok(work(members)),
+                _ => stoppable_beside(&stop, || work(members)),
+            }
+        })
     }
 
     /// A number from each report.
@@ -111,6 +139,19 @@ impl Batch {
 }
 
 impl Members {
+    fn new(simulations: Vec<insertion::Simulation>, starts: Vec<Arc<Py<Start>>>) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let simulations = simulations.into_iter().map(|one| stopped_by(&stop, one)).collect();
+        Self { batch: insertion::Batch::new(simulations), starts, stop }
+    }
+
+    /// A copy of a simulation outside of the batch.
+    fn copied(&self, place: usize) -> Simulation {
+        let mut simulation = self.batch.simulations()[place].clone();
+        simulation.stop_when(signalled);
+        Simulation::new(simulation, Arc::clone(&self.starts[place]))
+    }
+
     /// Number of instruments per simulation.
     fn hands(&self) -> usize {
         self.starts.first().map_or(1, |start| start.get().instruments.len())
@@ -127,6 +168,13 @@ impl Members {
     }
 }
 
+/// The simulation; its long steps end once `stop` is set, or at a signal on the thread that is told of them.
+fn stopped_by(stop: &Arc<AtomicBool>, mut simulation: insertion::Simulation) -> insertion::Simulation {
+    let stop = Arc::clone(stop);
+    simulation.stop_when(move || stop.load(Ordering::Relaxed) || signalled());
+    simulation
+}
+
 #[pymethods]
 impl Batch {
     /// A batch of copies of simulations, in this order. They may differ in everything but the number of instruments.
@@ -137,7 +185,7 @@ impl Batch {
             (one.with(py, |simulation| simulation.clone()), one.start())
         });
         let (list, starts): (Vec<_>, Vec<_>) = copied.unzip();
-        let members = Members { batch: insertion::Batch::new(list), starts };
+        let members = Members::new(list, starts);
         members.starts.iter().try_for_each(|start| members.check_hands(start.get()))?;
         Ok(Self { inner: Mutex::new(members) })
     }
@@ -151,7 +199,7 @@ impl Batch {
     ///
     /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step`
     /// would have raised; empty if all succeeded. Simulations that failed are unchanged, and do not affect the
-    /// others.
+    /// others. Ctrl-C raises KeyboardInterrupt, and leaves simulations unchanged whose step was not at its end.
     fn step<'py>(&self, py: Python<'py>, moves: Numbers<'_>) -> PyResult<Bound<'py, PyDict>> {
         self.carry_out(py, &moves, |batch, moves| batch.step_together(moves))
     }
@@ -159,7 +207,12 @@ impl Batch {
     /// As `step`, in ticks of about `solves` linear solves each (`Simulation.tick`), so that no simulation delays the
     /// others for long. The remaining motion is available as `behind`, and is continued by the next tick or step,
     /// even if its command is 0.
-    fn tick<'py>(&self, py: Python<'py>, moves: Numbers<'_>, solves: i64) -> PyResult<Bound<'py, PyDict>> {
+    fn tick<'py>(
+        &self,
+        py: Python<'py>,
+        moves: Numbers<'_>,
+        solves: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let solves = natural("solves", solves)?;
         self.carry_out(py, &moves, |batch, moves| batch.tick(moves, solves))
     }
@@ -184,9 +237,11 @@ impl Batch {
                 return Err(refuse(name, given, &format!("give one for each of {count} simulations")));
             }
         }
-        let noted =
-            || records.0.iter().zip(&times_s).filter_map(|(one, time_s)| Some((one.as_ref()?, time_s)));
-        noted().try_for_each(|(record, time_s)| record.get().check_time(*time_s))?;
+        for ((record, time_s), moves) in records.0.iter().zip(&times_s).zip(&moves) {
+            if let Some(record) = record {
+                record.get().check(*time_s, moves)?;
+            }
+        }
         self.with(py, |members| {
             let each = members.batch.simulations().iter().zip(&moves).zip(records.0.iter().zip(&times_s));
             for ((simulation, moves), (record, time_s)) in each {
@@ -216,9 +271,7 @@ impl Batch {
 
     /// A copy of one simulation.
     fn simulation(&self, py: Python<'_>, index: isize) -> PyResult<Simulation> {
-        self.at(py, index, |members, k| {
-            Ok(Simulation::new(members.batch.simulations()[k].clone(), Arc::clone(&members.starts[k])))
-        })
+        self.at(py, index, |members, k| Ok(members.copied(k)))
     }
 
     /// Replaces one simulation by a copy of `simulation`.
@@ -226,21 +279,21 @@ impl Batch {
         let new = simulation.with(py, |simulation| simulation.clone());
         self.at(py, index, |members, k| {
             members.check_hands(simulation.start().get())?;
-            members.batch.simulations_mut()[k] = new;
+            members.batch.simulations_mut()[k] = stopped_by(&members.stop, new);
             members.starts[k] = simulation.start();
             Ok(())
         })
     }
 
-    /// The state of one simulation.
+    /// The state of one simulation, as `Simulation.state`.
     fn state(&self, py: Python<'_>, index: isize) -> PyResult<State> {
-        self.at(py, index, |members, k| Ok(State { state: members.batch.simulations()[k].state() }))
+        self.at(py, index, |members, k| Ok(State::of(&members.batch.simulations()[k])))
     }
 
-    /// Restores a state of its scene in one simulation.
+    /// Restores a state of its scene in one simulation, as `Simulation.restore`.
     fn restore(&self, py: Python<'_>, index: isize, state: &State) -> PyResult<()> {
         self.at(py, index, |members, k| {
-            members.batch.simulations_mut()[k].restore(&state.state).map_err(exception)
+            state.restore_in(&mut members.batch.simulations_mut()[k]).map_err(exception)
         })
     }
 
@@ -264,13 +317,13 @@ impl Batch {
 
     /// Points of the centre lines at these arc lengths from the tip, mm: shape (m,) to (n, m, 3).
     ///
-    /// Raises InputError for lengths that are not finite.
+    /// Raises InputError for lengths that are not finite, or negative.
     fn points_mm<'py>(
         &self,
         py: Python<'py>,
         from_tip_mm: Numbers<'_>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let lengths = numbers("from_tip_mm", &from_tip_mm)?;
+        let lengths = lengths_mm("from_tip_mm", &from_tip_mm)?;
         let (count, list) = self.with(py, |members| {
             let all = members.batch.simulations();
             let list = all.iter().flat_map(|s| points_at(s, &lengths)).flat_map(|p| [p.x, p.y, p.z]);
@@ -352,10 +405,9 @@ impl Batch {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Vec<Simulation>,))> {
-        let simulations = slf.get().with(slf.py(), |members| {
-            let each = members.batch.simulations().iter().zip(&members.starts);
-            each.map(|(one, start)| Simulation::new(one.clone(), Arc::clone(start))).collect()
-        });
+        let simulations = slf
+            .get()
+            .with(slf.py(), |members| (0..members.starts.len()).map(|place| members.copied(place)).collect());
         Ok((slf.get_type().into_any(), (simulations,)))
     }
 

@@ -8,7 +8,7 @@ use endowire_core::{Error, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{List, Numbers, array, natural, rows};
+use crate::arrays::{List, Numbers, array, natural, natural_or, rows};
 use crate::error::{exception, refuse};
 use crate::simulation::Simulation;
 
@@ -43,36 +43,42 @@ impl Controller {
     /// Turns the bent tip into the direction of the way and advances. If it leaves the way or makes no progress, it
     /// pulls back and tries another rotation.
     ///
-    /// Raises InputError for an invalid path.
+    /// Raises InputError for an invalid path, and for distances below 0.
     #[staticmethod]
-    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = None))]
-    fn follow_path(
-        path_mm: Numbers<'_>,
+    #[pyo3(
+        signature = (path_mm, *, arrived_mm = 5.0, lead = None, followers = None),
+        text_signature = "(path_mm, *, arrived_mm=5.0, lead=0, followers=None)"
+    )]
+    fn follow_path<'py>(
+        path_mm: Numbers<'py>,
         arrived_mm: f64,
-        lead: i64,
-        followers: Option<List<(i64, f64)>>,
+        lead: Option<&Bound<'py, PyAny>>,
+        followers: Option<Followers<'py>>,
     ) -> PyResult<Self> {
+        check_distance("arrived_mm", arrived_mm)?;
         Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers)?, arrived_mm)))
     }
 
     /// Tries rotations of the instruments `turned` (by default the leading one) on copies of the simulation, pushes
     /// and pulls for 20 mm after each, and carries out the one that moved the tip farthest along the way.
     ///
-    /// Raises InputError for an invalid path.
+    /// Raises InputError as `follow_path`.
     #[staticmethod]
-    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = None, turned = None))]
-    fn search_ahead(
-        path_mm: Numbers<'_>,
+    #[pyo3(
+        signature = (path_mm, *, arrived_mm = 5.0, lead = None, followers = None, turned = None),
+        text_signature = "(path_mm, *, arrived_mm=5.0, lead=0, followers=None, turned=None)"
+    )]
+    fn search_ahead<'py>(
+        path_mm: Numbers<'py>,
         arrived_mm: f64,
-        lead: i64,
-        followers: Option<List<(i64, f64)>>,
-        turned: Option<List<i64>>,
+        lead: Option<&Bound<'py, PyAny>>,
+        followers: Option<Followers<'py>>,
+        turned: Option<List<Bound<'py, PyAny>>>,
     ) -> PyResult<Self> {
+        check_distance("arrived_mm", arrived_mm)?;
         let team = team(lead, followers)?;
         let turned = match turned {
-            Some(List(turned)) => {
-                turned.into_iter().map(|one| natural("turned", one)).collect::<PyResult<_>>()?
-            }
+            Some(List(turned)) => turned.iter().map(|one| natural("turned", one)).collect::<PyResult<_>>()?,
             None => vec![team.lead],
         };
         Ok(Self::of(SearchAhead::new(path(&path_mm)?, team, turned, arrived_mm)))
@@ -132,10 +138,23 @@ fn path(table: &Numbers<'_>) -> PyResult<CentrelinePath> {
     made.ok_or_else(|| refuse("path_mm", format!("{count} rows"), mend))
 }
 
-fn team(lead: i64, followers: Option<List<(i64, f64)>>) -> PyResult<Team> {
-    let follower =
-        |(instrument, behind_mm)| Ok(Follower { instrument: natural("followers", instrument)?, behind_mm });
+/// Refuses a distance that is negative or not finite.
+fn check_distance(name: &str, distance_mm: f64) -> PyResult<()> {
+    match distance_mm.is_finite() && distance_mm >= 0.0 {
+        true => Ok(()),
+        false => Err(refuse(name, distance_mm, "must be a distance of 0 or more")),
+    }
+}
+
+/// Instruments, and how far they stay behind the tip, mm.
+type Followers<'py> = List<(Bound<'py, PyAny>, f64)>;
+
+fn team(lead: Option<&Bound<'_, PyAny>>, followers: Option<Followers<'_>>) -> PyResult<Team> {
+    let follower = |(instrument, behind_mm): (Bound<'_, PyAny>, f64)| {
+        check_distance("followers", behind_mm)?;
+        Ok(Follower { instrument: natural("followers", &instrument)?, behind_mm })
+    };
     let followers =
         followers.map_or_else(Vec::new, |list| list.0).into_iter().map(follower).collect::<PyResult<_>>()?;
-    Ok(Team { lead: natural("lead", lead)?, followers })
+    Ok(Team { lead: natural_or("lead", lead, 0)?, followers })
 }

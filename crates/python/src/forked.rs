@@ -31,6 +31,25 @@ pub(crate) fn on_own_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResu
     Ok(threads(own)?.install(work))
 }
 
+/// Runs `work` on the threads of this process, and meanwhile `watch` on this thread; returns what `watch` does.
+///
+/// # Errors
+/// ComputationError if the system provides no threads.
+pub(crate) fn beside_own_threads<'a, T>(
+    work: impl FnOnce() + Send + 'a,
+    watch: impl FnOnce() -> T,
+) -> PyResult<T> {
+    let own = process::id();
+    let watched = move |scope: &rayon::Scope<'a>| {
+        scope.spawn(move |_| work());
+        watch()
+    };
+    if IMPORTED_IN.get().is_none_or(|imported| *imported == own) {
+        return Ok(rayon::in_place_scope(watched));
+    }
+    Ok(threads(own)?.in_place_scope(watched))
+}
+
 fn threads(own: u32) -> PyResult<Arc<ThreadPool>> {
     let mut kept = THREADS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, pool)) = kept.as_ref().filter(|(process, _)| *process == own) {

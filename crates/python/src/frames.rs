@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arrays::{array, natural};
+use crate::arrays::{array, natural, natural_or};
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::forked::on_own_threads;
@@ -39,27 +39,24 @@ impl Renderer {
         py: Python<'_>,
         spec: &ViewSpec,
         view: Option<&Bound<'_, PyAny>>,
-        plane: i64,
+        plane: Option<&Bound<'_, PyAny>>,
         vessel: &Vessel,
     ) -> PyResult<Self> {
-        let mut spec = match view {
-            Some(table) => document::read_over("view", spec, table)?,
-            None => spec.clone(),
-        };
-        spec.validate().map_err(exception)?;
+        let mut spec = overridden(spec, view)?;
+        let plane = natural_or("plane", plane, 0)?;
         if spec.wants(View::Fluoro) && !spec.injection.is_empty() && spec.flow.tree.is_none() {
             spec.flow.centreline = Some(Arc::new(vessel.tree(py)?.clone()));
         }
         let lumen = vessel.lumen.clone();
         let mut planes = spec.planes();
-        let Some(place) = usize::try_from(plane).ok().filter(|place| *place < planes.len()) else {
+        if plane >= planes.len() {
             let mend = match planes.len() {
                 1 => "the view has one plane, 0; a second is that of view.biplane_deg",
                 _ => "the view has two planes, 0 and 1",
             };
             return Err(refuse("plane", plane, mend));
-        };
-        let spec = planes.swap_remove(place);
+        }
+        let spec = planes.swap_remove(plane);
         let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, lumen.wall(&NoStore)?))?;
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
@@ -104,8 +101,13 @@ impl Renderer {
     ///
     /// Raises InputError for values out of range, and for a vessel that cannot be drawn.
     #[new]
-    #[pyo3(signature = (vessel, view, plane=0))]
-    fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>, plane: i64) -> PyResult<Self> {
+    #[pyo3(signature = (vessel, view, plane=None), text_signature = "(vessel, view, plane=0)")]
+    fn new(
+        py: Python<'_>,
+        vessel: &Vessel,
+        view: &Bound<'_, PyAny>,
+        plane: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
         Self::prepare(py, &ViewSpec::default(), Some(view), plane, vessel)
     }
 
@@ -124,11 +126,20 @@ impl Renderer {
     /// Draws the views of a simulation in its current state. `frame` is the number of the frame, which determines its
     /// noise and its time; by default the next one.
     ///
-    /// Raises InputError for a negative frame, and for a simulation that cannot be drawn.
+    /// Raises InputError for a view that requests no frames, for a negative frame, and for a simulation that cannot be
+    /// drawn.
     #[pyo3(signature = (simulation, frame=None))]
-    fn render(&self, py: Python<'_>, simulation: &Simulation, frame: Option<i64>) -> PyResult<Frames> {
+    fn render(
+        &self,
+        py: Python<'_>,
+        simulation: &Simulation,
+        frame: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Frames> {
         let frame: Option<u64> = frame.map(|frame| natural("frame", frame)).transpose()?;
         let views = self.views(py, simulation)?;
+        if self.with(py, |renderer| Ok(renderer.spec().views.is_empty()))? {
+            return Err(refuse("view.views", "[]", "nothing is drawn: give \"3d\", \"fluoro\" or both"));
+        }
         self.move_vessel(py, simulation)?;
         let frames = self.with(py, |renderer| match frame {
             None => renderer.render(&views),
@@ -174,6 +185,23 @@ impl Renderer {
         told.set_item("camera_matrix", array(py, labels.camera_matrix.as_flattened().to_vec(), [3, 4])?)?;
         Ok(told)
     }
+}
+
+/// Checks the keys and values of a `[view]` table: used where there is no vessel to draw yet.
+#[pyfunction]
+#[pyo3(name = "_check_view")]
+pub(crate) fn check_view(view: &Bound<'_, PyAny>) -> PyResult<()> {
+    overridden(&ViewSpec::default(), Some(view)).map(drop)
+}
+
+/// A view, overridden by a `[view]` table.
+fn overridden(spec: &ViewSpec, view: Option<&Bound<'_, PyAny>>) -> PyResult<ViewSpec> {
+    let spec = match view {
+        Some(table) => document::read_over("view", spec, table)?,
+        None => spec.clone(),
+    };
+    spec.validate().map_err(exception)?;
+    Ok(spec)
 }
 
 /// A picture as an array that takes over its pixels.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 
 use crate::error::ComputationError;
-use crate::forked::on_own_threads;
+use crate::forked::{beside_own_threads, on_own_threads};
 
 /// Interval at which signals are checked.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -38,6 +38,41 @@ pub(crate) fn stoppable<T: Send + 'static>(
     waited_for(py, Some(stop), work)
 }
 
+/// Whether a signal handler has raised, on the thread that is told of signals. Its exception is kept for the caller that
+/// is told about the end of the step.
+pub(crate) fn signalled() -> bool {
+    Python::attach(|py| py.check_signals().map_err(|raised| raised.restore(py)).is_err())
+}
+
+/// Runs `work` on the threads of parallel work, while this thread checks for signals: a signal sets `stop`, which `work`
+/// checks, and the end of the work is awaited. Never call it with the interpreter held.
+///
+/// # Errors
+/// As [`interruptible`].
+pub(crate) fn stoppable_beside<T: Send>(stop: &AtomicBool, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let (sender, receiver) = sync_channel(1);
+    let watch = move || {
+        let mut raised = None;
+        loop {
+            match receiver.recv_timeout(PATIENCE) {
+                Ok(made) => return raised.map_or(Ok(made), Err),
+                Err(RecvTimeoutError::Timeout) if raised.is_none() => {
+                    raised = Python::attach(|py| py.check_signals()).err();
+                    stop.store(raised.is_some(), Ordering::Relaxed);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err(ended()),
+            }
+        }
+    };
+    // Sending fails only if the watch has ended, which waits for it.
+    beside_own_threads(move || drop(sender.send(work())), watch)?
+}
+
+fn ended() -> PyErr {
+    ComputationError::new_err("the computation ended without a result")
+}
+
 fn waited_for<T: Send + 'static>(
     py: Python<'_>,
     stop: Option<&AtomicBool>,
@@ -63,7 +98,7 @@ fn waited_for<T: Send + 'static>(
                 return Err(signal);
             }
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(ComputationError::new_err("the computation ended without a result"));
+                return Err(ended());
             }
         }
     }

@@ -40,7 +40,7 @@ mod _endowire {
     #[pymodule_export]
     use super::control::Controller;
     #[pymodule_export]
-    use super::frames::{Frames, Renderer};
+    use super::frames::{Frames, Renderer, check_view};
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]

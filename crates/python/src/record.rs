@@ -3,6 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use endowire_assess::Way;
+use endowire_core::insertion::{Command, Move};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -42,7 +43,7 @@ impl Record {
     /// Records a step of a simulation: its end `time_s` since the start, and the command as given to
     /// `Simulation.step`. Positions of tips, forces and jumps come from the simulation's report.
     ///
-    /// Raises InputError for a time before that of the last step.
+    /// Raises InputError for a time before that of the last step, and for numbers that are not finite.
     #[pyo3(signature = (simulation, time_s, advance_mm=None, rotate_rad=None))]
     fn note(
         &self,
@@ -53,7 +54,7 @@ impl Record {
         rotate_rad: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let moves = simulation.moves(advance_mm, rotate_rad)?;
-        self.check_time(time_s)?;
+        self.check(time_s, &moves)?;
         simulation.with(py, |simulation| self.lock().note(time_s, &moves, simulation, None));
         Ok(())
     }
@@ -68,11 +69,12 @@ impl Record {
         &self,
         py: Python<'py>,
         vessel: Option<&Vessel>,
-        target: Option<Goal>,
+        target: Option<&Bound<'py, PyAny>>,
         within_mm: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         check_within(within_mm)?;
         let record = self.lock().clone();
+        let target = target.map(|target| Goal::of("target", target)).transpose()?;
         let way = match (vessel, target) {
             (None, None) => None,
             (None, Some(_)) => {
@@ -126,8 +128,15 @@ impl Record {
 }
 
 impl Record {
-    /// Refuses a time before that of the last step.
-    pub(crate) fn check_time(&self, time_s: f64) -> PyResult<()> {
+    /// Refuses a time before that of the last step, and moves that are no numbers.
+    pub(crate) fn check(&self, time_s: f64, moves: &[Move]) -> PyResult<()> {
+        for Move { command: Command { advance_mm, rotate_rad }, .. } in moves {
+            for (name, number) in [("advance_mm", *advance_mm), ("rotate_rad", *rotate_rad)] {
+                if !number.is_finite() {
+                    return Err(refuse(name, number, "must be a finite number"));
+                }
+            }
+        }
         let last_s = self.lock().samples.last().map_or(0.0, |last| last.time_s);
         if time_s >= last_s && time_s.is_finite() {
             return Ok(());

@@ -67,8 +67,8 @@ impl Scene {
 
     /// The moves of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
     ///
-    /// Raises InputError if a line has `until`, because the number of steps is then not known beforehand. `run`
-    /// carries out such a script.
+    /// Raises InputError if a line has `until`, because the number of steps is then not known beforehand, and if one
+    /// has `detach`, which is no move. `run` carries out such scripts.
     #[getter]
     fn moves<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let stack = self.scene.stack().map_err(exception)?;
@@ -112,13 +112,16 @@ impl Scene {
 
     /// A renderer for its `[view]` table, overridden by `view`, in `vessel` if that already exists. With
     /// `biplane_deg`, `plane` 1 is the fluoroscopy of the second plane.
-    #[pyo3(signature = (view=None, vessel=None, plane=0))]
+    #[pyo3(
+        signature = (view=None, vessel=None, plane=None),
+        text_signature = "($self, view=None, vessel=None, plane=0)"
+    )]
     fn renderer(
         &self,
         py: Python<'_>,
         view: Option<&Bound<'_, PyAny>>,
         vessel: Option<&Vessel>,
-        plane: i64,
+        plane: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Renderer> {
         let spec = ViewSpec::of_scene(&self.scene, &self.path).map_err(exception)?;
         match vessel {

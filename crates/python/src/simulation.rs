@@ -6,29 +6,37 @@ use endowire_core::Vec3;
 use endowire_core::device::line_mm;
 use endowire_core::field::FieldSpec;
 use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce};
+use endowire_core::methods::MethodChoice;
+use endowire_methods::AnyMethod;
 use endowire_viewer::DeviceView;
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{List, Numbers, natural, numbers, points};
+use crate::arrays::{List, Numbers, lengths_mm, natural, natural_or, place, points};
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
 use crate::moves::{of_each, together};
 use crate::report::StepReport;
 use crate::start::{Arguments, Start};
-use crate::state::State;
+use crate::state::{State, fields_of};
 use crate::vessel::Vessel;
 
-/// Start and state of a simulation, and the fields that it was put into, as JSON.
-type Pickled = (Py<Start>, State, Option<String>);
-
 /// One instrument or several.
-#[derive(FromPyObject)]
-pub(crate) enum Instruments {
-    One(Instrument),
-    List(List<Instrument>),
+fn instruments(object: &Bound<'_, PyAny>) -> PyResult<Vec<Instrument>> {
+    if let Ok(one) = object.extract::<Instrument>() {
+        return Ok(vec![one]);
+    }
+    object.extract::<List<Instrument>>().map(|list| list.0).map_err(|error| {
+        if !error.is_instance_of::<PyTypeError>(object.py()) {
+            return error;
+        }
+        let wanted = "must be an Instrument, or a list of them, the innermost first";
+        let shown = object.repr().map_or_else(|_| "…".to_owned(), |shown| shown.to_string());
+        PyTypeError::new_err(format!("instruments = {shown}: {wanted}"))
+    })
 }
 
 /// An insertion: instruments in a vessel, stepped by commands.
@@ -41,21 +49,18 @@ pub(crate) struct Simulation {
     inner: Mutex<insertion::Simulation>,
     /// Has its own reference count, since copies may be made with the interpreter released.
     start: Arc<Py<Start>>,
-    /// The fields that it was put into; `None` while it has the initial ones.
-    fields: Mutex<Option<Vec<FieldSpec>>>,
 }
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        let simulation = self.lock().clone();
-        Self { inner: Mutex::new(simulation), start: self.start(), fields: Mutex::new(self.fields()) }
+        Self::new(self.lock().clone(), self.start())
     }
 }
 
 impl Simulation {
     /// A simulation with this start.
     pub(crate) fn new(simulation: insertion::Simulation, start: Arc<Py<Start>>) -> Self {
-        Self { inner: Mutex::new(simulation), start, fields: Mutex::new(None) }
+        Self { inner: Mutex::new(simulation), start }
     }
 
     /// A simulation at its start.
@@ -90,18 +95,6 @@ impl Simulation {
     /// step.
     fn lock(&self) -> MutexGuard<'_, insertion::Simulation> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn fields(&self) -> Option<Vec<FieldSpec>> {
-        self.fields.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    /// Puts the instruments into fields, which are stored for pickling.
-    fn put_into(&self, py: Python<'_>, specs: Vec<FieldSpec>) -> PyResult<()> {
-        let fields = specs.iter().map(FieldSpec::field).collect::<Result<Vec<_>, _>>().map_err(exception)?;
-        self.with(py, |simulation| simulation.set_fields(fields)).map_err(exception)?;
-        *self.fields.lock().unwrap_or_else(PoisonError::into_inner) = Some(specs);
-        Ok(())
     }
 
     /// Runs `work` on the simulation with the interpreter released.
@@ -163,11 +156,11 @@ impl Simulation {
     fn py_new(
         py: Python<'_>,
         vessel: Py<Vessel>,
-        instruments: Instruments,
-        opening: Option<i64>,
+        instruments: &Bound<'_, PyAny>,
+        opening: Option<&Bound<'_, PyAny>>,
         depth_mm: Option<f64>,
-        position_mm: Option<[f64; 3]>,
-        direction: Option<[f64; 3]>,
+        position_mm: Option<&Bound<'_, PyAny>>,
+        direction: Option<&Bound<'_, PyAny>>,
         wall: Option<&Bound<'_, PyAny>>,
         method: Option<&Bound<'_, PyAny>>,
         sheath_friction_n: f64,
@@ -176,10 +169,9 @@ impl Simulation {
         friction: Option<List<f64>>,
         may_lead: Option<List<bool>>,
     ) -> PyResult<Self> {
-        let instruments = match instruments {
-            Instruments::One(instrument) => vec![instrument],
-            Instruments::List(List(list)) => list,
-        };
+        let instruments = self::instruments(instruments)?;
+        let position_mm = position_mm.map(|at| place("position_mm", at)).transpose()?;
+        let direction = direction.map(|along| place("direction", along)).transpose()?;
         let opening = opening.map(|opening| natural("opening", opening)).transpose()?;
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
         let inlet = || {
@@ -192,7 +184,7 @@ impl Simulation {
             position_mm,
             direction,
             wall: wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default(),
-            method: method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default(),
+            method: method.map(read_method).transpose()?.unwrap_or_default(),
             sheath_friction_n,
             sheath_friction,
             names: names.map(|list| list.0),
@@ -234,7 +226,7 @@ impl Simulation {
         py: Python<'_>,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
-        solves: i64,
+        solves: &Bound<'_, PyAny>,
         time_s: Option<f64>,
     ) -> PyResult<StepReport> {
         let (moves, solves) = (self.moves(advance_mm, rotate_rad)?, natural("solves", solves)?);
@@ -244,11 +236,11 @@ impl Simulation {
 
     /// Detaches the coil of an instrument, where it comes to rest, and withdraws its pusher. Returns the StepReport.
     ///
-    /// Raises InputError for an instrument that is not a coil, is already detached, or is not yet out of the
+    /// Raises InputError for an instrument that is not a coil (`Instrument.coil_mm`), is already detached, or is not yet out of the
     /// catheter, and ComputationError if it does not come to rest; then everything is unchanged.
-    #[pyo3(signature = (instrument=0))]
-    fn detach(&self, py: Python<'_>, instrument: i64) -> PyResult<StepReport> {
-        let place = natural("instrument", instrument)?;
+    #[pyo3(signature = (instrument=None), text_signature = "($self, instrument=0)")]
+    fn detach(&self, py: Python<'_>, instrument: Option<&Bound<'_, PyAny>>) -> PyResult<StepReport> {
+        let place = natural_or("instrument", instrument, 0)?;
         let done = self.with(py, |simulation| simulation.detach(place).cloned());
         done.map(StepReport::new).map_err(exception)
     }
@@ -258,9 +250,12 @@ impl Simulation {
     /// "moment_am2": 4e-3, "field_t": [0.05, 0.0, 0.0]}`, a magnet along the axis between two distances from the tip
     /// in a uniform magnetic field, or `{"kind": "weight", "instrument": 0, "force_n_per_mm": [0.0, 0.0, -1e-5]}`.
     ///
-    /// Raises InputError for values out of range, and for an unknown instrument; then nothing is changed.
+    /// Raises InputError for values out of range, for an unknown instrument, and for a magnet that ends beyond its
+    /// instrument; then nothing is changed.
     fn set_fields(&self, py: Python<'_>, fields: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.put_into(py, document::read("fields", fields)?)
+        let specs: Vec<FieldSpec> = document::read_list("fields", fields)?;
+        let fields = fields_of(&specs).map_err(exception)?;
+        self.with(py, |simulation| simulation.set_fields(fields)).map_err(exception)
     }
 
     /// Detached coils, in order: a list of pairs of an instrument and the points of its coil, from the detached end
@@ -347,12 +342,16 @@ impl Simulation {
     /// is the length that each point represents.
     ///
     /// Raises InputError for an unknown instrument.
-    fn lateral_forces<'py>(&self, py: Python<'py>, instrument: i64) -> PyResult<Bound<'py, PyDict>> {
-        let count = self.pushed().len();
-        let Some(place) = usize::try_from(instrument).ok().filter(|place| *place < count) else {
+    fn lateral_forces<'py>(
+        &self,
+        py: Python<'py>,
+        instrument: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (count, place) = (self.pushed().len(), natural::<usize>("instrument", instrument)?);
+        if place >= count {
             let mend = format!("there are {count}, the innermost is 0");
-            return Err(refuse("instrument", instrument, &mend));
-        };
+            return Err(refuse("instrument", place, &mend));
+        }
         let forces = self.with(py, |simulation| simulation.lateral_forces(place));
         let told = PyDict::new(py);
         let list = |of: fn(&LateralForce) -> f64| PyArray1::from_vec(py, forces.iter().map(of).collect());
@@ -379,26 +378,27 @@ impl Simulation {
     /// Points of the centre line at these arc lengths from the tip, mm: shape (n,) to (n, 3). Lengths beyond the
     /// inserted one give the mouth of the sheath.
     ///
-    /// Raises InputError for lengths that are not finite.
+    /// Raises InputError for lengths that are not finite, or negative.
     fn points_mm<'py>(
         &self,
         py: Python<'py>,
         from_tip_mm: Numbers<'_>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let lengths = numbers("from_tip_mm", &from_tip_mm)?;
+        let lengths = lengths_mm("from_tip_mm", &from_tip_mm)?;
         points(py, self.with(py, |simulation| points_at(simulation, &lengths)))
     }
 
-    /// Everything that the next step depends on, except for the surroundings of the instruments.
+    /// Everything that the next step depends on, except for what the simulation was made of: with the fields, also
+    /// those that were set and not stepped into.
     fn state(&self, py: Python<'_>) -> State {
-        State { state: self.with(py, |simulation| simulation.state()) }
+        self.with(py, |simulation| State::of(simulation))
     }
 
-    /// Restores a state of the same scene, to the bit.
+    /// Restores a state of the same scene, to the bit. Its fields replace those of the simulation.
     ///
     /// Raises InputError for a state of another method, vessel or instrument; then nothing is changed.
     fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
-        self.with(py, |simulation| simulation.restore(&state.state)).map_err(exception)
+        self.with(py, |simulation| state.restore_in(simulation)).map_err(exception)
     }
 
     /// A simulation in the same state that shares the vessel.
@@ -414,21 +414,15 @@ impl Simulation {
         self.copy(py)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Py<Start>, State))> {
         let (py, simulation) = (slf.py(), slf.get());
-        let fields = simulation.fields().map(|fields| serde_json::to_string(&fields)).transpose();
-        let fields = fields.map_err(|e| refuse("fields", e, "cannot be written"))?;
-        let parts = (simulation.start.clone_ref(py), simulation.state(py), fields);
+        let parts = (simulation.start.clone_ref(py), simulation.state(py));
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
 
     #[staticmethod]
-    fn _unpickled(py: Python<'_>, start: Py<Start>, state: &State, fields: Option<&str>) -> PyResult<Self> {
+    fn _unpickled(py: Python<'_>, start: Py<Start>, state: &State) -> PyResult<Self> {
         let unpickled = Self::new(start.get().simulation(), Arc::new(start));
-        if let Some(fields) = fields {
-            let fields = serde_json::from_str(fields).map_err(|e| refuse("fields", e, "cannot be read"))?;
-            unpickled.put_into(py, fields)?;
-        }
         unpickled.restore(py, state)?;
         Ok(unpickled)
     }
@@ -437,6 +431,11 @@ impl Simulation {
         let inserted_mm = self.with(py, |simulation| simulation.report().inserted_mm);
         format!("<endowire.Simulation: {inserted_mm} mm inserted>")
     }
+}
+
+/// A `[method]` table, whose name is the default one if absent, as in scenes.
+fn read_method(table: &Bound<'_, PyAny>) -> PyResult<AnyMethod> {
+    document::read_choice("method", table, "name", AnyMethod::default().name())
 }
 
 /// The tip; the mouth of the sheath before anything is inserted.

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::arrays::List;
 use crate::error::{InputError, exception, refuse};
 use crate::instrument::Instrument;
-use crate::interrupt::interruptible;
+use crate::interrupt::{interruptible, signalled};
 use crate::scene::Scene;
 use crate::vessel::Vessel;
 
@@ -79,10 +79,7 @@ impl Start {
     /// The simulation; Ctrl-C ends its long steps.
     pub(crate) fn simulation(&self) -> insertion::Simulation {
         let mut simulation = self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        // The exception of the signal handler is kept for the caller that is told about the end of the step.
-        simulation.stop_when(|| {
-            Python::attach(|py| py.check_signals().map_err(|raised| raised.restore(py)).is_err())
-        });
+        simulation.stop_when(signalled);
         simulation
     }
 }

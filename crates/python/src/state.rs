@@ -3,9 +3,11 @@
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use endowire_core::Error;
+use endowire_core::field::{Field, FieldSpec};
 use endowire_core::insertion;
+use endowire_core::{Error, Result};
 use endowire_sweep::{seal, whole};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -14,7 +16,7 @@ use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
 /// First bytes of a saved state, which ends with a hash, and those common to all versions.
-const FORMAT: &[u8] = b"endowire.State 9\n";
+const FORMAT: &[u8] = b"endowire.State 10\n";
 const ANY_FORMAT: &[u8] = b"endowire.State ";
 
 /// Whether a file was written by `State.save` of any version, or is empty, so that overwriting it loses nothing.
@@ -24,13 +26,16 @@ fn is_state(path: &Path) -> io::Result<bool> {
     Ok(begins.is_empty() || begins == ANY_FORMAT)
 }
 
-/// Everything that the next step of a simulation depends on, except for the surroundings of the instruments.
+/// Everything that changes in a simulation: all that the next step depends on, except for what the simulation was made
+/// of. The fields are part of it.
 ///
 /// It is immutable and small, and can be copied, pickled, sent and saved. `Simulation.restore` continues from it to
 /// the bit.
 #[pyclass(frozen, module = "endowire", name = "State")]
 pub(crate) struct State {
-    pub(crate) state: insertion::State,
+    state: insertion::State,
+    /// The fields in which the instruments last came to rest, and those to which the next step leads.
+    fields: [Vec<FieldSpec>; 2],
 }
 
 #[pymethods]
@@ -67,8 +72,9 @@ impl State {
         let Some(state) = seal::opened(data).and_then(|body| body.strip_prefix(FORMAT)) else {
             return Err(refuse("they are not whole, or were changed since they were written".to_owned()));
         };
-        let state = postcard::from_bytes(state).map_err(|e| refuse(e.to_string()))?;
-        Ok(Self { state })
+        let (state, fields): (_, String) = postcard::from_bytes(state).map_err(|e| refuse(e.to_string()))?;
+        let fields = serde_json::from_str(&fields).map_err(|e| refuse(format!("fields: {e}")))?;
+        Ok(Self { state, fields })
     }
 
     /// Writes the state to a file. At any time the file is completely the previous or the new one, even if the
@@ -125,9 +131,35 @@ impl State {
 }
 
 impl State {
-    fn bytes(&self) -> PyResult<Vec<u8>> {
-        postcard::to_extend(&self.state, FORMAT.to_vec())
-            .map(seal::sealed)
-            .map_err(|e| InputError::new_err(format!("the state cannot be written: {e}")))
+    /// The state of a simulation.
+    pub(crate) fn of(simulation: &insertion::Simulation) -> Self {
+        // All fields that Python and scenes can name have their numbers.
+        let fields = simulation.fields().map(|fields| fields.iter().filter_map(|one| one.spec()).collect());
+        Self { state: simulation.state(), fields }
     }
+
+    /// Restores it in a simulation of the same start; after an error nothing has changed.
+    pub(crate) fn restore_in(&self, simulation: &mut insertion::Simulation) -> Result<()> {
+        let [before, now] = &self.fields;
+        let mut restored = simulation.clone();
+        restored.set_fields(fields_of(before)?)?;
+        restored.restore(&self.state)?;
+        restored.set_fields(fields_of(now)?)?;
+        *simulation = restored;
+        Ok(())
+    }
+
+    fn bytes(&self) -> PyResult<Vec<u8>> {
+        let failed =
+            |e: &dyn std::fmt::Display| InputError::new_err(format!("the state cannot be written: {e}"));
+        // Their tags need a format that describes itself.
+        let fields = serde_json::to_string(&self.fields).map_err(|e| failed(&e))?;
+        let bytes = postcard::to_extend(&(&self.state, fields), FORMAT.to_vec()).map_err(|e| failed(&e))?;
+        Ok(seal::sealed(bytes))
+    }
+}
+
+/// The fields of these numbers.
+pub(crate) fn fields_of(specs: &[FieldSpec]) -> Result<Vec<Arc<dyn Field>>> {
+    specs.iter().map(FieldSpec::field).collect()
 }

@@ -30,7 +30,7 @@ pub(crate) fn sweep<'py>(
     py: Python<'py>,
     path: PathBuf,
     out: PathBuf,
-    jobs: Option<i64>,
+    jobs: Option<&Bound<'py, PyAny>>,
     shard: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
     let jobs = jobs.map(|jobs| natural("jobs", jobs)).transpose()?;

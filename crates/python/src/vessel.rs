@@ -5,6 +5,7 @@ use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use endowire_core::input::nearest;
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
     CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, Lumen, NoStore,
@@ -19,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Serialize;
 
-use crate::arrays::{Numbers, array, natural, points, rows};
+use crate::arrays::{List, Numbers, array, finite, natural, place, points, rows};
 use crate::document;
 use crate::error::{InputError, exception, refuse};
 use crate::instrument::Instrument;
@@ -47,26 +48,27 @@ struct Line {
 }
 
 /// An end of a centre line: the number of an opening, or a place in mm.
-#[derive(FromPyObject)]
-enum End {
-    Opening(usize),
-    Place([f64; 3]),
-}
-
-impl End {
-    fn core(self) -> CentrelineEnd {
-        match self {
-            Self::Opening(opening) => CentrelineEnd::Opening(opening),
-            Self::Place(place) => CentrelineEnd::Place(place.into()),
-        }
+fn end(name: &str, object: &Bound<'_, PyAny>) -> PyResult<CentrelineEnd> {
+    if object.extract::<List<Bound<'_, PyAny>>>().is_ok() {
+        return place(name, object).map(|place| CentrelineEnd::Place(place.into()));
     }
+    natural(name, object).map(CentrelineEnd::Opening)
 }
 
 /// The end of a way: the name of a target, or a place in mm.
-#[derive(FromPyObject)]
 pub(crate) enum Goal {
     Name(String),
     Place([f64; 3]),
+}
+
+impl Goal {
+    /// `name` is that of the argument in errors.
+    pub(crate) fn of(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match object.extract::<String>() {
+            Ok(target) => Ok(Self::Name(target)),
+            Err(_) => place(name, object).map(Self::Place),
+        }
+    }
 }
 
 /// Replaces the core's names `from` and `to` in an error by the arguments of the method.
@@ -101,8 +103,7 @@ enum UnpickledLumen<'py> {
 }
 
 /// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
-#[derive(FromPyObject)]
-pub(crate) enum Tree<'py> {
+enum Tree<'py> {
     Path(PathBuf),
     Table(Numbers<'py>),
 }
@@ -165,8 +166,8 @@ impl Vessel {
     }
 
     /// Builds the wall of a centre-line tree: a built-in anatomy ("straight_tube", "curved_tube", "aortic_arch",
-    /// "hepatic"), the path of a table, or an array of shape (n, 5) of x, y, z, radius (mm) and the row of the parent
-    /// (-1 for the root).
+    /// "aortic_arch_ii", "aortic_arch_iii", "hepatic", "sidewall_aneurysm", "basilar_aneurysm"), the path of a table, or
+    /// an array of shape (n, 5) of x, y, z, radius (mm) and the row of the parent (-1 for the root).
     ///
     /// Devices touch the exact surface of the tree. Triangles are generated only when something draws, writes or
     /// reads them; `edge_mm` or `triangles` set their resolution, by default with edges of a quarter of the smallest
@@ -178,11 +179,11 @@ impl Vessel {
     #[pyo3(signature = (tree, edge_mm = None, triangles = None))]
     fn generate(
         py: Python<'_>,
-        tree: Tree<'_>,
+        tree: &Bound<'_, PyAny>,
         edge_mm: Option<f64>,
-        triangles: Option<i64>,
+        triangles: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let tree = tree.tree()?;
+        let tree = Tree::of(tree)?.tree()?;
         let resolution = match (edge_mm, triangles) {
             (Some(edge_mm), None) => Resolution::EdgeMm(edge_mm),
             (None, Some(count)) => Resolution::Triangles(natural("triangles", count)?),
@@ -261,7 +262,7 @@ impl Vessel {
     /// mm: shape (n, 4), x, y, z and radius in mm, as used by `Controller.follow_path` and `search_ahead`.
     ///
     /// Raises InputError for an unknown name, for the root itself, and as `centreline`.
-    fn path<'py>(&self, py: Python<'py>, to: Goal) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn path<'py>(&self, py: Python<'py>, to: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let way = self.way(py, to)?;
         let numbers: Vec<f64> =
             way.points().iter().flat_map(|(p, radius_mm)| [p.x, p.y, p.z, *radius_mm]).collect();
@@ -280,10 +281,17 @@ impl Vessel {
     /// Raises InputError naming `start` or `ends` for an unknown opening, a place outside, and one that cannot be
     /// reached.
     #[pyo3(signature = (start = None, ends = None))]
-    fn with_centreline(&self, py: Python<'_>, start: Option<End>, ends: Option<Vec<End>>) -> PyResult<Self> {
+    fn with_centreline(
+        &self,
+        py: Python<'_>,
+        start: Option<&Bound<'_, PyAny>>,
+        ends: Option<List<Bound<'_, PyAny>>>,
+    ) -> PyResult<Self> {
         let lumen = self.lumen.clone();
-        let from = start.map(End::core);
-        let to: Vec<CentrelineEnd> = ends.unwrap_or_default().into_iter().map(End::core).collect();
+        let from = start.map(|start| end("start", start)).transpose()?;
+        let ends = ends.map_or_else(Vec::new, |list| list.0).into_iter().enumerate();
+        let to: Vec<CentrelineEnd> =
+            ends.map(|(index, one)| end(&format!("ends[{index}]"), &one)).collect::<PyResult<_>>()?;
         let found = interruptible(py, move || ExtractedCentreline::of(lumen.wall(&NoStore)?, from, &to))?;
         let found = found.map_err(|error| exception(as_argument(error)))?;
         let inlet = match from {
@@ -318,7 +326,7 @@ impl Vessel {
         &self,
         py: Python<'py>,
         instrument: &Instrument,
-        to: Goal,
+        to: &Bound<'py, PyAny>,
         force_n: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let way = self.way(py, to)?;
@@ -327,8 +335,14 @@ impl Vessel {
     }
 
     /// Whether points (mm, shape (n, 3)) are inside: booleans of shape (n,).
+    ///
+    /// Raises InputError for points that are not finite.
     fn contains<'py>(&self, py: Python<'py>, points_mm: Numbers<'_>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let points = rows("points_mm", &points_mm)?;
+        points
+            .iter()
+            .enumerate()
+            .try_for_each(|(row, point)| finite(&format!("points_mm[{row}]"), *point))?;
         let lumen = &self.lumen;
         let inside: endowire_core::Result<Vec<bool>> =
             py.detach(|| points.into_iter().map(|p: [f64; 3]| lumen.contains(&Vec3::from(p))).collect());
@@ -469,13 +483,16 @@ impl Vessel {
     }
 
     /// The way along its centre line.
-    fn way(&self, py: Python<'_>, to: Goal) -> PyResult<CentrelinePath> {
+    fn way(&self, py: Python<'_>, to: &Bound<'_, PyAny>) -> PyResult<CentrelinePath> {
         let tree = self.tree(py)?;
-        let row = match to {
+        let row = match Goal::of("to", to)? {
             Goal::Name(name) => tree.target(&name).map_err(exception)?.row,
             Goal::Place(place) => tree.nearest_row(&place.into()),
         };
-        tree.path_to(row).ok_or_else(|| refuse("to", row, "is the root, where the way begins"))
+        if let Some(way) = tree.path_to(row) {
+            return Ok(way);
+        }
+        Err(refuse("to", to.repr()?, "is at the root of the centre line, where the way begins"))
     }
 }
 
@@ -489,12 +506,19 @@ fn table<'py>(py: Python<'py>, tree: &CentrelineTree) -> PyResult<Bound<'py, PyA
     array(py, numbers, [tree.nodes().len(), 5])
 }
 
-impl Tree<'_> {
+impl<'py> Tree<'py> {
+    fn of(object: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(path) = object.extract::<PathBuf>() {
+            return Ok(Self::Path(path));
+        }
+        object.extract::<Numbers<'py>>().map(Self::Table)
+    }
+
     fn tree(&self) -> PyResult<CentrelineTree> {
         match self {
             Self::Path(path) => match built_in(path) {
                 Some(tree) => Ok(tree),
-                None => CentrelineTree::read(path).map_err(exception),
+                None => CentrelineTree::read(path).map_err(|error| unknown(path, error)),
             },
             Self::Table(table) => {
                 let nodes = rows::<5>("tree", table)?
@@ -521,6 +545,19 @@ impl Tree<'_> {
 /// The built-in anatomy of this name, unless a file has the same name.
 fn built_in(path: &Path) -> Option<CentrelineTree> {
     path.to_str().filter(|_| !path.exists()).and_then(anatomy::tree)
+}
+
+/// The error for a table that cannot be read: where a name has no folder and no extension, it was meant for a built-in
+/// anatomy.
+fn unknown(path: &Path, error: Error) -> PyErr {
+    let name = path.to_str().filter(|name| !path.exists() && Path::new(name).extension().is_none());
+    let Some(name) = name.filter(|name| !name.contains(std::path::is_separator)) else {
+        return exception(error);
+    };
+    let known = anatomy::NAMES.map(|known| format!("`{known}`")).join(", ");
+    let hint = nearest(&format!("unknown name `{name}`, expected one of {known}"));
+    let mend = format!("is no file, and no built-in anatomy: those are {}{hint}", anatomy::NAMES.join(", "));
+    refuse("tree", format!("{name:?}"), &mend)
 }
 
 /// Warns as `warnings.warn` does, at the line of the caller.

@@ -69,6 +69,54 @@ def test_a_batch_goes_on_and_its_vessel_is_in_a_pickle_once(vessel, wire, copied
     assert len(pickle.dumps(batch)) < 2 * len(pickle.dumps(batch.simulation(0)))
 
 
+@pytest.fixture
+def deploying(vessel):
+    """A coil on its pusher in a microcatheter, out of it."""
+    thin = {"radius_mm": 0.15, "bending_stiffness_nmm2": 0.5}
+    coil = endowire.Instrument([{**thin, "length_mm": 6.0}, {**thin, "length_mm": 100.0}], coil_mm=6.0)
+    catheter = endowire.Instrument(
+        [{"length_mm": 80.0, "radius_mm": 0.45, "inner_radius_mm": 0.25, "bending_stiffness_nmm2": 5.0}]
+    )
+    method = {"element_mm": 2.0, "self_contact": True}
+    simulation = endowire.Simulation(vessel, [coil, coil, catheter], method=method)
+    simulation.step([5.0, 0.0, 5.0])
+    simulation.step([7.0, 0.0, 0.0])
+    return simulation
+
+
+def test_a_coil_stays_one(deploying, copied):
+    other = copied(deploying)
+    assert [one.coil_mm for one in other.instruments] == [6.0, 6.0, 0.0]
+    for one in (deploying, other):
+        one.detach(0)
+    assert other.state().to_bytes() == deploying.state().to_bytes()
+    # With a detached coil, too.
+    after = copied(other)
+    assert len(after.coils) == 1
+    for one in (deploying, after):
+        one.step([0.0, 3.0, 0.0])
+    assert after.state().to_bytes() == deploying.state().to_bytes()
+
+
+def test_a_batch_of_coils_goes_on(deploying, copied):
+    deploying.detach(0)
+    batch = copied(endowire.Batch([deploying] * 2))
+    assert batch.step([[[0.0, 0.0], [3.0, 0.0], [0.0, 0.0]]] * 2) == {}
+    deploying.step([0.0, 3.0, 0.0])
+    assert batch.state(1).to_bytes() == deploying.state().to_bytes()
+
+
+def test_an_instrument_stays_a_coil(copied):
+    read = endowire.Instrument.read(SCENES.parent / "devices" / "coil_010_helix_2x6_soft.toml")
+    assert copied(read).coil_mm == read.coil_mm == pytest.approx(60.0)
+    assert "a coil of" in repr(read) and endowire.Instrument(read.sections).coil_mm == 0.0
+    again = endowire.Instrument(read.sections, coil_mm=read.coil_mm)
+    assert again.sections == read.sections and again.coil_mm == read.coil_mm
+    for wrong in (5.1, -1.0, float("nan"), read.length_mm):
+        with pytest.raises(endowire.InputError, match="coil_mm"):
+            endowire.Instrument(read.sections, coil_mm=wrong)
+
+
 def test_environments_go_on(vessel, wire, copied):
     if copied is copy.copy:
         pytest.skip("a shallow copy of an environment shares its episode, as everywhere")

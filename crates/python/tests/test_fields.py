@@ -2,11 +2,13 @@
 
 import copy
 import pickle
+from pathlib import Path
 
 import endowire
 import numpy as np
 import pytest
 
+VESSELS = Path(__file__).parents[3] / "assets" / "vessels"
 MAGNET = {"kind": "magnet", "end_mm": 4.0, "moment_am2": 4e-3, "field_t": [0.05, 0.0, 0.0]}
 
 
@@ -42,12 +44,59 @@ def test_copies_and_pickles_stay_in_the_field(simulation):
         assert other.report.field_energy_mj == simulation.report.field_energy_mj != 0.0
 
 
+def pickled(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+def in_a_batch(simulation):
+    return pickled(endowire.Batch([simulation])).simulation(0)
+
+
+def restored(simulation):
+    bare = simulation.copy()
+    bare.set_fields([])
+    bare.step()
+    batch = endowire.Batch([bare])
+    batch.restore(0, endowire.State.from_bytes(simulation.state().to_bytes()))
+    return batch.simulation(0)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, pickled, in_a_batch, restored])
+@pytest.mark.parametrize("is_stepped", [False, True])
+def test_fields_that_are_set_come_with_what_is_copied(simulation, copied, is_stepped):
+    simulation.set_fields([MAGNET])
+    if is_stepped:
+        simulation.step()
+    other = copied(simulation)
+    for one in (simulation, other):
+        one.step(2.0)
+    assert other.report.field_energy_mj < -0.01
+    assert other.state().to_bytes() == simulation.state().to_bytes()
+    assert other.report.to_dict() == simulation.report.to_dict()
+
+
+@pytest.mark.parametrize("copied", [pickled, in_a_batch])
+def test_fields_of_a_scene_that_are_removed_stay_away(copied):
+    text = (
+        'name = "in a field"\n[vessel]\ntree = "straight_tube.csv"\n[device]\n[[device.section]]\nlength_mm = 100.0\n'
+        "radius_mm = 0.3\nbending_stiffness_nmm2 = 10.0\n[sheath]\nopening = 0\n"
+        '[[field]]\nkind = "weight"\nforce_n_per_mm = [0.0, 1e-5, 0.0]\n'
+    )
+    simulation = endowire.Scene(VESSELS / "scene.toml", text=text).simulation()
+    simulation.step(20.0)
+    assert copied(simulation).step(1.0).field_energy_mj != 0.0
+    simulation.set_fields([])
+    assert copied(simulation).step(1.0).field_energy_mj == 0.0
+
+
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
         ({"kind": "magnet", "end_mm": 4.0, "moment_am2": 4e-3, "field_t": [50.0, 0.0, 0.0]}, "field_t = 50"),
         ({"kind": "weight", "force_n_per_mm": [float("nan"), 0.0, 0.0]}, "every number must be finite"),
-        ({"kind": "weight", "instrument": 3, "force_n_per_mm": [0.0, 0.0, 1e-5]}, "none of the 1 instruments"),
+        ({"kind": "weight", "instrument": 3, "force_n_per_mm": [0.0, 0.0, 1e-5]}, r"field\[0\].instrument = 3: there are 1"),
+        ({**MAGNET, "end_mm": 4000.0}, r"field\[0\].end_mm = 4000: must be within the instrument, 200 mm"),
+        (["weight", 0, [0.0, 0.0, 1e-5]], r"fields\[0\] = .*: must be a dictionary"),
         ({"kind": "wind"}, "wind"),
     ],
 )

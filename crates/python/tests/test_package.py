@@ -28,6 +28,7 @@ def test_stubs_name_everything():
     stub = ast.parse(STUB.read_text())
     native = endowire._endowire
     told = {node.name: node for node in stub.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+    told = {name: node for name, node in told.items() if not name.startswith("_")}
     assert set(told) == {name for name in vars(native) if not name.startswith("_")}
     for name, node in told.items():
         if isinstance(node, ast.ClassDef):

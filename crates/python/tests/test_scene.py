@@ -43,6 +43,8 @@ until = { push_force_n = 0.5 }
     scene = endowire.Scene(ASSETS / "vessels" / "scene.toml", text)
     with pytest.raises(endowire.InputError, match=r"script\[1\]\.until.*not known beforehand"):
         _ = scene.moves
+    documented = endowire.Scene.moves.__doc__
+    assert "`until`" in documented and "`detach`" in documented
 
 
 def test_rod_cases_are_solved():

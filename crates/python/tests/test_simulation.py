@@ -117,7 +117,7 @@ def test_wrong_commands_change_nothing(simulation, wrong, kind, words):
 def test_wrong_parts_are_named(vessel, wire):
     with pytest.raises(endowire.InputError, match="unknown field `frction`.*`friction`"):
         endowire.Simulation(vessel, wire, wall={"frction": 0.1})
-    with pytest.raises(endowire.InputError, match="wall: every number must be finite"):
+    with pytest.raises(endowire.InputError, match="wall.friction = inf: every number must be finite"):
         endowire.Simulation(vessel, wire, wall={"friction": float("inf")})
     with pytest.raises(endowire.InputError, match="sheath.opening = 7"):
         endowire.Simulation(vessel, wire, opening=7)
@@ -154,9 +154,9 @@ def test_negative_numbers_are_named(vessel, wire, simulation, tmp_path):
     for wrong, words in (
         (lambda: endowire.Simulation(vessel, wire, opening=-1), "opening = -1: must be 0 or more"),
         (lambda: endowire.Vessel.generate("curved_tube", triangles=-1), "triangles = -1: must be 0 or more"),
-        (lambda: simulation.lateral_forces(-1), "instrument = -1: there are 1"),
+        (lambda: simulation.lateral_forces(-1), "instrument = -1: must be 0 or more"),
         (lambda: endowire.Renderer(vessel, view).render(simulation, frame=-1), "frame = -1: must be 0"),
-        (lambda: endowire.Renderer(vessel, view, -1), "plane = -1: the view has one plane, 0"),
+        (lambda: endowire.Renderer(vessel, view, -1), "plane = -1: must be 0 or more"),
         (lambda: endowire.Controller.follow_path(line, lead=-1), "lead = -1: must be 0 or more"),
         (lambda: endowire.Controller.follow_path(line, followers=[(-1, 5.0)]), "followers = -1: must be 0"),
         (lambda: endowire.Controller.search_ahead(line, turned=[-1]), "turned = -1: must be 0 or more"),
