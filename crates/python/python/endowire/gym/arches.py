@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import ComputationError, InputError, Vessel
+from . import checks
 from .centreline import Centreline
 from .vessels import Site
 
@@ -207,7 +208,9 @@ class ArchVariety:
     bounds_mm = np.array([[-110.0, -120.0, -10.0], [110.0, 110.0, 320.0]])
 
     def __init__(self, count: int | None = None, edge_mm: float = 4.0, seed: int = 0) -> None:
-        self.count, self.edge_mm, self.seed = count, edge_mm, seed
+        self.count = None if count is None else checks.whole("count", count, 1)
+        self.edge_mm = checks.positive("edge_mm", edge_mm)
+        self.seed = checks.whole("seed", seed, 0)
         self._kept: dict[int, Site] = {}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ArchVariety:

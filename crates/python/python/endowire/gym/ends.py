@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from . import checks
+
 if TYPE_CHECKING:
     from .episodes import Episodes
 
@@ -46,7 +48,7 @@ class StepLimit:
     terminates = False
 
     def __init__(self, steps: int = 1000) -> None:
-        self.steps = steps
+        self.steps = checks.whole("steps", steps, 1)
 
     def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
         return episodes.steps >= self.steps
@@ -58,7 +60,7 @@ class ForceLimit:
     terminates = True
 
     def __init__(self, limit_n: float = 1.5) -> None:
-        self.limit_n = limit_n
+        self.limit_n = checks.at_least("limit_n", limit_n, 0.0)
 
     def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
         return episodes.batch.largest_contact_force_n > self.limit_n
@@ -76,7 +78,7 @@ class Laborious:
     terminates = False
 
     def __init__(self, iterations: int = 2000) -> None:
-        self.iterations = iterations
+        self.iterations = checks.whole("iterations", iterations, 1)
 
     def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
         return episodes.batch.iterations > self.iterations

@@ -31,6 +31,12 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Begins an episode. It has no options.
+
+        Raises InputError for any.
+        """
+        if options:
+            raise InputError(f"options = {sorted(map(str, options))}: there are none for reset: leave them out")
         super().reset(seed=seed)
         self._episodes.begin({0: self.np_random})
         return self._observation(), self._info()

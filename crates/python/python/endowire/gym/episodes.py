@@ -10,7 +10,8 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from .. import Batch, EndOfWay, EndowireError, Record
+from .. import Batch, EndOfWay, EndowireError, InputError, Record
+from . import checks
 from .centreline import Path, Ways
 from .scaling import shown
 from .task import Task
@@ -25,6 +26,7 @@ class Episodes:
 
     def __init__(self, task: Task, n: int) -> None:
         self.task = task
+        n = checks.whole("num_envs", n, 1)
         self.action_space = task.action_space()
         self._limits = task.limits()
         self._spaces = task.observation_spaces()
@@ -85,7 +87,7 @@ class Episodes:
             simulation.step(rotate_rad=[rng.uniform(0.0, 2.0 * np.pi) for _ in self.task.instruments])
             self.batch.replace(k, simulation)
             self.sites[k] = site
-            self.target_mm[k] = self.task.target.sample(rng, site, starts[k])
+            self.target_mm[k] = self._target_mm(self.task.target.sample(rng, site, starts[k]), site)
             self.paths[k] = site.centreline.path(self.target_mm[k])
             self._ways.put(k, site.centreline, self.target_mm[k])
             self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
@@ -98,6 +100,20 @@ class Episodes:
         self._look()
         for k in generators:
             self.way_before_mm[k] = self.way_begun_mm[k] = self.way_mm[k]
+
+    def _target_mm(self, sampled: Any, site: Site) -> NDArray[np.float64]:
+        """The target of an episode, which the tip must be able to reach."""
+        target_mm = checks.place_mm("target", sampled)
+        segment, _, off_mm = site.centreline.nearest(target_mm)
+        # The centre line may be off the axis, so only far from it it is asked whether the target is in the vessel.
+        radius_mm = site.centreline.radii_mm[[segment + 1, site.centreline.parents[segment + 1]]].max()
+        near_mm = radius_mm + self.task.threshold_mm
+        if off_mm > near_mm and not site.vessel.contains(target_mm[None])[0]:
+            raise InputError(
+                f"target = {target_mm.tolist()}: is outside the vessel, {off_mm:.1f} mm from its centre line: "
+                "give a place inside, mm"
+            )
+        return target_mm
 
     def step(self, velocities: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
         """Moves the selected environments by velocities, mm/s and rad/s, shape (n, n_instruments, 2), clipped to the
@@ -142,28 +158,48 @@ class Episodes:
             raise ResetNeeded(f"reset comes before {what}: call reset once first")
 
     def observe(self) -> dict[str, NDArray[Any]]:
-        """All observations, clipped to their spaces."""
+        """All observations, clipped to their spaces.
+
+        Raises InputError for a part whose numbers have another shape than its space, or are not finite.
+        """
         observed = {}
         for name, part in self._shown.items():
-            space = self._spaces[name]
-            values = part.observe(self)
-            observed[name] = (
-                values
-                if values.dtype == np.uint8
-                else np.clip(values, space.low, space.high).astype(space.dtype)
-            )
+            space, n = self._spaces[name], len(self.sites)
+            values = checks.an_array(f"observations[{name!r}]", part.observe(self))
+            if values.shape != (n, *space.shape):
+                raise InputError(
+                    f"observations[{name!r}] = an array of shape {values.shape}: must have the shape "
+                    f"{(n, *space.shape)}, of its space for each environment"
+                )
+            if values.dtype == np.uint8:
+                observed[name] = values
+                continue
+            if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
+                raise InputError(f"observations[{name!r}]: every number must be real and finite")
+            observed[name] = np.clip(values, space.low, space.high).astype(space.dtype)
         return observed
 
     def rewards(self) -> NDArray[np.float64]:
-        """The sum of all rewards, shape (n,)."""
-        return sum((part.reward(self) for part in self.task.rewards), np.zeros(len(self.sites)))
+        """The sum of all rewards, shape (n,).
+
+        Raises InputError for a reward of another shape, and for one that is not finite.
+        """
+        total = np.zeros(len(self.sites))
+        for index, part in enumerate(self.task.rewards):
+            name = f"rewards[{index}]"
+            values = checks.of_each(name, part, part.reward(self), len(total))
+            if not np.isfinite(values).all():
+                raise InputError(f"{name} = {values.tolist()} from {type(part).__name__}: every number must be finite")
+            total += values
+        return total
 
     def ended(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Terminated and truncated, shape (n,); failed episodes are truncated."""
         n = len(self.sites)
         terminated, truncated = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-        for end in self.task.ends:
-            (terminated if end.terminates else truncated).__ior__(end.ended(self))
+        for index, end in enumerate(self.task.ends):
+            values = checks.of_each(f"ends[{index}]", end, end.ended(self), n)
+            (terminated if end.terminates else truncated).__ior__(values != 0)
         truncated[list(self.failures)] = True
         self._over = terminated | truncated
         return terminated, truncated

@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from .. import InputError
+from . import checks
 from .episodes import Episodes
 from .policies import Policy
 from .task import Task
@@ -47,8 +48,7 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
 
     Raises InputError for ``num_envs`` below 1.
     """
-    if num_envs < 1:
-        raise InputError(f"num_envs = {num_envs}: must be 1 or more")
+    checks.whole("num_envs", num_envs, 1)
     if not len(seeds):
         return []
     episodes = Episodes(task, min(num_envs, len(seeds)))

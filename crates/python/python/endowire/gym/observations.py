@@ -12,10 +12,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from .. import InputError
+from .._endowire import _check_view
+from . import checks
+
 if TYPE_CHECKING:
     from .centreline import Path
     from .episodes import Episodes
     from .task import Task
+
+
+#: Shortest length ahead of a roadmap, mm: positions are relative to it.
+_LEAST_AHEAD_MM = 0.001
 
 
 class Observation(Protocol):
@@ -74,7 +82,7 @@ class Shape:
     """Points of the centre line at arc lengths from the tip, mm, shape (len(from_tip_mm), 3)."""
 
     def __init__(self, from_tip_mm: tuple[float, ...] = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0)) -> None:
-        self.from_tip_mm = np.asarray(from_tip_mm, dtype=float)
+        self.from_tip_mm = checks.lengths_mm("from_tip_mm", from_tip_mm, 0.0)
 
     def space(self, task: Task) -> spaces.Box:
         return _place(task, len(self.from_tip_mm))
@@ -102,7 +110,8 @@ class Roadmap:
     """
 
     def __init__(self, ahead_mm: tuple[float, ...] = (5.0, 10.0, 20.0, 40.0), bend_mm: float = 16.0) -> None:
-        self.ahead_mm, self.bend_mm = np.asarray(ahead_mm, dtype=float), bend_mm
+        self.ahead_mm = checks.lengths_mm("ahead_mm", ahead_mm, _LEAST_AHEAD_MM)
+        self.bend_mm = checks.positive("bend_mm", bend_mm)
 
     def space(self, task: Task) -> spaces.Box:
         return spaces.Box(-5.0, 5.0, (3 * len(self.ahead_mm) + 6,), dtype=np.float32)
@@ -166,7 +175,7 @@ class Forces:
     """
 
     def __init__(self, largest: float = 100.0) -> None:
-        self.largest = largest
+        self.largest = checks.positive("largest", largest)
 
     def space(self, task: Task) -> spaces.Box:
         return spaces.Box(-self.largest, self.largest, (2 * len(task.instruments) + 1,), dtype=np.float32)
@@ -205,9 +214,16 @@ class Fluoroscopy:
         size_px: tuple[int, int] = (128, 128),
         view: dict[str, Any] | None = None,
     ) -> None:
-        self.planes = planes
-        self.size_px = size_px
+        angles = checks.an_array("planes", planes)
+        if angles.ndim != 2 or angles.shape[1] != 2 or not len(angles):
+            raise InputError(f"planes = {planes!r}: give primary and secondary angle of one plane or more, deg")
+        self.planes = tuple((float(primary), float(secondary)) for primary, secondary in angles)
+        checks.numbers("size_px", size_px, (2,))
+        width, height = (checks.whole(f"size_px[{k}]", side, 1) for k, side in enumerate(size_px))
+        self.size_px = (width, height)
         self.view = dict(view or {})
+        for plane in self.planes:
+            _check_view(self._view(*plane))
 
     def space(self, task: Task) -> spaces.Box:
         width, height = self.size_px

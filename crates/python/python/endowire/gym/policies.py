@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import Controller, InputError
+from . import checks
 
 if TYPE_CHECKING:
     from .episodes import Episodes
@@ -36,7 +37,8 @@ class Uniform:
     """Random velocities, uniform from ``slowest_mm_s`` to the push limit and within the rotation limits."""
 
     def __init__(self, seed: int = 0, slowest_mm_s: float = -10.0) -> None:
-        self.rng, self.slowest_mm_s = np.random.default_rng(seed), slowest_mm_s
+        self.rng = np.random.default_rng(seed)
+        self.slowest_mm_s = checks.finite("slowest_mm_s", slowest_mm_s)
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         push, turn = episodes.task.speed_limits

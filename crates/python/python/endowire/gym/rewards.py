@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from . import checks
+
 if TYPE_CHECKING:
     from .episodes import Episodes
 
@@ -23,7 +25,7 @@ class Reached:
     """A reward for reaching the target."""
 
     def __init__(self, worth: float = 1.0) -> None:
-        self.worth = worth
+        self.worth = checks.finite("worth", worth)
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
         return self.worth * episodes.reached
@@ -33,7 +35,7 @@ class EachStep:
     """A reward for every step."""
 
     def __init__(self, worth: float = -0.005) -> None:
-        self.worth = worth
+        self.worth = checks.finite("worth", worth)
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
         return np.full(len(episodes.sites), self.worth)
@@ -43,7 +45,7 @@ class Approach:
     """A reward for every millimetre by which the path length to the target along the centre line decreases."""
 
     def __init__(self, worth_per_mm: float = 0.001) -> None:
-        self.worth_per_mm = worth_per_mm
+        self.worth_per_mm = checks.finite("worth_per_mm", worth_per_mm)
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
         return self.worth_per_mm * (episodes.way_before_mm - episodes.way_mm)
@@ -59,7 +61,7 @@ class Progress:
     """
 
     def __init__(self, worth: float = 1.0) -> None:
-        self.worth = worth
+        self.worth = checks.finite("worth", worth)
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
         # Avoids a division by zero if the episode starts at the target.
@@ -71,7 +73,7 @@ class Distance:
     """A reward for every millimetre between tip and target."""
 
     def __init__(self, worth_per_mm: float = -0.001) -> None:
-        self.worth_per_mm = worth_per_mm
+        self.worth_per_mm = checks.finite("worth_per_mm", worth_per_mm)
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
         return self.worth_per_mm * np.linalg.norm(episodes.tip_mm - episodes.target_mm, axis=1)
@@ -81,7 +83,8 @@ class ContactForce:
     """A reward for every newton by which the largest contact force exceeds a limit."""
 
     def __init__(self, worth_per_n: float = -0.1, limit_n: float = 1.0) -> None:
-        self.worth_per_n, self.limit_n = worth_per_n, limit_n
+        self.worth_per_n = checks.finite("worth_per_n", worth_per_n)
+        self.limit_n = checks.at_least("limit_n", limit_n, 0.0)
 
     def reward(self, episodes: Episodes) -> NDArray[np.float64]:
         beyond = np.maximum(episodes.batch.largest_contact_force_n - self.limit_n, 0.0)

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import Simulation
+from .. import InputError, Simulation
+from . import checks
 from .vessels import Site
 
 
@@ -27,7 +28,7 @@ class CentrelineTarget:
     """
 
     def __init__(self, least_mm: float = 50.0) -> None:
-        self.least_mm = least_mm
+        self.least_mm = checks.at_least("least_mm", least_mm, 0.0)
 
     def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
         line = site.centreline
@@ -36,7 +37,7 @@ class CentrelineTarget:
         if site.targets is not None:
             far &= site.targets
         if not far.any():
-            raise ValueError(
+            raise InputError(
                 f"least_mm = {self.least_mm}: no point of the centre line is so far from the sheath; "
                 f"the farthest is {ways_mm.max():.1f} mm away"
             )
@@ -53,7 +54,7 @@ class FixedTarget:
     """The same point in every episode, mm."""
 
     def __init__(self, position_mm: tuple[float, float, float]) -> None:
-        self.position_mm = np.asarray(position_mm, dtype=float)
+        self.position_mm = checks.place_mm("position_mm", position_mm)
 
     def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
         return self.position_mm
@@ -63,7 +64,13 @@ class NamedTarget:
     """A random one of these named points of a generated vessel."""
 
     def __init__(self, *names: str) -> None:
+        if not names or not all(isinstance(name, str) for name in names):
+            raise InputError(f"names = {names!r}: give the name of one target or more")
         self.names = names
 
     def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
-        return np.asarray(site.vessel.targets[self.names[int(rng.integers(len(self.names)))]])
+        name, known = self.names[int(rng.integers(len(self.names)))], site.vessel.targets
+        if name not in known:
+            others = f"has {', '.join(sorted(known))}" if known else "names no targets"
+            raise InputError(f"target = {name!r}: the vessel {others}")
+        return np.asarray(known[name])

@@ -11,7 +11,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from .. import InputError, Instrument, Simulation
-from . import ends, observations, rewards
+from .._endowire import _check_view
+from . import checks, ends, observations, rewards
 from .scaling import shown
 from .targets import CentrelineTarget, TargetSampler
 from .vessels import Site, VesselSource
@@ -34,10 +35,8 @@ def _ends() -> list[ends.End]:
     return [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit()]
 
 
-def _check_above_zero(name: str, value: float) -> None:
-    # NaN is not greater than anything.
-    if not isinstance(value, (int, float, np.number)) or not 0.0 < value < np.inf:
-        raise InputError(f"{name} = {value!r}: must be a number above 0")
+#: Keywords of `endowire.Simulation` for several instruments.
+_COUPLING = ("names", "friction", "may_lead")
 
 
 @dataclass(eq=False)
@@ -87,17 +86,36 @@ class Task:
             raise InputError(f"actions = {self.actions!r}: give scaled or physical")
         if self.observed not in ("scaled", "physical"):
             raise InputError(f"observed = {self.observed!r}: give scaled or physical")
-
+        self._check_parts()
         for name in ("threshold_mm", "control_period_s"):
-            _check_above_zero(name, getattr(self, name))
-        if np.isnan(self.force_limit_n):
-            raise InputError(f"force_limit_n = {self.force_limit_n!r}: must be a number")
-        if len(self.speed_limits) != 2:
-            raise InputError(f"speed_limits = {self.speed_limits!r}: give a push in mm/s and a turn in rad/s")
-        for k, limit in enumerate(self.speed_limits):
-            _check_above_zero(f"speed_limits[{k}]", limit)
-        if self.solves is not None and (not isinstance(self.solves, int) or self.solves < 1):
-            raise InputError(f"solves = {self.solves!r}: give a whole number of at least one, or None")
+            checks.positive(name, getattr(self, name))
+        # No limit is one, too.
+        if self.force_limit_n != np.inf:
+            checks.at_least("force_limit_n", self.force_limit_n, 0.0)
+        for k, limit in enumerate(checks.numbers("speed_limits", self.speed_limits, (2,))):
+            checks.positive(f"speed_limits[{k}]", float(limit))
+        if self.solves is not None:
+            checks.whole("solves", self.solves, 1)
+        checks.truth("assessed", self.assessed)
+
+    def _check_parts(self) -> None:
+        instruments = self.instruments
+        is_list = isinstance(instruments, Sequence) and all(isinstance(one, Instrument) for one in instruments)
+        if not is_list or not instruments:
+            raise InputError(f"instruments = {instruments!r}: give a list of Instruments, the innermost first")
+        checks.has("vessels", self.vessels, "sample")
+        checks.has("target", self.target, "sample")
+        if not isinstance(self.observations, Mapping):
+            raise InputError(f"observations = {self.observations!r}: give a dictionary of names and parts")
+        for name, method in (("observations", "observe"), ("rewards", "reward"), ("ends", "ended")):
+            checks.parts(name, getattr(self, name), method)
+        for name in ("wall", "method", "coupling", "view"):
+            if not isinstance(getattr(self, name), Mapping):
+                raise InputError(f"{name} = {getattr(self, name)!r}: give a dictionary of keys and values")
+        unknown = sorted(set(self.coupling) - set(_COUPLING))
+        if unknown:
+            raise InputError(f"coupling = {unknown[0]!r}: is no key of it: {', '.join(_COUPLING)}")
+        _check_view(self.view)
 
     def limits(self) -> NDArray[np.float64]:
         """Largest advance speed in mm/s and rotation speed in rad/s of each instrument, shape (n_instruments, 2)."""

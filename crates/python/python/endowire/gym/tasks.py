@@ -163,7 +163,10 @@ def navigation(vessel: str = "aortic_arch", target: str | None = None, **parts: 
     ``info["safety"]`` is the fraction of safe steps.
     """
     is_fine = vessel == "hepatic"
-    made = Vessel.generate(vessel, edge_mm=1.1 if is_fine else 3.0)
+    try:
+        made = Vessel.generate(vessel, edge_mm=1.1 if is_fine else 3.0)
+    except InputError as refused:
+        raise InputError(f"vessel = {vessel!r}: {refused}") from None
     if not made.targets:
         raise InputError(f"vessel = {vessel!r}: names no targets: give aortic_arch or hepatic")
     if target is not None and target not in made.targets:
@@ -209,9 +212,15 @@ TASKS = {
 }
 
 
+def _named(task: str, parts: dict[str, Any]) -> Task:
+    if task not in TASKS:
+        raise InputError(f"task = {task!r}: give one of {', '.join(TASKS)}")
+    return TASKS[task](**parts)
+
+
 def make_env(task: str, render_mode: str | None = None, **parts: Any) -> InsertionEnv:
     """The environment of a task of `TASKS`; keywords replace its parts."""
-    return InsertionEnv(TASKS[task](**parts), render_mode)
+    return InsertionEnv(_named(task, parts), render_mode)
 
 
 def make_vector_env(
@@ -224,7 +233,7 @@ def make_vector_env(
     """The vector environment of a task of `TASKS`; keywords replace its parts. An episode is truncated after
     ``max_episode_steps``, as by `gymnasium.make` for a single one.
     """
-    made = TASKS[task](**parts)
+    made = _named(task, parts)
     if max_episode_steps is not None:
         made.ends = [*made.ends, ends.StepLimit(max_episode_steps)]
     return InsertionVectorEnv(made, num_envs, render_mode)

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from .. import InputError
+from . import checks
 from .episodes import Episodes
 from .pictures import check_mode, picture
 from .task import Task
@@ -31,6 +32,7 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     def __init__(self, task: Task, num_envs: int = 1, render_mode: str | None = None) -> None:
         super().__init__()
         check_mode(render_mode)
+        num_envs = checks.whole("num_envs", num_envs, 1)
         self.task, self.num_envs, self.render_mode = task, num_envs, render_mode
         self._episodes = Episodes(task, num_envs)
         self._unit = task.action_unit()
@@ -44,7 +46,12 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Begins all episodes. Environment k has the seed ``seed + k``, or ``seed[k]``."""
+        """Begins all episodes, or with Gymnasium's option ``reset_mask``, True or False for each environment, only
+        these. Environment k has the seed ``seed + k``, or ``seed[k]``.
+
+        Raises InputError for seeds or a mask of another length, and for other options.
+        """
+        mask = self._mask(options)
         if seed is not None:
             seeds = (
                 [seed + k for k in range(self.num_envs)]
@@ -58,12 +65,29 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
                     f"seed = {count} numbers: give one, or one for each of {self.num_envs} environments"
                 )
             for k, own in enumerate(seeds):
-                if own is not None:
+                if own is not None and mask[k]:
                     self._generators[k] = seeding.np_random(int(own))[0]
             super().reset(seed=seeds[0])
-        self._episodes.begin(dict(enumerate(self._generators)))
-        self._over[:] = False
+        self._episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(mask)})
+        self._over[mask] = False
         return self._episodes.observe(), self._info()
+
+    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        """The environments that `reset` is to reset."""
+        unknown = sorted(map(str, set(options or {}) - {"reset_mask"}))
+        if unknown:
+            raise InputError(f"options = {unknown}: there is none but reset_mask")
+        if not options:
+            return np.ones(self.num_envs, dtype=bool)
+        mask = checks.an_array("reset_mask", options["reset_mask"])
+        if mask.shape != (self.num_envs,) or mask.dtype != bool:
+            mend = f"must be True or False for each of {self.num_envs} environments"
+            raise InputError(f"reset_mask = an array of shape {mask.shape} of {mask.dtype}: {mend}")
+        if not mask.any():
+            raise InputError("reset_mask = all False: name an environment that is to be reset")
+        if not mask.all():
+            self._episodes.check_begun("reset_mask")
+        return mask
 
     def step(
         self, actions: NDArray[np.float32]

@@ -40,7 +40,8 @@ class Site:
 
     def renderer(self, view: Mapping[str, Any]) -> Renderer:
         """The cached renderer of the vessel for a `[view]` table."""
-        key = json.dumps(view, sort_keys=True)
+        # Arrays and paths are taken as the lists and texts that they stand for.
+        key = json.dumps(view, sort_keys=True, default=lambda value: getattr(value, "tolist", value.__str__)())
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.vessel, dict(view))
         return self._renderers[key]
