@@ -9,6 +9,9 @@ use crate::injection::{Injection, flowed_ml, reaches_s};
 use crate::record::{Record, Sample};
 use crate::way::Way;
 
+/// Times that differ by less count as equal, s: that of a sample is a sum of steps, rounded.
+const SAME_S: f64 = 1e-9;
+
 /// Where the goal of a subject lies.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Site<'a> {
@@ -111,7 +114,8 @@ impl Reach {
         match flowed_s {
             None => Some(so_s),
             Some(flowed_s) => {
-                flowed_s.map(|time_s| time_s.max(so_s)).filter(|time_s| *time_s <= sample.time_s)
+                let by_now = |time_s: &f64| *time_s <= sample.time_s + SAME_S;
+                flowed_s.map(|time_s| time_s.max(so_s)).filter(by_now).map(|time_s| time_s.min(sample.time_s))
             }
         }
     }

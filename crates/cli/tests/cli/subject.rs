@@ -141,7 +141,7 @@ fn a_hand_that_goes_to_and_fro_unseen_arrives_and_does_not_pass() {
     let passed = |name: &str| metric(&score, name)["passed"].as_bool();
     assert_eq!((passed("reversals"), passed("moving_without_beam_s")), (Some(false), Some(false)));
     assert_eq!((passed("total_s"), passed("wall_force_n")), (Some(true), Some(true)));
-    assert_eq!((passed("turns"), score["score"].as_f64()), (None, Some(60.0)));
+    assert_eq!((passed("turns"), score["score"].as_f64()), (None, Some(100.0 * 4.0 / 6.0)));
 }
 
 /// A shipped subject with changes, in a file of its own; its score, and what was said, where it does not pass.
@@ -170,7 +170,7 @@ fn failed(name: &str, folder: &Path, changes: &[(&str, &str)]) -> (Value, String
 fn a_reference_that_misses_a_threshold_fails() {
     let folder = tempfile::tempdir().unwrap();
     let (score, said) = failed("curved_tube", folder.path(), &[("at_most = 0.02", "at_most = 0.001")]);
-    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("goal"), &json!(80.0)));
+    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("goal"), &json!(100.0 * 5.0 / 6.0)));
     assert_eq!(metric(&score, "hand_force_n")["passed"], json!(false));
     assert!(said.contains("curved_tube.toml: the reference script does not pass"), "{said}");
 }
@@ -207,7 +207,7 @@ fn a_folder_of_a_run_says_what_of_a_subject_it_cannot_tell() {
     let unjudged: Vec<&str> =
         score["unjudged"].as_array().unwrap().iter().map(|one| one["what"].as_str().unwrap()).collect();
     assert_eq!(unjudged, ["moving_without_beam_s", "limits.beam_s"]);
-    assert_eq!(score["score"], json!(80.0), "four points of five");
+    assert_eq!(score["score"], json!(100.0 * 5.0 / 6.0), "five points of six");
     let words = String::from_utf8(assess(&[]).stdout).unwrap();
     assert!(
         words.contains("not judged: moving_without_beam_s, limits.beam_s: no beam was recorded"),
