@@ -265,4 +265,13 @@ def test_a_model_of_stable_baselines_learns_and_acts(task):
     model.learn(64)
     (outcome,) = evaluation.evaluate(task, Learned(model, vector), [4])
     assert outcome.seed == 4 and outcome.steps > 0
+    # Actions that are drawn come from the seed, not from torch's own generator, which they leave as it is.
+    import torch
+
+    acts = [Learned(model, vector, seed=seed).act(vector.venv.episodes) for seed in (5, 5, 6, None)]
+    assert np.array_equal(acts[0], acts[1])
+    assert not np.array_equal(acts[0], acts[2]) and not np.array_equal(acts[0], acts[3])
+    before = torch.random.get_rng_state()
+    Learned(model, vector, seed=5).act(vector.venv.episodes)
+    assert torch.equal(before, torch.random.get_rng_state())
     assert pickle.loads(pickle.dumps(task)).observations["roadmap"].bend_mm == 16.0
