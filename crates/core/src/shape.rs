@@ -35,7 +35,11 @@ impl Shape {
 
     /// Largest angle between the directions at two neighbouring nodes, rad: by how much an element bends.
     pub fn largest_turn_rad(&self) -> f64 {
-        largest_turn_rad(self.tangents.iter())
+        let pairs = self.tangents.windows(2);
+        // Exact for small angles too, where the cosine is not.
+        pairs
+            .map(|pair| libm::atan2(pair[0].cross(&pair[1]).norm(), pair[0].dot(&pair[1])))
+            .fold(0.0, f64::max)
     }
 
     /// Allocates for up to `nodes` nodes.
@@ -81,13 +85,6 @@ impl Shape {
     pub fn tip_mm(&self) -> Option<Vec3> {
         self.positions_mm.last().copied()
     }
-}
-
-/// Largest angle between successive directions, rad.
-pub(crate) fn largest_turn_rad<'a>(tangents: impl Iterator<Item = &'a Vec3> + Clone) -> f64 {
-    let pairs = tangents.clone().zip(tangents.skip(1));
-    // Exact for small angles too, where the cosine is not.
-    pairs.map(|(a, b)| libm::atan2(a.cross(b).norm(), a.dot(b))).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

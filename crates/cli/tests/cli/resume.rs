@@ -412,9 +412,14 @@ fn what_a_script_injects_is_recorded_drawn_and_goes_on_as_if_nothing_had_been_be
     let steps = std::fs::read_to_string(at("whole/steps.csv")).unwrap();
     assert_eq!(rows[1][..6], ["10", &end_s(&steps, 10), "device", "6.0", "4.0", "40.0"]);
     let tips = |step: usize| steps.lines().nth(step).unwrap().split(',').skip(7).take(3).collect::<Vec<_>>();
-    assert_eq!((&rows[1][6..9], &rows[2][6..9]), (&tips(10)[..], &tips(26)[..]), "from the tip as it was then");
+    assert_eq!(
+        (&rows[1][6..9], &rows[2][6..9]),
+        (&tips(10)[..], &tips(26)[..]),
+        "from the tip as it was then"
+    );
     // What holds that tip.
-    let at_tip = steps.lines().next().unwrap().split(',').position(|name| name == "wall_force_tip_n").unwrap();
+    let at_tip =
+        steps.lines().next().unwrap().split(',').position(|name| name == "wall_force_tip_n").unwrap();
     let force = |step: usize| steps.lines().nth(step).unwrap().split(',').nth(at_tip).unwrap();
     assert_eq!((rows[0][9], rows[1][9], rows[2][9]), ("tip_force_n", force(10), force(26)));
     // Medium is in the frames from then on: a run without has the same before, and another after.

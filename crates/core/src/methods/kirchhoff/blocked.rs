@@ -1,8 +1,7 @@
 //! Detects a vessel narrower than the device that is pushed into it.
 //!
 //! A device is blocked if no sphere of its radius can pass ahead of its front (`contact/passage.rs`). Any other
-//! missing equilibrium is reported as a failed computation, and so is one of elements that bend too much to say: a
-//! device of long elements lies in the wall of a narrow bend, where it finds no room. A yielding wall lets a device through a vessel somewhat
+//! missing equilibrium is reported as a failed computation. A yielding wall lets a device through a vessel somewhat
 //! narrower than itself; this is not an error.
 
 use super::Environment;
@@ -13,7 +12,6 @@ use crate::device::line_mm;
 use crate::methods::Command;
 use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
-use crate::shape::{COARSE_TURN_RAD, largest_turn_rad};
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
 /// Penetration, as a fraction of its radius, from which a device counts as wedged.
@@ -24,7 +22,7 @@ const FRONT: usize = 60;
 /// After no equilibrium was found: rejects commands that advance an instrument where its passage is too narrow.
 ///
 /// # Errors
-/// [`PhysicalEnd::Blocked`] with the narrowest position; [`Error::Computation`] where elements are too coarse to say.
+/// [`PhysicalEnd::Blocked`] with the narrowest position.
 pub(super) fn refuse_narrow(
     environment: &Environment<'_>,
     from: Start<'_>,
@@ -35,13 +33,6 @@ pub(super) fn refuse_narrow(
         if command.advance_mm > 0.0
             && let Some((narrow, device_radius_mm)) = narrow(environment, from, &lengths_mm, instrument)
         {
-            let turn_rad = largest_turn_rad(from.state.rod.frames.iter().map(|frame| &frame.t));
-            if turn_rad > COARSE_TURN_RAD {
-                return Err(Error::Computation(format!(
-                    "kirchhoff: no equilibrium, and elements bend by up to {:.0}°: give shorter elements (method.element_mm)",
-                    turn_rad.to_degrees()
-                )));
-            }
             let position_mm = environment.wall().place(&narrow.place_mm);
             let lumen_radius_mm = narrow.radius_mm;
             return Err(Error::End(PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }));
