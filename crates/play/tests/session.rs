@@ -536,7 +536,7 @@ fn pictures_follow_the_pedal() {
     let filled = dark(&mut pictures, &session);
     (0..1200).for_each(|_| session.tick());
     let empty = dark(&mut pictures, &session);
-    assert!(filled > 4 * empty + 40, "{filled} {empty}");
+    assert!(filled > 4 * empty + 20, "{filled} {empty}");
 }
 
 #[test]

@@ -297,7 +297,7 @@ mod tests {
         assert!(refused(complex(2.0, 60.0, 200.0)).contains("turn_deg = 200"));
         assert!(refused(complex(0.5, 60.0, 40.0)).contains("arcs"));
         let short = complex(4.0, 60.0, 40.0).arcs("part \"a\"", 1e-5, 0.15).unwrap_err().to_string();
-        assert!(short.contains("\"a\".length_mm = 0.00001: is too short for loops of 4 mm"), "{short}");
+        assert!(short.contains("\"a\".length_mm = 1e-5: is too short for loops of 4 mm"), "{short}");
         assert!(refused(Secondary::Curve { points_mm: vec![[0.0; 3]; 2] }).contains("2 points"));
         assert!(refused(Secondary::Curve { points_mm: vec![[0.0; 3]; 3] }).contains("two places"));
         let back = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.1, 0.0]];

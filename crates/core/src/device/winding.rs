@@ -123,7 +123,7 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-4, "{wire}: {found}");
         }
         // A thicker wire in the same winding is stiffer by at least the fifth power.
-        assert!(bending_nmm2(0.002, 0.010) / bending_nmm2(0.001, 0.010) > 32.0);
+        assert!(bending_nmm2(0.0025, 0.010) / bending_nmm2(0.00125, 0.010) > 32.0);
     }
 
     #[test]
