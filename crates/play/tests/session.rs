@@ -448,7 +448,7 @@ fn the_room_refuses_what_it_cannot_do() {
             "pose = LAO 130 CRA 0: is out of reach: give at most 120°",
         ),
         (Input::CArm { pose: "CAU 70".parse().unwrap() }, "60° CRA or CAU"),
-        (table(1e9, false), "right_mm = 1000000000: must be a number from -10000 to 10000"),
+        (table(1e9, false), "right_mm = 1e9: must be a number from -10000 to 10000"),
         (table(1.0, true), "second = true: there is one plane alone"),
     ] {
         let error = refused(input);
