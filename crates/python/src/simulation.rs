@@ -135,6 +135,9 @@ impl Simulation {
     }
 }
 
+/// What pickling takes a simulation apart into: what makes it anew, and with what.
+type Reduced<'py> = (Bound<'py, PyAny>, (Py<Start>, State));
+
 #[pymethods]
 impl Simulation {
     /// Instruments at the mouth of a sheath in a vessel, with nothing inserted.
@@ -414,7 +417,7 @@ impl Simulation {
         self.copy(py)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Py<Start>, State))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (py, simulation) = (slf.py(), slf.get());
         let parts = (simulation.start.clone_ref(py), simulation.state(py));
         Ok((slf.get_type().getattr("_unpickled")?, parts))
