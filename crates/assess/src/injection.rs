@@ -57,7 +57,7 @@ impl Outlet {
 pub struct Injection {
     /// Time of its begin.
     pub time_s: f64,
-    /// Volume that the injector was told to give.
+    /// Volume that the injector is set to give.
     pub volume_ml: f64,
     /// Flow rate.
     pub rate_ml_per_s: f64,

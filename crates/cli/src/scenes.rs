@@ -10,7 +10,7 @@ use endowire_viewer::ViewSpec;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::recording::{RecordedNames, RecordedSummary};
+use crate::output::recording::RecordedSummary;
 use crate::output::tell;
 
 /// Reads a scene with overridden keys.
@@ -74,10 +74,9 @@ pub(crate) fn other_than_recorded(
     path: &Path,
 ) -> Result<Option<String>, Failure> {
     let Some(recorded) = &summary.scene_hash else { return Ok(None) };
-    let told = RecordedNames::read(dir);
     // Without the settings of now, which are meant to differ, and with the script of the run.
     let Ok((_, mut as_it_was)) = of_recording(summary, given, &[]) else { return Ok(None) };
-    if let Some(script) = &told.script_file
+    if let Some(script) = &summary.script_file
         && as_it_was.take_script(script).is_err()
     {
         return Ok(None);
@@ -85,7 +84,7 @@ pub(crate) fn other_than_recorded(
     if Provenance::of_scene(&as_it_was, &[])?.scene_hash() == recorded {
         return Ok(None);
     }
-    let name = told.scene.filter(|name| *name != as_it_was.name);
+    let name = summary.scene.as_ref().filter(|name| **name != as_it_was.name);
     let (path, dir) = (path.display(), dir.display());
     Ok(Some(match (given, name) {
         (Some(_), Some(name)) => format!(

@@ -5,10 +5,6 @@ use serde::{Deserialize, Serialize};
 use crate::Vec3;
 use crate::rod::quadrature::hermite;
 
-/// Angle by which an element may bend, rad: a ring of six elements, 60° each, has a push force off by 0.4 %, one of four
-/// by 4 %; at contacts the error is larger.
-pub(crate) const COARSE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_3;
-
 /// The inserted part of a device, from the sheath to the tip.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shape {

@@ -30,7 +30,7 @@ struct Members {
     batch: insertion::Batch,
     /// The start of each simulation.
     starts: Vec<Arc<Py<Start>>>,
-    /// Ends their long steps: threads of parallel work are not told of signals.
+    /// Ends their long steps: threads of parallel work receive no signals.
     stop: Arc<AtomicBool>,
 }
 
@@ -168,7 +168,7 @@ impl Members {
     }
 }
 
-/// The simulation; its long steps end once `stop` is set, or at a signal on the thread that is told of them.
+/// The simulation; its long steps end once `stop` is set, or at a signal on the thread that receives them.
 fn stopped_by(stop: &Arc<AtomicBool>, mut simulation: insertion::Simulation) -> insertion::Simulation {
     let stop = Arc::clone(stop);
     simulation.stop_when(move || stop.load(Ordering::Relaxed) || signalled());

@@ -38,8 +38,8 @@ pub(crate) fn stoppable<T: Send + 'static>(
     waited_for(py, Some(stop), work)
 }
 
-/// Whether a signal handler has raised, on the thread that is told of signals. Its exception is kept for the caller that
-/// is told about the end of the step.
+/// Whether a signal handler has raised, on the thread that receives signals. Its exception is kept for the caller,
+/// who learns that the step has ended.
 pub(crate) fn signalled() -> bool {
     Python::attach(|py| py.check_signals().map_err(|raised| raised.restore(py)).is_err())
 }

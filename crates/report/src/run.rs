@@ -184,7 +184,7 @@ pub fn events(rows: &[Row]) -> Vec<Event> {
             happened("not converged", format!("at {:.1} mm: the step found no equilibrium", row.inserted_mm));
         }
         if row.relaxations > 0 {
-            // What is not recorded, or is nothing, is not told as a number.
+            // What is not recorded, or is nothing, gets no number.
             let left = row.imbalance.filter(|left| *left > 0.0);
             let left = left.map_or_else(String::new, |left| format!(", {left:.1e} out of balance"));
             happened("last resort", format!("at {:.1} mm: left to come to rest{left}", row.inserted_mm));

@@ -107,7 +107,7 @@ fn list(folder: &Path, json: bool) -> Result<(), Failure> {
         let row = |row: &Row| format!("{}  {:<22} {}", row.level, row.subject, row.name);
         document.subjects.iter().map(row).collect::<Vec<_>>().join("\n")
     })?;
-    // The others are listed; each that is none is told.
+    // What can be read is listed; the rest is reported.
     let Some(last) = refused.pop() else { return Ok(()) };
     refused.iter().for_each(|error| tell(format_args!("endowire: {error}")));
     Err(last.into())

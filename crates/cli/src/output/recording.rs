@@ -17,6 +17,10 @@ use crate::failure::Failure;
 pub(crate) struct RecordedSummary {
     /// File of the scene.
     pub(crate) scene_file: PathBuf,
+    /// Name of the scene.
+    pub(crate) scene: Option<String>,
+    /// File of the script, if it was not the scene's own.
+    pub(crate) script_file: Option<PathBuf>,
     /// Hash of the scene's text and of the files it names.
     pub(crate) scene_hash: Option<String>,
     /// Keys of the scene that were set on the command line.
@@ -36,23 +40,6 @@ impl RecordedSummary {
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let read = || -> io::Result<_> { Ok(serde_json::from_slice(&std::fs::read(path)?)?) };
         read().map_err(|e| unreadable(path, &e))
-    }
-}
-
-/// What a summary.json says of its scene for messages; empty if there is none.
-#[derive(Debug, Default, Deserialize)]
-pub(crate) struct RecordedNames {
-    /// Name of the scene.
-    pub(crate) scene: Option<String>,
-    /// File of its script, if that was another.
-    pub(crate) script_file: Option<PathBuf>,
-}
-
-impl RecordedNames {
-    /// Those of the recording in a folder.
-    pub(crate) fn read(folder: &Path) -> Self {
-        let text = std::fs::read(folder.join(SUMMARY)).unwrap_or_default();
-        serde_json::from_slice(&text).unwrap_or_default()
     }
 }
 
@@ -84,6 +71,8 @@ impl Recording {
                 let scene_file = scene.to_path_buf();
                 RecordedSummary {
                     scene_file,
+                    scene: None,
+                    script_file: None,
                     scene_hash: None,
                     set: vec![],
                     unconverged_steps: 0,

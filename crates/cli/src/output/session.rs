@@ -15,7 +15,15 @@ pub(crate) fn beside(script: &Path) -> PathBuf {
 /// Scene of a session, and time of its recording, seconds since 1970-01-01 UTC, if given.
 pub(crate) fn read_head(path: &Path) -> Result<(RecordedSummary, Option<u64>), Failure> {
     let SessionFile { scene_file, set, recorded_unix_s, .. } = SessionFile::read(path)?;
-    let summary = RecordedSummary { scene_file, scene_hash: None, set, unconverged_steps: 0, complete: true };
+    let summary = RecordedSummary {
+        scene_file,
+        scene: None,
+        script_file: None,
+        scene_hash: None,
+        set,
+        unconverged_steps: 0,
+        complete: true,
+    };
     Ok((summary, recorded_unix_s))
 }
 

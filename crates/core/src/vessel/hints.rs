@@ -108,14 +108,8 @@ mod tests {
 
     #[test]
     fn an_opening_with_the_vessel_right_in_front_is_told() {
-        let opening = |beyond_mm: f64| Opening {
-            index: 3,
-            centre_mm: crate::Vec3::x(),
-            radius_mm: 3.0,
-            direction: crate::Vec3::x(),
-            boundary: Vec::new(),
-            beyond_mm,
-        };
+        let x = crate::Vec3::x();
+        let opening = |beyond_mm: f64| Opening { index: 3, beyond_mm, ..Opening::at_end(x, 3.0, x) };
         let told: Vec<String> = tight_hints(&[opening(0.2), opening(1.0)]).collect();
         assert!(told.len() == 1 && told[0].contains("in front of opening 3, at [1, 0, 0]"), "{told:?}");
     }

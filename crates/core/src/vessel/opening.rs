@@ -159,11 +159,14 @@ pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, rims_mm: &[f64], open
         for ((opening, rim_mm), beyond) in openings.iter().zip(rims_mm).zip(&mut beyond) {
             let free = FREE_RADII * opening.radius_mm;
             let (along, aside) = opening.beyond_and_aside_mm(&x);
+            if aside >= free {
+                continue;
+            }
             let before = along - rim_mm;
             let from_rim = libm::hypot(aside - opening.radius_mm, before);
             let is_own = before <= 0.0 || from_rim <= OWN_RIM * opening.radius_mm;
             // Rims may be oblique.
-            if aside < free && (along > free || !is_own) {
+            if along > free || !is_own {
                 let half = if is_own { 0.0 } else { HALFWAY * before };
                 *beyond = (along - free).max(half).min(*beyond);
             }
@@ -385,16 +388,13 @@ mod tests {
         assert!((found.openings[0].direction + Vec3::z()).norm() < 1e-15);
     }
 
+    /// An opening of radius 1 on the x axis.
+    fn opening(x: f64, direction: Vec3) -> Opening {
+        Opening::at_end(Vec3::x() * x, 1.0, direction.normalize())
+    }
+
     #[test]
     fn what_is_drawn_out_of_two_openings_stays_apart() {
-        let opening = |x: f64, direction: Vec3| Opening {
-            index: 0,
-            centre_mm: Vec3::x() * x,
-            radius_mm: 1.0,
-            direction: direction.normalize(),
-            boundary: Vec::new(),
-            beyond_mm: MOST_BEYOND_MM,
-        };
         let beyond = |mesh: &SurfaceMesh, turned: f64| {
             let mut pair =
                 [opening(-5.0, Vec3::new(turned, 0.0, 1.0)), opening(5.0, Vec3::new(-turned, 0.0, 1.0))];
@@ -425,14 +425,6 @@ mod tests {
 
     #[test]
     fn what_is_drawn_out_of_openings_that_face_each_other_meets_in_the_middle() {
-        let opening = |x: f64, direction: Vec3| Opening {
-            index: 0,
-            centre_mm: Vec3::x() * x,
-            radius_mm: 1.0,
-            direction,
-            boundary: Vec::new(),
-            beyond_mm: MOST_BEYOND_MM,
-        };
         for (gap, most) in [(1.0, 0.5), (4.0, 2.0), (7.0, LEAST_BEYOND_MM)] {
             let mut pair = [opening(0.0, Vec3::x()), opening(gap, -Vec3::x())];
             keep_apart(places(&SurfaceMesh::default()), &[0.0; 2], &mut pair);
