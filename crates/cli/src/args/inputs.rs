@@ -32,7 +32,7 @@ pub(crate) enum VesselCommand {
     Centreline(CentrelineArgs),
     /// Measure the sac of an aneurysm: neck, volume, height
     Sac(SacArgs),
-    /// Say whether a device can follow the way to a target: room, narrowest place, sharpest bend; passes, tight, blocked or short
+    /// Report whether a device can follow the path to a target: room, narrowest place, sharpest bend; passes, tight, blocked or short
     Passable(PassableArgs),
 }
 
@@ -63,13 +63,13 @@ pub(crate) enum DeviceCommand {
     },
 }
 
-/// How the coordinates of a surface file are meant.
+/// Unit and axes of the coordinates in a surface file.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct CoordinateArgs {
     /// Millimetres per unit of the file
     #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
     pub(crate) unit_mm: f64,
-    /// Axes of the file, LPS or RAS; as its header says, or LPS, if absent
+    /// Axes of the file, LPS or RAS; if absent, those of its header, or LPS
     #[arg(long, value_name = "AXES")]
     pub(crate) axes: Option<PatientAxes>,
 }
@@ -80,10 +80,10 @@ impl From<CoordinateArgs> for SurfaceFrame {
     }
 }
 
-/// What is wanted of the wall that devices feel; with none of these it is not made.
+/// Requests about the contact wall; without any of them it is not computed.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct FeltArgs {
-    /// Write the evenly meshed wall that devices feel (.ply, .obj or .stl) and report on it
+    /// Write the evenly meshed contact wall (.ply, .obj or .stl) and report on it
     #[arg(long, value_name = "FILE")]
     pub(crate) felt: Option<PathBuf>,
     /// How far that wall may be from the surface, mm, as vessel.wall.deviation_mm of a scene; 0.1 if absent
@@ -116,10 +116,10 @@ pub(crate) struct GenerateArgs {
 pub(crate) struct CentrelineArgs {
     /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
     pub(crate) file: PathBuf,
-    /// Where the centre line begins: the number of an opening, or a place x,y,z inside in mm; the inlet that `vessel check` tells if absent
+    /// Where the centre line begins: the number of an opening, or a place x,y,z inside in mm; if absent, the inlet that `vessel check` reports
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true)]
     pub(crate) from: Option<CentrelineEnd>,
-    /// Where it leads: the number of an opening, or a place x,y,z inside in mm (repeatable); all other openings if absent
+    /// Where the centre line ends: the number of an opening, or a place x,y,z inside in mm (repeatable); all other openings if absent
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true)]
     pub(crate) to: Vec<CentrelineEnd>,
     /// Write the centre-line table (x,y,z,radius,parent and the names of ends)
@@ -139,12 +139,12 @@ pub(crate) struct SacArgs {
     /// A place x,y,z within the sac in mm
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
     pub(crate) dome: Vec3,
-    /// A place x,y,z in the artery that it is on; the nearest one of the centre line that is found in the surface if absent
+    /// A place x,y,z in the parent artery; if absent, the nearest point of the centre line found in the surface
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
     pub(crate) parent: Option<Vec3>,
     #[command(flatten)]
     pub(crate) frame: CoordinateArgs,
-    /// Print what was measured as one JSON document on stdout
+    /// Print the measurements as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -159,21 +159,21 @@ pub(crate) struct PassableArgs {
     /// Where its tip goes: the number of an opening, a place x,y,z inside in mm, or with --centreline the name of a target
     #[arg(long, value_name = "END", allow_hyphen_values = true)]
     pub(crate) to: String,
-    /// Where it comes in: the number of an opening, or a place x,y,z inside in mm; the inlet that `vessel check` tells if absent
+    /// Where the device enters: the number of an opening, or a place x,y,z inside in mm; if absent, the inlet that `vessel check` reports
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true, conflicts_with = "centreline")]
     pub(crate) from: Option<CentrelineEnd>,
-    /// Centre-line table of the surface, with names; the way is found in the surface if absent
+    /// Centre-line table of the surface, with names; if absent, the path is found in the surface
     #[arg(long, value_name = "FILE")]
     pub(crate) centreline: Option<PathBuf>,
-    /// Force along the device, N, that is taken for none: a section takes a bend if pushing it in costs no more
+    /// Force along the device, N, below which a section counts as passing a bend freely
     #[arg(long, default_value_t = NO_FORCE_N, value_name = "N", allow_negative_numbers = true)]
     pub(crate) force_n: f64,
-    /// Draw the way through the vessel, coloured by its room, and room and bends along it (.png)
+    /// Draw the path through the vessel, coloured by its room, and plot room and bends along it (.png)
     #[arg(long, value_name = "FILE")]
     pub(crate) picture: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) frame: CoordinateArgs,
-    /// Print what was found as one JSON document on stdout
+    /// Print the result as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -41,11 +41,11 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     /// Run the scripted insertion of a scene and record it: summary.json, steps.csv, shapes.npz, frames/*.png
     Run(RunArgs),
-    /// Run a scene many times with other values of its keys: one Parquet row a run. Killed at any moment, the same command goes on
+    /// Run a scene many times with other values of its keys: one Parquet row a run. After an interruption the same command continues
     Sweep(SweepArgs),
-    /// Move the instruments of a scene by hand, under fluoroscopy: a window, or a protocol of JSON lines; what is done is recorded as a script
+    /// Move the instruments of a scene by hand, under fluoroscopy: a window, or a protocol of JSON lines; the session is recorded as a script
     Play(PlayArgs),
-    /// Score sessions of play, or recorded runs, by what studies of trainees measure: time, radiation, contrast, motion, safety, way, task
+    /// Score sessions of play, or recorded runs, by the measures of studies of trainees: time, radiation, contrast medium, motion, safety, path, task
     Assess(AssessArgs),
     /// Training subjects: a task in a scene with a goal, limits and thresholds of measures
     #[command(subcommand)]
@@ -78,9 +78,9 @@ pub(crate) enum Command {
     Experiment(ExperimentCommand),
     /// Make a folder with a scene to start from: vessel, device, script, views. It runs at once
     New(NewArgs),
-    /// Say what this machine has and what of it is used: adapter, display, threads, cache
+    /// Report graphics adapter, display, threads and cache of this machine, and which of them are used
     Doctor {
-        /// Print it as one JSON document on stdout
+        /// Print the report as one JSON document on stdout
         #[arg(long)]
         json: bool,
     },
@@ -96,20 +96,20 @@ pub(crate) enum Command {
     },
 }
 
-/// What a scene has otherwise than its file.
+/// Values of a scene that replace those of its file.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct SetArgs {
-    /// Give a key of the scene another value than its file does (repeatable). Keys are called from the top of the scene, as in a sweep:
+    /// Replace the value of a key of the scene (repeatable). Keys are written in full, as in a sweep:
     /// vessel.wall.friction=0.1, script[0].step_mm=2, device.part[0].length_mm=60 (of a device file too), view.every=10. Values are
     /// written as in the file, texts also without quotes; paths start from the scene's folder
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<Setting>,
 }
 
-/// What is made of steps without an equilibrium.
+/// How steps without an equilibrium count.
 #[derive(Debug, Default, Clone, Copy, clap::Args)]
 pub(crate) struct ConvergenceArgs {
-    /// End with exit code 0 also where steps have found no equilibrium; they are told and recorded either way
+    /// End with exit code 0 even if steps found no equilibrium; they are reported and recorded in either case
     #[arg(long)]
     pub(crate) allow_unconverged: bool,
 }
@@ -118,7 +118,7 @@ pub(crate) struct ConvergenceArgs {
 pub(crate) struct RunArgs {
     /// Scene file (TOML)
     pub(crate) scene: PathBuf,
-    /// Carry out the script of this file, tables `script` alone, in place of the scene's own: what `play` has recorded
+    /// Carry out the script of this file, which contains only tables `script`, instead of the scene's own: for example a session of `play`
     #[arg(long, value_name = "FILE")]
     pub(crate) script: Option<PathBuf>,
     #[command(flatten)]
@@ -130,14 +130,14 @@ pub(crate) struct RunArgs {
     /// shapes.npz and frames/step_*.png of the same name are replaced
     #[arg(long)]
     pub(crate) force: bool,
-    /// Save the state of the run into a file, again and again while it goes on and at its end. The file is whole at any moment, also after
-    /// the run was killed
+    /// Save the state of the run into a file, repeatedly during the run and at its end. The file is complete at any moment, even after the
+    /// run was killed
     #[arg(long, value_name = "FILE")]
     pub(crate) save_state: Option<PathBuf>,
-    /// Go on from a saved state of the same scene. The recording in DIR goes on after the step the state was saved at: what was recorded
-    /// later is dropped, and what follows has the bits of a run that was never interrupted. A new or empty DIR gets the steps from
-    /// there on. A FILE that is not there yet is no failure: the run begins from the start, and says so. With --save-state of the same file
-    /// one line serves a run that is killed and begun again any number of times
+    /// Continue from a saved state of the same scene. The recording in DIR continues after the step at which the state was saved: later
+    /// steps are dropped, and the following ones have the bits of a run that was never interrupted. A new or empty DIR gets the steps
+    /// from there on. If FILE does not exist yet, the run begins from the start and says so: with --save-state of the same file, one command
+    /// serves a run that is killed and started again any number of times
     #[arg(long, value_name = "FILE")]
     pub(crate) resume: Option<PathBuf>,
     #[command(flatten)]
@@ -147,7 +147,7 @@ pub(crate) struct RunArgs {
     /// Print the summary as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print neither progress nor summary; failures are told
+    /// Print neither progress nor summary, only failures
     #[arg(long)]
     pub(crate) quiet: bool,
 }
@@ -159,7 +159,7 @@ pub(crate) struct ReportArgs {
     /// File of the page; DIR/report.html if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-    /// Scene file, where it is not the one that summary.json names
+    /// Scene file, if it is not the one named in summary.json
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
     /// Give a key of the scene another value, beside those that the run had by its --set, which summary.json tells (repeatable)
@@ -171,26 +171,26 @@ pub(crate) struct ReportArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct AssessArgs {
-    /// Sessions of play (*.session.json), folders of recorded runs, or folders that hold sessions; of several at one task the course is told too:
-    /// in the order in which they were recorded, or in the order given where not all say when that was
+    /// Sessions of play (*.session.json), folders of recorded runs, or folders that hold sessions; for several at one task also
+    /// the change from one to the next: in the order of recording, or in the given order if some do not contain their time of recording
     #[arg(required = true, value_name = "SESSION|DIR")]
     pub(crate) sessions: Vec<PathBuf>,
-    /// Name of the point of the centre line that was to be reached; that of the script's last line with one if absent
+    /// Name of the target on the centre line; if absent, the last target that the script names
     #[arg(long, value_name = "NAME")]
     pub(crate) target: Option<String>,
-    /// Score them by a training subject, by its file or its name in assets/subjects: until its goal is reached or a limit is passed
+    /// Score them by a training subject, given by its file or its name in assets/subjects, until its goal is reached or a limit is exceeded
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["target", "within_mm", "scene"])]
     pub(crate) subject: Option<PathBuf>,
-    /// Distance from it at which the tip has arrived
+    /// Distance from the target at which the tip counts as arrived
     #[arg(long, default_value_t = 5.0, value_name = "MM", allow_negative_numbers = true)]
     pub(crate) within_mm: f64,
-    /// Scene file, where it is not the one that the sessions name
+    /// Scene file, if it is not the one named in the sessions
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
-    /// Write a page for a browser too: the tip's way on the roadmap, hands, beam, contrast medium and forces over time, what stood out, and of
-    /// several sessions their course
+    /// Also write a page for a browser: path of the tip on the roadmap; hands, beam, contrast medium and forces over time; notable events; and,
+    /// for several sessions, the change of the measures
     #[arg(long, value_name = "FILE")]
     pub(crate) page: Option<PathBuf>,
     /// Print the measures as one JSON document on stdout
@@ -200,7 +200,7 @@ pub(crate) struct AssessArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct NewArgs {
-    /// Folder to make; it must not be there, or be empty
+    /// Folder to create; it must not exist, or be empty
     pub(crate) dir: PathBuf,
     /// Surface of a vessel (STL, OBJ, PLY, VTP or VTK), which is copied, or a built-in anatomy
     #[arg(long, default_value = "aortic_arch", value_name = "FILE|NAME")]
@@ -214,46 +214,46 @@ pub(crate) struct NewArgs {
 
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct PlayArgs {
-    /// Scene file (TOML); or a training subject, by its file or its name in assets/subjects: then the task is shown, what was asked for is told
-    /// while it goes, and what was done is scored
+    /// Scene file (TOML); or a training subject, given by its file or its name in assets/subjects: then the window shows the task and the current
+    /// values of its limits, and the session is scored
     #[arg(value_name = "SCENE|SUBJECT")]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) set: SetArgs,
-    /// Show the scene's script in the time that it takes, until an instrument is moved by hand
+    /// Show the scene's script in real time, until an instrument is moved by hand
     #[arg(long)]
     pub(crate) watch: bool,
     /// Begin where the scene's script ends, with what it has injected in the vessel
     #[arg(long, conflicts_with = "watch")]
     pub(crate) after_script: bool,
-    /// Take the script of this file, tables `script` alone, in place of the scene's own: what an earlier session has recorded
+    /// Use the script of this file, which contains only tables `script`, instead of the scene's own: for example an earlier session
     #[arg(long, value_name = "FILE")]
     pub(crate) script: Option<PathBuf>,
-    /// File for what hands have done: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
+    /// File for the recorded session: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
     /// SCENE/played.toml, or that of the subject, if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
-    /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and time goes by as inputs say
+    /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and the inputs determine how time passes
     #[arg(long)]
     pub(crate) headless: bool,
-    /// With --headless: take the lines of this file in place of stdin
+    /// With --headless: read the lines of this file instead of stdin
     #[arg(long, requires = "headless", value_name = "FILE")]
     pub(crate) inputs: Option<PathBuf>,
-    /// With --headless: time goes by as on a clock, and pictures are drawn as for the window
+    /// With --headless: time passes in real time, and pictures are drawn as for the window
     #[arg(long, requires = "headless")]
     pub(crate) realtime: bool,
-    /// Take inputs, lines of JSON, also from programs of this machine that connect to this port, such as 7000, or address, such as [::1]:7000.
-    /// A connection begins with the line that is told as its first; pictures go into the folder of --record
+    /// Also accept inputs, lines of JSON, from programs of this machine that connect to this port, such as 7000, or address, such as [::1]:7000.
+    /// The first line of a connection must be the token that is printed at the start; pictures are written into the folder of --record
     #[arg(long, value_name = "PORT|ADDRESS")]
     pub(crate) listen: Option<crate::commands::play::Address>,
-    /// Let --listen take an address that other machines reach; what goes over it is not encrypted
+    /// Let --listen accept an address that other machines can reach; the connection is not encrypted
     #[arg(long, requires = "listen")]
     pub(crate) allow_remote: bool,
     /// Width and height of the fluoroscopic picture in pixels, 64 to 1024
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=1024))]
     pub(crate) size: u32,
-    /// Linear solves in a sixtieth of a second: what the device has not followed by then goes on in the next, so that none takes long. `all`: each ends in
-    /// equilibrium, and takes a second or more where a device snaps
+    /// Linear solves in a sixtieth of a second: the rest of the motion follows in the next ones, so that none takes long. `all`: each ends in
+    /// equilibrium, and takes a second or more when a device snaps
     #[arg(long, default_value_t, value_name = "N|all")]
     pub(crate) solves: crate::commands::play::Solves,
     /// Warn where a hand pushes or pulls harder than this
@@ -264,7 +264,7 @@ pub(crate) struct PlayArgs {
     pub(crate) warn_nmm: f64,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
-    /// Print at the end what was done, and how fast, as one JSON document on stdout; not without a window and a clock, where stdout is for answers
+    /// Print a summary of the session and its speed at the end as one JSON document on stdout; not with --headless alone, where stdout is for answers
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -275,10 +275,10 @@ pub(crate) struct SweepArgs {
     /// Sweep file (TOML): a scene, and an axis for each key that varies
     #[arg(required = true)]
     pub(crate) sweep: Option<PathBuf>,
-    /// Folder for rows as they come (runs.jsonl), the table of all (runs.parquet), and recordings where they are asked for
+    /// Folder for the rows of finished runs (runs.jsonl), the table of all runs (runs.parquet), and recordings if the sweep requests them
     #[arg(long, value_name = "DIR", required = true)]
     pub(crate) out: Option<PathBuf>,
-    /// Do one of several parts: the first of four is 1/4. Parts may go into one folder or into several, on one machine or on many
+    /// Run only one of several parts: the first of four is 1/4. Parts may go into one folder or into several, on one machine or on many
     #[arg(long, value_name = "I/N", default_value = "1/1")]
     pub(crate) shard: Shard,
     /// Runs at the same time; the number of cores if absent
@@ -288,7 +288,7 @@ pub(crate) struct SweepArgs {
     pub(crate) set: SetArgs,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
-    /// Print what has come of it as one JSON document on stdout
+    /// Print the result as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
     #[command(subcommand)]
@@ -297,7 +297,7 @@ pub(crate) struct SweepArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum SweepCommand {
-    /// Make one table of the rows in the folders of shards, in whatever order they are given
+    /// Make one table of the rows in the folders of shards; their order does not matter
     Merge {
         /// Folders of endowire sweep --out
         #[arg(required = true, value_name = "DIR")]
@@ -308,10 +308,10 @@ pub(crate) enum SweepCommand {
     },
 }
 
-/// Whether walls are kept from run to run.
+/// Whether walls are stored for later runs.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct CacheArgs {
-    /// Make the vessel's wall anew and keep nothing of it. Otherwise a wall that takes long to make is kept, up to 1 GiB in all, in the
+    /// Compute the vessel's wall anew and do not store it. Otherwise a wall that takes long to compute is stored, up to 1 GiB in all, in the
     /// folder walls of $ENDOWIRE_CACHE, or of endowire where the system has the caches of a user (Linux: $XDG_CACHE_HOME or ~/.cache;
     /// macOS: ~/Library/Caches; Windows: %LOCALAPPDATA%). It may be removed at any time
     #[arg(long)]
@@ -329,17 +329,17 @@ pub(crate) struct RodArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct VerifyArgs {
-    /// Add the numerical stress table: stiffness, loads, meshes and shapes far from the ordinary
+    /// Add the numerical stress table: extreme stiffnesses, loads, meshes and shapes
     #[arg(long)]
     pub(crate) stress: bool,
-    /// Random commands on instruments in one another in each case of the stress table
+    /// Number of random commands in each case of the stress table with several instruments
     #[arg(long, default_value_t = 1_000, value_name = "COUNT", requires = "stress")]
     pub(crate) commands: usize,
     /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
     /// surface may give unit_mm, a table sheath, length_mm and device_radius_mm)
     #[arg(long, value_name = "DIR", conflicts_with = "stress")]
     pub(crate) surfaces: Option<PathBuf>,
-    /// Every combination of the matrix: 162 cells a wire instead of 18
+    /// Every combination of the matrix: 162 cells per wire instead of 18
     #[arg(long, requires = "surfaces")]
     pub(crate) full: bool,
     /// Only cells whose name has all of these words, as in "phantom* 0.035 mu0.3"

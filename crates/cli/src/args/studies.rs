@@ -31,7 +31,7 @@ pub(crate) struct CompareArgs {
     /// Methods to run; all if absent
     #[arg(long, visible_alias = "method", value_delimiter = ',', value_name = "METHOD,…", value_parser = method_names())]
     pub(crate) methods: Vec<String>,
-    /// Numbers of elements to run, as 8,16,32; those that show each method best if absent
+    /// Numbers of elements to run, such as 8,16,32; if absent, a suitable range for each method
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub(crate) elements: Vec<usize>,
     /// Longest time of one solve or insertion
@@ -57,14 +57,14 @@ pub(crate) enum ExperimentCommand {
     Coil(CoilArgs),
 }
 
-/// What a coil is for.
+/// Purpose of a coil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum CoilKind {
-    /// It frames the sac.
+    /// Frames the sac.
     Framing,
-    /// It fills what is framed.
+    /// Fills the framed sac.
     Filling,
-    /// It fills what is left.
+    /// Fills the rest.
     Finishing,
 }
 
@@ -186,7 +186,7 @@ pub(crate) struct TimingArgs {
     /// Methods: all, or some of them
     #[arg(long, visible_alias = "method", value_delimiter = ',', default_value = "li2011-dense,li2011-banded,kirchhoff", value_name = "METHOD,…", value_parser = all_or_method_names())]
     pub(crate) methods: Vec<String>,
-    /// Longest time for a method to be brought in position; one that takes longer is told in a note
+    /// Longest time to bring a method into position; a method that takes longer is named in a note
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]
     pub(crate) limit_s: f64,
     /// Folder for timing.csv, .json, .svg and .png
