@@ -148,7 +148,7 @@ fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
     match site.instruments.iter().position(|one| one == name) {
         Some(hand) => Ok(way.for_instrument(hand)),
         None if site.instruments.is_empty() => Err(refuse(
-            "no instruments are told: the record is of a device alone, or of an earlier version".to_owned(),
+            "the record names no instruments: it is of a single device, or of an earlier version".to_owned(),
         )),
         None => {
             let nearest = nearest_name(site.instruments.iter().map(String::as_str), name);

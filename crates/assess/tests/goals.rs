@@ -155,7 +155,7 @@ fn a_goal_that_does_not_fit_is_refused_by_key_and_value() {
     }
     let alone = Exam::new(subject(CATHETER).unwrap(), &Site { tree: Some(&tree()), ..Site::default() });
     let error = alone.unwrap_err().to_string();
-    assert!(error.contains("goal.instrument = \"catheter\": no instruments are told"), "{error}");
+    assert!(error.contains("goal.instrument = \"catheter\": the record names no instruments"), "{error}");
     let serialised = serde_json::to_value(&subject("packing_density = 0.1").unwrap().goal).unwrap();
     assert_eq!(serialised, serde_json::json!({"packing_density": 0.1}));
     let Goal::Place(place) = subject(CATHETER).unwrap().goal else { panic!("a place") };

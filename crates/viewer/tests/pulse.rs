@@ -106,7 +106,7 @@ fn exposure_control_holds_the_dose_in_the_middle_of_phantoms_and_bodies() {
         eprintln!("{pose}: {ngy:.1} nGy, {exposure:?}");
         assert!((ngy / 300.0 - 1.0).abs() < 0.05, "{pose}: {ngy} nGy, {exposure:?}");
     }
-    // The twin: beyond what the tube can do the dose falls, and is told.
+    // The twin: beyond the limits of the tube the dose falls, and this is reported.
     let (exposure, ngy) = of(450.0, None, "AP");
     assert!(exposure.dose_ngy < 200.0 && ngy < 200.0 && exposure.kvp == 125.0, "{exposure:?}");
 }

@@ -115,7 +115,7 @@ fn a_page_has_all_of_it_and_nothing_from_a_network() {
     assert_eq!(shown["timeline"]["end_s"], 40.0);
     assert_eq!(shown["noticed"][0]["what"], "wall_force");
     assert!(data["vessels"][0]["triangles"].as_array().unwrap().len() > 100);
-    // One that cannot be written is told by its name.
+    // The message about one that cannot be written names it.
     let nowhere = folder.path().join("no/page.html");
     let output = endowire().arg("assess").arg(&first).arg("--page").arg(&nowhere).output().unwrap();
     assert!(!output.status.success() && said(&output).contains("no/page.html"), "{}", said(&output));

@@ -130,7 +130,7 @@ fn fluoroscopy_draws_the_materials_of_the_catalogue() {
     let files =
         draw(&scene(folder.path(), device.to_str().unwrap(), "[[view.device]]\nmaterial = \"tungsten\"\n"));
     assert!(of(&files, "tungsten").is_some() && of(&files, "platinum").is_none());
-    // A material that is not known is told before anything is drawn.
+    // An unknown material is reported before anything is drawn.
     let text = std::fs::read_to_string(&device).unwrap().replace("\"platinum\"", "\"platinun\"");
     let spoilt = folder.path().join("spoilt.toml");
     std::fs::write(&spoilt, text).unwrap();

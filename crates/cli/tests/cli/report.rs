@@ -31,7 +31,7 @@ fn a_page_is_whole_and_names_where_it_comes_from() {
     let summary = std::fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     assert!(text.contains(summary["scene_hash"].as_str().unwrap()));
-    // A folder without a run is told.
+    // A folder without a run is reported as such.
     let none = endowire().arg("report").arg(folder.path()).output().unwrap();
     assert_eq!(none.status.code(), Some(2));
     assert!(said(&none).contains("recorded run"));
