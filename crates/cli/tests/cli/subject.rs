@@ -125,7 +125,7 @@ fn a_hand_is_told_how_it_stands_and_is_scored_at_the_end() {
     assert!(standing(4)["verdict"].is_null());
     assert_eq!(standing(5)["verdict"]["passed"], json!(true));
     assert_eq!(answers[5]["readout"]["event"]["kind"], json!("ended"));
-    // The hand was told to rest when it was there.
+    // The hand was made to rest once the tip was there.
     assert!(standing(5)["distance_mm"].as_f64().unwrap() > 7.0);
     assert_eq!((&score["passed"], &score["score"]), (&json!(true), &json!(100.0)));
 }
