@@ -62,18 +62,18 @@ impl<const C: usize> Factor<C> {
     }
 
     /// Changes the dimension without releasing memory.
-    pub fn resize(&mut self, dimension: usize) {
+    pub(crate) fn resize(&mut self, dimension: usize) {
         self.rows.resize(dimension + C / 2, [0.0; C]);
         self.dimension = dimension;
     }
 
     /// Inertia of the last matrix factored.
-    pub fn inertia(&self) -> Inertia {
+    pub(crate) fn inertia(&self) -> Inertia {
         self.inertia
     }
 
     /// Factors `matrix` and returns its inertia.
-    pub fn factor(&mut self, matrix: &BandMatrix<C>) -> Result<Inertia, FactorError> {
+    pub(crate) fn factor(&mut self, matrix: &BandMatrix<C>) -> Result<Inertia, FactorError> {
         self.eliminate::<false>(matrix, None, &mut [])
     }
 

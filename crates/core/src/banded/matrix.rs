@@ -14,7 +14,7 @@ impl<const C: usize> BandMatrix<C> {
     const BLOCK: usize = C / 2;
 
     /// The zero matrix; `dimension` is a multiple of `C / 2`.
-    pub fn zeros(dimension: usize) -> Self {
+    pub(crate) fn zeros(dimension: usize) -> Self {
         debug_assert!(dimension.is_multiple_of(Self::BLOCK), "{dimension} rows are no whole blocks");
         Self { rows: vec![[0.0; C]; dimension] }
     }
@@ -30,14 +30,14 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Changes the dimension without releasing memory; entries are undefined afterwards.
-    pub fn resize(&mut self, dimension: usize) {
+    pub(crate) fn resize(&mut self, dimension: usize) {
         self.rows.resize(dimension, [0.0; C]);
     }
 
     /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`. Entries outside the blocks are ignored; they are an
     /// error of the caller's numbering, which debug builds report.
     #[inline]
-    pub fn add(&mut self, i: usize, j: usize, value: f64) {
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let column = j - i / Self::BLOCK * Self::BLOCK;
         debug_assert!(column < C && j < self.rows.len(), "entry ({i}, {j}) lies outside the blocks");
@@ -47,7 +47,8 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Entry `(i, j)`; zero outside the blocks.
-    pub fn get(&self, i: usize, j: usize) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let column = j - i / Self::BLOCK * Self::BLOCK;
         self.rows.get(i).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
@@ -89,7 +90,7 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Turns row and column `i` into those of the identity: the unknown is held.
-    pub fn hold(&mut self, i: usize) {
+    pub(crate) fn hold(&mut self, i: usize) {
         let begin = i / Self::BLOCK * Self::BLOCK;
         for k in begin.saturating_sub(Self::BLOCK)..i {
             self.rows[k][i - k / Self::BLOCK * Self::BLOCK] = 0.0;
@@ -118,7 +119,7 @@ pub struct Shift {
 
 impl Shift {
     /// Resets to the zero shift of this dimension; keeps the memory.
-    pub fn reset(&mut self, dimension: usize) {
+    pub(crate) fn reset(&mut self, dimension: usize) {
         for list in [&mut self.diagonal, &mut self.next] {
             list.clear();
             list.resize(dimension, 0.0);

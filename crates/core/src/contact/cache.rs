@@ -119,7 +119,7 @@ pub struct KnownPoints {
 
 impl KnownPoints {
     /// Allocates for `points` points.
-    pub fn reserve(&mut self, points: usize) {
+    pub(crate) fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
     }
 
@@ -176,7 +176,7 @@ impl ContactCache {
     }
 
     /// Allocates for `points` points.
-    pub fn reserve(&mut self, points: usize) {
+    pub(crate) fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
         self.spans.reserve(points.saturating_sub(self.spans.len()));
         self.pressing.reserve(points.saturating_sub(self.pressing.len()));
@@ -213,7 +213,7 @@ impl ContactCache {
     /// Transfers the knowledge from before the device advanced along its own curve: the wall does not move, so what
     /// was known of a position goes to the point of `after` that is then nearest to it. Beyond the tip each of the
     /// points `before` keeps its own.
-    pub fn begin(
+    pub(crate) fn begin(
         &mut self,
         known: &KnownPoints,
         before: &[ContactPoint],
@@ -264,7 +264,7 @@ impl ContactCache {
     }
 
     /// Stores the knowledge at the end of a step.
-    pub fn keep(&self, known: &mut KnownPoints) {
+    pub(crate) fn keep(&self, known: &mut KnownPoints) {
         known.points.clone_from(&self.points);
     }
 }

@@ -236,7 +236,7 @@ impl SmoothWall {
     }
 
     /// How far the smooth wall lies inside a triangle, mm: 0 where it lies beyond it.
-    pub fn inset_mm(&self, triangle: u32) -> f64 {
+    pub(crate) fn inset_mm(&self, triangle: u32) -> f64 {
         self.insets_mm[triangle as usize].into()
     }
 
@@ -246,7 +246,7 @@ impl SmoothWall {
     }
 
     /// The largest of all [`SmoothWall::inset_mm`].
-    pub fn deepest_inset_mm(&self) -> f64 {
+    pub(crate) fn deepest_inset_mm(&self) -> f64 {
         self.deepest_inset_mm
     }
 

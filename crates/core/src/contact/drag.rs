@@ -22,7 +22,7 @@ pub struct Drag {
 
 impl Drag {
     /// Renews the forces at a state. Returns the sum of their changes over the sum of the forces, 0 without forces.
-    pub fn renew(
+    pub(crate) fn renew(
         &mut self,
         flow: &BloodFlow,
         wall: MovedWall<'_>,
@@ -67,7 +67,7 @@ impl Drag {
     }
 
     /// Adds V and its derivatives.
-    pub fn add(&self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+    pub(crate) fn add(&self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         into.add_value(self.value_mj(elements, state));
         for (e, sum) in &self.sums {
             into.add_points(state, &elements[*e], *e, sum);
@@ -75,22 +75,22 @@ impl Drag {
     }
 
     /// V, mJ.
-    pub fn value_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
+    pub(crate) fn value_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
         self.sums.iter().map(|(e, sum)| sum.along(state, &elements[*e], *e)).sum()
     }
 
     /// Force on a contact point, N.
-    pub fn force_n(&self, index: usize) -> Vec3 {
+    pub(crate) fn force_n(&self, index: usize) -> Vec3 {
         self.forces_n.get(index).copied().unwrap_or_default()
     }
 
     /// Total force on the device, N.
-    pub fn total_n(&self) -> Vec3 {
+    pub(crate) fn total_n(&self) -> Vec3 {
         self.forces_n.iter().sum()
     }
 
     /// Sum of the magnitudes of the forces, N.
-    pub fn size_n(&self) -> f64 {
+    pub(crate) fn size_n(&self) -> f64 {
         self.size_n
     }
 }

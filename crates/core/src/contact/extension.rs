@@ -36,7 +36,7 @@ const STEEPEST: f64 = 0.67;
 const NEIGHBOURHOOD: f64 = 0.3;
 
 /// The surface of `wall` with its openings wider than `radius_mm` extended and the others closed.
-pub fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
+pub(crate) fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
     let mut mesh = wall.mesh().clone();
     let beside = beside_rims(wall);
     for opening in wall.openings() {
@@ -150,7 +150,7 @@ fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
 }
 
 /// How far beyond an opening a tip may go, mm.
-pub fn leave_mm(opening: &Opening) -> f64 {
+pub(crate) fn leave_mm(opening: &Opening) -> f64 {
     (opening.beyond_mm - LEFT_MM).max(0.0)
 }
 

@@ -112,7 +112,7 @@ pub struct NormalForce {
 
 /// Derivatives of a point's friction energy in its position and its angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrictionDerivatives {
+pub(crate) struct FrictionDerivatives {
     /// In the position, N: minus the friction force on the device.
     pub gradient: Vec3,
     /// Second derivative in the position, N/mm.
@@ -171,14 +171,14 @@ impl Friction {
     }
 
     /// Allocates for `points` points.
-    pub fn reserve(&mut self, points: usize) {
+    pub(crate) fn reserve(&mut self, points: usize) {
         if self.acts() {
             self.sliders.reserve(points.saturating_sub(self.sliders.len()));
         }
     }
 
     /// Whether there is friction.
-    pub fn acts(&self) -> bool {
+    pub(crate) fn acts(&self) -> bool {
         self.coefficient > 0.0
     }
 
@@ -277,7 +277,7 @@ impl Friction {
     }
 
     /// Stores the normal forces at the end of a step.
-    pub fn keep(&self, forces: &mut Vec<NormalForce>) {
+    pub(crate) fn keep(&self, forces: &mut Vec<NormalForce>) {
         forces.clear();
         forces.extend(self.sliders.iter().map(|s| NormalForce { normal: s.normal, force_n: s.force_n }));
     }
@@ -326,7 +326,7 @@ impl Friction {
 
     /// Lower and upper estimate of the energy dissipated in the step, mJ: with the normal forces of its start and of
     /// its end.
-    pub fn dissipated_mj(
+    pub(crate) fn dissipated_mj(
         &self,
         elements: &[ElementData],
         state: &RodState,
@@ -361,7 +361,7 @@ impl Friction {
 
     /// Resets slip at `state` and holds the normal forces there: the hand holds still, and the device slides on until
     /// it rests. Slip of a stuck point is scaled to the new, smaller ε, so that friction holds it as before.
-    pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
+    pub(crate) fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
         self.hold();
         let taken_mj = self.taken_mj(elements, state, points);
         let stick_mm = (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm);
@@ -382,7 +382,7 @@ impl Friction {
     }
 
     /// Derivatives of a point's friction energy; `None` without a normal force.
-    pub fn derivatives(
+    pub(crate) fn derivatives(
         &self,
         index: usize,
         x: &Vec3,

@@ -34,7 +34,7 @@ pub struct ContactPoint {
 
 impl ContactPoint {
     /// Position on the device's axis, mm.
-    pub fn position(&self, elements: &[ElementData], state: &RodState) -> Vec3 {
+    pub(crate) fn position(&self, elements: &[ElementData], state: &RodState) -> Vec3 {
         let (e, x, frames) = (self.element, &state.positions, &state.frames);
         self.between(&[x[e], x[e + 1], frames[e].t, frames[e + 1].t], elements[e].length)
     }
@@ -62,7 +62,7 @@ impl ContactPoint {
     }
 
     /// Material angle, rad.
-    pub fn angle(&self, state: &RodState) -> f64 {
+    pub(crate) fn angle(&self, state: &RodState) -> f64 {
         let [w0, w1, wb] = Point::at(self.xi, 0.0).phi;
         let sets = state.sets();
         let e = sets * self.element + self.set;
@@ -120,7 +120,7 @@ pub struct Counters {
 
 impl Counters {
     /// Adds other counts.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.queries += other.queries;
         self.near += other.near;
         self.avoided += other.avoided;

@@ -22,7 +22,7 @@ pub struct WallPotential {
 
 impl WallPotential {
     /// Penetration of the surface, mm; 0 where it is clear of the wall.
-    pub fn penetration_mm(&self, distance_mm: f64) -> f64 {
+    pub(crate) fn penetration_mm(&self, distance_mm: f64) -> f64 {
         (self.radius_mm - distance_mm).max(0.0)
     }
 
@@ -39,7 +39,7 @@ impl WallPotential {
     }
 
     /// ψ′(d) in N/mm and ψ″(d) in N/mm².
-    pub fn derivatives(&self, distance_mm: f64) -> (f64, f64) {
+    pub(crate) fn derivatives(&self, distance_mm: f64) -> (f64, f64) {
         if distance_mm >= self.radius_mm { (0.0, 0.0) } else { self.holding(distance_mm) }
     }
 }

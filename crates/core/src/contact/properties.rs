@@ -88,18 +88,13 @@ impl WallRegion {
 
 impl WallProperties {
     /// Whether there is friction anywhere.
-    pub fn has_friction(&self) -> bool {
+    pub(crate) fn has_friction(&self) -> bool {
         self.largest_friction() > 0.0
     }
 
     /// Largest coefficient of friction of all regions.
     pub fn largest_friction(&self) -> f64 {
         self.region.iter().filter_map(|r| r.friction).fold(self.friction, f64::max)
-    }
-
-    /// Modulus of the stiffest region, N/mm².
-    pub fn stiffest_n_per_mm2(&self) -> f64 {
-        self.region.iter().filter_map(|r| r.modulus_n_per_mm2).fold(self.modulus_n_per_mm2, f64::max)
     }
 
     /// ln(k/k₀), with k₀ the modulus outside all regions, and the coefficient of friction at a position on the wall.

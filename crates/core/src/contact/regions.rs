@@ -56,7 +56,7 @@ pub struct Stiffness {
 
 impl Stiffness {
     /// Gradient in N and Hessian in N/mm of `length_mm` eˢψ at an allowed distance.
-    pub fn derivatives(
+    pub(crate) fn derivatives(
         &self,
         potential: &WallPotential,
         d: &Distance,

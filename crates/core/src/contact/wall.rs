@@ -123,7 +123,7 @@ impl<'a> WallContact<'a> {
     }
 
     /// Work done and avoided since the last count, including the search for the tip's passage.
-    pub fn count(&mut self) -> Counters {
+    pub(crate) fn count(&mut self) -> Counters {
         self.counters.queries += std::mem::take(&mut self.cache.proximity.queries);
         std::mem::take(&mut self.counters)
     }
@@ -198,7 +198,12 @@ impl<'a> WallContact<'a> {
     }
 
     /// Contacts of all points that press on the wall at a state.
-    pub fn touches(&mut self, elements: &[ElementData], state: &RodState, to: &mut Vec<(usize, Touch)>) {
+    pub(crate) fn touches(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        to: &mut Vec<(usize, Touch)>,
+    ) {
         to.clear();
         for span in 0..self.cache.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {

@@ -66,7 +66,7 @@ impl Section {
 
     /// Energy per length to straighten it, ½ EI |κ⁰|², mJ/mm = N: also the force with which it comes out of a
     /// straight sheath.
-    pub fn straightening_n(&self) -> f64 {
+    pub(crate) fn straightening_n(&self) -> f64 {
         let [u, v] = self.rest_curvature_per_mm;
         0.5 * self.bending_stiffness_nmm2 * (u * u + v * v)
     }
@@ -192,7 +192,8 @@ impl Device {
     }
 
     /// Volume of the coil, the circle of its outer radius along its length, mm³; 0 of devices that are no coils.
-    pub fn coil_mm3(&self) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn coil_mm3(&self) -> f64 {
         let mut left_mm = self.coil_mm;
         let each = self.sections.iter().map(|section| {
             let length_mm = left_mm.clamp(0.0, section.length_mm);
@@ -253,7 +254,7 @@ impl Device {
 
     /// Energy to straighten this length of the device from its tip on, ∫ ½ EI |κ⁰|² ds, mJ: the energy released by a
     /// sheath when this length is out of it.
-    pub fn straightening_mj(&self, from_tip_mm: f64) -> f64 {
+    pub(crate) fn straightening_mj(&self, from_tip_mm: f64) -> f64 {
         let mut left_mm = from_tip_mm;
         let each = self.sections.iter().map(|section| {
             let length_mm = left_mm.clamp(0.0, section.length_mm);

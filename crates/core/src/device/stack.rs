@@ -156,7 +156,7 @@ impl Stack {
     }
 
     /// Whether there is friction between any instruments.
-    pub fn has_inner_friction(&self) -> bool {
+    pub(crate) fn has_inner_friction(&self) -> bool {
         self.frictions.iter().any(|friction| *friction > 0.0)
     }
 
@@ -164,7 +164,7 @@ impl Stack {
     ///
     /// # Errors
     /// More than three instruments, all coils counting as one.
-    pub fn twisted(mut self) -> Result<Self> {
+    pub(crate) fn twisted(mut self) -> Result<Self> {
         let mut angles = Angles::default();
         let sets = self.devices().map(|device| Some(angles.of(device))).collect();
         if angles.count > MAX_ANGLES {
@@ -215,7 +215,7 @@ impl Stack {
 
     /// Set of material angles of each instrument, if any: instruments with a rest shape have one, and all if friction
     /// twists them.
-    pub fn sets(&self) -> &[Option<usize>] {
+    pub(crate) fn sets(&self) -> &[Option<usize>] {
         &self.sets
     }
 
@@ -270,7 +270,7 @@ impl Stack {
     ///
     /// # Errors
     /// The first that cannot be combined with the next inserted one.
-    pub fn check_places(&self, inserted_mm: impl Iterator<Item = f64>) -> Result<()> {
+    pub(crate) fn check_places(&self, inserted_mm: impl Iterator<Item = f64>) -> Result<()> {
         let mut inner: Option<(&Instrument, f64)> = None;
         // An instrument pulled back to the mouth is out, whatever its rounding.
         for outer in self.instruments.iter().zip(inserted_mm).filter(|(_, mm)| *mm > LENGTH_SLACK_MM) {

@@ -68,7 +68,7 @@ impl<'a> FieldLoad<'a> {
     }
 
     /// The energy at a state, mJ.
-    pub fn energy_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
+    pub(crate) fn energy_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
         let each = self.parts.iter().flat_map(|(field, weight, samples)| {
             samples.iter().map(move |sample| {
                 let value = field.density(&sample.point(elements, state)).value;

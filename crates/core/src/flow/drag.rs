@@ -11,7 +11,7 @@ const THICKEST: f64 = 0.99;
 const NEXT_TO_WALL: f64 = 1e-6;
 
 /// Drag per length on a thread along a tube, `offset_mm` off its axis, N/mm.
-pub fn drag_n_per_mm(gradient_n_per_mm3: f64, radius_mm: f64, thread_mm: f64, offset_mm: f64) -> f64 {
+pub(crate) fn drag_n_per_mm(gradient_n_per_mm3: f64, radius_mm: f64, thread_mm: f64, offset_mm: f64) -> f64 {
     let (r, e) = (radius_mm, offset_mm);
     let a = thread_mm.min(THICKEST * r);
     let product = |sign: f64| (r + sign * e).powi(2) - a * a;
@@ -26,7 +26,7 @@ pub fn drag_n_per_mm(gradient_n_per_mm3: f64, radius_mm: f64, thread_mm: f64, of
 
 impl FlowAt {
     /// Drag per length on a thread of this radius with this unit tangent, N/mm.
-    pub fn drag_n_per_mm(&self, thread_mm: f64, tangent: &Vec3) -> Vec3 {
+    pub(crate) fn drag_n_per_mm(&self, thread_mm: f64, tangent: &Vec3) -> Vec3 {
         let along = drag_n_per_mm(self.gradient_n_per_mm3, self.radius_mm, thread_mm, self.offset_mm);
         (self.direction * 2.0 - tangent * self.direction.dot(tangent)) * along
     }

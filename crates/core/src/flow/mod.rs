@@ -32,7 +32,8 @@
 mod drag;
 mod tree;
 
-pub use drag::drag_n_per_mm;
+#[cfg(test)]
+pub(crate) use drag::drag_n_per_mm;
 pub use tree::{FlowNode, check_place, flow_nodes};
 
 use parry3d_f64::math::Vector;

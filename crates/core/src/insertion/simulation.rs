@@ -105,7 +105,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::step`] for each; an instrument that does not exist or is moved twice, and instruments that
-    /// cannot be inserted together by these lengths ([`Stack::check_places`]; all [`Error::Parameter`]).
+    /// cannot be inserted together by these lengths (all [`Error::Parameter`]).
     pub fn step_together(&mut self, moves: &[Move]) -> Result<&StepReport> {
         self.step_until(moves, None)
     }

@@ -66,25 +66,25 @@ impl<'a> Surroundings<'a> {
     ///
     /// # Errors
     /// [`Error::Stopped`].
-    pub fn check_stop(&self) -> Result<()> {
+    pub(crate) fn check_stop(&self) -> Result<()> {
         if self.stop.is_some_and(|stop| stop()) { Err(Error::Stopped) } else { Ok(()) }
     }
 
     /// Whether the device is in other fields after the step.
-    pub fn fields_change(&self) -> bool {
+    pub(crate) fn fields_change(&self) -> bool {
         let [before, after] = self.fields;
         before.len() != after.len() || before.iter().zip(after).any(|(a, b)| !Arc::ptr_eq(a, b))
     }
 
     /// The fields in which the device is after this part of the step, 0 to 1, with their weights: those before go over into those after evenly.
-    pub fn fields_at(&self, part: f64) -> impl Iterator<Item = (&'a dyn Field, f64)> + use<'a> {
+    pub(crate) fn fields_at(&self, part: f64) -> impl Iterator<Item = (&'a dyn Field, f64)> + use<'a> {
         let weights = if self.fields_change() { [1.0 - part, part] } else { [0.0, 1.0] };
         let each = self.fields.into_iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
         each.flat_map(|(fields, weight)| fields.iter().map(move |field| (&**field, weight)))
     }
 
     /// Where the vessel is after this part of the step, 0 to 1; none where it never moves.
-    pub fn displacement(&self, part: f64) -> Option<Displacement> {
+    pub(crate) fn displacement(&self, part: f64) -> Option<Displacement> {
         let [before, after] = self.time_s;
         self.motion
             .map(|motion| motion.at(if part == 1.0 { after } else { before + (after - before) * part }))

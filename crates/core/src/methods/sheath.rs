@@ -36,7 +36,7 @@ impl Sheath {
     }
 
     /// Whether it has friction.
-    pub fn has_friction(&self) -> bool {
+    pub(crate) fn has_friction(&self) -> bool {
         self.friction_n > 0.0 || self.friction > 0.0
     }
 

@@ -110,7 +110,7 @@ impl State {
     }
 
     /// Time since the start, s.
-    pub fn time_s(&self) -> f64 {
+    pub(crate) fn time_s(&self) -> f64 {
         self.time_s
     }
 

@@ -77,7 +77,7 @@ impl<const C: usize> Assembly<C> {
     }
 
     /// Changes the size without releasing memory.
-    pub fn resize(&mut self, elements: usize) {
+    pub(crate) fn resize(&mut self, elements: usize) {
         let n = Layout::<C>::dimension(elements);
         self.matrix.resize(n);
         self.residual.resize(n, 0.0);
@@ -85,7 +85,7 @@ impl<const C: usize> Assembly<C> {
     }
 
     /// Clears everything and adds the rod's elements.
-    pub fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
+    pub(crate) fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
         if self.hessian {
             self.matrix.begin_blocks();
             self.couplings.clear();

@@ -12,7 +12,7 @@ use super::state::RodState;
 use crate::Vec3;
 
 /// What two points depend on: x₀, h t₀, x₁ and h t₁ of the first element, and of the second.
-pub const PLACES: usize = 8;
+pub(crate) const PLACES: usize = 8;
 
 /// Derivatives of an energy of two points.
 #[derive(Debug, Clone, Copy)]
@@ -104,7 +104,7 @@ fn own_rows<const C: usize>(node: usize) -> [usize; OWN] {
 
 impl Couple {
     /// Zero energy, for a point on each of two elements.
-    pub fn none([first, second]: [usize; 2]) -> Self {
+    pub(crate) fn none([first, second]: [usize; 2]) -> Self {
         Self {
             first,
             second,

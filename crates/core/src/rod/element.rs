@@ -23,7 +23,7 @@ pub struct Material {
 
 impl Material {
     /// No instrument: it has ended before this element.
-    pub const NONE: Self =
+    pub(crate) const NONE: Self =
         Self { bending: [0.0; 3], torsion: [0.0; 3], rest_curvature: [[0.0; 2]; 3], rest_twist: [0.0; 3] };
 
     /// Whether there is an instrument.
@@ -76,7 +76,7 @@ impl ElementData {
 
     /// Energy that straightening the element takes, mJ: the magnitude of the terms whose difference is the bending
     /// energy.
-    pub fn straightening_energy(&self) -> f64 {
+    pub(crate) fn straightening_energy(&self) -> f64 {
         let each = self.materials.iter().map(|material| {
             let [u, v] = material.rest_curvature[1];
             0.5 * self.length * material.bending[1] * (u * u + v * v)
@@ -85,7 +85,7 @@ impl ElementData {
     }
 
     /// Largest moment by which the other instruments bend one to their common shape; 0 for a single instrument.
-    pub fn mutual_moment(&self) -> f64 {
+    pub(crate) fn mutual_moment(&self) -> f64 {
         let all = self.bending[1];
         if self.materials[0].bending[1] == all {
             return 0.0;
@@ -100,7 +100,7 @@ impl ElementData {
     /// Factor γ of the augmentation γ·CᵀC (see [`super::assembly`]): as stiff along the rod as the element is across it,
     /// and below half the element's true axial stiffness, which keeps the transformed flexibility positive.
     #[inline]
-    pub fn augmentation(&self) -> f64 {
+    pub(crate) fn augmentation(&self) -> f64 {
         let h = self.length;
         let across = 4.0 * (self.bending[0] + self.bending[1] + self.bending[2]) / (h * h * h);
         if self.flexibility > 0.0 { across.min(0.5 / self.flexibility) } else { across }
@@ -135,12 +135,12 @@ pub struct Energy<T = f64> {
 
 impl Energy {
     /// The sum.
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.bend + self.twist + self.axial
     }
 
     /// Adds another.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.bend += other.bend;
         self.twist += other.twist;
         self.axial += other.axial;
@@ -149,7 +149,7 @@ impl Energy {
 
 /// r′ at the middle of the element.
 #[inline(always)]
-pub fn mid_slope<V>(first: V, chord: V, second: V) -> V
+pub(crate) fn mid_slope<V>(first: V, chord: V, second: V) -> V
 where
     V: Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
 {

@@ -55,7 +55,7 @@ impl Frame {
 
     /// Components of `w` along (t, u, v).
     #[inline]
-    pub fn local(&self, w: &Vec3) -> Vec3 {
+    pub(crate) fn local(&self, w: &Vec3) -> Vec3 {
         Vec3::new(self.t.dot(w), self.u.dot(w), self.v.dot(w))
     }
 
@@ -66,7 +66,7 @@ impl Frame {
     }
 
     /// The tangent moved by `−log`: (a, b) such that `self.transported(a, b).t == t`.
-    pub fn log(&self, t: &Vec3) -> (f64, f64) {
+    pub(crate) fn log(&self, t: &Vec3) -> (f64, f64) {
         let (a, b) = (self.u.dot(t), self.v.dot(t));
         let s = libm::hypot(a, b);
         let angle = libm::atan2(s, self.t.dot(t));

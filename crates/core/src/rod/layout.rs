@@ -17,7 +17,7 @@ pub const PLAIN: usize = 12;
 /// Number of unknowns of two neighbouring nodes with one set of angles.
 pub const TWISTED: usize = 16;
 /// Largest number of sets of angles.
-pub const MAX_ANGLES: usize = 3;
+pub(crate) const MAX_ANGLES: usize = 3;
 
 /// Row numbers of the unknowns where two neighbouring nodes have `C` = 12 + 4k of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +27,7 @@ impl<const C: usize> Layout<C> {
     /// Number of sets of angles, k.
     pub const ANGLES: usize = (C - PLAIN) / 4;
     /// Unknowns per node.
-    pub const BLOCK: usize = C / 2;
+    pub(crate) const BLOCK: usize = C / 2;
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
     pub const fn dimension(elements: usize) -> usize {
@@ -36,37 +36,37 @@ impl<const C: usize> Layout<C> {
 
     /// First of the three position unknowns of node `i`.
     #[inline]
-    pub const fn position(self, i: usize) -> usize {
+    pub(crate) const fn position(self, i: usize) -> usize {
         Self::BLOCK * i + Self::ANGLES
     }
 
     /// First of the two tangent unknowns of node `i`; the first angle, where there is one, comes next.
     #[inline]
-    pub const fn tangent(self, i: usize) -> usize {
+    pub(crate) const fn tangent(self, i: usize) -> usize {
         Self::BLOCK * i + Self::ANGLES + 3
     }
 
     /// The angle of node `i` in a `set` below k.
     #[inline]
-    pub const fn angle(self, i: usize, set: usize) -> usize {
+    pub(crate) const fn angle(self, i: usize, set: usize) -> usize {
         Self::BLOCK * i + Self::ANGLES + 5 + set
     }
 
     /// The angle bubble of element `e` in a `set` below k.
     #[inline]
-    pub const fn bubble(self, e: usize, set: usize) -> usize {
+    pub(crate) const fn bubble(self, e: usize, set: usize) -> usize {
         Self::BLOCK * (e + 1) + set
     }
 
     /// The axial force of element `e`.
     #[inline]
-    pub const fn tension(self, e: usize) -> usize {
+    pub(crate) const fn tension(self, e: usize) -> usize {
         Self::BLOCK * (e + 2) - 1
     }
 
     /// First of the six rows of end supports: three of position, two of the tangent, one of the angle.
     #[inline]
-    pub const fn support(self, elements: usize) -> usize {
+    pub(crate) const fn support(self, elements: usize) -> usize {
         Self::BLOCK * (elements + 1)
     }
 }

@@ -56,7 +56,7 @@ impl PointSum {
     }
 
     /// Adds a part of the energy of a point at ξ of an element of this length that depends on its tangent as well ([`crate::field`]).
-    pub fn add_directed(&mut self, (xi, length): (f64, f64), weight: f64, density: &EnergyDensity) {
+    pub(crate) fn add_directed(&mut self, (xi, length): (f64, f64), weight: f64, density: &EnergyDensity) {
         self.felt = true;
         let c = hermite(xi);
         let [chord, along, ahead] = Point::at(xi, 0.0).y;

@@ -42,7 +42,7 @@ impl Point {
 
     /// y and z for the given chord and tangents.
     #[inline(always)]
-    pub fn derivatives<V>(&self, e: V, t0: V, t1: V) -> (V, V)
+    pub(crate) fn derivatives<V>(&self, e: V, t0: V, t1: V) -> (V, V)
     where
         V: Copy + Add<Output = V> + Mul<f64, Output = V>,
     {

@@ -127,7 +127,7 @@ impl RodState {
     }
 
     /// Twist of the whole rod, rad, any number of turns.
-    pub fn twist(&self) -> f64 {
+    pub(crate) fn twist(&self) -> f64 {
         self.twist_to(self.elements(), 0)
     }
 
@@ -244,14 +244,18 @@ impl RodState {
 
     /// Whether an element bends by more than 120° from end to end: then the drawn curve is a fiftieth shorter than
     /// the element, at 180° a tenth, where its twist is no longer defined.
-    pub fn is_folded(&self, elements: &[ElementData]) -> bool {
+    pub(crate) fn is_folded(&self, elements: &[ElementData]) -> bool {
         const COSINE: f64 = -0.5;
         let mut each = self.frames.windows(2).zip(elements).filter(|(_, data)| !data.is_break());
         each.any(|(ends, _)| ends[0].t.dot(&ends[1].t) < COSINE)
     }
 
     /// The largest rotation in a step, at nodes and at the middle of elements, and the largest change of angle.
-    pub fn largest_turn<const C: usize>(elements: &[ElementData], base: &Self, d: &[f64]) -> (f64, f64) {
+    pub(crate) fn largest_turn<const C: usize>(
+        elements: &[ElementData],
+        base: &Self,
+        d: &[f64],
+    ) -> (f64, f64) {
         let l = Layout::<C>;
         let (mut square, mut twist) = (0.0f64, 0.0f64);
         for i in 0..base.frames.len() {

@@ -56,7 +56,7 @@ impl Supports {
     }
 
     /// Errors of the last node in each condition: three of position, two of the tangent, one of the angle.
-    pub fn gaps(&self, state: &RodState) -> [f64; 6] {
+    pub(crate) fn gaps(&self, state: &RodState) -> [f64; 6] {
         let mut gaps = [0.0; 6];
         let n = state.elements();
         for (j, q) in self.end_directions.iter().enumerate() {
@@ -96,7 +96,7 @@ impl Supports {
     }
 
     /// Updates the branch of the end angle after an accepted step.
-    pub fn follow(&mut self, state: &RodState) {
+    pub(crate) fn follow(&mut self, state: &RodState) {
         let target = self.angle_target(state);
         if let Some(end) = &mut self.end_angle {
             end.target = target;
@@ -104,7 +104,7 @@ impl Supports {
     }
 
     /// Adds the rows of the end conditions.
-    pub fn add<const C: usize>(
+    pub(crate) fn add<const C: usize>(
         &self,
         elements: &[ElementData],
         state: &RodState,
@@ -176,7 +176,7 @@ impl Supports {
     }
 
     /// Holds the rows of the first node and clears their residual.
-    pub fn hold<const C: usize>(&self, assembly: &mut Assembly<C>) {
+    pub(crate) fn hold<const C: usize>(&self, assembly: &mut Assembly<C>) {
         for row in self.held::<C>().into_iter().flatten() {
             if assembly.hessian {
                 assembly.matrix.hold(row);

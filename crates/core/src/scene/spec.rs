@@ -341,8 +341,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// Initial inserted lengths of the instruments, mm.
     ///
     /// # Errors
-    /// A length greater than the instrument's, and instruments that cannot be inserted together by these lengths
-    /// ([`Stack::check_places`]).
+    /// A length greater than the instrument's, and instruments that cannot be inserted together by these lengths.
     pub fn inserted_mm(&self, stack: &Stack) -> Result<Vec<f64>> {
         let mut lengths_mm = vec![0.0; stack.instruments().len()];
         for (index, (spec, device)) in self.instrument.iter().zip(stack.devices()).enumerate() {

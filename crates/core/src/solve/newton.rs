@@ -85,7 +85,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Changes the size without releasing memory.
-    pub fn resize(&mut self, elements: usize) {
+    pub(crate) fn resize(&mut self, elements: usize) {
         let n = Layout::<C>::dimension(elements);
         if self.step.len() == n {
             return;

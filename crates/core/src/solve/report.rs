@@ -53,7 +53,7 @@ pub enum StopReason {
     /// An equilibrium, but friction does not follow the current normal forces of the wall.
     Unsettled,
     /// An element bends more than its interpolation can represent
-    /// ([`RodState::is_folded`](crate::rod::RodState::is_folded)).
+    /// (`RodState::is_folded`).
     Folded,
     /// The state or the matrix contains a number that is not finite.
     NotFinite,

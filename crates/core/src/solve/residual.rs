@@ -19,7 +19,7 @@ pub struct ResidualSize {
 
 impl<const C: usize> Newton<C> {
     /// The size of the residual of the assembled system.
-    pub fn residual(
+    pub(crate) fn residual(
         &self,
         elements: &[ElementData],
         external: &dyn External,

@@ -23,18 +23,23 @@ pub(super) const SHIFTS: usize = 60;
 
 impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
-    pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
+    pub(crate) fn inertia(
+        &mut self,
+        elements: &[ElementData],
+        supports: &Supports,
+        sigma: f64,
+    ) -> Option<Inertia> {
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
         self.factor.factor_shifted(&self.assembly, &self.unit_shift, sigma).ok()
     }
 
-    /// Factors the assembled matrix with the regularisation, for [`Self::apply_inverse`].
+    /// Factors the assembled matrix with the regularisation, for the inverse.
     pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
         self.inertia(elements, supports, Self::regularisation(elements))
     }
 
     /// Replaces a right-hand side by the solution with the matrix factored last.
-    pub fn apply_inverse(&self, elements: &[ElementData], b: &mut [f64]) {
+    pub(crate) fn apply_inverse(&self, elements: &[ElementData], b: &mut [f64]) {
         self.factor.solve(b);
         Self::restore_tensions(elements, b);
     }

@@ -324,7 +324,7 @@ impl StaticProblem {
     }
 
     /// The solution of a solved state.
-    pub fn solution(&self, solved: &Solved) -> StaticSolution {
+    pub(crate) fn solution(&self, solved: &Solved) -> StaticSolution {
         let state = &solved.state;
         let n = self.elements.len();
         let frame = &state.frames[n];

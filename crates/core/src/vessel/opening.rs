@@ -107,7 +107,7 @@ impl Opening {
     }
 
     /// The triangles that close the opening: a fan around its centre, facing out.
-    pub fn cap(&self, mesh: &SurfaceMesh) -> impl Iterator<Item = [Vec3; 3]> {
+    pub(crate) fn cap(&self, mesh: &SurfaceMesh) -> impl Iterator<Item = [Vec3; 3]> {
         let at = |k: usize| mesh.vertices_mm[self.boundary[k % self.boundary.len()] as usize];
         (0..self.boundary.len()).map(move |k| [at(k), at(k + 1), self.centre_mm])
     }

@@ -169,7 +169,7 @@ impl WallQuery {
     }
 
     /// Number of triangles.
-    pub fn triangles(&self) -> usize {
+    pub(crate) fn triangles(&self) -> usize {
         self.mesh.triangles.len()
     }
 

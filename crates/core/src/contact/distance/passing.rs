@@ -21,7 +21,7 @@ pub(super) const PASSING: f64 = 0.2;
 impl SmoothWall {
     /// As [`SmoothWall::distance`], with derivatives, the costly part, only where the distance is less than
     /// `limit_mm`. Also returns the coverage: how well the vertices reach.
-    pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<(Nearness, f64)> {
+    pub(crate) fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<(Nearness, f64)> {
         let list = self.list(triangle as usize);
         let front = self.reach_from(x, list, None);
         let derived = |reached: &Reached| self.derive(x, list, reached, |_| {});

@@ -90,7 +90,7 @@ impl Place {
     }
 
     /// ϑ at a state; 0 for instruments that turn freely.
-    pub fn turned_rad(&self, state: &RodState) -> f64 {
+    pub(crate) fn turned_rad(&self, state: &RodState) -> f64 {
         self.sets.map_or(0.0, |(inner, outer)| state.angle(self.node, inner) - state.angle(self.node, outer))
     }
 
@@ -101,7 +101,7 @@ impl Place {
     }
 
     /// Components of friction along and around the line, as fractions of the largest friction.
-    pub fn parts(&self, state: &RodState) -> [f64; 2] {
+    pub(crate) fn parts(&self, state: &RodState) -> [f64; 2] {
         let (around, slip) = self.slip_mm(state);
         let over = rates(slip, self.stick_mm).0;
         [over * self.advance_mm, over * around]

@@ -55,7 +55,7 @@ impl Friction {
     /// Renews the normal forces, unless they are settled or held, and records the contact forces at the base.
     /// `active` gives the ascending indices of the active points, each with its normal, its force unknown, and the
     /// force of its depth, N. `least_n` is a negligible force.
-    pub fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
+    pub(crate) fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
         let mut active = active.peekable();
         let follows = self.renewal.follows();
         let (mut change_n, mut sum_n) = (0.0, least_n);
@@ -76,13 +76,13 @@ impl Friction {
 
     /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
     /// again.
-    pub fn settles(&mut self, least_n: f64) -> bool {
+    pub(crate) fn settles(&mut self, least_n: f64) -> bool {
         let settled = self.unsettled(least_n) < SETTLED;
         self.renewal.settles(settled)
     }
 
     /// Relative difference of normal forces from the contact forces at the last base.
-    pub fn unsettled(&self, least_n: f64) -> f64 {
+    pub(crate) fn unsettled(&self, least_n: f64) -> f64 {
         let (mut change_n, mut sum_n) = (0.0, least_n);
         for slider in self.sliders.iter().filter(|slider| slider.force_n != 0.0 || slider.seen.1 > 0.0) {
             change_n += (slider.normal * slider.force_n - slider.seen.0 * slider.seen.1).norm();
@@ -92,7 +92,7 @@ impl Friction {
     }
 
     /// Stops renewing normal forces.
-    pub fn hold(&mut self) {
+    pub(crate) fn hold(&mut self) {
         self.renewal = Renewal::Held;
     }
 
@@ -108,7 +108,7 @@ impl Friction {
     }
 
     /// Resets and holds the normal forces of the start of the step.
-    pub fn rewind(&mut self) {
+    pub(crate) fn rewind(&mut self) {
         self.hold();
         self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.begun);
     }

@@ -152,13 +152,13 @@ impl SelfContact {
     }
 
     /// Contacts of the rod with itself at a state about which nothing is known.
-    pub fn touching_at(&mut self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
+    pub(crate) fn touching_at(&mut self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         self.look_at_base(elements, state);
         self.touching(elements, state)
     }
 
     /// Contacts of the rod with itself at the base, the last state of a solution.
-    pub fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
+    pub(crate) fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         let curve = self.curve(elements, state);
         let gaps: Vec<usize> = (0..elements.len()).filter(|e| curve.is_break(*e)).collect();
         let rod = |place: Place| gaps.partition_point(|gap| *gap < place.element);

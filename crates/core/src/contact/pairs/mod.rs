@@ -75,7 +75,7 @@ impl Skin {
     /// Default contact modulus of a rod, over EI/r⁴. A solid round wire has E = 4/π EI/r⁴, and two of them in contact
     /// yield by about as much as their material does; ten times as hard they are practically rigid: a plectoneme
     /// under T r²/EI = 10⁻³ sinks in by 10⁻⁴ of its radius.
-    pub const RIGID: f64 = 10.0;
+    pub(crate) const RIGID: f64 = 10.0;
 
     /// The surface of a gap between two rods.
     pub(crate) const NONE: Self = Self { radius_mm: 0.0, modulus_n_per_mm2: 0.0 };
@@ -135,7 +135,7 @@ impl Pair {
 
 /// Counts of searches and their results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PairCounters {
+pub(crate) struct PairCounters {
     /// Bases at which pairs were looked for.
     pub searches: u64,
     /// Pairs of near elements.
@@ -213,7 +213,7 @@ impl SelfContact {
 
     /// The same for a ring, whose last node coincides with its first.
     #[must_use]
-    pub fn closed(self) -> Self {
+    pub(crate) fn closed(self) -> Self {
         Self { closed: true, ..self }
     }
 
@@ -222,7 +222,8 @@ impl SelfContact {
     }
 
     /// Counts so far.
-    pub fn counters(&self) -> PairCounters {
+    #[cfg(test)]
+    pub(crate) fn counters(&self) -> PairCounters {
         self.counters
     }
 

@@ -156,7 +156,7 @@ impl WallContact<'_> {
 
     /// Records the positions of all points at the base, which must be known before they are stored or evaluated
     /// elsewhere.
-    pub fn know_whole_base(&mut self, elements: &[ElementData]) {
+    pub(crate) fn know_whole_base(&mut self, elements: &[ElementData]) {
         for span in 0..self.cache.spans.len() {
             self.know_base(span, elements);
         }
@@ -164,7 +164,7 @@ impl WallContact<'_> {
 
     /// The room of each node of a device at a state, mm: how far it can move without coming near a wall, as known
     /// from the points on the element before it, or their radius if that is larger.
-    pub fn rooms(&self, elements: &[ElementData], state: &RodState, room_mm: &mut Vec<f64>) {
+    pub(crate) fn rooms(&self, elements: &[ElementData], state: &RodState, room_mm: &mut Vec<f64>) {
         room_mm.clear();
         room_mm.resize(elements.len() + 1, f64::INFINITY);
         for span in &self.cache.spans {

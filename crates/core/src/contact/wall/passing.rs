@@ -13,7 +13,7 @@ impl WallContact<'_> {
     /// Whether the device has passed through the wall at this state: followed from the sheath, a piece of it between
     /// two points in the lumen crosses the wall, or emerges on its other side. The side of a point that has sunk in
     /// is known.
-    pub fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+    pub(crate) fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let mut last: Option<(Vec3, f64)> = None;
         let mut sunk = false;
         for index in (0..self.points.len()).rev() {
@@ -48,7 +48,7 @@ impl WallContact<'_> {
 
     /// Whether a guess must be rejected: a point sinks much deeper than at its origin, or passes through the wall on
     /// its way from there.
-    pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+    pub(crate) fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let deep = (0..self.cache.spans.len()).any(|span| {
             let Some(points) = self.near(span, elements, state) else { return false };
             let mut room = Room::UNLIMITED;

@@ -21,27 +21,27 @@ impl WallContact<'_> {
     }
 
     /// Holds the normal forces of friction.
-    pub fn hold_friction(&mut self) {
+    pub(crate) fn hold_friction(&mut self) {
         self.friction.hold();
     }
 
     /// Normal forces of friction follow the contact forces again.
-    pub fn release_friction(&mut self) {
+    pub(crate) fn release_friction(&mut self) {
         self.friction.release();
     }
 
     /// Resets and holds the normal forces of the start of the step.
-    pub fn rewind_friction(&mut self) {
+    pub(crate) fn rewind_friction(&mut self) {
         self.friction.rewind();
     }
 
     /// Resets slip at `state`, the state assembled last, and holds the normal forces there.
-    pub fn anchor_friction(&mut self, elements: &[ElementData], state: &RodState) {
+    pub(crate) fn anchor_friction(&mut self, elements: &[ElementData], state: &RodState) {
         self.friction.anchor(elements, state, self.points);
     }
 
     /// Relative difference of the normal forces of friction from those of the state assembled last.
-    pub fn unsettled(&self) -> f64 {
+    pub(crate) fn unsettled(&self) -> f64 {
         self.friction.unsettled(self.least_force_n())
     }
 

@@ -78,12 +78,12 @@ impl Script {
     }
 
     /// Whether steps have times: a script has speeds in all of its lines or in none.
-    pub fn is_timed(&self) -> bool {
+    pub(crate) fn is_timed(&self) -> bool {
         self.motions.iter().any(Motion::is_timed)
     }
 
     /// The name in messages of the first line with a condition; `None` if all steps are known in advance.
-    pub fn conditional(&self) -> Option<&str> {
+    pub(crate) fn conditional(&self) -> Option<&str> {
         self.motions.iter().find(|motion| motion.until.is_some()).map(|motion| motion.name.as_str())
     }
 

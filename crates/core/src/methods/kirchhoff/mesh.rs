@@ -32,7 +32,7 @@ pub struct Fineness {
 impl Fineness {
     /// With this spacing a sharp crest between two contact points comes to within two thirds of a radius of the axis
     /// before contact; with 2 radii it would reach the axis.
-    pub const CONTACT_SPACING_RADII: f64 = 1.5;
+    pub(crate) const CONTACT_SPACING_RADII: f64 = 1.5;
 
     /// Approximate number of contact points of a device.
     pub(super) fn points(&self, device: &Device) -> usize {

@@ -115,7 +115,7 @@ impl SurfaceMesh {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn read_of(files: &dyn Files, path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
+    pub(crate) fn read_of(files: &dyn Files, path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
         let frame = frame.into();
         frame.check()?;
         // Reject an unknown format before reading a large file.

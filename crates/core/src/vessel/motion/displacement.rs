@@ -41,7 +41,7 @@ impl Displacement {
     }
 
     /// u, mm.
-    pub fn displacement_mm(&self, material: &Vec3) -> Vec3 {
+    pub(crate) fn displacement_mm(&self, material: &Vec3) -> Vec3 {
         let each = self.modes.iter().map(|mode| {
             let v = mode.matrix * material + mode.offset;
             mode.fade.map_or(v, |fade| v * fade.at_mm((material - fade.centre()).norm()))
@@ -55,7 +55,7 @@ impl Displacement {
     }
 
     /// F = I + ∂u/∂X.
-    pub fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
+    pub(crate) fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
         let mut gradient = Matrix3::identity();
         for mode in &self.modes {
             match mode.fade {
@@ -70,7 +70,7 @@ impl Displacement {
     }
 
     /// F⁻¹ and the second derivatives.
-    pub fn local(&self, material: &Vec3) -> Local {
+    pub(crate) fn local(&self, material: &Vec3) -> Local {
         let mut second = [Matrix3::zeros(); 3];
         for mode in &self.modes {
             let Some(fade) = mode.fade else { continue };
@@ -107,7 +107,7 @@ impl Displacement {
 
     /// Upper bound of the ratio of lengths between material points and in the moved vessel, either way: 1/(1 −
     /// |∂u/∂X|).
-    pub fn stretch(&self) -> f64 {
+    pub(crate) fn stretch(&self) -> f64 {
         1.0 / (1.0 - self.steepest)
     }
 }
@@ -123,14 +123,14 @@ impl Local {
     /// ```text
     /// g = F⁻ᵀ ∇φ,    F⁻ᵀ (∇∇φ − Σ gₖ ∂²uₖ/∂X²) F⁻¹
     /// ```
-    pub fn in_space(&self, gradient: &Vec3, hessian: &Matrix3<f64>) -> (Vec3, Matrix3<f64>) {
+    pub(crate) fn in_space(&self, gradient: &Vec3, hessian: &Matrix3<f64>) -> (Vec3, Matrix3<f64>) {
         let back = self.inverse.transpose();
         let g = back * gradient;
         (g, back * (hessian - self.bent(&g)) * self.inverse)
     }
 
     /// Σ gₖ ∂²uₖ/∂X².
-    pub fn bent(&self, g: &Vec3) -> Matrix3<f64> {
+    pub(crate) fn bent(&self, g: &Vec3) -> Matrix3<f64> {
         self.second[0] * g.x + self.second[1] * g.y + self.second[2] * g.z
     }
 }

@@ -85,7 +85,7 @@ impl VesselMotion {
     }
 
     /// Upper bound of the displacement of any point within `within_mm` of `place`, mm.
-    pub fn farthest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
+    pub(crate) fn farthest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
         self.modes.iter().map(|mode| mode.farthest_mm(place, within_mm)).sum()
     }
 }

@@ -90,7 +90,7 @@ impl SweptVessel {
     }
 
     /// Its openings, numbered as those of its mesh; without a mesh they have no boundary.
-    pub fn openings(&self) -> &[Opening] {
+    pub(crate) fn openings(&self) -> &[Opening] {
         &self.openings
     }
 
@@ -100,7 +100,7 @@ impl SweptVessel {
     }
 
     /// Whether a position is in the lumen.
-    pub fn contains(&self, x: &Vec3) -> bool {
+    pub(crate) fn contains(&self, x: &Vec3) -> bool {
         let is_beyond = |opening: &Opening| {
             let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
             beyond_mm > 0.0
