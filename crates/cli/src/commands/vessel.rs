@@ -20,6 +20,8 @@ struct Document {
     provenance: Provenance,
     file: String,
     sound: bool,
+    /// Why it is not sound, a few words each.
+    faults: Vec<String>,
     #[serde(flatten)]
     report: CheckReport,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -94,8 +96,15 @@ fn report_on(
         other => Failure::from(other).at(file.display()),
     })?;
     let felt = FeltReport::new(&surface, felt)?;
-    let document =
-        Document { provenance, file: file.display().to_string(), sound: report.is_sound(), report, felt };
+    let faults = report.faults();
+    let document = Document {
+        provenance,
+        file: file.display().to_string(),
+        sound: faults.is_empty(),
+        faults,
+        report,
+        felt,
+    };
     answer(&document, json, || text(&document))
 }
 
@@ -106,7 +115,11 @@ const OPENINGS_LISTED: usize = 20;
 fn text(document: &Document) -> String {
     let r = &document.report;
     let size: Vec<String> = (0..3).map(|k| format!("{:.1}", r.high_mm[k] - r.low_mm[k])).collect();
-    let verdict = if document.sound { "sound" } else { "faulty: it is repaired on loading, as told below" };
+    let verdict = match (document.faults.join(", "), r.flat) {
+        (faults, _) if faults.is_empty() => "sound".to_owned(),
+        (faults, true) => format!("faulty: {faults}: no device can be in it"),
+        (faults, false) => format!("faulty: {faults}; it is repaired on loading, as told below"),
+    };
     let mut lines = vec![
         format!("{}: {verdict}", document.file),
         format!("  triangles            {}", r.triangles),

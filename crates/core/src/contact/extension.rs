@@ -32,6 +32,8 @@ const STRAIGHTENING: f64 = 1.0;
 /// Largest slope of the wall against the opening's direction that is continued: an extension widens by 4/27 of it
 /// times the radius, and a tenth of the radius is kept free around it.
 const STEEPEST: f64 = 0.67;
+/// Depth of the cone that closes an opening without room in front of it, in radii of the opening.
+const INWARD: f64 = 0.1;
 /// Half length of rim over which the inclination is averaged, in radii of the opening.
 const NEIGHBOURHOOD: f64 = 0.3;
 
@@ -40,7 +42,9 @@ pub(crate) fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
     let mut mesh = wall.mesh().clone();
     let beside = beside_rims(wall);
     for opening in wall.openings() {
-        if opening.radius_mm > radius_mm {
+        if opening.beyond_mm == 0.0 {
+            close_inward(&mut mesh, opening);
+        } else if opening.radius_mm > radius_mm {
             extend(&mut mesh, opening, &beside);
         } else {
             opening.close(&mut mesh);
@@ -55,6 +59,13 @@ fn beside_rims(wall: &Wall) -> Vec<[u32; 3]> {
     wall.openings().iter().flat_map(|o| &o.boundary).for_each(|v| on_rim[*v as usize] = true);
     let is_beside = |t: &&[u32; 3]| t.iter().filter(|v| on_rim[**v as usize]).count() > 1;
     wall.mesh().triangles.iter().filter(is_beside).copied().collect()
+}
+
+/// Closes an opening that the vessel touches by a cone into it, since a flat cap would be felt on the other side.
+fn close_inward(mesh: &mut SurfaceMesh, opening: &Opening) {
+    let centre = mesh.vertices_mm.len();
+    opening.close(mesh);
+    mesh.vertices_mm[centre] -= opening.direction * (INWARD * opening.radius_mm);
 }
 
 /// Adds rings along the opening's direction, as far apart as the rim's vertices.

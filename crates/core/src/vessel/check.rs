@@ -1,7 +1,7 @@
 //! Properties and faults of a surface as given.
 
 use super::crossings::crossings;
-use super::hints::{facing_hints, unit_hint};
+use super::hints::{opening_hints, unit_hint};
 use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3};
@@ -104,17 +104,31 @@ impl CheckReport {
     /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults,
     /// connected, around a volume. Open ends are fine.
     pub fn is_sound(&self) -> bool {
-        let faults = [
-            self.non_manifold_edges,
-            self.flipped_triangles,
-            self.degenerate_triangles,
-            self.duplicate_triangles,
-            self.self_intersections,
-            self.stray_edges,
-            self.repair.edges_sewn,
-            self.facing_openings.len(),
+        self.faults().is_empty()
+    }
+
+    /// Why it is not sound: a few words for each kind of fault, with the number of such faults.
+    pub fn faults(&self) -> Vec<String> {
+        let counts = [
+            (self.non_manifold_edges, "edge of more than two triangles", "edges of more than two triangles"),
+            (self.flipped_triangles, "flipped triangle", "flipped triangles"),
+            (self.degenerate_triangles, "triangle without area", "triangles without area"),
+            (self.duplicate_triangles, "duplicate triangle", "duplicate triangles"),
+            (self.self_intersections, "self-intersection", "self-intersections"),
+            (self.stray_edges, "stray open edge", "stray open edges"),
+            (self.repair.edges_sewn, "edge along a crack", "edges along cracks"),
+            (
+                self.facing_openings.len(),
+                "pair of openings that face each other",
+                "pairs of openings that face each other",
+            ),
         ];
-        faults.iter().all(|count| *count == 0) && !self.flat
+        let counted = counts
+            .iter()
+            .filter(|(count, ..)| *count > 0)
+            .map(|(count, one, several)| format!("{count} {}", if *count == 1 { one } else { several }));
+        let flat = self.flat.then(|| "it encloses no volume, as a sheet".to_owned());
+        flat.into_iter().chain(counted).collect()
     }
 }
 
@@ -215,7 +229,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
 fn hints(wall: &Wall, survey: &Survey, diagonal_mm: f64, unit_mm: f64) -> Vec<String> {
     let half_lumen_mm = survey.lumen.as_ref().map(|lumen| lumen.median_mm);
     let unit = unit_hint(diagonal_mm, half_lumen_mm, unit_mm);
-    let mut hints: Vec<String> = unit.into_iter().chain(facing_hints(wall.openings())).collect();
+    let mut hints: Vec<String> = unit.into_iter().chain(opening_hints(wall.openings())).collect();
     if wall.openings().is_empty() {
         let list = |v: &[f64; 3]| format!("[{:.3}, {:.3}, {:.3}]", v[0], v[1], v[2]);
         hints.push(match &survey.start {

@@ -31,25 +31,33 @@ const TIGHT_RADII: f64 = 0.1;
 pub fn wall_hints(wall: &Wall, unit_mm: f64) -> Result<Vec<String>> {
     let (low, high) = wall.mesh().used_bounds_mm().unwrap_or_default();
     let unit = unit_hint((high - low).norm(), survey::median_half_lumen_mm(wall)?, unit_mm);
-    let openings = facing_hints(wall.openings()).chain(tight_hints(wall.openings()));
-    Ok(unit.into_iter().chain(openings).collect())
+    Ok(unit.into_iter().chain(opening_hints(wall.openings())).collect())
+}
+
+/// One sentence for each pair of openings that face each other, and for each opening without room in front of it.
+pub(super) fn opening_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
+    facing_hints(openings).chain(tight_hints(openings))
 }
 
 /// One sentence for each opening without room in front of it.
 fn tight_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
     let tight = openings.iter().filter(|opening| opening.beyond_mm < TIGHT_RADII * opening.radius_mm);
     tight.map(|opening| {
+        let at = opening.centre_mm;
+        let (where_it_is, what_follows) = match opening.beyond_mm > 0.0 {
+            true => ("lies right in front of", "its wall may be felt through the opening"),
+            false => ("touches", "forces of the wall are wrong where they touch"),
+        };
         format!(
-            "the vessel itself lies right in front of opening {}, at {}: its wall may be felt through the opening; cut the surface \
-             farther back there, or move apart what touches",
-            opening.index,
-            crate::error::vector(&opening.centre_mm)
+            "the vessel itself {where_it_is} opening {}, at [{:.2}, {:.2}, {:.2}]: {what_follows}; cut the surface farther back \
+             there, or move apart what touches",
+            opening.index, at.x, at.y, at.z
         )
     })
 }
 
 /// One sentence for each pair of openings that face each other.
-pub(super) fn facing_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
+fn facing_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
     opening::facing(openings).into_iter().map(|[i, j]| {
         let (a, b) = (&openings[i], &openings[j]);
         format!(
@@ -111,7 +119,10 @@ mod tests {
         let x = crate::Vec3::x();
         let opening = |beyond_mm: f64| Opening { index: 3, beyond_mm, ..Opening::at_end(x, 3.0, x) };
         let told: Vec<String> = tight_hints(&[opening(0.2), opening(1.0)]).collect();
-        assert!(told.len() == 1 && told[0].contains("in front of opening 3, at [1, 0, 0]"), "{told:?}");
+        assert!(
+            told.len() == 1 && told[0].contains("in front of opening 3, at [1.00, 0.00, 0.00]"),
+            "{told:?}"
+        );
     }
 
     #[test]

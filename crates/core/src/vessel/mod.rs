@@ -9,6 +9,7 @@ mod extract;
 mod files;
 mod generate;
 mod hints;
+mod in_front;
 mod inside;
 mod intersect;
 mod lumen;

@@ -1,6 +1,5 @@
 //! The openings of a wall, through which blood and devices pass.
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -10,7 +9,7 @@ use super::topology::{EdgeTable, EdgeUse, NONE};
 use crate::Vec3;
 
 /// Length of the straight extension of an opening, mm, if nothing is in the way.
-const MOST_BEYOND_MM: f64 = 32.0;
+pub(super) const MOST_BEYOND_MM: f64 = 32.0;
 /// Length of the extensions of two openings, mm, that round free space about both need not allow, if they do not meet.
 const LEAST_BEYOND_MM: f64 = 3.0;
 /// Radius of the free space around an extension's axis, in radii of the opening.
@@ -18,8 +17,9 @@ const FREE_RADII: f64 = 1.1;
 /// Part of the way to what is in front of an opening that its extension may take.
 const HALFWAY: f64 = 0.5;
 /// Distance from a rim, in radii of the opening, within which the wall is the vessel's own: it may curl over its rim.
-const OWN_RIM: f64 = 0.25;
-/// Smallest length of an extension, as a fraction of its opening's radius: it is closed by a cap of its own.
+pub(super) const OWN_RIM: f64 = 0.25;
+/// Length of an extension, as a fraction of its opening's radius, below which there is none: the wall touches the
+/// opening, and no cap fits between the two.
 const FLAT: f64 = 0.01;
 /// Circles on each disc of an extension, and points on each, with which two extensions are compared.
 const CIRCLES: usize = 3;
@@ -32,7 +32,8 @@ const TRUNK: f64 = 0.4;
 /// An open end of a wall: one closed loop of edges that belong to a single triangle each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
-    /// Its index: largest radius first, ties by centre (x, then y, then z).
+    /// Its index: largest radius first, then by centre (x, then y, then z). Radii and coordinates that differ by
+    /// rounding count as equal, so that a vessel's centre line, its mesh and a file of this have the same numbers.
     pub index: usize,
     /// Centre in mm: mean of the loop, each vertex weighted by the length of its edges.
     pub centre_mm: Vec3,
@@ -43,7 +44,8 @@ pub struct Opening {
     pub direction: Vec3,
     /// The loop's vertices, in the order in which triangles of a cap would traverse them; empty without a mesh.
     pub boundary: Vec<u32>,
-    /// Possible length of a straight extension of the vessel, mm, before it meets the vessel or another extension.
+    /// Possible length of a straight extension of the vessel, mm, before it meets the vessel or another extension; 0
+    /// where the vessel touches the opening.
     pub beyond_mm: f64,
 }
 
@@ -128,15 +130,44 @@ pub(super) fn inlet(openings: &[Opening]) -> Option<&Opening> {
     trunks.min_by(|a, b| a.centre_mm.z.total_cmp(&b.centre_mm.z))
 }
 
-/// Sample points of a mesh: its vertices and the middles of its triangles.
-pub(super) fn places(mesh: &SurfaceMesh) -> impl Iterator<Item = Vec3> {
-    let centres = (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<Vec3>() / 3.0);
-    mesh.vertices_mm.iter().copied().chain(centres)
+/// Shortens the extensions of openings, whose rims reach so far beyond their planes, so that they meet neither each
+/// other nor the wall. Round free space is kept about each where there is room for it; where the wall touches an
+/// opening there is no extension at all.
+///
+/// `wall` calls its last argument with sample points of the wall near the opening of this number, and whether they are
+/// of the stretch that ends there.
+pub(super) fn keep_apart(
+    wall: impl Fn(usize, &Opening, &mut dyn FnMut(Vec3, bool)),
+    rims_mm: &[f64],
+    openings: &mut [Opening],
+) {
+    let mut beyond = apart_from_others(openings);
+    for (number, (opening, beyond)) in openings.iter().zip(&mut beyond).enumerate() {
+        let rim_mm = rims_mm[number];
+        let free = FREE_RADII * opening.radius_mm;
+        wall(number, opening, &mut |x, is_of_end| {
+            let (along, aside) = opening.beyond_and_aside_mm(&x);
+            if aside >= free {
+                return;
+            }
+            let before = along - rim_mm;
+            let is_behind = before <= if is_of_end { 0.0 } else { -FLAT * opening.radius_mm };
+            let from_rim = libm::hypot(aside - opening.radius_mm, before);
+            let is_own = is_behind || (is_of_end && from_rim <= OWN_RIM * opening.radius_mm);
+            // Rims may be oblique.
+            if along > free || !is_own {
+                let half = if is_own { 0.0 } else { HALFWAY * before };
+                *beyond = (along - free).max(half).min(*beyond);
+            }
+        });
+    }
+    for (opening, beyond) in openings.iter_mut().zip(beyond) {
+        opening.beyond_mm = if beyond < FLAT * opening.radius_mm { 0.0 } else { beyond };
+    }
 }
 
-/// Shortens the extensions of openings, whose rims reach so far beyond their planes, so that they meet neither each
-/// other nor these sample points of the wall. Round free space is kept about each where there is room for it.
-pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, rims_mm: &[f64], openings: &mut [Opening]) {
+/// Lengths of the extensions with which they do not meet each other.
+fn apart_from_others(openings: &[Opening]) -> Vec<f64> {
     let mut beyond = vec![MOST_BEYOND_MM; openings.len()];
     for (i, a) in openings.iter().enumerate() {
         for (j, b) in openings.iter().enumerate().skip(i + 1) {
@@ -155,26 +186,7 @@ pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, rims_mm: &[f64], open
             beyond[j] = length_mm.min(beyond[j]);
         }
     }
-    for x in wall {
-        for ((opening, rim_mm), beyond) in openings.iter().zip(rims_mm).zip(&mut beyond) {
-            let free = FREE_RADII * opening.radius_mm;
-            let (along, aside) = opening.beyond_and_aside_mm(&x);
-            if aside >= free {
-                continue;
-            }
-            let before = along - rim_mm;
-            let from_rim = libm::hypot(aside - opening.radius_mm, before);
-            let is_own = before <= 0.0 || from_rim <= OWN_RIM * opening.radius_mm;
-            // Rims may be oblique.
-            if along > free || !is_own {
-                let half = if is_own { 0.0 } else { HALFWAY * before };
-                *beyond = (along - free).max(half).min(*beyond);
-            }
-        }
-    }
-    for (opening, beyond) in openings.iter_mut().zip(beyond) {
-        opening.beyond_mm = beyond.max(FLAT * opening.radius_mm);
-    }
+    beyond
 }
 
 /// The largest length up to this one that is allowed, if all shorter ones are.
@@ -228,16 +240,46 @@ pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
     pairs
 }
 
-/// The order of openings, as in [`Opening::index`].
-fn order(a: &Opening, b: &Opening) -> Ordering {
-    let key = |o: &Opening| [-o.radius_mm, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z];
-    let order = |k: usize| key(a)[k].total_cmp(&key(b)[k]);
-    order(0).then(order(1)).then(order(2)).then(order(3))
+/// Differences of radii, relative to them, and of coordinates of centres, relative to the radius, up to which they
+/// are equal: a rim of triangles is measured to about a thousandth, and files are rounded.
+const EQUAL: [f64; 4] = [2e-3, 1e-2, 1e-2, 1e-2];
+
+/// What openings are ordered by, as in [`Opening::index`].
+fn keys(opening: &Opening) -> [f64; 4] {
+    let centre_mm = &opening.centre_mm;
+    [-opening.radius_mm, centre_mm.x, centre_mm.y, centre_mm.z]
+}
+
+/// The numbers of openings in their order.
+fn in_order(openings: &[Opening]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..openings.len()).collect();
+    // By exact values first: these decide if all are equal.
+    for key in (0..EQUAL.len()).rev() {
+        order.sort_by(|a, b| keys(&openings[*a])[key].total_cmp(&keys(&openings[*b])[key]));
+    }
+    arrange(&mut order, openings, 0);
+    order
+}
+
+/// Sorts openings by a key, and those of which it is equal by the next ones.
+fn arrange(order: &mut [usize], openings: &[Opening], key: usize) {
+    let Some(equal) = EQUAL.get(key) else { return };
+    let value = |index: usize| keys(&openings[index])[key];
+    order.sort_by(|a, b| value(*a).total_cmp(&value(*b)));
+    let mut rest = order;
+    while let Some(&first) = rest.first() {
+        let most = value(first) + equal * openings[first].radius_mm;
+        let count = rest.iter().take_while(|index| value(**index) <= most).count().max(1);
+        let (alike, others) = rest.split_at_mut(count);
+        arrange(alike, openings, key + 1);
+        rest = others;
+    }
 }
 
 /// Sets the indices of openings.
-pub(super) fn number(openings: &mut [Opening]) {
-    openings.sort_by(order);
+pub(super) fn number(openings: &mut Vec<Opening>) {
+    let order = in_order(openings);
+    *openings = order.iter().map(|index| openings[*index].clone()).collect();
     for (index, opening) in openings.iter_mut().enumerate() {
         opening.index = index;
     }
@@ -299,11 +341,12 @@ pub(crate) fn boundary(mesh: &SurfaceMesh, table: &EdgeTable) -> Boundary {
             loops.push((Opening::of_loop(mesh, simple), start.0));
         }
     }
-    loops.sort_by(|(a, _), (b, _)| order(a, b).then(a.boundary.cmp(&b.boundary)));
-    for (index, (opening, _)) in loops.iter_mut().enumerate() {
-        opening.index = index;
-    }
-    let (openings, first_triangle) = loops.into_iter().unzip();
+    loops.sort_by(|(a, _), (b, _)| a.boundary.cmp(&b.boundary));
+    let (found, first): (Vec<Opening>, Vec<u32>) = loops.into_iter().unzip();
+    let order = in_order(&found);
+    let first_triangle = order.iter().map(|k| first[*k]).collect();
+    let mut openings = found;
+    number(&mut openings);
     Boundary { openings, first_triangle, stray_edges }
 }
 
@@ -393,15 +436,40 @@ mod tests {
         Opening::at_end(Vec3::x() * x, 1.0, direction.normalize())
     }
 
+    /// Sample points of a wall that ends at all openings.
+    fn wall(places: &[Vec3]) -> impl Fn(usize, &Opening, &mut dyn FnMut(Vec3, bool)) {
+        move |_, _, see| places.iter().for_each(|x| see(*x, true))
+    }
+
+    #[test]
+    fn openings_that_differ_by_rounding_are_numbered_by_their_places() {
+        let numbers = |radii: [f64; 4], off: f64| -> Vec<f64> {
+            let places = [(9.0, 0.0), (-9.0, off), (0.0, -4.0 * off), (0.0, 5.0)];
+            let mut all: Vec<Opening> = (places.iter().zip(radii))
+                .map(|((x, y), radius)| Opening::at_end(Vec3::new(*x + off, *y, 0.0), radius, Vec3::z()))
+                .collect();
+            number(&mut all);
+            assert!(all.iter().enumerate().all(|(k, opening)| opening.index == k));
+            all.iter().map(|opening| (opening.centre_mm.x + opening.centre_mm.y).round()).collect()
+        };
+        let exact = numbers([2.0, 2.0, 3.0, 2.0], 0.0);
+        assert_eq!(exact, [0.0, -9.0, 5.0, 9.0]);
+        for off in [-1e-3, 1e-9, 1e-3] {
+            assert_eq!(numbers([2.0 - off, 2.0, 3.0, 2.0 + off], off), exact, "{off}");
+        }
+        // Openings of different sizes go by these.
+        assert_eq!(numbers([2.1, 2.0, 3.0, 2.05], 0.0), [0.0, 9.0, 5.0, -9.0]);
+    }
+
     #[test]
     fn what_is_drawn_out_of_two_openings_stays_apart() {
-        let beyond = |mesh: &SurfaceMesh, turned: f64| {
+        let beyond = |mesh: &[Vec3], turned: f64| {
             let mut pair =
                 [opening(-5.0, Vec3::new(turned, 0.0, 1.0)), opening(5.0, Vec3::new(-turned, 0.0, 1.0))];
-            keep_apart(places(mesh), &[0.0; 2], &mut pair);
+            keep_apart(wall(mesh), &[0.0; 2], &mut pair);
             pair.map(|o| o.beyond_mm)
         };
-        let nothing = SurfaceMesh::default();
+        let nothing = [];
         assert_eq!(beyond(&nothing, 0.0), [MOST_BEYOND_MM; 2]);
         assert_eq!(beyond(&nothing, -0.2), [MOST_BEYOND_MM; 2]);
         // They approach to 2.2 mm after 7.8 mm / √2 each.
@@ -412,14 +480,14 @@ mod tests {
             beyond(&nothing, 1.0)
         );
         // A vertex of the vessel 10 mm above the first.
-        let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 0.5, 10.0)], triangles: Vec::new() };
+        let vessel = [Vec3::new(-5.0, 0.5, 10.0)];
         let [first, second] = beyond(&vessel, 0.0);
         assert!((first - 8.9).abs() < 1e-12 && second == MOST_BEYOND_MM, "{first} {second}");
         // Half a millimetre in front of it: half of that, since an extension through the vessel would be felt in it.
-        let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 0.5, 0.5)], triangles: Vec::new() };
+        let vessel = [Vec3::new(-5.0, 0.5, 0.5)];
         assert_eq!(beyond(&vessel, 0.0), [0.25, MOST_BEYOND_MM]);
         // The vessel's own wall at the rim is not in the way.
-        let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 1.05, 0.1)], triangles: Vec::new() };
+        let vessel = [Vec3::new(-5.0, 1.05, 0.1)];
         assert_eq!(beyond(&vessel, 0.0), [MOST_BEYOND_MM; 2]);
     }
 
@@ -427,7 +495,7 @@ mod tests {
     fn what_is_drawn_out_of_openings_that_face_each_other_meets_in_the_middle() {
         for (gap, most) in [(1.0, 0.5), (4.0, 2.0), (7.0, LEAST_BEYOND_MM)] {
             let mut pair = [opening(0.0, Vec3::x()), opening(gap, -Vec3::x())];
-            keep_apart(places(&SurfaceMesh::default()), &[0.0; 2], &mut pair);
+            keep_apart(wall(&[]), &[0.0; 2], &mut pair);
             for found in pair.map(|o| o.beyond_mm) {
                 assert!(found <= most && found > 0.99 * most, "{found} of a gap of {gap}");
             }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+use super::in_front::Ends;
 use super::mesh::retain_numbered;
 use super::opening::{self, Opening};
 pub use super::topology::NONE as NO_NEIGHBOUR;
@@ -216,7 +217,12 @@ impl Wall {
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
         let rims_mm: Vec<f64> = boundary.openings.iter().map(|opening| opening.rim_mm(&mesh)).collect();
-        opening::keep_apart(opening::places(&mesh), &rims_mm, &mut boundary.openings);
+        let across = table.neighbours(mesh.triangles.len());
+        let ends = Ends::new(&mesh, &across, &boundary.openings);
+        let see = |number: usize, opening: &Opening, see: &mut dyn FnMut(Vec3, bool)| {
+            ends.sample(number, opening, see);
+        };
+        opening::keep_apart(see, &rims_mm, &mut boundary.openings);
         let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
         Self { mesh, openings: boundary.openings, caps, report }
     }

@@ -185,7 +185,11 @@ fn openings(axes: &[Axis], ends: &[TreeEnd]) -> Vec<Opening> {
             place.position + (u * libm::cos(angle) + v * libm::sin(angle)) * place.radius[0]
         })
     });
-    opening::keep_apart(walls, &vec![0.0; ends.len()], &mut openings);
+    let walls: Vec<Vec3> = walls.collect();
+    let see = |_: usize, _: &Opening, see: &mut dyn FnMut(Vec3, bool)| {
+        walls.iter().for_each(|x| see(*x, true));
+    };
+    opening::keep_apart(see, &vec![0.0; ends.len()], &mut openings);
     openings
 }
 

@@ -249,3 +249,19 @@ fn the_far_side_of_a_septum_is_another_wall() {
     let other = closest(&field, &x);
     assert!((other.distance_mm() + 0.5).abs() < 2e-3 && other.normal().x < -0.99, "{}", other.distance_mm());
 }
+
+#[test]
+fn openings_have_the_numbers_that_they_have_in_an_exported_surface() {
+    for name in ["straight_tube", "curved_tube", "basilar_aneurysm", "sidewall_aneurysm"] {
+        let tree = anatomy::tree(name).unwrap();
+        let vessel = Lumen::from(SweptVessel::new(tree, anatomy::asset_resolution(name)).unwrap());
+        let mut exported = vessel.wall(&NoStore).unwrap().mesh().clone();
+        // As an STL file has them, and moved by less than anyone would see.
+        exported.vertices_mm.iter_mut().for_each(|x| *x = x.map(|c| f64::from((c + 1e-3) as f32)));
+        let read = crate::vessel::Wall::from_surface(&exported).unwrap();
+        assert_eq!(read.openings().len(), vessel.openings().len(), "{name}");
+        for (one, other) in vessel.openings().iter().zip(read.openings()) {
+            assert!((one.centre_mm - other.centre_mm).norm() < 0.1, "{name}: {one:?} {other:?}");
+        }
+    }
+}
