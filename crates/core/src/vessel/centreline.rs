@@ -50,6 +50,11 @@ pub struct Target {
     pub row: usize,
 }
 
+/// Whether a name is that of an opening in a centre line that was computed.
+fn is_opening(name: &str) -> bool {
+    name.strip_prefix("opening ").is_some_and(|number| number.parse::<usize>().is_ok())
+}
+
 impl CentrelineTree {
     /// A tree of `nodes`.
     ///
@@ -134,6 +139,15 @@ impl CentrelineTree {
     /// An unknown name, with the most similar one.
     pub fn target(&self, name: &str) -> Result<&Target> {
         self.targets.iter().find(|target| target.name == name).ok_or_else(|| {
+            // One number is as near as another: a computed centre line has all openings but those.
+            let known: Vec<&str> = self.targets.iter().map(|target| target.name.as_str()).collect();
+            if is_opening(name) && known.iter().any(|name| is_opening(name)) {
+                let mend = format!(
+                    "the centre line begins at this opening, or does not lead to it; its targets are {}",
+                    known.join(", ")
+                );
+                return Error::parameter("target", format!("{name:?}"), mend);
+            }
             let mend = match nearest_name(self.targets.iter().map(|target| target.name.as_str()), name) {
                 Some(nearest) => format!("did you mean {nearest:?}?"),
                 None => {
@@ -474,6 +488,14 @@ mod tests {
         assert!(json(&open) != json(&tree));
         let named = |name: &str| open.clone().with_targets(vec![Target { name: name.into(), row: 2 }]);
         assert!(named("end closed").is_err() && named("closed end").is_ok());
+    }
+
+    #[test]
+    fn the_opening_where_a_computed_line_begins_is_no_target() {
+        let table = "0,0,0,2,-1\n0,0,5,1.5,0,opening 0\n0 3 9 1 0 opening 2\n";
+        let told = CentrelineTree::parse(table).unwrap().target("opening 1").unwrap_err().to_string();
+        let expected = "the centre line begins at this opening, or does not lead to it; its targets are opening 0, opening 2";
+        assert!(told.ends_with(expected), "{told}");
     }
 
     #[test]

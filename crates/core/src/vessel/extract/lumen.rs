@@ -78,6 +78,14 @@ impl<'a> Lumen<'a> {
         })
     }
 
+    /// Whether the straight way between two positions in the lumen stays in it.
+    pub(super) fn sees(&self, from: &Vec3, to: &Vec3) -> bool {
+        let way = to - from;
+        let length_mm = way.norm();
+        let Some(direction) = way.try_normalize(OFF * self.size_mm) else { return true };
+        !self.leaves(from, to) && self.free_mm(from, &direction).is_none_or(|mm| mm > length_mm)
+    }
+
     /// Distance to the wall along a unit vector, mm; `None` if the path leaves through an opening.
     pub(super) fn free_mm(&self, from: &Vec3, direction: &Vec3) -> Option<f64> {
         self.query.first_met(from, direction, self.size_mm).map(|(mm, _)| mm)

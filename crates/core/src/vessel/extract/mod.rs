@@ -14,7 +14,7 @@ mod ways;
 pub(super) use self::growing::Growing;
 pub(super) use self::lumen::Sphere;
 use self::lumen::{Lumen, Spheres};
-use self::ways::Ways;
+use self::ways::{Beside, Ways};
 use super::{CentrelineTree, Target, Wall};
 use crate::{Error, Result, Vec3};
 
@@ -65,8 +65,10 @@ impl ExtractedCentreline {
     /// without a path, and for a surface without the openings needed.
     pub fn of(wall: &Wall, from: Option<CentrelineEnd>, to: &[CentrelineEnd]) -> Result<Self> {
         let lumen = Lumen::new(wall)?;
-        let inlet = wall.inlet().map_or(0, |opening| opening.index);
-        let first = from.unwrap_or(CentrelineEnd::Opening(inlet));
+        let first = from.or_else(|| wall.inlet().map(|inlet| CentrelineEnd::Opening(inlet.index)));
+        let first = first.ok_or_else(|| {
+            Error::parameter("from", "none", "the surface has no opening to begin at: give a place inside")
+        })?;
         let root = end(&lumen, &first, "from")?;
         let all: Vec<CentrelineEnd> = match to {
             [] => {
@@ -173,20 +175,26 @@ fn end(lumen: &Lumen<'_>, end: &CentrelineEnd, key: &str) -> Result<Sphere> {
 /// The paths from the first sphere to the ends, through more closely spaced spheres if needed.
 fn found_ways(lumen: &Lumen<'_>, root: Sphere, ends: &[Sphere]) -> Vec<Option<Vec<Sphere>>> {
     let mut found = vec![None; ends.len()];
-    for spacing in SPACINGS {
+    for (level, spacing) in SPACINGS.into_iter().enumerate() {
         let mut spheres = Spheres::default();
         for sphere in [root].iter().chain(ends).copied().chain(lumen.spheres(spacing)) {
             spheres.push(sphere);
         }
-        let ways = Ways::from(0, &spheres, lumen);
-        for (k, way) in found.iter_mut().enumerate() {
-            if way.is_none() {
+        let mut beside = Beside::new(&spheres, lumen);
+        let mut take = |beside: &Beside| {
+            let ways = Ways::from(0, &spheres, beside);
+            for (k, way) in found.iter_mut().enumerate().filter(|(_, way)| way.is_none()) {
                 let numbers = ways.to(k + 1);
                 *way = numbers.map(|way| way.into_iter().map(|sphere| spheres.all[sphere]).collect());
             }
-        }
-        if found.iter().all(Option::is_some) {
+            found.iter().all(Option::is_some)
+        };
+        if take(&beside) {
             break;
+        }
+        if level + 1 == SPACINGS.len() {
+            beside.join_ends(1 + ends.len(), &spheres, lumen);
+            take(&beside);
         }
     }
     found

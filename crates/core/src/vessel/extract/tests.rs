@@ -1,6 +1,6 @@
 use super::*;
 use crate::vessel::generate::axes;
-use crate::vessel::{GeneratedWall, anatomy};
+use crate::vessel::{GeneratedWall, SurfaceMesh, anatomy};
 
 /// Distance of computed centre lines from the exact ones, relative to the tolerance: half a millimetre, or a
 /// twentieth of the radius if larger. Positions within a radius of ends, and where two branches overlap, are
@@ -181,4 +181,41 @@ fn a_way_does_not_cross_the_gap_of_a_ring_that_is_cut_open() {
     // Nor do the felt extensions of its ends meet.
     let reach: f64 = wall.openings().iter().map(|opening| opening.beyond_mm).sum();
     assert!(reach > 4.0 && reach < 4.7, "{reach}");
+}
+
+/// A box from z = −40 to 0 with a pyramid on it, whose apex is at z = 40.
+fn spike() -> Wall {
+    let corner = |k: usize| {
+        let side = |bit: usize| if k >> bit & 1 == 1 { 3.0 } else { -3.0 };
+        Vec3::new(side(0), side(1), if k > 3 { 0.0 } else { -40.0 })
+    };
+    let vertices_mm = (0..8).map(corner).chain([Vec3::z() * 40.0]).collect();
+    let quads = [[0, 2, 3, 1], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
+    let halves = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let triangles = halves.chain([[4, 5, 8], [5, 7, 8], [7, 6, 8], [6, 4, 8]]).collect();
+    Wall::from_surface(&SurfaceMesh { vertices_mm, triangles }).unwrap()
+}
+
+#[test]
+fn a_way_leads_into_a_pointed_corner_and_out_of_it() {
+    let wall = spike();
+    let place = |x: f64, z: f64| CentrelineEnd::Place(Vec3::new(x, 0.6 * x, z));
+    for (from, to) in [(place(0.0, -30.0), place(0.1, 38.0)), (place(0.0, 36.0), place(1.0, -35.0))] {
+        let found = ExtractedCentreline::of(&wall, Some(from), &[to]).unwrap();
+        let way = found.tree.path_to(found.tree.targets()[0].row).unwrap();
+        assert!((way.length_mm() - 69.5).abs() < 2.5, "{}", way.length_mm());
+        assert!(found.tree.nodes().iter().all(|node| wall.contains(&node.position_mm).unwrap()));
+    }
+    // Twin: there is no way into another piece of the surface.
+    let mut two = wall.mesh().clone();
+    let count = two.vertices_mm.len() as u32;
+    two.vertices_mm.extend_from_within(..);
+    two.vertices_mm[count as usize..].iter_mut().for_each(|x| x.x += 10.0);
+    two.triangles.extend(wall.mesh().triangles.iter().map(|t| t.map(|v| v + count)));
+    let two = Wall::from_surface(&two).unwrap();
+    let other = CentrelineEnd::Place(Vec3::new(10.0, 0.0, 38.0));
+    let error = ExtractedCentreline::of(&two, Some(place(0.0, -30.0)), &[other]).unwrap_err().to_string();
+    assert!(error.contains("no way inside the vessel leads there"), "{error}");
+    let error = ExtractedCentreline::of(&wall, None, &[other]).unwrap_err().to_string();
+    assert!(error.starts_with("from = none: the surface has no opening to begin at"), "{error}");
 }

@@ -36,8 +36,11 @@ impl PartialOrd for Reached {
     }
 }
 
-impl Ways {
-    pub(super) fn from(first: usize, spheres: &Spheres, lumen: &Lumen<'_>) -> Self {
+/// The spheres beside each sphere, with which it overlaps.
+pub(super) struct Beside(Vec<Vec<usize>>);
+
+impl Beside {
+    pub(super) fn new(spheres: &Spheres, lumen: &Lumen<'_>) -> Self {
         let all = &spheres.all;
         let mut beside: Vec<Vec<usize>> = vec![Vec::new(); all.len()];
         for (k, sphere) in all.iter().enumerate() {
@@ -48,6 +51,42 @@ impl Ways {
                 beside[other].push(k);
             }
         }
+        Self(beside)
+    }
+
+    /// Joins each of the first so many spheres, the ends, to the nearest one of another part that it sees: in a
+    /// pointed corner no spheres lead from one to the next.
+    pub(super) fn join_ends(&mut self, count: usize, spheres: &Spheres, lumen: &Lumen<'_>) {
+        let all = &spheres.all;
+        for end in 0..count.min(all.len()) {
+            let own = self.part(end);
+            let from_mm = all[end].centre_mm;
+            let away_mm = |k: usize| (all[k].centre_mm - from_mm).norm();
+            let mut others: Vec<usize> = (count..all.len()).filter(|k| !own[*k]).collect();
+            others.sort_by(|&a, &b| away_mm(a).total_cmp(&away_mm(b)).then(a.cmp(&b)));
+            if let Some(seen) = others.into_iter().find(|k| lumen.sees(&from_mm, &all[*k].centre_mm)) {
+                self.0[end].push(seen);
+                self.0[seen].push(end);
+            }
+        }
+    }
+
+    /// Whether each sphere is in the same part as this one.
+    fn part(&self, of: usize) -> Vec<bool> {
+        let mut is_in = vec![false; self.0.len()];
+        let mut open = vec![of];
+        while let Some(at) = open.pop() {
+            if !std::mem::replace(&mut is_in[at], true) {
+                open.extend(&self.0[at]);
+            }
+        }
+        is_in
+    }
+}
+
+impl Ways {
+    pub(super) fn from(first: usize, spheres: &Spheres, beside: &Beside) -> Self {
+        let all = &spheres.all;
         let mut cost = vec![f64::INFINITY; all.len()];
         let mut before = vec![None; all.len()];
         (cost[first], before[first]) = (0.0, Some(first));
@@ -56,7 +95,7 @@ impl Ways {
             if at.cost > cost[at.sphere] {
                 continue;
             }
-            for &next in &beside[at.sphere] {
+            for &next in &beside.0[at.sphere] {
                 let through = at.cost + length_over_radius(&all[at.sphere], &all[next]);
                 if through < cost[next] {
                     (cost[next], before[next]) = (through, Some(at.sphere));
