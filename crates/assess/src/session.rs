@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_core::input::plain;
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -47,5 +48,8 @@ impl SessionFile {
 }
 
 fn not_a_session(path: &Path, error: &dyn std::fmt::Display) -> Error {
-    Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
+    Error::content(
+        path,
+        format!("{}; give a session of endowire play or the folder of a run", plain(&error.to_string())),
+    )
 }

@@ -336,7 +336,7 @@ fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
             "threshold[1].metric = \"wall_force_n\": has a threshold already",
         ),
         ("level = 2", "level = 5", "level = 5: must be from 1 to 4"),
-        ("level = 2", "level = \"hard\"", "line 3: level: invalid type"),
+        ("level = 2", "level = \"hard\"", "line 3: level: must be a whole number"),
         ("text = \"Push on.\"", "text = \" \"", "text = \"\": must not be empty"),
         ("tip_within_mm = 5.0", "tip_within_mm = 0.0", "goal.tip_within_mm = 0: must be a number above 0"),
         ("time_s = 30.0", "time_s = -1.0", "limits.time_s = -1: must be a number above 0"),

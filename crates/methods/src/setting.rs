@@ -6,7 +6,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use endowire_core::file::{FileSystem, Files};
-use endowire_core::input::from_toml_of;
+use endowire_core::input::{from_toml_of, plain};
 use endowire_core::{Error, Result};
 use toml::{Table, Value};
 
@@ -101,8 +101,7 @@ impl SceneTables {
     /// # Errors
     /// [`Error::Content`] if it is not TOML.
     pub fn of_file(text: &str, path: &Path, files: Arc<dyn Files>) -> Result<Self> {
-        let tables =
-            toml::from_str(text).map_err(|error| Error::content(path, error.message().to_owned()))?;
+        let tables = toml::from_str(text).map_err(|error| Error::content(path, plain(error.message())))?;
         Ok(Self { path: path.to_owned(), files, tables })
     }
 
@@ -250,7 +249,10 @@ mod tests {
             ("vessel.wall.frction=0.1", "scene.toml: --set: vessel.wall.frction = 0.1: "),
             ("vessel.wall.frction=0.1", "did you mean `friction`?"),
             ("vesel.wall.friction=0.1", "did you mean `vessel`?"),
-            ("vessel.wall.friction=much", "vessel.wall.friction = \"much\": friction: invalid type"),
+            (
+                "vessel.wall.friction=much",
+                "vessel.wall.friction = \"much\": friction: must be a number, not the text \"much\"",
+            ),
             ("device.part[2].length_mm=1", "the scene has 2 in that list"),
             ("device.prt[0].length_mm=1", "did you mean `part[0]`?"),
             ("device.part[0].lenth_mm=1", "did you mean `length_mm`?"),

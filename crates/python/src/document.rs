@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use endowire_core::input::nearest;
+use endowire_core::input::{nearest, plain};
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
@@ -176,7 +176,7 @@ fn refuse_lists(name: &str, given: &Value, read: &Value) -> PyResult<()> {
 
 /// The error of a reader, with the nearest right key for an unknown one.
 fn refused(name: &str, error: &serde_json::Error) -> PyErr {
-    let text = error.to_string();
+    let text = plain(&error.to_string());
     InputError::new_err(format!("{name}: {text}{}", nearest(&text)))
 }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use endowire_core::input::plain;
 use endowire_methods::Setting;
 use endowire_viewer::{Mode, Pose};
 
@@ -78,7 +79,7 @@ pub(crate) struct FrameArgs {
 }
 
 fn mode(text: &str) -> Result<Mode, String> {
-    serde_json::from_value(serde_json::Value::from(text)).map_err(|e| e.to_string())
+    serde_json::from_value(serde_json::Value::from(text)).map_err(|e| plain(&e.to_string()))
 }
 
 #[derive(Debug, clap::Args)]

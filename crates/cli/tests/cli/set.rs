@@ -127,7 +127,11 @@ fn a_wrong_key_or_value_is_refused_with_the_nearest_right_one() {
         ("run", "vessel.wall.frction=0.1", "vessel.wall.frction = 0.1: "),
         ("run", "vessel.wall.frction=0.1", "did you mean `friction`?"),
         ("run", "vesel.wall.friction=0.1", "did you mean `vessel`?"),
-        ("run", "vessel.wall.friction=much", "vessel.wall.friction = \"much\": friction: invalid type"),
+        (
+            "run",
+            "vessel.wall.friction=much",
+            "vessel.wall.friction = \"much\": friction: must be a number, not the text \"much\"",
+        ),
         ("run", "vessel.wall.friction", "write KEY=VALUE"),
         ("run", "script[1].step_mm=2", "the scene has 1 in that list, and [0] is the first"),
         ("run", "scrpt[0].step_mm=2", "did you mean `script[0]`?"),

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use endowire_core::Vec3;
+use endowire_core::input::plain;
 use endowire_core::insertion::{DetachedCoil, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
@@ -164,7 +165,8 @@ fn scene(file: &Path, device: Option<&Path>, settings: &[Setting]) -> Result<Sce
 /// The view of a scene with the keys of the specification. If another device replaces the scene's own, the materials
 /// of the latter are left out.
 fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<ViewSpec, Failure> {
-    let bad = |e: serde_json::Error| Failure::Input(format!("view: {e}")).at(file.display());
+    let bad =
+        |e: serde_json::Error| Failure::Input(format!("view: {}", plain(&e.to_string()))).at(file.display());
     let mut of_scene = ViewSpec::of_scene(scene, file)?;
     if other_device {
         of_scene.device.clear();

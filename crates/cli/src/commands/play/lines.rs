@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 
 use endowire_core::error::nearest_name;
+use endowire_core::input::plain;
 use endowire_play::{INPUTS, Input, Readout};
 use serde::{Deserialize, Serialize};
 
@@ -49,8 +50,9 @@ fn parse(text: &str) -> Result<Line, String> {
         #[serde(rename = "do")]
         name: String,
     }
-    let Name { name } = serde_json::from_str(text).map_err(|e| format!("no command: {e}"))?;
-    let wrong = |e: serde_json::Error| format!("{name}: {e}");
+    let Name { name } = serde_json::from_str(text)
+        .map_err(|e: serde_json::Error| format!("no command: {}", plain(&e.to_string())))?;
+    let wrong = |e: serde_json::Error| format!("{name}: {}", plain(&e.to_string()));
     if ORDERS.contains(&name.as_str()) {
         let order = serde_json::from_str(text).map_err(wrong)?;
         return checked(order).map(Line::Order);

@@ -1,6 +1,6 @@
 //! Options of the command line for frames.
 
-use endowire_core::input::nearest;
+use endowire_core::input::{nearest, plain};
 use endowire_viewer::{View, ViewSpec};
 use serde_json::Value;
 
@@ -174,8 +174,8 @@ pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) 
         }
         *place = value;
         // Checked one by one, so that the message names the faulty one.
-        let fits = serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| e.to_string());
+        let fits = serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| plain(&e.to_string()));
         fits.map_err(|e| failed(format!("{set}: {e}{}", nearest(&e))))?;
     }
-    serde_json::from_value(table).map_err(|e| failed(e.to_string()))
+    serde_json::from_value(table).map_err(|e| failed(plain(&e.to_string())))
 }
