@@ -136,11 +136,19 @@ fn wanted(args: &RenderArgs, recording: &Recording) -> Result<Vec<usize>, Failur
     let to = args.to.unwrap_or(recorded);
     let last = to.min(recorded);
     let beyond = to > recorded && recording.summary.complete;
-    if args.every == 0 || args.from == 0 || args.from > last || beyond {
+    if args.to.is_some_and(|to| args.from > to) {
         return Err(Failure::Input(format!(
-            "--from {} --to {to} --every {}: {} has steps 1 to {}",
+            "--from {} --to {to}: the last step to draw comes before the first: give --to a step from {0} on",
+            args.from
+        )));
+    }
+    if args.every == 0 {
+        return Err(Failure::Input("--every 0: must be 1 or more: every so many steps are drawn".to_owned()));
+    }
+    if args.from == 0 || args.from > last || beyond {
+        return Err(Failure::Input(format!(
+            "--from {} --to {to}: {} has steps 1 to {}",
             args.from,
-            args.every,
             args.dir.display(),
             recorded
         )));

@@ -58,6 +58,16 @@ struct Start {
 /// Runs the matrix, or prints the scenes of its cells.
 pub(crate) fn surfaces(args: &VerifyArgs, folder: &Path) -> Result<(), Failure> {
     let files = surfaces_in(folder)?;
+    let none = |pattern: &str| {
+        let mend = "no cell has all of these words; --full has more cells";
+        Failure::Input(format!("--cells {pattern}: {mend}"))
+    };
+    // Reading the surfaces takes minutes.
+    if let Some(pattern) = args.cells.as_deref()
+        && !files.iter().any(|file| file.may_match(pattern, args.full))
+    {
+        return Err(none(pattern));
+    }
     let mut inputs = Vec::new();
     for file in &files {
         inputs.push(read_input(&file.path)?);
@@ -82,9 +92,7 @@ pub(crate) fn surfaces(args: &VerifyArgs, folder: &Path) -> Result<(), Failure> 
     if let Some(pattern) = &args.cells {
         jobs.retain(|(surface, cell)| matches(&cell.name_in(surface), pattern));
         if jobs.is_empty() {
-            return Err(Failure::Input(format!(
-                "--cells {pattern}: no cell has all of these words; --full has more cells"
-            )));
+            return Err(none(pattern));
         }
     }
     if args.scene {

@@ -167,7 +167,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     std::fs::write(&nan, pose).unwrap();
     let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
     // Each message names key, value and mend.
-    let cases: [(Vec<&str>, &[&str]); 20] = [
+    let cases: [(Vec<&str>, &[&str]); 22] = [
         (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
         (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
         (
@@ -179,6 +179,11 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
             &["c_arm.nothing=0", "expected one of", "sid_mm"],
         ),
         (vec!["render", text(&run), "--from", "900"], &["--from 900", "steps 1 to 106"]),
+        (
+            vec!["render", text(&run), "--from", "5", "--to", "2"],
+            &["--from 5 --to 2: the last step to draw comes before the first"],
+        ),
+        (vec!["render", text(&run), "--every", "0"], &["--every 0: must be 1 or more"]),
         (vec!["render", text(&run), "--view", "3d", "--labels"], &["--labels", "use --view fluoro"]),
         (vec!["render", text(&run), "--view", "fluoro", "--animate", text(&far)], &["no/such/folder"]),
         (

@@ -48,6 +48,47 @@ fn the_wire_of_new_scenes_is_that_of_the_catalogue() {
     let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates/wire.toml");
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
     assert_eq!(read(&template), read(&assets().join("devices/wire_035_hydrophilic_angled.toml")));
+    let template = template.with_file_name("microwire.toml");
+    assert_eq!(read(&template), read(&assets().join("devices/microwire_014_shaped.toml")));
+}
+
+/// A box of this size along z, closed or without its two ends.
+fn box_of(wide: f64, long: f64, is_closed: bool) -> String {
+    let corner = |k: usize| {
+        let side = |bit: usize| if k >> bit & 1 == 1 { wide / 2.0 } else { -wide / 2.0 };
+        format!("v {} {} {}\n", side(0), side(1), if k > 3 { long } else { 0.0 })
+    };
+    let sides = ["1 2 6 5", "2 4 8 6", "4 3 7 8", "3 1 5 7"];
+    let ends = ["1 3 4 2", "5 6 8 7"];
+    let faces = sides.iter().chain(ends.iter().filter(|_| is_closed));
+    (0..8).map(corner).chain(faces.map(|face| format!("f {face}\n"))).collect()
+}
+
+#[test]
+fn a_new_scene_of_an_unusual_vessel_runs_or_it_is_said_why_there_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let vessel = folder.path().join("box.obj");
+    for (name, text, expected) in [
+        ("closed", box_of(8.0, 60.0, true), Ok(())),
+        ("thin", box_of(0.7, 30.0, false), Ok(())),
+        ("short", box_of(3.0, 5.0, false), Ok(())),
+        ("hair", box_of(0.2, 5.0, false), Err("the thinnest wire that a new scene can have")),
+    ] {
+        std::fs::write(&vessel, text).unwrap();
+        let made = folder.path().join(name);
+        let output = endowire().arg("new").arg(&made).arg("--vessel").arg(&vessel).output().unwrap();
+        if let Err(reason) = expected {
+            assert!(output.status.code() == Some(2) && said(&output).contains(reason), "{output:?}");
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(0), "{name}: {output:?}");
+        let mut run = endowire();
+        run.arg("run").arg(made.join("scene.toml")).arg("--out").arg(made.join("out"));
+        let run = run.args(["--set", "view.views=[]", "--json"]).output().unwrap();
+        assert_eq!(run.status.code(), Some(0), "{name}: {run:?}");
+        let summary: Value = serde_json::from_str(&told(&run)).unwrap();
+        assert!(summary["failure"].is_null() && summary["inserted_mm"].as_f64() > Some(0.0), "{summary}");
+    }
 }
 
 #[test]

@@ -9,6 +9,8 @@ use endowire_core::scene::SheathSpec;
 use endowire_core::vessel::{PatientAxes, SurfaceFrame, SurfaceMesh};
 use endowire_core::{Error, Result};
 
+use super::{Cell, WIRES, Wire, cells, matches};
+
 /// One number, or several.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
@@ -101,6 +103,25 @@ pub struct SurfaceFile {
     pub sidecar: Sidecar,
 }
 
+impl SurfaceFile {
+    /// The wires that are tried in it, whether they fit or not.
+    pub fn wires(&self) -> Vec<Wire> {
+        match self.sidecar.radii_mm() {
+            Some(radii) => radii.into_iter().map(Wire::of_radius).collect(),
+            None => WIRES.to_vec(),
+        }
+    }
+
+    /// Whether it may have a cell that a pattern matches, known before the surface is read.
+    pub fn may_match(&self, pattern: &str, full: bool) -> bool {
+        let wires = self.wires();
+        // Which cells a wire has depends on how many of the thinner ones fit.
+        let cells = cells(wires.len().max(2), full);
+        let named = |wire: &Wire, cell: &Cell| format!("{} {} {}", self.name, wire.name(), cell.name());
+        wires.iter().any(|wire| cells.iter().any(|cell| matches(&named(wire, cell), pattern)))
+    }
+}
+
 /// The surfaces of a folder in the order of their names, with their sidecars.
 ///
 /// # Errors
@@ -161,6 +182,10 @@ mod tests {
         assert_eq!(files[2].frame, SurfaceFrame { unit_mm: 3.0, axes: Some(PatientAxes::Ras) });
         assert_eq!(files[3].frame, 1.0.into());
         assert_eq!(files[2].sidecar.radii_mm(), Some(vec![0.3]));
+        // A pattern is known to match none before anything is read, which would fail here.
+        let may_match = |pattern: &str| files.iter().filter(|file| file.may_match(pattern, false)).count();
+        assert_eq!((may_match("a.STL step0.5 mu0.1"), may_match("@3 el2"), may_match("")), (1, 0, 5));
+        assert_eq!((may_match("*@3 el2"), may_match("0.014"), may_match("0.035 k1 step3")), (1, 3, 0));
         for (text, at_fault) in [
             ("unit_mm = []", "unit_mm"),
             ("device_radius_mm = -1.0", "device_radius_mm"),

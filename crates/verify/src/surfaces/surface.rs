@@ -11,7 +11,7 @@ use endowire_core::vessel::{
 use endowire_core::{Error, Result};
 
 use super::start::{Found, at_opening, inside};
-use super::{SurfaceFile, WIRES, Wire};
+use super::{SurfaceFile, Wire};
 
 /// Default for the longest insertion, mm.
 const LENGTH_MM: f64 = 400.0;
@@ -90,10 +90,7 @@ impl Surface {
             wall,
         };
         let query = WallQuery::new(&surface.wall)?;
-        let wires: Vec<Wire> = match file.sidecar.radii_mm() {
-            Some(radii) => radii.into_iter().map(Wire::of_radius).collect(),
-            None => WIRES.to_vec(),
-        };
+        let wires = file.wires();
         let thinnest_mm = wires.iter().map(|w| w.radius_mm).fold(f64::MAX, f64::min);
         let given = file.sidecar.sheath.as_ref().map(|sheath| sheath.place(&surface.wall)).transpose()?;
         // Openings that not even the thinnest wire can enter are cracks.
