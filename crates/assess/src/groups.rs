@@ -160,7 +160,13 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let turned = total(hands().map(|(_, hand)| hand.rotate_rad.abs()));
     let retracted = total(hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)));
     vec![
-        of("tip_path_mm", "mm", Some(path_mm), "way of the foremost tip, without what undo does", RAFII),
+        of(
+            "tip_path_mm",
+            "mm",
+            Some(path_mm),
+            "way of the foremost tip from the end of the first step on, without what undo does",
+            RAFII,
+        ),
         of(
             "path_ratio",
             "1",

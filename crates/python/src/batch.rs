@@ -82,16 +82,7 @@ impl Batch {
         let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
         let moves = crate::moves::moves(moves, Some(count), hands)?;
         let told = self.work(py, |members| work(&mut members.batch, &moves))?.map_err(exception)?;
-        let failures = PyDict::new(py);
-        for (index, told) in told.into_iter().enumerate() {
-            match told {
-                Ok(()) => {}
-                // No simulation has failed: the caller wants to stop.
-                Err(stopped @ Error::Stopped) => return Err(exception(stopped)),
-                Err(failed) => failures.set_item(index, exception(failed).into_value(py))?,
-            }
-        }
-        Ok(failures)
+        failures(py, told)
     }
 
     /// Runs long `work` on the members, which a signal ends. Threads are used only for several, since a program may have
@@ -168,6 +159,20 @@ impl Members {
     }
 }
 
+/// The failures of simulations as a dictionary from their indices to exceptions.
+fn failures(py: Python<'_>, told: Vec<endowire_core::Result<()>>) -> PyResult<Bound<'_, PyDict>> {
+    let failures = PyDict::new(py);
+    for (index, told) in told.into_iter().enumerate() {
+        match told {
+            Ok(()) => {}
+            // No simulation has failed: the caller wants to stop.
+            Err(stopped @ Error::Stopped) => return Err(exception(stopped)),
+            Err(failed) => failures.set_item(index, exception(failed).into_value(py))?,
+        }
+    }
+    Ok(failures)
+}
+
 /// The simulation; its long steps end once `stop` is set, or at a signal on the thread that receives them.
 fn stopped_by(stop: &Arc<AtomicBool>, mut simulation: insertion::Simulation) -> insertion::Simulation {
     let stop = Arc::clone(stop);
@@ -215,6 +220,20 @@ impl Batch {
     ) -> PyResult<Bound<'py, PyDict>> {
         let solves = natural("solves", solves)?;
         self.carry_out(py, &moves, |batch, moves| batch.tick(moves, solves))
+    }
+
+    /// Detaches the coil of an instrument in each simulation, as `Simulation.detach`: a number of an instrument for each,
+    /// or None where nothing is detached.
+    ///
+    /// Returns the failures, as `step`.
+    fn detach<'py>(&self, py: Python<'py>, instruments: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+        let each = instruments.try_iter()?.map(|one| match one? {
+            one if one.is_none() => Ok(None),
+            one => natural("instruments", &one).map(Some),
+        });
+        let instruments = each.collect::<PyResult<Vec<Option<usize>>>>()?;
+        let told = self.work(py, |members| members.batch.detach(&instruments))?.map_err(exception)?;
+        failures(py, told)
     }
 
     /// Adds the last step of each simulation to a record: `moves` as in `step`, and its end times `times_s`, shape

@@ -47,6 +47,10 @@ impl Renderer {
         if spec.wants(View::Fluoro) && !spec.injection.is_empty() && spec.flow.tree.is_none() {
             spec.flow.centreline = Some(Arc::new(vessel.tree(py)?.clone()));
         }
+        // An injection outside the vessel would be a picture without medium.
+        if spec.wants(View::Fluoro) {
+            spec.check_places().map_err(exception)?;
+        }
         let lumen = vessel.lumen.clone();
         let mut planes = spec.planes();
         if plane >= planes.len() {

@@ -106,6 +106,20 @@ def test_a_batch_of_coils_goes_on(deploying, copied):
     assert batch.state(1).to_bytes() == deploying.state().to_bytes()
 
 
+def test_a_batch_detaches_the_coils_of_some(deploying):
+    batch = endowire.Batch([deploying] * 2)
+    before = batch.state(0).to_bytes()
+    assert batch.detach([None, 0]) == {}
+    deploying.detach(0)
+    assert batch.state(0).to_bytes() == before
+    assert batch.state(1).to_bytes() == deploying.state().to_bytes()
+    # What cannot be detached is told, and the others are not affected.
+    failures = batch.detach([0, 0])
+    assert list(failures) == [1] and "detached already" in str(failures[1])
+    with pytest.raises(endowire.InputError, match="instruments = 1: give one for each of the 2"):
+        batch.detach([None])
+
+
 def test_an_instrument_stays_a_coil(copied):
     read = endowire.Instrument.read(SCENES.parent / "devices" / "coil_010_helix_2x6_soft.toml")
     assert copied(read).coil_mm == read.coil_mm == pytest.approx(60.0)

@@ -49,6 +49,16 @@ def test_the_second_plane_is_the_first_turned(vessel, simulation):
         endowire.Renderer(vessel, view, 2)
 
 
+def test_an_injection_outside_the_vessel_is_refused(vessel):
+    def view(at_mm):
+        one = {"at_mm": at_mm, "start_s": 0.0, "rate_ml_per_s": 3.0, "duration_s": 2.0}
+        return {"views": ["fluoro"], "size_px": [32, 32], "injection": [one]}
+
+    with pytest.raises(endowire.InputError, match=r"view\.injection\[0\]\.at_mm"):
+        endowire.Renderer(vessel, view([500.0, 0.0, 0.0]))
+    endowire.Renderer(vessel, view([0.0, 0.0, 20.0]))
+
+
 def test_a_wrong_view_is_named(vessel):
     with pytest.raises(endowire.InputError, match="unknown field `sizepx`"):
         endowire.Renderer(vessel, {"sizepx": [1, 1]})

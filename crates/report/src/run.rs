@@ -83,13 +83,14 @@ pub struct Row {
     bend_mj: f64,
     twist_mj: f64,
     wall_mj: f64,
+    field_mj: Option<f64>,
     max_penetration_mm: f64,
     jumped: bool,
     left_through: Option<usize>,
     converged: bool,
     #[serde(default)]
     relaxations: u32,
-    // `None` in recordings of older versions, which lack these columns.
+    // `None` in recordings of older versions, which lack these columns, as `field_mj`.
     imbalance: Option<f64>,
     wall_force_sum_n: Option<f64>,
     wall_force_largest_n: Option<f64>,
@@ -108,6 +109,7 @@ impl Row {
             bend_mj: report.energy.bend,
             twist_mj: report.energy.twist,
             wall_mj: report.energy.wall,
+            field_mj: Some(report.energy.field),
             max_penetration_mm: report.max_penetration_mm,
             jumped: report.jumped,
             left_through: report.left_through,
@@ -118,6 +120,12 @@ impl Row {
             wall_force_largest_n: Some(force.largest_n),
             wall_force_tip_n: Some(force.tip_n),
         }
+    }
+}
+
+impl Row {
+    fn energy_mj(&self) -> f64 {
+        self.bend_mj + self.twist_mj + self.wall_mj + self.field_mj.unwrap_or_default()
     }
 }
 
@@ -145,7 +153,7 @@ impl Series {
             inserted_mm: rows.iter().map(|row| row.inserted_mm).collect(),
             push_force_n: rows.iter().map(|row| row.push_force_n).collect(),
             torque_nmm: rows.iter().map(|row| row.torque_nmm).collect(),
-            energy_mj: rows.iter().map(|row| row.bend_mj + row.twist_mj + row.wall_mj).collect(),
+            energy_mj: rows.iter().map(Row::energy_mj).collect(),
             wall_mj: rows.iter().map(|row| row.wall_mj).collect(),
             max_penetration_mm: rows.iter().map(|row| row.max_penetration_mm).collect(),
             wall_force_sum_n: rows.iter().map(|row| row.wall_force_sum_n).collect(),
@@ -219,6 +227,7 @@ mod tests {
             bend_mj: 0.0,
             twist_mj: 0.0,
             wall_mj: 0.0,
+            field_mj: None,
             max_penetration_mm: 0.0,
             jumped: false,
             left_through: None,

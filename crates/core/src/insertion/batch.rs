@@ -60,6 +60,17 @@ impl Batch {
         self.each("moves", moves, |simulation, moves| simulation.tick(moves, solves, None).map(drop))
     }
 
+    /// Detaches the coil of an instrument in each simulation ([`Simulation::detach`]), except where none is given.
+    ///
+    /// # Errors
+    /// As [`Batch::step`].
+    pub fn detach(&mut self, instruments: &[Option<usize>]) -> Result<Vec<Result<()>>> {
+        self.each("instruments", instruments, |simulation, instrument| match instrument {
+            Some(instrument) => simulation.detach(*instrument).map(drop),
+            None => Ok(()),
+        })
+    }
+
     /// Calls a function on each simulation with its input.
     fn each<T: Sync>(
         &mut self,
@@ -181,6 +192,16 @@ mod tests {
         }
         let refused = batch.tick(&vec![Vec::new(); 3], 0).unwrap();
         assert!(refused.into_iter().all(|told| told.unwrap_err().to_string().contains("solves = 0")));
+    }
+
+    #[test]
+    fn what_is_no_coil_is_not_detached_and_the_others_wait() {
+        let one = simulation();
+        let mut batch = Batch::new(vec![one; 2]);
+        batch.step(&[Command::advance(5.0); 2]).unwrap();
+        let told = batch.detach(&[None, Some(0)]).unwrap();
+        assert!(told[0].is_ok() && told[1].as_ref().is_err_and(|e| e.to_string().contains("is no coil")));
+        assert!(batch.detach(&[None]).unwrap_err().to_string().contains("instruments = 1"));
     }
 
     #[test]

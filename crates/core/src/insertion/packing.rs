@@ -1,7 +1,8 @@
 //! Packing of a sac (aneurysm) with coils.
 //!
 //! The volume of a coil is that of its outer radius along its centre line, π/4 D² L, the usual definition in packing
-//! densities. It counts where its centre line is beyond the neck's plane.
+//! densities. It counts where its centre line is beyond the neck's plane and out of the catheter: what still lies in a
+//! catheter whose tip is in the sac fills nothing yet, and goes back with it.
 
 use serde::Serialize;
 

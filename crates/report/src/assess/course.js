@@ -79,7 +79,10 @@ function spark(one, cell) {
   canvas.className = "spark"; canvas.title = one.values.map(short).join(", "); canvas.setAttribute("role", "img"); canvas.setAttribute("aria-label", canvas.title);
   drawings.push(() => {
     const [c, w, h] = fitted(canvas), known = one.values.filter(v => v !== null), low = Math.min(...known), high = Math.max(...known);
-    const px = place(one.values.length, 0, w - 6), differ = high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)), py = v => differ ? 5 + (h - 10) * (high - v) / (high - low) : h / 2;
+    // What differs by less than a fiftieth stays nearly flat: rounding must not look like progress.
+    const span = Math.max(high - low, 0.02 * Math.max(Math.abs(low), Math.abs(high))) || 1;
+    const differ = high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)), px = place(one.values.length, 0, w - 6);
+    const py = v => h / 2 - (h - 10) * (v - (low + high) / 2) / span;
     through(c, one.values, px, py, "#9aa4ae");
     one.values.forEach((v, k) => { if (v === null) return; const best = v === one.best && differ; c.fillStyle = best ? GREEN : "#4a545e"; c.beginPath(); c.arc(px(k), py(v), best ? 3 : 2, 0, 7); c.fill(); });
   });
