@@ -9,7 +9,7 @@ use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_methods::{
-    AnyMethod, BeamFem, Chain, ChordEnergy, MODEL_NAMES, RodModel, TipForce, cantilever, static_model,
+    AnyMethod, BeamFem, Chain, ChordEnergy, MODEL_NAMES, RodModel, TipForce, cantilever, li2011, static_model,
 };
 
 /// Distance of the tip from `tip` under the load a.
@@ -43,6 +43,31 @@ fn every_method_is_of_second_order() {
         let order = (error(8) / error(16)).log2();
         assert!((1.8..2.3).contains(&order), "{name}: {order}");
     }
+}
+
+/// Distance of the tip from the exact one after so many inputs of the paper's method, with unit tangents or as printed.
+fn error_of_the_papers_method(elements: usize, unit_tangents: bool) -> f64 {
+    let mut chain = li2011::Chain::uniform(Vec3::zeros(), Vec3::x(), 1.0, elements, 1.0);
+    let (mut nodes, mut tangents) = (Vec::new(), Vec::new());
+    chain.forces_n[elements - 1] = -Vec3::y();
+    if unit_tangents {
+        chain.directions = vec![Vec3::x(); elements];
+    }
+    for _ in 0..40 {
+        li2011::dense::solve(&chain, &mut nodes, &mut tangents);
+        if unit_tangents {
+            chain.normalise(&mut tangents, &mut nodes);
+            chain.directions.clone_from(&tangents);
+        }
+    }
+    (nodes[elements - 1] - exact()).norm()
+}
+
+#[test]
+fn the_papers_method_is_of_second_order_with_unit_tangents_and_of_none_as_printed() {
+    let order = |unit| (error_of_the_papers_method(8, unit) / error_of_the_papers_method(16, unit)).log2();
+    assert!((1.8..2.2).contains(&order(true)), "{}", order(true));
+    assert!(order(false).abs() < 0.1, "{}", order(false));
 }
 
 #[test]
