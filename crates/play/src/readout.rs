@@ -34,6 +34,17 @@ pub struct Event {
     pub text: String,
 }
 
+impl Event {
+    /// Seconds for which an event is shown.
+    const SHOWN_S: f64 = 6.0;
+
+    /// Whether it is still to be shown after so many steps, at this time: a refusal only until a step succeeds.
+    pub fn is_shown(&self, steps: usize, time_s: f64) -> bool {
+        let is_over = self.kind == EventKind::Refused && steps > self.step;
+        time_s - self.time_s < Self::SHOWN_S && !is_over
+    }
+}
+
 /// Kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -160,4 +171,18 @@ pub struct Readout {
     pub event: Option<Event>,
     /// Number of events so far.
     pub events: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_is_shown_until_a_step_succeeds_and_others_for_a_while() {
+        let event = |kind| Event { step: 7, time_s: 10.0, kind, text: String::new() };
+        let refused = event(EventKind::Refused);
+        assert!(refused.is_shown(7, 11.0) && !refused.is_shown(8, 11.0) && !refused.is_shown(7, 17.0));
+        let jumped = event(EventKind::Jumped);
+        assert!(jumped.is_shown(8, 11.0) && !jumped.is_shown(8, 17.0));
+    }
 }

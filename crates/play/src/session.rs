@@ -435,12 +435,14 @@ impl Session {
             self.history.begin_motion();
         }
         let (was_out, warned) = (self.simulation.report().left_through, self.warns());
+        let was_stopped = self.simulation.report().has_failed();
         let report = step.carry_out(&mut self.simulation)?;
         let stopped = step.solves.is_some() && report.has_failed();
         let (jumped, out, detached) = (report.jumped, report.left_through, step.detach);
         self.holds_still = false;
         self.history.push(step, &self.simulation);
-        if stopped {
+        // A hand that goes on pushing is stopped in every tick: that is one event.
+        if stopped && !was_stopped {
             self.happened(EventKind::Blocked, "the wall has stopped the hands".to_owned());
         }
         if jumped {

@@ -170,8 +170,8 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     });
     writer.write(canvas, [x, y + 24], 15, FAINT, &times);
     let told = shown.failure.map(str::to_owned).or_else(|| {
-        let recent = |event: &&endowire_play::Event| readout.time_s - event.time_s < 6.0;
-        readout.event.as_ref().filter(recent).map(|event| event.text.clone())
+        let shown = |event: &&endowire_play::Event| event.is_shown(readout.step, readout.time_s);
+        readout.event.as_ref().filter(shown).map(|event| event.text.clone())
     });
     let told =
         told.or_else(|| readout.demonstrates.then(|| "the script is shown: move to take over".to_owned()));
