@@ -67,7 +67,7 @@ impl ExtractedCentreline {
         let lumen = Lumen::new(wall)?;
         let first = from.or_else(|| wall.inlet().map(|inlet| CentrelineEnd::Opening(inlet.index)));
         let first = first.ok_or_else(|| {
-            Error::parameter("from", "none", "the surface has no opening to begin at: give a place inside")
+            Error::parameter("from", "none", "the surface has no opening: give a place inside to begin at")
         })?;
         let root = end(&lumen, &first, "from")?;
         let all: Vec<CentrelineEnd> = match to {

@@ -217,5 +217,5 @@ fn a_way_leads_into_a_pointed_corner_and_out_of_it() {
     let error = ExtractedCentreline::of(&two, Some(place(0.0, -30.0)), &[other]).unwrap_err().to_string();
     assert!(error.contains("no way inside the vessel leads there"), "{error}");
     let error = ExtractedCentreline::of(&wall, None, &[other]).unwrap_err().to_string();
-    assert!(error.starts_with("from = none: the surface has no opening to begin at"), "{error}");
+    assert!(error.starts_with("from = none: the surface has no opening: give a place inside"), "{error}");
 }

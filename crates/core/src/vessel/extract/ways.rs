@@ -36,6 +36,11 @@ impl PartialOrd for Reached {
     }
 }
 
+/// Number of spheres above which a part is a lumen of its own, and is not joined to others.
+const MANY: usize = 200;
+/// Largest number of spheres of other parts to which the part of an end is joined, one after the other.
+const MOST_JOINTS: usize = 32;
+
 /// The spheres beside each sphere, with which it overlaps.
 pub(super) struct Beside(Vec<Vec<usize>>);
 
@@ -54,19 +59,20 @@ impl Beside {
         Self(beside)
     }
 
-    /// Joins each of the first so many spheres, the ends, to the nearest one of another part that it sees: in a
-    /// pointed corner no spheres lead from one to the next.
+    /// Joins the parts of the first so many spheres, the ends, to the spheres of other parts that they see, the nearest
+    /// first: in a pointed corner no spheres lead from one to the next. Parts of many spheres are left as they are.
     pub(super) fn join_ends(&mut self, count: usize, spheres: &Spheres, lumen: &Lumen<'_>) {
-        let all = &spheres.all;
-        for end in 0..count.min(all.len()) {
-            let own = self.part(end);
-            let from_mm = all[end].centre_mm;
-            let away_mm = |k: usize| (all[k].centre_mm - from_mm).norm();
-            let mut others: Vec<usize> = (count..all.len()).filter(|k| !own[*k]).collect();
-            others.sort_by(|&a, &b| away_mm(a).total_cmp(&away_mm(b)).then(a.cmp(&b)));
-            if let Some(seen) = others.into_iter().find(|k| lumen.sees(&from_mm, &all[*k].centre_mm)) {
-                self.0[end].push(seen);
-                self.0[seen].push(end);
+        for end in 0..count.min(spheres.all.len()) {
+            for _ in 0..MOST_JOINTS {
+                let is_own = self.part(end);
+                let own: Vec<usize> = (0..is_own.len()).filter(|k| is_own[*k]).collect();
+                if own.len() > MANY {
+                    break;
+                }
+                let nearest = own.iter().filter_map(|from| nearest_seen(*from, &is_own, spheres, lumen));
+                let Some((_, from, to)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+                self.0[from].push(to);
+                self.0[to].push(from);
             }
         }
     }
@@ -82,6 +88,22 @@ impl Beside {
         }
         is_in
     }
+}
+
+/// The nearest sphere outside a part that one of it sees: the distance, mm, the one and the other.
+fn nearest_seen(
+    from: usize,
+    is_own: &[bool],
+    spheres: &Spheres,
+    lumen: &Lumen<'_>,
+) -> Option<(f64, usize, usize)> {
+    let all = &spheres.all;
+    let away_mm = |k: usize| (all[k].centre_mm - all[from].centre_mm).norm();
+    let mut others: Vec<(f64, usize)> =
+        (0..all.len()).filter(|k| !is_own[*k]).map(|k| (away_mm(k), k)).collect();
+    others.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let seen = others.into_iter().find(|(_, k)| lumen.sees(&all[from].centre_mm, &all[*k].centre_mm));
+    seen.map(|(mm, to)| (mm, from, to))
 }
 
 impl Ways {
