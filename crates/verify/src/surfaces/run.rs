@@ -328,14 +328,15 @@ mod tests {
         assert_eq!(arrived.name, "tube.ply 0.014 step1 el1 mu0.1 k100 turn0");
         assert_eq!(row(&surface, -1.0).message.unwrap(), "too slow: not done within -1 s");
 
-        let left = row(&tube("device_radius_mm = 0.3", false), 1.0);
+        let two = tube("device_radius_mm = [0.3, 4.5]", false);
+        assert_eq!(two.skipped, ["0.354 is too thick at the sheath"]);
+        let left = row(&two, 1.0);
         assert_eq!(left.ending, Ending::Left, "{left:?}");
         assert!(left.ending.is_good() && left.inserted_mm > 95.0);
 
-        let outside = tube("[sheath]\nposition_mm = [9, 0, 0]\ndirection = [0, 0, 1]", false);
+        let outside =
+            tube("device_radius_mm = 0.3\n[sheath]\nposition_mm = [9, 0, 0]\ndirection = [0, 0, 1]", false);
         assert_eq!(row(&outside, 1.0).ending, Ending::Refused);
-        let thick = tube("device_radius_mm = [0.4, 4.5]", false);
-        assert_eq!(thick.skipped, ["0.354 is too thick at the sheath"]);
     }
 
     /// Counter-check: the triangles that are checked are not those of the insertion.
@@ -350,12 +351,12 @@ mod tests {
         // A closed tube of 30 mm; the wire gets to 41 mm minus the length its tip bends back.
         let mut closed = whole.wall.closed_mesh();
         closed.vertices_mm.iter_mut().for_each(|v| v.z *= 0.3);
+        let mut simulation = cell.simulation(&whole, &NoStore).unwrap();
         let checked = Surface {
             given: CrossingTest::new(&closed),
             wall: Wall::from_surface(&closed).unwrap(),
-            ..tube(start, false)
+            ..whole
         };
-        let mut simulation = cell.simulation(&whole, &NoStore).unwrap();
         for (advance_mm, crossings) in [(25.0, 0), (15.0, 1)] {
             simulation.step(Command::advance(advance_mm)).unwrap();
             let mut row = CellRow::new(&checked, &cell);

@@ -60,44 +60,42 @@ fn clearance_mm(simulation: &Simulation, coil: &DetachedCoil) -> f64 {
 
 #[test]
 fn a_coil_that_is_detached_yields_to_the_next_one_which_does_not_pass_it() {
-    for friction in [0.0, 0.1] {
-        let mut simulation = two_coils(friction, true);
-        advance(&mut simulation, &[0], OUT_MM).unwrap();
-        let was = axis(simulation.shape());
-        let report = simulation.detach(0).unwrap();
-        assert!(report.converged && !report.jumped && report.inserted_mm == 3.0, "{report:?}");
-        let coil = simulation.coils()[0].clone();
-        assert_eq!((coil.instrument, coil.shape.from_tip_mm[0]), (0, COIL_MM));
-        // It springs back where the pusher had held it, and stays near its position.
-        let moved_mm = (coil.shape.tip_mm().unwrap() - was[was.len() - 1]).norm();
-        assert!(moved_mm < 1.0, "{moved_mm}");
-        let (mut least_mm, mut touched) = (f64::INFINITY, false);
-        for step in 0..40 {
-            simulation.step_together(&[Move { instrument: 1, command: Command::advance(0.5) }]).unwrap();
-            let clearance_mm = clearance_mm(&simulation, &simulation.coils()[0]);
-            assert!(clearance_mm > 1.95 * RADIUS_MM, "{friction}, step {step}: {clearance_mm}");
-            least_mm = least_mm.min(clearance_mm);
-            touched |= simulation.touching().iter().any(|touch| touch.rods == [0, 1]);
-        }
-        assert!(touched && least_mm < 2.01 * RADIUS_MM, "they do not touch: {least_mm}");
-        // It has been pushed aside, and keeps its length.
-        let now = &simulation.coils()[0];
-        let farthest_mm = farthest_mm(now, &coil);
-        assert!(farthest_mm > 0.1 * RADIUS_MM, "{farthest_mm}");
-        let length_mm =
-            |coil: &DetachedCoil| axis(&coil.shape).windows(2).map(|p| (p[1] - p[0]).norm()).sum::<f64>();
-        assert!((length_mm(now) - length_mm(&coil)).abs() < 1e-3 * COIL_MM, "{} mm", length_mm(now));
-        // It is part of the state.
-        let saved = serde_json::to_string(&simulation.state()).unwrap();
-        let mut again = two_coils(friction, true);
-        again.restore(&serde_json::from_str::<State>(&saved).unwrap()).unwrap();
-        assert_eq!(again.coils(), simulation.coils());
-        let step = |of: &mut Simulation| {
-            of.step_together(&[Move { instrument: 1, command: Command::advance(-0.5) }]).unwrap().clone()
-        };
-        assert_eq!(step(&mut again), step(&mut simulation));
-        assert_eq!(again.coils(), simulation.coils());
+    let mut simulation = two_coils(0.1, true);
+    advance(&mut simulation, &[0], OUT_MM).unwrap();
+    let was = axis(simulation.shape());
+    let report = simulation.detach(0).unwrap();
+    assert!(report.converged && !report.jumped && report.inserted_mm == 3.0, "{report:?}");
+    let coil = simulation.coils()[0].clone();
+    assert_eq!((coil.instrument, coil.shape.from_tip_mm[0]), (0, COIL_MM));
+    // It springs back where the pusher had held it, and stays near its position.
+    let moved_mm = (coil.shape.tip_mm().unwrap() - was[was.len() - 1]).norm();
+    assert!(moved_mm < 1.0, "{moved_mm}");
+    let (mut least_mm, mut touched) = (f64::INFINITY, false);
+    for step in 0..40 {
+        simulation.step_together(&[Move { instrument: 1, command: Command::advance(0.5) }]).unwrap();
+        let clearance_mm = clearance_mm(&simulation, &simulation.coils()[0]);
+        assert!(clearance_mm > 1.95 * RADIUS_MM, "step {step}: {clearance_mm}");
+        least_mm = least_mm.min(clearance_mm);
+        touched |= simulation.touching().iter().any(|touch| touch.rods == [0, 1]);
     }
+    assert!(touched && least_mm < 2.01 * RADIUS_MM, "they do not touch: {least_mm}");
+    // It has been pushed aside, and keeps its length.
+    let now = &simulation.coils()[0];
+    let farthest_mm = farthest_mm(now, &coil);
+    assert!(farthest_mm > 0.1 * RADIUS_MM, "{farthest_mm}");
+    let length_mm =
+        |coil: &DetachedCoil| axis(&coil.shape).windows(2).map(|p| (p[1] - p[0]).norm()).sum::<f64>();
+    assert!((length_mm(now) - length_mm(&coil)).abs() < 1e-3 * COIL_MM, "{} mm", length_mm(now));
+    // It is part of the state.
+    let saved = serde_json::to_string(&simulation.state()).unwrap();
+    let mut again = two_coils(0.1, true);
+    again.restore(&serde_json::from_str::<State>(&saved).unwrap()).unwrap();
+    assert_eq!(again.coils(), simulation.coils());
+    let step = |of: &mut Simulation| {
+        of.step_together(&[Move { instrument: 1, command: Command::advance(-0.5) }]).unwrap().clone()
+    };
+    assert_eq!(step(&mut again), step(&mut simulation));
+    assert_eq!(again.coils(), simulation.coils());
 }
 
 /// Largest distance of a coil's node from its earlier position, mm.
