@@ -59,3 +59,32 @@ draw turn --size 200 --mode dsa --time 1.4 --pose "RAO 60" --turn 120 --count 4
 for k in 0 1 2 3; do
   cp "$out/turn/frame_00000${k}_fluoro.png" "$to"/arch_turn_$k.png
 done
+
+# Chapter 15, what was mended: a thin wire, two coaxial instruments, contrast medium in the liver, skin and air, blades.
+mended() { # NAME, FILE OF IT, SCENE, OPTIONS
+  "$endowire" fluoro "$3" --out "$out/mended_$1" --size 200 "${@:4}"
+  cp "$out/mended_$1/frame_000000_$2.png" "$to/mended_$1.png"
+}
+cat >"$out/wire_014.toml" <<END
+vessel.file = "$PWD/assets/vessels/curved_tube.stl"
+device.file = "$PWD/assets/devices/microwire_014.toml"
+sheath = { position_mm = [0.0, 0.0, 1.0], direction = [0.0, 0.0, 1.0] }
+method = { name = "kirchhoff", element_mm = 4.0 }
+script = [{ advance_mm = 150.0, step_mm = 10.0 }]
+[view]
+views = ["fluoro"]
+c_arm = { field_mm = 300.0, isocentre_mm = [0.0, 0.0, 70.0] }
+xray = { tissue_mm = 150.0 }
+detector = { dose_ngy = 300.0 }
+END
+mended wire fluoro "$out/wire_014.toml"
+catheter=(assets/scenes/arch_vertebral.toml --steps 90 --set c_arm.magnification=2.5)
+mended coaxial fluoro "${catheter[@]}" --labels
+for k in 1 2; do
+  cp "$out/mended_coaxial/frame_000000_mask_$k.png" "$to"/mended_coaxial_$k.png
+done
+sed -n '/^```toml file=liver.toml$/,/^```$/p' docs/guide/15-pictures.md | sed '/^```/d' | sed "s#\"assets/#\"$PWD/assets/#" >"$out/liver.toml"
+mended liver fluoro "$out/liver.toml" --steps 0 --time 2.0
+body=(assets/scenes/aortic_arch.toml --steps 0 --pose "RAO 20" --set c_arm.field_mm=540)
+mended skin fluoro "${body[@]}"
+mended blades fluoro "${body[@]}" --set 'c_arm.collimation_mm=[270, 297]'

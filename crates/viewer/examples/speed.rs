@@ -4,12 +4,14 @@
 //! `cargo run --profile dist -p endowire-viewer --example speed [FOLDER FOR THE SPHERES AS STL]`
 
 use std::f64::consts::{PI, TAU};
+use std::path::Path;
 use std::time::Instant;
 
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 use endowire_viewer::{
-    Backend, CArmSpec, DevicePoint, DeviceView, FrameTime, Renderer, TorsoSpec, View, ViewSpec, XRaySpec,
+    Backend, CArmSpec, DevicePoint, DeviceView, FrameTime, InjectionSpec, Renderer, TorsoSpec, View,
+    ViewSpec, XRaySpec,
 };
 
 const RADIUS_MM: f64 = 30.0;
@@ -78,7 +80,43 @@ fn spec(side: u32) -> ViewSpec {
     }
 }
 
+/// What a first picture of the arch costs: set-up, what stays for a pose, the picture itself.
+fn first_picture() -> Result<()> {
+    let vessels = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels");
+    let wall = Wall::from_surface(&SurfaceMesh::read(&vessels.join("aortic_arch.stl"), 1.0)?)?;
+    let slab = ViewSpec { size_px: [512; 2], c_arm: CArmSpec::default(), ..spec(512) };
+    let mut body = slab.clone();
+    body.patient.torso = Some(TorsoSpec::default());
+    body.xray.contrast_fraction = 0.05;
+    let mut injected = body.clone();
+    injected.flow.tree = Some(vessels.join("aortic_arch.csv"));
+    injected.injection = vec![InjectionSpec {
+        start_s: 0.0,
+        duration_s: 1.0,
+        rate_ml_per_s: 20.0,
+        at_mm: None,
+        at_tip: false,
+    }];
+    for (name, spec) in [("a slab", slab), ("a body", body), ("a body, contrast medium that flows", injected)]
+    {
+        let start = Instant::now();
+        let mut times = [cpu_ms(start), 0.0, 0.0, 0.0];
+        let mut renderer = Renderer::of_wall(&spec, &wall)?;
+        times[1] = cpu_ms(start);
+        renderer.prepare()?;
+        times[2] = cpu_ms(start);
+        renderer.render_at(&[], FrameTime { frame: 0, time_s: 0.5 })?;
+        times[3] = cpu_ms(start);
+        let [set_up, pose, picture] = [0, 1, 2].map(|k| times[k + 1] - times[k]);
+        println!(
+            "first picture of the arch in {name}, 512²: {set_up:.0} ms CPU of set-up, {pose:.0} for the pose, {picture:.0} for itself"
+        );
+    }
+    Ok(())
+}
+
 fn main() -> Result<()> {
+    first_picture()?;
     let folder = std::env::args().nth(1).map(std::path::PathBuf::from);
     for rings in [71, 158] {
         let mesh = sphere(rings);

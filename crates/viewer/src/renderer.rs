@@ -18,7 +18,7 @@ use crate::gpu;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
 use crate::spec::{Backend, CArmSpec, View, ViewSpec};
-use crate::tails::with_tails;
+use crate::tails::Filled;
 use crate::three_d::{ContactView, Solids, annotate, draw_markers};
 use crate::xray::{Exposure, PathLengths};
 
@@ -66,8 +66,8 @@ impl Renderer {
         Self::of_setup(Setup::new(spec, wall)?)
     }
 
-    /// As [`Self::new`], for a wall with openings: the 3D view shows them closed, and in the beam vessels taper off
-    /// there, as if they continued into invisibly fine branches. Contrast medium flows along a centre line computed
+    /// As [`Self::new`], for a wall with openings: the 3D view shows them closed, and in the beam contrast
+    /// medium fades beyond them, as if vessels continued into invisibly fine branches. Contrast medium flows along a centre line computed
     /// from the wall if `spec` has none.
     ///
     /// # Errors
@@ -78,7 +78,7 @@ impl Renderer {
             spec.find_centreline(wall)?;
         }
         let closed = Arc::new(wall.closed_mesh());
-        Self::of_setup(Setup::filled(&spec, closed, Arc::new(with_tails(wall)))?)
+        Self::of_setup(Setup::filled(&spec, closed, Arc::new(Filled::with_tails(wall)))?)
     }
 
     fn of_setup(setup: Setup) -> Result<Self> {
@@ -350,7 +350,10 @@ impl Renderer {
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
         let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
-            Ok((setup.lumen.then(|| scope.vessel(setup.wall_now(), setup.filled_now())), scope.exposure))
+            Ok((
+                setup.lumen.then(|| scope.vessel(setup.wall_now(), &setup.filled_now().surface)),
+                scope.exposure,
+            ))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
         labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)

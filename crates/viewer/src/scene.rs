@@ -10,6 +10,7 @@ use crate::contrast::Flow;
 use crate::cpu::{check_closed, check_drawable};
 use crate::patient::Patient;
 use crate::spec::{View, ViewSpec};
+use crate::tails::Filled;
 use crate::three_d::Camera;
 
 /// Data for an engine, only those that the wanted views need.
@@ -17,8 +18,8 @@ use crate::three_d::Camera;
 pub(crate) struct Setup {
     pub(crate) spec: ViewSpec,
     pub(crate) wall: Arc<SurfaceMesh>,
-    /// The surface of the blood-filled lumen in the beam.
-    pub(crate) filled: Arc<SurfaceMesh>,
+    /// The blood-filled lumen in the beam.
+    pub(crate) filled: Arc<Filled>,
     pub(crate) patient: Arc<Patient>,
     /// The displaced vessel, if displaced; C-arm and camera refer to the vessel at rest.
     pub(crate) moved: Option<Arc<Moved>>,
@@ -38,7 +39,7 @@ pub(crate) struct Setup {
 pub(crate) struct Moved {
     pub(crate) displacement: Displacement,
     wall: Arc<SurfaceMesh>,
-    filled: Arc<SurfaceMesh>,
+    filled: Arc<Filled>,
     /// The air of a generated body: diaphragm, borders of the heart and bowel move with the vessel.
     air: Option<SurfaceMesh>,
 }
@@ -52,10 +53,7 @@ impl Setup {
         };
         self.moved = displacement.map(|displacement| {
             let wall = Arc::new(moved(&self.wall, displacement));
-            let filled = match Arc::ptr_eq(&self.wall, &self.filled) {
-                true => Arc::clone(&wall),
-                false => Arc::new(moved(&self.filled, displacement)),
-            };
+            let filled = Arc::new(self.filled.moved(|v| displacement.place(v)));
             let air = self.patient.air().map(|air| moved(air, displacement));
             Arc::new(Moved { displacement: displacement.clone(), wall, filled, air })
         });
@@ -72,7 +70,7 @@ impl Setup {
     }
 
     /// The blood-filled lumen at its displacement.
-    pub(crate) fn filled_now(&self) -> &SurfaceMesh {
+    pub(crate) fn filled_now(&self) -> &Filled {
         self.moved.as_ref().map_or(&self.filled, |moved| &moved.filled)
     }
 
@@ -86,12 +84,12 @@ impl Setup {
 
     /// A set-up with a closed wall, filled with blood to its ends.
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
-        let wall = Arc::new(wall.clone());
-        Self::filled(spec, Arc::clone(&wall), wall)
+        let filled = Filled { surface: wall.clone(), ..Filled::default() };
+        Self::filled(spec, Arc::new(wall.clone()), Arc::new(filled))
     }
 
     /// A set-up with a closed wall and a given blood-filled lumen.
-    pub(crate) fn filled(spec: &ViewSpec, wall: Arc<SurfaceMesh>, filled: Arc<SurfaceMesh>) -> Result<Self> {
+    pub(crate) fn filled(spec: &ViewSpec, wall: Arc<SurfaceMesh>, filled: Arc<Filled>) -> Result<Self> {
         Self::made(spec, (wall, filled), None)
     }
 
@@ -108,7 +106,7 @@ impl Setup {
 
     fn made(
         spec: &ViewSpec,
-        (wall, filled): (Arc<SurfaceMesh>, Arc<SurfaceMesh>),
+        (wall, filled): (Arc<SurfaceMesh>, Arc<Filled>),
         other: Option<&Self>,
     ) -> Result<Self> {
         spec.validate()?;
@@ -134,7 +132,7 @@ impl Setup {
         if spec.wants(View::Fluoro) {
             let other = other.filter(|other| other.c_arm.is_some());
             let known = other.is_some_and(|other| other.lumen);
-            let closed = if known { Ok(()) } else { check_closed(&filled) };
+            let closed = if known { Ok(()) } else { check_closed(&filled.surface) };
             // Only contrast medium shows the inside of the wall: blood resembles tissue, and a device is drawn
             // without it.
             if !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0 {
@@ -151,7 +149,7 @@ impl Setup {
                 Some(other) => Arc::clone(&other.patient),
                 None => Arc::new(Patient::new(spec, &wall)?),
             };
-            setup.flow = flow(spec, &filled, other)?;
+            setup.flow = flow(spec, &filled.surface, other)?;
         }
         if spec.wants(View::ThreeD) && spec.camera.c_arm {
             let own = || CArm::new(&spec.c_arm, spec.size_px, &wall);

@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_core::Vec3;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_viewer::{Backend, CArmSpec, FlowSpec, InjectionSpec, PathLengths, Renderer, View, ViewSpec};
 
@@ -93,7 +94,7 @@ fn what_comes_out_at_the_end_of_a_vessel_is_downstream_of_it_only() {
         let paths = renderer.path_lengths_at(&[], 1.0).unwrap();
         let arm = renderer.c_arm().unwrap();
         // The row of 50 mm above that end, three aortas wide.
-        let row = arm.project(&endowire_core::Vec3::new(0.0, 0.0, 50.0))[1] as usize;
+        let row = arm.project(&Vec3::new(0.0, 0.0, 50.0))[1] as usize;
         let above = paths.contrast_mm[..row * paths.width as usize].iter().fold(0.0_f32, |m, mm| m.max(*mm));
         let below = paths.contrast_mm[row * paths.width as usize..].iter().fold(0.0_f32, |m, mm| m.max(*mm));
         [above, below]
@@ -128,6 +129,56 @@ fn neighbouring_pixels_of_a_lumen_differ_by_little() {
         // The twin: medium that fills whole or not at all.
         assert!(cut > 0.5, "{cut}");
     }
+}
+
+/// An open tube of radius 2 mm along z, from 0 to 40 mm.
+fn tube() -> Wall {
+    const SIDES: u32 = 48;
+    let mut mesh = SurfaceMesh::default();
+    for ring in 0..=20 {
+        mesh.vertices_mm.extend((0..SIDES).map(|k| {
+            let (s, c) = (std::f64::consts::TAU * f64::from(k) / f64::from(SIDES)).sin_cos();
+            Vec3::new(2.0 * c, 2.0 * s, 2.0 * f64::from(ring))
+        }));
+    }
+    for ring in 0..20 {
+        for k in 0..SIDES {
+            let corner = |ring: u32, k: u32| ring * SIDES + k % SIDES;
+            let [a, b] = [corner(ring, k), corner(ring, k + 1)];
+            let [d, c] = [corner(ring + 1, k), corner(ring + 1, k + 1)];
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    Wall::from_surface(&mesh).unwrap()
+}
+
+/// Medium that is everywhere fades beyond an end over more than a diameter, and where half of it is left the vessel is
+/// nearly as wide as before: it neither looks cut nor ends like a sharpened pencil.
+#[test]
+fn medium_in_all_blood_fades_beyond_an_end_and_does_not_taper_to_a_point() {
+    let mut view = far(ViewSpec { views: vec![View::Fluoro], backend: Backend::Cpu, ..ViewSpec::default() });
+    view.xray.contrast_fraction = 0.2;
+    (view.c_arm.field_mm, view.c_arm.isocentre_mm) = (Some(60.0), Some([0.0, 0.0, 30.0]));
+    let mut renderer = Renderer::of_wall(&view, &tube()).unwrap();
+    let paths = renderer.path_lengths(&[]).unwrap();
+    let arm = renderer.c_arm().unwrap().clone();
+    let width = paths.width as usize;
+    let row = |z: f64| {
+        let row = arm.project(&Vec3::new(0.0, 0.0, z))[1] as usize;
+        &paths.contrast_mm[row * width..][..width]
+    };
+    let on_axis = |z: f64| row(z)[arm.project(&Vec3::new(0.0, 0.0, z))[0] as usize];
+    let inside = on_axis(20.0);
+    assert!((inside / (0.2 * 4.0) - 1.0).abs() < 0.01, "{inside}");
+    let beyond: Vec<(f64, f32)> =
+        (0..140).map(|k| 40.0 + 0.1 * f64::from(k)).map(|z| (z, on_axis(z) / inside)).collect();
+    let least = beyond.windows(2).map(|pair| pair[1].1 - pair[0].1).fold(0.0, f32::min);
+    assert!(beyond.windows(2).all(|pair| pair[1].1 <= pair[0].1 + 1e-3) && least > -0.12, "{least}");
+    let at = |share: f32| beyond.iter().find(|(_, left)| *left < share).unwrap().0;
+    assert!(at(0.1) - at(0.9) > 4.0 && at(0.001) < 53.0, "{} {} {}", at(0.9), at(0.1), at(0.001));
+    let wide = |z: f64| row(z).iter().filter(|mm| **mm > 0.25 * inside).count() as f64;
+    let ratio = wide(at(0.5)) / wide(20.0);
+    assert!(ratio > 0.65, "{ratio}");
 }
 
 /// Largest difference of the fraction between neighbours over the largest fraction, away from the edges of what vessels cover there.

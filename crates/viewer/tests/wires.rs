@@ -6,7 +6,7 @@ mod common;
 
 use common::*;
 use endowire_core::Vec3;
-use endowire_viewer::{Backend, DeviceView, Material, Renderer, ViewSpec};
+use endowire_viewer::{Backend, DevicePart, DeviceView, Material, PathLengths, Renderer, ViewSpec};
 
 /// Radius of a wire of 0.014 inch, mm.
 const RADIUS_MM: f64 = 0.178;
@@ -34,6 +34,17 @@ fn across(size: usize, tilt_deg: f64, of: impl Fn(usize) -> f64) -> Vec<f64> {
 fn beat(sums: &[f64]) -> f64 {
     let mean = sums.iter().sum::<f64>() / sums.len() as f64;
     sums.iter().map(|sum| (sum / mean - 1.0).abs()).fold(0.0, f64::max)
+}
+
+/// The same from a straight line through the values: what is nearer to the source is drawn larger.
+fn beat_about_line(sums: &[f64]) -> f64 {
+    let middle = (sums.len() - 1) as f64 / 2.0;
+    let offsets = || (0..sums.len()).map(|k| k as f64 - middle);
+    let slope =
+        offsets().zip(sums).map(|(x, sum)| x * sum).sum::<f64>() / offsets().map(|x| x * x).sum::<f64>();
+    let mean = sums.iter().sum::<f64>() / sums.len() as f64;
+    let level: Vec<f64> = offsets().zip(sums).map(|(x, sum)| sum / (mean + slope * x)).collect();
+    beat(&level)
 }
 
 /// Pieces of a mask, neighbours being those on the four sides.
@@ -85,6 +96,80 @@ fn a_wire_of_fourteen_thousandths_is_even_and_whole_at_any_angle_and_arrays_are_
                 assert!((0..left.len()).all(agree), "{size} {tilt_deg}: arrays show what the picture shows");
             }
             eprintln!("{size} {material}: at most {:.3} off at {} degrees", worst.0, worst.1);
+        }
+    }
+}
+
+/// The beat of shadow and arrays along a straight device, wherever the C-arm sees it, in the lines across the middle
+/// 90 % of it that are in the picture.
+fn beats_along(renderer: &Renderer, from_to: [Vec3; 2], left: [&[f32]; 2], paths: &PathLengths) -> [f64; 2] {
+    let size = renderer.c_arm().unwrap().size_px()[0] as usize;
+    let [from, to] = from_to.map(|end| renderer.c_arm().unwrap().project(&end));
+    let axis = usize::from((to[1] - from[1]).abs() > (to[0] - from[0]).abs());
+    let at = |part: f64| (from[axis] + part * (to[axis] - from[axis])).clamp(2.0, size as f64 - 2.0);
+    let (low, high) = (at(0.05).min(at(0.95)), at(0.05).max(at(0.95)));
+    let pixel = |line: usize, k: usize| if axis == 1 { line * size + k } else { k * size + line };
+    let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        (low as usize..high as usize).map(|line| (0..size).map(|k| of(pixel(line, k))).sum()).collect()
+    };
+    let all_mm = |i: usize| paths.devices_mm.iter().map(|map| f64::from(map.1[i])).sum();
+    [beat_about_line(&sums(&|i| 1.0 - f64::from(left[0][i] / left[1][i]))), beat_about_line(&sums(&all_mm))]
+}
+
+/// What is looked at: C-arm (primary, secondary, rotation, magnification), side of the field, ends of the device.
+type Sight = ([f64; 4], f64, [Vec3; 2]);
+
+#[test]
+fn it_is_so_in_other_fields_and_poses_at_the_edge_in_a_catheter_and_of_wound_wire() {
+    let whole = [Vec3::new(-60.0, 0.0, -21.0), Vec3::new(60.0, 0.0, 33.0)];
+    let beyond = [Vec3::new(-60.0, 0.0, -20.0), Vec3::new(200.0, 0.0, 40.0)];
+    let border = [Vec3::new(-60.0, 0.0, 92.4), Vec3::new(60.0, 0.0, 91.8)];
+    let sights: [Sight; 7] = [
+        ([0.0, 0.0, 0.0, 1.0], 200.0, whole),
+        ([0.0, 0.0, 0.0, 1.0], 480.0, whole),
+        ([-40.0, 0.0, 0.0, 1.0], 300.0, whole),
+        ([35.0, 28.0, 0.0, 1.0], 300.0, whole),
+        ([0.0, -20.0, 23.0, 1.7], 380.0, whole),
+        ([0.0, 0.0, 0.0, 1.0], 300.0, beyond),
+        ([0.0, 0.0, 0.0, 1.0], 273.0, border),
+    ];
+    let wound = DevicePart {
+        from_tip_mm: Some([0.0, 1000.0]),
+        material: Some(Material::Platinum),
+        outer_radius_mm: Some(RADIUS_MM),
+        inner_radius_mm: 0.12,
+    };
+    let shaft = DevicePart {
+        from_tip_mm: Some([0.0, 1000.0]),
+        material: Some(Material::PebaxBariumSulphate40),
+        outer_radius_mm: Some(0.45),
+        inner_radius_mm: 0.25,
+    };
+    for (size, bound) in [(512_u32, 0.05), (256, 0.10)] {
+        for (number, ([primary_deg, secondary_deg, rotation_deg, magnification], field_mm, ends)) in
+            (0..).zip(sights)
+        {
+            let (mut view, _) = scene(size, 0.0, Material::Steel316L);
+            let arm = &mut view.c_arm;
+            (arm.primary_deg, arm.secondary_deg) = (primary_deg, secondary_deg);
+            (arm.rotation_deg, arm.magnification) = (rotation_deg, magnification);
+            (arm.pixel_mm, arm.field_mm) = (None, Some(field_mm));
+            let wire = device(9, RADIUS_MM, |w| ends[0] + (ends[1] - ends[0]) * w);
+            let steel = DeviceView { material: Some(Material::Steel316L), ..wire.clone() };
+            let coil = DeviceView { parts: vec![wound], ..wire };
+            let outer = device(9, 0.45, |w| ends[0] + (ends[1] - ends[0]) * w);
+            let catheter = DeviceView { parts: vec![shaft], ..outer };
+            for devices in [vec![steel.clone()], vec![coil], vec![steel, catheter]] {
+                let mut renderer = Renderer::new(&view, &sphere(90.0, 24, Vec3::zeros())).unwrap();
+                let bare = renderer.transmission_at(&[], 0.0).unwrap();
+                let left = renderer.transmission_at(&devices, 0.0).unwrap();
+                let paths = renderer.path_lengths(&devices).unwrap();
+                let beats = beats_along(&renderer, ends, [&left, &bare], &paths);
+                assert!(beats.iter().all(|beat| *beat <= bound), "{size} {number}: {beats:?}");
+                for label in renderer.labels(&devices, &[]).unwrap().devices {
+                    assert_eq!(pieces(label.mask.pixels(), size), 1, "{size} {number}");
+                }
+            }
         }
     }
 }

@@ -64,9 +64,10 @@ impl Shares {
             (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
         });
         let of_pixels: Vec<_> = crossings.chunk_by(|a, b| a.0 == b.0).collect();
-        let shared = of_pixels.par_iter().with_min_len(FEWEST_PIXELS).map_init(Vec::new, |room, of_pixel| {
-            (of_pixel[0].0, of_ray(&flow.mixing, c_arm, of_pixel, material, room))
-        });
+        let shared =
+            of_pixels.par_iter().with_min_len(FEWEST_PIXELS).map_init(Room::default, |room, of_pixel| {
+                (of_pixel[0].0, of_ray(&flow.mixing, c_arm, of_pixel, material, room))
+            });
         let mut map = Self { pixels: vec![], shares: vec![], tissue: tissue(flow, c_arm, displacement) };
         for (pixel, shares) in shared.collect::<Vec<_>>().into_iter().filter(|(_, shares)| !shares.is_empty())
         {
@@ -135,17 +136,48 @@ impl ContrastMap {
     }
 }
 
-/// The shares of a ray's length in the lumen; `room` is a work buffer.
+/// Work buffers of a thread.
+#[derive(Debug, Default)]
+struct Room {
+    /// Shares at a place.
+    here: Vec<(u32, f32)>,
+    /// Sums of a ray by nodes, zero between rays, and the nodes that it has met, in this order.
+    sums: Vec<f32>,
+    met: Vec<u32>,
+}
+
+impl Room {
+    /// Adds a length with the shares of this place.
+    fn add(&mut self, length: f32) {
+        for &(node, share) in &self.here {
+            let at = node as usize;
+            if at >= self.sums.len() {
+                self.sums.resize(at + 1, 0.0);
+            }
+            if self.sums[at] == 0.0 {
+                self.met.push(node);
+            }
+            self.sums[at] += share * length;
+        }
+    }
+
+    /// The sums of the ray.
+    fn take(&mut self) -> Vec<(u32, f32)> {
+        self.met.drain(..).map(|node| (node, std::mem::take(&mut self.sums[node as usize]))).collect()
+    }
+}
+
+/// The shares of a ray's length in the lumen.
 fn of_ray(
     mixing: &Mixing,
     c_arm: &CArm,
     crossings: &[(u32, f32, bool)],
     material: impl Fn(Vec3) -> Vec3,
-    room: &mut Vec<(u32, f32)>,
+    room: &mut Room,
 ) -> Vec<(u32, f32)> {
     let (pixel, width) = (crossings[0].0, c_arm.size_px()[0]);
     let (source, direction) = c_arm.ray([f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5]);
-    let (mut own, mut all): (Vec<(u32, f32)>, f32) = (vec![], 0.0);
+    let mut all = 0.0;
     let mut depth = 0;
     for pair in crossings.windows(2) {
         depth += if pair[0].2 { 1 } else { -1 };
@@ -157,16 +189,11 @@ fn of_ray(
         let steps = (length / STEP_MM).ceil();
         for k in 0..steps as usize {
             let at = f64::from(pair[0].1) + (k as f64 + 0.5) * length / steps;
-            mixing.shares(&material(source + direction * at), room);
-            for &(node, share) in room.iter() {
-                let length = share * (length / steps) as f32;
-                match own.iter_mut().find(|share| share.0 == node) {
-                    Some(share) => share.1 += length,
-                    None => own.push((node, length)),
-                }
-            }
+            mixing.shares(&material(source + direction * at), &mut room.here);
+            room.add((length / steps) as f32);
         }
     }
+    let mut own = room.take();
     let before: f32 = own.iter().map(|share| share.1).sum();
     own.retain(|share| share.1 > LEAST_SHARE * all);
     let kept: f32 = own.iter().map(|share| share.1).sum();

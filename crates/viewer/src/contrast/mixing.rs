@@ -10,12 +10,11 @@ use endowire_core::Vec3;
 use rustc_hash::FxHashMap;
 
 use super::flow::Node;
+use crate::tails::{fade_mm, left};
 
 /// Difference of p over which shares decrease to zero, mm: medium released at a position is mixed with the blood of a
 /// vessel of radius r over √(20 r) on either side.
 const MIXED_MM: f64 = 20.0;
-/// Length over which medium fades beyond the ends of the tree, in their radii.
-const FADE_RADII: f64 = 2.0;
 /// Smallest radius used in mixing, since points are 2 mm apart.
 const THINNEST_MM: f64 = 1.0;
 /// Longest step along a line of queries, and side of the cells that cache their nearest point, mm.
@@ -25,6 +24,10 @@ pub(super) const STEP_MM: f64 = 1.25;
 #[derive(Debug)]
 pub(super) struct Mixing {
     points: Vec<Point>,
+    /// Place, radius and number of the points that are no ends, beside each other: all of them are asked for each cell.
+    inner: Vec<([f64; 4], u32)>,
+    /// The ends.
+    ends: Vec<u32>,
     /// The nearest point of each cached cell.
     cells: FxHashMap<[i32; 3], u32>,
 }
@@ -40,17 +43,19 @@ struct Point {
 }
 
 impl Point {
+    /// The power over the radius: of an end the least along the line by which it continues.
     fn power_mm(&self, place: &Vec3) -> f64 {
-        let squared = (place - self.position_mm).norm_squared() - self.radius_mm * self.radius_mm;
-        squared / self.radius_mm.max(THINNEST_MM)
+        let mut off = place - self.position_mm;
+        if let Some(outward) = self.outward {
+            off -= outward * off.dot(&outward).clamp(0.0, fade_mm(self.radius_mm));
+        }
+        (off.norm_squared() - self.radius_mm * self.radius_mm) / self.radius_mm.max(THINNEST_MM)
     }
 
     /// 1 within the tree, decreasing beyond its end.
     fn left(&self, place: &Vec3) -> f64 {
         let Some(outward) = self.outward else { return 1.0 };
-        let beyond = (place - self.position_mm).dot(&outward) / (FADE_RADII * self.radius_mm);
-        let left = 1.0 - beyond.clamp(0.0, 1.0);
-        left * left * (3.0 - 2.0 * left)
+        left((place - self.position_mm).dot(&outward) / fade_mm(self.radius_mm))
     }
 }
 
@@ -71,7 +76,16 @@ impl Mixing {
             let Node { position_mm, radius_mm, .. } = nodes[i];
             Point { position_mm, radius_mm, outward, about: about(nodes, &neighbours, i) }
         };
-        Self { points: (0..nodes.len()).map(point).collect(), cells: FxHashMap::default() }
+        let points: Vec<Point> = (0..nodes.len()).map(point).collect();
+        let (mut inner, mut ends) = (vec![], vec![]);
+        for (number, point) in (0..).zip(&points) {
+            let [x, y, z] = point.position_mm.into();
+            match point.outward {
+                None => inner.push(([x, y, z, point.radius_mm], number)),
+                Some(_) => ends.push(number),
+            }
+        }
+        Self { points, inner, ends, cells: FxHashMap::default() }
     }
 
     /// Sets `shares` to those of a position. Their sum is 1, or less beyond the ends of the tree.
@@ -102,9 +116,21 @@ impl Mixing {
     /// The point nearest to the middle of a cell.
     fn nearest(&self, cell: [i32; 3]) -> u32 {
         let middle = Vec3::from(cell.map(|i| (f64::from(i) + 0.5) * STEP_MM));
-        let power = |point: &Point| point.power_mm(&middle);
-        let best = (0..).zip(&self.points).min_by(|a, b| power(a.1).total_cmp(&power(b.1)));
-        best.map_or(0, |(i, _)| i)
+        let mut best = (f64::INFINITY, 0);
+        for &([x, y, z, radius_mm], number) in &self.inner {
+            let squared = (middle.x - x).powi(2) + (middle.y - y).powi(2) + (middle.z - z).powi(2);
+            let power = (squared - radius_mm * radius_mm) / radius_mm.max(THINNEST_MM);
+            if power < best.0 {
+                best = (power, number);
+            }
+        }
+        for &number in &self.ends {
+            let power = self.points[number as usize].power_mm(&middle);
+            if power < best.0 {
+                best = (power, number);
+            }
+        }
+        best.1
     }
 }
 

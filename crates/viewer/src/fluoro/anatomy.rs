@@ -9,6 +9,7 @@ use crate::engine::PathEngine;
 use crate::material::Material;
 use crate::patient::{Body, Patient};
 use crate::scene::Setup;
+use crate::tails::Filled;
 
 /// Smallest number of rows per thread.
 const FEWEST_ROWS: usize = 16;
@@ -21,6 +22,8 @@ pub(crate) struct Anatomy {
     pub(crate) bone: Vec<f32>,
     pub(crate) lung: Vec<f32>,
     pub(crate) lumen: Vec<f32>,
+    /// The part of the lumen, beyond ends of vessels, in which medium that is everywhere is not seen.
+    pub(crate) faded: Vec<f32>,
 }
 
 impl Anatomy {
@@ -28,12 +31,11 @@ impl Anatomy {
     /// per pixel and interpolated: it only has to look right, and its bones are most of what rays meet.
     pub(crate) fn new(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Self> {
         let view = &c_arm.refined(rays);
-        let lumen = if setup.lumen {
-            engine.mesh(view, setup.filled_now())?
-        } else {
-            view.obliquities().map(|_| 0.0).collect()
+        let (lumen, faded) = match setup.lumen {
+            true => filled(setup, view, engine)?,
+            false => (view.obliquities().map(|_| 0.0).collect(), vec![]),
         };
-        let mut maps = Self { lumen, ..Self::default() };
+        let mut maps = Self { lumen, faded, ..Self::default() };
         match &*setup.patient {
             Patient::Slab { tissue_mm } => {
                 maps.body = view.obliquities().map(|obliquity| (tissue_mm * obliquity) as f32).collect();
@@ -68,7 +70,7 @@ impl Anatomy {
     ) -> Result<Self> {
         let mut moved = self.clone();
         if setup.lumen {
-            moved.lumen = engine.mesh(&c_arm.refined(rays), setup.filled_now())?;
+            (moved.lumen, moved.faded) = filled(setup, &c_arm.refined(rays), engine)?;
         }
         moved.lung = air(setup, c_arm, rays, engine)?;
         if let Patient::Tomogram(volume) = &*setup.patient {
@@ -97,6 +99,12 @@ impl Anatomy {
         [(self.body[ray] - bone - lung - lumen).max(0.0), bone, lung, lumen]
     }
 
+    /// Length of the lumen on a ray in which medium that is everywhere is not seen.
+    #[inline]
+    pub(crate) fn faded(&self, ray: usize) -> f32 {
+        if self.faded.is_empty() { 0.0 } else { self.faded[ray] }
+    }
+
     /// Thickness of soft tissue equivalent to the middle of the image: the median over its middle ninth, where
     /// exposure control measures.
     pub(crate) fn reference_mm(&self, view: &CArm) -> f64 {
@@ -122,12 +130,21 @@ impl Anatomy {
     }
 }
 
-/// Lengths in a mesh with one ray per pixel; empty for a mesh without triangles.
+/// Lengths in a mesh; empty for a mesh without triangles.
 fn cast(mesh: &SurfaceMesh, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
     match mesh.triangles.is_empty() {
         true => Ok(vec![]),
         false => engine.mesh(c_arm, mesh),
     }
+}
+
+/// Lengths in the lumen, and those of it in which medium has faded.
+fn filled(setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<(Vec<f32>, Vec<f32>)> {
+    let filled = setup.filled_now();
+    let lumen = engine.mesh(view, &filled.surface)?;
+    let mut faded = cast(&filled.faded, view, engine)?;
+    faded.iter_mut().for_each(|length| *length /= Filled::DEPTH);
+    Ok((lumen, faded))
 }
 
 /// Lengths in the air of a generated body, at its displacement.

@@ -157,7 +157,8 @@ impl Fluoroscope {
         let mu = lanes.each_ref().map(|lanes| beam.mean(lanes));
         let contrast = setup.flow.as_ref().map(|flow| {
             let known = kept.and_then(|kept| kept.shares.clone());
-            let shares = || Arc::new(Shares::new(flow, c_arm, setup.filled_now(), setup.displacement()));
+            let shares =
+                || Arc::new(Shares::new(flow, c_arm, &setup.filled_now().surface, setup.displacement()));
             ContrastMap::new(flow, known.unwrap_or_else(shares), setup.displacement())
         });
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
@@ -218,7 +219,7 @@ impl Fluoroscope {
         self.anatomy = Arc::new(self.anatomy.moved(setup, &self.c_arm, SUBRAYS, engine)?);
         self.vessel = None;
         if let Some(flow) = &setup.flow {
-            let shares = Shares::new(flow, &self.c_arm, setup.filled_now(), setup.displacement());
+            let shares = Shares::new(flow, &self.c_arm, &setup.filled_now().surface, setup.displacement());
             self.contrast = Some(ContrastMap::new(flow, Arc::new(shares), setup.displacement()));
         }
         self.look(&setup.spec);

@@ -139,7 +139,8 @@ impl Fluoroscope {
     #[inline]
     pub(super) fn layers(&self, ray: usize, [fraction, tissue_mm]: [f32; 2]) -> [f32; 5] {
         let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
-        [tissue - self.beam.reference_mm(), bone, lung, lumen, lumen * fraction + tissue_mm]
+        let medium = lumen * fraction - self.anatomy.faded(ray) * self.fraction + tissue_mm;
+        [tissue - self.beam.reference_mm(), bone, lung, lumen, medium]
     }
 
     /// If the rays of a pixel differ little: their mean lengths, and the ratio of their mean signal to the signal of

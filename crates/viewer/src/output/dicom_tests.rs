@@ -43,7 +43,7 @@ fn angiogram(c_arm: &CArm, mode: Mode) -> Angiogram<'_> {
     Angiogram {
         c_arm,
         turn_deg: 0.0,
-        exposure: Exposure { kvp: 80.0, dose_ngy: 30.0, tissue_mm: 200.0, pulse: None },
+        exposure: Exposure { kvp: 80.0, dose_ngy: 30.0, entrance_ngy: 9000.0, tissue_mm: 200.0, pulse: None },
         pace: Pace::even(12.5),
         mode,
         contrast: mode == Mode::Dsa,

@@ -64,6 +64,45 @@ pub(super) fn tube(mesh: &mut SurfaceMesh, points: &[(Vec3, f64)]) {
     loft(mesh, &rings);
 }
 
+/// Adds a closed flat bar through points with half its thickness and the vector of half its height there, with all
+/// surfaces `inset` inside.
+pub(super) fn bar(mesh: &mut SurfaceMesh, points: &[(Vec3, f64, Vec3)], inset: f64) {
+    let last = points.len() - 1;
+    let ring = |i: usize| -> Vec<Vec3> {
+        let (middle, thick, tall) = points[i];
+        let along = points[(i + 1).min(last)].0 - points[i.saturating_sub(1)].0;
+        let across = along.cross(&tall).normalize() * (thick - inset).max(TIP_MM);
+        let tall = tall.normalize() * (tall.norm() - inset).max(TIP_MM);
+        (0..TUBE_SIDES)
+            .map(|k| {
+                let (s, c) = libm::sincos(TAU * k as f64 / TUBE_SIDES as f64);
+                middle + across * s + tall * c
+            })
+            .collect()
+    };
+    loft(mesh, &(0..=last).map(ring).collect::<Vec<_>>());
+}
+
+/// Adds a bowl about a centre, of these outer and inner radii, whose bottom lies in a direction and whose rim is this
+/// angle away from it.
+pub(super) fn bowl(mesh: &mut SurfaceMesh, centre: Vec3, [outer, inner]: [f64; 2], down: Vec3, rim_rad: f64) {
+    const RINGS: i32 = 10;
+    let down = down.normalize();
+    let first = Vec3::new(down.y, down.z, down.x).cross(&down).normalize();
+    let second = first.cross(&down);
+    let ring = |radius: f64, k: i32| -> Vec<Vec3> {
+        let (s, c) = libm::sincos(rim_rad * f64::from(k) / f64::from(RINGS));
+        let at = |k: usize| libm::sincos(TAU * k as f64 / (2 * TUBE_SIDES) as f64);
+        (0..2 * TUBE_SIDES)
+            .map(at)
+            .map(|(v, u)| centre + (down * c + (first * u + second * v) * s) * radius)
+            .collect()
+    };
+    let outside = (1..=RINGS).map(|k| ring(outer, k));
+    let inside = (1..=RINGS).rev().map(|k| ring(inner, k));
+    loft(mesh, &outside.chain(inside).collect::<Vec<_>>());
+}
+
 /// Adds an ellipsoid with half axes along the coordinates.
 pub(super) fn ellipsoid(mesh: &mut SurfaceMesh, centre: Vec3, half: Vec3) {
     const RINGS: usize = 18;

@@ -1,4 +1,4 @@
-//! Air in the body: lungs with their vessels, trachea, stomach and colon.
+//! Air in the body: lungs with their vessels, trachea, throat and sinuses, stomach and colon.
 //!
 //! A lung is the region inside the chest wall, outside heart, mediastinum and spine, above the diaphragm and below
 //! the dome of its apex. The limits are distances, blended where they meet, and the surface is found along rays from
@@ -248,6 +248,7 @@ impl Trunk {
         let larynx = Vec3::new(self.spine[0], self.spine_y(self.apex + 75.0) - 30.0, self.apex + 75.0);
         let middle = (carina + larynx) / 2.0 + Vec3::y() * -6.0;
         tube(mesh, &smooth(&[(larynx, 6.0), (middle, 8.5), (carina + Vec3::z() * 8.0, 8.5)], 0.0));
+        self.air_of_head(mesh, larynx);
         self.bowel(mesh);
     }
 

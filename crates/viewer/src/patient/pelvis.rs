@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
-use super::loft::{ellipsoid, hollow, loft, smooth, tube};
+use super::loft::{bowl, ellipsoid, hollow, loft, smooth, tube};
 use super::trunk::{Trunk, step};
 
 /// Centre of a hip joint relative to the middle of the fifth lumbar vertebra: lateral, forward, down, mm.
@@ -24,6 +24,7 @@ impl Trunk {
         for side in [-1.0, 1.0] {
             self.iliac_wing(mesh, side, inset);
             self.pubic_arch(mesh, side, inset);
+            self.hip_socket(mesh, side, inset);
             self.thigh_bone(mesh, side, inset);
         }
     }
@@ -31,14 +32,19 @@ impl Trunk {
     fn sacrum(&self, mesh: &mut SurfaceMesh, inset: f64) {
         // Height, half width, half depth, how far back.
         let profile = [
-            (-136.0, 4.0, 4.0, 14.0),
-            (-118.0, 8.0, 5.0, 28.0),
-            (-100.0, 17.0, 7.0, 36.0),
-            (-76.0, 29.0, 10.0, 38.0),
-            (-52.0, 39.0, 14.0, 30.0),
-            (-34.0, 47.0, 18.0, 20.0),
-            (-22.0, 49.0, 19.0, 12.0),
-            (-17.0, 40.0, 16.0, 9.0),
+            (-138.0, 3.0, 3.0, 14.0),
+            (-126.0, 7.0, 4.0, 24.0),
+            (-114.0, 6.0, 3.0, 30.0),
+            (-102.0, 18.0, 6.0, 36.0),
+            (-94.0, 24.0, 6.5, 38.0),
+            (-82.0, 28.0, 9.0, 38.0),
+            (-73.0, 31.0, 8.5, 37.0),
+            (-62.0, 37.0, 12.0, 34.0),
+            (-51.0, 42.0, 12.0, 29.0),
+            (-42.0, 50.0, 16.0, 24.0),
+            (-32.0, 57.0, 18.0, 18.0),
+            (-23.0, 58.0, 17.0, 12.0),
+            (-17.0, 44.0, 14.0, 9.0),
         ];
         let ring = |(up, wide, deep, back): (f64, f64, f64, f64)| -> Vec<Vec3> {
             (0..28)
@@ -54,7 +60,7 @@ impl Trunk {
             for side in [-1.0, 1.0] {
                 let back = 38.0 - 0.35 * (up + 76.0_f64).abs();
                 let hole = self.pelvic(side * out, back, up);
-                hollow(mesh, |mesh| ellipsoid(mesh, hole, Vec3::new(4.5, 6.0, 3.5).add_scalar(-0.3 * inset)));
+                hollow(mesh, |mesh| ellipsoid(mesh, hole, Vec3::new(5.0, 6.0, 4.0).add_scalar(-0.3 * inset)));
             }
         }
     }
@@ -70,7 +76,7 @@ impl Trunk {
             let [from, to] = [1.25 - 0.85 * flare, 1.75 + 0.35 * flare];
             let angle = from + (to - from) * part;
             let edge = libm::pow(libm::sin(PI * part).max(0.04), 0.4) * step(up, -0.12, 0.06).max(0.05);
-            let thick = (3.0 + 9.0 * (1.0 - step(up, 0.0, 0.45))) * edge - inset.min(2.0 * edge);
+            let thick = (4.2 + 8.0 * (1.0 - step(up, 0.0, 0.45))) * edge - inset.min(2.0 * edge);
             let [u, v] = [hip_side + 6.0 + 36.0 * flare, 58.0 + 14.0 * flare].map(|h| h + face * thick);
             let crest = 128.0 * up - 34.0 * up * up * (2.0 * part - 0.75).powi(2);
             let back = v * libm::cos(angle) - hip_front * (1.0 - flare) + 8.0;
@@ -95,6 +101,13 @@ impl Trunk {
         tube(mesh, &smooth(&crest, inset));
     }
 
+    /// The socket of a hip, open outwards, downwards and forwards.
+    fn hip_socket(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
+        let [hip_side, hip_front, hip_down] = HIP_MM;
+        let middle = self.pelvic(side * hip_side, -hip_front, -hip_down - 4.0);
+        bowl(mesh, middle, [30.5 - inset, 26.0 + inset], Vec3::new(-0.72 * side, 0.34, 0.6), 1.45);
+    }
+
     /// Pubis and ischium: a ring in front of and below the joint.
     fn pubic_arch(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
         let [hip_side, hip_front, hip_down] = HIP_MM;
@@ -103,7 +116,7 @@ impl Trunk {
             (at(hip_side - 18.0, -6.0, -6.0), 11.0),
             (at(48.0, -36.0, -4.0), 7.5),
             (at(24.0, -56.0, -14.0), 7.5),
-            (at(9.0, -62.0, -26.0), 9.0),
+            (at(12.0, -62.0, -26.0), 9.5),
         ];
         let lower = [
             (at(hip_side - 16.0, 6.0, -8.0), 13.0),
@@ -111,7 +124,7 @@ impl Trunk {
             (at(hip_side - 30.0, 26.0, -66.0), 13.5),
             (at(46.0, 2.0, -70.0), 8.0),
             (at(22.0, -36.0, -50.0), 6.0),
-            (at(9.0, -58.0, -34.0), 7.0),
+            (at(12.0, -58.0, -36.0), 7.5),
         ];
         for path in [&upper[..], &lower[..]] {
             tube(mesh, &smooth(path, inset));
@@ -123,14 +136,22 @@ impl Trunk {
         let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);
         ellipsoid(mesh, at(hip_side, 0.0, -4.0), Vec3::repeat(23.5 - inset));
         let neck = [
-            (at(hip_side + 14.0, 1.0, -10.0), 16.0),
-            (at(hip_side + 32.0, 4.0, -22.0), 15.0),
-            (at(hip_side + 48.0, 10.0, -34.0), 18.0),
-            (at(hip_side + 52.0, 9.0, -62.0), 18.0),
-            (at(hip_side + 46.0, 4.0, -110.0), 14.5),
-            (at(hip_side + 40.0, 0.0, -190.0), 14.0),
+            (at(hip_side + 12.0, 1.0, -8.0), 14.5),
+            (at(hip_side + 24.0, 4.0, -17.0), 13.0),
+            (at(hip_side + 38.0, 8.0, -32.0), 16.0),
+            (at(hip_side + 43.0, 9.0, -52.0), 17.0),
+            (at(hip_side + 39.0, 6.0, -84.0), 15.0),
+            (at(hip_side + 35.0, 3.0, -120.0), 14.0),
+            (at(hip_side + 28.0, 0.0, -190.0), 13.5),
         ];
         // The shaft's wall is thick.
         tube(mesh, &smooth(&neck, 3.0 * inset));
+        // The greater trochanter rises beside the neck.
+        let greater = [
+            (at(hip_side + 52.0, 12.0, -14.0), 9.0),
+            (at(hip_side + 53.0, 13.0, -26.0), 11.0),
+            (at(hip_side + 50.0, 11.0, -42.0), 11.0),
+        ];
+        tube(mesh, &smooth(&greater, inset));
     }
 }

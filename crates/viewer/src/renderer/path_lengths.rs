@@ -45,17 +45,20 @@ impl Renderer {
             let maps = scope.inside_devices(&devices)?;
             Ok((maps, injected(setup, scope, &devices, time_s)))
         })?;
-        let Anatomy { body, bone, lung, lumen } = self.central.clone().unwrap_or_default();
+        let Anatomy { body, bone, lung, lumen, faded } = self.central.clone().unwrap_or_default();
         let fraction = self.setup.spec.xray.contrast_fraction as f32;
         let mut contrast_mm = vec![];
         if fraction > 0.0 || !injected.is_empty() {
             // A device may fill all of the lumen on a ray, and be longer there by rounding, or at the edge of a vessel,
             // where its length is a mean over the pixel and that of the lumen is not.
             let filling = |i: usize| (lumen[i] - devices_mm.iter().map(|map| map.1[i]).sum::<f32>()).max(0.0);
-            contrast_mm = (0..pixels).map(|i| fraction * filling(i)).collect();
+            let lacking = |i: usize| fraction * faded.get(i).copied().unwrap_or(0.0);
+            let constant = |i: usize| (fraction * filling(i) - lacking(i)).max(0.0);
+            contrast_mm = (0..pixels).map(constant).collect();
             for medium in injected {
                 let i = medium.pixel as usize;
-                contrast_mm[i] = (fraction + medium.fraction).min(1.0) * filling(i) + medium.tissue_mm;
+                let in_lumen = (fraction + medium.fraction).min(1.0) * filling(i) - lacking(i);
+                contrast_mm[i] = in_lumen.max(0.0) + medium.tissue_mm;
             }
         }
         Ok(PathLengths {

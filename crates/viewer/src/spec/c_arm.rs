@@ -61,6 +61,16 @@ impl Default for CArmSpec {
     }
 }
 
+/// Distance of the patient entrance reference point before the isocentre, mm (IEC 60601-2-43).
+const REFERENCE_MM: f64 = 150.0;
+
+impl CArmSpec {
+    /// Distance from the source to the patient entrance reference point, mm.
+    pub fn reference_mm(&self) -> f64 {
+        (self.sod_mm - REFERENCE_MM).max(1.0)
+    }
+}
+
 /// Angles of a C-arm in clinical words: LAO or RAO with an angle, CRA or CAU with an angle, or AP.
 ///
 /// ```

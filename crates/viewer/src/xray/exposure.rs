@@ -14,6 +14,9 @@
 //! voltage the current stays at its limit and the dose follows from it. So within the limits the dose is exact behind
 //! T of tissue, and in the measuring field as accurate as its median represents the mean.
 //!
+//! The *entrance* kerma is that at the patient entrance reference point, 150 mm before the isocentre (IEC 60601-2-43),
+//! in free air: k(U, 0) / k(U, T) of the dose at the detector, by the inverse square of the distances.
+//!
 //! N₀ is that of the anode table: SpekPy 2.5, model casim, 12 degrees, photons from 15 keV upwards.
 
 use endowire_core::{Error, Result};
@@ -38,6 +41,8 @@ pub struct Exposure {
     pub kvp: f64,
     /// Air kerma at the detector behind the thickness, per frame.
     pub dose_ngy: f64,
+    /// Air kerma at the patient entrance reference point, per frame.
+    pub entrance_ngy: f64,
     /// Thickness of soft tissue with the patient's attenuation in the measuring field.
     pub tissue_mm: f64,
     /// Current and length of the pulse; absent without exposure control.
@@ -61,7 +66,9 @@ impl Exposure {
     pub(crate) fn new(spec: &ViewSpec, tissue_mm: f64) -> Result<Self> {
         let wanted_ngy = spec.detector.dose_ngy.unwrap_or_else(|| spec.xray.mode.dose_ngy());
         let Some(control) = &spec.exposure else {
-            return Ok(Self { kvp: spec.xray.kvp, dose_ngy: wanted_ngy, tissue_mm, pulse: None });
+            let kvp = spec.xray.kvp;
+            let entrance_ngy = wanted_ngy * entrance(spec, kvp, tissue_mm)?;
+            return Ok(Self { kvp, dose_ngy: wanted_ngy, entrance_ngy, tissue_mm, pulse: None });
         };
         let [least, most] = control.current_ma;
         let pulse_ms = spec.xray.pulse_ms;
@@ -79,9 +86,11 @@ impl Exposure {
             (step, ngy_per_ma) = (step - 1, lower);
         }
         let current_ma = (wanted_ngy / ngy_per_ma).clamp(least, most);
+        let dose_ngy = current_ma * ngy_per_ma;
         Ok(Self {
             kvp: kvp(step),
-            dose_ngy: current_ma * ngy_per_ma,
+            dose_ngy,
+            entrance_ngy: dose_ngy * entrance(spec, kvp(step), tissue_mm)?,
             tissue_mm,
             pulse: Some(Pulse { current_ma, pulse_ms }),
         })
@@ -106,10 +115,19 @@ fn on_curve(curve: &[[f64; 2]], at: f64) -> f64 {
 fn ngy_per_mas(spec: &ViewSpec, step: usize, tissue_mm: f64) -> Result<f64> {
     let (tube, through) = Spectrum::filtered(kvp(step), spec.xray.aluminium_mm, spec.xray.copper_mm)?;
     let tissue = |e| Material::SoftTissue.attenuation_per_mm(e).unwrap_or(0.0) * tissue_mm;
-    let behind = tube.behind(tissue);
-    let photons: f64 = behind.lines.iter().map(|line| line.1).sum();
-    let at_detector = 1e6 * OUTPUT[step] * through * photons * (1000.0 / spec.c_arm.sid_mm).powi(2);
-    Ok(at_detector / behind.photons_per_mm2_ngy())
+    let photons_per_mm2 = 1e6 * OUTPUT[step] * through * (1000.0 / spec.c_arm.sid_mm).powi(2);
+    Ok(photons_per_mm2 * tube.behind(tissue).kerma_ngy())
+}
+
+/// Air kerma at the entrance reference point over that at the detector.
+fn entrance(spec: &ViewSpec, kvp: f64, tissue_mm: f64) -> Result<f64> {
+    let farther = (spec.c_arm.sid_mm / spec.c_arm.reference_mm()).powi(2);
+    if let Some(energy) = spec.xray.energy_kev {
+        return Ok(farther * libm::exp(Material::SoftTissue.attenuation_per_mm(energy)? * tissue_mm));
+    }
+    let (tube, _) = Spectrum::filtered(kvp, spec.xray.aluminium_mm, spec.xray.copper_mm)?;
+    let behind = tube.behind(|e| Material::SoftTissue.attenuation_per_mm(e).unwrap_or(0.0) * tissue_mm);
+    Ok(farther * tube.kerma_ngy() / behind.kerma_ngy())
 }
 
 /// Checks what exposure control requires.
@@ -170,8 +188,33 @@ mod tests {
         }
         // Without control nothing changes.
         let fixed = ViewSpec { exposure: None, ..view(Mode::Cine) };
-        let expected = Exposure { kvp: 80.0, dose_ngy: 300.0, tissue_mm: 300.0, pulse: None };
-        assert_eq!(Exposure::new(&fixed, 300.0).unwrap(), expected);
+        let exposure = Exposure::new(&fixed, 300.0).unwrap();
+        assert_eq!((exposure.kvp, exposure.dose_ngy, exposure.pulse), (80.0, 300.0, None));
+    }
+
+    #[test]
+    fn the_entrance_kerma_is_what_the_tube_gives_there() {
+        // 600 mm from the source, without a patient, by the same current.
+        let exposure = Exposure::new(&view(Mode::Cine), 200.0).unwrap();
+        let pulse = exposure.pulse.unwrap();
+        let mas = pulse.current_ma * pulse.pulse_ms / 1000.0;
+        let mut free = view(Mode::Cine);
+        free.c_arm.sid_mm = 600.0;
+        let step = ((exposure.kvp - FIRST_KVP) / STEP_KVP).round() as usize;
+        let expected = mas * ngy_per_mas(&free, step, 0.0).unwrap();
+        assert!((exposure.entrance_ngy / expected - 1.0).abs() < 1e-9, "{exposure:?} {expected}");
+        // A few hundred times as much as behind the patient; without control by the voltage of the scene.
+        assert!((100.0..1000.0).contains(&(exposure.entrance_ngy / exposure.dose_ngy)), "{exposure:?}");
+        let fixed = ViewSpec { exposure: None, ..view(Mode::Cine) };
+        let fixed = Exposure::new(&fixed, 200.0).unwrap();
+        assert!((fixed.entrance_ngy / exposure.entrance_ngy - 1.0).abs() < 1e-9, "both by 80 kV: {fixed:?}");
+        // Of one energy by its attenuation alone.
+        let mut one = ViewSpec { exposure: None, ..view(Mode::Cine) };
+        one.xray.energy_kev = Some(60.0);
+        let mu = Material::SoftTissue.attenuation_per_mm(60.0).unwrap();
+        let ratio = (one.c_arm.sid_mm / 600.0).powi(2) * (200.0 * mu).exp();
+        let found = Exposure::new(&one, 200.0).unwrap();
+        assert!((found.entrance_ngy / found.dose_ngy / ratio - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -66,6 +66,11 @@ impl Spectrum {
         self.lines.iter().map(|&(e, n)| n * of(e)).sum::<f64>() / total
     }
 
+    /// Air kerma of the lines' photons on each mm², nGy.
+    pub(crate) fn kerma_ngy(&self) -> f64 {
+        self.lines.iter().map(|line| line.1).sum::<f64>() / self.photons_per_mm2_ngy()
+    }
+
     /// Photons per mm² for an air kerma of one nanogray.
     pub(crate) fn photons_per_mm2_ngy(&self) -> f64 {
         // 1 keV = 1.602e-16 J; µ_en/ρ is in cm²/g, so 1/mm² · keV · cm²/g = 100 · 1.602e-16 · 1000 Gy.
@@ -87,10 +92,8 @@ mod tests {
 
     /// Aluminium that halves the air kerma, mm.
     fn half_value_mm(tube: &Spectrum) -> f64 {
-        let kerma = |mm: f64| {
-            let behind = tube.behind(|e| Material::Aluminium.attenuation_per_mm(e).unwrap() * mm);
-            behind.lines.iter().map(|line| line.1).sum::<f64>() / behind.photons_per_mm2_ngy()
-        };
+        let kerma =
+            |mm: f64| tube.behind(|e| Material::Aluminium.attenuation_per_mm(e).unwrap() * mm).kerma_ngy();
         let (mut low, mut high) = (0.0, 50.0);
         for _ in 0..60 {
             let middle = (low + high) / 2.0;
