@@ -9,7 +9,8 @@ impl Record {
     /// Records a step that ended at `time_s`, in which the instruments made these moves. `packing` is the state of
     /// coils in the vessel's sac, if it has one. Consecutive rests become one sample.
     pub fn note(&mut self, time_s: f64, moves: &[Move], simulation: &Simulation, packing: Option<Packing>) {
-        let (report, force) = (simulation.report(), simulation.wall_force());
+        let report = simulation.report();
+        let [wall_force_n, tip_force_n] = self.wall_forces_n(simulation);
         let instruments = simulation.stack().instruments();
         if self.instruments.is_empty() {
             self.instruments = instruments.iter().map(|one| one.name.clone()).collect();
@@ -40,8 +41,8 @@ impl Record {
             tip_mm,
             tip_at_rest_mm: at_rest(tip_mm),
             hands: hands.collect(),
-            wall_force_n: force.sum_n,
-            tip_force_n: force.tip_n,
+            wall_force_n,
+            tip_force_n,
             jumped: report.jumped && !rests,
             packing: packing.map(|Packing { density, outside_mm, .. }| Packed { density, outside_mm }),
             undone: false,
@@ -54,6 +55,19 @@ impl Record {
                 last.time_s = time_s;
             }
             _ => self.samples.push(sample),
+        }
+    }
+
+    /// Forces of the wall, in all and at the tip, N. In a tick that ends on the way to an equilibrium contacts are those
+    /// of an iteration, which may be a hundred times as large: then, as at the hands, the last ones remain.
+    pub fn wall_forces_n(&self, simulation: &Simulation) -> [f64; 2] {
+        let report = simulation.report();
+        match self.samples.last() {
+            Some(last) if report.is_under_way() && !report.converged => [last.wall_force_n, last.tip_force_n],
+            _ => {
+                let force = simulation.wall_force();
+                [force.sum_n, force.tip_n]
+            }
         }
     }
 

@@ -3,6 +3,8 @@
 use endowire_core::vessel::{CentrelinePath, CentrelineTree};
 use endowire_core::{Result, Vec3};
 
+use crate::record::Record;
+
 /// The way through a centre-line tree to a place.
 #[derive(Debug, Clone)]
 pub struct Way {
@@ -26,6 +28,23 @@ impl Way {
     pub fn to_target(tree: &CentrelineTree, name: &str, within_mm: f64) -> Result<Option<Self>> {
         let place_mm = tree.nodes()[tree.target(name)?.row].position_mm;
         Ok(Self::towards(tree, place_mm, within_mm))
+    }
+
+    /// The way on which a record is measured: to the named target if there is one, otherwise to where its tip ended.
+    ///
+    /// # Errors
+    /// As [`Self::to_target`].
+    pub fn of_record(
+        record: &Record,
+        tree: &CentrelineTree,
+        target: Option<&str>,
+        within_mm: f64,
+    ) -> Result<Option<Self>> {
+        match (target, record.samples.iter().rev().find_map(|sample| sample.tip_mm)) {
+            (Some(name), _) => Self::to_target(tree, name, within_mm),
+            (None, Some(place_mm)) => Ok(Self::to_place(tree, &place_mm)),
+            (None, None) => Ok(None),
+        }
     }
 
     /// The same way for the tip of one instrument, by its index.

@@ -40,10 +40,34 @@ pub struct Lab {
     revisions: [u64; 2],
     beam_ticks: u64,
     /// Dose in earlier configurations, and the number of ticks with the beam on in the current one.
-    dose_ngy: f64,
+    dose: Dose,
     room_ticks: u64,
-    /// Dose per frame chosen by exposure control for this configuration, once it is known.
-    delivered_ngy: Option<f64>,
+    /// Exposure of a frame in this configuration, once one is drawn, and the last one of any.
+    delivered: Option<Delivered>,
+    last_delivered: Option<Delivered>,
+}
+
+/// What tubes have given.
+#[derive(Debug, Clone, Copy, Default)]
+struct Dose {
+    /// Air kerma at the detectors.
+    detector_ngy: f64,
+    /// Air kerma at the entrance reference points.
+    entrance_ngy: f64,
+    /// The same times the open area there.
+    area_ngymm2: f64,
+}
+
+impl std::ops::Add for Dose {
+    type Output = Self;
+
+    fn add(self, more: Self) -> Self {
+        Self {
+            detector_ngy: self.detector_ngy + more.detector_ngy,
+            entrance_ngy: self.entrance_ngy + more.entrance_ngy,
+            area_ngymm2: self.area_ngymm2 + more.area_ngymm2,
+        }
+    }
 }
 
 impl Lab {
@@ -75,9 +99,10 @@ impl Lab {
             down: false,
             revisions: [0; 2],
             beam_ticks: 0,
-            dose_ngy: 0.0,
+            dose: Dose::default(),
             room_ticks: 0,
-            delivered_ngy: None,
+            delivered: None,
+            last_delivered: None,
         };
         lab.fluoro.planes().iter().try_for_each(ViewSpec::validate)?;
         Ok(lab)
@@ -110,28 +135,58 @@ impl Lab {
 
     /// Air kerma at the detectors so far, µGy.
     pub fn dose_ugy(&self) -> f64 {
-        (self.dose_ngy + self.room_ngy()) / 1000.0
+        (self.dose + self.room_dose()).detector_ngy / 1000.0
+    }
+
+    /// Air kerma at the entrance reference points so far, µGy; `None` before a live picture was drawn.
+    pub fn entrance_ugy(&self) -> Option<f64> {
+        self.last_delivered.map(|_| (self.dose + self.room_dose()).entrance_ngy / 1000.0)
+    }
+
+    /// Kerma–area product so far, µGy·m².
+    pub fn kerma_area_ugym2(&self) -> Option<f64> {
+        self.last_delivered.map(|_| (self.dose + self.room_dose()).area_ngymm2 * 1e-9)
+    }
+
+    /// Peak voltage, kV: that of the scene until exposure control has chosen one.
+    pub fn kvp(&self) -> f64 {
+        self.delivered.map_or(self.fluoro.xray.kvp, |frame| frame.kvp)
+    }
+
+    /// Current in a pulse, mA.
+    pub fn current_ma(&self) -> Option<f64> {
+        self.delivered.and_then(|frame| frame.current_ma)
     }
 
     /// State of the beam from `time_s` on, for assessment.
     pub(crate) fn beam(&self, time_s: f64) -> BeamState {
-        let arm = &self.fluoro.c_arm;
-        let side_mm = arm.field_mm.unwrap_or(0.0) / arm.magnification;
-        let [primary_deg, secondary_deg] = arm.angles_deg();
+        let [primary_deg, secondary_deg] = self.fluoro.c_arm.angles_deg();
         BeamState {
             time_s,
             on: self.down,
             frames_per_s: self.fluoro.frames_per_s,
             dose_ngy: self.frame_ngy(),
-            field_mm2: side_mm * side_mm * self.open[0] * self.open[1],
+            field_mm2: self.open_mm2(),
             primary_deg,
             secondary_deg,
         }
     }
 
-    /// Air kerma at the detectors in the current configuration, nGy.
-    fn room_ngy(&self) -> f64 {
-        self.frame_ngy() * self.room_ticks as f64 * self.fluoro.frames_per_s / TICKS_PER_S
+    /// Open area at the detector, mm².
+    fn open_mm2(&self) -> f64 {
+        let arm = &self.fluoro.c_arm;
+        let side_mm = arm.field_mm.unwrap_or(0.0) / arm.magnification;
+        side_mm * side_mm * self.open[0] * self.open[1]
+    }
+
+    /// Dose in the current configuration. One in which nothing was drawn counts at the entrance as the one before.
+    fn room_dose(&self) -> Dose {
+        let detector_ngy = self.frame_ngy() * self.room_ticks as f64 * self.fluoro.frames_per_s / TICKS_PER_S;
+        let arm = &self.fluoro.c_arm;
+        let nearer = (arm.reference_mm() / arm.sid_mm).powi(2);
+        let entrance = self.last_delivered.map_or(0.0, |frame| frame.entrance_ngy / frame.frame_ngy);
+        let entrance_ngy = detector_ngy * entrance;
+        Dose { detector_ngy, entrance_ngy, area_ngymm2: entrance_ngy * self.open_mm2() * nearer }
     }
 
     /// Air kerma at the detectors per frame, nGy.
@@ -141,13 +196,13 @@ impl Lab {
             let plane_ngy = spec.detector.dose_ngy.unwrap_or_else(|| spec.xray.mode.dose_ngy());
             plane_ngy * spec.planes().len() as f64
         };
-        self.delivered_ngy.unwrap_or_else(wanted_ngy)
+        self.delivered.map_or_else(wanted_ngy, |frame| frame.frame_ngy)
     }
 
-    /// Stores the dose of a frame, if the frame was made in the current configuration.
+    /// Stores the exposure of a frame, if the frame was made in the current configuration.
     pub(crate) fn exposed(&mut self, delivered: Delivered) {
         if delivered.revision == self.revisions[0] {
-            self.delivered_ngy = Some(delivered.frame_ngy);
+            (self.delivered, self.last_delivered) = (Some(delivered), Some(delivered));
         }
     }
 
@@ -329,8 +384,8 @@ impl Lab {
         let mut spec = self.fluoro.clone();
         with(&mut spec);
         spec.planes().iter().try_for_each(ViewSpec::validate)?;
-        self.dose_ngy += self.room_ngy();
-        (self.room_ticks, self.delivered_ngy) = (0, None);
+        self.dose = self.dose + self.room_dose();
+        (self.room_ticks, self.delivered) = (0, None);
         self.fluoro = spec;
         self.revisions[0] += 1;
         Ok(())

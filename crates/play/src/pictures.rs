@@ -7,7 +7,7 @@
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
-use endowire_viewer::{DeviceView, FrameTime, Image, Pushed, Renderer, ViewSpec};
+use endowire_viewer::{DeviceView, Exposure, FrameTime, Image, Pushed, Renderer, ViewSpec};
 
 use crate::session::{Delivered, Snapshot};
 
@@ -151,21 +151,25 @@ impl Pictures {
         Ok(())
     }
 
-    /// Dose of a frame at the detectors of all planes, if chosen by exposure control; `None` without it, or before it
-    /// is known.
+    /// Exposure of a frame of all planes; `None` before one was drawn in the current room.
     pub fn delivered(&self, snapshot: &Snapshot) -> Option<Delivered> {
         let revision = snapshot.lab.revisions()[0];
-        snapshot.lab.fluoro().exposure.as_ref()?;
-        let dose_ngy = |plane: &Plane| {
+        let exposure = |plane: &Plane| {
             let now = [&plane.sharp, &plane.coarse].into_iter().flatten().find(|made| made.0 == revision)?;
-            Some(now.1.exposure()?.dose_ngy)
+            now.1.exposure()
         };
-        let each: Option<Vec<f64>> = self.planes.iter().map(dose_ngy).collect();
-        let frame_ngy = each.filter(|each| !each.is_empty())?.iter().sum();
-        Some(Delivered { revision, frame_ngy })
+        let each: Vec<Exposure> = self.planes.iter().map(exposure).collect::<Option<_>>()?;
+        let first = each.first()?;
+        Some(Delivered {
+            revision,
+            frame_ngy: each.iter().map(|one| one.dose_ngy).sum(),
+            entrance_ngy: each.iter().map(|one| one.entrance_ngy).sum(),
+            kvp: first.kvp,
+            current_ma: first.pulse.map(|pulse| pulse.current_ma),
+        })
     }
 
-    /// The same, computed if it is unknown.
+    /// The same, computed if exposure control has to choose it.
     ///
     /// # Errors
     /// As [`Self::fluoro`].
@@ -217,14 +221,39 @@ impl Pictures {
     /// # Errors
     /// As [`Renderer::new`] and [`Renderer::render_at`].
     pub fn three_d(&mut self, snapshot: &Snapshot) -> Result<Image> {
+        let (renderer, views) = self.ready_for_three_d(snapshot)?;
+        let image = renderer.render_at(&views, snapshot.moment)?.three_d;
+        image.ok_or_else(|| Error::parameter("view.views", "3d", "was not drawn"))
+    }
+
+    /// The same begun on a graphics processor, whose answer is awaited.
+    ///
+    /// # Errors
+    /// As [`Self::three_d`] and [`Renderer::three_d_on`].
+    #[cfg(feature = "gpu")]
+    pub fn three_d_on(
+        &mut self,
+        snapshot: &Snapshot,
+        graphics: &endowire_viewer::Graphics,
+    ) -> Result<endowire_viewer::Drawing> {
+        let (renderer, views) = self.ready_for_three_d(snapshot)?;
+        renderer.three_d_on(graphics, &views)
+    }
+
+    /// Draws the 3D view anew, for instance on another graphics processor than before.
+    pub fn forget_three_d(&mut self) {
+        self.three_d = None;
+    }
+
+    /// The renderer of the 3D view in the state of a snapshot, and the devices.
+    fn ready_for_three_d(&mut self, snapshot: &Snapshot) -> Result<(&mut Renderer, Vec<DeviceView>)> {
         let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
         self.pushed.leave(&snapshot.coils)?;
         let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
         let renderer = made(&mut self.three_d, None, room, &self.wall)?;
         renderer.move_vessel(snapshot.displacement.as_ref())?;
         renderer.show_contacts(&snapshot.contacts);
-        let image = renderer.render_at(&views, snapshot.moment)?.three_d;
-        image.ok_or_else(|| Error::parameter("view.views", "3d", "was not drawn"))
+        Ok((renderer, views))
     }
 
     /// Name of the backend that draws the fluoroscopic picture.

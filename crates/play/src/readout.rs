@@ -113,6 +113,19 @@ pub struct LabReadout {
     pub beam_s: f64,
     /// Air kerma at the detectors so far, µGy; as delivered by exposure control, if it acts.
     pub dose_ugy: f64,
+    /// Air kerma at the patient entrance reference points so far, µGy, without backscatter: 150 mm before the
+    /// isocentre. Absent until a live picture has been drawn, since it depends on the patient.
+    pub entrance_ugy: Option<f64>,
+    /// Kerma–area product so far, µGy·m².
+    pub kerma_area_ugym2: Option<f64>,
+    /// Peak voltage of the tube, kV.
+    pub kvp: f64,
+    /// Current of the tube in a pulse, mA, if exposure control has chosen it.
+    pub current_ma: Option<f64>,
+    /// Source to detector, mm.
+    pub sid_mm: f64,
+    /// Contrast medium that has flowed from hands' injections, ml, including undone ones.
+    pub contrast_ml: f64,
 }
 
 /// Statistics of the steps so far, without undone ones.

@@ -87,13 +87,19 @@ pub struct Snapshot {
     pub readout: Readout,
 }
 
-/// Dose of one fluoroscopic frame at the detectors of all planes.
+/// Exposure of one fluoroscopic frame of all planes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delivered {
     /// Revision of the room ([`Lab::revisions`]).
     pub(crate) revision: u64,
-    /// Air kerma, nGy.
+    /// Air kerma at the detectors, nGy.
     pub(crate) frame_ngy: f64,
+    /// Air kerma at the entrance reference points, nGy.
+    pub(crate) entrance_ngy: f64,
+    /// Voltage of the first plane, kV.
+    pub(crate) kvp: f64,
+    /// Its current, with exposure control, mA.
+    pub(crate) current_ma: Option<f64>,
 }
 
 impl std::fmt::Debug for Session {
@@ -515,12 +521,18 @@ impl Session {
         &self.simulation
     }
 
+    /// Contrast medium that hands have injected so far, ml.
+    fn contrast_ml(&self) -> f64 {
+        let by_s = self.time_s();
+        self.telemetry.record().injections.iter().map(|one| one.flowed_ml(by_s)).sum::<f64>() + 0.0
+    }
+
     /// All motions and injections as `[[script]]` tables of a scene file, which repeat them to the bit.
     pub fn script(&self) -> String {
         self.history.script(&self.simulation)
     }
 
-    /// Stores the dose chosen by exposure control for the current room; until then the nominal dose counts.
+    /// Stores the exposure of a drawn frame for the current room; until then the nominal dose counts.
     pub fn exposed(&mut self, delivered: Delivered) {
         self.lab.exposed(delivered);
     }
@@ -558,7 +570,7 @@ impl Session {
             instruments: self.instruments(),
             tip_mm: self.simulation.shape().tip_mm().map(Into::into),
             contacts: report.contacts.len(),
-            wall_force_n: self.simulation.wall_force().sum_n,
+            wall_force_n: self.telemetry.record().wall_forces_n(&self.simulation)[0],
             lab: LabReadout {
                 live: self.lab.is_live(),
                 mode: spec.xray.mode,
@@ -570,6 +582,12 @@ impl Session {
                 open: self.lab.open(),
                 beam_s: self.lab.beam_s(),
                 dose_ugy: self.lab.dose_ugy(),
+                entrance_ugy: self.lab.entrance_ugy(),
+                kerma_area_ugym2: self.lab.kerma_area_ugym2(),
+                kvp: self.lab.kvp(),
+                current_ma: self.lab.current_ma(),
+                sid_mm: spec.c_arm.sid_mm,
+                contrast_ml: self.contrast_ml(),
             },
             packing: packing(self.sac.as_ref()),
             subject: self.standing(),

@@ -591,6 +591,38 @@ fn two_planes_are_live_together_and_a_room_that_changes_is_coarse_until_it_is_sh
 }
 
 #[test]
+fn entrance_kerma_and_kerma_area_are_those_of_the_open_field() {
+    let (path, scene) = scene("curved_tube.toml");
+    let view = ViewSpec::of_scene(&scene, &path).unwrap();
+    let simulation = scene.simulation(&NoStore).unwrap();
+    let mut session = Session::new(simulation, view, 64, Limits::default()).unwrap();
+    let wall = session.simulation().lumen().wall(&NoStore).unwrap().clone();
+    let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
+    session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
+    (0..60).for_each(|_| session.tick());
+    assert_eq!(session.readout().lab.entrance_ugy, None, "it depends on a patient who was not seen");
+    pictures.fluoro(&session.snapshot()).unwrap();
+    session.exposed(pictures.delivered(&session.snapshot()).unwrap());
+    let whole = session.readout().lab;
+    // A second of 30 frames of 30 nGy at the detector, the tissue, and distances of 1100 and 600 mm.
+    let (entrance, area) = (whole.entrance_ugy.unwrap(), whole.kerma_area_ugym2.unwrap());
+    assert!((whole.dose_ugy - 0.9).abs() < 1e-9);
+    assert!((10.0..1000.0).contains(&(entrance / whole.dose_ugy)), "{entrance}");
+    let side_m = whole.field_mm * 1e-3 * 600.0 / 750.0;
+    assert!((area / (entrance * side_m * side_m) - 1.0).abs() < 1e-9, "{area} {entrance}");
+    assert_eq!((whole.kvp, whole.current_ma, whole.sid_mm), (80.0, None, 1100.0));
+    // Half of the width for another second: as much at the entrance, half as much on the area.
+    session.apply(&Input::Collimate { width: 0.5, height: 1.0 }).unwrap();
+    (0..60).for_each(|_| session.tick());
+    pictures.fluoro(&session.snapshot()).unwrap();
+    session.exposed(pictures.delivered(&session.snapshot()).unwrap());
+    let narrow = session.readout().lab;
+    assert!((narrow.entrance_ugy.unwrap() / entrance - 2.0).abs() < 0.05, "{:?}", narrow.entrance_ugy);
+    let more = narrow.kerma_area_ugym2.unwrap() / area - 1.0;
+    assert!((more - 0.5).abs() < 0.03, "{more}");
+}
+
+#[test]
 fn dose_is_what_exposure_control_brings() {
     let (path, scene) = scene("curved_tube.toml");
     let dose = |most_ma: f64, known_after: usize| {

@@ -32,11 +32,9 @@ impl Task {
     fn measured(&self, path: &Path) -> endowire_core::Result<Vec<Metric>> {
         let record = Record::read(path)?;
         let tree = self.centreline.as_deref().map(CentrelineTree::read).transpose()?;
-        let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
-        let way = match (&tree, &self.target, last_mm) {
-            (Some(tree), Some(name), _) => Way::to_target(tree, name, self.within_mm)?,
-            (Some(tree), None, Some(place_mm)) => Way::to_place(tree, &place_mm),
-            _ => None,
+        let way = match &tree {
+            Some(tree) => Way::of_record(&record, tree, self.target.as_deref(), self.within_mm)?,
+            None => None,
         };
         Ok(endowire_assess::assess(&record, way.as_ref()))
     }

@@ -80,16 +80,14 @@ impl Record {
             (None, Some(_)) => {
                 return Err(refuse("target", "a point of a centre line", "give the vessel too"));
             }
-            (Some(vessel), Some(Goal::Name(name))) => {
-                Way::to_target(vessel.tree(py)?, &name, within_mm).map_err(exception)?
-            }
             (Some(vessel), Some(Goal::Place(place))) => {
                 Way::towards(vessel.tree(py)?, place.into(), within_mm)
             }
+            (Some(vessel), Some(Goal::Name(name))) => {
+                Way::of_record(&record, vessel.tree(py)?, Some(&name), within_mm).map_err(exception)?
+            }
             (Some(vessel), None) => {
-                let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
-                let tree = vessel.tree(py)?;
-                last_mm.and_then(|place_mm| Way::to_place(tree, &place_mm))
+                Way::of_record(&record, vessel.tree(py)?, None, within_mm).map_err(exception)?
             }
         };
         let measured = interruptible(py, move || endowire_assess::assess(&record, way.as_ref()))?;

@@ -42,7 +42,7 @@ export function show({ readout: now, planes, three: view, backend, backend3D }) 
   element("detach").hidden = !now.packing;
   element("arm").textContent = pose(lab.lao_deg, lab.cra_deg);
   if (lab.second_deg) element("second-arm").textContent = pose(...lab.second_deg);
-  element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.dose_ugy.toFixed(1)} µGy`;
+  element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.entrance_ugy === null ? "" : `${(lab.entrance_ugy / 1000).toFixed(2)} mGy, ${lab.kerma_area_ugym2.toFixed(1)} µGy·m²`}`;
   element("field").textContent = `${lab.field_mm.toFixed(0)} mm`;
   element("backend").textContent = backend === backend3D ? `pictures by ${backend}` : [backend && `fluoroscopy by ${backend}`, `3D by ${backend3D}`].filter(Boolean).join(", ");
   hands(now);

@@ -8,14 +8,14 @@ use endowire_assess::{Exam, SessionFile, Site};
 use endowire_core::file::{Files, InMemory};
 use endowire_core::insertion::Script;
 use endowire_core::methods::MethodChoice;
-use endowire_core::vessel::{CentrelineTree, NoStore, Wall};
+use endowire_core::vessel::{CentrelineTree, NoStore};
 use endowire_core::{Error, Result};
 use endowire_methods::Setting;
 use endowire_play::{
     Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, TICK_SOLVES, lumens, script_head,
 };
 use endowire_report::{Frame, Recorder, Run, Series, Vessel, events};
-use endowire_viewer::{Backend, Graphics, Image, PixelFormat, Pushed, ViewSpec};
+use endowire_viewer::{Backend, Graphics, Image, PixelFormat, ViewSpec};
 use serde_json::{Value, json};
 
 use crate::opened::Opened;
@@ -39,8 +39,6 @@ pub(crate) struct Played {
     pictures: Pictures,
     three_d: ThreeD,
     /// Copies for drawing on a graphics processor.
-    pushed: Pushed,
-    wall: Wall,
 }
 
 /// Name of a file whose script overrides any other.
@@ -81,8 +79,7 @@ impl Played {
             session = session.with_exam(Exam::new(subject, &site)?);
         }
         let first = session.snapshot();
-        let pushed = Pushed::new(&scene, first.lab.fluoro())?;
-        let pictures = Pictures::new(&scene, &first, wall.clone())?;
+        let pictures = Pictures::new(&scene, &first, wall)?;
         let provenance = json!({
             "scene": scene.name, "method": scene.method.name(), "seed": scene.seed, "version": env!("CARGO_PKG_VERSION"),
         });
@@ -97,8 +94,6 @@ impl Played {
             noted: 0,
             pictures,
             three_d: ThreeD::new(),
-            pushed,
-            wall,
         })
     }
 
@@ -245,7 +240,7 @@ impl Played {
 
     /// Draws the 3D view on a graphics processor from now on.
     pub(crate) fn three_d_by(&mut self, graphics: Rc<Graphics>) {
-        self.three_d.draw_by(graphics, self.pushed.clone(), self.wall.clone());
+        self.three_d.draw_by(graphics, &mut self.pictures);
     }
 
     /// Draws the 3D view on the processor from now on.

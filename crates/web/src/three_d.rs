@@ -3,10 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
 use endowire_play::{Pictures, Snapshot};
-use endowire_viewer::{Drawing, Graphics, Image, Pushed, Renderer};
+use endowire_viewer::{Graphics, Image};
 
 /// State shown by a frame: the step, the tip, and the room.
 type Seen = (usize, Option<[f64; 3]>, u64);
@@ -24,10 +23,6 @@ pub(crate) struct ThreeD {
 #[derive(Debug)]
 struct OnGraphics {
     graphics: Rc<Graphics>,
-    pushed: Pushed,
-    wall: Wall,
-    /// With the revision of the room for which it was made.
-    renderer: Option<(u64, Renderer)>,
     answer: Rc<RefCell<Option<Result<Image>>>>,
     /// Whether a frame is being drawn.
     waits: bool,
@@ -38,10 +33,10 @@ impl ThreeD {
         Self { seen: None, graphics: None, failure: None }
     }
 
-    /// Draws on a graphics processor from now on; `pushed` and `wall` are those of the session.
-    pub(crate) fn draw_by(&mut self, graphics: Rc<Graphics>, pushed: Pushed, wall: Wall) {
-        let answer = Rc::default();
-        self.graphics = Some(OnGraphics { graphics, pushed, wall, renderer: None, answer, waits: false });
+    /// Draws on a graphics processor from now on.
+    pub(crate) fn draw_by(&mut self, graphics: Rc<Graphics>, pictures: &mut Pictures) {
+        pictures.forget_three_d();
+        self.graphics = Some(OnGraphics { graphics, answer: Rc::default(), waits: false });
         self.seen = None;
     }
 
@@ -63,7 +58,7 @@ impl ThreeD {
     pub(crate) fn next(&mut self, snapshot: &Snapshot, pictures: &mut Pictures) -> Result<Option<Image>> {
         let seen = Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]));
         if let Some(on) = &mut self.graphics {
-            match on.next(snapshot, self.seen != seen) {
+            match on.next(snapshot, pictures, self.seen != seen) {
                 Ok((image, asked)) => {
                     if asked {
                         self.seen = seen;
@@ -88,13 +83,18 @@ impl ThreeD {
 
 impl OnGraphics {
     /// The frame that has arrived, if any, and whether another one was requested.
-    fn next(&mut self, snapshot: &Snapshot, is_new: bool) -> Result<(Option<Image>, bool)> {
+    fn next(
+        &mut self,
+        snapshot: &Snapshot,
+        pictures: &mut Pictures,
+        is_new: bool,
+    ) -> Result<(Option<Image>, bool)> {
         let arrived = self.answer.take();
         self.waits &= arrived.is_none();
         let image = arrived.transpose()?;
         let asks = is_new && !self.waits;
         if asks {
-            let drawing = self.begun(snapshot)?;
+            let drawing = pictures.three_d_on(snapshot, &self.graphics)?;
             let answer = self.answer.clone();
             self.waits = true;
             wasm_bindgen_futures::spawn_local(async move {
@@ -103,24 +103,5 @@ impl OnGraphics {
             });
         }
         Ok((image, asks))
-    }
-
-    fn begun(&mut self, snapshot: &Snapshot) -> Result<Drawing> {
-        let (revision, spec) = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
-        self.pushed.leave(&snapshot.coils)?;
-        let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
-        let renderer = match &mut self.renderer {
-            Some((drawn, renderer)) => {
-                if *drawn != revision {
-                    renderer.change(spec)?;
-                    *drawn = revision;
-                }
-                renderer
-            }
-            none => &mut none.insert((revision, Renderer::of_wall(spec, &self.wall)?)).1,
-        };
-        renderer.move_vessel(snapshot.displacement.as_ref())?;
-        renderer.show_contacts(&snapshot.contacts);
-        renderer.three_d_on(&self.graphics, &views)
     }
 }

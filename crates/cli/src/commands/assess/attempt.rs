@@ -99,12 +99,7 @@ fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> R
     let tree = scene.centreline(&places.cache).map_err(in_scene)?;
     scenes::tell_found_centreline(path, scene);
     let target = args.target.clone().or_else(|| target(scene));
-    let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
-    let way = match (&target, last_mm) {
-        (Some(name), _) => Way::to_target(tree, name, args.within_mm).map_err(in_scene)?,
-        (None, Some(place)) => Way::to_place(tree, &place),
-        (None, None) => None,
-    };
+    let way = Way::of_record(&record, tree, target.as_deref(), args.within_mm).map_err(in_scene)?;
     let metrics = endowire_assess::assess(&record, way.as_ref());
     Ok(Attempt {
         session: session.to_path_buf(),

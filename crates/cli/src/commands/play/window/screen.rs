@@ -1,6 +1,6 @@
 //! Layout of the window: the live picture, the 3D view, forces, help.
 
-use endowire_play::{InstrumentReadout, Readout};
+use endowire_play::{InstrumentReadout, LabReadout, Readout};
 use endowire_viewer::{Image, Mode, PixelFormat};
 
 use super::super::live::Shown;
@@ -15,7 +15,7 @@ pub(super) const WARN: u32 = 0xff_5a4a;
 const LIVE: u32 = 0xff_c020;
 pub(super) const CHOSEN: u32 = 0x5a_c8fa;
 /// Height of the panel below the pictures, and of a line of text, at the usual size.
-const PANEL_PX: usize = 172;
+const PANEL_PX: usize = 196;
 /// Smallest lag of a device behind its commanded motion that is shown, mm.
 const LAG_MM: f64 = 0.05;
 
@@ -144,16 +144,16 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         instrument(writer, canvas, one, y, chosen);
     }
     let lab = &readout.lab;
-    let beam = format!(
-        "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {}, {} in all",
-        (lab.beam_s / 60.0).floor(),
-        lab.beam_s % 60.0,
-        lab.dose_ugy,
-        readout.contacts,
-        force(readout.wall_force_n)
-    );
     let y = top + 28 + 26 * readout.instruments.len() + 8;
-    writer.write(canvas, [12, y], 15, TEXT, &beam);
+    writer.write(canvas, [12, y], 15, TEXT, &beam(lab));
+    let sac = readout.packing.as_ref().map_or_else(String::new, |packing| {
+        // Rounding must not leave a minus sign before zero.
+        let full = (1e3 * packing.density).round() / 10.0 + 0.0;
+        format!("   sac {full:.1} % full, {:.1} mm of coils outside", packing.outside_mm)
+    });
+    let contacts = format!("contacts {}, {} in all", readout.contacts, force(readout.wall_force_n));
+    let contrast = format!("contrast {:.0} ml   ", lab.contrast_ml);
+    writer.write(canvas, [12, y + 24], 15, TEXT, &[contrast, contacts, sac].concat());
     let frame = |ms: f64| format!("   {:.1} ms a step   {ms:.1} ms a frame", shown.moment.step_ms);
     let times = [
         format!("step {}", readout.step),
@@ -162,13 +162,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         gamepad.map_or_else(String::new, |name| format!("   gamepad: {name}")),
     ]
     .concat();
-    let x = readout.packing.as_ref().map_or(12, |packing| {
-        // Rounding must not leave a minus sign before zero.
-        let full = (1e3 * packing.density).round() / 10.0 + 0.0;
-        let sac = format!("sac {full:.1} % full, {:.1} mm of coils outside   ", packing.outside_mm);
-        writer.write(canvas, [12, y + 24], 15, TEXT, &sac)
-    });
-    writer.write(canvas, [x, y + 24], 15, FAINT, &times);
+    writer.write(canvas, [12, y + 48], 15, FAINT, &times);
     let told = shown.failure.map(str::to_owned).or_else(|| {
         let shown = |event: &&endowire_play::Event| event.is_shown(readout.step, readout.time_s);
         readout.event.as_ref().filter(shown).map(|event| event.text.clone())
@@ -176,8 +170,20 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     let told =
         told.or_else(|| readout.demonstrates.then(|| "the script is shown: move to take over".to_owned()));
     if let Some(text) = told {
-        writer.write(canvas, [12, y + 48], 15, WARN, &text);
+        writer.write(canvas, [12, y + 72], 15, WARN, &text);
     }
+}
+
+/// Tube and doses: kerma at the patient's entrance and kerma–area product once a picture was drawn.
+fn beam(lab: &LabReadout) -> String {
+    let clock = format!("beam {:02.0}:{:04.1}", (lab.beam_s / 60.0).floor(), lab.beam_s % 60.0);
+    let current = lab.current_ma.map_or_else(String::new, |ma| format!(" {ma:.0} mA"));
+    let tube = format!("   {:.0} kV{current}   SID {:.0} mm", lab.kvp, lab.sid_mm);
+    let kerma = match (lab.entrance_ugy, lab.kerma_area_ugym2) {
+        (Some(ugy), Some(area)) => format!("   entrance {:.2} mGy, {area:.1} µGy·m²", ugy / 1000.0),
+        _ => format!("   detector {:.1} µGy", lab.dose_ugy),
+    };
+    [clock, tube, kerma].concat()
 }
 
 fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout, y: usize, chosen: bool) {
