@@ -55,7 +55,7 @@ impl SelfContact {
         }));
     }
 
-    /// Begins with the forces of an earlier part; call it after [`Self::renew`].
+    /// Begins with the forces of an earlier part; call it after [`Self::renew`] and [`Self::begin_friction`].
     pub(crate) fn recall(&mut self, elements: &[ElementData], kept: &[PairForce]) {
         if kept.is_empty() {
             return;
@@ -77,7 +77,7 @@ impl SelfContact {
             let around = next.saturating_sub(1)..(next + 1).min(self.sites.len());
             let off_mm = |site: &usize| (arc_mm(&self.sites[*site]) - here_mm).abs();
             if let Some(site) = around.min_by(|a, b| off_mm(a).total_cmp(&off_mm(b))) {
-                let (arc_mm, force_n, rub) = (other_mm, *force_n, Rub::default());
+                let (arc_mm, force_n, rub) = (other_mm, *force_n, self.recalled_friction(*force_n));
                 self.before.push(Remembered { site, arc_mm, force_n, rub });
             }
         }

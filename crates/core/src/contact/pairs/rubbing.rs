@@ -28,9 +28,11 @@ use crate::solve::Moved;
 /// Friction of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Rub {
-    /// n, from the second point to the first, and N.
+    /// n, from the second point to the first, and N. A recalled force has no direction before the first base.
     normal: Vec3,
     force_n: f64,
+    /// N at the start of the part.
+    begun_n: f64,
     /// The same at the base.
     seen: (Vec3, f64),
     /// a − b, mm.
@@ -82,6 +84,11 @@ pub(crate) struct Rubs {
 }
 
 impl Rub {
+    /// With the normal force of an earlier part.
+    fn recalled(force_n: f64) -> Self {
+        Self { force_n, begun_n: force_n, ..Self::default() }
+    }
+
     fn plane(&self) -> Matrix3<f64> {
         Matrix3::identity() - self.normal * self.normal.transpose()
     }
@@ -141,6 +148,11 @@ impl SelfContact {
         rubbing.advances_mm.extend(advances_mm);
     }
 
+    /// Friction of a pair with the normal force of an earlier part.
+    pub(super) fn recalled_friction(&self, force_n: f64) -> Rub {
+        if self.rubs() { Rub::recalled(force_n) } else { Rub::default() }
+    }
+
     /// Whether there is friction.
     fn rubs(&self) -> bool {
         self.rubbing.coefficient > 0.0
@@ -176,6 +188,8 @@ impl SelfContact {
                 change_n += (rub.normal * rub.force_n - normal * force_n).norm();
                 sum_n += force_n;
                 (rub.normal, rub.force_n) = (normal, force_n);
+            } else if rub.normal == Vec3::zeros() {
+                rub.normal = normal;
             }
             rub.from_mm = a - b - rub.kept_mm;
             rub.slip_mm = rub.along(&(apart_mm - rub.from_mm));
@@ -214,10 +228,10 @@ impl SelfContact {
         self.rubbing.renewal = Renewal::Begins;
     }
 
-    /// Resets normal forces to those of the start of the part, zero, and holds them.
+    /// Resets normal forces to those of the start of the part, and holds them.
     pub(crate) fn rewind_friction(&mut self) {
         self.hold_friction();
-        self.pairs.iter_mut().for_each(|pair| pair.rub.force_n = 0.0);
+        self.pairs.iter_mut().for_each(|Pair { rub, .. }| *rub = Rub::recalled(rub.begun_n));
     }
 
     /// Resets slip at the base and holds the normal forces there: see
@@ -246,17 +260,21 @@ impl SelfContact {
         rubbing.advances_mm.fill(0.0);
     }
 
-    /// Lower and upper estimate of the energy dissipated in the part, mJ: with zero normal forces, as at its start,
-    /// and with those of its end.
+    /// Lower and upper estimate of the energy dissipated in the part, mJ: with the normal forces of its start and of its
+    /// end.
     pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
         let Rubbing { coefficient, stick_mm, taken_mj, .. } = self.rubbing;
-        let each = self
-            .pairs
-            .iter()
-            .filter(|pair| pair.rubs())
-            .map(|Pair { rub, .. }| coefficient * rub.force_n * rubbed_mm(rub.slip_mm.norm(), stick_mm));
-        let most_mj = taken_mj + each.sum::<f64>();
-        (if taken_mj == 0.0 { 0.0 } else { most_mj }, most_mj)
+        let (mut at_start_mj, mut at_end_mj) = (0.0, 0.0);
+        for Pair { rub, .. } in &self.pairs {
+            let way_mm = rubbed_mm(rub.slip_mm.norm(), stick_mm);
+            at_start_mj += coefficient * rub.begun_n * way_mm;
+            at_end_mj += coefficient * rub.force_n * way_mm;
+        }
+        // After slip was reset, the forces of the start no longer apply.
+        if taken_mj != 0.0 {
+            return (taken_mj + at_end_mj, taken_mj + at_end_mj);
+        }
+        (f64::min(at_start_mj, at_end_mj), f64::max(at_start_mj, at_end_mj))
     }
 
     /// Friction force on the first point of a pair at the base, N.
