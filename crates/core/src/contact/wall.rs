@@ -280,7 +280,7 @@ impl External for WallContact<'_> {
 }
 
 impl Contacts for WallContact<'_> {
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
         self.foresee_contacts(elements, base, moved);
         self.foresee_slipping(base, moved);
     }
@@ -289,13 +289,13 @@ impl Contacts for WallContact<'_> {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
         self.press_or_let_go_contacts(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
     }
 
-    fn look_towards(&mut self, moved: &Moved<'_>) {
+    fn look_towards(&mut self, moved: &dyn Moved) {
         self.look_towards_contacts(moved);
     }
 
@@ -307,7 +307,7 @@ impl Contacts for WallContact<'_> {
         self.go_towards_contacts(part);
     }
 
-    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
         self.contact_merit(moved)
     }
 

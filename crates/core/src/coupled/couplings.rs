@@ -84,6 +84,11 @@ impl<const C: usize> Couplings<C> {
         &self.nodes
     }
 
+    /// Number of the block of two nodes, the earlier one first.
+    pub(super) fn number(&self, nodes: &(usize, usize)) -> Option<usize> {
+        self.numbers.get(nodes).copied()
+    }
+
     /// Entries of a block, row by row.
     pub(super) fn entries(&self, number: usize) -> &[f64] {
         &self.values[number * Self::BLOCK * Self::BLOCK..(number + 1) * Self::BLOCK * Self::BLOCK]

@@ -17,7 +17,7 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::linalg::{SupernodalThreshold, amd};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 
 use super::Couplings;
@@ -39,21 +39,23 @@ enum Source {
     Own(usize),
     /// The band's block of a node and the next; if `true`, its rows are those of the next.
     Next(usize, bool),
-    /// A coupling; if `true`, its rows are those of the later node.
+    /// A coupling of the structure; if `true`, its rows are those of the later node.
     Coupling(usize, bool),
 }
 
 /// A factorisation; its memory is reused, and its structure as long as the couplings are the same.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CoupledFactor {
-    /// The couplings for which the structure was computed.
+    /// The couplings for which the structure was computed, in ascending order.
     nodes: Vec<(usize, usize)>,
+    /// Number of each of them in the matrix that is factored.
+    numbers: Vec<usize>,
     dimension: usize,
     /// Node at each position of the elimination.
     order: Vec<usize>,
     blocks: Vec<Block>,
-    column_starts: Vec<usize>,
-    rows: Vec<usize>,
+    /// The structure of the lower triangle in the order of elimination.
+    structure: Option<SymbolicSparseColMat<usize>>,
     values: Vec<f64>,
     symbolic: Option<Arc<SymbolicCholesky<usize>>>,
     factor: Vec<f64>,
@@ -74,16 +76,19 @@ impl CoupledFactor {
         shift: &Shift,
         factor: f64,
     ) -> Result<Inertia, FactorError> {
-        if self.symbolic.is_none() || self.dimension != matrix.dimension() || self.nodes != couplings.nodes()
-        {
+        let known = self.symbolic.is_some() && self.dimension == matrix.dimension();
+        if !(known && self.numbers_in(couplings)) {
             self.symbolic = None;
             self.analyse::<C>(matrix.dimension(), couplings.nodes())?;
+            self.numbers_in(couplings);
         }
         self.gather(matrix, couplings, shift, factor);
-        let Some(symbolic) = self.symbolic.clone() else { return Err(FactorError::ZeroPivot { row: 0 }) };
+        let (Some(symbolic), Some(structure)) = (self.symbolic.clone(), &self.structure) else {
+            return Err(FactorError::ZeroPivot { row: 0 });
+        };
         let mut memory = memory(symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Spec::default()))?;
         let mut numbers = std::mem::take(&mut self.factor);
-        let lower = SparseColMatRef::new(self.structure(), &self.values);
+        let lower = SparseColMatRef::new(structure.as_ref(), &self.values);
         let found = symbolic.factorize_numeric_ldlt(
             &mut numbers,
             lower,
@@ -125,10 +130,11 @@ impl CoupledFactor {
         self.order[place / (C / 2)] * (C / 2) + place % (C / 2)
     }
 
-    /// The structure of the lower triangle in the order of elimination.
-    fn structure(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        let n = self.dimension;
-        SymbolicSparseColMatRef::new_checked(n, n, &self.column_starts, None, &self.rows)
+    /// Finds the number of each coupling of the structure in a matrix; returns whether that has these and no others.
+    fn numbers_in<const C: usize>(&mut self, couplings: &Couplings<C>) -> bool {
+        self.numbers.clear();
+        self.numbers.extend(self.nodes.iter().map_while(|nodes| couplings.number(nodes)));
+        self.numbers.len() == self.nodes.len() && self.nodes.len() == couplings.nodes().len()
     }
 
     /// Finds an order of elimination and the structure of the factor.
@@ -141,6 +147,7 @@ impl CoupledFactor {
         self.dimension = dimension;
         self.nodes.clear();
         self.nodes.extend_from_slice(couplings);
+        self.nodes.sort_unstable();
         self.order = order(dimension / block, couplings)?;
         let mut places = vec![0; self.order.len()];
         for (place, node) in self.order.iter().enumerate() {
@@ -158,11 +165,12 @@ impl CoupledFactor {
                 self.blocks.push(below(node, node + 1, Source::Next, node));
             }
         }
-        for (number, (i, j)) in couplings.iter().enumerate() {
+        for (number, (i, j)) in self.nodes.iter().enumerate() {
             self.blocks.push(below(*i, *j, Source::Coupling, number));
         }
         self.blocks.sort_unstable_by_key(|b| (b.column, b.row));
-        (self.column_starts, self.rows) = columns(&self.blocks, block, |c| c..block);
+        let (starts, rows) = columns(&self.blocks, block, |c| c..block);
+        self.structure = Some(SymbolicSparseColMat::new_checked(dimension, dimension, starts, None, rows));
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..CholeskySymbolicParams::default()
@@ -213,11 +221,11 @@ impl CoupledFactor {
                         }
                         Source::Coupling(number, true) => {
                             let row = c * block..(c + 1) * block;
-                            self.values.extend_from_slice(&couplings.entries(number)[row]);
+                            self.values.extend_from_slice(&couplings.entries(self.numbers[number])[row]);
                             None
                         }
                         Source::Coupling(number, false) => {
-                            let entries = couplings.entries(number);
+                            let entries = couplings.entries(self.numbers[number]);
                             self.values.extend((0..block).map(|r| entries[r * block + c]));
                             None
                         }

@@ -3,7 +3,7 @@
 //! The points are Σ cᵢ qᵢ with q = (x₀, h t₀, x₁, h t₁) of each element, as in [`super::points`], and an energy of both is given by its
 //! derivatives in the eight. Tangents turn on a sphere: at second order tᵢ moves by −½|δ|² tᵢ as well.
 
-use nalgebra::{Matrix3, Matrix3x2};
+use nalgebra::{Matrix3, Matrix3x2, SMatrix};
 
 use super::assembly::Assembly;
 use super::element::ElementData;
@@ -30,6 +30,19 @@ pub struct Couple {
     pub hessian: [[Matrix3<f64>; PLACES]; PLACES],
 }
 
+/// A spring that is linear in the unknowns, between two points of the centre line.
+#[derive(Debug, Clone, Copy)]
+pub struct Link {
+    /// The elements of both points.
+    pub elements: [usize; 2],
+    /// Weights of the eight in the difference of the points, first minus second.
+    pub weights: [f64; PLACES],
+    /// First derivative in that difference.
+    pub gradient: Vec3,
+    /// Second derivative in it.
+    pub hessian: Matrix3<f64>,
+}
+
 /// Unknowns of a node on which a point depends: its position, and the rotation of its tangent along u and v.
 const OWN: usize = 5;
 
@@ -48,7 +61,7 @@ impl<const C: usize> Assembly<C> {
     /// Adds the energy of two points.
     pub(super) fn add_coupled(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple) {
         let l = Layout::<C>;
-        let ends = couple.ends(elements, state);
+        let ends = ends([couple.first, couple.second], elements, state);
         for End { node, place, turns, .. } in &ends {
             let (force, turning) = (couple.gradient[*place], turns.tr_mul(&couple.gradient[place + 1]));
             (0..3).for_each(|a| self.residual[l.position(*node) + a] += force[a]);
@@ -60,7 +73,37 @@ impl<const C: usize> Assembly<C> {
         for (k, one) in ends.iter().enumerate() {
             self.add_own(one, couple);
             for other in &ends[k + 1..] {
-                self.add_between(one, other, &couple.between(one, other));
+                self.add_between(one.node, other.node, &couple.between(one, other));
+            }
+        }
+    }
+
+    /// Adds a linear spring between two points.
+    pub(super) fn add_linked(&mut self, elements: &[ElementData], state: &RodState, link: &Link) {
+        let l = Layout::<C>;
+        // What the difference changes by with the unknowns of each node.
+        let ends = ends(link.elements, elements, state).map(|End { node, place, turns, .. }| {
+            let mut ways = SMatrix::<f64, 3, OWN>::zeros();
+            ways.fixed_columns_mut::<3>(0).fill_diagonal(link.weights[place]);
+            ways.fixed_columns_mut::<2>(3).copy_from(&(turns * link.weights[place + 1]));
+            (node, ways)
+        });
+        for (k, (node, ways)) in ends.iter().enumerate() {
+            let force = ways.tr_mul(&link.gradient);
+            let first = l.position(*node);
+            (0..OWN).for_each(|a| self.residual[first + a] += force[a]);
+            if !self.hessian {
+                continue;
+            }
+            let stiff = link.hessian * ways;
+            for (m, (other, others)) in ends.iter().enumerate().skip(k) {
+                let block = others.tr_mul(&stiff);
+                let block = std::array::from_fn(|a| std::array::from_fn(|b| block[(b, a)]));
+                if m == k {
+                    self.add_on_diagonal(*node, &block);
+                } else {
+                    self.add_between(*node, *other, &block);
+                }
             }
         }
     }
@@ -68,32 +111,47 @@ impl<const C: usize> Assembly<C> {
     /// Adds the derivatives in the unknowns of one node.
     fn add_own(&mut self, end: &End, couple: &Couple) {
         let l = Layout::<C>;
-        let block = couple.between(end, end);
-        let rows = own_rows::<C>(end.node);
-        for a in 0..OWN {
-            for b in a..OWN {
-                self.matrix.add(rows[a], rows[b], block[a][b]);
-            }
-        }
+        self.add_on_diagonal(end.node, &couple.between(end, end));
         let back = couple.carried[end.place + 1].dot(&end.tangent);
         for row in [l.tangent(end.node), l.tangent(end.node) + 1] {
             self.matrix.add(row, row, -back);
         }
     }
 
-    /// Adds the derivatives in the unknowns of one node and of another, in or outside the band.
-    fn add_between(&mut self, one: &End, other: &End, block: &[[f64; OWN]; OWN]) {
-        if one.node.abs_diff(other.node) > 1 {
-            let first = Layout::<C>.position(0);
-            return self.couplings.add_block((one.node, other.node), first, block);
+    /// Adds a symmetric block of the unknowns of one node.
+    fn add_on_diagonal(&mut self, node: usize, block: &[[f64; OWN]; OWN]) {
+        let rows = own_rows::<C>(node);
+        for a in 0..OWN {
+            for b in a..OWN {
+                self.matrix.add(rows[a], rows[b], block[a][b]);
+            }
         }
-        let (rows, columns) = (own_rows::<C>(one.node), own_rows::<C>(other.node));
+    }
+
+    /// Adds the derivatives in the unknowns of one node and of another, in or outside the band.
+    fn add_between(&mut self, one: usize, other: usize, block: &[[f64; OWN]; OWN]) {
+        if one.abs_diff(other) > 1 {
+            let first = Layout::<C>.position(0);
+            return self.couplings.add_block((one, other), first, block);
+        }
+        let (rows, columns) = (own_rows::<C>(one), own_rows::<C>(other));
         for (row, values) in rows.iter().zip(block) {
             for (column, value) in columns.iter().zip(values) {
                 self.matrix.add(*row, *column, *value);
             }
         }
     }
+}
+
+/// The nodes on which points of two elements depend.
+fn ends(of: [usize; 2], elements: &[ElementData], state: &RodState) -> [End; 4] {
+    [0, 1, 2, 3].map(|k| {
+        let element = of[k / 2];
+        let node = element + k % 2;
+        let (frame, h) = (&state.frames[node], elements[element].length);
+        let turns = Matrix3x2::from_columns(&[frame.u * h, frame.v * h]);
+        End { node, place: 2 * k, turns, tangent: frame.t * h }
+    })
 }
 
 /// The rows of a node's position and tangent.
@@ -112,17 +170,6 @@ impl Couple {
             carried: [Vec3::zeros(); PLACES],
             hessian: [[Matrix3::zeros(); PLACES]; PLACES],
         }
-    }
-
-    /// The nodes on which the two points depend.
-    fn ends(&self, elements: &[ElementData], state: &RodState) -> [End; 4] {
-        [0, 1, 2, 3].map(|k| {
-            let element = if k < 2 { self.first } else { self.second };
-            let node = element + k % 2;
-            let (frame, h) = (&state.frames[node], elements[element].length);
-            let turns = Matrix3x2::from_columns(&[frame.u * h, frame.v * h]);
-            End { node, place: 2 * k, turns, tangent: frame.t * h }
-        })
     }
 
     /// Second derivatives in the unknowns of one end and of the same or a later one.

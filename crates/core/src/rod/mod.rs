@@ -48,7 +48,7 @@ mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
-pub use couples::Couple;
+pub use couples::{Couple, Link};
 pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
 pub use lagrangian::{element_energy, element_system};

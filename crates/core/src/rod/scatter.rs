@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::assembly::{Assembly, RankOne};
-use super::couples::Couple;
+use super::couples::{Couple, Link};
 use super::element::ElementData;
 use super::layout::Layout;
 use super::points::PointSum;
@@ -36,6 +36,10 @@ impl<const C: usize> Stencils for Assembly<C> {
 
     fn add_couple(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple) {
         self.add_coupled(elements, state, couple);
+    }
+
+    fn add_link(&mut self, elements: &[ElementData], state: &RodState, link: &Link) {
+        self.add_linked(elements, state, link);
     }
 
     fn add_spin(
@@ -141,6 +145,22 @@ fn point_columns<const C: usize>(
         (l.tangent(e + 1), f1.u * s1),
         (l.tangent(e + 1) + 1, f1.v * s1),
     ]
+}
+
+/// Changes of x₀, h t₀, x₁ and h t₁ of element `e` in the step `d`.
+pub(crate) fn element_step<const C: usize>(
+    state: &RodState,
+    element: &ElementData,
+    e: usize,
+    d: &[f64],
+) -> [Vec3; 4] {
+    let l = Layout::<C>;
+    let node = |i: usize| {
+        let (x, t, f) = (l.position(i), l.tangent(i), &state.frames[i]);
+        (Vec3::new(d[x], d[x + 1], d[x + 2]), (f.u * d[t] + f.v * d[t + 1]) * element.length)
+    };
+    let ((x0, t0), (x1, t1)) = (node(e), node(e + 1));
+    [x0, t0, x1, t1]
 }
 
 /// Displacement of the point at ξ of element `e` in the step `d`.

@@ -3,7 +3,7 @@
 
 use nalgebra::Matrix3;
 
-use super::couples::Couple;
+use super::couples::{Couple, Link};
 use super::element::ElementData;
 use super::points::PointSum;
 use super::state::RodState;
@@ -38,6 +38,9 @@ pub trait Stencils {
 
     /// Adds derivatives in the positions of two points on elements that are not neighbours.
     fn add_couple(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple);
+
+    /// Adds a linear spring between two points on elements that are not neighbours.
+    fn add_link(&mut self, elements: &[ElementData], state: &RodState, link: &Link);
 
     /// Adds the derivatives in the material angle of the energy of a point (element, ξ and set of angles): the first
     /// and second `spin` derivatives in the angle, and the `mixed` one in angle and position.

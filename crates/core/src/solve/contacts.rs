@@ -22,13 +22,13 @@
 //! dm/ds = Σ [κᵢ (gᵢ + ∇dᵢ·(δ + s p))₋ − Fᵢ − s (Fᵢ′ − Fᵢ)] ∇dᵢ·p
 //! ```
 
-use super::external::{ContactMerit, Contacts};
+use super::external::{ContactMerit, Contacts, Moved};
 use super::line_search::LineSearch;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::StopReason;
 use super::shift::{SHIFT_GROWTH, SHIFTS};
 use crate::Vec3;
-use crate::rod::scatter::{point_step, point_turn};
+use crate::rod::scatter::{element_step, point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
 
 /// Largest number of rounds, one factorisation each, in which the active set at the end of a step is sought.
@@ -66,15 +66,21 @@ pub(crate) fn falls_until(mut slope: impl FnMut(f64) -> f64) -> f64 {
     low.0
 }
 
-/// Displacement and rotation of points of the rod in a step.
-pub(crate) fn moved<'a, const C: usize>(
-    elements: &'a [ElementData],
-    state: &'a RodState,
-    step: &'a [f64],
-) -> impl Fn((usize, f64, usize)) -> (Vec3, f64) + 'a {
-    move |(e, xi, set)| {
-        let way = point_step::<C>(state, &elements[e], (e, xi), step);
-        (way, point_turn::<C>((e, xi, set), step))
+/// The rod's motion in a step from a state.
+pub(crate) struct StepOf<'a, const C: usize> {
+    pub(crate) elements: &'a [ElementData],
+    pub(crate) state: &'a RodState,
+    pub(crate) step: &'a [f64],
+}
+
+impl<const C: usize> Moved for StepOf<'_, C> {
+    fn point(&self, (e, xi, set): (usize, f64, usize)) -> (Vec3, f64) {
+        let way = point_step::<C>(self.state, &self.elements[e], (e, xi), self.step);
+        (way, point_turn::<C>((e, xi, set), self.step))
+    }
+
+    fn element(&self, e: usize) -> [Vec3; 4] {
+        element_step::<C>(self.state, &self.elements[e], e, self.step)
     }
 }
 
@@ -119,9 +125,9 @@ impl<const C: usize> Newton<C> {
         &self,
         problem: &mut Problem<'_>,
         state: &RodState,
-        ask: impl FnOnce(&mut dyn Contacts, &super::Moved<'_>) -> T,
+        ask: impl FnOnce(&mut dyn Contacts, &dyn Moved) -> T,
     ) -> T {
-        let moved = moved::<C>(problem.elements, state, &self.step);
+        let moved = StepOf::<C> { elements: problem.elements, state, step: &self.step };
         problem.external.contacts().map_or_else(T::default, |contacts| ask(contacts, &moved))
     }
 
@@ -182,7 +188,7 @@ impl<const C: usize> Newton<C> {
     fn change_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState) -> usize {
         let Problem { elements, supports, external, .. } = problem;
         let Some(contacts) = external.contacts() else { return 0 };
-        let moved = moved::<C>(elements, state, &self.step);
+        let moved = StepOf::<C> { elements, state, step: &self.step };
         let into: &mut Assembly<C> = &mut self.assembly;
         std::mem::swap(&mut into.residual, &mut into.correction);
         let changed = contacts.press_or_let_go(elements, state, &moved, into);

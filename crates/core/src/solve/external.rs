@@ -3,9 +3,14 @@
 use crate::Vec3;
 use crate::rod::{ElementData, RodState, Stencils};
 
-/// Motion of the point at ξ of an element in a step, on the instrument in a set of angles: displacement, mm, and
-/// rotation, rad.
-pub type Moved<'a> = dyn Fn((usize, f64, usize)) -> (Vec3, f64) + 'a;
+/// Motion of the rod in a step.
+pub trait Moved {
+    /// Displacement, mm, and rotation, rad, of the point at ξ of an element, on the instrument in a set of angles.
+    fn point(&self, place: (usize, f64, usize)) -> (Vec3, f64);
+
+    /// Changes of what points of an element depend on: x₀, h t₀, x₁ and h t₁, mm.
+    fn element(&self, e: usize) -> [Vec3; 4];
+}
 
 /// An energy outside the rod: loads, walls, or several of them together. It acts through the rod's [`Stencils`] and
 /// does not know the unknowns.
@@ -69,7 +74,7 @@ pub struct Sizes {
 /// Forces that push and never pull, as unknowns beside the rod's shape, and their response to a step.
 pub trait Contacts {
     /// Stores a step from the base that solves the assembled system.
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>);
+    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved);
 
     /// Adds the springs of contacts that become active by another step, and removes those of contacts that become
     /// inactive. Returns how many changed.
@@ -77,12 +82,12 @@ pub trait Contacts {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize;
 
     /// Stores another step, which solves the system as it is now.
-    fn look_towards(&mut self, moved: &Moved<'_>);
+    fn look_towards(&mut self, moved: &dyn Moved);
 
     /// Slope of the model at a fraction of the way from the first stored step to the second: of the energy with
     /// springs where contacts press and none where they would pull.
@@ -93,7 +98,7 @@ pub trait Contacts {
 
     /// Takes the forces at the end of a step as target. Until the next base, the value is the merit of these
     /// contacts.
-    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit;
+    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit;
 
     /// Moves the forces by a fraction of the way to their target.
     fn take(&mut self, part: f64);

@@ -48,7 +48,7 @@ impl External for Together<'_> {
 }
 
 impl Contacts for Together<'_> {
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
         self.each().for_each(|part| part.foresee(elements, base, moved));
     }
 
@@ -56,13 +56,13 @@ impl Contacts for Together<'_> {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
         self.each().map(|part| part.press_or_let_go(elements, base, moved, into)).sum()
     }
 
-    fn look_towards(&mut self, moved: &Moved<'_>) {
+    fn look_towards(&mut self, moved: &dyn Moved) {
         self.each().for_each(|part| part.look_towards(moved));
     }
 
@@ -74,7 +74,7 @@ impl Contacts for Together<'_> {
         self.each().for_each(|one| one.go_towards(part));
     }
 
-    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
         self.each().map(|part| part.merit(moved)).fold(ContactMerit::default(), |a, b| ContactMerit {
             excess_mj: a.excess_mj + b.excess_mj,
             slope_mj: a.slope_mj + b.slope_mj,

@@ -100,7 +100,8 @@ impl SelfContact {
         self.clear = None;
         self.place_tree(elements);
         self.counters.searches += 1;
-        self.tree.near(CLEAR * 2.0 * self.largest_radius_mm, self.apart_mm(), &mut self.near);
+        let reach_mm = CLEAR * 2.0 * self.largest_radius_mm;
+        self.tree.near(reach_mm, self.apart_mm(), |_, _| reach_mm, &mut self.near);
         if self.near.is_empty() {
             self.clear = Some(Clear::of(state));
         }

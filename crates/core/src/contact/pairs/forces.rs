@@ -7,7 +7,7 @@ use super::{Pair, SelfContact};
 use crate::Vec3;
 use crate::contact::force::merit;
 use crate::rod::{Couple, ElementData, RodState, Stencils};
-use crate::solve::{ContactMerit, Moved};
+use crate::solve::ContactMerit;
 
 /// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;
@@ -81,16 +81,18 @@ impl SelfContact {
     }
 
     /// Merit of all pairs at a state, or their energy if forces have no target, mJ.
-    pub(super) fn stored_or_merit_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
-        let curve = self.curve(elements, state);
+    pub(super) fn stored_or_merit_mj(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         // The distance of two stretches changes by at most the sum of their motions.
         let motion_mm = 2.0 * motions_mm(elements, nodes(&self.base), state).fold(0.0, f64::max);
+        self.know_pairs_within(elements, motion_mm);
+        let curve = self.curve(elements, state);
         let of = |pair: &Pair| {
             if -pair.depth_mm() > motion_mm && !(self.aimed && pair.foreseen && pair.aim_n > 0.0) {
                 return 0.0;
             }
             let [_, to] = pair.gap.at;
-            let gap = Gap::find(&curve, self.sites[pair.site].place, pair.gap.slide, to, pair.touch_mm);
+            let site = self.sites[pair.site].place;
+            let gap = Gap::find(&curve, site, pair.gap.slide, to, (pair.touch_mm, f64::INFINITY));
             let depth_mm = pair.touch_mm - gap.distance;
             if !self.aimed {
                 return 0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2);
@@ -105,10 +107,10 @@ impl SelfContact {
     }
 
     /// See [`Contacts::merit`](crate::solve::Contacts::merit).
-    pub(super) fn aim(&mut self, moved: &Moved<'_>) -> ContactMerit {
+    pub(super) fn aim(&mut self) -> ContactMerit {
         let mut sum = ContactMerit::default();
         for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
-            pair.change_mm = pair.change(moved);
+            pair.change_mm = pair.change(&self.ways);
             // The force that balances the rod's own stiffness, which is κ (p − ∇G·δx) once the contacts at the end
             // are found.
             pair.aim_n = (-pair.carried_n).max(0.0);

@@ -39,8 +39,17 @@ const WINDOW: f64 = 2.0;
 const STEPS: usize = 40;
 /// Length of a step, in touching distances, after which the descent ends: the next would be its square.
 const SHORT: f64 = 1e-7;
+/// The descent ends where even this many times the decrease that Newton's step promises leaves the gap too wide: Φ is
+/// a parabola but for the curvature of both lines, which is small within the distances that matter.
+const PROMISED: f64 = 4.0;
 /// Smallest Hessian of a minimum, as a fraction of the stiffness of straight lines.
 const CONVEX: f64 = 1e-3;
+
+/// Distance of a site from a stretch up to which its gap may be below `known`, both in touching distances. A slide
+/// s ≤ W brings it nearer by at most s, and counts as ε s².
+pub(super) fn reach(known: f64) -> f64 {
+    WINDOW + (known * known - SLIDE * WINDOW * WINDOW).max(0.0).sqrt()
+}
 
 /// Second derivatives of Φ in s and t.
 type Stiffness = [f64; 3];
@@ -102,8 +111,16 @@ fn inverse([ss, st, tt]: Stiffness, free: [bool; 2]) -> Option<Stiffness> {
 
 impl Gap {
     /// The gap of a site from the stretch about a point, by descent from an initial slide and that point. `touch` is
-    /// the distance at which surfaces touch.
-    pub(super) fn find(curve: &Curve<'_>, site: Place, slide: f64, to: Place, touch: f64) -> Self {
+    /// the distance at which surfaces touch. If the gap is wider than `within`, the descent may end early, at places
+    /// that are farther apart than that.
+    pub(super) fn find(
+        curve: &Curve<'_>,
+        site: Place,
+        slide: f64,
+        to: Place,
+        (touch, within): (f64, f64),
+    ) -> Self {
+        let enough = 0.5 * within * within;
         let window = WINDOW * touch;
         let at = |slide: f64| curve.walk(site, slide.clamp(-window, window));
         let (first, mut slide) = at(slide);
@@ -124,8 +141,11 @@ impl Gap {
             };
             let mut step = [ss * down[0] + st * down[1], st * down[0] + tt * down[1]];
             let size = step[0].abs().max(step[1].abs());
+            let promised = 0.5 * (step[0] * down[0] + step[1] * down[1]);
             if size > 2.0 * touch {
                 step = step.map(|s| s * 2.0 * touch / size);
+            } else if now.phi - PROMISED * promised > enough {
+                break;
             }
             let mut part = 1.0;
             loop {

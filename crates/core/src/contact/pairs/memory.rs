@@ -6,9 +6,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::curve::{Curve, Place};
-use super::gap::Gap;
+use super::gap::{Gap, reach};
 use super::rubbing::Rub;
-use super::{KNOWN, LOOKED_AT, Pair, SelfContact, Site, tree};
+use super::{KNOWN, NEAR, Pair, SelfContact, Site, tree};
 use crate::contact::force::PENALTY;
 use crate::rod::{ElementData, RodState};
 
@@ -55,7 +55,7 @@ impl SelfContact {
         }));
     }
 
-    /// Begins with the forces of an earlier part; call it after [`Self::renew`].
+    /// Begins with the forces of an earlier part; call it after [`Self::renew`] and [`Self::begin_friction`].
     pub(crate) fn recall(&mut self, elements: &[ElementData], kept: &[PairForce]) {
         if kept.is_empty() {
             return;
@@ -77,7 +77,7 @@ impl SelfContact {
             let around = next.saturating_sub(1)..(next + 1).min(self.sites.len());
             let off_mm = |site: &usize| (arc_mm(&self.sites[*site]) - here_mm).abs();
             if let Some(site) = around.min_by(|a, b| off_mm(a).total_cmp(&off_mm(b))) {
-                let (arc_mm, force_n, rub) = (other_mm, *force_n, Rub::default());
+                let (arc_mm, force_n, rub) = (other_mm, *force_n, self.recalled_friction(*force_n));
                 self.before.push(Remembered { site, arc_mm, force_n, rub });
             }
         }
@@ -94,30 +94,49 @@ impl SelfContact {
         if self.look_whether_clear(elements, state) {
             self.pairs.clear();
             self.before.clear();
+            self.known = KNOWN;
             return;
         }
         self.place_tree(elements);
         self.counters.searches += 1;
-        let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
-        let mut near = std::mem::take(&mut self.near);
-        self.tree.near(reach_mm, self.apart_mm(), &mut near);
-        self.counters.elements += near.len() as u64;
         // At the first base of a part there are no pairs, but perhaps recalled forces.
         self.before.extend(self.pairs.drain(..).map(|pair| {
             let Pair { site, arc_mm, force_n, rub, .. } = pair;
             Remembered { site, arc_mm, force_n, rub }
         }));
-        let mut pairs = std::mem::take(&mut self.pairs);
         let curve = Curve { elements, state, skins: &self.skins, closed: self.closed };
         self.site_positions.clear();
         self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
-        for (a, b) in &near {
-            self.find_between(&curve, (*a, *b), reach_mm, &mut pairs);
-            self.find_between(&curve, (*b, *a), reach_mm, &mut pairs);
+        self.known = 0.0;
+        self.seek(elements, state, NEAR);
+        self.remember();
+        self.before.clear();
+    }
+
+    /// Before a trial at which points have moved by this much from the base, finds the pairs that may touch there.
+    pub(super) fn know_pairs_within(&mut self, elements: &[ElementData], motion_mm: f64) {
+        let thinnest = self.skins.iter().map(|skin| skin.radius_mm).filter(|radius_mm| *radius_mm > 0.0);
+        let touch_mm = 2.0 * thinnest.fold(f64::INFINITY, f64::min);
+        // Pairs not yet found are `known` touching distances apart, and come nearer by that motion.
+        if self.known < KNOWN && motion_mm > (self.known - 1.0) * touch_mm {
+            let base = std::mem::take(&mut self.base);
+            self.seek(elements, &base, KNOWN);
+            self.base = base;
         }
-        (self.near, self.pairs) = (near, pairs);
-        self.pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
-        self.pairs.dedup_by(|q, p| {
+    }
+
+    /// Finds the pairs at the base whose gap is between the distance known so far and another, in touching distances.
+    fn seek(&mut self, elements: &[ElementData], base: &RodState, known: f64) {
+        let (mut near, mut pairs) = (std::mem::take(&mut self.near), std::mem::take(&mut self.pairs));
+        let curve = Curve { elements, state: base, skins: &self.skins, closed: self.closed };
+        let reach_mm = |a: usize, b: usize| reach(known) * self.touch_mm(a, b);
+        self.tree.near(2.0 * self.largest_radius_mm * reach(known), self.apart_mm(), reach_mm, &mut near);
+        for (a, b) in &near {
+            self.find_between(&curve, (*a, *b), known, &mut pairs);
+            self.find_between(&curve, (*b, *a), known, &mut pairs);
+        }
+        pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
+        pairs.dedup_by(|q, p| {
             let same = p.site == q.site && (q.arc_mm - p.arc_mm).abs() < TWICE * p.touch_mm;
             // At a shoulder the thicker side is felt.
             if same && q.depth_mm() > p.depth_mm() {
@@ -125,13 +144,26 @@ impl SelfContact {
             }
             same
         });
-        self.counters.pairs += self.pairs.len() as u64;
-        self.remember();
-        self.before.clear();
+        self.counters.elements += near.len() as u64;
+        self.counters.pairs += (pairs.len() - self.pairs.len()) as u64;
+        (self.near, self.pairs, self.known) = (near, pairs, known);
+    }
+
+    /// Distance of the axes of two elements whose surfaces touch, mm.
+    fn touch_mm(&self, a: usize, b: usize) -> f64 {
+        self.skins[a].radius_mm + self.skins[b].radius_mm
     }
 
     /// Finds the pairs of the sites of element `a` with element `b`: minima within `b` of the distance from a site.
-    fn find_between(&self, curve: &Curve<'_>, (a, b): (usize, usize), reach_mm: f64, into: &mut Vec<Pair>) {
+    pub(super) fn find_between(
+        &self,
+        curve: &Curve<'_>,
+        (a, b): (usize, usize),
+        known: f64,
+        into: &mut Vec<Pair>,
+    ) {
+        let touch_mm = self.touch_mm(a, b);
+        let known_mm = [self.known, known].map(|known| known * touch_mm);
         let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
         for site in self.first_sites[a]..self.first_sites[a + 1] {
             let x = self.site_positions[site];
@@ -143,13 +175,9 @@ impl SelfContact {
                 continue;
             }
             let xi = if down < 0.0 && up > 0.0 { down / (down - up) } else { f64::from(u8::from(up < 0.0)) };
-            if (x - curve.jet(Place { element: b, xi }).at).norm() > reach_mm {
-                continue;
-            }
-            let touch_mm = self.skins[a].radius_mm + self.skins[b].radius_mm;
             let place = self.sites[site].place;
-            let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, touch_mm);
-            if gap.distance < KNOWN * touch_mm {
+            let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, (touch_mm, known_mm[1]));
+            if (known_mm[0]..known_mm[1]).contains(&gap.distance) {
                 into.extend(self.pair(curve, site, gap, touch_mm));
             }
         }
@@ -169,6 +197,7 @@ impl SelfContact {
         let element = &curve.elements[a];
         Some(Pair {
             site,
+            weights: gap.weights(),
             gap,
             touch_mm,
             spring_n_per_mm: weight_mm * softer,

@@ -38,6 +38,7 @@ mod tests;
 mod tree;
 
 use crate::Vec3;
+use crate::rod::couples::PLACES;
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
 
@@ -53,10 +54,11 @@ use tree::Tree;
 
 /// Largest distance between sites, in radii.
 const SPACING_RADII: f64 = 0.5;
-/// Pairs are sought up to this many touching distances: a step approaches by at most half.
+/// Pairs at a base are sought up to this many touching distances, more than a step foresees.
+const NEAR: f64 = 1.5;
+/// They are sought up to this many before a trial that moves points so far that others may touch: a step approaches by
+/// at most half.
 const KNOWN: f64 = 2.0;
-/// Elements are tested up to this many times that distance: a site may slide as far as its distance.
-const LOOKED_AT: f64 = 4.0;
 /// If nothing is nearer than this many touching distances, motions of up to `FREE` of one need no new search.
 const CLEAR: f64 = 8.0;
 /// Tolerance, for rounding, by which a trial may exceed the safe fraction.
@@ -99,6 +101,8 @@ struct Pair {
     site: usize,
     /// The gap at the base.
     gap: Gap,
+    /// Weights in the difference of both points of what they depend on.
+    weights: [f64; PLACES],
     /// D, the touching distance, mm.
     touch_mm: f64,
     /// κ, N/mm.
@@ -162,8 +166,12 @@ pub struct SelfContact {
     base: RodState,
     near: Vec<(usize, usize)>,
     pairs: Vec<Pair>,
+    /// Gap up to which they are known, in touching distances.
+    known: f64,
     /// Forces for the next base: recalled ones of an earlier part, or those of the previous base while pairs are sought.
     before: Vec<Remembered>,
+    /// Changes of what points of each element depend on, in the step looked at last: x₀, h t₀, x₁ and h t₁, mm.
+    ways: Vec<[Vec3; 4]>,
     /// Whether forces have a target.
     aimed: bool,
     /// The last state tested at which nothing was near, if so.
@@ -264,26 +272,29 @@ impl External for SelfContact {
 }
 
 impl Contacts for SelfContact {
-    fn foresee(&mut self, _elements: &[ElementData], _base: &RodState, moved: &Moved<'_>) {
-        self.foresee_pairs(moved);
-        self.foresee_slipping(moved);
+    fn foresee(&mut self, _elements: &[ElementData], _base: &RodState, moved: &dyn Moved) {
+        self.follow(moved);
+        self.foresee_pairs();
+        self.foresee_slipping();
     }
 
     fn press_or_let_go(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        _moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
-        self.press_or_let_go_pairs(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
+        // The step is the one that was foreseen, moved by fractions of the ways to others.
+        self.press_or_let_go_pairs(elements, base, into) + self.slip_on(elements, base, into)
     }
 
-    fn look_towards(&mut self, moved: &Moved<'_>) {
+    fn look_towards(&mut self, moved: &dyn Moved) {
+        self.follow(moved);
         for pair in &mut self.pairs {
-            pair.end_mm = pair.change(moved);
+            pair.end_mm = pair.change(&self.ways);
         }
-        self.look_towards_slips(moved);
+        self.look_towards_slips();
     }
 
     fn slope_towards(&mut self, part: f64) -> f64 {
@@ -293,12 +304,14 @@ impl Contacts for SelfContact {
     fn go_towards(&mut self, part: f64) {
         for pair in &mut self.pairs {
             pair.carried_n += part * (pair.linear_n(pair.end_mm) - pair.carried_n);
+            pair.change_mm += part * (pair.end_mm - pair.change_mm);
         }
         self.carry_slipping(part);
     }
 
-    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
-        self.aim(moved)
+    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
+        self.follow(moved);
+        self.aim()
     }
 
     fn take(&mut self, part: f64) {

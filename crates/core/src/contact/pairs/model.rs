@@ -1,25 +1,32 @@
 //! The model of a step: gaps to first order, and springs where they close; the counterpart of `wall/model.rs`.
 
-use super::curve::Curve;
+use nalgebra::Matrix3;
+
 use super::{Pair, SelfContact};
 use crate::Vec3;
 use crate::contact::point::FOLLOW;
-use crate::rod::{ElementData, RodState, Stencils};
+use crate::rod::{ElementData, Link, RodState, Stencils};
 use crate::solve::Moved;
+
+/// Changes of what points of each element depend on, in a step: x₀, h t₀, x₁ and h t₁, mm.
+pub(super) type Ways = [[Vec3; 4]];
 
 impl Pair {
     /// Change of its gap in a step, to first order, mm.
-    pub(super) fn change(&self, moved: &Moved<'_>) -> f64 {
-        if !self.foreseen {
-            return 0.0;
-        }
-        self.gap.direction().dot(&self.way(moved))
+    pub(super) fn change(&self, ways: &Ways) -> f64 {
+        if self.foreseen { self.gap.direction().dot(&self.way(ways)) } else { 0.0 }
     }
 
     /// Relative displacement of its points in a step, mm.
-    pub(super) fn way(&self, moved: &Moved<'_>) -> Vec3 {
-        let [a, b] = self.gap.at.map(|place| moved((place.element, place.xi, 0)).0);
-        a - b
+    pub(super) fn way(&self, ways: &Ways) -> Vec3 {
+        let [a, b] = self.gap.at.map(|place| &ways[place.element]);
+        let each = self.weights.iter().zip(a.iter().chain(b));
+        each.fold(Vec3::zeros(), |sum, (weight, way)| sum + way * *weight)
+    }
+
+    /// A spring in the difference of its points.
+    pub(super) fn link(&self, gradient: Vec3, hessian: Matrix3<f64>) -> Link {
+        Link { elements: self.gap.at.map(|place| place.element), weights: self.weights, gradient, hessian }
     }
 
     /// Force of its spring in the system after a step with this change of its gap, N.
@@ -37,11 +44,17 @@ impl Pair {
 }
 
 impl SelfContact {
+    /// Stores the motion of a step.
+    pub(super) fn follow(&mut self, moved: &dyn Moved) {
+        self.ways.clear();
+        self.ways.extend((0..self.skins.len()).map(|e| moved.element(e)));
+    }
+
     /// See [`Contacts::foresee`](crate::solve::Contacts::foresee).
-    pub(super) fn foresee_pairs(&mut self, moved: &Moved<'_>) {
+    pub(super) fn foresee_pairs(&mut self) {
         for pair in &mut self.pairs {
             pair.foreseen = pair.at_base || -pair.depth_mm() < 0.5 * FOLLOW * pair.touch_mm;
-            pair.change_mm = pair.change(moved);
+            pair.change_mm = pair.change(&self.ways);
             pair.carried_n = pair.linear_n(pair.change_mm);
         }
     }
@@ -51,19 +64,22 @@ impl SelfContact {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
-        let curve = Curve { elements, state: base, skins: &self.skins, closed: self.closed };
         let mut changed = 0;
         for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
-            pair.change_mm = pair.change(moved);
             let presses = pair.change_mm < pair.depth_mm();
             if presses != pair.presses {
                 (pair.presses, changed) = (presses, changed + 1);
                 let spring = if presses { pair.spring_n_per_mm } else { -pair.spring_n_per_mm };
                 // A plane: the gap has no curvature, and no force acts on the rotation of tangents.
-                into.add_couple(elements, base, &pair.couple(&curve, -spring * pair.depth_mm(), 0.0, spring));
+                let along = pair.gap.direction();
+                let plane = spring * along;
+                into.add_link(
+                    elements,
+                    base,
+                    &pair.link(-plane * pair.depth_mm(), plane * along.transpose()),
+                );
             }
         }
         changed

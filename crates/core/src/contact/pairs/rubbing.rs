@@ -23,14 +23,15 @@ use crate::contact::friction::{
     CHANGED, RENEWED, Renewal, STICK_AT_REST, force_of_slip, phi, resistance, rubbed_mm,
 };
 use crate::rod::{Couple, ElementData, RodState, Stencils};
-use crate::solve::Moved;
 
 /// Friction of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Rub {
-    /// n, from the second point to the first, and N.
-    normal: Vec3,
-    force_n: f64,
+    /// n, from the second point to the first, and N. A recalled force has no direction before the first base.
+    pub(super) normal: Vec3,
+    pub(super) force_n: f64,
+    /// N at the start of the part.
+    pub(super) begun_n: f64,
     /// The same at the base.
     seen: (Vec3, f64),
     /// a − b, mm.
@@ -82,6 +83,11 @@ pub(crate) struct Rubs {
 }
 
 impl Rub {
+    /// With the normal force of an earlier part.
+    fn recalled(force_n: f64) -> Self {
+        Self { force_n, begun_n: force_n, ..Self::default() }
+    }
+
     fn plane(&self) -> Matrix3<f64> {
         Matrix3::identity() - self.normal * self.normal.transpose()
     }
@@ -108,11 +114,11 @@ impl Pair {
     }
 
     /// Adds a friction force as a gradient, and its derivative, to the pair's contribution.
-    fn add_friction(&self, to: &mut Couple, force_n: &Vec3, stiffness: &Matrix3<f64>, carried: f64) {
-        let c = self.gap.weights();
+    fn add_friction(&self, to: &mut Couple, force_n: &Vec3, stiffness: &Matrix3<f64>) {
+        let c = &self.weights;
         for k in 0..c.len() {
             to.gradient[k] += force_n * c[k];
-            to.carried[k] += force_n * (carried * c[k]);
+            to.carried[k] += force_n * c[k];
             for l in k..c.len() {
                 to.hessian[k][l] += stiffness * (c[k] * c[l]);
             }
@@ -139,6 +145,11 @@ impl SelfContact {
         rubbing.begun.copy_from(state);
         rubbing.advances_mm.clear();
         rubbing.advances_mm.extend(advances_mm);
+    }
+
+    /// Friction of a pair with the normal force of an earlier part.
+    pub(super) fn recalled_friction(&self, force_n: f64) -> Rub {
+        if self.rubs() { Rub::recalled(force_n) } else { Rub::default() }
     }
 
     /// Whether there is friction.
@@ -176,6 +187,8 @@ impl SelfContact {
                 change_n += (rub.normal * rub.force_n - normal * force_n).norm();
                 sum_n += force_n;
                 (rub.normal, rub.force_n) = (normal, force_n);
+            } else if rub.normal == Vec3::zeros() {
+                rub.normal = normal;
             }
             rub.from_mm = a - b - rub.kept_mm;
             rub.slip_mm = rub.along(&(apart_mm - rub.from_mm));
@@ -214,10 +227,10 @@ impl SelfContact {
         self.rubbing.renewal = Renewal::Begins;
     }
 
-    /// Resets normal forces to those of the start of the part, zero, and holds them.
+    /// Resets normal forces to those of the start of the part, and holds them.
     pub(crate) fn rewind_friction(&mut self) {
         self.hold_friction();
-        self.pairs.iter_mut().for_each(|pair| pair.rub.force_n = 0.0);
+        self.pairs.iter_mut().for_each(|Pair { rub, .. }| *rub = Rub::recalled(rub.begun_n));
     }
 
     /// Resets slip at the base and holds the normal forces there: see
@@ -246,17 +259,21 @@ impl SelfContact {
         rubbing.advances_mm.fill(0.0);
     }
 
-    /// Lower and upper estimate of the energy dissipated in the part, mJ: with zero normal forces, as at its start,
-    /// and with those of its end.
+    /// Lower and upper estimate of the energy dissipated in the part, mJ: with the normal forces of its start and of its
+    /// end.
     pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
         let Rubbing { coefficient, stick_mm, taken_mj, .. } = self.rubbing;
-        let each = self
-            .pairs
-            .iter()
-            .filter(|pair| pair.rubs())
-            .map(|Pair { rub, .. }| coefficient * rub.force_n * rubbed_mm(rub.slip_mm.norm(), stick_mm));
-        let most_mj = taken_mj + each.sum::<f64>();
-        (if taken_mj == 0.0 { 0.0 } else { most_mj }, most_mj)
+        let (mut at_start_mj, mut at_end_mj) = (0.0, 0.0);
+        for Pair { rub, .. } in &self.pairs {
+            let way_mm = rubbed_mm(rub.slip_mm.norm(), stick_mm);
+            at_start_mj += coefficient * rub.begun_n * way_mm;
+            at_end_mj += coefficient * rub.force_n * way_mm;
+        }
+        // After slip was reset, the forces of the start no longer apply.
+        if taken_mj != 0.0 {
+            return (taken_mj + at_end_mj, taken_mj + at_end_mj);
+        }
+        (f64::min(at_start_mj, at_end_mj), f64::max(at_start_mj, at_end_mj))
     }
 
     /// Friction force on the first point of a pair at the base, N.
@@ -273,7 +290,7 @@ impl SelfContact {
         let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
         let largest_n = coefficient * pair.rub.force_n;
         let (force_n, stiffness) = force_of_slip(largest_n, &pair.rub.plane(), &pair.rub.slip_mm, stick_mm);
-        pair.add_friction(to, &force_n, &stiffness, 1.0);
+        pair.add_friction(to, &force_n, &stiffness);
         largest_n * phi(pair.rub.slip_mm.norm(), stick_mm)
     }
 
@@ -289,11 +306,11 @@ impl SelfContact {
 
     /// Stores the friction in a step from the base that solves the current system; the counterpart of
     /// [`crate::contact::wall`] (`wall/slipping.rs`).
-    pub(super) fn foresee_slipping(&mut self, moved: &Moved<'_>) {
+    pub(super) fn foresee_slipping(&mut self) {
         let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
         let begins = !std::mem::replace(&mut self.slips_known, true);
         for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
-            let way_mm = pair.way(moved);
+            let way_mm = pair.way(&self.ways);
             let rub = &mut pair.rub;
             if begins {
                 (rub.at_rest_n, rub.stiffness) =
@@ -309,16 +326,14 @@ impl SelfContact {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
         let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
         let mut changed = 0;
         for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
-            let way_mm = pair.way(moved);
             let largest_n = coefficient * pair.rub.force_n;
             let rub = &mut pair.rub;
-            rub.way_mm = way_mm;
+            let way_mm = rub.way_mm;
             let slip_mm = rub.slip_mm + rub.along(&way_mm);
             let (force_n, stiffness) = force_of_slip(largest_n, &rub.plane(), &slip_mm, stick_mm);
             let off_n = (force_n - rub.linear_n(&way_mm)).norm();
@@ -327,19 +342,17 @@ impl SelfContact {
                 let at_rest_n = force_n - stiffness * way_mm;
                 let (more_n, stiffer) = (at_rest_n - rub.at_rest_n, stiffness - rub.stiffness);
                 (rub.at_rest_n, rub.stiffness) = (at_rest_n, stiffness);
-                let mut couple = Couple::none(pair.gap.at.map(|place| place.element));
                 // Linear: no force acts on the rotation of tangents.
-                pair.add_friction(&mut couple, &more_n, &stiffer, 0.0);
-                into.add_couple(elements, base, &couple);
+                into.add_link(elements, base, &pair.link(more_n, stiffer));
             }
         }
         changed
     }
 
     /// Computes the slips of pairs with friction in a round.
-    pub(super) fn look_towards_slips(&mut self, moved: &Moved<'_>) {
+    pub(super) fn look_towards_slips(&mut self) {
         for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
-            let end_mm = pair.way(moved);
+            let end_mm = pair.way(&self.ways);
             pair.rub.end_n = pair.rub.linear_n(&end_mm);
             pair.rub.end_mm = end_mm;
         }
@@ -357,10 +370,11 @@ impl SelfContact {
         each.sum()
     }
 
-    /// Updates the balanced forces after that part of the round.
+    /// Moves on by that part of the round, with the balanced forces.
     pub(super) fn carry_slipping(&mut self, part: f64) {
         for Pair { rub, .. } in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
             rub.carried_n += (rub.end_n - rub.carried_n) * part;
+            rub.way_mm += (rub.end_mm - rub.way_mm) * part;
         }
     }
 }

@@ -37,6 +37,41 @@ fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
 }
 
 #[test]
+fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
+    let (elements, state) = tests::along(|a| Vec3::new(0.5 * a.cos(), 0.5 * a.sin(), 0.03 * a), 13.0, 40);
+    let coil = || SelfContact::new(&elements, vec![Skin { radius_mm: 0.1, modulus_n_per_mm2: 40.0 }; 40]);
+    let mut first = coil();
+    first.look_at_base(&elements, &state);
+    first.pairs.iter_mut().for_each(|pair| pair.force_n = 0.5);
+    let mut kept = Vec::new();
+    first.keep(&mut kept);
+    let sums_n = |contact: &SelfContact| {
+        let sum = |of: fn(&Pair) -> f64| contact.pairs.iter().map(of).sum::<f64>();
+        (sum(|pair| pair.rub.force_n), sum(|pair| pair.rub.begun_n))
+    };
+    for (coefficient, share) in [(0.3, 1.0), (0.0, 0.0)] {
+        let mut next = coil();
+        let rubs = Rubs { coefficient, stick_mm: [1e-3, 1e-5], least_n: 1e-9 };
+        next.begin_friction(&state, elements.iter().map(|_| 0.0), rubs);
+        next.recall(&elements, &kept);
+        next.hold_friction();
+        next.look_at_base(&elements, &state);
+        next.rub_with_pairs(&elements, &state);
+        let wanted_n = share * 0.5 * kept.len() as f64;
+        let (force_n, begun_n) = sums_n(&next);
+        assert!((force_n - wanted_n).abs() <= 1e-9 * wanted_n && force_n == begun_n, "{force_n}");
+        let rubbing = next.pairs.iter().filter(|pair| pair.rubs());
+        assert!(
+            rubbing.clone().all(|pair| (pair.rub.normal - pair.gap.direction().normalize()).norm() < 1e-12)
+        );
+        // Another force, then back to that of the start.
+        next.pairs.iter_mut().for_each(|pair| pair.rub.force_n *= 3.0);
+        next.rewind_friction();
+        assert_eq!(sums_n(&next), (force_n, begun_n));
+    }
+}
+
+#[test]
 fn rods_that_cross_slip_at_coulombs_force_and_stick_below_it() {
     let (smooth_n, none_n) = pressed_across(0.0, 0.1, 0.05);
     assert!(smooth_n > 0.05 && none_n.abs() < 5e-3 * smooth_n, "{smooth_n} {none_n}");

@@ -67,7 +67,7 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
     let rows: Vec<usize> = (0..=elements.len())
         .flat_map(|i| (0..5).map(move |a| if a < 3 { l.position(i) + a } else { l.tangent(i) + a - 3 }))
         .collect();
-    let moved = |way: &[f64], h: f64| {
+    let mut moved = |way: &[f64], h: f64| {
         let mut to = state.clone();
         for (i, w) in way.chunks_exact(5).enumerate() {
             to.positions[i] += Vec3::new(w[0], w[1], w[2]) * h;
@@ -108,6 +108,101 @@ fn derivatives_are_those_of_the_energy_along_lines_and_at_crossings() {
     for friction in [0.0, 0.4] {
         derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1, friction);
     }
+}
+
+#[test]
+fn a_linear_spring_is_a_couple_without_curvature() {
+    let (elements, state) = along(coil(0.5, 0.19), 13.0, 40);
+    let mut touching = contact(&elements, 0.1);
+    touching.look_at_base(&elements, &state);
+    let (mut one, mut other) =
+        (Assembly::<TWISTED>::new(elements.len()), Assembly::<TWISTED>::new(elements.len()));
+    for (k, pair) in touching.pairs.iter().enumerate() {
+        let (first, second) = (0.3 + k as f64, 2.0 + (k as f64).sin());
+        let m = pair.gap.direction();
+        one.add_couple(
+            &elements,
+            &state,
+            &pair.couple(&touching.curve(&elements, &state), first, 0.0, second),
+        );
+        other.add_link(&elements, &state, &pair.link(m * first, second * m * m.transpose()));
+    }
+    let n = one.residual.len();
+    let largest = one.residual.iter().fold(0.0, |most, r| f64::max(most, r.abs()));
+    assert!(touching.pairs.len() > 100 && largest > 1.0);
+    for i in 0..n {
+        assert!((one.residual[i] - other.residual[i]).abs() < 1e-12 * largest, "row {i}");
+        for j in i..n {
+            let block = Layout::<TWISTED>::BLOCK;
+            let entry = |of: &Assembly<TWISTED>| {
+                if j / block - i / block <= 1 { of.matrix.get(i, j) } else { of.couplings.get(i, j) }
+            };
+            // A couple turns tangents with its carried forces, which are none here.
+            assert!((entry(&one) - entry(&other)).abs() < 1e-12 * largest, "({i}, {j})");
+        }
+    }
+}
+
+#[test]
+fn no_pair_is_missed_by_a_search_in_two_parts() {
+    // Bodies of several tangles with the same sites: a coil, a crossing, and a coil wound to a coil.
+    let wound = |a: f64| {
+        let b = 22.0 * a;
+        let out = 1.0 + 0.22 * b.cos();
+        Vec3::new(out * a.cos(), out * a.sin(), 0.22 * b.sin() + 0.02 * a)
+    };
+    let rods = [along(coil(0.5, 0.17), 26.0, 90), along(loop_over(0.1), 5.0, 30), along(wound, 6.0, 260)];
+    for (elements, state) in &rods {
+        let mut touching = contact(elements, 0.1);
+        touching.look_at_base(elements, state);
+        let near = touching.pairs.len();
+        // Without a limit on the distance, no descent ends early and no place is too far away.
+        let (mut every, curve) = (Vec::new(), touching.curve(elements, state));
+        assert_eq!(touching.known, NEAR);
+        let from_nothing = SelfContact { known: 0.0, ..touching.clone() };
+        for a in 0..elements.len() {
+            for b in (0..elements.len()).filter(|b| *b != a) {
+                from_nothing.find_between(&curve, (a, b), 1e3, &mut every);
+            }
+        }
+        every.retain(|pair| pair.gap.distance < KNOWN * pair.touch_mm);
+        touching.know_pairs_within(elements, 1e3);
+        let missed = |list: &[Pair], from: &[Pair]| {
+            let same = |p: &Pair, q: &Pair| {
+                p.site == q.site
+                    && (p.arc_mm - q.arc_mm).abs() < 1e-6
+                    && (p.gap.distance - q.gap.distance).abs() < 1e-9
+            };
+            list.iter().find(|p| !from.iter().any(|q| same(p, q))).map(|p| (p.site, p.arc_mm, p.gap))
+        };
+        assert!(0 < near && near < touching.pairs.len(), "{near} of {}", touching.pairs.len());
+        assert_eq!(missed(&every, &touching.pairs), None);
+        assert_eq!(missed(&touching.pairs, &every), None);
+        // In order of sites, as forces are handed on.
+        assert!(touching.pairs.is_sorted_by_key(|pair| pair.site));
+    }
+}
+
+#[test]
+fn a_trial_that_moves_far_meets_pairs_that_were_not_near() {
+    // Two rods, 1.7 touching distances apart, and one of them moved until they press.
+    let (mut elements, mut state) = along(|x| Vec3::new(x, 0.0, 0.0), 4.0, 8);
+    let (others, other) = along(|x| Vec3::new(x, 0.0, 0.34), 4.0, 8);
+    elements.push(ElementData::BREAK);
+    elements.extend(others);
+    state.join(&other);
+    let mut touching = contact(&elements, 0.1);
+    touching.look_at_base(&elements, &state);
+    assert!(touching.pairs.is_empty());
+    let lowered = |by_mm: f64| {
+        let mut to = state.clone();
+        to.positions[9..].iter_mut().for_each(|x| x.z -= by_mm);
+        to
+    };
+    assert_eq!(touching.stored_or_merit_mj(&elements, &lowered(0.139)), 0.0);
+    // Energy of the depth over the length, half of it for each of both.
+    let pressed_mj = touching.stored_or_merit_mj(&elements, &lowered(0.15));
+    assert!((pressed_mj / (0.5 * 40.0 * 4.0 * 0.01 * 0.01) - 1.0).abs() < 0.01, "{pressed_mj}");
 }
 
 #[test]

@@ -144,13 +144,21 @@ impl Tree {
         if self.closed { apart.min(self.length() - apart) } else { apart }
     }
 
-    /// Adds elements (a, b), a before b, that may be nearer to each other than `reach`, and are at least `apart` from
-    /// each other along the rod.
-    pub(super) fn near(&self, reach: f64, apart: f64, into: &mut Vec<(usize, usize)>) {
+    /// Adds elements (a, b), a before b, that may be nearer to each other than the `reach` of both, at most `longest`,
+    /// and are at least `apart` from each other along the rod.
+    pub(super) fn near(
+        &self,
+        longest: f64,
+        apart: f64,
+        reach: impl Fn(usize, usize) -> f64,
+        into: &mut Vec<(usize, usize)>,
+    ) {
         into.clear();
-        let is_near = |a: &Stretch, b: &Stretch| self.boxes[a.0][0].distance(&self.boxes[b.0][0]) < reach;
+        let is_near = |a: &Stretch, b: &Stretch| self.boxes[a.0][0].distance(&self.boxes[b.0][0]) < longest;
         let mut leaf = |a: usize, b: usize| {
-            if self.may_touch(a, b, apart) && lower_distance(&self.controls[a], &self.controls[b]) < reach {
+            if self.may_touch(a, b, apart)
+                && lower_distance(&self.controls[a], &self.controls[b]) < reach(a, b)
+            {
                 into.push((a, b));
             }
         };

@@ -100,11 +100,11 @@ impl WallContact<'_> {
     }
 
     /// See [`Contacts::merit`](crate::solve::Contacts::merit).
-    pub(super) fn contact_merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+    pub(super) fn contact_merit(&mut self, moved: &dyn Moved) -> ContactMerit {
         let mut sum = ContactMerit::default();
         for k in 0..self.cache.foreseen.len() {
             let mut contact = self.cache.foreseen[k];
-            let way = moved(self.points[contact.index].place()).0;
+            let way = moved.point(self.points[contact.index].place()).0;
             contact.change_mm = way.dot(&contact.gradient);
             // The force that balances the rod's own stiffness, which is κ (p − ∇d·δx) once the contacts at the end
             // are found.

@@ -100,7 +100,7 @@ pub(super) fn straighten(
 
 impl WallContact<'_> {
     /// See [`Contacts::foresee`](crate::solve::Contacts::foresee).
-    pub(super) fn foresee_contacts(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+    pub(super) fn foresee_contacts(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
         if self.cache.foreseen.is_empty() && self.cache.aside.is_empty() {
             for span in 0..self.cache.spans.len() {
                 for index in self.near(span, elements, base).into_iter().flatten() {
@@ -110,7 +110,7 @@ impl WallContact<'_> {
         }
         self.take_note_of_ways(moved);
         for contact in &mut self.cache.foreseen {
-            contact.change_mm = moved(self.points[contact.index].place()).0.dot(&contact.gradient);
+            contact.change_mm = moved.point(self.points[contact.index].place()).0.dot(&contact.gradient);
             contact.carried_n = contact.linear_n(contact.change_mm);
         }
     }
@@ -130,11 +130,11 @@ impl WallContact<'_> {
 
     /// Moves to `foreseen` the points aside that a step may bring into contact. The planes of the others are out of
     /// its reach.
-    fn take_note_of_ways(&mut self, moved: &Moved<'_>) {
+    fn take_note_of_ways(&mut self, moved: &dyn Moved) {
         let mut aside = std::mem::take(&mut self.cache.aside);
         let before = self.cache.foreseen.len();
         aside.retain(|point| {
-            let way_mm = moved(self.points[point.index].place()).0.norm();
+            let way_mm = moved.point(self.points[point.index].place()).0.norm();
             let stays = STEEPEST * way_mm <= point.clear_mm;
             if !stays && let Some(mut contact) = self.at_base(point.index, point.penalty_n_per_mm) {
                 contact.change_mm = point.way.dot(&contact.gradient);
@@ -180,16 +180,16 @@ impl WallContact<'_> {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
         for point in &mut self.cache.aside {
-            point.way = moved(self.points[point.index].place()).0;
+            point.way = moved.point(self.points[point.index].place()).0;
         }
         let mut changed = 0;
         for contact in &mut self.cache.foreseen {
             let point = &self.points[contact.index];
-            contact.change_mm = moved(point.place()).0.dot(&contact.gradient);
+            contact.change_mm = moved.point(point.place()).0.dot(&contact.gradient);
             let presses = contact.gap_mm + contact.change_mm < 0.0;
             if presses != contact.presses {
                 (contact.presses, changed) = (presses, changed + 1);
@@ -200,13 +200,13 @@ impl WallContact<'_> {
     }
 
     /// See [`Contacts::look_towards`](crate::solve::Contacts::look_towards).
-    pub(super) fn look_towards_contacts(&mut self, moved: &Moved<'_>) {
+    pub(super) fn look_towards_contacts(&mut self, moved: &dyn Moved) {
         self.take_note_of_ways(moved);
         let (mut ends, mut slips) = std::mem::take(&mut self.cache.ends);
         ends.clear();
         ends.extend(self.cache.foreseen.iter().map(|contact| {
             let point = &self.points[contact.index];
-            moved(point.place()).0.dot(&contact.gradient)
+            moved.point(point.place()).0.dot(&contact.gradient)
         }));
         self.slips_to(moved, &mut slips);
         self.cache.ends = (ends, slips);

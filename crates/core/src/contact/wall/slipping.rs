@@ -102,7 +102,7 @@ fn stiffness(f: &FrictionDerivatives) -> (Matrix3<f64>, Vec3, f64) {
 
 impl WallContact<'_> {
     /// Stores the friction in a step from the base that solves the current system.
-    pub(super) fn foresee_slipping(&mut self, base: &RodState, moved: &Moved<'_>) {
+    pub(super) fn foresee_slipping(&mut self, base: &RodState, moved: &dyn Moved) {
         let mut slipping = std::mem::take(&mut self.cache.slipping);
         if slipping.is_empty() && self.friction.acts() {
             let rubbing = self.points.iter().enumerate().filter(|(index, _)| self.friction.holds(*index));
@@ -121,7 +121,7 @@ impl WallContact<'_> {
             }));
         }
         for rubbing in &mut slipping {
-            rubbing.way = moved(self.points[rubbing.index].place());
+            rubbing.way = moved.point(self.points[rubbing.index].place());
             rubbing.carried = rubbing.linear(&rubbing.way);
         }
         self.cache.slipping = slipping;
@@ -132,13 +132,13 @@ impl WallContact<'_> {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
         let mut changed = 0;
         for slipping in &mut self.cache.slipping {
             let (index, point) = (slipping.index, &self.points[slipping.index]);
-            slipping.way = moved(point.place());
+            slipping.way = moved.point(point.place());
             let (x, angle) = plus(&slipping.base, 1.0, &slipping.way);
             let Some(f) = self.friction.derivatives(index, &x, angle, point.potential.radius_mm) else {
                 continue;
@@ -154,7 +154,7 @@ impl WallContact<'_> {
     }
 
     /// Computes the slips of the points with friction in a round.
-    pub(super) fn slips_to(&self, moved: &Moved<'_>, slips: &mut Vec<Slip>) {
+    pub(super) fn slips_to(&self, moved: &dyn Moved, slips: &mut Vec<Slip>) {
         let slip = |slipping: &Slipping, way: &Motion| {
             let (x, angle) = plus(&slipping.base, 1.0, way);
             let radius_mm = self.points[slipping.index].potential.radius_mm;
@@ -162,7 +162,7 @@ impl WallContact<'_> {
         };
         let of = |slipping: &Slipping| {
             let point = &self.points[slipping.index];
-            let end = moved(point.place());
+            let end = moved.point(point.place());
             let (begin_mm, end_mm) = (slip(slipping, &slipping.way), slip(slipping, &end));
             let way = plus(&end, -1.0, &slipping.way);
             let carried = plus(&slipping.linear(&end), -1.0, &slipping.carried);

@@ -37,19 +37,19 @@ impl External for Pushed<'_> {
 }
 
 impl Contacts for Pushed<'_> {
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
         self.wall.foresee(elements, base, moved);
     }
     fn press_or_let_go(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &Moved<'_>,
+        moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
         if self.foreseeing { self.wall.press_or_let_go(elements, base, moved, into) } else { 0 }
     }
-    fn look_towards(&mut self, moved: &Moved<'_>) {
+    fn look_towards(&mut self, moved: &dyn Moved) {
         self.wall.look_towards(moved);
     }
     fn slope_towards(&mut self, part: f64) -> f64 {
@@ -58,7 +58,7 @@ impl Contacts for Pushed<'_> {
     fn go_towards(&mut self, part: f64) {
         self.wall.go_towards(part);
     }
-    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
         self.wall.merit(moved)
     }
     fn take(&mut self, part: f64) {
@@ -169,6 +169,20 @@ fn a_point_is_active_by_its_depth_and_by_its_force() {
     assert!(contact.cache.pressing.len() == 1 && contact.settled(1e-9));
 }
 
+/// A motion of the whole rod along x, mm.
+struct Sideways(f64);
+
+impl Moved for Sideways {
+    fn point(&self, _: (usize, f64, usize)) -> (Vec3, f64) {
+        (Vec3::x() * self.0, 0.0)
+    }
+
+    fn element(&self, _: usize) -> [Vec3; 4] {
+        let way = Vec3::x() * self.0;
+        [way, Vec3::zeros(), way, Vec3::zeros()]
+    }
+}
+
 #[test]
 fn forces_go_where_the_step_leads_as_far_as_it_is_taken() {
     let surface = straight();
@@ -180,7 +194,7 @@ fn forces_go_where_the_step_leads_as_far_as_it_is_taken() {
         contact.cache.points[0].force_n = 0.0;
         let mut assembly = Assembly::<PLAIN>::new(1);
         contact.linearise(&elements, &base, &mut assembly);
-        let on = move |_: (usize, f64, usize)| (Vec3::x() * way_mm, 0.0);
+        let on = Sideways(way_mm);
         contact.foresee(&elements, &base, &on);
         let changed = contact.press_or_let_go(&elements, &base, &on, &mut assembly);
         contact.merit(&on);

@@ -197,9 +197,9 @@ impl<const C: usize> Tools<C> {
             least_n: least_force_n(stack.softest_nmm2()),
         };
         self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
+        self.loops.begin_friction(rod, advances_mm(mesh, stack, motions), friction);
         let pressed = &resumed.map_or(start.state, |resumed| &resumed.state).pairs;
         self.loops.recall(&mesh.elements, pressed);
-        self.loops.begin_friction(rod, advances_mm(mesh, stack, motions), friction);
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
         self.loops.blocks_its_tip(&mesh.elements, rod, advance_mm)
     }
