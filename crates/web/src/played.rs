@@ -38,7 +38,6 @@ pub(crate) struct Played {
     noted: usize,
     pictures: Pictures,
     three_d: ThreeD,
-    /// Copies for drawing on a graphics processor.
 }
 
 /// Name of a file whose script overrides any other.

@@ -101,7 +101,10 @@ fn a_faulty_surface_is_told_why_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("one.obj");
     for (text, verdict) in [
-        ("v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n", "faulty: it encloses no volume, as a sheet: no device can be in it"),
+        (
+            "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n",
+            "faulty: it encloses no volume, as a sheet: no device can be in it",
+        ),
         (
             "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
             "faulty: 1 flipped triangle; it is repaired on loading, as told below",
