@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use endowire_core::input::plain;
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -132,13 +133,13 @@ impl Found {
             Error::content(path, reason)
         };
         let Some((_, first)) = lines.next() else { return Ok(None) };
-        let header: Header = serde_json::from_slice(first).map_err(|e| refuse(0, e.to_string()))?;
+        let header: Header = serde_json::from_slice(first).map_err(|e| refuse(0, plain(&e.to_string())))?;
         if header.format != FORMAT {
             return Err(refuse(0, format!("the format is {:?} and not {FORMAT:?}", header.format)));
         }
         let mut rows = Vec::new();
         for (index, line) in lines {
-            let row: Row = serde_json::from_slice(line).map_err(|e| refuse(index, e.to_string()))?;
+            let row: Row = serde_json::from_slice(line).map_err(|e| refuse(index, plain(&e.to_string())))?;
             if row.run >= header.runs || row.parameters.len() != header.columns.parameters.len() {
                 return Err(refuse(index, format!("run {} is none of the sweep", row.run)));
             }

@@ -35,16 +35,16 @@ fn inserted_mm(scene: &Scene, script: &Script) -> f64 {
 
 #[test]
 fn a_line_ends_at_a_target_that_was_found_where_it_ends_at_the_known_one() {
-    let more = "[[script]]\nadvance_mm = 250.0\nstep_mm = 1.0\nuntil = { tip_within_mm = 10.0, target = \"opening 1\" }\n";
-    let scene = scene("curved_tube", 0, "", more);
+    let more = "[[script]]\nadvance_mm = 250.0\nstep_mm = 1.0\nuntil = { tip_within_mm = 10.0, target = \"opening 0\" }\n";
+    let scene = scene("curved_tube", 1, "", more);
     let stack = scene.stack().unwrap();
     assert!(scene.found_centreline().is_none() && scene.finds_centreline());
     let found = inserted_mm(&scene, &scene.steps(&stack, &NoStore).unwrap());
-    assert_eq!(scene.found_centreline().unwrap().targets()[0].name, "opening 1");
+    assert_eq!(scene.found_centreline().unwrap().targets()[0].name, "opening 0");
     let tree = anatomy::tree("curved_tube").unwrap();
     // The sheath is at the last row's end.
     let known = |row: usize| {
-        let named = tree.clone().with_targets(vec![Target { name: "opening 1".into(), row }]).unwrap();
+        let named = tree.clone().with_targets(vec![Target { name: "opening 0".into(), row }]).unwrap();
         inserted_mm(&scene, &Script::new(&scene.script, &stack, &[0.0], Some(&named)).unwrap())
     };
     assert!((found - known(0)).abs() <= 1.0, "{found} {}", known(0));

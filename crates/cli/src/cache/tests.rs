@@ -134,7 +134,7 @@ fn a_kept_centre_line_is_the_one_that_was_found_with_its_targets_and_is_that_of_
     // Changes a digit in the table, which shows whether the file is read.
     forge(&file, |bytes| {
         let at = 16 + 32 + "x,y,z,radius,parent,target\n".len();
-        bytes[at..at + 2].copy_from_slice(b"7,");
+        bytes[at] = b'7';
     });
     assert_ne!(cache.centreline(&of(0)).unwrap(), found);
 }

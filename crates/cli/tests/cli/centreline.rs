@@ -39,7 +39,7 @@ fn the_centre_line_of_a_surface_is_a_table_that_makes_the_surface_again() {
     assert_eq!((&report["sound"], report["openings"].as_array().unwrap().len()), (&true.into(), 2));
     // It begins where devices come in: in an arch at its narrower end, from the groin.
     let arch = text(&assets().join("vessels/aortic_arch.stl")).to_owned();
-    for (file, inlet) in [(tube(), 1), (arch, 1)] {
+    for (file, inlet) in [(tube(), 0), (arch, 1)] {
         let report = told(&vessel(&["check", &file, "--json"]));
         assert_eq!(report["inlet"], inlet, "{file}");
         assert!(report["openings"][inlet]["centre_mm"][2].as_f64().unwrap().abs() < 1.0, "{file}");
@@ -48,7 +48,7 @@ fn the_centre_line_of_a_surface_is_a_table_that_makes_the_surface_again() {
         assert!(told.contains(&format!("opening {inlet}")), "{told}");
     }
     let lines = String::from_utf8(vessel(&["centreline", &tube()]).stdout).unwrap();
-    assert!(lines.contains("opening 0") && lines.contains("least radius mm"), "{lines}");
+    assert!(lines.contains("opening 1") && lines.contains("least radius mm"), "{lines}");
 }
 
 #[test]
@@ -66,16 +66,16 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
             .collect();
         told(&vessel(&given))
     };
-    let thin = passage(&wire(), &["--to", "0"]);
+    let thin = passage(&wire(), &["--to", "1"]);
     assert!(["passes", "tight"].contains(&thin["passage"].as_str().unwrap()), "{thin}");
     assert!(
         (thin["sharpest"]["bend_radius_mm"].as_f64().unwrap() - 45.0).abs() < 3.0,
         "{}",
         thin["sharpest"]
     );
-    let named = passage(&wire(), &["--to", "opening 0", "--centreline", &table]);
+    let named = passage(&wire(), &["--to", "opening 1", "--centreline", &table]);
     assert_eq!(named["passage"], thin["passage"]);
-    let blocked = passage(&thick, &["--to", "0,0,50", "--from", "1"]);
+    let blocked = passage(&thick, &["--to", "0,0,50", "--from", "0"]);
     assert_eq!(blocked["passage"], "blocked");
     assert_eq!((blocked["reaches_mm"].as_f64(), &thin["reaches_mm"]), (Some(0.0), &thin["length_mm"]));
     let lines =
@@ -105,9 +105,10 @@ fn ends_that_are_none_are_refused_by_their_flag() {
         (vec!["centreline", "--to", "100,0,0"], "--to = [100, 0, 0]: is not inside"),
         (vec!["centreline", "--to", "1,2"], "a place x,y,z in mm"),
         (vec!["passable", "--to", "nowhere"], "--centreline FILE"),
-        (vec!["passable", "--to", "opening 2", "--centreline", &table], "did you mean \"opening 0\""),
-        (vec!["passable", "--to", "0", "--force-n", "0"], "--force-n = 0: must be positive"),
-        (vec!["passable", "--to", "0", "--picture", "way.svg"], "--picture way.svg: name a file .png"),
+        (vec!["passable", "--to", "opening 2", "--centreline", &table], "its targets are opening 1"),
+        (vec!["passable", "--to", "opening 0"], "--to = opening 0: the way begins there"),
+        (vec!["passable", "--to", "1", "--force-n", "0"], "--force-n = 0: must be positive"),
+        (vec!["passable", "--to", "1", "--picture", "way.svg"], "--picture way.svg: name a file .png"),
     ] {
         let file = tube();
         let mut given = vec![arguments[0], &file];

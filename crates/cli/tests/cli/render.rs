@@ -222,7 +222,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
             &["view.detector.blur_mm = 0.15: is 150 pixels", "give at most 0.05 mm"],
         ),
         (still(&["--orbit", "1e300", "--view", "both"]), &["--orbit 1", "give -36000 to 36000 degrees"]),
-        (still(&["--set", "detector.seed=-1"]), &["detector.seed=-1", "u64"]),
+        (still(&["--set", "detector.seed=-1"]), &["detector.seed=-1", "a whole number, 0 or more"]),
         (still(&["--mode", "roadmap"]), &["view.xray.mode = roadmap", "give a [[view.injection]]"]),
     ];
     check_refused(&cases);

@@ -223,13 +223,13 @@ mod tests {
         CArm::new(&spec, size_px, &wall).unwrap()
     }
 
+    /// A tube whose focal spot is a point.
+    fn tube() -> XRaySpec {
+        XRaySpec { focal_spot_mm: 0.0, ..XRaySpec::default() }
+    }
+
     fn detector(spec: &DetectorSpec) -> Detector {
-        Detector::new(
-            &DetectorSpec { seed: 5, ..spec.clone() },
-            &XRaySpec::default(),
-            &arm(0.0, [32, 8]),
-            0.0,
-        )
+        Detector::new(&DetectorSpec { seed: 5, ..spec.clone() }, &tube(), &arm(0.0, [32, 8]), 0.0)
     }
 
     fn ramp() -> Vec<f32> {
@@ -343,7 +343,7 @@ mod tests {
     #[test]
     fn light_spreads_as_a_gaussian_and_nothing_is_lost() {
         let spec = DetectorSpec { noise: false, lag: 0.0, blur_mm: 0.36, ..DetectorSpec::default() };
-        let mut detector = Detector::new(&spec, &XRaySpec::default(), &arm(0.0, [32, 20]), 0.0);
+        let mut detector = Detector::new(&spec, &tube(), &arm(0.0, [32, 20]), 0.0);
         let mut signal = vec![0.0; 640];
         signal[10 * 32 + 16] = 1.0;
         let image = detector.read(signal.clone(), signal.clone(), 1.0, 0);

@@ -203,11 +203,13 @@ mod tests {
         let step = ((exposure.kvp - FIRST_KVP) / STEP_KVP).round() as usize;
         let expected = mas * ngy_per_mas(&free, step, 0.0).unwrap();
         assert!((exposure.entrance_ngy / expected - 1.0).abs() < 1e-9, "{exposure:?} {expected}");
-        // A few hundred times as much as behind the patient; without control by the voltage of the scene.
+        // A few hundred times as much as behind the patient, and as many without control at the same voltage.
         assert!((100.0..1000.0).contains(&(exposure.entrance_ngy / exposure.dose_ngy)), "{exposure:?}");
-        let fixed = ViewSpec { exposure: None, ..view(Mode::Cine) };
+        let mut fixed = ViewSpec { exposure: None, ..view(Mode::Cine) };
+        fixed.xray.kvp = exposure.kvp;
         let fixed = Exposure::new(&fixed, 200.0).unwrap();
-        assert!((fixed.entrance_ngy / exposure.entrance_ngy - 1.0).abs() < 1e-9, "both by 80 kV: {fixed:?}");
+        let share = |of: &Exposure| of.entrance_ngy / of.dose_ngy;
+        assert!((share(&fixed) / share(&exposure) - 1.0).abs() < 1e-9, "{fixed:?} {exposure:?}");
         // Of one energy by its attenuation alone.
         let mut one = ViewSpec { exposure: None, ..view(Mode::Cine) };
         one.xray.energy_kev = Some(60.0);

@@ -39,8 +39,10 @@ const WINDOW: f64 = 2.0;
 const STEPS: usize = 40;
 /// Length of a step, in touching distances, after which the descent ends: the next would be its square.
 const SHORT: f64 = 1e-7;
-/// The descent ends where even this many times the decrease that Newton's step promises leaves the gap too wide: Φ is
-/// a parabola but for the curvature of both lines, which is small within the distances that matter.
+/// Length of a step, in touching distances, within which Φ is nearly the parabola of Newton's step: rods bend little on
+/// a tenth of their thickness.
+const PARABOLIC: f64 = 0.1;
+/// From there the descent ends where even this many times the decrease that the step promises leaves the gap too wide.
 const PROMISED: f64 = 4.0;
 /// Smallest Hessian of a minimum, as a fraction of the stiffness of straight lines.
 const CONVEX: f64 = 1e-3;
@@ -135,17 +137,16 @@ impl Gap {
                 !(held(down[0], places[0]) || (slide.abs() >= window && down[0] * slide > 0.0)),
                 !held(down[1], places[1]),
             ];
-            let Some([ss, st, tt]) = inverse(now.stiffness, free).or_else(|| inverse(now.straight, free))
-            else {
-                break;
-            };
+            let convex = inverse(now.stiffness, free);
+            let Some([ss, st, tt]) = convex.or_else(|| inverse(now.straight, free)) else { break };
             let mut step = [ss * down[0] + st * down[1], st * down[0] + tt * down[1]];
             let size = step[0].abs().max(step[1].abs());
             let promised = 0.5 * (step[0] * down[0] + step[1] * down[1]);
+            if convex.is_some() && size < PARABOLIC * touch && now.phi - PROMISED * promised > enough {
+                break;
+            }
             if size > 2.0 * touch {
                 step = step.map(|s| s * 2.0 * touch / size);
-            } else if now.phi - PROMISED * promised > enough {
-                break;
             }
             let mut part = 1.0;
             loop {

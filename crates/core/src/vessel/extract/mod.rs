@@ -80,6 +80,9 @@ impl ExtractedCentreline {
             let mend = "the surface has no other opening to lead to: give places inside";
             return Err(Error::parameter("to", "none", mend));
         }
+        if let Some(k) = all.iter().position(|to| *to == first) {
+            return Err(Error::parameter("to", name(&first, k), "the way begins there: name another end"));
+        }
         let ends = all.iter().map(|to| end(&lumen, to, "to")).collect::<Result<Vec<Sphere>>>()?;
         let ways = found_ways(&lumen, root, &ends);
         if let Some(missed) = (0..all.len()).find(|&k| ways[k].is_none() && !to.is_empty()) {
