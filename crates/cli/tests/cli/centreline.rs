@@ -79,11 +79,11 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
     assert_eq!(blocked["passage"], "blocked");
     assert_eq!((blocked["reaches_mm"].as_f64(), &thin["reaches_mm"]), (Some(0.0), &thin["length_mm"]));
     let lines =
-        String::from_utf8(vessel(&["passable", &tube(), "--device", &wire(), "--to", "0"]).stdout).unwrap();
+        String::from_utf8(vessel(&["passable", &tube(), "--device", &wire(), "--to", "1"]).stdout).unwrap();
     assert!(lines.contains("narrowest") && lines.contains("sharpest bend"), "{lines}");
     let pictures = [&wire(), &thick].map(|device| {
         let path = folder.path().join("way.png");
-        passage(device, &["--to", "0", "--picture", text(&path)]);
+        passage(device, &["--to", "1", "--picture", text(&path)]);
         let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
         let mut reader = decoder.read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];

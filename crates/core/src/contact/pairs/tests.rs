@@ -145,7 +145,7 @@ fn a_linear_spring_is_a_couple_without_curvature() {
 
 #[test]
 fn no_pair_is_missed_by_a_search_in_two_parts() {
-    // Bodies of several tangles with the same sites: a coil, a crossing, and a coil wound to a coil.
+    // A coil, a crossing, and a coil that is wound to a coil.
     let wound = |a: f64| {
         let b = 22.0 * a;
         let out = 1.0 + 0.22 * b.cos();
@@ -156,14 +156,15 @@ fn no_pair_is_missed_by_a_search_in_two_parts() {
         let mut touching = contact(elements, 0.1);
         touching.look_at_base(elements, state);
         let near = touching.pairs.len();
-        // Without a limit on the distance, no descent ends early and no place is too far away.
+        // From twice as far as any site of a pair may be, without a limit at which a descent ends early.
+        let farthest_mm = 2.0 * gap::reach(KNOWN) * 0.2;
         let (mut every, curve) = (Vec::new(), touching.curve(elements, state));
         assert_eq!(touching.known, NEAR);
-        let from_nothing = SelfContact { known: 0.0, ..touching.clone() };
-        for a in 0..elements.len() {
-            for b in (0..elements.len()).filter(|b| *b != a) {
-                from_nothing.find_between(&curve, (a, b), 1e3, &mut every);
-            }
+        let (from_nothing, mut far) = (SelfContact { known: 0.0, ..touching.clone() }, Vec::new());
+        touching.tree.near(farthest_mm, touching.apart_mm(), |_, _| farthest_mm, &mut far);
+        for (a, b) in far {
+            from_nothing.find_between(&curve, (a, b), 1e3, &mut every);
+            from_nothing.find_between(&curve, (b, a), 1e3, &mut every);
         }
         every.retain(|pair| pair.gap.distance < KNOWN * pair.touch_mm);
         touching.know_pairs_within(elements, 1e3);
