@@ -306,11 +306,11 @@ fn a_surface_is_dropped_and_entered_and_what_is_none_is_told_in_the_cores_words(
     let tube = "await (await fetch('assets/vessels/curved_tube.stl')).arrayBuffer()";
     drop_file(&mut browser, "tube.stl", tube);
     browser.wait("document.querySelectorAll('.picture button').length === 2");
-    assert_eq!(browser.eval("document.getElementById('opening').textContent"), "1");
-    browser.eval(
-        "[...document.querySelectorAll('.picture button')].find((one) => one.textContent === '0').click()",
-    );
     assert_eq!(browser.eval("document.getElementById('opening').textContent"), "0");
+    browser.eval(
+        "[...document.querySelectorAll('.picture button')].find((one) => one.textContent === '1').click()",
+    );
+    assert_eq!(browser.eval("document.getElementById('opening').textContent"), "1");
     browser.eval("document.getElementById('vessel-go').click()");
     browser.wait("!document.querySelector('dialog[open]') && document.title === 'endowire: own'");
     drop_file(&mut browser, "broken.stl", &format!("({tube}).slice(0, 200)"));

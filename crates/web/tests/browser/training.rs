@@ -94,7 +94,7 @@ fn a_subject_is_read_done_by_hand_scored_and_saved() {
     };
     assert_eq!(text(&mut browser, "task-name"), "A wire through a straight tube (level 1)");
     assert!(text(&mut browser, "task-text").contains("Counts:"));
-    assert_eq!(text(&mut browser, "task-goal"), "tip within 8 mm of opening 0");
+    assert_eq!(text(&mut browser, "task-goal"), "tip within 8 mm of opening 1");
     assert_eq!(text(&mut browser, "task-limits"), "time 60 s, beam 60 s, wall force 0.2 N");
     assert_eq!(browser.eval("document.querySelectorAll('#task-counts tbody tr').length"), 4);
     // Time stands still while it is read, and pictures go on.
@@ -104,7 +104,7 @@ fn a_subject_is_read_done_by_hand_scored_and_saved() {
     assert_eq!(browser.eval(time_s), 0.0);
     browser.eval("document.getElementById('task-go').click()");
     browser.wait("(async () => (await import('./screen.js')).readout.time_s > 0.2)()");
-    assert!(text(&mut browser, "to-go").starts_with("to opening 0: "));
+    assert!(text(&mut browser, "to-go").starts_with("to opening 1: "));
     assert_eq!(browser.eval("document.querySelectorAll('#used .used').length"), 3);
     browser.key("Enter", true);
     browser.key("Enter", false);
@@ -158,7 +158,7 @@ fn a_subject_is_shown_by_its_reference_and_one_that_does_not_fit_is_told() {
     crate::drop_file(
         &mut browser,
         "own.toml",
-        "(await (await fetch('assets/subjects/straight_tube.toml')).text()).replace('opening 0', 'opening 7')",
+        "(await (await fetch('assets/subjects/straight_tube.toml')).text()).replace('opening 1', 'opening 7')",
     );
     browser.wait("document.getElementById('told').textContent.includes('goal.target = \"opening 7\"')");
     assert!(browser.console.is_empty(), "{:?}", browser.console);

@@ -145,13 +145,13 @@ fn a_linear_spring_is_a_couple_without_curvature() {
 
 #[test]
 fn no_pair_is_missed_by_a_search_in_two_parts() {
-    // A coil, a crossing, and a coil that is wound to a coil.
+    // A coil, a crossing, and a coil that is wound to a coil; none bends as sharply as pairs are apart.
     let wound = |a: f64| {
-        let b = 22.0 * a;
-        let out = 1.0 + 0.22 * b.cos();
-        Vec3::new(out * a.cos(), out * a.sin(), 0.22 * b.sin() + 0.02 * a)
+        let b = 24.0 * a;
+        let out = 1.5 + 0.45 * b.cos();
+        Vec3::new(out * a.cos(), out * a.sin(), 0.45 * b.sin() + 0.02 * a)
     };
-    let rods = [along(coil(0.5, 0.17), 26.0, 90), along(loop_over(0.1), 5.0, 30), along(wound, 6.0, 260)];
+    let rods = [along(coil(0.5, 0.17), 26.0, 90), along(loop_over(0.1), 5.0, 30), along(wound, 6.0, 520)];
     for (elements, state) in &rods {
         let mut touching = contact(elements, 0.1);
         touching.look_at_base(elements, state);
