@@ -42,8 +42,7 @@ pub struct Lab {
     /// Dose in earlier configurations, and the number of ticks with the beam on in the current one.
     dose: Dose,
     room_ticks: u64,
-    /// Exposure of a frame in this configuration, once one is drawn, and the last one of any.
-    delivered: Option<Delivered>,
+    /// Exposure of the last frame, which may be of an earlier configuration.
     last_delivered: Option<Delivered>,
 }
 
@@ -101,7 +100,6 @@ impl Lab {
             beam_ticks: 0,
             dose: Dose::default(),
             room_ticks: 0,
-            delivered: None,
             last_delivered: None,
         };
         lab.fluoro.planes().iter().try_for_each(ViewSpec::validate)?;
@@ -150,12 +148,12 @@ impl Lab {
 
     /// Peak voltage, kV: that of the scene until exposure control has chosen one.
     pub fn kvp(&self) -> f64 {
-        self.delivered.map_or(self.fluoro.xray.kvp, |frame| frame.kvp)
+        self.delivered().map_or(self.fluoro.xray.kvp, |frame| frame.kvp)
     }
 
     /// Current in a pulse, mA.
     pub fn current_ma(&self) -> Option<f64> {
-        self.delivered.and_then(|frame| frame.current_ma)
+        self.delivered().and_then(|frame| frame.current_ma)
     }
 
     /// State of the beam from `time_s` on, for assessment.
@@ -196,13 +194,18 @@ impl Lab {
             let plane_ngy = spec.detector.dose_ngy.unwrap_or_else(|| spec.xray.mode.dose_ngy());
             plane_ngy * spec.planes().len() as f64
         };
-        self.delivered.map_or_else(wanted_ngy, |frame| frame.frame_ngy)
+        self.delivered().map_or_else(wanted_ngy, |frame| frame.frame_ngy)
+    }
+
+    /// Exposure of a frame in this configuration, once one is drawn.
+    fn delivered(&self) -> Option<Delivered> {
+        self.last_delivered.filter(|frame| frame.revision == self.revisions[0])
     }
 
     /// Stores the exposure of a frame, if the frame was made in the current configuration.
     pub(crate) fn exposed(&mut self, delivered: Delivered) {
         if delivered.revision == self.revisions[0] {
-            (self.delivered, self.last_delivered) = (Some(delivered), Some(delivered));
+            self.last_delivered = Some(delivered);
         }
     }
 
@@ -385,7 +388,7 @@ impl Lab {
         with(&mut spec);
         spec.planes().iter().try_for_each(ViewSpec::validate)?;
         self.dose = self.dose + self.room_dose();
-        (self.room_ticks, self.delivered) = (0, None);
+        self.room_ticks = 0;
         self.fluoro = spec;
         self.revisions[0] += 1;
         Ok(())

@@ -66,9 +66,9 @@ impl Renderer {
         Self::of_setup(Setup::new(spec, wall)?)
     }
 
-    /// As [`Self::new`], for a wall with openings: the 3D view shows them closed, and in the beam contrast
-    /// medium fades beyond them, as if vessels continued into invisibly fine branches. Contrast medium flows along a centre line computed
-    /// from the wall if `spec` has none.
+    /// As [`Self::new`], for a wall with openings: the 3D view shows them closed, and in the beam contrast medium
+    /// fades beyond them, as if vessels continued into invisibly fine branches. Contrast medium flows along a centre
+    /// line computed from the wall if `spec` has none.
     ///
     /// # Errors
     /// As [`Self::new`], and a wall from which no centre line can be computed if one is needed.

@@ -53,7 +53,11 @@ impl Setup {
         };
         self.moved = displacement.map(|displacement| {
             let wall = Arc::new(moved(&self.wall, displacement));
-            let filled = Arc::new(self.filled.moved(|v| displacement.place(v)));
+            let surface = match Arc::ptr_eq(&self.wall, &self.filled.surface) {
+                true => Arc::clone(&wall),
+                false => Arc::new(moved(&self.filled.surface, displacement)),
+            };
+            let filled = Arc::new(Filled { surface, faded: moved(&self.filled.faded, displacement) });
             let air = self.patient.air().map(|air| moved(air, displacement));
             Arc::new(Moved { displacement: displacement.clone(), wall, filled, air })
         });
@@ -84,8 +88,9 @@ impl Setup {
 
     /// A set-up with a closed wall, filled with blood to its ends.
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
-        let filled = Filled { surface: wall.clone(), ..Filled::default() };
-        Self::filled(spec, Arc::new(wall.clone()), Arc::new(filled))
+        let wall = Arc::new(wall.clone());
+        let filled = Filled { surface: Arc::clone(&wall), ..Filled::default() };
+        Self::filled(spec, wall, Arc::new(filled))
     }
 
     /// A set-up with a closed wall and a given blood-filled lumen.

@@ -4,6 +4,8 @@
 //! branches too fine to be seen. So a vessel continues straight beyond its openings, and contrast medium fades along
 //! this tail: filled up to a flat end it would look sawn off, filled up to a tip like a sharpened pencil.
 
+use std::sync::Arc;
+
 use endowire_core::Vec3;
 use endowire_core::vessel::{Opening, SurfaceMesh, Wall};
 
@@ -34,7 +36,7 @@ fn part_with(share: f64) -> f64 {
 #[derive(Debug, Default)]
 pub(crate) struct Filled {
     /// The closed surface of a wall with tails at its openings.
-    pub(crate) surface: SurfaceMesh,
+    pub(crate) surface: Arc<SurfaceMesh>,
     /// The tails from each of their rings on: a ray's length in all of these together is [`Filled::DEPTH`] times the
     /// length that medium seems to lack.
     pub(crate) faded: SurfaceMesh,
@@ -46,47 +48,38 @@ impl Filled {
 
     /// The lumen of a wall with tails.
     pub(crate) fn with_tails(wall: &Wall) -> Self {
-        let mut filled = Self { surface: wall.mesh().clone(), faded: SurfaceMesh::default() };
-        wall.openings().iter().for_each(|opening| filled.add_tail(opening));
-        filled
+        let (mut surface, mut faded) = (wall.mesh().clone(), SurfaceMesh::default());
+        wall.openings().iter().for_each(|opening| add_tail(&mut surface, &mut faded, opening));
+        Self { surface: Arc::new(surface), faded }
     }
+}
 
-    /// This displaced.
-    pub(crate) fn moved(&self, place: impl Fn(&Vec3) -> Vec3) -> Self {
-        let [surface, faded] = [&self.surface, &self.faded].map(|mesh| SurfaceMesh {
-            vertices_mm: mesh.vertices_mm.iter().map(&place).collect(),
-            triangles: mesh.triangles.clone(),
-        });
-        Self { surface, faded }
+fn add_tail(surface: &mut SurfaceMesh, faded: &mut SurfaceMesh, opening: &Opening) {
+    let length_mm = fade_mm(opening.radius_mm);
+    let rim: Vec<Vec3> = opening.boundary.iter().map(|&v| surface.vertices_mm[v as usize]).collect();
+    let mut last = opening.boundary.clone();
+    let mut last_faded = vec![];
+    for ring in 0..RINGS {
+        let part = part_with(1.0 - (f64::from(ring) + 0.5) / f64::from(RINGS));
+        let middle = opening.centre_mm + opening.direction * (part * length_mm);
+        // Slowly narrower at first, as arteries are.
+        let scale = libm::sqrt(libm::cos(part * std::f64::consts::FRAC_PI_2));
+        let places: Vec<Vec3> = rim.iter().map(|v| middle + (v - opening.centre_mm) * scale).collect();
+        let next = add_points(surface, &places);
+        join(surface, &last, &next, 1);
+        last = next;
+        let next = add_points(faded, &places);
+        join(faded, &last_faded, &next, ring);
+        let middle = add_points(faded, &[middle])[0];
+        // Towards the vessel.
+        close(faded, &next, middle, [1, 0]);
+        last_faded = next;
     }
-
-    fn add_tail(&mut self, opening: &Opening) {
-        let length_mm = fade_mm(opening.radius_mm);
-        let rim: Vec<Vec3> = opening.boundary.iter().map(|&v| self.surface.vertices_mm[v as usize]).collect();
-        let mut last = opening.boundary.clone();
-        let mut last_faded = vec![];
-        for ring in 0..RINGS {
-            let part = part_with(1.0 - (f64::from(ring) + 0.5) / f64::from(RINGS));
-            let middle = opening.centre_mm + opening.direction * (part * length_mm);
-            // Slowly narrower at first, as arteries are.
-            let scale = libm::sqrt(libm::cos(part * std::f64::consts::FRAC_PI_2));
-            let places: Vec<Vec3> = rim.iter().map(|v| middle + (v - opening.centre_mm) * scale).collect();
-            let next = add_points(&mut self.surface, &places);
-            join(&mut self.surface, &last, &next, 1);
-            last = next;
-            let next = add_points(&mut self.faded, &places);
-            join(&mut self.faded, &last_faded, &next, ring);
-            let middle = add_points(&mut self.faded, &[middle])[0];
-            // Towards the vessel.
-            close(&mut self.faded, &next, middle, [1, 0]);
-            last_faded = next;
-        }
-        let tip = [opening.centre_mm + opening.direction * length_mm];
-        let point = add_points(&mut self.surface, &tip)[0];
-        close(&mut self.surface, &last, point, [0, 1]);
-        let point = add_points(&mut self.faded, &tip)[0];
-        (0..RINGS).for_each(|_| close(&mut self.faded, &last_faded, point, [0, 1]));
-    }
+    let tip = [opening.centre_mm + opening.direction * length_mm];
+    let point = add_points(surface, &tip)[0];
+    close(surface, &last, point, [0, 1]);
+    let point = add_points(faded, &tip)[0];
+    (0..RINGS).for_each(|_| close(faded, &last_faded, point, [0, 1]));
 }
 
 fn add_points(mesh: &mut SurfaceMesh, places_mm: &[Vec3]) -> Vec<u32> {

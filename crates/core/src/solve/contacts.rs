@@ -67,10 +67,10 @@ pub(crate) fn falls_until(mut slope: impl FnMut(f64) -> f64) -> f64 {
 }
 
 /// The rod's motion in a step from a state.
-pub(crate) struct StepOf<'a, const C: usize> {
-    pub(crate) elements: &'a [ElementData],
-    pub(crate) state: &'a RodState,
-    pub(crate) step: &'a [f64],
+struct StepOf<'a, const C: usize> {
+    elements: &'a [ElementData],
+    state: &'a RodState,
+    step: &'a [f64],
 }
 
 impl<const C: usize> Moved for StepOf<'_, C> {

@@ -278,11 +278,13 @@ fn arrange(order: &mut [usize], openings: &[Opening], key: usize) {
 
 /// Sets the indices of openings.
 pub(super) fn number(openings: &mut Vec<Opening>) {
-    let order = in_order(openings);
-    *openings = order.iter().map(|index| openings[*index].clone()).collect();
-    for (index, opening) in openings.iter_mut().enumerate() {
-        opening.index = index;
-    }
+    *openings = numbered(openings, &in_order(openings));
+}
+
+/// The openings in this order, with their indices.
+fn numbered(openings: &[Opening], order: &[usize]) -> Vec<Opening> {
+    let numbers = order.iter().enumerate();
+    numbers.map(|(index, number)| Opening { index, ..openings[*number].clone() }).collect()
 }
 
 /// Boundary loops of a consistently oriented mesh.
@@ -292,6 +294,8 @@ pub(crate) struct Boundary {
     pub(crate) openings: Vec<Opening>,
     /// For each opening the triangle with its first edge.
     pub(crate) first_triangle: Vec<u32>,
+    /// The triangle across each side of each; empty without open edges.
+    pub(super) across: Vec<[u32; 3]>,
     /// Open edges that form no loop, because they end at a non-manifold edge.
     pub(crate) stray_edges: usize,
 }
@@ -345,9 +349,7 @@ pub(crate) fn boundary(mesh: &SurfaceMesh, table: &EdgeTable) -> Boundary {
     let (found, first): (Vec<Opening>, Vec<u32>) = loops.into_iter().unzip();
     let order = in_order(&found);
     let first_triangle = order.iter().map(|k| first[*k]).collect();
-    let mut openings = found;
-    number(&mut openings);
-    Boundary { openings, first_triangle, stray_edges }
+    Boundary { openings: numbered(&found, &order), first_triangle, across, stray_edges }
 }
 
 /// Splits a closed walk at vertices it passes more than once.

@@ -217,8 +217,7 @@ impl Wall {
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
         let rims_mm: Vec<f64> = boundary.openings.iter().map(|opening| opening.rim_mm(&mesh)).collect();
-        let across = table.neighbours(mesh.triangles.len());
-        let ends = Ends::new(&mesh, &across, &boundary.openings);
+        let ends = Ends::new(&mesh, &boundary.across, &boundary.openings);
         let see = |number: usize, opening: &Opening, see: &mut dyn FnMut(Vec3, bool)| {
             ends.sample(number, opening, see);
         };

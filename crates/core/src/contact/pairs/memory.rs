@@ -115,8 +115,7 @@ impl SelfContact {
 
     /// Before a trial at which points have moved by this much from the base, finds the pairs that may touch there.
     pub(super) fn know_pairs_within(&mut self, elements: &[ElementData], motion_mm: f64) {
-        let thinnest = self.skins.iter().map(|skin| skin.radius_mm).filter(|radius_mm| *radius_mm > 0.0);
-        let touch_mm = 2.0 * thinnest.fold(f64::INFINITY, f64::min);
+        let touch_mm = 2.0 * self.thinnest_radius_mm;
         // Pairs not yet found are `known` touching distances apart, and come nearer by that motion.
         if self.known < KNOWN && motion_mm > (self.known - 1.0) * touch_mm {
             let base = std::mem::take(&mut self.base);

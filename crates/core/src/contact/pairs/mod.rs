@@ -158,6 +158,8 @@ pub struct SelfContact {
     /// Site positions at the base.
     site_positions: Vec<Vec3>,
     largest_radius_mm: f64,
+    /// Smallest radius of a rod; infinite if there is none.
+    thinnest_radius_mm: f64,
     /// Whether the rod's end is its start.
     closed: bool,
     tree: Tree,
@@ -211,7 +213,10 @@ impl SelfContact {
             sites.extend((0..count as usize).map(site));
             first_sites.push(sites.len());
         }
-        self.largest_radius_mm = known.iter().map(|skin| skin.radius_mm).fold(0.0, f64::max);
+        let radii_mm = || known.iter().map(|skin| skin.radius_mm);
+        self.largest_radius_mm = radii_mm().fold(0.0, f64::max);
+        self.thinnest_radius_mm =
+            radii_mm().filter(|radius_mm| *radius_mm > 0.0).fold(f64::INFINITY, f64::min);
         self.pairs.clear();
         self.before.clear();
         self.aimed = false;
