@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use endowire_core::Vec3;
-use endowire_viewer::{Backend, Renderer};
+use endowire_viewer::{Backend, DevicePart, Material, Renderer};
 
 /// Share of the radius from the axis within which a path counts as away from the silhouette.
 const INNER: f64 = 0.95;
@@ -68,6 +68,61 @@ fn a_device_is_an_exact_cylinder() {
         assert_eq!(maps.len(), 1);
         let (error, count) = worst(&renderer, &maps[0].1, radius, |ray| cylinder_chord(radius, ray));
         assert!(count > 2_000 && error < 1e-3, "{}: {error} over {count}", renderer.backend());
+    }
+}
+
+#[test]
+fn a_wire_seen_along_its_axis_has_its_volume_in_pictures_of_any_size() {
+    let (radius, long) = (0.178, 60.0);
+    let volume = std::f64::consts::PI * radius * radius * long;
+    let along = |off: Vec3, turn: f64| {
+        let (s, c) = turn.sin_cos();
+        device(31, radius, move |w| off + Vec3::new(0.0, c, s) * (long * (w - 0.5)))
+    };
+    let off = Vec3::new(0.37, 0.0, -0.21);
+    // The wire, one that is oblique by 1.5 degrees, and a catheter.
+    let mut hollow = along(off, 0.0);
+    hollow.parts = vec![DevicePart {
+        material: Some(Material::Steel316L),
+        outer_radius_mm: Some(0.45),
+        inner_radius_mm: 0.25,
+        ..DevicePart::default()
+    }];
+    let tube = volume * (0.45f64.powi(2) - 0.25f64.powi(2)) / radius.powi(2);
+    let cases = [(along(off, 0.0), volume), (along(off, 1.5f64.to_radians()), volume), (hollow, tube)];
+    for size in [64, 128, 200, 300, 512, 1000, 2000] {
+        let mut view = spec(Backend::Cpu, size, 120.0 / f64::from(size));
+        (view.c_arm.sid_mm, view.c_arm.sod_mm) = (100_000.0, 99_000.0);
+        for mut renderer in engines(&view, &sphere(40.0, 24, Vec3::zeros())) {
+            let per_mm = {
+                let arm = renderer.c_arm().unwrap();
+                arm.project(&Vec3::x())[0] - arm.project(&Vec3::zeros())[0]
+            };
+            for (number, (device, volume)) in cases.iter().enumerate() {
+                let paths = renderer.path_lengths(std::slice::from_ref(device)).unwrap();
+                let sum = paths.devices_mm[0].1.iter().map(|length| f64::from(*length)).sum::<f64>();
+                let ratio = sum / (per_mm * per_mm) / volume;
+                assert!((ratio - 1.0).abs() < 0.01, "{}: {size} {number}: {ratio}", renderer.backend());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wire_seen_end_on_at_the_border_is_cut_there() {
+    // Half of a wire that is as long as it is seen: what is beyond the border does not come back within it.
+    let radius = 0.178;
+    let mut view = spec(Backend::Cpu, 64, 1.0);
+    (view.c_arm.sid_mm, view.c_arm.sod_mm) = (100_000.0, 99_000.0);
+    for mut renderer in engines(&view, &sphere(20.0, 24, Vec3::zeros())) {
+        let arm = renderer.c_arm().unwrap();
+        let per_mm = arm.project(&Vec3::x())[0] - arm.project(&Vec3::zeros())[0];
+        let border_mm = 32.0 / per_mm;
+        let wire = device(9, radius, |w| Vec3::new(border_mm, 20.0 * (w - 0.5), 0.4));
+        let paths = renderer.path_lengths(std::slice::from_ref(&wire)).unwrap();
+        let sum = paths.devices_mm[0].1.iter().map(|length| f64::from(*length)).sum::<f64>();
+        let half = sum / (per_mm * per_mm) / (std::f64::consts::PI * radius * radius * 20.0);
+        assert!((half - 0.5).abs() < 0.05, "{}: {half}", renderer.backend());
     }
 }
 

@@ -11,6 +11,16 @@
 //!
 //! For a mitred or tapering piece, the length in the middle of the covered part of the cell is used, scaled by that
 //! integral for a cylinder: the sum over a row is its area wherever the wire lies between pixels.
+//!
+//! Seen end on, a piece is a spot that may be smaller than a cell. Rays a quarter of its radius apart tell how it is
+//! distributed over cells, and its volume V what the sum over all cells is: a ray is o = √(1 + x² + y²) times as long as it is
+//! deep, and a square millimetre at the depth z has (f/z)² cells, with f from source to detector in cells, so
+//!
+//! ```text
+//! Σ lengths = ∫ o (f/z)² dV ≈ o f² V/(z₀ z₁)
+//! ```
+//!
+//! with the depths z₀ and z₁ of its ends.
 
 use endowire_core::Vec3;
 
@@ -29,6 +39,11 @@ const NARROW: f64 = 0.1;
 /// Sine of the smallest angle between ray and axis at which a piece is integrated across: end on, its length matters,
 /// not its width.
 const LEAST_SINE: f64 = 0.3;
+/// Spacing of rays through a piece seen end on, in radii, and number of lines of them along it that are enough.
+const RAYS_END_ON: (f64, f64) = (0.25, 16.0);
+/// Ratio of the radius of a piece seen end on to a cell's width above which the lengths at the middles of cells sum up to its
+/// volume within a hundredth.
+const FINE: f64 = 16.0;
 
 /// The cells of the pixels touched by devices, by material.
 #[derive(Debug)]
@@ -119,31 +134,68 @@ pub(crate) fn quarter(cell: usize) -> usize {
     cell / across / half * 2 + cell % across / half
 }
 
-/// Calls `visit(cell, length_mm)` for every cell of `view` in which `piece` is visible.
-fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
-    let size = view.size_px();
-    let reach = piece.reach();
-    let near = view.sod_mm() + piece.start.z.min(piece.end.z) - reach;
-    let ends = [&piece.start, &piece.end].map(|at| view.pixel_of(at));
-    // A piece that reaches behind the source may be visible anywhere.
-    let outer = if near > 0.0 { 1.05 * reach * view.focal_px() / near } else { f64::INFINITY };
-    let run = [0, 1].map(|k| (ends[1][k] - ends[0][k]).abs());
-    // Lines are rows where the piece is vertical in the image, otherwise columns; cells of a line are counted along
-    // `u`.
-    let (u, v) = if run[1] >= run[0] { (0, 1) } else { (1, 0) };
-    let (low, high) = (ends[0][v].min(ends[1][v]), ends[0][v].max(ends[1][v]));
-    let mean_radius = piece.radius + 0.5 * piece.slope * (piece.end - piece.start).norm();
-    for line in span(low - outer, high + outer, size[v]) {
-        let across = line as f64 + 0.5;
+/// Where a piece is in the image, in lines of cells: rows where it is vertical, otherwise columns.
+struct Band {
+    /// Projected centres of its ends.
+    ends: [[f64; 2]; 2],
+    /// Distance from them beyond which it is not visible; infinite for a piece that reaches behind the source.
+    outer: f64,
+    /// The coordinate along lines, and the one across them.
+    u: usize,
+    v: usize,
+}
+
+impl Band {
+    fn new(view: &CArm, piece: &Piece) -> Self {
+        let reach = piece.reach();
+        let near = view.sod_mm() + piece.start.z.min(piece.end.z) - reach;
+        let ends = [&piece.start, &piece.end].map(|at| view.pixel_of(at));
+        let outer = if near > 0.0 { 1.05 * reach * view.focal_px() / near } else { f64::INFINITY };
+        let run = [0, 1].map(|k| (ends[1][k] - ends[0][k]).abs());
+        let (u, v) = if run[1] >= run[0] { (0, 1) } else { (1, 0) };
+        Self { ends, outer, u, v }
+    }
+
+    /// The first and the last position across lines at which it may be visible.
+    fn lines(&self) -> [f64; 2] {
+        let [a, b] = self.ends.map(|end| end[self.v]);
+        [a.min(b) - self.outer, a.max(b) + self.outer]
+    }
+
+    /// The same along the line at a position across them.
+    fn along(&self, across: f64) -> [f64; 2] {
+        let Self { ends, u, v, .. } = *self;
         let part = ((across - ends[0][v]) / (ends[1][v] - ends[0][v])).clamp(0.0, 1.0);
         let middle = if part.is_nan() { ends[0][u] } else { ends[0][u] + part * (ends[1][u] - ends[0][u]) };
         // Lines meet the piece at 45° or more.
-        let reach = 1.5 * outer + 1.0;
-        let cells = span(middle - reach, middle + reach, size[u]);
+        let reach = 1.5 * self.outer + 1.0;
+        [middle - reach, middle + reach]
+    }
+
+    /// A position from those along and across lines.
+    fn place(&self, along: f64, across: f64) -> [f64; 2] {
+        if self.u == 0 { [along, across] } else { [across, along] }
+    }
+}
+
+/// Calls `visit(cell, length_mm)` for every cell of `view` in which `piece` is visible, possibly with several parts
+/// of its length.
+fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
+    let size = view.size_px();
+    let band = Band::new(view, piece);
+    if let Some(end_on) = EndOn::new(view, piece, &band) {
+        return end_on.cast(view, piece, &band, visit);
+    }
+    let [low, high] = band.lines();
+    let mean_radius = mean_radius(piece);
+    for line in span(low, high, size[band.v]) {
+        let across = line as f64 + 0.5;
+        let [first, last] = band.along(across);
+        let cells = span(first, last, size[band.u]);
         if cells.is_empty() {
             continue;
         }
-        let place = |along: f64| if u == 0 { [along, across] } else { [across, along] };
+        let place = |along: f64| band.place(along, across);
         let first = cells.start as f64;
         let (from, sine) = off_axis(view, piece, place(first));
         let (to, _) = off_axis(view, piece, place(cells.end as f64));
@@ -159,8 +211,71 @@ fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
                 })
             };
             if length > 0.0 {
-                visit(if u == 0 { [cell, line] } else { [line, cell] }, length);
+                visit(if band.u == 0 { [cell, line] } else { [line, cell] }, length);
             }
+        }
+    }
+}
+
+fn mean_radius(piece: &Piece) -> f64 {
+    piece.radius + 0.5 * piece.slope * (piece.end - piece.start).norm()
+}
+
+/// A piece seen end on, in cells not much narrower than it is: rays through their middles would miss it or meet it too often.
+struct EndOn {
+    /// Its radius in cells.
+    radius: f64,
+    /// Sum of the mean lengths of all cells, also of those beyond the border, mm: its volume, projected.
+    sum_mm: f64,
+}
+
+impl EndOn {
+    /// `None` for a piece that is not.
+    fn new(view: &CArm, piece: &Piece, band: &Band) -> Option<Self> {
+        let middle = [0, 1].map(|k| 0.5 * (band.ends[0][k] + band.ends[1][k]));
+        let depths = [&piece.start, &piece.end].map(|end| view.sod_mm() + end.z);
+        // Square of the number of cells per mm; along the axis this product is its mean.
+        let scale = view.focal_px().powi(2) / (depths[0] * depths[1]);
+        let radius = mean_radius(piece) * scale.sqrt();
+        let coarse = radius > 0.0 && radius < FINE && band.outer.is_finite();
+        if !coarse || off_axis(view, piece, middle).1 >= LEAST_SINE {
+            return None;
+        }
+        let length_mm = (piece.end - piece.start).norm();
+        let [first, last] = [piece.radius, piece.radius + piece.slope * length_mm];
+        let volume_mm3 =
+            std::f64::consts::PI / 3.0 * length_mm * (first * first + first * last + last * last);
+        let [x, y] = view.slopes(middle);
+        Some(Self { radius, sum_mm: volume_mm3 * scale * (1.0 + x * x + y * y).sqrt() })
+    }
+
+    /// As [`cast`], with the lengths of rays that are denser than the cells, scaled to the right sum.
+    fn cast(&self, view: &CArm, piece: &Piece, band: &Band, mut visit: impl FnMut([usize; 2], f64)) {
+        let size = view.size_px().map(f64::from);
+        let [low, high] = band.lines();
+        let (share, fewest) = RAYS_END_ON;
+        let spacing = share * self.radius;
+        let length = high - low - 2.0 * (band.outer - self.radius);
+        // Numbers of rays across a cell.
+        let rays = (1.0 / spacing).ceil();
+        let lines = (1.0 / spacing.max(length / fewest)).ceil();
+        let numbers =
+            |[from, to]: [f64; 2], each: f64| (from * each).floor() as i64..(to * each).ceil() as i64;
+        let mut met: Vec<([f64; 2], f64)> = Vec::new();
+        for line in numbers([low, high], lines) {
+            let across = (line as f64 + 0.5) / lines;
+            for ray in numbers(band.along(across), rays) {
+                let at = band.place((ray as f64 + 0.5) / rays, across);
+                let length = self::length(view, piece, at);
+                if length > 0.0 {
+                    met.push((at, length));
+                }
+            }
+        }
+        let each = self.sum_mm / met.iter().map(|ray| ray.1).sum::<f64>();
+        let seen = |at: &[f64; 2]| (0..2).all(|k| (0.0..size[k]).contains(&at[k]));
+        for (at, length) in met.into_iter().filter(|(at, _)| seen(at)) {
+            visit(at.map(|x| x as usize), each * length);
         }
     }
 }
