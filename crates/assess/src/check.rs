@@ -1,9 +1,16 @@
 //! What a record may say. Every reader of records checks them here, so measures need no checks of their own.
 
+use endowire_core::device::Stack;
+use endowire_core::error::{nearest_name, number};
 use endowire_core::{Error, Result, Vec3};
 
-use crate::injection::Injection;
-use crate::record::{BeamState, Hand, Sample};
+use crate::record::{BeamState, Hand, Packed, Record, Sample};
+
+/// Largest coordinate of a place, mm, as of a centre line; and largest size of any other value.
+const FARTHEST_MM: f64 = 1e6;
+const LARGEST: f64 = 1e12;
+/// Lengths that differ by less count as equal, mm.
+const SLACK_MM: f64 = 1e-6;
 
 /// Requirements of a value, and the words for them.
 enum Must {
@@ -17,7 +24,7 @@ enum Must {
 
 impl Must {
     fn holds(&self, value: f64) -> bool {
-        value.is_finite()
+        value.abs() <= LARGEST
             && match self {
                 Self::BeNumber => true,
                 Self::NotBeBelowZero => value >= 0.0,
@@ -41,71 +48,116 @@ type Asked = (&'static str, f64, Must);
 fn values(entry: &str, asked: impl IntoIterator<Item = Asked>) -> Result<()> {
     match asked.into_iter().find(|(_, value, must)| !must.holds(*value)) {
         None => Ok(()),
-        Some((key, value, must)) => Err(Error::parameter(format!("{entry}.{key}"), value, must.words())),
-    }
-}
-
-fn place(entry: &str, key: &str, place: Option<Vec3>) -> Result<()> {
-    match place.filter(|place| !place.iter().all(|value| value.is_finite())) {
-        None => Ok(()),
-        Some(place) => {
-            let value = format!("[{}, {}, {}]", place.x, place.y, place.z);
-            Err(Error::parameter(format!("{entry}.{key}"), value, "must be three finite numbers"))
+        Some((key, value, must)) => {
+            let mend = format!("{}, and at most {LARGEST:e} in size", must.words());
+            Err(Error::parameter(format!("{entry}.{key}"), value, mend))
         }
     }
 }
 
-/// Checks that times do not go back; `list` is the name of their entries.
-fn forward(list: &str, times_s: impl Iterator<Item = f64>) -> Result<()> {
+fn place(entry: &str, key: &str, place: Option<Vec3>) -> Result<()> {
+    let is_there = |value: &f64| value.abs() <= FARTHEST_MM;
+    match place.filter(|place| !place.iter().all(is_there)) {
+        None => Ok(()),
+        Some(place) => {
+            let value = format!("[{}, {}, {}]", number(place.x), number(place.y), number(place.z));
+            let mend = format!("must be three finite numbers, from -{FARTHEST_MM} to {FARTHEST_MM}");
+            Err(Error::parameter(format!("{entry}.{key}"), value, mend))
+        }
+    }
+}
+
+/// Checks that times do not go back; `list` is the name of their entries, which are given by their numbers.
+pub(crate) fn forward(list: &str, times_s: impl Iterator<Item = (usize, f64)>) -> Result<()> {
     let mut before_s = 0.0;
-    for (index, time_s) in times_s.enumerate() {
+    for (number, time_s) in times_s {
         if time_s < before_s {
             let mend = format!(
                 "comes after {before_s}: put {list} in order of time, or leave out what is not of this session"
             );
-            return Err(Error::parameter(format!("{list}[{index}].time_s"), time_s, mend));
+            return Err(Error::parameter(format!("{list}[{number}].time_s"), time_s, mend));
         }
         before_s = time_s;
     }
     Ok(())
 }
 
-/// Checks steps.
-pub(crate) fn samples(samples: &[Sample]) -> Result<()> {
-    for (index, sample) in samples.iter().enumerate() {
-        let entry = format!("samples[{index}]");
-        values(
-            &entry,
-            [
-                ("time_s", sample.time_s, Must::NotBeBelowZero),
-                ("wall_force_n", sample.wall_force_n, Must::NotBeBelowZero),
-                ("tip_force_n", sample.tip_force_n, Must::NotBeBelowZero),
-            ],
-        )?;
-        place(&entry, "tip_mm", sample.tip_mm)?;
-        place(&entry, "tip_at_rest_mm", sample.tip_at_rest_mm)?;
-        if let Some(packed) = sample.packing {
-            let packing = [
-                ("density", packed.density, Must::NotBeBelowZero),
-                ("outside_mm", packed.outside_mm, Must::NotBeBelowZero),
-            ];
-            values(&format!("{entry}.packing"), packing)?;
+/// Checks that a list of names contains a name.
+fn named(key: String, name: &str, names: &[String]) -> Result<()> {
+    if names.iter().any(|one| one == name) {
+        return Ok(());
+    }
+    let nearest = nearest_name(names.iter().map(String::as_str), name).unwrap_or_default();
+    let mend =
+        format!("is no instrument of the record, which has {}; did you mean {nearest:?}?", names.join(", "));
+    Err(Error::parameter(key, format!("{name:?}"), mend))
+}
+
+/// Checks the steps of a session, each with a hand for every instrument. A record that names none is of one device.
+pub(crate) fn samples(record: &Record) -> Result<()> {
+    let Record { instruments, samples, .. } = record;
+    if samples.is_empty() {
+        let mend = "nothing was recorded: give a session in which time went by";
+        return Err(Error::parameter("samples", "[]", mend));
+    }
+    for (index, name) in instruments.iter().enumerate() {
+        if name.is_empty() || instruments[..index].contains(name) {
+            let mend = "each instrument has a name of its own";
+            return Err(Error::parameter(format!("instruments[{index}]"), format!("{name:?}"), mend));
         }
-        for (number, hand) in sample.hands.iter().enumerate() {
+    }
+    for (index, one) in samples.iter().enumerate() {
+        let entry = format!("samples[{index}]");
+        let hands = one.hands.len();
+        if hands != instruments.len().max(1) {
+            let named = if instruments.is_empty() { "no names".to_owned() } else { instruments.join(", ") };
+            let mend = format!("must be one for each of instruments, which has {named}");
+            return Err(Error::parameter(format!("{entry}.hands"), format!("{hands} hands"), mend));
+        }
+        sample(&entry, one)?;
+        one.packing.iter().try_for_each(|packed| self::packed(&entry, packed))?;
+        for (number, hand) in one.hands.iter().enumerate() {
             self::hand(&format!("{entry}.hands[{number}]"), hand)?;
         }
     }
-    forward("samples", samples.iter().map(|sample| sample.time_s))
+    forward("samples", samples.iter().map(|sample| sample.time_s).enumerate())
 }
 
-fn hand(entry: &str, hand: &Hand) -> Result<()> {
+/// Checks a step, apart from its hands and its packing.
+pub(crate) fn sample(entry: &str, sample: &Sample) -> Result<()> {
+    values(
+        entry,
+        [
+            ("time_s", sample.time_s, Must::NotBeBelowZero),
+            ("wall_force_n", sample.wall_force_n, Must::NotBeBelowZero),
+            ("tip_force_n", sample.tip_force_n, Must::NotBeBelowZero),
+        ],
+    )?;
+    place(entry, "tip_mm", sample.tip_mm)?;
+    place(entry, "tip_at_rest_mm", sample.tip_at_rest_mm)
+}
+
+/// Checks the packing of a step.
+pub(crate) fn packed(entry: &str, packed: &Packed) -> Result<()> {
+    let packing = [
+        ("density", packed.density, Must::NotBeBelowZero),
+        ("outside_mm", packed.outside_mm, Must::NotBeBelowZero),
+    ];
+    values(&format!("{entry}.packing"), packing)
+}
+
+/// Checks a hand.
+pub(crate) fn hand(entry: &str, hand: &Hand) -> Result<()> {
     let number = |key, value| (key, value, Must::BeNumber);
+    // Sums of advances are rounded.
+    let below = hand.inserted_mm < 0.0 && hand.inserted_mm > -SLACK_MM;
+    let inserted_mm = if below { 0.0 } else { hand.inserted_mm };
     values(
         entry,
         [
             number("advance_mm", hand.advance_mm),
             number("rotate_rad", hand.rotate_rad),
-            number("inserted_mm", hand.inserted_mm),
+            ("inserted_mm", inserted_mm, Must::NotBeBelowZero),
             number("push_force_n", hand.push_force_n.unwrap_or(0.0)),
             number("torque_nmm", hand.torque_nmm),
         ],
@@ -114,8 +166,9 @@ fn hand(entry: &str, hand: &Hand) -> Result<()> {
     place(entry, "tip_at_rest_mm", hand.tip_at_rest_mm)
 }
 
-/// Checks injections.
-pub(crate) fn injections(injections: &[Injection]) -> Result<()> {
+/// Checks injections; where the record names instruments, medium leaves one of them or the sheath.
+pub(crate) fn injections(record: &Record) -> Result<()> {
+    let Record { instruments, injections, .. } = record;
     for (index, one) in injections.iter().enumerate() {
         let entry = format!("injections[{index}]");
         values(
@@ -131,9 +184,42 @@ pub(crate) fn injections(injections: &[Injection]) -> Result<()> {
             place(&entry, "at_mm", Some(outlet.at_mm))?;
             let force_n = outlet.tip_force_n.unwrap_or(0.0);
             values(&entry, [("tip_force_n", force_n, Must::NotBeBelowZero)])?;
+            if let Some(name) = outlet.instrument.as_ref().filter(|_| !instruments.is_empty()) {
+                named(format!("{entry}.instrument"), name, instruments)?;
+            }
         }
     }
-    forward("injections", injections.iter().map(|one| one.time_s))
+    forward("injections", injections.iter().map(|one| one.time_s).enumerate())
+}
+
+/// Checks a record against the instruments of its scene: their names, and that no more of one is in than there is.
+pub(crate) fn in_scene(record: &Record, stack: &Stack) -> Result<()> {
+    let names: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
+    // Recordings of a single device need not name it.
+    let unnamed = record.instruments.is_empty() && !stack.is_several();
+    if record.instruments != names && !unnamed {
+        let mend = format!(
+            "the scene has [{}]: give the record of this scene (of a run, its folder with instruments.csv)",
+            names.join(", ")
+        );
+        return Err(Error::parameter("instruments", format!("[{}]", record.instruments.join(", ")), mend));
+    }
+    for (index, one) in record.injections.iter().enumerate() {
+        if let Some(name) = one.outlet.as_ref().and_then(|outlet| outlet.instrument.as_ref()) {
+            named(format!("injections[{index}].outlet.instrument"), name, &names)?;
+        }
+    }
+    for (index, sample) in record.samples.iter().enumerate() {
+        for (number, (hand, one)) in sample.hands.iter().zip(stack.instruments()).enumerate() {
+            let length_mm = one.device.length_mm();
+            if hand.inserted_mm > length_mm + SLACK_MM {
+                let name = format!("samples[{index}].hands[{number}].inserted_mm");
+                let mend = format!("{} is {length_mm} mm long: give the record of this scene", one.name);
+                return Err(Error::parameter(name, hand.inserted_mm, mend));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Checks a log of the beam. Without any state it says nothing about the beam, not that it was off.
@@ -155,5 +241,5 @@ pub(crate) fn beam(beam: &[BeamState]) -> Result<()> {
             ],
         )?;
     }
-    forward("beam", beam.iter().map(|state| state.time_s))
+    forward("beam", beam.iter().map(|state| state.time_s).enumerate())
 }

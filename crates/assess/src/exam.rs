@@ -106,11 +106,12 @@ impl Exam {
     /// Starts a subject at a site.
     ///
     /// # Errors
-    /// [`Error::Content`] if the goal does not fit the site: a target that the vessel does not name or at the start
-    /// of its centre line, an instrument that does not exist, or a sac where there is none.
+    /// [`Error::Content`] if goal or thresholds do not fit the site: a target that the vessel does not name or at the
+    /// start of its centre line, an instrument that does not exist, a sac where there is none, or a measure that has no
+    /// value there.
     pub fn new(subject: Subject, site: &Site<'_>) -> Result<Self> {
-        let reach = Reach::new(&subject.goal, site)
-            .map_err(|error| Error::content(subject.path(), error.to_string()))?;
+        let reach = Reach::new(&subject.goal, site).and_then(|reach| subject.check_at(site).map(|()| reach));
+        let reach = reach.map_err(|error| Error::content(subject.path(), error.to_string()))?;
         Ok(Self { subject: Arc::new(subject), reach, seen: 0, wall_force_n: 0.0, score: None })
     }
 

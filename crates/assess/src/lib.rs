@@ -23,6 +23,7 @@
 mod check;
 mod course;
 mod exam;
+mod folder;
 mod goal;
 mod groups;
 mod injection;

@@ -69,18 +69,30 @@ impl Reach {
                 Err(Error::parameter("goal.inject_ml", ml, mend))
             }
             Goal::Place(PlaceGoal { instrument: Some(name), .. }) => {
-                let hand = self.way.as_ref().and_then(|way| way.instrument);
+                // A single device is its own foremost tip.
+                let Some(hand) = self.way.as_ref().and_then(|way| way.instrument) else { return Ok(()) };
+                let refuse =
+                    |mend: String| Err(Error::parameter("goal.instrument", format!("{name:?}"), mend));
+                if record.instruments.get(hand) != Some(name) {
+                    let known = match record.instruments.as_slice() {
+                        [] => "names no instruments".to_owned(),
+                        known => format!("is of {}", known.join(", ")),
+                    };
+                    return refuse(format!(
+                        "the record {known}: give the session, or the folder of the run with its instruments.csv"
+                    ));
+                }
                 let unknown = |sample: &Sample| {
-                    let of_hand = hand.and_then(|hand| sample.hands.get(hand));
-                    of_hand.is_none_or(|of_hand| of_hand.inserted_mm > 0.0)
-                        && sample.tip_of_mm(hand).is_none()
+                    let is_in = sample.hands.get(hand).is_none_or(|hand| hand.inserted_mm > 0.0);
+                    is_in && sample.tip_of_mm(Some(hand)).is_none()
                 };
                 if !record.samples.iter().any(unknown) {
                     return Ok(());
                 }
-                let mend =
-                    "the record does not tell where its tip is: it is of an earlier version; record it again";
-                Err(Error::parameter("goal.instrument", format!("{name:?}"), mend))
+                refuse(
+                    "the record does not tell where its tip is: it is of an earlier version; record it again"
+                        .into(),
+                )
             }
             _ => Ok(()),
         }
@@ -146,7 +158,9 @@ fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
     let Some(name) = &goal.instrument else { return Ok(way) };
     let refuse = |mend: String| Error::parameter("goal.instrument", format!("{name:?}"), mend);
     match site.instruments.iter().position(|one| one == name) {
-        Some(hand) => Ok(way.for_instrument(hand)),
+        Some(hand) if site.instruments.len() > 1 => Ok(way.for_instrument(hand)),
+        // Its tip is the foremost one.
+        Some(_) => Ok(way),
         None if site.instruments.is_empty() => Err(refuse(
             "the record names no instruments: it is of a single device, or of an earlier version".to_owned(),
         )),

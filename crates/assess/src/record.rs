@@ -1,22 +1,18 @@
 //! Records of procedures.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use endowire_core::{Error, Result, Vec3};
+use endowire_core::device::Stack;
+use endowire_core::{Result, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::check;
-use crate::injection::{Injection, Outlet};
+use crate::injection::Injection;
 use crate::session::SessionFile;
 use crate::total::total;
+use crate::{check, folder};
 
 /// Name of the beam log, beside steps.csv or a session's script; absent if the beam was not recorded.
 pub const BEAM: &str = "beam.csv";
-
-/// Other tables of a folder of a run.
-const STEPS: &str = "steps.csv";
-const INJECTIONS: &str = "injections.csv";
 
 /// Motions below these count as rest: advance, mm, and rotation, rad.
 pub(crate) const REST_MM: f64 = 1e-9;
@@ -99,13 +95,11 @@ impl Sample {
         self.tip_at_rest_mm.or(self.tip_mm)
     }
 
-    /// The same for the tip of an instrument; for the foremost tip if `hand` is `None`.
+    /// The same for the tip of one of several instruments; for the foremost tip if `hand` is `None`.
     pub(crate) fn tip_of_mm(&self, hand: Option<usize>) -> Option<Vec3> {
         match hand {
-            Some(hand) if self.hands.len() > 1 => {
-                self.hands.get(hand).and_then(|hand| hand.tip_at_rest_mm.or(hand.tip_mm))
-            }
-            _ => self.on_centreline_mm(),
+            Some(hand) => self.hands.get(hand).and_then(|hand| hand.tip_at_rest_mm.or(hand.tip_mm)),
+            None => self.on_centreline_mm(),
         }
     }
 
@@ -159,38 +153,44 @@ pub struct Record {
 impl Record {
     /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv and, if they exist,
     /// instruments.csv, injections.csv, packing.csv and beam.csv. Hands rest after the last step of a run until all
-    /// medium has flowed.
+    /// medium has flowed. The tables must be of the same steps, and of as many as summary.json counts, if it exists.
     ///
     /// # Errors
-    /// [`Error::Content`] naming a file that is missing or invalid, with the key and value that are impossible.
+    /// [`Error::Content`](endowire_core::Error::Content) naming a file that is missing or invalid, with the key and value
+    /// that are impossible.
     pub fn read(path: &Path) -> Result<Self> {
         if path.is_file() {
             SessionFile::read(path).map(|session| session.record)
         } else {
-            Self::of_folder(path)
+            folder::read(path)
         }
     }
 
     /// Reads a session from the bytes of its file; `path` is for messages.
     ///
     /// # Errors
-    /// [`Error::Content`] if it is not a session, or has an impossible value.
+    /// [`Error::Content`](endowire_core::Error::Content) if it is not a session, or has an impossible value.
     pub fn from_session(bytes: &[u8], path: &Path) -> Result<Self> {
         SessionFile::parse(bytes, path).map(|session| session.record)
     }
 
-    /// Refuses impossible values.
+    /// Refuses impossible values, and samples and injections that do not fit the named instruments.
     ///
     /// # Errors
-    /// [`Error::Parameter`] with key and value.
+    /// [`Error::Parameter`](endowire_core::Error::Parameter) with key and value.
     pub(crate) fn check(&self) -> Result<()> {
-        check::samples(&self.samples)?;
-        check::injections(&self.injections)?;
-        match &self.beam {
-            // Nothing was recorded, so neither was a state of the beam.
-            Some(beam) if !(beam.is_empty() && self.samples.is_empty()) => check::beam(beam),
-            _ => Ok(()),
-        }
+        check::samples(self)?;
+        check::injections(self)?;
+        self.beam.as_deref().map_or(Ok(()), check::beam)
+    }
+
+    /// Refuses a record of other instruments than those of its scene: the places of tips and the lengths that are in
+    /// would be those of something else.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`](endowire_core::Error::Parameter) with key and value.
+    pub fn check_in(&self, stack: &Stack) -> Result<()> {
+        check::in_scene(self, stack)
     }
 
     /// Largest number of instruments in a sample.
@@ -198,40 +198,9 @@ impl Record {
         self.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0)
     }
 
-    fn of_folder(folder: &Path) -> Result<Self> {
-        let steps: Vec<Step> = rows(&folder.join(STEPS))?;
-        let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();
-        let mut instruments: Vec<String> = vec![];
-        for row in optional::<InstrumentRow>(&folder.join("instruments.csv"))?.unwrap_or_default() {
-            hands.entry(row.step).or_default().push(row.hand());
-            if !instruments.contains(&row.instrument) {
-                instruments.push(row.instrument);
-            }
-        }
-        let packing = optional::<PackingRow>(&folder.join("packing.csv"))?.unwrap_or_default();
-        let mut packing: BTreeMap<usize, Packed> =
-            packing.into_iter().map(|row| (row.step, row.packed())).collect();
-        let samples = steps.into_iter().map(|step| {
-            let alone = || vec![step.hand()];
-            let packing = packing.remove(&step.step);
-            Sample { packing, ..step.sample(hands.remove(&step.step).unwrap_or_else(alone)) }
-        });
-        let samples: Vec<Sample> = samples.collect();
-        let injections = optional::<InjectionRow>(&folder.join(INJECTIONS))?.unwrap_or_default();
-        let injections: Vec<Injection> = injections.into_iter().map(InjectionRow::injection).collect();
-        let beam: Option<Vec<BeamState>> = optional(&folder.join(BEAM))?;
-        let in_file = |name: &str, checked: Result<()>| {
-            checked.map_err(|error| Error::content(&folder.join(name), error.to_string()))
-        };
-        in_file(STEPS, check::samples(&samples))?;
-        in_file(INJECTIONS, check::injections(&injections))?;
-        in_file(BEAM, beam.as_deref().map_or(Ok(()), check::beam))?;
-        Ok(Self { instruments, samples, injections, beam }.flowed_out())
-    }
-
     /// The record with a rest at its end, if medium still flows there: a run ends with its last step, but not what it
     /// has injected.
-    fn flowed_out(mut self) -> Self {
+    pub(crate) fn flowed_out(mut self) -> Self {
         let end_s = self.injections.iter().map(Injection::end_s).fold(0.0, f64::max);
         if let Some(last) = self.samples.last().filter(|last| last.time_s < end_s) {
             let rests = |hand: &Hand| Hand { advance_mm: 0.0, rotate_rad: 0.0, ..*hand };
@@ -333,143 +302,4 @@ impl Record {
         let end_s = self.end_s();
         Some(beam.iter().zip(ends).map(move |(state, end)| (state, end.min(end_s).max(state.time_s))))
     }
-}
-
-#[derive(Debug, Deserialize)]
-struct Step {
-    step: usize,
-    advance_mm: f64,
-    rotate_rad: f64,
-    inserted_mm: f64,
-    nodes: usize,
-    tip_x_mm: f64,
-    tip_y_mm: f64,
-    tip_z_mm: f64,
-    push_force_n: f64,
-    torque_nmm: f64,
-    jumped: bool,
-    wall_force_sum_n: f64,
-    wall_force_tip_n: f64,
-    time_s: f64,
-}
-
-impl Step {
-    fn hand(&self) -> Hand {
-        Hand {
-            advance_mm: self.advance_mm,
-            rotate_rad: self.rotate_rad,
-            inserted_mm: self.inserted_mm,
-            push_force_n: self.push_force_n.is_finite().then_some(self.push_force_n),
-            torque_nmm: self.torque_nmm,
-            ..Hand::default()
-        }
-    }
-
-    fn sample(&self, hands: Vec<Hand>) -> Sample {
-        let tip_mm = Vec3::new(self.tip_x_mm, self.tip_y_mm, self.tip_z_mm);
-        Sample {
-            time_s: self.time_s,
-            tip_mm: (self.nodes > 0).then_some(tip_mm),
-            tip_at_rest_mm: None,
-            hands,
-            wall_force_n: self.wall_force_sum_n,
-            tip_force_n: self.wall_force_tip_n,
-            jumped: self.jumped,
-            packing: None,
-            undone: false,
-        }
-    }
-}
-
-#[derive(Debug, Deserialize)]
-struct InstrumentRow {
-    step: usize,
-    instrument: String,
-    advance_mm: f64,
-    rotate_rad: f64,
-    inserted_mm: f64,
-    tip_x_mm: Option<f64>,
-    tip_y_mm: Option<f64>,
-    tip_z_mm: Option<f64>,
-    push_force_n: Option<f64>,
-    torque_nmm: f64,
-}
-
-impl InstrumentRow {
-    fn hand(&self) -> Hand {
-        let &Self { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, .. } = self;
-        let tip_mm = match (self.tip_x_mm, self.tip_y_mm, self.tip_z_mm) {
-            (Some(x), Some(y), Some(z)) => Some(Vec3::new(x, y, z)),
-            _ => None,
-        };
-        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, tip_mm, tip_at_rest_mm: None }
-    }
-}
-
-#[derive(Debug, Deserialize)]
-struct PackingRow {
-    step: usize,
-    packing: f64,
-    outside_mm: f64,
-}
-
-impl PackingRow {
-    fn packed(&self) -> Packed {
-        Packed { density: self.packing, outside_mm: self.outside_mm }
-    }
-}
-
-#[derive(Debug, Deserialize)]
-struct InjectionRow {
-    time_s: f64,
-    instrument: String,
-    volume_ml: f64,
-    rate_ml_per_s: f64,
-    tip_x_mm: f64,
-    tip_y_mm: f64,
-    tip_z_mm: f64,
-    #[serde(default)]
-    tip_force_n: Option<f64>,
-}
-
-impl InjectionRow {
-    fn injection(self) -> Injection {
-        let Self { time_s, instrument, volume_ml, rate_ml_per_s, tip_force_n, .. } = self;
-        let at_mm = Vec3::new(self.tip_x_mm, self.tip_y_mm, self.tip_z_mm);
-        let outlet = Some(Outlet { instrument: Some(instrument), at_mm, tip_force_n });
-        Injection { time_s, volume_ml, rate_ml_per_s, outlet }
-    }
-}
-
-fn optional<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Option<Vec<T>>> {
-    if path.exists() { rows(path).map(Some) } else { Ok(None) }
-}
-
-/// Reads the rows of a table. An incomplete last row, left by a run that was killed, is dropped.
-fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>> {
-    let mut text = std::fs::read(path).map_err(|error| {
-        Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
-    })?;
-    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
-    let mut reader = csv::Reader::from_reader(text.as_slice());
-    let columns = reader.headers().cloned().unwrap_or_default();
-    let rows: std::result::Result<_, _> = reader.into_deserialize().collect();
-    rows.map_err(|error| Error::content(path, format!("{}; {}", wrong_row(&error, &columns), mend(path))))
-}
-
-/// What is wrong with a row: its line, its column if that is known, and the reason.
-fn wrong_row(error: &csv::Error, columns: &csv::StringRecord) -> String {
-    let csv::ErrorKind::Deserialize { pos, err } = error.kind() else { return error.to_string() };
-    let line = pos.as_ref().map_or_else(String::new, |pos| format!("line {}: ", pos.line()));
-    let column = err.field().and_then(|field| columns.get(usize::try_from(field).ok()?));
-    let column = column.map_or_else(String::new, |name| format!("{name}: "));
-    format!("{line}{column}{}", err.kind())
-}
-
-/// The remedy for a table with an invalid row.
-fn mend(path: &Path) -> &'static str {
-    if path.file_name().is_some_and(|name| name == BEAM) {
-        return "a row of this log has time_s, on (true or false), frames_per_s, dose_ngy, field_mm2, primary_deg and secondary_deg";
-    }
-    "give the folder of a recorded run (endowire run)"
 }

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::goal::Goal;
 use crate::metric::{Better, Metric};
+use crate::reach::Site;
 use crate::record::Record;
+use crate::unjudged::why_never;
 
 /// Levels, from the easiest.
 const LEVELS: std::ops::RangeInclusive<u8> = 1..=4;
@@ -244,6 +246,19 @@ impl Subject {
             }
         }
         Ok(())
+    }
+
+    /// Refuses thresholds of measures that have no value at a site.
+    pub(crate) fn check_at(&self, site: &Site<'_>) -> Result<()> {
+        let mut never = self.threshold.iter().enumerate().filter_map(|(index, threshold)| {
+            Some((index, &threshold.metric, why_never(&threshold.metric, &self.goal, site)?))
+        });
+        match never.next() {
+            None => Ok(()),
+            Some((index, metric, mend)) => {
+                Err(Error::parameter(format!("threshold[{index}].metric"), format!("{metric:?}"), mend))
+            }
+        }
     }
 
     /// Name of the subject in commands: the stem of its file.

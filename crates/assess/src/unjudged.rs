@@ -3,7 +3,9 @@
 
 use serde::Serialize;
 
+use crate::goal::Goal;
 use crate::metric::{Group, Metric};
+use crate::reach::Site;
 use crate::record::Record;
 use crate::subject::Limits;
 
@@ -36,6 +38,23 @@ pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
         "path_ratio" => "the tip ends where it began",
         "time_in_trunk_s" => "the tip did not come past the first fork on its way, or there is none",
         _ => "no way to a target is known, or no tip was on it",
+    }
+}
+
+/// Why a measure has no value in any session with this goal at this site, and the remedy; `None` if it may have one.
+pub(crate) fn why_never(metric: &str, goal: &Goal, site: &Site<'_>) -> Option<&'static str> {
+    let of_way = ["arrived", "path_ratio", "placement_error_mm", "time_in_trunk_s", "wrong_branches"];
+    match (metric, goal) {
+        ("packing_density" | "coil_outside_mm", _) if !site.has_sac => Some(
+            "there is no sac that coils fill: give [vessel.sac] in the scene, or leave the threshold out",
+        ),
+        ("catheter_ahead_s", _) if site.instruments.len() == 1 => {
+            Some("there is one instrument alone: name another measure")
+        }
+        (metric, Goal::Packing(_)) if of_way.contains(&metric) => {
+            Some("to a sac that is packed no way is known: name another measure, or a target as the goal")
+        }
+        _ => None,
     }
 }
 

@@ -15,7 +15,7 @@ pub struct Way {
     /// Row of the first fork along the path.
     first_fork: Option<usize>,
     target_mm: Option<(Vec3, f64)>,
-    /// Index of the instrument that must arrive; `None` for the foremost tip.
+    /// Index of the one of several instruments that must arrive; `None` for the foremost tip.
     pub(crate) instrument: Option<usize>,
 }
 
@@ -47,7 +47,7 @@ impl Way {
         }
     }
 
-    /// The same way for the tip of one instrument, by its index.
+    /// The same way for the tip of one of several instruments, by its index.
     #[must_use]
     pub fn for_instrument(self, hand: usize) -> Self {
         Self { instrument: Some(hand), ..self }

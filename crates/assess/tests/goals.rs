@@ -40,7 +40,8 @@ fn record() -> Record {
         let hands = vec![hand(0.0), hand(3.0)];
         Sample { time_s: second as f64, tip_mm: hands[0].tip_mm, hands, ..Sample::default() }
     };
-    Record { samples: (1..=8).map(sample).collect(), ..Record::default() }
+    let instruments = ["wire", "catheter"].map(str::to_owned).to_vec();
+    Record { instruments, samples: (1..=8).map(sample).collect(), ..Record::default() }
 }
 
 fn end(score: &Score) -> Option<(EndedBy, f64)> {
@@ -120,6 +121,17 @@ fn a_record_that_does_not_tell_is_refused() {
     old.samples.iter_mut().flat_map(|sample| &mut sample.hands).for_each(|hand| hand.tip_mm = None);
     let error = told(&catheter, &old);
     assert!(error.contains("goal.toml: goal.instrument = \"catheter\": the record does not tell"), "{error}");
+    // The foremost tip does not stand in for the one that is named.
+    let mut alone = record();
+    alone.instruments.clear();
+    alone.samples.iter_mut().for_each(|sample| sample.hands.truncate(1));
+    let error = told(&catheter, &alone);
+    assert!(error.contains("goal.instrument = \"catheter\": the record names no instruments"), "{error}");
+    assert_eq!(end(&catheter.clone().score(&alone)), None);
+    let mut other = record();
+    other.instruments[1] = "sheath".to_owned();
+    let error = told(&catheter, &other);
+    assert!(error.contains("goal.instrument = \"catheter\": the record is of wire, sheath"), "{error}");
     let error = told(&exam("packing_density = 0.1", true).unwrap(), &record());
     assert!(error.contains("goal.packing_density = 0.1: the record does not tell"), "{error}");
     // What asks for the foremost tip is judged by any record.
@@ -152,6 +164,21 @@ fn a_goal_that_does_not_fit_is_refused_by_key_and_value() {
     ] {
         let error = exam(&goal, false).unwrap_err();
         assert!(error.starts_with("subjects/goal.toml: ") && error.contains(told), "{error}\n{told}");
+    }
+    // Thresholds of measures that have no value there.
+    for (goal, metric, has_sac, told) in [
+        (CATHETER, "packing_density", false, Some("there is no sac that coils fill")),
+        (CATHETER, "coil_outside_mm", false, Some("there is no sac that coils fill")),
+        (CATHETER, "packing_density", true, None),
+        ("packing_density = 0.1", "wrong_branches", true, Some("to a sac that is packed no way is known")),
+        ("packing_density = 0.1", "catheter_ahead_s", true, None),
+    ] {
+        let limit = if metric == "packing_density" { "at_least = 0.1" } else { "at_most = 1.0" };
+        let made = exam(&format!("{goal}\n[[threshold]]\nmetric = \"{metric}\"\n{limit}"), has_sac);
+        let error = made.err();
+        assert_eq!(error.is_some(), told.is_some(), "{metric}: {error:?}");
+        let whole = format!("goal.toml: threshold[0].metric = \"{metric}\": {}", told.unwrap_or_default());
+        assert!(error.is_none_or(|error| error.contains(&whole)), "{whole}");
     }
     let alone = Exam::new(subject(CATHETER).unwrap(), &Site { tree: Some(&tree()), ..Site::default() });
     let error = alone.unwrap_err().to_string();

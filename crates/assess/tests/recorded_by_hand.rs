@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use endowire_assess::{Metric, Record, Way, assess};
+use endowire_core::device::{Device, Instrument, Section, Stack};
 use fork::tree;
 use serde_json::{Value, json};
 
@@ -333,6 +334,33 @@ fn a_session_that_cannot_be_is_refused_by_key_and_value() {
         ("/record/injections/1/outlet/tip_force_n", json!(-1.0), "injections[1].outlet.tip_force_n = -1"),
         ("/record/beam/0/dose_ngy", json!(-1.0), "record.beam[0].dose_ngy = -1: must be"),
         ("/record/beam", json!([]), "record.beam = empty"),
+        ("/record/samples", json!([]), "record.samples = []: nothing was recorded"),
+        ("/record/samples/2/hands", json!([]), "record.samples[2].hands = 0 hands: must be one for each"),
+        ("/record/instruments", json!(["wire"]), "record.samples[0].hands = 2 hands: must be one for each"),
+        ("/record/instruments", json!(["wire", "a", "b"]), "record.samples[0].hands = 2 hands: must be one"),
+        (
+            "/record/instruments",
+            json!([]),
+            "2 hands: must be one for each of instruments, which has no names",
+        ),
+        (
+            "/record/instruments",
+            json!(["wire", "wire"]),
+            "record.instruments[1] = \"wire\": each instrument has",
+        ),
+        (
+            "/record/samples/2/hands/0/inserted_mm",
+            json!(-50.0),
+            "samples[2].hands[0].inserted_mm = -50: must",
+        ),
+        ("/record/samples/2/tip_mm", json!([1e300, 0.0, 0.0]), "samples[2].tip_mm = [1e300, 0, 0]: must be"),
+        ("/record/beam/0/dose_ngy", json!(1e300), "record.beam[0].dose_ngy = 1e300: must be"),
+        (
+            "/record/injections/0/outlet/instrument",
+            json!("cathter"),
+            "injections[0].outlet.instrument = \"cathter\": is no instrument of the record, which has wire, catheter; \
+             did you mean \"catheter\"?",
+        ),
         ("/recorded", json!(1), "unknown field `recorded`"),
         ("/record/samples/0/hands/0/pushed", json!(1), "unknown field `pushed`"),
         ("/record/injections/0/through", json!("wire"), "unknown field `through`"),
@@ -346,8 +374,137 @@ fn a_session_that_cannot_be_is_refused_by_key_and_value() {
         let error = read(&other.to_string()).unwrap_err().to_string();
         assert!(error.starts_with("a.session.json: ") && error.contains(told), "{error}\n{told}");
     }
-    // Nothing was recorded, of the beam either.
-    let empty =
-        r#"{"scene_file": "a.toml", "set": [], "record": {"samples": [], "injections": [], "beam": []}}"#;
-    assert!(read(empty).is_ok());
+}
+
+/// A wire and its catheter in three steps, and what the catheter injects.
+const HANDS: &str = "\
+step,instrument,advance_mm,rotate_rad,inserted_mm,tip_x_mm,tip_y_mm,tip_z_mm,push_force_n,torque_nmm
+1,wire,10,0,10,10,0,0,0.1,0.2
+1,catheter,5,0,5,5,0,0,0.1,0
+2,wire,-4,0,6,6,0,0,,0
+2,catheter,0,0,5,5,0,0,0.1,0
+3,wire,44,0,50,50,0,0,0.1,0
+3,catheter,0,0,5,5,0,0,0.1,0
+";
+
+#[test]
+fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
+    let whole = |name: &str| match name {
+        "steps.csv" => STEPS.to_owned(),
+        "instruments.csv" => HANDS.to_owned(),
+        "injections.csv" => INJECTIONS.replace("device", "catheter"),
+        "packing.csv" => PACKING.to_owned(),
+        _ => r#"{"steps": 3, "complete": true}"#.to_owned(),
+    };
+    let files = ["steps.csv", "instruments.csv", "injections.csv", "packing.csv", "summary.json"];
+    let read = |changed: &[(&str, String)]| {
+        let folder = tempfile::tempdir().unwrap();
+        files.iter().for_each(|name| std::fs::write(folder.path().join(name), whole(name)).unwrap());
+        changed.iter().for_each(|(name, text)| std::fs::write(folder.path().join(name), text).unwrap());
+        Record::read(folder.path()).map_err(|error| error.to_string())
+    };
+    let record = read(&[]).unwrap();
+    assert_eq!(
+        (record.instruments.as_slice(), record.samples.len()),
+        (&["wire", "catheter"].map(str::to_owned)[..], 3)
+    );
+    let lines = |name: &str, count: usize| {
+        whole(name).lines().take(count).map(|line| format!("{line}\n")).collect::<String>()
+    };
+    let cut = |name: &str, bytes: usize| whole(name)[..whole(name).len() - bytes].to_owned();
+    // Killed while it wrote the last rows, of a step that its summary does not count yet.
+    let killed = ("summary.json", r#"{"steps": 2, "complete": false}"#.to_owned());
+    let ends_at = |record: Record| record.samples.last().unwrap().tip_mm.unwrap().x;
+    assert_eq!(ends_at(record), 50.0);
+    assert_eq!(ends_at(read(&[killed.clone(), ("steps.csv", cut("steps.csv", 5))]).unwrap()), 6.0);
+    let half = [
+        killed.clone(),
+        ("steps.csv", lines("steps.csv", 3)),
+        ("instruments.csv", cut("instruments.csv", 5)),
+    ];
+    assert_eq!(ends_at(read(&half).unwrap()), 6.0);
+    for (name, text, told) in [
+        ("steps.csv", cut("steps.csv", 5), "step = 2: is the last one, and summary.json counts 3 steps"),
+        ("steps.csv", lines("steps.csv", 3), "step = 2: is the last one, and summary.json counts 3 steps"),
+        ("steps.csv", lines("steps.csv", 1), "steps = []: it has no step"),
+        ("steps.csv", String::new(), "steps = []: it has no step"),
+        ("steps.csv", STEPS.replace("\n2,", "\n4,"), "step = 4: comes after step 1"),
+        ("steps.csv", STEPS.replace("0.2,0,2\n", "-0.2,0,2\n"), "step[1].wall_force_n = -0.2: must be"),
+        (
+            "summary.json",
+            r#"{"steps": 2, "complete": true}"#.to_owned(),
+            "step = 3: is the last one, and summary",
+        ),
+        (
+            "instruments.csv",
+            lines("instruments.csv", 5),
+            "step[3].instrument = []: those of the steps before are",
+        ),
+        (
+            "instruments.csv",
+            cut("instruments.csv", 5),
+            "step[3].instrument = [wire]: those of the steps before",
+        ),
+        ("instruments.csv", lines("instruments.csv", 1), "step[1].instrument = []: steps.csv has this step"),
+        (
+            "instruments.csv",
+            HANDS.replace("5,5,0,0", "-5,5,0,0"),
+            "step[1].catheter.inserted_mm = -5: must be",
+        ),
+        ("packing.csv", lines("packing.csv", 2), "step = 2: is missing, and steps.csv has it"),
+        (
+            "injections.csv",
+            INJECTIONS.replace("device", "cathter"),
+            "injections[0].outlet.instrument = \"cathter\"",
+        ),
+        (
+            "injections.csv",
+            whole("injections.csv").replace("\n1,", "\n800,"),
+            "after_step = 800: steps.csv ends with step 3",
+        ),
+    ] {
+        let error = read(&[(name, text)]).unwrap_err();
+        let file = if name == "summary.json" { "steps.csv" } else { name };
+        assert!(error.contains(&format!("{file}: ")) && error.contains(told), "{error}\n{told}");
+    }
+}
+
+/// A device of 200 mm for each of these names.
+fn stack(names: &[&str]) -> Stack {
+    let one = |name: &&str| {
+        let section = Section { inner_radius_mm: Some(0.4), ..Section::straight(200.0, 0.5, 1.0) };
+        Instrument { name: (*name).to_owned(), device: Device::new(vec![section]).unwrap(), may_lead: true }
+    };
+    Stack::new(names.iter().map(one).collect()).unwrap()
+}
+
+#[test]
+fn a_record_of_other_instruments_than_the_scenes_is_refused() {
+    let record = Record::from_session(session().as_bytes(), Path::new("a.session.json")).unwrap();
+    let told = |record: &Record, names: &[&str]| record.check_in(&stack(names)).unwrap_err().to_string();
+    assert!(record.check_in(&stack(&["wire", "catheter"])).is_ok());
+    for names in [&["wire"][..], &["wire", "sheath"], &["catheter", "wire"], &["wire", "micro", "catheter"]] {
+        let error = told(&record, names);
+        assert!(
+            error.starts_with(&format!(
+                "instruments = [wire, catheter]: the scene has [{}]",
+                names.join(", ")
+            )),
+            "{error}"
+        );
+    }
+    let mut long = record.clone();
+    long.samples[2].hands[1].inserted_mm = 5000.0;
+    let error = told(&long, &["wire", "catheter"]);
+    assert!(error.contains("samples[2].hands[1].inserted_mm = 5000: catheter is 200 mm long"), "{error}");
+    // The folder of a run of several without their table is that of none of them.
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("steps.csv", STEPS), ("injections.csv", INJECTIONS)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let alone = Record::read(folder.path()).unwrap();
+    assert!(alone.check_in(&stack(&["device"])).is_ok());
+    assert!(told(&alone, &["wire", "catheter"]).contains("instruments = []: the scene has [wire, catheter]"));
+    let error = told(&alone, &["wire"]);
+    assert!(error.contains("injections[0].outlet.instrument = \"device\": is no instrument"), "{error}");
 }

@@ -84,6 +84,48 @@ fn a_session_is_measured_with_its_rests_and_its_beam_and_its_script_without() {
 }
 
 #[test]
+fn a_record_of_other_instruments_than_its_scene_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = session(folder.path());
+    let out = folder.path().join("out");
+    let script = folder.path().join("played.toml");
+    let args = ["--script", text(&script), "--json", "--out", text(&out)];
+    told(&endowire().arg("run").arg(scene("arch_vertebral.toml")).args(args).output().unwrap());
+    let goal = |instrument: &str| {
+        let file = folder.path().join("goal.toml");
+        let head =
+            format!("name = \"a\"\nlevel = 1\ntext = \"b\"\nscene = {:?}\n", scene("arch_vertebral.toml"));
+        let goal = "[goal]\ntarget = \"opening 4\"\ntip_within_mm = 5.0\n";
+        std::fs::write(&file, format!("{head}{goal}instrument = \"{instrument}\"\n")).unwrap();
+        file
+    };
+    let subject = goal("catheter");
+    let assess = |record: &Path, more: &[&str]| {
+        let output = endowire().arg("assess").arg(record).args(more).output().unwrap();
+        (output.status.code(), said(&output))
+    };
+    let with_subject = ["--subject", text(&subject)];
+    for record in [&session, &out] {
+        for more in [&[][..], &with_subject] {
+            let (code, said) = assess(record, more);
+            assert_eq!(code, Some(0), "the twin: {said}");
+        }
+    }
+    std::fs::remove_file(out.join("instruments.csv")).unwrap();
+    let mut renamed = document(&session);
+    renamed["record"]["instruments"][1] = json!("sheath");
+    std::fs::write(&session, renamed.to_string()).unwrap();
+    for (record, names) in [(&session, "wire, sheath"), (&out, "")] {
+        for more in [&[][..], &with_subject] {
+            let (code, said) = assess(record, more);
+            let told =
+                format!("{}: instruments = [{names}]: the scene has [wire, catheter]", record.display());
+            assert!(code == Some(2) && said.contains(&told), "{said}");
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_assessed_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let nothing = folder.path().join("nothing.session.json");

@@ -65,6 +65,9 @@ fn sessions_are_ordered_by_when_they_were_recorded_and_their_course_is_told() {
     let order: Vec<&str> =
         all["sessions"].as_array().unwrap().iter().map(|one| one["session"].as_str().unwrap()).collect();
     assert!(order[0].ends_with("b.session.json") && order[3].ends_with("c.session.json"), "{order:?}");
+    // One that is named and lies in the folder too is one attempt.
+    let twice = assessed(&[text(folder.path()), text(&folder.path().join("a.session.json"))]);
+    assert_eq!(twice["courses"], all["courses"]);
     // For people.
     let output = endowire().arg("assess").arg(folder.path()).output().unwrap();
     let table = String::from_utf8(output.stdout).unwrap();

@@ -66,6 +66,15 @@ impl<'a> Places<'a> {
         Ok(self.add(Place { path, set: summary.set.clone(), scene }))
     }
 
+    /// The record of a session, which must be one of its scene.
+    fn read(&self, session: &Path, place: usize) -> Result<Record, Failure> {
+        let record = Record::read(session)?;
+        let Place { path, scene, .. } = &self.all[place];
+        let stack = scene.stack().map_err(|error| Failure::from(error).at(path.display()))?;
+        record.check_in(&stack).map_err(|error| Failure::from(error).at(session.display()))?;
+        Ok(record)
+    }
+
     fn add(&mut self, place: Place) -> usize {
         self.all.push(place);
         self.all.len() - 1
@@ -91,9 +100,9 @@ pub(super) fn measured(
 }
 
 fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> Result<Attempt, Failure> {
-    let record = Record::read(session)?;
     let (summary, recorded_unix_s) = read_head(session)?;
     let place = places.find(&summary)?;
+    let record = places.read(session, place)?;
     let Place { path, scene, .. } = &places.all[place];
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let tree = scene.centreline(&places.cache).map_err(in_scene)?;
@@ -124,17 +133,15 @@ pub(super) fn scored(
     files: &[PathBuf],
     places: &mut Places<'_>,
 ) -> Result<(Provenance, Vec<Attempt>), Failure> {
-    let path = subject.resolve(&subject.scene);
     let settings = subjects::settings(subject)?;
-    let scene = scenes::read(&path, &settings)?;
-    let exam = subjects::exam(subject.clone(), (&scene, &path), &places.cache)?;
+    let (scene, path, exam) = subjects::in_scene(subject, &places.cache)?;
     let provenance = Provenance::of_scene(&scene, &settings)?;
     let place = places.add(Place { path: path.clone(), set: subject.set.clone(), scene });
     let mut attempts = vec![];
     for session in files {
         let (summary, recorded_unix_s) = read_head(session)?;
         check_scene(session, &summary, &path, &settings)?;
-        let record = Record::read(session)?;
+        let record = places.read(session, place)?;
         exam.check(&record).map_err(|error| Failure::from(error).at(session.display()))?;
         let score = exam.clone().score(&record);
         attempts.push(Attempt {

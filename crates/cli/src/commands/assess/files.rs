@@ -1,5 +1,6 @@
 //! Finds sessions: session files, folders of runs, and folders that contain sessions.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
@@ -9,7 +10,8 @@ const STEPS: &str = "steps.csv";
 /// Ending of session files.
 const ENDING: &str = ".session.json";
 
-/// The sessions in the order given; those of a folder sorted by name.
+/// The sessions in the order given; those of a folder sorted by name. One that is given more than once, as by its name
+/// and by its folder, is one session.
 pub(super) fn of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut all = vec![];
     for path in named {
@@ -27,6 +29,8 @@ pub(super) fn of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
         all.extend(within);
     }
+    let mut seen = BTreeSet::new();
+    all.retain(|path| seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
     Ok(all)
 }
 
