@@ -120,6 +120,15 @@ impl MethodChoice for AnyMethod {
         matches!(self, Self::Kirchhoff(options) if options.takes_several())
     }
 
+    fn check_detach(&self) -> Result<()> {
+        match self {
+            Self::Kirchhoff(options) => options.check_detach(),
+            _ => {
+                Err(Error::parameter("method.name", self.name(), "this method knows no coils: use kirchhoff"))
+            }
+        }
+    }
+
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
         let paper = |options: &Li2011Options, solver| -> Result<Box<dyn Method>> {
             Ok(Box::new(Li2011::new(*options, solver, surroundings, store)?))

@@ -122,6 +122,27 @@ fn push(session: &mut Session, instrument: &str, mm: f64) {
     (0..60).for_each(|_| session.tick());
 }
 
+#[test]
+fn a_script_that_detaches_is_refused_where_loops_do_not_touch() {
+    let room = Room::new();
+    let script =
+        "[[script]]\ninstrument = \"first\"\nadvance_mm = 16.0\n\n[[script]]\ninstrument = \"first\"\n";
+    let checked = |method: &str, script: &str| {
+        let file = room.folder.path().join("scene.toml");
+        std::fs::write(&file, format!("{}\n{script}", SCENE.replace("self_contact = true", method))).unwrap();
+        let scene = Scene::read(&file).unwrap();
+        scene.steps(&scene.stack().unwrap(), &NoStore).map(drop).map_err(|error| error.to_string())
+    };
+    let detaches = format!("{script}detach = true\n");
+    assert_eq!(checked("self_contact = true", &detaches), Ok(()));
+    assert_eq!(checked("", &format!("{script}withdraw = true\n")), Ok(()));
+    let error = checked("", &detaches).unwrap_err();
+    assert!(
+        error.starts_with("method.self_contact = false: ") && error.ends_with("script[1].detach"),
+        "{error}"
+    );
+}
+
 fn detach(session: &mut Session, instrument: &str) -> endowire_core::Result<()> {
     session.apply(&Input::Detach { instrument: Some(instrument.to_owned()) })
 }

@@ -214,6 +214,14 @@ pub trait MethodChoice: Debug {
         false
     }
 
+    /// Checks whether coils can be detached with this method and its options.
+    ///
+    /// # Errors
+    /// The method, or the option that forbids it.
+    fn check_detach(&self) -> Result<()> {
+        Err(Error::parameter("method.name", self.name(), "this method knows no coils: use kirchhoff"))
+    }
+
     /// The method at rest at the sheath, nothing inserted; walls that are costly to build come from `store`.
     ///
     /// # Errors
@@ -245,6 +253,11 @@ impl MethodChoice for OwnMethod {
     fn takes_several(&self) -> bool {
         let Self::Kirchhoff(options) = self;
         options.takes_several()
+    }
+
+    fn check_detach(&self) -> Result<()> {
+        let Self::Kirchhoff(options) = self;
+        options.check_detach()
     }
 
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {

@@ -183,9 +183,17 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// Names file, line and key of the error.
     pub fn take_script(&mut self, path: &Path) -> Result<()> {
-        let (file, _): (ScriptFile, String) = from_toml_of(&*self.files, path)?;
-        (self.script, self.script_file) = (file.script, Some(path.to_owned()));
+        (self.script, self.script_file) = (self.read_script(path)?, Some(path.to_owned()));
         Ok(())
+    }
+
+    /// The lines of a file with `[[script]]` tables, which replace nothing.
+    ///
+    /// # Errors
+    /// As [`SceneOf::take_script`].
+    pub fn read_script(&self, path: &Path) -> Result<Vec<ScriptLine>> {
+        let (file, _): (ScriptFile, String) = from_toml_of(&*self.files, path)?;
+        Ok(file.script)
     }
 
     /// The text the scene was read from.
@@ -427,18 +435,31 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         script_commands(&self.script, device)
     }
 
-    /// The script, checked against the instruments and the targets of the vessel. If a line has a target and the
-    /// scene has no centre line, it is computed, and stored in `store`.
+    /// The script, checked against the instruments, the method and the targets of the vessel. If a line has a target and
+    /// the scene has no centre line, it is computed, and stored in `store`.
     ///
     /// # Errors
-    /// As [`Script::new`], [`SceneOf::inserted_mm`] and [`SceneOf::centreline`].
+    /// As [`Script::new`], [`SceneOf::inserted_mm`], [`SceneOf::centreline`] and, if a coil is detached,
+    /// [`MethodChoice::check_detach`].
     pub fn steps(&self, stack: &Stack, store: &dyn WallStore) -> Result<Script> {
+        self.steps_of(&self.script, stack, store)
+    }
+
+    /// The script of other lines than the scene's, in this scene.
+    ///
+    /// # Errors
+    /// As [`SceneOf::steps`].
+    pub fn steps_of(&self, lines: &[ScriptLine], stack: &Stack, store: &dyn WallStore) -> Result<Script> {
         // Do not open a file unnecessarily.
-        let centreline = match self.script.iter().any(ScriptLine::has_target) {
+        let centreline = match lines.iter().any(ScriptLine::has_target) {
             true => Some(self.centreline(store)?),
             false => None,
         };
-        let script = Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline)?;
+        let script = Script::new(lines, stack, &self.inserted_mm(stack)?, centreline)?;
+        if let Some(line) = script.detaches() {
+            let hint = format!("a coil is left behind by {line}.detach");
+            self.method.check_detach().map_err(|error| with_hint(error, &hint))?;
+        }
         if script.injects() && self.device.as_ref().is_some_and(|device| device.file.is_some()) {
             // Sections in the scene may give the lumen for rendering only; a file describes a device completely.
             let solid = |device: &Device| device.sections().iter().all(|s| s.inner_radius_mm.is_none());

@@ -121,6 +121,11 @@ impl Script {
         self.motions.iter().any(|motion| motion.inject.is_some())
     }
 
+    /// The name in messages of the first line that detaches a coil.
+    pub(crate) fn detaches(&self) -> Option<&str> {
+        self.motions.iter().find(|motion| motion.detach.is_some()).map(|motion| motion.name.as_str())
+    }
+
     fn check_speeds(&self) -> Result<()> {
         match self.motions.iter().find(|motion| !motion.parts.is_empty() && !motion.is_timed()) {
             Some(motion) if self.is_timed() => {

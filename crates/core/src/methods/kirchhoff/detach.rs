@@ -14,7 +14,7 @@ use super::transport::transport_together;
 use super::workspace::Workspace;
 use super::{Environment, meshed};
 use crate::device::{LENGTH_SLACK_MM, line_mm};
-use crate::methods::InstrumentReport;
+use crate::methods::{InstrumentReport, MethodChoice};
 use crate::{Error, Result};
 
 /// Refuses a coil that cannot be detached; returns the length of one that can, mm.
@@ -33,9 +33,7 @@ pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instru
     if from.coils.iter().any(|coil| coil.instrument == instrument) {
         return refused("is detached already: push the next coil".into());
     }
-    if !environment.options.self_contact {
-        return refused("what follows would pass through it: set method.self_contact = true".into());
-    }
+    environment.options.check_detach()?;
     let inserted_mm = from.report.lengths_mm();
     let left_mm = stack.out_mm(instrument, &inserted_mm) - inserted_mm[instrument];
     if left_mm > LENGTH_SLACK_MM {

@@ -216,5 +216,5 @@ fn what_cannot_be_detached_is_refused_and_nothing_is_lost() {
     // Counter-check: without self-contact.
     let mut blind = two_coils(0.0, false);
     advance(&mut blind, &[0], OUT_MM).unwrap();
-    assert!(told(&mut blind, 0).contains("self_contact"));
+    assert!(told(&mut blind, 0).contains("method.self_contact = false: what follows"));
 }

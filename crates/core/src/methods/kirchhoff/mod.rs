@@ -106,6 +106,14 @@ impl MethodChoice for KirchhoffOptions {
     fn takes_several(&self) -> bool {
         true
     }
+
+    fn check_detach(&self) -> Result<()> {
+        if self.self_contact {
+            return Ok(());
+        }
+        let mend = "what follows a detached coil would pass through it: set it to true";
+        Err(Error::parameter("method.self_contact", false, mend))
+    }
 }
 
 /// The method for several instruments, given the number of their sets of angles.
