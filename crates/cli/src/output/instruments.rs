@@ -67,6 +67,7 @@ impl InstrumentTable {
             let tip = simulation.tip_of_mm(index);
             let outside = report.instruments[index + 1..].iter().map(|other| other.inserted_mm);
             let felt_mm = (told.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
+            let lateral = simulation.lateral_forces(index).into_iter().map(|at| at.force_n.norm());
             self.table.push(Row {
                 step,
                 instrument: instrument.name.clone(),
@@ -82,7 +83,7 @@ impl InstrumentTable {
                 torque_nmm: told.torque_nmm,
                 felt_mm,
                 felt_radius_mm: instrument.device.max_radius_within(felt_mm),
-                lateral_n: simulation.lateral_forces(index).iter().map(|at| at.force_n.norm()).sum(),
+                lateral_n: lateral.fold(0.0, |sum, force_n| sum + force_n),
             })?;
         }
         self.table.flush()

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step, Tally};
-use endowire_core::vessel::{Lumen, NoStore, Wall};
+use endowire_core::vessel::{Lumen, NoStore, Sac, Wall};
 use endowire_methods::Scene;
 use endowire_sweep::seal;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ use super::whole;
 use crate::failure::Failure;
 
 /// First line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 18";
+const FORMAT: &str = "endowire state 19";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// Hashes of everything that the steps up to a state depended on.
@@ -29,6 +29,8 @@ pub(crate) struct Parts {
     motion: String,
     flow: String,
     wall: String,
+    sac: String,
+    field: String,
     device: String,
     sheath: String,
     method: String,
@@ -47,8 +49,8 @@ fn vessel(lumen: &Lumen) -> String {
 }
 
 impl Parts {
-    /// The hashes for a simulation of `scene`.
-    fn new(scene: &Scene, simulation: &Simulation) -> Self {
+    /// The hashes for a simulation of `scene`, whose packing is recorded in this sac.
+    fn new(scene: &Scene, simulation: &Simulation, sac: Option<&Sac>) -> Self {
         let json = |value: Result<Vec<u8>, serde_json::Error>| hash(value.unwrap_or_default());
         // Without flow, results do not depend on a centre line.
         let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline(&NoStore).ok());
@@ -60,6 +62,8 @@ impl Parts {
             motion: json(serde_json::to_vec(&scene.vessel.motion)),
             flow: json(serde_json::to_vec(&(&scene.vessel.flow, tree))),
             wall: json(serde_json::to_vec(&scene.vessel.wall)),
+            sac: json(serde_json::to_vec(&sac)),
+            field: json(serde_json::to_vec(&scene.field)),
             device: json(pushed(scene, simulation)),
             sheath: hash(sheath.collect()),
             method: json(serde_json::to_vec(&scene.method)),
@@ -73,6 +77,8 @@ impl Parts {
             ("how it moves (vessel.motion)", &self.motion, &other.motion),
             ("what flows in it (vessel.flow)", &self.flow, &other.flow),
             ("the properties of its wall (vessel.wall)", &self.wall, &other.wall),
+            ("the sac that coils fill (vessel.sac)", &self.sac, &other.sac),
+            ("the fields that act on the device (field)", &self.field, &other.field),
             ("the device", &self.device, &other.device),
             ("the sheath", &self.sheath, &other.sheath),
             ("the method or its options", &self.method, &other.method),
@@ -210,11 +216,11 @@ impl Saved {
         self.header.course.clone()
     }
 
-    /// Restores the state in a simulation of the scene at its start, if it was saved in the same scene; returns the
-    /// script at that step. `seen` is called with each step so far.
+    /// Restores the state in a simulation of the scene at its start, if it was saved in the same scene with the same
+    /// sac; returns the script at that step. `seen` is called with each step so far.
     pub(crate) fn restore<'a>(
         &self,
-        scene: &Scene,
+        (scene, sac): (&Scene, Option<&Sac>),
         simulation: &mut Simulation,
         script: &'a Script,
         seen: impl FnMut(Step<'_>),
@@ -228,7 +234,7 @@ impl Saved {
                 self.header.scene
             )));
         }
-        let mut differing = self.header.parts.differing(&Parts::new(scene, simulation));
+        let mut differing = self.header.parts.differing(&Parts::new(scene, simulation, sac));
         let several = simulation.stack().is_several();
         let run = match replayed(script, &self.header.lines, several, seen) {
             Ok((run, hash)) if hash == self.header.script => Some(run),
@@ -271,9 +277,9 @@ pub(crate) struct Saver {
 }
 
 impl Saver {
-    /// For a simulation of `scene`; an existing file is replaced.
-    pub(crate) fn new(path: &Path, scene: &Scene, simulation: &Simulation) -> Self {
-        let parts = Parts::new(scene, simulation);
+    /// For a simulation of `scene` with its sac; an existing file is replaced.
+    pub(crate) fn new(path: &Path, (scene, sac): (&Scene, Option<&Sac>), simulation: &Simulation) -> Self {
+        let parts = Parts::new(scene, simulation, sac);
         Self { path: path.to_path_buf(), scene: scene.name.clone(), parts, last: None }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use crate::common::{endowire, said, scene_text};
+use crate::common::{assets, endowire, said, scene_text};
 use serde_json::Value;
 
 /// The lines of the script, each of several steps: pushing, turning, pulling back.
@@ -203,6 +203,11 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
             "[[vessel.motion]]\nwaveform = \"steady\"\ndisplacement_mm = [0.5, 0.0, 0.0]\n\n[sheath]",
             "how it moves (vessel.motion) is not",
         ),
+        (
+            "[sheath]",
+            "[[field]]\nkind = \"weight\"\nforce_n_per_mm = [0.0, 0.0, 1e-5]\n\n[sheath]",
+            "the fields that act on the device (field) is not",
+        ),
         ("retract_mm", "advance_mm", "the script"),
         ("advance_mm = 120.0", "advance_mm = 100.0", "step 50, and the script has 45"),
         ("advance_mm = 120.0", "advance_mm = 119.0", "the part of the script that was carried out is not"),
@@ -224,7 +229,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     // What is no state, and one that is damaged at any byte.
     let bytes = std::fs::read(&state).unwrap();
     let damaged = at("damaged");
-    let newer = [b"endowire state 19", &bytes["endowire state 18".len()..]].concat();
+    let newer = [b"endowire state 20", &bytes["endowire state 19".len()..]].concat();
     let mut changed = bytes.clone();
     let middle = changed.len() / 2;
     changed[middle] ^= 1;
@@ -254,6 +259,38 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     done(&run(&at("less.toml"), &at("less"), &[]));
     assert!(refused(&text, &state, "less").contains("another shape"));
     assert_eq!(files(&at("out")), kept);
+}
+
+#[test]
+fn a_state_of_another_sac_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = format!(
+        "[vessel]\nfile = {:?}\n[vessel.sac]\ndome_mm = [2.0, 6.0, 35.0]\nparent_mm = [2.0, 0.0, 36.0]\n[sheath]\nopening = 0\n\
+         [[device.section]]\nlength_mm = 50.0\nradius_mm = 0.2\nbending_stiffness_nmm2 = 1.0\n\
+         [method]\nelement_mm = 2.0\n[[script]]\nadvance_mm = 4.0\n[view]\nviews = []\n",
+        assets().join("vessels/sidewall_aneurysm.stl")
+    );
+    std::fs::write(at("scene.toml"), text).unwrap();
+    let state = at("state");
+    done(&run(&at("scene.toml"), &at("out"), &["--save-state".as_ref(), &state]));
+    let kept = files(&at("out"));
+    // Without a coil nothing is filled, and nothing has no sign.
+    let packing = std::fs::read_to_string(at("out/packing.csv")).unwrap();
+    assert!(packing.lines().count() == 5 && !packing.contains("-0.0"), "{packing}");
+    let resumed = |set: &str| {
+        let more: [&Path; 4] = ["--resume".as_ref(), &state, "--set".as_ref(), set.as_ref()];
+        run(&at("scene.toml"), &at("out"), &more)
+    };
+    let other = resumed("vessel.sac.parent_mm=[2.0, 0.5, 30.0]");
+    assert_eq!(other.status.code(), Some(2), "{}", said(&other));
+    assert!(
+        said(&other).contains("the sac that coils fill (vessel.sac) is not the same"),
+        "{}",
+        said(&other)
+    );
+    assert_eq!(files(&at("out")), kept);
+    done(&resumed("vessel.sac.parent_mm=[2.0, 0.0, 36.0]"));
 }
 
 #[test]

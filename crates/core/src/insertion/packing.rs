@@ -61,7 +61,8 @@ impl Packing {
         let pieces = pieces(simulation);
         let (inside, outside): (Vec<_>, Vec<_>) = pieces.iter().partition(|p| height_mm(&p.at_mm) >= 0.0);
         let volume = |piece: &&Piece| std::f64::consts::PI * piece.radius_mm.powi(2) * piece.length_mm;
-        let coils_mm3: f64 = inside.iter().map(volume).sum();
+        // From 0: the sum of no values would be −0.
+        let coils_mm3 = inside.iter().map(volume).fold(0.0, |sum, mm3| sum + mm3);
         let outside_mm = outside.iter().fold(0.0, |sum, piece| sum + piece.length_mm);
         let contacts = simulation.report().contacts.iter();
         let at_dome = contacts.filter(|contact| height_mm(&contact.position_mm) >= 0.0);

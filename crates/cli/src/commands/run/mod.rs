@@ -43,7 +43,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
     }
     let sac = scene.sac(simulation.lumen(), &cache).map_err(in_scene)?;
-    let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
+    let saver = args.save_state.as_ref().map(|path| Saver::new(path, (&scene, sac.as_ref()), &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation), &cache)?;
     if !args.quiet {
         scenes::tell_found_centreline(&args.scene, &scene);
@@ -53,7 +53,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     let mut times_s = Vec::new();
     let mut hand = match &saved {
-        Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {
+        Some(saved) => saved.restore((&scene, sac.as_ref()), &mut simulation, &script, |step| {
             times_s.push(step.time_s.unwrap_or_else(|| frames.time_s(times_s.len() + 1)));
         })?,
         None => script.begin(),
