@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use endowire_assess::{Exam, Score, Scored, Site, Subject, Threshold};
 use endowire_core::error::nearest_name;
+use endowire_core::insertion::Simulation;
 use endowire_methods::{Scene, Setting};
-use endowire_play::lumens;
+use endowire_play::{Limits, lumens};
 use endowire_viewer::ViewSpec;
 use serde::Serialize;
 
 use crate::cache::Cache;
+use crate::commands::play;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::scenes;
@@ -19,6 +21,9 @@ pub(crate) const FOLDER: &str = "assets/subjects";
 
 /// Size limit of input files, bytes; a larger file is not examined.
 const LARGEST_FILE: u64 = 16 << 20;
+
+/// Size of the pictures of a session that shows none, pixels.
+pub(crate) const SIDE_PX: u32 = 64;
 
 /// A score with its provenance.
 #[derive(Serialize)]
@@ -69,15 +74,39 @@ pub(crate) fn settings(subject: &Subject) -> Result<Vec<Setting>, Failure> {
     parsed.collect::<Result<_, _>>().map_err(|error| Failure::from(error).at(subject.path().display()))
 }
 
-/// The exam of a subject in its scene, which was read from a file.
-pub(crate) fn exam(subject: Subject, (scene, path): (&Scene, &Path), cache: &Cache) -> Result<Exam, Failure> {
+/// The scene of a subject with its path, and the exam there.
+///
+/// Everything is refused here that `subject run` refuses before its first step.
+pub(crate) fn in_scene(subject: &Subject, cache: &Cache) -> Result<(Scene, PathBuf, Exam), Failure> {
+    let path = subject.resolve(&subject.scene);
+    let scene = scenes::read(&path, &settings(subject)?)?;
+    let in_subject = |failure: Failure| failure.at(subject.path().display());
+    let (session, _) = play::open(&scene, &path, cache, SIDE_PX, Limits::default()).map_err(in_subject)?;
+    let exam = exam(subject.clone(), (&scene, &path), session.simulation(), cache)?;
+    Ok((scene, path, exam))
+}
+
+/// The exam of a subject in its scene, which was read from a file and has this simulation at its start. A reference that
+/// is no script for this scene is refused.
+pub(crate) fn exam(
+    subject: Subject,
+    (scene, path): (&Scene, &Path),
+    simulation: &Simulation,
+    cache: &Cache,
+) -> Result<Exam, Failure> {
     let place = subject.path().display().to_string();
     let in_subject = |error: endowire_core::Error| Failure::from(error).at(&place);
     // Only a target point needs the centre line, which may have to be extracted first.
     let tree = subject.goal.target().map(|_| scene.centreline(cache)).transpose().map_err(in_subject)?;
-    let stack = scene.stack().map_err(in_subject)?;
+    let stack = simulation.stack();
+    if let Some(reference) = &subject.reference {
+        let file = subject.resolve(reference);
+        let lines = scene.read_script(&file).map_err(in_subject)?;
+        let place = |error: endowire_core::Error| Failure::from(error).at(file.display()).at(&place);
+        scene.steps_of(&lines, stack, cache).map_err(place)?;
+    }
     let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
-    let all_solid = !lumens(&stack, &ViewSpec::of_scene(scene, path)?).contains(&true);
+    let all_solid = !lumens(stack, &ViewSpec::of_scene(scene, path)?).contains(&true);
     let site = Site { tree, instruments: &instruments, has_sac: scene.vessel.sac.is_some(), all_solid };
     Ok(Exam::new(subject, &site)?)
 }

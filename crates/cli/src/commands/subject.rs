@@ -16,10 +16,7 @@ use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{answer, tell};
 use crate::scenes;
-use crate::subjects::{self, ScoreDocument};
-
-/// Size of the pictures, pixels; they are not shown.
-const SIDE_PX: u32 = 64;
+use crate::subjects::{self, SIDE_PX, ScoreDocument};
 
 /// The document of `subject list`.
 #[derive(Serialize)]
@@ -116,9 +113,7 @@ fn list(folder: &Path, json: bool) -> Result<(), Failure> {
 fn show(which: &Path, cache: &Cache, json: bool) -> Result<(), Failure> {
     let subject = subjects::read(which)?;
     // What does not fit its scene is refused here as in `run`.
-    let path = subject.resolve(&subject.scene);
-    let scene = scenes::read(&path, &subjects::settings(&subject)?)?;
-    subjects::exam(subject.clone(), (&scene, &path), cache)?;
+    subjects::in_scene(&subject, cache)?;
     let document = Shown {
         provenance: Provenance::new(&[read_input(subject.path())?], 0),
         subject: subject.stem(),
@@ -163,8 +158,8 @@ fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
     let settings = subjects::settings(&subject)?;
     let scene = scenes::with_script(&path, &settings, reference.as_deref())?;
     let cache = Cache::new(&args.cache);
-    let exam = subjects::exam(subject, (&scene, &path), &cache)?;
     let (session, script) = play::open(&scene, &path, &cache, SIDE_PX, Warnings::default())?;
+    let exam = subjects::exam(subject, (&scene, &path), session.simulation(), &cache)?;
     let mut session = session.with_script(script).with_exam(exam);
     let begun = [Input::Pedal { down: true, mode: Some(Mode::Fluoro) }, Input::Script {}];
     begun
@@ -182,7 +177,8 @@ fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&stem));
     let provenance = Provenance::of_scene(&scene, &settings)?;
-    let record = Record::new(folder.join("played.toml"), &path, &settings).scored(provenance.clone());
+    let record = Record::new(folder.join("played.toml"), &path, &settings)?;
+    let mut record = record.scored(provenance.clone());
     record.finish(&session)?;
     let Some(score) = session.score() else { return Ok(()) };
     answer(&ScoreDocument { provenance: &provenance, score: &score }, args.json, || subjects::text(&score))?;

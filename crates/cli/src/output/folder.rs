@@ -1,4 +1,4 @@
-//! The folder of a recording. Only one run at a time may hold it, and only files of an earlier recording are removed
+//! The folder of a recording. Only one run at a time may hold it, as only one session its file, and only files of an earlier recording are removed
 //! from it.
 
 use std::fs::{File, OpenOptions, TryLockError};
@@ -17,11 +17,11 @@ use crate::failure::Failure;
 pub(crate) const TABLE: &str = "steps.csv";
 /// Start of its first line.
 const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
-/// Locked by the run that records. The empty file remains afterwards: only the lock counts, and it is released when a
+/// Locked by the run that records; of a session, with the name of its script before it. The empty file remains afterwards: only the lock counts, and it is released when a
 /// program dies.
 const LOCK: &str = ".endowire-lock";
 
-/// The right to record into a folder, until it is dropped.
+/// The right to record into a folder or a file, until it is dropped.
 pub(crate) struct Claim {
     /// `None` on a file system without locks.
     _lock: Option<File>,
@@ -44,7 +44,7 @@ pub(crate) fn claim(folder: &Path, force: bool) -> Result<Claim, Failure> {
         )));
     }
     std::fs::create_dir_all(folder).map_err(failed)?;
-    let claim = lock(folder)?;
+    let claim = claim_again(folder)?;
     let removed = remove_earlier(folder, is_recording(folder)).map_err(failed)?;
     if !removed.is_empty() {
         let what = if earlier { "the earlier recording" } else { "files" };
@@ -55,7 +55,23 @@ pub(crate) fn claim(folder: &Path, force: bool) -> Result<Claim, Failure> {
 
 /// Locks the folder of a recording that resumes.
 pub(crate) fn claim_again(folder: &Path) -> Result<Claim, Failure> {
-    lock(folder)
+    lock(&folder.join(LOCK), || {
+        let folder = folder.display();
+        format!(
+            "--out {folder}: another run is recording into this folder: wait until it has ended, or give another folder"
+        )
+    })
+}
+
+/// Locks the file of a session's script, whose folder exists.
+pub(crate) fn claim_file(script: &Path) -> Result<Claim, Failure> {
+    let name = script.file_name().unwrap_or_default().to_string_lossy();
+    lock(&script.with_file_name(format!(".{name}{LOCK}")), || {
+        let script = script.display();
+        format!(
+            "--record {script}: another session is being recorded there: wait until it has ended, or give another file"
+        )
+    })
 }
 
 /// Removes the frames of a recording: those of the remaining steps are drawn again.
@@ -63,16 +79,12 @@ pub(crate) fn remove_frames(folder: &Path) -> io::Result<()> {
     frames(&folder.join("frames"))?.iter().try_for_each(std::fs::remove_file)
 }
 
-fn lock(folder: &Path) -> Result<Claim, Failure> {
-    let path = folder.join(LOCK);
-    let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
-    let file = file.map_err(|e| Failure::write(&path, &e))?;
+fn lock(path: &Path, taken: impl FnOnce() -> String) -> Result<Claim, Failure> {
+    let file = OpenOptions::new().create(true).truncate(false).write(true).open(path);
+    let file = file.map_err(|e| Failure::write(path, &e))?;
     match file.try_lock() {
         Ok(()) => Ok(Claim { _lock: Some(file) }),
-        Err(TryLockError::WouldBlock) => Err(Failure::Input(format!(
-            "--out {}: another run is recording into this folder: wait until it has ended, or give another folder",
-            folder.display()
-        ))),
+        Err(TryLockError::WouldBlock) => Err(Failure::Input(taken())),
         // Some network file systems have no locks; there the recording runs without one.
         Err(TryLockError::Error(_)) => Ok(Claim { _lock: None }),
     }
@@ -125,7 +137,7 @@ pub(crate) fn step_times(folder: &Path) -> Result<Vec<(usize, f64)>, Failure> {
 /// A file that the program did not write.
 fn first_file(folder: &Path) -> Option<std::ffi::OsString> {
     let names = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.file_name());
-    names.filter(|name| name != LOCK).min()
+    names.filter(|name| !name.to_string_lossy().ends_with(LOCK)).min()
 }
 
 /// Removes the files of a recording and returns their names. Frames are removed only if the folder is a recording.

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::process::Child;
 
-use crate::common::{Listening, endowire, play, scene};
+use crate::common::{Listening, endowire, play, said, scene, wait_until};
 use serde_json::{Value, json};
 
 /// Sends lines, and has the answers.
@@ -175,6 +175,40 @@ fn a_program_that_leaves_takes_nothing_with_it() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     let text = std::fs::read_to_string(&record).unwrap();
     assert!(text.contains("advance_mm = 12.0") && text.contains("advance_mm = 0.5"), "{text}");
+}
+
+#[test]
+fn what_a_killed_session_leaves_is_of_one_session_and_its_file_is_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let [session, score] = ["session.json", "score.json"].map(|end| record.with_extension(end));
+    // Of an earlier session.
+    for file in [&record, &session, &score] {
+        std::fs::write(file, "earlier").unwrap();
+    }
+    let more = ["--headless", "--realtime", "--size", "64"];
+    let mut child = play("curved_tube.toml", &record, &more).spawn().unwrap();
+    child.stdin.as_mut().unwrap().write_all(b"{\"do\": \"move\", \"mm_per_s\": 5}\n").unwrap();
+    let text = |file: &std::path::Path| std::fs::read_to_string(file).unwrap_or_default();
+    wait_until(|| text(&session).contains("scene_file"));
+    // Another session may record beside it, and not to the same file.
+    let second = play("curved_tube.toml", &record, &["--headless"]).output().unwrap();
+    let told = said(&second);
+    assert!(
+        second.status.code() == Some(2) && told.contains("another session is being recorded there"),
+        "{told}"
+    );
+    let beside =
+        play("curved_tube.toml", &folder.path().join("other.toml"), &["--headless"]).output().unwrap();
+    assert!(beside.status.success(), "{}", said(&beside));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(text(&record).contains("[[script]]") && !score.exists(), "{}", text(&record));
+    let assessed = endowire().arg("assess").arg(&session).arg("--json").output().unwrap();
+    assert!(assessed.status.success(), "{}", said(&assessed));
+    // Its lock has died with it.
+    let again = play("curved_tube.toml", &record, &["--headless"]).output().unwrap();
+    assert!(again.status.success(), "{}", said(&again));
 }
 
 /// Random lines of bytes from a fixed seed, some of them nearly commands.

@@ -283,18 +283,42 @@ fn what_does_not_fit_its_scene_is_refused_when_it_is_shown() {
     let folder = tempfile::tempdir().unwrap();
     let carotid = "scene = \"SCENES/arch_carotid.toml\"\n";
     let goal = "[goal]\ntarget = \"left carotid\"\ntip_within_mm = 10.0\n";
+    std::fs::write(folder.path().join("far.toml"), "[[script]]\nadvance_mm = 10000.0\n").unwrap();
     for (content, told) in [
         (format!("{carotid}{}", goal.replace("left carotid", "left carotis")), "goal.target"),
         (format!("{carotid}{goal}instrument = \"catheter\"\n"), "goal.instrument"),
         (format!("{carotid}set = [\"vessel.wall.frictoin=0.1\"]\n{goal}"), "frictoin"),
         (format!("{carotid}{goal}inject_ml = 5.0\n"), "goal.inject_ml = 5: no instrument has a lumen"),
+        (
+            format!("{carotid}set = [\"vessel.wall.friction=9\"]\n{goal}"),
+            "own.toml: SCENES/arch_carotid.toml: vessel.wall.friction = 9: must be",
+        ),
+        (
+            format!("{carotid}reference = \"SCENES/arch_carotid.toml\"\n{goal}"),
+            "own.toml: SCENES/arch_carotid.toml: ",
+        ),
+        (
+            format!("{carotid}reference = \"far.toml\"\n{goal}"),
+            "far.toml: script[0].advance_mm = 10000: in its step",
+        ),
+        (
+            format!("{carotid}{goal}[[threshold]]\nmetric = \"packing_density\"\nat_least = 0.2\n"),
+            "threshold[0].metric = \"packing_density\": there is no sac",
+        ),
     ] {
         let file = own_subject(folder.path(), &content);
         let output = endowire().args(["subject", "show", text(&file)]).output().unwrap();
-        assert!(output.status.code() == Some(2) && said(&output).contains(told), "{told}: {}", said(&output));
+        let told = told.replace("SCENES", &assets().join("scenes").display().to_string());
+        assert!(
+            output.status.code() == Some(2) && said(&output).contains(&told),
+            "{told}: {}",
+            said(&output)
+        );
     }
-    let file = own_subject(folder.path(), &format!("{carotid}{goal}"));
+    std::fs::write(folder.path().join("far.toml"), "[[script]]\nadvance_mm = 10.0\n").unwrap();
+    let file = own_subject(folder.path(), &format!("{carotid}reference = \"far.toml\"\n{goal}"));
     assert!(endowire().args(["subject", "show", text(&file)]).output().unwrap().status.success(), "the twin");
+    std::fs::remove_file(folder.path().join("far.toml")).unwrap();
     // One that cannot be read leaves the others in the list.
     std::fs::write(folder.path().join("bad.toml"), "level = 9\n").unwrap();
     let output = endowire().args(["subject", "list", text(folder.path())]).output().unwrap();

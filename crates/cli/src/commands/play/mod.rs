@@ -99,9 +99,10 @@ fn play_in(args: &PlayArgs, subject: Option<Subject>) -> Result<(), Failure> {
     }
     let record =
         args.record.clone().unwrap_or_else(|| Path::new("out").join(&scene.name).join("played.toml"));
-    let mut record = Record::new(record, &args.scene, &args.set.set);
+    let mut record = Record::new(record, &args.scene, &args.set.set)?;
     if let Some(subject) = subject {
-        session = session.with_exam(subjects::exam(subject, (&scene, &args.scene), &cache)?);
+        let exam = subjects::exam(subject, (&scene, &args.scene), session.simulation(), &cache)?;
+        session = session.with_exam(exam);
         record = record.scored(Provenance::of_scene(&scene, &args.set.set)?);
     }
     let session = begun(session, args).map_err(in_scene)?;

@@ -1,6 +1,7 @@
 //! Saves a session to disk.
 
 use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use endowire_assess::SessionFile;
@@ -8,6 +9,7 @@ use endowire_methods::Setting;
 use endowire_play::{Session, Went, script_head};
 
 use crate::failure::Failure;
+use crate::output::folder::{self, Claim};
 use crate::output::provenance::Provenance;
 use crate::output::{session as session_file, tell, to_json, whole};
 use crate::subjects::ScoreDocument;
@@ -15,7 +17,8 @@ use crate::subjects::ScoreDocument;
 /// Interval between saves of a running session.
 const EVERY: Duration = Duration::from_secs(2);
 
-/// The file of a session's script.
+/// The files of a session: its script, and beside it what is assessed. They are always of one session: those of an
+/// earlier one are removed before the first is written.
 pub(crate) struct Record {
     path: PathBuf,
     head: String,
@@ -25,16 +28,33 @@ pub(crate) struct Record {
     provenance: Option<Provenance>,
     /// Start time, for a session in real time.
     recorded_unix_s: Option<u64>,
-    written: Instant,
+    /// Begin of the last save.
+    saved: Instant,
+    /// The save under way: hands do not wait for it.
+    saving: Option<JoinHandle<Result<(), Failure>>>,
+    /// Whether files of an earlier session are removed.
+    cleared: bool,
+    _claim: Claim,
 }
 
 impl Record {
-    /// A record at `path` of a session in a scene with these settings.
-    pub(crate) fn new(path: PathBuf, scene: &Path, settings: &[Setting]) -> Self {
-        let head = script_head(scene, settings, &path);
-        let set = settings.iter().map(ToString::to_string).collect();
-        let scene = scene.to_path_buf();
-        Self { path, head, scene, set, provenance: None, recorded_unix_s: None, written: Instant::now() }
+    /// A record at `path` of a session in a scene with these settings. Its folder is created, and no other session can
+    /// record there meanwhile.
+    pub(crate) fn new(path: PathBuf, scene: &Path, settings: &[Setting]) -> Result<Self, Failure> {
+        let folder = folder_of(&path);
+        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
+        Ok(Self {
+            head: script_head(scene, settings, &path),
+            scene: scene.to_path_buf(),
+            set: settings.iter().map(ToString::to_string).collect(),
+            provenance: None,
+            recorded_unix_s: None,
+            saved: Instant::now(),
+            saving: None,
+            cleared: false,
+            _claim: folder::claim_file(&path)?,
+            path,
+        })
     }
 
     /// Marks the session as one in real time that starts now. A session whose time advances by inputs has no date, so
@@ -52,37 +72,59 @@ impl Record {
 
     /// Folder of the script.
     pub(crate) fn folder(&self) -> &Path {
-        self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+        folder_of(&self.path)
     }
 
     /// Saves the session at intervals, in case the program is killed.
     pub(crate) fn keep(&mut self, session: &Session) -> Result<(), Failure> {
-        if self.written.elapsed() < EVERY {
+        let busy = self.saving.as_ref().is_some_and(|saving| !saving.is_finished());
+        if busy || self.saved.elapsed() < EVERY {
             return Ok(());
         }
-        self.written = Instant::now();
-        self.write(session)
+        self.save(session)
     }
 
-    fn write(&self, session: &Session) -> Result<(), Failure> {
-        let folder = self.folder();
-        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
+    /// Begins to save the session as it is.
+    fn save(&mut self, session: &Session) -> Result<(), Failure> {
+        self.saved_whole()?;
+        self.saved = Instant::now();
+        if !std::mem::replace(&mut self.cleared, true) {
+            for file in [session_file::beside(&self.path), self.score_file()] {
+                whole::remove(&file).map_err(|e| Failure::write(&file, &e))?;
+            }
+        }
         let text = format!("{}{}", self.head, session.script());
-        whole::write_bytes(&self.path, text.as_bytes()).map_err(|e| Failure::write(&self.path, &e))
-    }
-
-    /// Saves the whole session, with the files for assessment, and reports the path.
-    pub(crate) fn finish(&self, session: &Session) -> Result<(), Failure> {
-        self.write(session)?;
         let of_session = SessionFile {
             scene_file: self.scene.clone(),
             set: self.set.clone(),
             recorded_unix_s: self.recorded_unix_s,
             record: session.record().clone(),
         };
-        session_file::write(&of_session, &session_file::beside(&self.path))?;
+        let script = self.path.clone();
+        self.saving = Some(std::thread::spawn(move || {
+            whole::write_bytes(&script, text.as_bytes()).map_err(|e| Failure::write(&script, &e))?;
+            session_file::write(&of_session, &session_file::beside(&script))
+        }));
+        Ok(())
+    }
+
+    /// Waits for the save under way.
+    fn saved_whole(&mut self) -> Result<(), Failure> {
+        let stopped = |_| Failure::Computation(format!("{}: could not be saved", self.path.display()));
+        self.saving.take().map_or(Ok(()), |saving| saving.join().map_err(stopped)?)
+    }
+
+    /// File of the score of a subject.
+    fn score_file(&self) -> PathBuf {
+        self.path.with_extension("score.json")
+    }
+
+    /// Saves the whole session, with the files for assessment, and reports the path.
+    pub(crate) fn finish(&mut self, session: &Session) -> Result<(), Failure> {
+        self.save(session)?;
+        self.saved_whole()?;
         if let Some((provenance, score)) = self.provenance.as_ref().zip(session.score()) {
-            let path = self.path.with_extension("score.json");
+            let path = self.score_file();
             let text = to_json(&ScoreDocument { provenance, score: &score })?;
             whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
         }
@@ -98,4 +140,9 @@ impl Record {
         tell(format_args!("{} steps are recorded in {}{told}", session.steps(), self.path.display()));
         Ok(())
     }
+}
+
+/// Folder of a script.
+fn folder_of(script: &Path) -> &Path {
+    script.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
