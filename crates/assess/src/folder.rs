@@ -113,8 +113,11 @@ fn by_step<T>(rows: Vec<T>, step: impl Fn(&T) -> usize, most: usize) -> BTreeMap
     all
 }
 
+/// Hands by step.
+type Hands = BTreeMap<usize, Vec<Hand>>;
+
 /// Names and motions of several instruments, by step; none if there is no table of them, as of a single device.
-fn hands(folder: &Path, steps: &[Step]) -> Result<(Vec<String>, BTreeMap<usize, Vec<Hand>>)> {
+fn hands(folder: &Path, steps: &[Step]) -> Result<(Vec<String>, Hands)> {
     let path = folder.join(INSTRUMENTS);
     let Some(rows) = optional::<InstrumentRow>(&path)? else { return Ok((vec![], BTreeMap::new())) };
     let most = steps.last().map_or(0, |step| step.step);

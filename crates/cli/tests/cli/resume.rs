@@ -235,7 +235,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     changed[middle] ^= 1;
     let told = [
         (text.clone().into_bytes(), "is no saved state"),
-        (newer, "its format is \"endowire state 19\""),
+        (newer, "its format is \"endowire state 20\""),
         (changed, "is not whole or was changed"),
         (bytes[..bytes.len() - 1].to_vec(), "is not whole"),
         (bytes[..20].to_vec(), "is not whole"),
