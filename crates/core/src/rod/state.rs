@@ -144,6 +144,30 @@ impl RodState {
         }))
     }
 
+    /// Measures the angles of the first nodes from these triads, moved here by smallest rotations; the device stays as
+    /// it is.
+    ///
+    /// The smallest rotation does not spin a triad about its tangent. So where the triads are those of the same nodes
+    /// elsewhere, the difference of an angle is the spin of the device on the way. Measured from triads carried along
+    /// the rod it is not: those themselves spin by ∫ t·(t′ × δt) ds, the change of writhe (Fuller 1978).
+    pub(crate) fn measure_from(&mut self, triads: &[Frame]) {
+        let sets = self.sets();
+        let mut spin = 0.0;
+        for (i, from) in triads.iter().enumerate() {
+            let own = self.frames[i];
+            self.frames[i] = from.transported_to(&own.t);
+            let w = self.frames[i].u;
+            let more = libm::atan2(own.v.dot(&w), own.u.dot(&w)) - spin;
+            // As little more than at the node before as it can be.
+            let more = more - (more / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+            spin += more;
+            self.angles[sets * i..sets * (i + 1)].iter_mut().for_each(|angle| *angle -= spin);
+            if i > 0 {
+                self.reference_twists[i - 1] += more;
+            }
+        }
+    }
+
     /// The material triad (t, d₁, d₂) of node `i`, of the first instrument that has angles.
     pub(crate) fn material_frame(&self, i: usize) -> Frame {
         self.frames[i].turned(self.angle(i, 0))
@@ -289,4 +313,69 @@ fn mid_rate<const C: usize>(elements: &[ElementData], base: &RodState, d: &[f64]
 #[inline]
 fn position_step(d: &[f64], at: usize) -> Vec3 {
     Vec3::new(d[at], d[at + 1], d[at + 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const NODES: usize = 9;
+
+    /// A rod whose tangents go from z to this angle from it in the plane at this azimuth, with a uniform twist.
+    fn bent(angle: f64, azimuth: f64, twist: f64) -> RodState {
+        let elements = [ElementData::plain(1.0, 1.0); NODES - 1];
+        let tangent = |i: usize| {
+            let polar = angle * i as f64 / (NODES - 1) as f64;
+            Vec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos())
+        };
+        let mut frames = vec![Frame::new(Vec3::z(), Some(Vec3::x()))];
+        for i in 1..NODES {
+            frames.push(frames[i - 1].transported_to(&tangent(i)));
+        }
+        let mut state = RodState::from_frames(&elements, Vec3::zeros(), frames);
+        state.angles.iter_mut().enumerate().for_each(|(i, angle)| *angle = twist * i as f64);
+        state
+    }
+
+    #[test]
+    fn an_angle_measured_from_elsewhere_is_the_spin_on_the_way() {
+        let (angle, turn) = (1.2, 0.5);
+        let (before, mut after) = (bent(angle, 0.3, 0.1), bent(angle, 0.3 + turn, 0.1));
+        let was = after.clone();
+        after.measure_from(&before.frames);
+        // The area between the two paths of the tangent: of a spherical triangle with this angle between two sides.
+        let side = libm::tan(0.5 * angle).powi(2);
+        let area = 2.0 * (side * turn.sin()).atan2(1.0 + side * turn.cos());
+        let spin = after.angle(NODES - 1, 0) - before.angle(NODES - 1, 0);
+        assert!((spin.abs() - area).abs() < 1e-12, "{spin} {area}");
+        // Both rods carry their triads without twist: measured from those, nothing has turned.
+        assert_eq!(was.angle(NODES - 1, 0), before.angle(NODES - 1, 0));
+        assert_eq!(after.angle(0, 0), 0.0);
+    }
+
+    #[test]
+    fn measured_from_elsewhere_the_device_is_the_same() {
+        let before = bent(0.4, 0.0, 0.0);
+        let was = bent(2.5, 1.9, 1.0);
+        let mut after = was.clone();
+        after.measure_from(&before.frames);
+        for i in 0..NODES {
+            let off = (after.material_frame(i).u - was.material_frame(i).u).norm();
+            assert!(off < 1e-12 && after.frames[i].t == was.frames[i].t, "{off} at {i}");
+        }
+        for e in 0..NODES - 1 {
+            let twist = after.angles[e + 1] - after.angles[e] + after.reference_twists[e];
+            assert!((twist - 1.0).abs() < 1e-12, "{twist}");
+            let off = reference_twist(&after.frames[e], &after.frames[e + 1]) - after.reference_twists[e];
+            assert!((off / TAU - (off / TAU).round()).abs() < 1e-12, "{off}");
+        }
+        // Counter-check: the triads are others.
+        assert!((after.frames[NODES - 1].u - was.frames[NODES - 1].u).norm() > 0.1);
+        // And back.
+        after.measure_from(&was.frames);
+        for (a, b) in after.angles.iter().zip(&was.angles) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
 }

@@ -4,6 +4,11 @@ use super::{ROUNDING, WallContact};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 impl WallContact<'_> {
+    /// Whether there is friction.
+    pub(crate) fn rubs(&self) -> bool {
+        self.friction.acts()
+    }
+
     /// Renews the normal forces of friction from the contact forces at the base, unless held.
     pub(super) fn rub_with_contacts(&mut self) {
         if !self.friction.acts() {

@@ -6,7 +6,7 @@
 
 use super::carried::WallWork;
 use crate::device::Stack;
-use crate::methods::{InstrumentReport, StepReport};
+use crate::methods::StepReport;
 
 /// Released or missing energy is significant above this fraction of the energy stored or released from the sheath.
 const NOTABLE: f64 = 0.02;
@@ -53,11 +53,16 @@ impl Balance {
         };
         for index in 0..after.instruments.len().max(1) {
             let (was, is) = (before.hand(index), after.hand(index));
-            let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
+            let (first_n, last_n) = match (was.push_force_n, is.push_force_n) {
+                (Some(first_n), Some(last_n)) => (first_n, last_n),
+                // Where the force jumps, the one on the side of the motion counts.
+                (Some(force_n), None) | (None, Some(force_n)) => (force_n, force_n),
+                (None, None) => (shared_n(before), shared_n(after)),
+            };
             // With nothing inserted a hand feels nothing, and all that comes out of the sheath may pull.
             let comes_in = was.inserted_mm == 0.0 && is.inserted_mm > 0.0;
-            let at_first = if comes_in { -from_sheath_mj.abs() / is.inserted_mm } else { push(&was) };
-            add(at_first, push(&is), is.inserted_mm - was.inserted_mm);
+            let first_n = if comes_in { -from_sheath_mj.abs() / is.inserted_mm } else { first_n };
+            add(first_n, last_n, is.inserted_mm - was.inserted_mm);
             add(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
         }
         let (was, is) = (before.energy.total(), after.energy.total());
@@ -88,4 +93,18 @@ impl Balance {
     pub(super) fn borrowed_mj(&self, lost_mj: f64) -> f64 {
         (lost_mj - (self.mean_mj - self.stored_mj)).max(0.0)
     }
+}
+
+/// Equal share of the push force of instruments whose tips are level, N: each alone has none, all together have one, and they go equally
+/// far.
+fn shared_n(report: &StepReport) -> f64 {
+    let mut rest_n = report.push_force_n;
+    let mut level = 0.0;
+    for hand in report.instruments.iter().filter(|hand| hand.inserted_mm > 0.0) {
+        match hand.push_force_n {
+            Some(force_n) => rest_n -= force_n,
+            None => level += 1.0,
+        }
+    }
+    rest_n / f64::max(level, 1.0)
 }

@@ -3,7 +3,9 @@
 //! The line is as long as the instrument inserted farthest, and its nodes are marks at whole element lengths from its
 //! tip. Where another instrument or a section ends, stiffness jumps, and a node moves with that end; a mark within
 //! half an element of it is removed, so that no sliver arises while an end slides by. Two ends closer than [`NEAR`]
-//! share a node, and material ending inside an element counts by its share of the element.
+//! share a node, and material ending inside an element counts by its share of the element. An end that has no node
+//! because it is near another one counts as at that one: as a share of its own, a stiff section of a micrometre would be
+//! bent as much as the soft one beside it.
 //!
 //! The outermost instrument at a position touches the wall, at the contact points that it would have alone: they are
 //! marks on it, and their weights end where it becomes covered. So energies are continuous as ends pass nodes.
@@ -13,6 +15,10 @@ use crate::contact::ContactPoint;
 use crate::device::{Device, Section, Stack, line_mm};
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material, shares};
+
+/// An end of a section as near to a node as this fraction of its element counts as at the node: above [`NEAR`] in all
+/// elements but slivers, since others are at least half as long as they should be.
+const FLUSH: f64 = 2.5 * NEAR;
 
 /// What a node moves with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,9 +217,7 @@ pub(super) fn alone(device: &Device, set: Option<usize>, (near, far): (f64, f64)
 fn between(device: &Device, near: f64, far: f64) -> Material {
     let h = near - far;
     let mut sum = Material::NONE;
-    let last = device.sections().len() - 1;
-    for (k, (section, begin)) in device.sections().iter().zip(begins(device)).enumerate() {
-        let until = if k == last { f64::INFINITY } else { begin + section.length_mm };
+    for (section, begin, until) in flush_sections(device, near, far) {
         if begin <= far && near <= until {
             return material(section);
         }
@@ -223,6 +227,27 @@ fn between(device: &Device, near: f64, far: f64) -> Material {
         }
     }
     sum
+}
+
+/// The section that comes out of the sheath, of which an element has this distance from the tip at the mouth, and that
+/// at its other node.
+pub(super) fn at_mouth(device: &Device, near: f64, far: f64) -> &Section {
+    let mut each = flush_sections(device, near, far);
+    each.find(|(_, _, until)| near <= *until).map_or(device.section_at(near), |(section, ..)| section)
+}
+
+/// The sections of a device, and where they begin and end, from its tip. Those that end nearly at one of the nodes of
+/// an element end there.
+fn flush_sections(device: &Device, near: f64, far: f64) -> impl Iterator<Item = (&Section, f64, f64)> {
+    let last = device.sections().len() - 1;
+    let flush = move |end: f64| {
+        let node = if (end - near).abs() < (end - far).abs() { near } else { far };
+        if (end - node).abs() < FLUSH * (near - far) { node } else { end }
+    };
+    device.sections().iter().zip(begins(device)).enumerate().map(move |(k, (section, begin))| {
+        let until = if k == last { f64::INFINITY } else { flush(begin + section.length_mm) };
+        (section, flush(begin), until)
+    })
 }
 
 /// A section, at all Gauss points.

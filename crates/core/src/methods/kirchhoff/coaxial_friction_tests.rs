@@ -233,3 +233,33 @@ fn a_valve_holds_against_the_hand_and_moves_nothing_inside() {
     assert!(told(sheath.rubbing(-1.0, 0.0).unwrap_err()).starts_with("sheath.friction_n = -1"));
     assert!(told(sheath.rubbing(0.0, 3.0).unwrap_err()).starts_with("sheath.friction = 3"));
 }
+
+#[test]
+fn level_tips_on_a_rough_wall_are_pushed_as_one_device_is() {
+    let wire = Section::straight(320.0, 0.3, 5.0);
+    let catheter = Section { inner_radius_mm: Some(0.35), ..Section::straight(300.0, 0.6, 15.0) };
+    let torsional_stiffness_nmm2 = Some(catheter.torsion_nmm2());
+    let alone = Section { bending_stiffness_nmm2: 20.0, torsional_stiffness_nmm2, ..catheter };
+    let single = rubbing(bend(), 4.0, Device::new(vec![alone]).unwrap(), FRICTION);
+    // Level, nearly level, and apart.
+    for ahead_mm in [0.0, 1e-6, 0.01] {
+        let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
+        let mut both = rubbing(bend(), 4.0, stack, FRICTION);
+        let mut one = single.clone();
+        if ahead_mm > 0.0 {
+            push(&mut both, &[(WIRE, ahead_mm)]).unwrap();
+        }
+        for _ in 0..60 {
+            push(&mut both, &[(WIRE, 1.0), (CATHETER, 1.0)]).unwrap();
+            one.step(Command::advance(1.0)).unwrap();
+            assert_eq!(
+                both.report().relaxations,
+                0,
+                "{ahead_mm} mm ahead at {} mm",
+                one.report().inserted_mm
+            );
+        }
+        let [force_n, expected_n] = [&both, &one].map(|simulation| simulation.report().push_force_n);
+        assert!((force_n / expected_n - 1.0).abs() < 0.01, "{ahead_mm} mm ahead: {force_n} {expected_n} N");
+    }
+}

@@ -401,3 +401,25 @@ fn instruments_with_flush_tips_push_together_as_one_does() {
         "{sum} {alone_n}"
     );
 }
+
+#[test]
+fn the_end_of_a_section_leaves_the_sheath_without_a_jump_of_the_push_force() {
+    let wire = Section::straight(300.0, 0.2, 50.0);
+    let tip =
+        Section { length_mm: 20.0, bending_stiffness_nmm2: 0.1, rest_curvature_per_mm: [0.05, 0.0], ..wire };
+    let catheter = Section { inner_radius_mm: Some(0.4), ..Section::straight(200.0, 0.6, 20.0) };
+    let catheter = [Section { length_mm: 100.0, ..catheter }, catheter];
+    let stack = Stack::new(vec![instrument("wire", [tip, wire]), instrument("catheter", catheter)]).unwrap();
+    let mut simulation = in_tube(stack, 20.0);
+    push(&mut simulation, &[(CATHETER, 10.0)]).unwrap();
+    for _ in 0..19 {
+        push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
+    }
+    // The soft tip pushes itself out by ½ EI κ², before and after.
+    for beyond_mm in [-0.5, -1e-3, 0.0, 1e-7, 1e-5, 1e-4, 5e-4, 9.99e-4, 1e-3, 1.001e-3, 2e-3, 3e-3, 0.5] {
+        let mut there = simulation.clone();
+        push(&mut there, &[(WIRE, 1.0 + beyond_mm)]).unwrap();
+        let told = there.report().instruments[WIRE].push_force_n.unwrap();
+        assert!((told + 1.25e-4).abs() < 5e-6, "{told} N at {beyond_mm} mm");
+    }
+}

@@ -16,7 +16,7 @@ pub(super) struct Guess {
     pub(super) motions: Vec<HandMotion>,
     /// The correction, on the nodes of the sub-step.
     learnt: Correction,
-    slid: RodState,
+    pub(super) slid: RodState,
     pub(super) other: RodState,
     /// The room of each node at the prediction, mm.
     pub(super) room_mm: Vec<f64>,
@@ -49,6 +49,9 @@ impl Guess {
             } else {
                 correction.transfer(start.mesh, mesh, &mut self.learnt);
                 self.learnt.apply(factor, line, state);
+            }
+            if contact.rubs() {
+                state.measure_from(&self.slid.frames[..=line.len()]);
             }
             let mut crosses =
                 || loops.as_deref_mut().is_some_and(|loops| loops.crosses(elements, &self.slid, state));

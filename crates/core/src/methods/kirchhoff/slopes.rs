@@ -9,7 +9,7 @@
 //! ½EI|κ⁰|² per length, is part of it.
 
 use super::Environment;
-use super::coaxial::Nodes;
+use super::coaxial::{Nodes, at_mouth};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
@@ -126,8 +126,11 @@ fn push_force<const C: usize>(
         });
         each.sum()
     });
-    let straightened_n =
-        together.iter().map(|index| stack.instruments()[*index].device.section_at(own).straightening_n());
+    let far = own - at.mesh.elements[0].length;
+    let straightened_n = together.iter().map(|index| {
+        let device = &stack.instruments()[*index].device;
+        at_mouth(device, inserted_mm[*index], far).straightening_n()
+    });
     Some(stored + wall + loops + field + turned - dragged - straightened_n.sum::<f64>())
 }
 

@@ -149,10 +149,11 @@ impl<const C: usize> Tools<C> {
             self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
             if let Some((_, passage)) = left {
                 self.friction.carry(passage, &self.guess.motions);
+                self.guess.slid.copy_from(&after.rod);
+                transport_from(start, &mut after.rod);
+                after.rod.measure_from(&self.guess.slid.frames);
             }
-        }
-        // Unless the vessel moved, it is already there.
-        if !self.friction.acts() || left.is_some() {
+        } else {
             transport_from(start, &mut after.rod);
         }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);

@@ -5,7 +5,7 @@ use crate::device::{Device, Section};
 use crate::insertion::{Command, Sheath, Simulation, WallProperties};
 use crate::methods::StepReport;
 use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
 
 /// A device in a straight tube along z, with a sheath at this place and direction.
 fn in_tube(
@@ -98,4 +98,68 @@ fn a_hook_that_slides_takes_what_the_hand_gives() {
         before = report;
     }
     assert!((given - left - taken).abs() < 0.02 * taken, "{given} {left} {taken}");
+}
+
+/// A straight tube of radius 1 mm and 70 mm, from the open end at 0 to the closed one.
+fn blind_tube() -> Wall {
+    const AROUND: u32 = 32;
+    let rings: Vec<(f64, f64)> = (0..=140)
+        .map(|i| (0.5 * f64::from(i), 1.0))
+        .chain((1..5).map(|i| (70.0, 1.0 - 0.2 * f64::from(i))))
+        .collect();
+    let mut mesh = SurfaceMesh::default();
+    for (z, radius_mm) in &rings {
+        let angles = (0..AROUND).map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(AROUND));
+        mesh.vertices_mm.extend(angles.map(|a| Vec3::new(radius_mm * a.cos(), radius_mm * a.sin(), *z)));
+    }
+    mesh.vertices_mm.push(Vec3::new(0.0, 0.0, 70.0));
+    let last = rings.len() as u32 - 1;
+    for k in 0..AROUND {
+        let next = (k + 1) % AROUND;
+        for i in 0..last {
+            let [a, b] = [k, next].map(|k| i * AROUND + k);
+            mesh.triangles.extend([[a, b, b + AROUND], [a, b + AROUND, a + AROUND]]);
+        }
+        mesh.triangles.push([last * AROUND + k, last * AROUND + next, (last + 1) * AROUND]);
+    }
+    Wall::from_surface(&mesh).unwrap()
+}
+
+/// A wire pushed against a closed end winds up on the wall of its tube. A coil that grows turns the wire beyond it about
+/// its axis, however little it is twisted, and its surface rubs on the wall.
+#[test]
+fn a_wire_that_winds_up_takes_what_the_hand_gives() {
+    let sheath = Sheath {
+        position_mm: Vec3::new(0.1, 0.0, 1.0),
+        direction: Vec3::new(0.01, 0.02, 1.0).normalize(),
+        friction: 0.0,
+        friction_n: 0.0,
+    };
+    let properties = WallProperties { friction: 0.3, modulus_n_per_mm2: 50.0, ..WallProperties::default() };
+    let method = KirchhoffOptions { element_mm: 1.0, ..KirchhoffOptions::default() };
+    let wire = Device::uniform(200.0, 0.5, 0.5).unwrap();
+    let builder = Simulation::builder(blind_tube(), wire, sheath).properties(properties);
+    let mut simulation = builder.method(&method).build().unwrap();
+    let mut before = go_on(&mut simulation, 68.0, 2.0);
+    let (mut given, mut left, mut taken) = (0.0, 0.0, 0.0);
+    while simulation.report().inserted_mm < 72.0 - 1e-9 {
+        let report = simulation.step(Command::advance(0.1)).unwrap().clone();
+        assert!(!report.jumped, "{}", report.inserted_mm);
+        given += 0.05 * (before.push_force_n + report.push_force_n);
+        left += report.energy.total() - before.energy.total();
+        taken += report.dissipated_mj;
+        before = report;
+    }
+    // It lies on the wall on all sides.
+    let across = |axis: usize| {
+        let each = simulation.shape().positions_mm.iter().map(|x| x[axis]);
+        each.fold((0.0f64, 0.0f64), |(least, most), x| (least.min(x), most.max(x)))
+    };
+    assert!(
+        [0, 1].iter().all(|axis| across(*axis).0 < -0.4 && across(*axis).1 > 0.4),
+        "{:?}",
+        [across(0), across(1)]
+    );
+    // The force in steps of 0.1 mm; without the turn half as much as friction takes would be missing.
+    assert!((given - left - taken).abs() < 0.1 * taken, "{given} {left} {taken}");
 }
