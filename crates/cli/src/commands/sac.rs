@@ -34,9 +34,14 @@ pub(crate) fn sac(args: &SacArgs) -> Result<(), Failure> {
     answer(&document, args.json, || text(&document))
 }
 
-/// Replaces the core's names `dome` and `parent` in an error by the flags of the command line.
+/// Replaces the core's names in an error by the flags of the command line. A surface without two openings has no centre
+/// line that says where the artery is.
 fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
+        Error::Parameter { name, value, .. } if ["from", "to"].contains(&name.as_str()) => {
+            let mend = "no centre line is found between two openings, by which the artery would be known: give a place in the artery";
+            Error::parameter("--parent", value, mend)
+        }
         Error::Parameter { name, value, mend } if ["dome", "parent"].contains(&name.as_str()) => {
             Error::Parameter { name: format!("--{name}"), value, mend }
         }

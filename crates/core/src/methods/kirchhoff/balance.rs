@@ -8,7 +8,8 @@ use super::carried::WallWork;
 use crate::device::Stack;
 use crate::methods::StepReport;
 
-/// Released or missing energy is significant above this fraction of the energy stored or released from the sheath.
+/// Released or missing energy is significant above this fraction of the energy that is stored in the device and the wall,
+/// exchanged with fields, or released from the sheath.
 const NOTABLE: f64 = 0.02;
 /// Energy below which none is significant, mJ.
 const NOTABLE_FLOOR_MJ: f64 = 1e-6;
@@ -65,9 +66,13 @@ impl Balance {
             add(first_n, last_n, is.inserted_mm - was.inserted_mm);
             add(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
         }
-        let (was, is) = (before.energy.total(), after.energy.total());
-        let notable_mj = NOTABLE * is.max(was).max(from_sheath_mj.abs()).max(NOTABLE_FLOOR_MJ);
-        Self { least_mj, mean_mj, most_mj, stored_mj: is - was - from_sheath_mj, rubbed_mj, notable_mj }
+        let (was, is) = (before.energy, after.energy);
+        let stored_mj = is.total() - was.total() - from_sheath_mj;
+        // The energy in a field has an arbitrary zero: its change counts.
+        let [elastic_was, elastic_is] = [was, is].map(|energy| energy.total() - energy.field);
+        let sizes_mj = [elastic_was, elastic_is, (is.field - was.field).abs(), from_sheath_mj.abs()];
+        let notable_mj = NOTABLE * sizes_mj.into_iter().fold(NOTABLE_FLOOR_MJ, f64::max);
+        Self { least_mj, mean_mj, most_mj, stored_mj, rubbed_mj, notable_mj }
     }
 
     /// Whether energy that had been put in was released.
