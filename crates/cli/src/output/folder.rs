@@ -1,5 +1,5 @@
-//! The folder of a recording. Only one run at a time may hold it, as only one session its file, and only files of an earlier recording are removed
-//! from it.
+//! The folder of a recording, and the file of a session. Only one run at a time may hold a folder, only one session a
+//! file, and only files of an earlier recording are removed from a folder.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read};
@@ -17,8 +17,8 @@ use crate::failure::Failure;
 pub(crate) const TABLE: &str = "steps.csv";
 /// Start of its first line.
 const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
-/// Locked by the run that records; of a session, with the name of its script before it. The empty file remains afterwards: only the lock counts, and it is released when a
-/// program dies.
+/// Locked by the run that records; by a session, with the name of its script before it. The empty file remains
+/// afterwards: only the lock counts, and it is released when a program dies.
 const LOCK: &str = ".endowire-lock";
 
 /// The right to record into a folder or a file, until it is dropped.

@@ -100,8 +100,8 @@ impl Balance {
     }
 }
 
-/// Equal share of the push force of instruments whose tips are level, N: each alone has none, all together have one, and they go equally
-/// far.
+/// Equal share of the push force of instruments whose tips are level, N: each alone has none, all together have one, and
+/// they go equally far.
 fn shared_n(report: &StepReport) -> f64 {
     let mut rest_n = report.push_force_n;
     let mut level = 0.0;

@@ -14,7 +14,7 @@
 //!
 //! A neck is where the area is least before it rises again, or before the descent ends. Where it falls on in two
 //! sections, a bend of the artery is cut off, not a sac. Along a straight neck all planes have the same area: of those
-//! whose area is hardly more than the least, the highest is taken, where the sac begins.
+//! whose area exceeds the least by at most [`EQUAL`], the highest is taken, where the sac begins.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -39,7 +39,7 @@ pub(super) struct Descent {
     short_mm: f64,
     /// Area, mm²; infinite if there is none below the middle.
     pub(super) area_mm2: f64,
-    /// Height above the middle of the highest plane of hardly more than that area, mm.
+    /// Height above the middle of the highest plane whose area counts as equal to that, mm.
     pub(super) level_mm: f64,
 }
 

@@ -143,7 +143,7 @@ fn the_neck_of_a_ball_on_a_tube_is_the_plane_that_touches_the_tube_whatever_the_
         let sac = sac.unwrap();
         assert!(is_wide(&sac, 7.0f64.sqrt()), "{sac:?}");
         assert!((sac.volume_mm3 / exact_mm3 - 1.0).abs() < 0.01, "{sac:?}");
-        // The area hardly depends on the normal.
+        // The area changes little with the normal.
         let normal = placed(Vec3::y()) - placed(Vec3::zeros());
         assert!(sac.normal.dot(&normal) > libm::cos(2.0f64.to_radians()), "{sac:?}");
         assert!((sac.neck_mm - placed(Vec3::y() * 2.0)).norm() < 0.1, "{sac:?}");
