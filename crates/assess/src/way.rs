@@ -60,23 +60,15 @@ impl Way {
 
     /// The way to a place that is not a target, so there is no arrival. `None` if the tree begins there.
     pub fn to_place(tree: &CentrelineTree, place_mm: &Vec3) -> Option<Self> {
-        Self::to_row(tree, tree.nearest_row(place_mm))
-    }
-
-    /// The way to a place; a tip within `within_mm` of it has arrived. `None` if the tree begins there.
-    pub fn towards(tree: &CentrelineTree, place_mm: Vec3, within_mm: f64) -> Option<Self> {
-        let way = Self::to_place(tree, &place_mm)?;
-        Some(Self { target_mm: Some((place_mm, within_mm)), ..way })
-    }
-
-    fn to_row(tree: &CentrelineTree, row: usize) -> Option<Self> {
-        let path = tree.path_to(row)?;
+        let path = tree.path_to_place(place_mm)?;
+        let (row, end_mm) = tree.nearest(place_mm);
         let (nodes, children) = (tree.nodes(), tree.children());
         let mut right = vec![false; nodes.len()];
         let (mut at, mut first_fork) = (Some(row), None);
         while let Some(of) = at {
             right[of] = true;
-            if children[of].len() > 1 {
+            let is_reached = of != row || end_mm == nodes[row].position_mm;
+            if children[of].len() > 1 && is_reached {
                 first_fork = Some(of);
             }
             at = nodes[of].parent;
@@ -87,6 +79,12 @@ impl Way {
             beyond.extend(&children[of]);
         }
         Some(Self { tree: tree.clone(), path, right, first_fork, target_mm: None, instrument: None })
+    }
+
+    /// The way to a place; a tip within `within_mm` of it has arrived. `None` if the tree begins there.
+    pub fn towards(tree: &CentrelineTree, place_mm: Vec3, within_mm: f64) -> Option<Self> {
+        let way = Self::to_place(tree, &place_mm)?;
+        Some(Self { target_mm: Some((place_mm, within_mm)), ..way })
     }
 
     /// The target, and the distance within which a tip has arrived, mm.

@@ -485,14 +485,14 @@ impl Vessel {
     /// The way along its centre line.
     fn way(&self, py: Python<'_>, to: &Bound<'_, PyAny>) -> PyResult<CentrelinePath> {
         let tree = self.tree(py)?;
-        let row = match Goal::of("to", to)? {
-            Goal::Name(name) => tree.target(&name).map_err(exception)?.row,
-            Goal::Place(place) => tree.nearest_row(&place.into()),
+        let way = match Goal::of("to", to)? {
+            Goal::Name(name) => tree.path_to(tree.target(&name).map_err(exception)?.row),
+            Goal::Place(place) => tree.path_to_place(&place.into()),
         };
-        if let Some(way) = tree.path_to(row) {
-            return Ok(way);
+        match way {
+            Some(way) => Ok(way),
+            None => Err(refuse("to", to.repr()?, "is at the root of the centre line, where the way begins")),
         }
-        Err(refuse("to", to.repr()?, "is at the root of the centre line, where the way begins"))
     }
 }
 

@@ -54,27 +54,37 @@ def test_a_path_leads_from_the_root_to_a_place():
     assert 0.0 < line.path(np.array([0.0, 0.0, -1.0])).length_mm < 0.2
 
 
+def target_of(line):
+    """Between two points of the line."""
+    return line.point_mm(len(line.lengths_mm) - 3, 0.3)
+
+
 def test_ways_of_many_are_those_of_each():
     rng, ways, alone = np.random.default_rng(1), centreline.Ways(3), centreline.Ways(1)
     tables = [arches.arch(np.random.default_rng(seed))[0] for seed in (4, 6, 7)]
     lines = [centreline.Centreline(table) for table in (tables[0][:20], *tables[1:])]
     # A longer tree after a shorter one, and a shorter one in the place of a longer.
     for k, line in [(0, lines[0]), (2, lines[1]), (1, lines[1]), (2, lines[2]), (1, lines[0])]:
-        target = line.positions_mm[-3]
-        ways.put(k, line, target)
+        ways.put(k, line, target_of(line))
     for _ in range(20):
         points = rng.uniform(*arches.ArchVariety.bounds_mm, (3, 3))
         told = ways.left_mm(points)
         for k, line in enumerate((lines[0], lines[0], lines[2])):
             segment, part, _ = line.nearest(points[k])
-            rows = line.ways_mm(line.positions_mm[-3])
+            rows, length = line.ways_mm(target_of(line)), line.lengths_mm[segment]
             child, parent = rows[segment + 1], rows[line.parents[segment + 1]]
-            length = line.lengths_mm[segment]
-            assert told[k] == pytest.approx(
-                min(child + (1 - part) * length, parent + part * length), abs=1e-9
-            )
-            alone.put(0, line, line.positions_mm[-3])
+            expected = min(child + (1 - part) * length, parent + part * length)
+            if segment == len(line.lengths_mm) - 3:
+                expected = abs(part - 0.3) * length
+            assert told[k] == pytest.approx(expected, abs=1e-9)
+            alone.put(0, line, target_of(line))
             assert alone.left_mm(points[k : k + 1])[0] == told[k]
+    # On the target's own segment it is the distance along that, on either side.
+    segment = len(lines[0].lengths_mm) - 3
+    alone.put(0, lines[0], target_of(lines[0]))
+    for part in (0.0, 0.1, 0.3, 0.4, 1.0):
+        left = alone.left_mm(lines[0].point_mm(segment, part)[None])
+        assert left == pytest.approx(abs(part - 0.3) * lines[0].lengths_mm[segment], abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["follow_path", "search_ahead"])
@@ -252,6 +262,32 @@ def test_a_vector_of_stable_baselines_does_what_single_environments_do(task):
     again = vector.reset()
     assert all(np.array_equal(again[name][0], values) for name, values in singles[0].reset(seed=7)[0].items())
     vector.close()
+
+
+def test_a_correction_of_nothing_does_what_its_base_does(task):
+    pytest.importorskip("stable_baselines3")
+    from endowire.gym.sb3 import SB3VecEnv
+
+    base = policies.Steered("follow_path")
+    advised = replace(task, observations={"advice": observations.Advice(base)})
+    vector = SB3VecEnv(advised, 2, seed=5, base=base)
+    observed, ends = vector.reset(), {}
+    while len(ends) < 2:
+        # Asked again it answers the same.
+        assert np.array_equal(base.act(vector.episodes), base.act(vector.episodes))
+        advice = np.clip(base.act(vector.episodes) / task.limits(), -1.0, 1.0)
+        assert observed["advice"] == pytest.approx(advice, abs=1e-6)
+        observed, _, over, infos = vector.step(np.zeros((2, 1, 2)))
+        for k in np.flatnonzero(over):
+            ends.setdefault(int(k), (infos[k]["steps"], infos[k]["way_mm"]))
+    alone = evaluation.evaluate(task, policies.Steered("follow_path"), [5, 6])
+    assert [ends[k] for k in range(2)] == [(each.steps, each.way_mm) for each in alone]
+    # Counter-check: a correction changes it.
+    vector.seed(5)
+    vector.reset()
+    for _ in range(alone[0].steps):
+        infos = vector.step(np.full((2, 1, 2), -0.2))[3]
+    assert infos[0]["way_mm"] != alone[0].way_mm
 
 
 def test_a_model_of_stable_baselines_learns_and_acts(task):

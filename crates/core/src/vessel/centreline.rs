@@ -158,23 +158,51 @@ impl CentrelineTree {
         })
     }
 
-    /// The row nearest to a position.
-    pub fn nearest_row(&self, place_mm: &Vec3) -> usize {
-        let away_mm = |row: &usize| (self.nodes[*row].position_mm - place_mm).norm();
-        (0..self.nodes.len()).min_by(|a, b| away_mm(a).total_cmp(&away_mm(b))).unwrap_or(0)
+    /// The row nearest to a position, or the one behind it: the row at the end of the segment on which the nearest
+    /// point of the line is, and that point.
+    pub fn nearest(&self, place_mm: &Vec3) -> (usize, Vec3) {
+        let on_segment = |row: usize| {
+            let (to, from) = (self.nodes[row].position_mm, self.nodes[self.nodes[row].parent?].position_mm);
+            let piece = to - from;
+            let part = ((place_mm - from).dot(&piece) / piece.norm_squared()).clamp(0.0, 1.0);
+            let on = if part == 1.0 { to } else { from + piece * part };
+            Some((row, on, (on - place_mm).norm()))
+        };
+        let each = (1..self.nodes.len()).filter_map(on_segment);
+        let nearest = each.min_by(|a, b| a.2.total_cmp(&b.2));
+        nearest.map_or((0, self.nodes[0].position_mm), |(row, on, _)| (row, on))
     }
 
     /// The path from the root to a row; `None` if the row does not exist or is the root.
     pub fn path_to(&self, row: usize) -> Option<CentrelinePath> {
+        CentrelinePath::new(self.points_to((row > 0).then_some(row)?)?)
+    }
+
+    /// The path from the root to the point of the line nearest to a position; `None` if that is the root.
+    pub fn path_to_place(&self, place_mm: &Vec3) -> Option<CentrelinePath> {
+        let (row, end_mm) = self.nearest(place_mm);
+        let mut points = self.points_to(row)?;
+        let (to_mm, to_radius_mm) = points.pop()?;
+        let (from_mm, from_radius_mm) = *points.last()?;
+        let [along_mm, length_mm] = [end_mm, to_mm].map(|place| (place - from_mm).norm());
+        if along_mm > COINCIDENT_MM {
+            let part = along_mm / length_mm;
+            points.push((end_mm, from_radius_mm + (to_radius_mm - from_radius_mm) * part));
+        }
+        CentrelinePath::new(points)
+    }
+
+    /// The points from the root to a row, with their radii; `None` if it does not exist.
+    fn points_to(&self, row: usize) -> Option<Vec<(Vec3, f64)>> {
         let mut points = Vec::new();
-        let mut at = (row > 0).then_some(row);
+        let mut at = Some(row);
         while let Some(row) = at {
             let node = self.nodes.get(row)?;
             points.push((node.position_mm, node.radius_mm));
             at = node.parent;
         }
         points.reverse();
-        CentrelinePath::new(points)
+        Some(points)
     }
 
     /// Reads a table.
@@ -365,6 +393,8 @@ const SIZE_LIMIT: u64 = 64 << 20;
 
 /// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
 const LARGEST_MM: f64 = 1e6;
+/// Distance up to which two points are the same, mm.
+const COINCIDENT_MM: f64 = 1e-9;
 /// Longest distance from a point to its parent, mm, the length of a body; and in radii of the wider of the two, since
 /// no vessel is straight for longer. Otherwise a single wrong number would create a vessel that takes minutes, or
 /// that intersects itself.
@@ -390,7 +420,7 @@ fn check_row(
         Some(parent) if parent >= row => {
             Err(("parent", describe(node.parent), format!("must be an earlier row: this is row {row}")))
         }
-        Some(parent) if (nodes[parent].position_mm - node.position_mm).norm() <= 1e-9 => {
+        Some(parent) if (nodes[parent].position_mm - node.position_mm).norm() <= COINCIDENT_MM => {
             Err(("parent", describe(node.parent), "the point lies on its parent; remove one of them".into()))
         }
         Some(parent) => {
@@ -488,6 +518,28 @@ mod tests {
         assert!(json(&open) != json(&tree));
         let named = |name: &str| open.clone().with_targets(vec![Target { name: name.into(), row: 2 }]);
         assert!(named("end closed").is_err() && named("closed end").is_ok());
+    }
+
+    #[test]
+    fn a_path_ends_at_the_point_of_the_line_nearest_to_a_place() {
+        let tree = CentrelineTree::parse("0 0 0 2 -1\n0 0 10 2 0\n0 0 30 4 1\n0 20 10 1 1\n").unwrap();
+        let path = |x: f64, y: f64, z: f64| tree.path_to_place(&Vec3::new(x, y, z)).unwrap();
+        // Between rows, beside the line.
+        let between = path(1.0, -0.5, 25.0);
+        assert!(
+            (between.length_mm() - 25.0).abs() < 1e-12
+                && (between.end_mm() - Vec3::z() * 25.0).norm() < 1e-12
+        );
+        assert!((between.points()[2].1 - 3.5).abs() < 1e-12, "{:?}", between.points());
+        // At rows, and beyond the last, it is that to the row.
+        for row in 1..4 {
+            let at = tree.nodes()[row].position_mm;
+            assert_eq!(tree.path_to_place(&at), tree.path_to(row), "{row}");
+        }
+        assert_eq!(path(0.0, 25.0, 10.0), tree.path_to(3).unwrap());
+        assert!((path(0.0, 3.0, 10.5).length_mm() - 13.0).abs() < 1e-12);
+        assert_eq!(tree.path_to_place(&Vec3::new(0.0, 0.0, -3.0)), None);
+        assert_eq!(tree.path_to(0), None);
     }
 
     #[test]

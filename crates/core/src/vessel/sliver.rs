@@ -9,6 +9,10 @@ use crate::Vec3;
 /// few.
 const PASSES: usize = 16;
 
+/// Length up to which an edge is closed to remove a sliver in a cluster of them, in tolerances: corners of such a
+/// cluster are a little too far apart to be welded.
+const CLUSTER: f64 = 10.0;
+
 /// Whether a triangle is thinner than `tolerance_mm` (or rounding).
 pub(crate) fn is_degenerate(corners: &[Vec3; 3], tolerance_mm: f64) -> bool {
     let [a, b, c] = *corners;
@@ -21,7 +25,6 @@ pub(crate) fn is_degenerate(corners: &[Vec3; 3], tolerance_mm: f64) -> bool {
 /// the triangle across it. Returns the number of degenerate triangles found; none remains.
 pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> usize {
     let before = mesh.triangles.len();
-    let repeated = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
     mesh.triangles.retain(|t| !repeated(t));
     let mut found = before - mesh.triangles.len();
     for pass in 0..PASSES {
@@ -52,11 +55,45 @@ pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> us
         }
         retain_numbered(&mut mesh.triangles, |index, t| !gone[index] && !repeated(t));
     }
-    // The remaining ones are in clusters of slivers that flips only pass around.
+    close_clusters(mesh, tolerance_mm);
+    // The rest leaves slits.
     let survivors: Vec<bool> =
         (0..mesh.triangles.len()).map(|i| !is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
     retain_numbered(&mut mesh.triangles, |index, _| survivors[index]);
     found
+}
+
+/// Removes clusters of slivers with corners close to each other, between which flips only pass slivers around: both
+/// ends of the shortest edge of each become one, until none is left.
+fn close_clusters(mesh: &mut SurfaceMesh, tolerance_mm: f64) {
+    loop {
+        let mut joined: Vec<u32> = (0..mesh.vertices_mm.len() as u32).collect();
+        let mut touched = vec![false; joined.len()];
+        for index in 0..mesh.triangles.len() {
+            let corners = mesh.corners(index);
+            if !is_degenerate(&corners, tolerance_mm) {
+                continue;
+            }
+            let length = |side: usize| (corners[(side + 1) % 3] - corners[side]).norm();
+            let side = (0..3).min_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+            let [a, b] = [side, (side + 1) % 3].map(|k| mesh.triangles[index][k]);
+            if length(side) <= CLUSTER * tolerance_mm && !touched[a as usize] && !touched[b as usize] {
+                joined[a.max(b) as usize] = a.min(b);
+                (touched[a as usize], touched[b as usize]) = (true, true);
+            }
+        }
+        if !touched.contains(&true) {
+            return;
+        }
+        for t in &mut mesh.triangles {
+            *t = t.map(|v| joined[v as usize]);
+        }
+        mesh.triangles.retain(|t| !repeated(t));
+    }
+}
+
+fn repeated(t: &[u32; 3]) -> bool {
+    t[0] == t[1] || t[1] == t[2] || t[2] == t[0]
 }
 
 /// Replaces needle (a, b, c), long edge a–b, and its neighbour across a–b by the two halves of the neighbour cut at c.
@@ -94,5 +131,25 @@ mod tests {
         assert!((0..mesh.triangles.len()).all(|i| !is_degenerate(&mesh.corners(i), 1e-6)));
         assert_eq!(opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings[0].boundary.len(), 4);
         assert!((area(&mesh) - 1.0).abs() < 1e-15);
+    }
+    #[test]
+    fn a_cluster_of_slivers_is_closed_to_a_point() {
+        // In the middle of a square, the corners of a smaller one, 1.2 tolerances wide: its two halves are too thin
+        // whichever diagonal divides it.
+        let side = 0.5 * 1.2e-3;
+        let outer = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]];
+        let inner = outer.map(|[x, y]| [side * x, side * y]);
+        let vertices_mm = outer.iter().chain(&inner).map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
+        let ring = (0..4).flat_map(|k: u32| {
+            let next = (k + 1) % 4;
+            [[k, next, 4 + k], [next, 4 + next, 4 + k]]
+        });
+        let triangles = ring.chain([[4, 5, 6], [4, 6, 7]]).collect();
+        let mut mesh = SurfaceMesh { vertices_mm, triangles };
+        assert_eq!(remove_degenerate(&mut mesh, 1e-3), 6);
+        assert_eq!(mesh.triangles.len(), 4);
+        let borders = opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings;
+        assert_eq!(borders.len(), 1, "the square's own border");
+        assert_eq!(borders[0].boundary.len(), 4);
     }
 }

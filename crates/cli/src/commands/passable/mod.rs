@@ -80,13 +80,13 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
     answer(&document, args.json, || text(&document))
 }
 
-/// The way to a named row of a table, or to the row nearest to a place.
+/// The way to a named row of a table, or to the point of its line nearest to a place.
 fn way_in_table(tree: &CentrelineTree, to: &str) -> Result<CentrelinePath, Failure> {
-    let row = match parse_end(to) {
-        Ok(CentrelineEnd::Place(place)) => tree.nearest_row(&place),
-        _ => tree.target(to).map_err(as_flag)?.row,
+    let way = match parse_end(to) {
+        Ok(CentrelineEnd::Place(place)) => tree.path_to_place(&place),
+        _ => tree.path_to(tree.target(to).map_err(as_flag)?.row),
     };
-    tree.path_to(row).ok_or_else(|| {
+    way.ok_or_else(|| {
         Failure::Input(format!("--to = {to}: is the root of the centre line, where the way begins"))
     })
 }

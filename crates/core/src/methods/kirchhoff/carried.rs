@@ -12,7 +12,9 @@
 //! proceeds as in a vessel at rest; slip is measured from the material points themselves
 //! ([`Friction::carry`](crate::contact::Friction::carry)).
 
+use super::configuration::Start;
 use super::mesh::Mesh;
+use super::state::KirchhoffState;
 use super::transport::lay;
 use crate::Vec3;
 use crate::contact::Contact;
@@ -75,8 +77,17 @@ impl Curve {
     }
 }
 
+/// The start of a part in which the wall moves; none where it does not, or without a device.
+pub(super) fn taken_along(was: Start<'_>, passage: Option<Passage<'_>>) -> Option<KirchhoffState> {
+    passage.filter(|_| was.state.rod.elements() > 0).map(|passage| {
+        let mut taken = was.state.clone();
+        carried(was.mesh, &was.state.rod, passage, &mut taken.rod);
+        taken
+    })
+}
+
 /// Sets `out` to the displaced device that was in `state`.
-pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: &mut RodState) {
+fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: &mut RodState) {
     let curve = Curve::new(mesh, state, passage);
     let mut element = 0;
     let inserted_mm = mesh.from_tip_mm[0];
@@ -87,10 +98,8 @@ pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: 
     // Angles are now measured from triads carried along the rod without twist.
     out.angles.clone_from(&state.angles);
     let sets = state.sets();
-    let mut twist = 0.0;
-    for (e, more) in state.reference_twists.iter().enumerate() {
-        twist += more;
-        out.angles[sets * (e + 1)..sets * (e + 2)].iter_mut().for_each(|angle| *angle += twist);
+    for (i, twist) in state.carried_twists().enumerate() {
+        out.angles[sets * i..sets * (i + 1)].iter_mut().for_each(|angle| *angle += twist);
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
-use super::carried::carried;
+use super::carried::taken_along;
 use super::configuration::Start;
 use super::hands::lengths;
 use super::state::{KirchhoffState, Ticking};
@@ -166,11 +166,7 @@ impl<const C: usize> Workspace<C> {
             way.at(to, hands);
             let then = displacement(to);
             let passage = displaced.as_ref().zip(then.as_ref()).filter(|(before, after)| before != after);
-            let taken = passage.filter(|_| was.state.rod.elements() > 0).map(|passage| {
-                let mut taken = was.state.clone();
-                carried(was.mesh, &was.state.rod, passage, &mut taken.rod);
-                taken
-            });
+            let taken = taken_along(was, passage);
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
             let there = environment.displaced(then.as_ref()).with_fields_at(to);
             sum.substeps += 1;

@@ -113,9 +113,8 @@ impl Correction {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = found.elements();
-        // Angles are compared where they are measured from triads carried along the rod without twist.
-        let mut twist: f64 =
-            found.reference_twists.iter().zip(&slid.reference_twists).map(|(a, b)| a - b).sum();
+        // Those of the slid device are measured from triads carried along the rod without twist; so are these.
+        let mut twist = found.reference_twists.iter().sum::<f64>();
         for e in (0..n).rev() {
             let (f, i) = (&slid.frames[e], e + 1);
             self.departures.push(Departure {
@@ -127,7 +126,7 @@ impl Correction {
                 angle: found.angle(i, set) + twist - slid.angle(i, set),
                 bubble: found.bubbles[sets * e + set] - slid.bubbles[sets * e + set],
             }));
-            twist -= found.reference_twists[e] - slid.reference_twists[e];
+            twist -= found.reference_twists[e];
         }
     }
 
@@ -167,11 +166,9 @@ impl Correction {
         }
     }
 
-    /// Adds `factor` times the correction to the slid device, whose elements are the first in `state`. Its angles are then
-    /// measured from triads carried along the rod without twist.
+    /// Adds `factor` times the correction to the slid device, whose elements are the first in `state`.
     pub(super) fn apply(&self, factor: f64, elements: &[ElementData], state: &mut RodState) {
         let n = elements.len();
-        let mut twist = 0.0;
         let first = n - n.min(self.departures.len());
         // Each middle before the tangents on either side change.
         let mut t = state.frames[first].t;
@@ -182,9 +179,8 @@ impl Correction {
             let t1 = (far.t + axes(&far) * by.tangent * factor).normalize();
             state.chords[e] = (m.normalize() + (t + t1) * 0.25) / 1.5;
             let sets = state.sets();
-            twist += std::mem::take(&mut state.reference_twists[e]);
             for (set, by) in self.turns[sets * (n - 1 - e)..][..sets].iter().enumerate() {
-                state.angles[sets * (e + 1) + set] += factor * by.angle + twist;
+                state.angles[sets * (e + 1) + set] += factor * by.angle;
                 state.bubbles[sets * e + set] += factor * by.bubble;
             }
             if e > first {

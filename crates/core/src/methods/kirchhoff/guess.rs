@@ -7,7 +7,7 @@ use super::configuration::Start;
 use super::extrapolation::Correction;
 use super::mesh::Mesh;
 use crate::contact::{HandMotion, SelfContact, WallContact};
-use crate::rod::RodState;
+use crate::rod::{Frame, RodState};
 
 /// The candidates for the prediction.
 #[derive(Debug, Clone, Default)]
@@ -16,7 +16,9 @@ pub(super) struct Guess {
     pub(super) motions: Vec<HandMotion>,
     /// The correction, on the nodes of the sub-step.
     learnt: Correction,
-    pub(super) slid: RodState,
+    slid: RodState,
+    /// Triads of the device slid in the vessel as it was, if the vessel moves; else empty.
+    pub(super) before_motion: Vec<Frame>,
     pub(super) other: RodState,
     /// The room of each node at the prediction, mm.
     pub(super) room_mm: Vec<f64>,
@@ -26,41 +28,56 @@ impl Guess {
     /// Allocates for `elements` elements.
     pub(super) fn reserve(&mut self, elements: usize) {
         self.slid.reserve(elements);
+        self.before_motion.reserve((elements + 1).saturating_sub(self.before_motion.len()));
         self.other.reserve(elements);
         self.room_mm.reserve((elements + 1).saturating_sub(self.room_mm.len()));
     }
 
     /// Adds the correction to the slid device in `state`, unless the result is beyond the wall or passes through
-    /// itself. Returns whether the prediction is valid.
+    /// itself. With friction, angles are then measured from the triads of the device where its slip begins. Returns
+    /// whether the prediction is valid.
     pub(super) fn choose(
         &mut self,
         contact: &mut WallContact<'_>,
-        mut loops: Option<&mut SelfContact>,
+        loops: Option<&mut SelfContact>,
         (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
     ) -> bool {
         self.slid.copy_from(state);
+        let corrected = self.correct(contact, loops, (start, mesh, &mut *state));
+        if contact.rubs() {
+            if !self.before_motion.is_empty() {
+                state.measure_from(&self.before_motion);
+            } else if corrected {
+                state.measure_from(&self.slid.frames[..=mesh.line()]);
+            }
+        }
+        corrected || !contact.is_outside(&mesh.elements, state)
+    }
+
+    /// Adds the correction to the slid device in `state`, or leaves it as it is; returns whether it did.
+    fn correct(
+        &mut self,
+        contact: &mut WallContact<'_>,
+        loops: Option<&mut SelfContact>,
+        (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
+    ) -> bool {
         let elements = &mesh.elements;
         let line = &elements[..mesh.line()];
         let correction = &start.state.correction;
-        if let Some(factor) = correction.repeats(&self.motions) {
-            // Nodes of a single device are the same marks in every step.
-            if mesh.inserted_mm.is_empty() {
-                correction.apply(factor, line, state);
-            } else {
-                correction.transfer(start.mesh, mesh, &mut self.learnt);
-                self.learnt.apply(factor, line, state);
-            }
-            if contact.rubs() {
-                state.measure_from(&self.slid.frames[..=line.len()]);
-            }
-            let mut crosses =
-                || loops.as_deref_mut().is_some_and(|loops| loops.crosses(elements, &self.slid, state));
-            if !contact.is_outside(elements, state) && !crosses() {
-                return true;
-            }
+        let Some(factor) = correction.repeats(&self.motions) else { return false };
+        // Nodes of a single device are the same marks in every step.
+        if mesh.inserted_mm.is_empty() {
+            correction.apply(factor, line, state);
+        } else {
+            correction.transfer(start.mesh, mesh, &mut self.learnt);
+            self.learnt.apply(factor, line, state);
+        }
+        let wrong = contact.is_outside(elements, state)
+            || loops.is_some_and(|loops| loops.crosses(elements, &self.slid, state));
+        if wrong {
             state.copy_from(&self.slid);
         }
-        !contact.is_outside(elements, state)
+        !wrong
     }
 
     /// Continues from an unfinished solution: replaces `state`, the slid device, by that.

@@ -142,6 +142,7 @@ impl<const C: usize> Tools<C> {
             }
         };
         motions(&start.state.report, hands, &mut self.guess.motions);
+        self.guess.before_motion.clear();
         if self.friction.acts() {
             // Slip is measured from where the device was before the vessel moved.
             transport_from(left.map_or(start, |(was, _)| was), &mut after.rod);
@@ -149,9 +150,8 @@ impl<const C: usize> Tools<C> {
             self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
             if let Some((_, passage)) = left {
                 self.friction.carry(passage, &self.guess.motions);
-                self.guess.slid.copy_from(&after.rod);
+                self.guess.before_motion.extend_from_slice(&after.rod.frames);
                 transport_from(start, &mut after.rod);
-                after.rod.measure_from(&self.guess.slid.frames);
             }
         } else {
             transport_from(start, &mut after.rod);

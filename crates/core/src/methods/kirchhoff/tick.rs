@@ -8,11 +8,13 @@
 //!
 //! An error after a successful part is postponed to the next tick, which repeats it.
 //!
-//! A moving vessel cannot wait. There the device moves in each tick as far as its solves permit, at a fold or not.
+//! A moving vessel and changing fields cannot wait: a tick ends at its own time. Their change is gone through like
+//! hand motion, in parts if necessary, but with half of the solves; if these do not suffice the device relaxes at
+//! its end as far as the other half permits.
 
 use super::Environment;
 use super::blocked::refuse_wedged;
-use super::carried::carried;
+use super::carried::taken_along;
 use super::command::{AT_REST, REST_RADII, Sum, WORK_RAD};
 use super::configuration::Start;
 use super::extrapolation::Correction;
@@ -41,12 +43,34 @@ pub(super) enum Ticked {
     Overtaken,
 }
 
+/// Progress of what changes around the device in a tick: the vessel and fields.
+struct Change {
+    /// Its part that is over, 0 to 1.
+    done: f64,
+    /// Part of the rest that is in the next part.
+    next: f64,
+    /// Whether the device relaxes at its end, however far away.
+    overtaken: bool,
+}
+
+impl Change {
+    /// The part of it that is over after the next part.
+    fn to(&self) -> f64 {
+        let to = self.done + self.next * (1.0 - self.done);
+        if self.overtaken || self.next == 1.0 { 1.0 } else { to }
+    }
+
+    fn goes_on(&self) -> bool {
+        self.done < 1.0
+    }
+}
+
 /// A part of the hands' motion attempted by a tick.
 struct Part<'a> {
     effort: Effort,
     /// Earlier ticks' progress in it.
     resumed: Option<&'a UnderWay>,
-    /// The largest motion of a hand, mm.
+    /// The largest motion of a hand, mm; of a change without one, its part.
     part_mm: f64,
     /// Whether hands hold still while the device relaxes.
     holds_still: bool,
@@ -59,15 +83,16 @@ impl<'a> Part<'a> {
     fn next(
         begun: &'a Ticking,
         (way, longest_mm): (&Way, f64),
-        overtaken: bool,
+        change: &Change,
         hands: &mut Vec<Hand>,
     ) -> Self {
         let travel_mm = way.travel_mm(WORK_RAD);
         let part = if travel_mm > longest_mm { longest_mm / travel_mm } else { 1.0 };
+        let of_change_mm = if travel_mm == 0.0 && change.goes_on() { change.next } else { 0.0 };
         let fresh = |effort: Effort| Self {
             effort,
             resumed: None,
-            part_mm: part * travel_mm,
+            part_mm: part * travel_mm + of_change_mm,
             holds_still: false,
             moving: 0,
         };
@@ -82,7 +107,7 @@ impl<'a> Part<'a> {
             }
             Ticking::Rest | Ticking::Moving(0) => {
                 way.at(part, hands);
-                let near = matches!(begun, Ticking::Rest) && !overtaken;
+                let near = matches!(begun, Ticking::Rest) && !change.overtaken;
                 fresh(if near { Effort::Near } else { Effort::Moving })
             }
         }
@@ -150,37 +175,43 @@ impl<const C: usize> Workspace<C> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
-        let was = Start { mesh, state: from };
-        let [at_first, at_last] = [0.0, 1.0].map(|part| surroundings.displacement(part));
-        let passage = at_first.as_ref().zip(at_last.as_ref()).filter(|(first, last)| first != last);
-        let taken = passage.filter(|_| from.rod.elements() > 0).map(|passage| {
-            let mut taken = from.clone();
-            carried(mesh, &from.rod, passage, &mut taken.rod);
-            taken
-        });
-        let there = environment.displaced(at_last.as_ref());
-        // The first part includes the vessel's motion, the others start after it.
-        let mut left = passage.map(|passage| (was, passage));
-        let mut at_start = environment.displaced(at_first.as_ref());
+        let moves = surroundings.moves();
+        let mut displaced = surroundings.displacement(0.0);
+        let is_changed = moves || surroundings.fields_change();
+        let mut change = Change { done: if is_changed { 0.0 } else { 1.0 }, next: 1.0, overtaken: false };
         // With friction, relaxation over a part up to this length may end nearby.
         let let_go_mm = if environment.has_friction() { HELD_MM } else { FOLD_MM };
         let mut course =
             Course { longest_mm: from.stride.part_mm, sum: Sum::default(), moved: false, rests: true };
         let (rest, fold, mut moving);
         (rest, fold) = (Ticking::Rest, Ticking::Moving(0));
-        let mut begun = if passage.is_some() { &rest } else { &from.tick };
+        let mut begun = &from.tick;
+        if moves {
+            // The unfinished solution is of another place of the vessel.
+            change.overtaken = matches!(begun, Ticking::Moving(1..));
+            begun = &rest;
+        }
         // Remaining work, or the error that ends the tick.
         let ends = loop {
             let parts = course.sum.substeps;
-            if parts > 0 && tools.work.solves + OF_A_PART * parts >= solves {
+            let spent = tools.work.solves + OF_A_PART * parts;
+            if parts > 0 && spent >= solves && !change.goes_on() {
                 break Ok(begun.clone());
             }
-            let here = match &taken {
-                _ if course.moved => now.start(),
-                Some(state) => Start { mesh, state },
-                None => was,
-            };
-            let part = Part::next(begun, (way, course.longest_mm), left.is_some(), hands);
+            // Where the change cannot wait any longer, it comes to its end.
+            let within = if moves && change.goes_on() { solves / 2 } else { solves };
+            if change.goes_on() && spent >= within && !change.overtaken {
+                (change.overtaken, begun) = (true, &rest);
+            }
+            let was = if course.moved { now.start() } else { Start { mesh, state: from } };
+            let part = Part::next(begun, (way, course.longest_mm), &change, hands);
+            let Part { effort, resumed, part_mm, .. } = part;
+            let to = if part.resumed.is_some() { 1.0 } else { change.to() };
+            let then = surroundings.displacement(to);
+            let passage = displaced.as_ref().zip(then.as_ref()).filter(|(before, after)| before != after);
+            let taken = taken_along(was, passage);
+            let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
+            let there = environment.displaced(then.as_ref()).with_fields_at(to);
             course.sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 now.withdraw(surroundings.stack, hands);
@@ -189,15 +220,17 @@ impl<const C: usize> Workspace<C> {
                 way.go_on_from(hands);
                 break Ok(Ticking::Rest);
             }
-            let Part { effort, resumed, part_mm, .. } = part;
             let before = tools.work;
             let most = resumed.map_or(MOST_NEAR, |under_way| MOST_NEAR - under_way.iterations);
-            let solves_left = solves.saturating_sub(before.solves);
+            let allowed = if change.overtaken { solves } else { within };
+            let solves_left = allowed.saturating_sub(before.solves).max(1);
+            let left = passage.map(|passage| (was, passage));
             let attempted = Attempt { hands, effort, most, solves: solves_left, left, resumed };
             let tried = tools.try_step(&there, here, attempted, next);
             match tried {
-                Ok(found) if part.strays(&found) && left.is_none() => {
+                Ok(found) if part.strays(&found) && !change.overtaken => {
                     (course.longest_mm, begun) = (0.5 * part_mm, &rest);
+                    change.next *= 0.5;
                 }
                 Ok(found) => {
                     let tip_mm = there.wall().material(&next.state.tip_mm());
@@ -210,18 +243,26 @@ impl<const C: usize> Workspace<C> {
                     moving = course.take(&part, &found, lies, iterations);
                     std::mem::swap(now, next);
                     way.go_on_from(hands);
-                    (begun, left, at_start) = (&moving, None, there);
-                    if matches!(moving, Ticking::Rest) && way.is_done() {
+                    (displaced, begun) = (then, &moving);
+                    change = Change { done: to, next: 1.0, overtaken: false };
+                    if matches!(moving, Ticking::Rest) && way.is_done() && !change.goes_on() {
                         break Ok(Ticking::Rest);
                     }
                 }
-                Err(Lost::UnderWay) => {
+                Err(Lost::UnderWay) if !change.goes_on() || (to == 1.0 && !moves) => {
                     let under_way = tools.under_way(&part, hands, &next.state, (from, before));
                     break Ok(Ticking::Solving(Box::new(under_way)));
                 }
-                Err(_) if left.is_some() => return Ok(Ticked::Overtaken),
+                Err(Lost::UnderWay) => (change.overtaken, begun) = (true, &rest),
+                Err(_) if change.overtaken => return Ok(Ticked::Overtaken),
                 // It stays where it is.
-                Err(_) if part.holds_still => break Ok(Ticking::Rest),
+                Err(_) if part.holds_still => {
+                    begun = &rest;
+                    if !change.goes_on() {
+                        break Ok(Ticking::Rest);
+                    }
+                    change.overtaken = true;
+                }
                 Err(lost) if effort == Effort::Moving && part_mm <= FOLD_MM => {
                     let inserted_mm = line_mm(lengths(&way.start));
                     let told =
@@ -229,12 +270,16 @@ impl<const C: usize> Workspace<C> {
                     break Err(Error::Computation(told));
                 }
                 Err(_) if effort == Effort::Near && part_mm <= let_go_mm => {
+                    let at_start = environment.displaced(displaced.as_ref());
                     if let Err(wedged) = refuse_wedged(&at_start, here, &way.commands) {
                         break Err(wedged);
                     }
                     (course.longest_mm, begun) = (part_mm, &fold);
                 }
-                Err(_) => (course.longest_mm, begun) = (0.5 * part_mm, &rest),
+                Err(_) => {
+                    (course.longest_mm, begun) = (0.5 * part_mm, &rest);
+                    change.next *= 0.5;
+                }
             }
         };
         if !course.moved {

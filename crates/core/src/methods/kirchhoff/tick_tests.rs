@@ -180,9 +180,9 @@ fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
     assert!(deepest_mm < 0.4 + 0.01, "{deepest_mm}");
 }
 
-#[test]
-fn a_vessel_that_moves_takes_the_device_along_in_every_tick() {
-    let heaving = MotionMode {
+/// To and fro by 1.5 mm in a second.
+fn heaving() -> MotionMode {
+    MotionMode {
         waveform: Waveform::Breathing,
         period_s: Some(1.0),
         phase: 0.0,
@@ -190,8 +190,30 @@ fn a_vessel_that_moves_takes_the_device_along_in_every_tick() {
         turn: None,
         still: None,
         within: None,
-    };
-    let mut ticking = two(&[heaving]);
+    }
+}
+
+#[test]
+fn ticks_with_enough_solves_are_steps_in_a_vessel_that_moves_too() {
+    let (mut ticking, mut stepping) = (two(&[heaving()]), two(&[heaving()]));
+    let mut relaxations = [0, 0];
+    for tick in 1..=60u32 {
+        let moves = pushed([0.1, 0.02], [0.05, 0.0]);
+        let time_s = Some(5e-3 * f64::from(tick));
+        relaxations[0] += stepping.step_until(&moves, time_s).unwrap().relaxations;
+        let report = ticking.tick(&moves, 500, time_s).unwrap();
+        assert!(report.converged && report.behind.is_empty());
+        relaxations[1] += report.relaxations;
+    }
+    assert_eq!(relaxations, [0, 0]);
+    assert!(apart_mm(&ticking, &stepping) < 1e-4, "{}", apart_mm(&ticking, &stepping));
+    let forces = [&ticking, &stepping].map(|each| each.report().instruments[0].push_force_n.unwrap());
+    assert!((forces[0] / forces[1] - 1.0).abs() < 1e-3, "{forces:?}");
+}
+
+#[test]
+fn a_vessel_that_moves_takes_the_device_along_in_every_tick() {
+    let mut ticking = two(&[heaving()]);
     for tick in 1..=150u32 {
         let time_s = 1e-3 * f64::from(tick);
         let report = ticking.tick(&hands(1, u64::from(tick)), 6, Some(time_s)).unwrap();

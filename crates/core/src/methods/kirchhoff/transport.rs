@@ -81,20 +81,9 @@ pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut 
     }
     // Relative to triads carried along the rod without twist, like the new ones.
     let tail = state.angles[0];
-    let mut carried = 0.0;
-    let mut k = 1;
-    for i in 0..=n {
-        let known = old.checked_sub(n - i).filter(|k| *k > 0);
-        let Some(known) = known else {
-            out.angles.push(tail);
-            continue;
-        };
-        while k <= known {
-            carried += state.reference_twists[k - 1];
-            k += 1;
-        }
-        out.angles.push(state.angles[known] + carried);
-    }
+    out.angles.resize(n.saturating_sub(old), tail);
+    let known = state.angles.iter().zip(state.carried_twists()).map(|(angle, carried)| angle + carried);
+    out.angles.extend(known.skip(old.saturating_sub(n)));
     out.angles[0] = tail;
 }
 

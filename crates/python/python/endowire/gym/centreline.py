@@ -104,11 +104,14 @@ class Ways:
         self._begin_mm, self._along_mm = np.zeros((3, n, 0)), np.zeros((3, n, 0))
         self._squares, self._lengths_mm = np.zeros((n, 0)), np.zeros((n, 0))
         self._from_parent_mm, self._from_child_mm = np.zeros((n, 0)), np.zeros((n, 0))
+        # The target's segment, and the place on it.
+        self._segment, self._part = np.zeros(n, dtype=int), np.zeros(n)
         self._rows = np.arange(n)
 
     def put(self, k: int, line: Centreline, target_mm: NDArray[np.float64]) -> None:
         """Sets the tree and the target of environment k."""
         ways_mm = line.ways_mm(target_mm)
+        self._segment[k], self._part[k], _ = line.nearest(target_mm)
         more = len(line.lengths_mm) - self._squares.shape[1]
         if more > 0:
             for name, fill in (
@@ -133,10 +136,7 @@ class Ways:
         self._from_child_mm[k, :count] = ways_mm[1:]
 
     def left_mm(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Path length from the point on the tree nearest to each given point to the target, mm: shape (n, 3) to (n,).
-
-        On the target's own segment it is up to twice too long, but continuous.
-        """
+        """Path length from the point on the tree nearest to each given point to the target, mm: shape (n, 3) to (n,)."""
         x, y, z = points_mm.T[:, :, None] - self._begin_mm
         u, v, w = self._along_mm
         part = np.clip((x * u + y * v + z * w) / self._squares, 0.0, 1.0)
@@ -146,4 +146,4 @@ class Ways:
         near: NDArray[np.float64] = np.minimum(
             self._from_child_mm[at] + (1.0 - part) * length, self._from_parent_mm[at] + part * length
         )
-        return near
+        return np.where(at[1] == self._segment, np.abs(part - self._part) * length, near)
