@@ -7,7 +7,7 @@
 //! ```
 //!
 //! where x̄ and t̄ are its position and direction after the device has slid by the advance Δ of its hand along the
-//! line's curve, so that a device that follows its curve slips by exactly Δ t̄ for any step length; θ is the material
+//! line's curve before the step, so that a device that follows its curve slips by exactly Δ t̄ for any step length; θ is the material
 //! angle, θₐ that before the step, and n × t the direction in which a surface that touches the wall with normal n
 //! moves when the device spins. Friction is then
 //!
@@ -39,7 +39,6 @@ use serde::{Deserialize, Serialize};
 
 use super::ContactPoint;
 use crate::Vec3;
-use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
 use crate::vessel::Displacement;
 
@@ -83,15 +82,12 @@ struct Slider {
 }
 
 impl Slider {
-    /// A point that has moved by `advance_mm` along its own curve, without normal force yet.
-    fn at(point: &ContactPoint, elements: &[ElementData], state: &RodState, advance_mm: f64) -> Self {
-        let e = point.element;
-        let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-        let slope = Point::at(point.xi, 0.0).derivatives(state.chords[e], t0, t1).0;
-        let along = slope / slope.norm();
+    /// A point at x̄ with direction t̄, to where it has moved by `advance_mm` along its own curve, without normal force
+    /// yet.
+    fn at((place_mm, along): (Vec3, Vec3), from_rad: f64, advance_mm: f64) -> Self {
         Self {
-            from_mm: point.position(elements, state) - along * advance_mm,
-            from_rad: point.angle(state),
+            from_mm: place_mm - along * advance_mm,
+            from_rad,
             along,
             normal: Vec3::zeros(),
             force_n: 0.0,
@@ -194,6 +190,19 @@ impl Friction {
         before: (&[ContactPoint], &[NormalForce]),
         hands: &[HandMotion],
     ) {
+        self.begin_on(|point| point.position_and_tangent(elements, state), state, points, before, hands);
+    }
+
+    /// As [`Self::begin`], with x̄ and t̄ of each point. A `state` on other nodes than before has them only nearly:
+    /// between nodes that have moved on, a curve of cubic pieces is another one.
+    pub(crate) fn begin_on(
+        &mut self,
+        slid: impl Fn(&ContactPoint) -> (Vec3, Vec3),
+        state: &RodState,
+        points: &[ContactPoint],
+        before: (&[ContactPoint], &[NormalForce]),
+        hands: &[HandMotion],
+    ) {
         self.sliders.clear();
         self.release();
         self.taken_mj = 0.0;
@@ -209,7 +218,8 @@ impl Friction {
         let near_tip = TIP_RADII * radius + advance.abs();
         let mut k = 0;
         for (index, point) in points.iter().enumerate() {
-            let mut slider = Slider::at(point, elements, state, hands[point.instrument].advance_mm());
+            let advance_mm = hands[point.instrument].advance_mm();
+            let mut slider = Slider::at(slid(point), point.angle(state), advance_mm);
             let same = |old: &ContactPoint| old.instrument == point.instrument;
             if point.from_tip_mm < near_tip && old_points.get(index).is_none_or(same) {
                 if index < count {
@@ -252,7 +262,8 @@ impl Friction {
         }
         self.sliders.extend(points.iter().zip(forces).map(|(point, NormalForce { normal, force_n })| {
             let (normal, force_n) = (*normal, *force_n);
-            Slider { normal, force_n, begun: (normal, force_n), ..Slider::at(point, elements, state, 0.0) }
+            let at = Slider::at(point.position_and_tangent(elements, state), point.angle(state), 0.0);
+            Slider { normal, force_n, begun: (normal, force_n), ..at }
         }));
     }
 

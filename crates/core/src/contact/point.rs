@@ -39,6 +39,14 @@ impl ContactPoint {
         self.between(&[x[e], x[e + 1], frames[e].t, frames[e + 1].t], elements[e].length)
     }
 
+    /// Position on the device's axis, mm, and unit tangent there.
+    pub(crate) fn position_and_tangent(&self, elements: &[ElementData], state: &RodState) -> (Vec3, Vec3) {
+        let e = self.element;
+        let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
+        let slope = Point::at(self.xi, 0.0).derivatives(state.chords[e], t0, t1).0;
+        (self.position(elements, state), slope / slope.norm())
+    }
+
     /// Position on an element of that length, given positions and tangents of its nodes, mm.
     pub(super) fn between(&self, [x0, x1, t0, t1]: &[Vec3; 4], length_mm: f64) -> Vec3 {
         if self.xi == 1.0 {

@@ -1,6 +1,6 @@
 //! Construction of a simulation, with the checks before it begins.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::simulation::{Environment, Simulation};
 use super::{Sheath, WallProperties};
@@ -88,7 +88,7 @@ impl<'a> SimulationBuilder<'a> {
         let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
         let twists = stack.is_several() && (properties.has_friction() || rub);
         let stack = if twists { stack.twisted()? } else { stack };
-        let scene = Environment { lumen, properties, sheath, stack, motion, flow };
+        let scene = Environment { lumen, properties, sheath, stack, motion, flow, mark: OnceLock::new() };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {

@@ -2,6 +2,7 @@
 
 mod batch;
 mod builder;
+mod mark;
 mod nodes;
 mod packing;
 mod script;

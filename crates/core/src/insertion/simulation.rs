@@ -1,12 +1,12 @@
 //! A device, a vessel and a method, stepped by commands.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::contact::{Counters, Touching, WallProperties};
 use crate::device::{Device, LENGTH_SLACK_MM, Stack, line_mm};
 use crate::field::Field;
 use crate::flow::BloodFlow;
-use crate::insertion::SimulationBuilder;
+use crate::insertion::{SimulationBuilder, mark};
 use crate::methods::{
     Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Stop, Surroundings,
     WallForce,
@@ -43,12 +43,19 @@ pub(super) struct Environment {
     pub(super) stack: Stack,
     pub(super) motion: Option<VesselMotion>,
     pub(super) flow: Option<BloodFlow>,
+    /// A number that stands for it, once it was needed.
+    pub(super) mark: OnceLock<u64>,
 }
 
 impl Environment {
+    /// A number that differs between scenes.
+    fn mark(&self) -> u64 {
+        *self.mark.get_or_init(|| mark::of(self))
+    }
+
     /// In a step from one time to another, s, outside of fields.
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
-        let Self { lumen, properties, sheath, stack, motion, flow } = self;
+        let Self { lumen, properties, sheath, stack, motion, flow, .. } = self;
         let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
         let fields = [&[][..]; 2];
         Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields, stop: None, time_s }
@@ -194,7 +201,7 @@ impl Simulation {
     }
 
     /// Replaces the fields in which the device lies. The next step follows the equilibrium from the old fields to the
-    /// new ones, also in a command without motion; a tick applies the new fields at once. The length inside the sheath
+    /// new ones, also in a command without motion; so does a tick, as far as its linear solves permit. The length inside the sheath
     /// and detached coils do not feel fields. A [`State`] contains none: a restored simulation keeps its own.
     ///
     /// # Errors
@@ -280,19 +287,22 @@ impl Simulation {
 
     /// Everything the next step depends on, except the device's environment.
     pub fn state(&self) -> State {
-        self.method.state().at(self.time_s)
+        self.method.state().of_scene(self.scene.mark(), self.time_s)
     }
 
     /// Continues from a state of this scene: shape, report and all further steps are those of the simulation it was
     /// taken from, to the bit. After an error nothing has changed.
     ///
     /// # Errors
-    /// A state of another method, vessel, device, sheath or element length, as far as its numbers reveal it
-    /// ([`Error::Parameter`]).
+    /// A state of another method, vessel, wall, device, sheath or element length ([`Error::Parameter`]).
     pub fn restore(&mut self, state: &State) -> Result<()> {
         if !(0.0..=LATEST_S).contains(&state.time_s()) {
             let mend = format!("must be a time from 0 to {LATEST_S} s: restore a state of this scene");
             return Err(Error::parameter("state.time_s", state.time_s(), mend));
+        }
+        if state.scene() != self.scene.mark() {
+            let mend = "it was taken in another scene: its vessel, wall, instruments or sheath are others; restore a state of this scene";
+            return Err(Error::parameter("state.scene", format!("{:016x}", state.scene()), mend));
         }
         self.method.restore(&self.scene.surroundings([self.time_s; 2]), state)?;
         self.time_s = state.time_s();

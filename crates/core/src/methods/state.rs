@@ -20,6 +20,8 @@ use crate::{Error, Result, Vec3};
 pub struct State {
     /// Name of the method.
     method: String,
+    /// The number of the scene that it belongs to; 0 for none.
+    scene: u64,
     /// Time since the start, s.
     time_s: f64,
     content: Content,
@@ -101,12 +103,17 @@ pub struct NodesState {
 impl State {
     /// The state of the method `method`.
     pub fn new(method: &str, content: Content) -> Self {
-        Self { method: method.to_owned(), time_s: 0.0, content }
+        Self { method: method.to_owned(), scene: 0, time_s: 0.0, content }
     }
 
-    /// The same state at a time since the start, s.
-    pub(crate) fn at(self, time_s: f64) -> Self {
-        Self { time_s, ..self }
+    /// The same state of a scene at a time since the start, s.
+    pub(crate) fn of_scene(self, scene: u64, time_s: f64) -> Self {
+        Self { scene, time_s, ..self }
+    }
+
+    /// The number of the scene that it belongs to; 0 for none.
+    pub(crate) fn scene(&self) -> u64 {
+        self.scene
     }
 
     /// Time since the start, s.

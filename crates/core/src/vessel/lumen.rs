@@ -26,6 +26,10 @@ impl Meshed {
         Self { wall, query: OnceLock::new() }
     }
 
+    pub(crate) fn wall(&self) -> &Wall {
+        &self.wall
+    }
+
     fn query(&self) -> Result<&Arc<WallQuery>> {
         if let Some(known) = self.query.get() {
             return Ok(known);

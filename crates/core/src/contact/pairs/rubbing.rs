@@ -128,10 +128,12 @@ impl Pair {
 
 impl SelfContact {
     /// Begins a part of a command: rods are at a state after devices have slid along their own curves, each element
-    /// by its advance, mm.
+    /// by its advance, mm. Their first nodes were at `places` on these curves: in `state` they are only nearly, since
+    /// between nodes that have moved on, a curve of cubic pieces is another one.
     pub(crate) fn begin_friction(
         &mut self,
         state: &RodState,
+        places: impl Iterator<Item = Vec3>,
         advances_mm: impl Iterator<Item = f64>,
         Rubs { coefficient, stick_mm: [stick_mm, least_stick_mm], least_n }: Rubs,
     ) {
@@ -143,6 +145,7 @@ impl SelfContact {
         }
         rubbing.renewal = Renewal::Begins;
         rubbing.begun.copy_from(state);
+        rubbing.begun.positions.iter_mut().zip(places).for_each(|(to, place)| *to = place);
         rubbing.advances_mm.clear();
         rubbing.advances_mm.extend(advances_mm);
     }

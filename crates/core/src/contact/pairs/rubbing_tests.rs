@@ -24,7 +24,7 @@ fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
     let skin = |data: &ElementData| if data.is_break() { Skin::NONE } else { Skin::rigid(RADIUS, 1.0) };
     let mut loops = SelfContact::new(&all, all.iter().map(skin).collect());
     let rubs = Rubs { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
-    loops.begin_friction(&rods, all.iter().map(|_| 0.0), rubs);
+    loops.begin_friction(&rods, std::iter::empty(), all.iter().map(|_| 0.0), rubs);
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
     let options = NewtonOptions { tolerance: 1e-9, ..NewtonOptions::default() };
     let mut outside = Together(vec![&mut loops, &mut held]);
@@ -52,7 +52,7 @@ fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
     for (coefficient, share) in [(0.3, 1.0), (0.0, 0.0)] {
         let mut next = coil();
         let rubs = Rubs { coefficient, stick_mm: [1e-3, 1e-5], least_n: 1e-9 };
-        next.begin_friction(&state, elements.iter().map(|_| 0.0), rubs);
+        next.begin_friction(&state, std::iter::empty(), elements.iter().map(|_| 0.0), rubs);
         next.recall(&elements, &kept);
         next.hold_friction();
         next.look_at_base(&elements, &state);

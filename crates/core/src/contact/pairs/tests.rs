@@ -52,7 +52,7 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
         *x += Vec3::new((0.7 * i as f64).sin(), (1.1 * i as f64).cos(), 0.3) * 0.01;
     }
     let rubs = Rubs { coefficient: friction, stick_mm: [0.02, 0.001], least_n: 0.0 };
-    touching.begin_friction(&begun, elements.iter().map(|_| 0.005), rubs);
+    touching.begin_friction(&begun, std::iter::empty(), elements.iter().map(|_| 0.005), rubs);
     let mut assembly = Assembly::<C>::new(elements.len());
     touching.look_at_base(elements, state);
     // With the forces of the energy itself.

@@ -5,8 +5,9 @@
 //! nor dissipated was released: the device has jumped.
 
 use super::carried::WallWork;
+use super::state::KirchhoffState;
 use crate::device::Stack;
-use crate::methods::StepReport;
+use crate::methods::{InstrumentReport, StepReport};
 
 /// Released or missing energy is significant above this fraction of the energy that is stored in the device and the wall,
 /// exchanged with fields, or released from the sheath.
@@ -32,13 +33,23 @@ pub(super) struct Balance {
 }
 
 impl Balance {
-    /// The balance between two reports, given the work of wall and blood and the bounds of the dissipation.
+    /// The balance between two states, given the work of wall and blood and the bounds of the dissipation. Friction
+    /// outside the body is not part of it: what hands do against that is lost at once.
     pub(super) fn new(
         stack: &Stack,
-        (before, after): (&StepReport, &StepReport),
+        (was_state, is_state): (&KirchhoffState, &KirchhoffState),
         by_wall: WallWork,
         rubbed_mj: (f64, f64),
     ) -> Self {
+        let (before, after) = (&was_state.report, &is_state.report);
+        let inside = |state: &KirchhoffState, index: usize| {
+            let (hand, outside) = (state.report.hand(index), state.outside[index]);
+            InstrumentReport {
+                push_force_n: hand.push_force_n.map(|force_n| force_n - outside.push_n),
+                torque_nmm: hand.torque_nmm - outside.torque_nmm,
+                ..hand
+            }
+        };
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
         // The part that has come out of the sheath was straight in it.
@@ -53,12 +64,12 @@ impl Balance {
             mean_mj += 0.5 * (was + is) * way;
         };
         for index in 0..after.instruments.len().max(1) {
-            let (was, is) = (before.hand(index), after.hand(index));
+            let (was, is) = (inside(was_state, index), inside(is_state, index));
             let (first_n, last_n) = match (was.push_force_n, is.push_force_n) {
                 (Some(first_n), Some(last_n)) => (first_n, last_n),
                 // Where the force jumps, the one on the side of the motion counts.
                 (Some(force_n), None) | (None, Some(force_n)) => (force_n, force_n),
-                (None, None) => (shared_n(before), shared_n(after)),
+                (None, None) => (shared_n(was_state), shared_n(is_state)),
             };
             // With nothing inserted a hand feels nothing, and all that comes out of the sheath may pull.
             let comes_in = was.inserted_mm == 0.0 && is.inserted_mm > 0.0;
@@ -102,12 +113,16 @@ impl Balance {
 
 /// Equal share of the push force of instruments whose tips are level, N: each alone has none, all together have one, and
 /// they go equally far.
-fn shared_n(report: &StepReport) -> f64 {
-    let mut rest_n = report.push_force_n;
+fn shared_n(state: &KirchhoffState) -> f64 {
+    let report = &state.report;
+    let outside_n: f64 = state.outside.iter().map(|friction| friction.push_n).sum();
+    let mut rest_n = report.push_force_n - outside_n;
     let mut level = 0.0;
-    for hand in report.instruments.iter().filter(|hand| hand.inserted_mm > 0.0) {
+    for (hand, outside) in
+        report.instruments.iter().zip(&state.outside).filter(|(hand, _)| hand.inserted_mm > 0.0)
+    {
         match hand.push_force_n {
-            Some(force_n) => rest_n -= force_n,
+            Some(force_n) => rest_n -= force_n - outside.push_n,
             None => level += 1.0,
         }
     }

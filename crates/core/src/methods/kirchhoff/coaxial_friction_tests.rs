@@ -234,6 +234,45 @@ fn a_valve_holds_against_the_hand_and_moves_nothing_inside() {
     assert!(told(sheath.rubbing(0.0, 3.0).unwrap_err()).starts_with("sheath.friction = 3"));
 }
 
+/// What is rubbed off in a sheath and a valve while a wire comes out of its catheter and goes back into the sheath, in
+/// steps of this length, mm: the energy, mJ, and the number of jumps.
+fn out_and_back(step_mm: f64) -> (f64, usize) {
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 40.0) };
+    let hook = Section { rest_curvature_per_mm: [0.04, 0.02], ..Section::straight(20.0, 0.3, 2.0) };
+    let device = Device::new(vec![hook, Section::straight(200.0, 0.35, 12.0)]).unwrap();
+    let wire = Instrument { name: "wire".into(), device, may_lead: true };
+    let stack = Stack::new(vec![wire, one("catheter", catheter)]).unwrap().sealed(vec![0.0, 0.02]).unwrap();
+    let tree = bend().enumerate().map(|(i, position_mm)| CentrelineNode {
+        position_mm,
+        radius_mm: 4.0,
+        parent: i.checked_sub(1),
+    });
+    let tree = CentrelineTree::new(tree.collect()).unwrap();
+    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(1.6)).unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap().rubbing(0.05, 0.3).unwrap();
+    let mut simulation = Simulation::builder(made.wall, stack, sheath).build().unwrap();
+    let steps = (60.0 / step_mm) as usize;
+    let (mut taken_mj, mut jumps) = (0.0, 0);
+    let courses = [(CATHETER, step_mm), (WIRE, step_mm), (WIRE, -step_mm), (CATHETER, -step_mm)];
+    for (index, step_mm) in courses {
+        for _ in 0..steps {
+            push(&mut simulation, &[(index, step_mm)]).unwrap();
+            taken_mj += simulation.report().dissipated_mj;
+            jumps += usize::from(simulation.report().jumped);
+        }
+    }
+    (taken_mj, jumps)
+}
+
+#[test]
+fn friction_outside_the_body_is_no_jump_for_any_step_and_counts_to_the_end() {
+    let (coarse, fine) = (out_and_back(5.0), out_and_back(1.0));
+    assert_eq!((coarse.1, fine.1), (0, 0));
+    assert!((coarse.0 / fine.0 - 1.0).abs() < 0.02, "{coarse:?} {fine:?}");
+    // The valve alone takes 2.4 mJ, and that of the sheath 6 for the catheter.
+    assert!(fine.0 > 8.4, "{fine:?}");
+}
+
 #[test]
 fn level_tips_on_a_rough_wall_are_pushed_as_one_device_is() {
     let wire = Section::straight(320.0, 0.3, 5.0);

@@ -7,7 +7,7 @@ use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::taken_along;
 use super::configuration::Start;
-use super::hands::lengths;
+use super::hands::{lengths, motions};
 use super::state::{KirchhoffState, Ticking};
 use super::step_control::StepControl;
 use super::substep::{Attempt, Effort, Found};
@@ -62,6 +62,11 @@ impl Sum {
             }
             so_far.released_mj += jump.released_mj;
         }
+    }
+
+    /// Adds energy dissipated by friction, mJ.
+    pub(super) fn rub(&mut self, dissipated_mj: f64) {
+        self.dissipated_mj += dissipated_mj;
     }
 
     /// Records the imbalance of a device that was relaxed from a fold.
@@ -171,8 +176,9 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(then.as_ref()).with_fields_at(to);
             sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
+                motions(&was.state.report, hands, &mut tools.guess.motions);
                 now.withdraw(surroundings.stack, hands);
-                tools.write_report(&there, hands, now);
+                sum.rub(tools.write_report(&there, hands, now));
                 break;
             }
             let left = passage.map(|passage| (was, passage));

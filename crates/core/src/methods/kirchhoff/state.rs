@@ -38,6 +38,18 @@ pub struct KirchhoffState {
     #[serde(with = "crate::methods::state::shared")]
     pub(super) coils: Coils,
     pub(super) report: StepReport,
+    /// Friction outside the body, for each hand.
+    pub(super) outside: Vec<OutsideFriction>,
+}
+
+/// Friction of the sheath's mouth and of valves on a hand, part of its forces in the report. It moves nothing inside, so
+/// the energy balance of the device leaves it out.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct OutsideFriction {
+    /// On its push force, N.
+    pub(super) push_n: f64,
+    /// On its torque, N·mm.
+    pub(super) torque_nmm: f64,
 }
 
 /// Progress of ticks.
@@ -108,6 +120,7 @@ impl KirchhoffState {
             coils: Coils::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
             tick: Ticking::Rest,
+            outside: vec![OutsideFriction::default(); instruments.len().max(1)],
             report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }
@@ -200,6 +213,10 @@ impl KirchhoffState {
         self.coils
             .iter()
             .try_for_each(|coil| coil.check(belongs.stack, felt, (sets, belongs.inner_friction)))?;
+        let hands = belongs.stack.instruments().len();
+        if self.outside.len() != hands {
+            return Err(other("outside", self.outside.len(), format!("there are {hands} instruments here")));
+        }
         if let Ticking::Solving(under_way) = &self.tick
             && !(0.0..f64::INFINITY).contains(&under_way.shift)
         {
@@ -226,7 +243,9 @@ impl KirchhoffState {
         }
         let mut inner_friction =
             self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
-        let is_finite = r.is_finite() && self.pairs.iter().all(PairForce::is_finite);
+        let mut outside = self.outside.iter().flat_map(|friction| [friction.push_n, friction.torque_nmm]);
+        let is_finite =
+            r.is_finite() && outside.all(f64::is_finite) && self.pairs.iter().all(PairForce::is_finite);
         if !(is_finite && inner_friction.all(f64::is_finite)) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
         }

@@ -12,10 +12,10 @@ use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::{KirchhoffState, UnderWay};
-use super::transport::{transport, transport_together};
+use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
-use crate::contact::{Rubs, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{ContactPoint, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
@@ -145,9 +145,13 @@ impl<const C: usize> Tools<C> {
         self.guess.before_motion.clear();
         if self.friction.acts() {
             // Slip is measured from where the device was before the vessel moved.
-            transport_from(left.map_or(start, |(was, _)| was), &mut after.rod);
+            let was = left.map_or(start, |(was, _)| was);
+            transport_from(was, &mut after.rod);
             let before = (&start.mesh.points[..], &start.state.forces[..]);
-            self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+            let slid = |point: &ContactPoint| {
+                place_on_curve(was.mesh, &was.state.rod, mesh.from_tip_mm[0] - point.from_tip_mm)
+            };
+            self.friction.begin_on(slid, &after.rod, &mesh.points, before, &self.guess.motions);
             if let Some((_, passage)) = left {
                 self.friction.carry(passage, &self.guess.motions);
                 self.guess.before_motion.extend_from_slice(&after.rod.frames);
@@ -198,10 +202,14 @@ impl<const C: usize> Tools<C> {
             least_n: least_force_n(stack.softest_nmm2()),
         };
         self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
-        self.loops.begin_friction(rod, advances_mm(mesh, stack, motions), friction);
+        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+        let place = |from_tip_mm: &f64| {
+            place_on_curve(start.mesh, &start.state.rod, mesh.from_tip_mm[0] - from_tip_mm).0
+        };
+        let places = mesh.from_tip_mm.iter().map(place);
+        self.loops.begin_friction(rod, places, advances_mm(mesh, stack, motions), friction);
         let pressed = &resumed.map_or(start.state, |resumed| &resumed.state).pairs;
         self.loops.recall(&mesh.elements, pressed);
-        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
         self.loops.blocks_its_tip(&mesh.elements, rod, advance_mm)
     }
 
@@ -233,11 +241,11 @@ impl<const C: usize> Tools<C> {
         (left, aside_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
         rubbed_mj: (f64, f64),
     ) -> Balance {
-        let reports = (&was.state.report, &is.state.report);
+        let (states, reports) = ((was.state, is.state), (&was.state.report, &is.state.report));
         let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
         let by_fields = work_of_fields(environment, was, is);
-        Balance::new(environment.surroundings.stack, reports, by_wall.with(by_fields), rubbed_mj)
+        Balance::new(environment.surroundings.stack, states, by_wall.with(by_fields), rubbed_mj)
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
@@ -334,9 +342,9 @@ impl<const C: usize> Tools<C> {
         let farthest_mm = self.newton.neighbourhood.farthest(rod);
         let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
-        let elsewhere_mj = between_mj + self.write_report(environment, hands, next);
-        hold_hands(found.residual, &start.state.report, &mut next.parts().1.report);
-        let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
+        let outside_mj = self.write_report(environment, hands, next);
+        hold_hands(found.residual, start.state, next.parts().1);
+        let rubbed_mj = (least_mj + between_mj, most_mj + between_mj);
         let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
         let after = next.parts().1;
         let lacks = balance.lacks();
@@ -344,8 +352,9 @@ impl<const C: usize> Tools<C> {
             return Err(Lost::Unbalanced);
         }
         let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
-        let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
-        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(dissipated_mj + released_mj) };
+        let (rubbed_mj, released_mj) = balance.lost_mj(jumps);
+        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(rubbed_mj + released_mj) };
+        let dissipated_mj = rubbed_mj + outside_mj;
         let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
         let residual = found.residual;
@@ -355,10 +364,12 @@ impl<const C: usize> Tools<C> {
 
 /// Keeps the hand forces of the last equilibrium where the residual says that the device is not at rest: its own are arbitrary, and would
 /// count as work.
-fn hold_hands(residual: f64, before: &StepReport, after: &mut StepReport) {
+fn hold_hands(residual: f64, before: &KirchhoffState, after: &mut KirchhoffState) {
     if residual <= AT_REST {
         return;
     }
+    after.outside.copy_from_slice(&before.outside);
+    let (before, after) = (&before.report, &mut after.report);
     (after.push_force_n, after.torque_nmm) = (before.push_force_n, before.torque_nmm);
     for (was, is) in before.instruments.iter().zip(&mut after.instruments) {
         (is.push_force_n, is.torque_nmm) = (was.push_force_n, was.torque_nmm);

@@ -18,7 +18,7 @@ use super::carried::taken_along;
 use super::command::{AT_REST, REST_RADII, Sum, WORK_RAD};
 use super::configuration::Start;
 use super::extrapolation::Correction;
-use super::hands::{Hand, Way, lengths};
+use super::hands::{Hand, Way, lengths, motions};
 use super::search::{LONGEST, MOST_NEAR};
 use super::state::{KirchhoffState, Ticking, UnderWay};
 use super::step_control::{FOLD_MM, HELD_MM, NEARER};
@@ -214,8 +214,9 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(then.as_ref()).with_fields_at(to);
             course.sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
+                motions(&was.state.report, hands, &mut tools.guess.motions);
                 now.withdraw(surroundings.stack, hands);
-                tools.write_report(&there, hands, now);
+                course.sum.rub(tools.write_report(&there, hands, now));
                 (course.moved, course.rests) = (true, true);
                 way.go_on_from(hands);
                 break Ok(Ticking::Rest);

@@ -94,10 +94,10 @@ fn a_hook_that_slides_takes_what_the_hand_gives() {
         // Coulomb's law: all of it slides along, with forces decreasing from step to step.
         let rub: f64 = report.contacts.iter().map(|c| c.friction_n.norm()).sum();
         let off = report.dissipated_mj / (0.5 * rub) - 1.0;
-        assert!(off.abs() < 0.04, "{}: {off}", report.inserted_mm);
+        assert!(off.abs() < 0.006, "{}: {off}", report.inserted_mm);
         before = report;
     }
-    assert!((given - left - taken).abs() < 0.02 * taken, "{given} {left} {taken}");
+    assert!((given - left - taken).abs() < 1e-3 * taken, "{given} {left} {taken}");
 }
 
 /// A straight tube of radius 1 mm and 70 mm, from the open end at 0 to the closed one.
@@ -123,6 +123,32 @@ fn blind_tube() -> Wall {
         mesh.triangles.push([last * AROUND + k, last * AROUND + next, (last + 1) * AROUND]);
     }
     Wall::from_surface(&mesh).unwrap()
+}
+
+/// A bent tip that is pushed through a straight tube keeps its shape: all that the hand gives is rubbed off, however long
+/// elements are. Their curves change as nodes move on, and what slips does not.
+#[test]
+fn a_bent_tip_that_slides_along_takes_what_the_hand_gives() {
+    for element_mm in [4.0, 2.0, 1.0] {
+        let sheath = Sheath::new(Vec3::z(), Vec3::z()).unwrap();
+        let properties = WallProperties { friction: 0.3, ..WallProperties::default() };
+        let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
+        let tip = Section { rest_curvature_per_mm: [-0.03, 0.066], ..Section::straight(25.0, 0.32, 6.0) };
+        let wire = Device::new(vec![tip, Section::straight(100.0, 0.32, 38.0)]).unwrap();
+        let builder = Simulation::builder(blind_tube(), wire, sheath).properties(properties);
+        let mut simulation = builder.method(&method).build().unwrap();
+        let mut before = go_on(&mut simulation, 40.0, 1.0);
+        let (mut given, mut left, mut taken) = (0.0, 0.0, 0.0);
+        for _ in 0..60 {
+            let report = simulation.step(Command::advance(0.2)).unwrap().clone();
+            assert!(!report.jumped, "{}", report.inserted_mm);
+            given += 0.1 * (before.push_force_n + report.push_force_n);
+            left += report.energy.total() - before.energy.total();
+            taken += report.dissipated_mj;
+            before = report;
+        }
+        assert!((given - left - taken).abs() < 3e-3 * taken, "{element_mm}: {given} {left} {taken}");
+    }
 }
 
 /// A wire pushed against a closed end winds up on the wall of its tube. A coil that grows turns the wire beyond it about

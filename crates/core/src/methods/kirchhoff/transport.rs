@@ -1,7 +1,7 @@
 //! The simple predictor: the rod slides along its own curve, and straight ahead beyond its tip.
 
 use crate::Vec3;
-use crate::rod::quadrature::Point;
+use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Frame, RodState};
 
 use super::mesh::Mesh;
@@ -26,6 +26,25 @@ fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut us
     let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
     let slope = Point::at(xi, 0.0).derivatives(state.chords[e], t0, t1).0;
     slope / slope.norm()
+}
+
+/// Position and unit tangent at an arc length from the sheath on the curve of `state`, and straight ahead beyond its
+/// tip.
+pub(super) fn place_on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64) -> (Vec3, Vec3) {
+    let (last, inserted_mm) = (state.elements(), mesh.from_tip_mm[0]);
+    let s = inserted_mm - from_sheath_mm;
+    if last == 0 || s <= 0.0 {
+        let along = state.frames[last].t;
+        return (state.positions[last] - along * s, along);
+    }
+    let e = (mesh.from_tip_mm[1..=last].partition_point(|end| *end > s)).min(last - 1);
+    let length_mm = mesh.elements[e].length;
+    let xi = ((mesh.from_tip_mm[e] - s) / length_mm).clamp(0.0, 1.0);
+    let [t0, t1] = [e, e + 1].map(|i| state.frames[i].t);
+    let [w0, s0, w1, s1] = hermite(xi);
+    let place = state.positions[e] * w0 + state.positions[e + 1] * w1 + (t0 * s0 + t1 * s1) * length_mm;
+    let slope = Point::at(xi, 0.0).derivatives(state.chords[e], t0, t1).0;
+    (place, slope / slope.norm())
 }
 
 /// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
