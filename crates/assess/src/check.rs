@@ -55,14 +55,15 @@ fn values(entry: &str, asked: impl IntoIterator<Item = Asked>) -> Result<()> {
     }
 }
 
-fn place(entry: &str, key: &str, place: Option<Vec3>) -> Result<()> {
+/// Checks a place.
+pub(crate) fn place(name: &str, place: Option<Vec3>) -> Result<()> {
     let is_there = |value: &f64| value.abs() <= FARTHEST_MM;
     match place.filter(|place| !place.iter().all(is_there)) {
         None => Ok(()),
         Some(place) => {
             let value = format!("[{}, {}, {}]", number(place.x), number(place.y), number(place.z));
             let mend = format!("must be three finite numbers, from -{FARTHEST_MM} to {FARTHEST_MM}");
-            Err(Error::parameter(format!("{entry}.{key}"), value, mend))
+            Err(Error::parameter(name, value, mend))
         }
     }
 }
@@ -93,13 +94,18 @@ fn named(key: String, name: &str, names: &[String]) -> Result<()> {
     Err(Error::parameter(key, format!("{name:?}"), mend))
 }
 
+/// Refuses a record in which nothing was done.
+pub(crate) fn done(record: &Record) -> Result<()> {
+    if record.is_empty() {
+        let mend = "nothing was done: give a session in which time went by";
+        return Err(Error::parameter("samples", "[]", mend));
+    }
+    Ok(())
+}
+
 /// Checks the steps of a session, each with a hand for every instrument. A record that names none is of one device.
 pub(crate) fn samples(record: &Record) -> Result<()> {
     let Record { instruments, samples, .. } = record;
-    if samples.is_empty() {
-        let mend = "nothing was recorded: give a session in which time went by";
-        return Err(Error::parameter("samples", "[]", mend));
-    }
     for (index, name) in instruments.iter().enumerate() {
         if name.is_empty() || instruments[..index].contains(name) {
             let mend = "each instrument has a name of its own";
@@ -133,8 +139,8 @@ pub(crate) fn sample(entry: &str, sample: &Sample) -> Result<()> {
             ("tip_force_n", sample.tip_force_n, Must::NotBeBelowZero),
         ],
     )?;
-    place(entry, "tip_mm", sample.tip_mm)?;
-    place(entry, "tip_at_rest_mm", sample.tip_at_rest_mm)
+    place(&format!("{entry}.tip_mm"), sample.tip_mm)?;
+    place(&format!("{entry}.tip_at_rest_mm"), sample.tip_at_rest_mm)
 }
 
 /// Checks the packing of a step.
@@ -162,8 +168,8 @@ pub(crate) fn hand(entry: &str, hand: &Hand) -> Result<()> {
             number("torque_nmm", hand.torque_nmm),
         ],
     )?;
-    place(entry, "tip_mm", hand.tip_mm)?;
-    place(entry, "tip_at_rest_mm", hand.tip_at_rest_mm)
+    place(&format!("{entry}.tip_mm"), hand.tip_mm)?;
+    place(&format!("{entry}.tip_at_rest_mm"), hand.tip_at_rest_mm)
 }
 
 /// Checks injections; where the record names instruments, medium leaves one of them or the sheath.
@@ -181,7 +187,7 @@ pub(crate) fn injections(record: &Record) -> Result<()> {
         )?;
         if let Some(outlet) = &one.outlet {
             let entry = format!("{entry}.outlet");
-            place(&entry, "at_mm", Some(outlet.at_mm))?;
+            place(&format!("{entry}.at_mm"), Some(outlet.at_mm))?;
             let force_n = outlet.tip_force_n.unwrap_or(0.0);
             values(&entry, [("tip_force_n", force_n, Must::NotBeBelowZero)])?;
             if let Some(name) = outlet.instrument.as_ref().filter(|_| !instruments.is_empty()) {

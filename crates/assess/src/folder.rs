@@ -1,7 +1,7 @@
 //! The folder of a run as a record: steps.csv and the tables beside it, which must be of the same steps.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use endowire_core::{Error, Result, Vec3};
 use serde::Deserialize;
@@ -9,6 +9,7 @@ use serde::Deserialize;
 use crate::check;
 use crate::injection::{Injection, Outlet};
 use crate::record::{BEAM, BeamState, Hand, Packed, Record, Sample};
+use crate::session::SessionFile;
 
 /// Tables of a folder, and its summary.
 const STEPS: &str = "steps.csv";
@@ -25,7 +26,8 @@ const AGAIN: &str = "rows are missing, or are of another run: run the scene agai
 /// # Errors
 /// [`Error::Content`] naming a file that is missing or invalid, with the step, key and value.
 pub(crate) fn read(folder: &Path) -> Result<Record> {
-    let steps = steps(folder)?;
+    let summary = summary(folder)?.unwrap_or_default();
+    let steps = steps(folder, &summary)?;
     let (instruments, mut hands) = hands(folder, &steps)?;
     let mut packing = packing(folder, &steps)?;
     let mut samples = Vec::with_capacity(steps.len());
@@ -49,9 +51,24 @@ pub(crate) fn read(folder: &Path) -> Result<Record> {
     let injections = injections(folder, last)?;
     let beam: Option<Vec<BeamState>> = optional(&folder.join(BEAM))?;
     in_table(&folder.join(BEAM), beam.as_deref().map_or(Ok(()), check::beam))?;
-    let record = Record { instruments, samples, injections, beam };
+    in_table(&folder.join(SUMMARY), check::place("start_mm", summary.start_mm))?;
+    let record = Record { instruments, start_mm: summary.start_mm, samples, injections, beam };
     in_table(&folder.join(INJECTIONS), check::injections(&record))?;
     Ok(record.flowed_out())
+}
+
+/// Reads the record of a run with its scene, which summary.json names.
+///
+/// # Errors
+/// As [`read`], and a summary that is missing or names no scene.
+pub(crate) fn read_in_scene(folder: &Path) -> Result<SessionFile> {
+    let named = summary(folder)?.and_then(|summary| Some((summary.scene_file?, summary.set)));
+    let Some((scene_file, set)) = named else {
+        let mend =
+            "says which scene the run is of, and is missing or names none; give the folder of a recorded run";
+        return Err(Error::content(&folder.join(SUMMARY), mend));
+    };
+    Ok(SessionFile { scene_file, set, recorded_unix_s: None, record: read(folder)? })
 }
 
 /// Name of a step in messages.
@@ -69,17 +86,32 @@ fn refused<T>(path: &Path, name: &str, value: impl std::fmt::Display, but: &str)
     in_table(path, Err(Error::parameter(name, value, format!("{but}: {AGAIN}"))))
 }
 
-/// The part of summary.json that counts steps.
-#[derive(Debug, Deserialize)]
-struct Counted {
+/// The part of summary.json that is read here.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Summary {
+    scene_file: Option<PathBuf>,
+    set: Vec<String>,
+    start_mm: Option<Vec3>,
     steps: Option<usize>,
-    #[serde(default)]
     complete: bool,
+}
+
+/// The summary, if there is one.
+fn summary(folder: &Path) -> Result<Option<Summary>> {
+    let path = folder.join(SUMMARY);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let read: std::io::Result<Summary> =
+        std::fs::read(&path).and_then(|text| Ok(serde_json::from_slice(&text)?));
+    let unreadable = |error| Error::content(&path, format!("{error}; give the folder of a recorded run"));
+    read.map(Some).map_err(unreadable)
 }
 
 /// The steps, one after another. A run that was killed may have recorded more of them than its summary counts, and no
 /// run fewer.
-fn steps(folder: &Path) -> Result<Vec<Step>> {
+fn steps(folder: &Path, summary: &Summary) -> Result<Vec<Step>> {
     let path = folder.join(STEPS);
     let steps: Vec<Step> = rows(&path)?;
     let Some(last) = steps.last().map(|last| last.step) else {
@@ -88,15 +120,7 @@ fn steps(folder: &Path) -> Result<Vec<Step>> {
     if let Some(pair) = steps.windows(2).find(|pair| pair[1].step != pair[0].step + 1) {
         return refused(&path, "step", pair[1].step, &format!("comes after step {}", pair[0].step));
     }
-    let summary = folder.join(SUMMARY);
-    if !summary.exists() {
-        return Ok(steps);
-    }
-    let counted: std::io::Result<Counted> =
-        std::fs::read(&summary).and_then(|text| Ok(serde_json::from_slice(&text)?));
-    let counted = counted
-        .map_err(|error| Error::content(&summary, format!("{error}; give the folder of a recorded run")))?;
-    match counted.steps.filter(|count| last < *count || counted.complete && last > *count) {
+    match summary.steps.filter(|count| last < *count || summary.complete && last > *count) {
         Some(count) => {
             refused(&path, "step", last, &format!("is the last one, and {SUMMARY} counts {count} steps"))
         }

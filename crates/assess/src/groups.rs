@@ -146,13 +146,17 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
         |name, unit, value, definition, study| lower(Group::Motion, (name, unit), value, definition, study);
     let path = record.path_of_tip();
     let path_mm = total(path.windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()));
-    let mut tips = record.samples.iter().filter_map(|sample| sample.tip_mm);
+    let mut tips =
+        record.start_mm.into_iter().chain(record.samples.iter().filter_map(|sample| sample.tip_mm));
     let first = tips.next();
     let ends = first.zip(tips.next_back().or(first));
     let shortest_mm = way.zip(ends).map(|(way, (from, to))| way.length_mm(&from, &to));
     let ratio = shortest_mm.filter(|mm| *mm >= SHORTEST_MM).map(|mm| path_mm / mm);
     let speeds = speeds(&path);
-    let moving_s = record.end_s() - idle_s(record);
+    // Of the same stretch of time as the path.
+    let begins_s = path.first().map_or(0.0, |first| first.0);
+    let moves = |(_, sample): &(f64, &crate::Sample)| sample.time_s > begins_s && !sample.rests();
+    let moving_s = total(record.timed().filter(moves).map(|(took_s, _)| took_s));
     let (count, mean_s) = submovements(&speeds);
     let hands = || record.samples.iter().flat_map(|sample| sample.hands.iter().enumerate());
     let most = record.hand_count();
@@ -160,13 +164,7 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let turned = total(hands().map(|(_, hand)| hand.rotate_rad.abs()));
     let retracted = total(hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)));
     vec![
-        of(
-            "tip_path_mm",
-            "mm",
-            Some(path_mm),
-            "way of the foremost tip from the end of the first step on, without what undo does",
-            RAFII,
-        ),
+        of("tip_path_mm", "mm", Some(path_mm), "way of the foremost tip, without what undo does", RAFII),
         of(
             "path_ratio",
             "1",
@@ -178,7 +176,7 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
             "tip_speed_mm_per_s",
             "mm/s",
             (moving_s > 0.0).then(|| path_mm / moving_s),
-            "way of the tip over the time in which a hand moves",
+            "way of the tip over the time in which a hand moves meanwhile",
             ESTRADA,
         )),
         higher(of(

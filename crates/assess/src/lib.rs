@@ -52,7 +52,7 @@ pub use injection::{Injection, Outlet};
 pub use metric::{Better, Group, Metric};
 pub use noticed::{Noticed, NoticedKind, noticed};
 pub use reach::Site;
-pub use record::{BEAM, BeamState, Hand, Packed, Record, Sample};
+pub use record::{BEAM, BeamState, Hand, Packed, Record, Sample, start_mm};
 pub use score::{Score, Scored, Verdict};
 pub use session::SessionFile;
 pub use subject::{Limits, Subject, Threshold};

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use endowire_core::device::Stack;
+use endowire_core::insertion::Simulation;
 use endowire_core::{Result, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -142,12 +143,20 @@ pub struct Record {
     /// Names of the instruments, innermost first; empty if they were not recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<String>,
+    /// Position of the foremost tip at time 0, before the first step ([`Self::begin`]); `None` if it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_mm: Option<Vec3>,
     /// Its steps, in order of time.
     pub samples: Vec<Sample>,
     /// Injections, in order of time.
     pub injections: Vec<Injection>,
     /// The beam, if it was recorded.
     pub beam: Option<Vec<BeamState>>,
+}
+
+/// Where the way of the foremost tip begins: at the tip, or in the sheath's mouth, as long as nothing is inserted.
+pub fn start_mm(simulation: &Simulation) -> Vec3 {
+    simulation.shape().tip_mm().unwrap_or(simulation.sheath().position_mm)
 }
 
 impl Record {
@@ -157,21 +166,28 @@ impl Record {
     ///
     /// # Errors
     /// [`Error::Content`](endowire_core::Error::Content) naming a file that is missing or invalid, with the key and value
-    /// that are impossible.
+    /// that are impossible, and a session in which nothing was done.
     pub fn read(path: &Path) -> Result<Self> {
-        if path.is_file() {
-            SessionFile::read(path).map(|session| session.record)
-        } else {
-            folder::read(path)
-        }
+        if path.is_file() { SessionFile::read(path)?.done(path) } else { folder::read(path) }
     }
 
     /// Reads a session from the bytes of its file; `path` is for messages.
     ///
     /// # Errors
-    /// [`Error::Content`](endowire_core::Error::Content) if it is not a session, or has an impossible value.
+    /// [`Error::Content`](endowire_core::Error::Content) if it is not a session, has an impossible value, or nothing
+    /// was done in it.
     pub fn from_session(bytes: &[u8], path: &Path) -> Result<Self> {
-        SessionFile::parse(bytes, path).map(|session| session.record)
+        SessionFile::parse(bytes, path)?.done(path)
+    }
+
+    /// Begins the record at the state of a simulation before its first step.
+    pub fn begin(&mut self, simulation: &Simulation) {
+        self.start_mm = Some(start_mm(simulation));
+    }
+
+    /// Whether nothing was done: no step was carried out and no time went by. Such a record has no score.
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
     }
 
     /// Refuses impossible values, and samples and injections that do not fit the named instruments.
@@ -179,9 +195,11 @@ impl Record {
     /// # Errors
     /// [`Error::Parameter`](endowire_core::Error::Parameter) with key and value.
     pub(crate) fn check(&self) -> Result<()> {
+        check::place("start_mm", self.start_mm)?;
         check::samples(self)?;
         check::injections(self)?;
-        self.beam.as_deref().map_or(Ok(()), check::beam)
+        // A session in which nothing was done has seen no beam.
+        self.beam.as_deref().filter(|_| !self.is_empty()).map_or(Ok(()), check::beam)
     }
 
     /// Refuses a record of other instruments than those of its scene: the places of tips and the lengths that are in
@@ -220,10 +238,11 @@ impl Record {
         })
     }
 
-    /// The path of the foremost tip: times, s, and places. Where the session went to another of its states, as by undo,
+    /// The path of the foremost tip: times, s, and places. It begins before the first step, or without that place at the
+    /// end of the first step with a tip. Where the session went to another of its states, as by undo,
     /// the path goes on from where the tip was: what follows is shifted by the distance that no hand has moved it.
     pub(crate) fn path_of_tip(&self) -> Vec<(f64, Vec3)> {
-        let mut path: Vec<(f64, Vec3)> = Vec::new();
+        let mut path: Vec<(f64, Vec3)> = self.start_mm.map(|start| (0.0, start)).into_iter().collect();
         let (mut shift, mut undone) = (Vec3::zeros(), false);
         for sample in &self.samples {
             undone |= sample.undone;
@@ -283,7 +302,7 @@ impl Record {
         let states =
             |beam: &Vec<BeamState>| beam.iter().filter(|one| one.time_s <= time_s).copied().collect();
         let beam = self.beam.as_ref().map(states);
-        Self { instruments: self.instruments.clone(), samples, injections, beam }
+        Self { instruments: self.instruments.clone(), start_mm: self.start_mm, samples, injections, beam }
     }
 
     /// The record up to a time.

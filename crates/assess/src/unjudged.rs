@@ -22,6 +22,9 @@ pub struct Unjudged {
 
 /// Why a measure has no value.
 pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
+    if record.is_empty() {
+        return "nothing was done in the session";
+    }
     let of_beam = ["beam_on_s", "beam_on_idle_s", "moving_without_beam_s"].contains(&metric.name);
     if of_beam || metric.group == Group::Radiation {
         return if record.beam.is_none() { NO_BEAM } else { "the beam was never on" };
@@ -34,7 +37,8 @@ pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
         "packing_density" | "coil_outside_mm" => {
             "no sac is packed: the scene has none, or it was not recorded"
         }
-        "spectral_arc_length" | "submovement_s" | "tip_speed_mm_per_s" => "the tip did not move",
+        "spectral_arc_length" | "submovement_s" => "the tip did not move",
+        "tip_speed_mm_per_s" => "no hand moved after the first place of the tip that was recorded",
         "path_ratio" => "the tip ends where it began",
         "time_in_trunk_s" => "the tip did not come past the first fork on its way, or there is none",
         _ => "no way to a target is known, or no tip was on it",

@@ -74,7 +74,8 @@ fn each_measure_is_what_it_says() {
         ("against_wall_ml", 6.0),
         ("tip_path_mm", 178.0),
         ("path_ratio", 178.0 / 138.0),
-        ("tip_speed_mm_per_s", 178.0 / 8.0),
+        // From 1 s on, but for 2 s of rest.
+        ("tip_speed_mm_per_s", 178.0 / 7.0),
         ("submovements", 2.0),
         ("submovement_s", 3.5),
         ("reversals", 2.0),
@@ -133,6 +134,31 @@ fn medium_is_measured_as_it_has_flowed_and_at_the_tip_that_it_leaves() {
     // Of two instruments it must be recorded.
     two.injections[0].outlet = None;
     assert_eq!(value(&two, "against_wall_ml"), None);
+}
+
+#[test]
+fn way_and_speed_do_not_depend_on_how_long_steps_are() {
+    // 60 mm in 6 s, after 2 s of rest.
+    let of = |steps: u32, start_mm: Option<Vec3>| {
+        let step = |k: u32| {
+            let part = f64::from(k) / f64::from(steps);
+            sample(2.0 + 6.0 * part, [60.0 * part, 0.0], 60.0 / f64::from(steps), 0.0)
+        };
+        let rest = Sample { tip_mm: start_mm, ..sample(2.0, [0.0, 0.0], 0.0, 0.0) };
+        let samples = std::iter::once(rest).chain((1..=steps).map(step)).collect();
+        let metrics = assess(&Record { samples, start_mm, ..Record::default() }, None);
+        ["tip_path_mm", "tip_speed_mm_per_s", "submovement_s"].map(|name| {
+            let value = metrics.iter().find(|metric| metric.name == name).unwrap().value;
+            value.map(|value| (value * 1e9).round() / 1e9)
+        })
+    };
+    for steps in [1, 6, 60] {
+        assert_eq!(of(steps, Some(Vec3::zeros())), [Some(60.0), Some(10.0), Some(6.0)], "{steps} steps");
+    }
+    // Where the tip was before the first step is not known: way and speed are of the time from its end on.
+    assert_eq!(of(1, None), [Some(0.0), None, None]);
+    assert_eq!(of(6, None), [Some(50.0), Some(10.0), Some(5.0)]);
+    assert_eq!(of(60, None), [Some(59.0), Some(10.0), Some(5.9)]);
 }
 
 #[test]

@@ -67,6 +67,7 @@ fn record() -> Record {
         samples: samples.collect(),
         injections: vec![injection(0.5, 4.0, 0.0), injection(3.5, 6.0, 0.01)],
         beam: Some(vec![beam(0.0, true), beam(7.5, false)]),
+        ..Record::default()
     }
 }
 

@@ -8,7 +8,7 @@ mod fork;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use endowire_assess::{Metric, Record, Way, assess};
+use endowire_assess::{Metric, Record, SessionFile, Way, assess};
 use endowire_core::device::{Device, Instrument, Section, Stack};
 use fork::tree;
 use serde_json::{Value, json};
@@ -155,7 +155,8 @@ fn a_session_of_two_instruments_is_measured_as_by_hand() {
         // From 20 mm: 80 mm along the trunk, 47 mm into the branch, which is the way itself.
         ("tip_path_mm", 127.0),
         ("path_ratio", 1.0),
-        ("tip_speed_mm_per_s", 127.0 / 5.0),
+        // From 1 s on, but for 1 s of rest.
+        ("tip_speed_mm_per_s", 127.0 / 4.0),
         // From 2 to 4 s with 40 mm/s, from 5 to 6 s with 47 mm/s.
         ("submovements", 2.0),
         ("submovement_s", 1.5),
@@ -237,7 +238,8 @@ fn a_folder_of_a_run_is_measured_as_by_hand() {
         // 4 mm back and 44 mm on, between places 40 mm apart.
         ("tip_path_mm", Some(48.0)),
         ("path_ratio", Some(1.2)),
-        ("tip_speed_mm_per_s", Some(9.6)),
+        // In the last three seconds.
+        ("tip_speed_mm_per_s", Some(16.0)),
         // From 2 to 5 s with 4 and 22 mm/s.
         ("submovements", Some(1.0)),
         ("submovement_s", Some(3.0)),
@@ -327,6 +329,7 @@ fn a_session_that_cannot_be_is_refused_by_key_and_value() {
     let whole: Value = serde_json::from_str(&session()).unwrap();
     assert!(read(&whole.to_string()).is_ok(), "the twin");
     for (pointer, value, told) in [
+        ("/record/start_mm", json!([1e9, 0.0, 0.0]), "record.start_mm = [1e9, 0, 0]: must be three"),
         ("/record/samples/2/time_s", json!(0.0), "record.samples[2].time_s = 0: comes after 2"),
         ("/record/samples/2/wall_force_n", json!(-5.0), "record.samples[2].wall_force_n = -5: must be"),
         ("/record/injections/0/volume_ml", json!(-5.0), "record.injections[0].volume_ml = -5: must be"),
@@ -334,7 +337,7 @@ fn a_session_that_cannot_be_is_refused_by_key_and_value() {
         ("/record/injections/1/outlet/tip_force_n", json!(-1.0), "injections[1].outlet.tip_force_n = -1"),
         ("/record/beam/0/dose_ngy", json!(-1.0), "record.beam[0].dose_ngy = -1: must be"),
         ("/record/beam", json!([]), "record.beam = empty"),
-        ("/record/samples", json!([]), "record.samples = []: nothing was recorded"),
+        ("/record/samples", json!([]), "record.samples = []: nothing was done"),
         ("/record/samples/2/hands", json!([]), "record.samples[2].hands = 0 hands: must be one for each"),
         ("/record/instruments", json!(["wire"]), "record.samples[0].hands = 2 hands: must be one for each"),
         ("/record/instruments", json!(["wire", "a", "b"]), "record.samples[0].hands = 2 hands: must be one"),
@@ -507,4 +510,74 @@ fn a_record_of_other_instruments_than_the_scenes_is_refused() {
     assert!(told(&alone, &["wire", "catheter"]).contains("instruments = []: the scene has [wire, catheter]"));
     let error = told(&alone, &["wire"]);
     assert!(error.contains("injections[0].outlet.instrument = \"device\": is no instrument"), "{error}");
+}
+
+#[test]
+fn the_folder_of_a_run_says_where_its_way_began_and_in_which_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("steps.csv", STEPS);
+    let error = SessionFile::read(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("summary.json: says which scene the run is of"), "{error}");
+    let length_mm = |summary: &str| {
+        write("summary.json", summary);
+        value(&assess(&Record::read(folder.path()).unwrap(), None), "tip_path_mm").unwrap()
+    };
+    let without = length_mm(r#"{"scene_file": "a.toml", "steps": 3}"#);
+    assert_eq!(without, 48.0);
+    let with = length_mm(r#"{"scene_file": "a.toml", "set": ["seed=2"], "start_mm": [7.0, 0.0, 0.0]}"#);
+    assert_eq!(with, 48.0 + 3.0, "3 mm in the first step");
+    let session = SessionFile::read(folder.path()).unwrap();
+    assert_eq!(
+        (session.scene_file.as_path(), session.set.as_slice()),
+        (Path::new("a.toml"), &["seed=2".to_owned()][..])
+    );
+}
+
+#[test]
+fn a_session_of_another_scene_than_the_subjects_is_refused_unless_pictures_alone_differ() {
+    let set = |set: &[&str]| -> Vec<String> { set.iter().map(|&one| one.to_owned()).collect() };
+    let mut file = SessionFile::parse(session().as_bytes(), Path::new("a.session.json")).unwrap();
+    let checked = |file: &SessionFile, scene: &str, of_subject: &[&str]| {
+        let path = Path::new("a.session.json");
+        let checked =
+            file.check_in((Path::new(scene), &set(of_subject)), &stack(&["wire", "catheter"]), path);
+        checked.map_err(|error| error.to_string())
+    };
+    assert!(checked(&file, "a.toml", &[]).is_ok() && checked(&file, "a.toml", &["view.every=3"]).is_ok());
+    let error = checked(&file, "b.toml", &[]).unwrap_err();
+    assert!(
+        error.starts_with("a.session.json: was recorded in a.toml, and the subject is in b.toml"),
+        "{error}"
+    );
+    file.set = set(&["view.every=1000", "seed=2", "view.camera.orbit_deg=9"]);
+    assert!(checked(&file, "a.toml", &["seed=2"]).is_ok());
+    // Times are counted in frames, and doses are those of the beam.
+    for setting in ["vessel.wall.friction=0.5", "view.frames_per_s=5", "view.detector.dose_ngy=9"] {
+        file.set = set(&[setting]);
+        assert!(checked(&file, "a.toml", &[]).unwrap_err().contains(setting));
+    }
+    // More is in than there is.
+    file.set = vec![];
+    file.record.samples[1].hands[0].inserted_mm = 1e9;
+    let error = checked(&file, "a.toml", &[]).unwrap_err();
+    assert!(error.contains("a.session.json: samples[1].hands[0].inserted_mm = 1e9: wire is"), "{error}");
+}
+
+#[test]
+fn a_session_in_which_nothing_was_done_is_read_and_has_no_measures() {
+    let mut text: Value = serde_json::from_str(&session()).unwrap();
+    for (key, list) in [("samples", json!([])), ("injections", json!([])), ("beam", json!([]))] {
+        text["record"][key] = list;
+    }
+    let path = Path::new("a.session.json");
+    let file = SessionFile::parse(text.to_string().as_bytes(), path).unwrap();
+    assert!(file.record.is_empty());
+    let checked = file.check_in((Path::new("a.toml"), &[]), &stack(&["wire", "catheter"]), path);
+    assert!(checked.unwrap_err().to_string().contains("samples = []: nothing was done"));
+    let error = Record::from_session(text.to_string().as_bytes(), path).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "a.session.json: record.samples = []: nothing was done: give a session in which time went by"
+    );
 }

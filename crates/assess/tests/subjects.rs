@@ -136,6 +136,13 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert!(words.starts_with("not judged: beam_on_s, limits.beam_s: no beam was recorded"), "{words}");
     let seen = Record { beam: Some(vec![beam(0.0, true)]), ..pushed(|_| 0.5) };
     assert!(exam(of_beam).score(&seen).unjudged.is_empty());
+    // Where nothing was done, that is the reason, and not that instruments or a sac are missing.
+    let of_two =
+        [("\"spectral_arc_length\"", "\"catheter_ahead_s\""), ("at_least = -100.0", "at_most = 1.0")];
+    let of_two = subject(&of_two).unwrap();
+    let nothing = exam(of_two).score(&Record { beam: Some(vec![]), ..Record::default() });
+    let [of_ahead] = nothing.unjudged.as_slice() else { panic!("{:?}", nothing.unjudged) };
+    assert_eq!(of_ahead.why, "nothing was done in the session");
 
     // What comes after the end does not count, and who stops before it has no score.
     let mut longer = pushed(|_| 0.5);

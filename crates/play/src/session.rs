@@ -120,7 +120,7 @@ impl Session {
         }
         let lab = Lab::new(view, side_px, simulation.lumen().wall(&NoStore)?.mesh())?;
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];
-        let history = History::new(&simulation);
+        let (history, telemetry) = (History::new(&simulation), Telemetry::new(&simulation));
         Ok(Self {
             simulation,
             hands,
@@ -136,7 +136,7 @@ impl Session {
             holds_still: false,
             events: Vec::new(),
             events_in_all: 0,
-            telemetry: Telemetry::default(),
+            telemetry,
             sac: None,
             exam: None,
         })

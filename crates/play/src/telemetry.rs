@@ -14,14 +14,14 @@ pub(crate) struct Telemetry {
     elsewhere: bool,
 }
 
-impl Default for Telemetry {
-    /// An empty record, of the beam too: a session always knows its beam.
-    fn default() -> Self {
-        Self { record: Record { beam: Some(vec![]), ..Record::default() }, elsewhere: false }
-    }
-}
-
 impl Telemetry {
+    /// An empty record that begins at the state of this simulation, of the beam too: a session always knows its beam.
+    pub(crate) fn new(simulation: &Simulation) -> Self {
+        let mut record = Record { beam: Some(vec![]), ..Record::default() };
+        record.begin(simulation);
+        Self { record, elsewhere: false }
+    }
+
     /// The record so far.
     pub(crate) fn record(&self) -> &Record {
         &self.record

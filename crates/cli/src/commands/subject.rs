@@ -180,7 +180,10 @@ fn run(args: &SubjectRunArgs) -> Result<(), Failure> {
     let record = Record::new(folder.join("played.toml"), &path, &settings)?;
     let mut record = record.scored(provenance.clone());
     record.finish(&session)?;
-    let Some(score) = session.score() else { return Ok(()) };
+    let Some(score) = session.score() else {
+        let what = "interrupted before the first step: nothing was done, and there is no score";
+        return Err(Failure::Computation(format!("{place}: {what}")));
+    };
     answer(&ScoreDocument { provenance: &provenance, score: &score }, args.json, || subjects::text(&score))?;
     if score.verdict.passed {
         return Ok(());

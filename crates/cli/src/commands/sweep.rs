@@ -141,7 +141,7 @@ impl Recordings<'_> {
     fn recording(&self, run: &Run<'_>, simulation: &Simulation) -> Result<Recording, Failure> {
         let name = format!("{:06}", run.number());
         let (folder, scene_file) = (self.folder.join(&name), self.folder.join(name + ".toml"));
-        let mut recorder = Recorder::new(&folder, false, simulation.stack())?;
+        let mut recorder = Recorder::new(&folder, false, simulation)?;
         let text = run.standalone()?;
         whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
         let scene = Scene::read(&scene_file)?;
@@ -189,6 +189,7 @@ impl endowire_sweep::Recorder for Recording {
             script_file: None,
             method: self.scene.method.name(),
             centreline_found: self.scene.finds_centreline(),
+            start_mm: self.recorder.start_mm,
             outcome: outcome.clone(),
             packing: self.recorder.packed(),
             step_time_s: self.steps.as_secs_f64(),

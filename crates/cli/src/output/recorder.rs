@@ -7,7 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use endowire_core::device::Stack;
+use endowire_core::Vec3;
 use endowire_core::insertion::{DetachedCoil, Move, Simulation};
 use endowire_core::vessel::Sac;
 use endowire_sweep::RunOutcome;
@@ -20,7 +20,7 @@ use super::frames::PlaneTold;
 use super::instruments::InstrumentTable;
 use super::packing::{Packed, PackingTable};
 use super::provenance::Provenance;
-use super::recording::Recording;
+use super::recording::{RecordedSummary, Recording};
 use super::{SUMMARY, to_json, whole};
 use crate::failure::Failure;
 
@@ -44,6 +44,9 @@ pub(crate) struct Summary {
     pub(crate) method: &'static str,
     /// Whether the vessel's centre line was needed and, since the scene names none, was extracted from its surface.
     pub(crate) centreline_found: bool,
+    /// Position of the foremost tip before the first step, mm: in the sheath's mouth if nothing is inserted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) start_mm: Option<Vec3>,
     /// Outcome of the run.
     #[serde(flatten)]
     pub(crate) outcome: RunOutcome,
@@ -114,6 +117,8 @@ pub(crate) struct Recorder {
     packing: Option<PackingTable>,
     arrays: ShapeArrays,
     steps: usize,
+    /// Where the way of the tip begins, if that is known.
+    pub(crate) start_mm: Option<Vec3>,
     coils: CoilTable,
     /// Frames so far, relative to the folder.
     pub(crate) frames: Vec<String>,
@@ -122,13 +127,13 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// Starts a recording in `folder`, which is created if necessary; an earlier recording in it is replaced. A
-    /// folder with other files is refused, unless `force` is set.
-    pub(crate) fn new(folder: &Path, force: bool, stack: &Stack) -> Result<Self, Failure> {
+    /// Starts a recording of a simulation as it is in `folder`, which is created if necessary; an earlier recording in it
+    /// is replaced. A folder with other files is refused, unless `force` is set.
+    pub(crate) fn new(folder: &Path, force: bool, at: &Simulation) -> Result<Self, Failure> {
         let claim = folder::claim(folder, force)?;
         let start = || -> io::Result<_> {
             let table = File::create(folder.join(folder::TABLE))?;
-            Ok((table, InstrumentTable::new(folder, stack)?, ShapeArrays::new(folder)?))
+            Ok((table, InstrumentTable::new(folder, at.stack())?, ShapeArrays::new(folder)?))
         };
         let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
         Ok(Self {
@@ -138,6 +143,7 @@ impl Recorder {
             packing: None,
             arrays,
             steps: 0,
+            start_mm: Some(endowire_assess::start_mm(at)),
             coils: CoilTable::new(folder),
             frames: Vec::new(),
             checkpoint: None,
@@ -154,7 +160,7 @@ impl Recorder {
         at: &Simulation,
     ) -> Result<(Self, Option<Recording>), Failure> {
         if !folder::is_recording(folder) {
-            let mut recorder = Self::new(folder, force, at.stack())?;
+            let mut recorder = Self::new(folder, force, at)?;
             recorder.steps = steps;
             return Ok((recorder, None));
         }
@@ -190,6 +196,10 @@ impl Recorder {
             Ok((table, InstrumentTable::go_on(folder, at.stack(), steps)?, arrays))
         };
         let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let start_mm = match recording {
+            Some(_) => RecordedSummary::read(&folder.join(SUMMARY)).ok().and_then(|summary| summary.start_mm),
+            None => Some(endowire_assess::start_mm(at)),
+        };
         let coils = CoilTable::go_on(folder, at.stack(), steps)?;
         let table = csv::WriterBuilder::new().has_headers(kept.bytes == 0).from_writer(table);
         let recorder = Self {
@@ -199,6 +209,7 @@ impl Recorder {
             packing: None,
             arrays,
             steps,
+            start_mm,
             coils,
             frames: Vec::new(),
             checkpoint: None,

@@ -26,6 +26,9 @@ pub(crate) struct RecordedSummary {
     /// Keys of the scene that were set on the command line.
     #[serde(default)]
     pub(crate) set: Vec<String>,
+    /// Where the way of the tip begins; `None` in recordings of versions that did not tell.
+    #[serde(default)]
+    pub(crate) start_mm: Option<Vec3>,
     /// Number of steps without an equilibrium; 0 in recordings of versions that did not count them.
     #[serde(default)]
     pub(crate) unconverged_steps: usize,
@@ -36,6 +39,20 @@ pub(crate) struct RecordedSummary {
 }
 
 impl RecordedSummary {
+    /// That of a recording in this scene, of which nothing else is known.
+    pub(crate) fn in_scene(scene: &Path) -> Self {
+        Self {
+            scene_file: scene.to_path_buf(),
+            scene: None,
+            script_file: None,
+            scene_hash: None,
+            set: vec![],
+            start_mm: None,
+            unconverged_steps: 0,
+            complete: true,
+        }
+    }
+
     /// Reads a summary.json.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let read = || -> io::Result<_> { Ok(serde_json::from_slice(&std::fs::read(path)?)?) };
@@ -67,18 +84,7 @@ impl Recording {
     pub(crate) fn read(folder: &Path, scene: Option<&Path>) -> Result<Self, Failure> {
         let summary = match (RecordedSummary::read(&folder.join(SUMMARY)), scene) {
             (Ok(summary), _) => summary,
-            (Err(_), Some(scene)) => {
-                let scene_file = scene.to_path_buf();
-                RecordedSummary {
-                    scene_file,
-                    scene: None,
-                    script_file: None,
-                    scene_hash: None,
-                    set: vec![],
-                    unconverged_steps: 0,
-                    complete: false,
-                }
-            }
+            (Err(_), Some(scene)) => RecordedSummary { complete: false, ..RecordedSummary::in_scene(scene) },
             (Err(failure), None) => return Err(failure),
         };
         let packed = folder.join(arrays::PACKED);

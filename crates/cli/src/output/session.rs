@@ -12,19 +12,11 @@ pub(crate) fn beside(script: &Path) -> PathBuf {
     script.with_extension("session.json")
 }
 
-/// Scene of a session, and time of its recording, seconds since 1970-01-01 UTC, if given.
-pub(crate) fn read_head(path: &Path) -> Result<(RecordedSummary, Option<u64>), Failure> {
-    let SessionFile { scene_file, set, recorded_unix_s, .. } = SessionFile::read(path)?;
-    let summary = RecordedSummary {
-        scene_file,
-        scene: None,
-        script_file: None,
-        scene_hash: None,
-        set,
-        unconverged_steps: 0,
-        complete: true,
-    };
-    Ok((summary, recorded_unix_s))
+impl RecordedSummary {
+    /// The scene of a session.
+    pub(crate) fn of_session(session: &SessionFile) -> Self {
+        Self { set: session.set.clone(), ..Self::in_scene(&session.scene_file) }
+    }
 }
 
 /// Writes a session file.

@@ -144,3 +144,30 @@ fn a_session_by_the_clock_says_when_and_one_by_its_inputs_does_not() {
         assert!(since_s.is_none_or(|since_s| since_s < 600), "{since_s:?}");
     }
 }
+
+#[test]
+fn a_session_in_which_nothing_was_done_is_left_out_and_one_alone_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, total_s) in [("a", 40.0), ("c", 20.0)] {
+        session(folder.path(), name, total_s, None);
+    }
+    let mut empty = document(folder.path().join("a.session.json"));
+    empty["record"] = json!({"samples": [], "injections": [], "beam": []});
+    let nothing = folder.path().join("b.session.json");
+    std::fs::write(&nothing, empty.to_string()).unwrap();
+    let output = endowire().args(["assess", text(folder.path())]).output().unwrap();
+    let left_out = format!("{}: nothing was done in it: it is left out", nothing.display());
+    let table = String::from_utf8(output.stdout.clone()).unwrap();
+    assert!(
+        output.status.success() && said(&output).contains(&left_out) && table.contains(&left_out),
+        "{table}"
+    );
+    let all = assessed(&[text(folder.path())]);
+    assert_eq!((&all["left_out"], all["sessions"].as_array().unwrap().len()), (&json!([nothing]), 2));
+    let output = endowire().args(["assess", text(&nothing)]).output().unwrap();
+    assert!(
+        output.status.code() == Some(2) && said(&output).contains("nothing was done"),
+        "{}",
+        said(&output)
+    );
+}

@@ -368,3 +368,17 @@ fn what_is_no_subject_or_does_not_belong_to_it_is_refused_by_name() {
     let shown = String::from_utf8(shown.stdout).unwrap();
     assert!(shown.contains("tip within 10 mm of innominate") && shown.contains("level 2"), "{shown}");
 }
+
+#[test]
+fn a_session_in_which_nothing_was_done_has_no_score() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let mut command = in_workspace();
+    command.args(["play", "vertebral_catheter", "--headless", "--size", "64", "--record", text(&record)]);
+    let output = command.stdin(Stdio::null()).output().unwrap();
+    let said = said(&output);
+    let told = "vertebral_catheter: nothing was done: there is no score";
+    assert!(output.status.success() && said.contains(told) && !said.contains("of 100"), "{said}");
+    assert!(folder.path().join("played.session.json").exists());
+    assert!(!folder.path().join("played.score.json").exists());
+}

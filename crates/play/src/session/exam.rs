@@ -32,8 +32,10 @@ impl Session {
         self.exam.as_ref().map(|exam| exam.standing(self.telemetry.record()))
     }
 
-    /// The score of the subject, if there is one; if it has not ended, that of the session so far.
+    /// The score of the subject, if there is one; if it has not ended, that of the session so far. `None` if nothing was
+    /// done yet.
     pub fn score(&self) -> Option<Arc<Score>> {
-        self.exam.clone().map(|exam| exam.score(self.telemetry.record()))
+        let record = Some(self.telemetry.record()).filter(|record| !record.is_empty())?;
+        self.exam.clone().map(|exam| exam.score(record))
     }
 }

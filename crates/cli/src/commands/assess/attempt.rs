@@ -3,16 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_assess::{Metric, Record, Score, Subject, Way};
-use endowire_methods::{Scene, Setting};
+use endowire_assess::{Metric, Record, Score, SessionFile, Subject, Way};
+use endowire_core::device::Stack;
+use endowire_methods::Scene;
 
 use crate::args::AssessArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::recording::RecordedSummary;
-use crate::output::{SUMMARY, session as session_file};
+use crate::output::tell;
 use crate::{scenes, subjects};
+
+/// Why a session is left out.
+pub(super) const LEFT_OUT: &str = "nothing was done in it: it is left out";
 
 /// A measured session.
 pub(super) struct Attempt {
@@ -66,13 +70,10 @@ impl<'a> Places<'a> {
         Ok(self.add(Place { path, set: summary.set.clone(), scene }))
     }
 
-    /// The record of a session, which must be one of its scene.
-    fn read(&self, session: &Path, place: usize) -> Result<Record, Failure> {
-        let record = Record::read(session)?;
+    /// The instruments of a scene.
+    fn stack(&self, place: usize) -> Result<Stack, Failure> {
         let Place { path, scene, .. } = &self.all[place];
-        let stack = scene.stack().map_err(|error| Failure::from(error).at(path.display()))?;
-        record.check_in(&stack).map_err(|error| Failure::from(error).at(session.display()))?;
-        Ok(record)
+        scene.stack().map_err(|error| Failure::from(error).at(path.display()))
     }
 
     fn add(&mut self, place: Place) -> usize {
@@ -81,28 +82,39 @@ impl<'a> Places<'a> {
     }
 }
 
-/// The scene of a session or a run, and the time of the recording, if known; a run does not contain it.
-fn read_head(session: &Path) -> Result<(RecordedSummary, Option<u64>), Failure> {
-    if session.is_dir() {
-        Ok((RecordedSummary::read(&session.join(SUMMARY))?, None))
-    } else {
-        session_file::read_head(session)
+/// The sessions that are assessed, with their files, and the files of those in which nothing was done. These are left
+/// out and told of, unless all are such.
+pub(super) fn read(files: &[PathBuf]) -> Result<(Vec<(&Path, SessionFile)>, Vec<&Path>), Failure> {
+    let (mut sessions, mut left_out) = (vec![], vec![]);
+    for file in files {
+        let session = SessionFile::read(file)?;
+        if session.record.is_empty() {
+            left_out.push(file.as_path());
+        } else {
+            sessions.push((file.as_path(), session));
+        }
     }
+    if sessions.is_empty() {
+        // This says what is wrong with it.
+        for file in &left_out {
+            Record::read(file)?;
+        }
+    }
+    left_out.iter().for_each(|file| tell(format_args!("{}: {LEFT_OUT}", file.display())));
+    Ok((sessions, left_out))
 }
 
-/// Measures sessions on the way to a target.
+/// Measures a session on the way to a target.
 pub(super) fn measured(
     args: &AssessArgs,
-    files: &[PathBuf],
+    (session, of_file): (&Path, SessionFile),
     places: &mut Places<'_>,
-) -> Result<Vec<Attempt>, Failure> {
-    files.iter().map(|file| measured_one(args, file, places)).collect()
-}
-
-fn measured_one(args: &AssessArgs, session: &Path, places: &mut Places<'_>) -> Result<Attempt, Failure> {
-    let (summary, recorded_unix_s) = read_head(session)?;
+) -> Result<Attempt, Failure> {
+    let (summary, recorded_unix_s) = (RecordedSummary::of_session(&of_file), of_file.recorded_unix_s);
     let place = places.find(&summary)?;
-    let record = places.read(session, place)?;
+    let record = of_file.record;
+    let refused = |error| Failure::from(error).at(session.display());
+    record.check_in(&places.stack(place)?).map_err(refused)?;
     let Place { path, scene, .. } = &places.all[place];
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let tree = scene.centreline(&places.cache).map_err(in_scene)?;
@@ -130,22 +142,22 @@ fn target(scene: &Scene) -> Option<String> {
 /// Scores sessions by a subject; returns the provenance and the attempts.
 pub(super) fn scored(
     subject: &Subject,
-    files: &[PathBuf],
+    sessions: Vec<(&Path, SessionFile)>,
     places: &mut Places<'_>,
 ) -> Result<(Provenance, Vec<Attempt>), Failure> {
     let settings = subjects::settings(subject)?;
     let (scene, path, exam) = subjects::in_scene(subject, &places.cache)?;
     let provenance = Provenance::of_scene(&scene, &settings)?;
     let place = places.add(Place { path: path.clone(), set: subject.set.clone(), scene });
+    let (stack, set) = (places.stack(place)?, settings.iter().map(ToString::to_string).collect::<Vec<_>>());
     let mut attempts = vec![];
-    for session in files {
-        let (summary, recorded_unix_s) = read_head(session)?;
-        check_scene(session, &summary, &path, &settings)?;
-        let record = places.read(session, place)?;
+    for (session, of_file) in sessions {
+        of_file.check_in((&path, &set), &stack, session)?;
+        let SessionFile { record, recorded_unix_s, .. } = of_file;
         exam.check(&record).map_err(|error| Failure::from(error).at(session.display()))?;
         let score = exam.clone().score(&record);
         attempts.push(Attempt {
-            session: session.clone(),
+            session: session.to_path_buf(),
             recorded_unix_s,
             place,
             target: subject.goal.target().map(str::to_owned),
@@ -156,32 +168,4 @@ pub(super) fn scored(
         });
     }
     Ok((provenance, attempts))
-}
-
-/// Refuses a session that was recorded in a scene other than the subject's.
-fn check_scene(
-    session: &Path,
-    recorded: &RecordedSummary,
-    scene: &Path,
-    settings: &[Setting],
-) -> Result<(), Failure> {
-    let same = match (recorded.scene_file.canonicalize(), scene.canonicalize()) {
-        (Ok(recorded), Ok(scene)) => recorded == scene,
-        // A scene that was moved or deleted can only be compared by its file name.
-        _ => recorded.scene_file.file_name() == scene.file_name(),
-    };
-    let set: Vec<String> = settings.iter().map(ToString::to_string).collect();
-    if same && recorded.set == set {
-        return Ok(());
-    }
-    let told = |scene: &Path, set: &[String]| {
-        let set: String = set.iter().map(|setting| format!(" --set '{setting}'")).collect();
-        format!("{}{set}", scene.display())
-    };
-    Err(Failure::Input(format!(
-        "{}: was recorded in {}, and the subject is in {}: name the subject that it was recorded with",
-        session.display(),
-        told(&recorded.scene_file, &recorded.set),
-        told(scene, &set)
-    )))
 }

@@ -34,7 +34,13 @@ struct Document<'a> {
 #[serde(untagged)]
 enum Told<'a> {
     One(Box<Session<'a>>),
-    Several { sessions: Vec<Session<'a>>, courses: &'a [CourseOf<'a>] },
+    Several {
+        sessions: Vec<Session<'a>>,
+        courses: &'a [CourseOf<'a>],
+        /// Sessions in which nothing was done.
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        left_out: &'a [&'a Path],
+    },
 }
 
 /// The results of a session.
@@ -64,27 +70,30 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     }
     let files = files::of(&args.sessions)?;
     let mut places = Places::new(args);
+    let (sessions, left_out) = attempt::read(&files)?;
     let (provenance, mut attempts) = match &args.subject {
-        Some(which) => attempt::scored(&subjects::read(which)?, &files, &mut places)?,
+        Some(which) => attempt::scored(&subjects::read(which)?, sessions, &mut places)?,
         None => {
             let contents = files.iter().map(|file| read_input(&files::content(file)));
             let contents = contents.collect::<Result<Vec<_>, _>>()?;
-            (Provenance::new(&contents, 0), attempt::measured(args, &files, &mut places)?)
+            let measured = sessions.into_iter().map(|one| attempt::measured(args, one, &mut places));
+            (Provenance::new(&contents, 0), measured.collect::<Result<_, _>>()?)
         }
     };
     course::order(&mut attempts);
     let courses = courses(&attempts, &places);
     let told = match attempts.as_slice() {
-        [attempt] => Told::One(Box::new(told(attempt, &places))),
+        [attempt] if left_out.is_empty() => Told::One(Box::new(told(attempt, &places))),
         all => Told::Several {
             sessions: all.iter().map(|attempt| told(attempt, &places)).collect(),
             courses: &courses,
+            left_out: &left_out,
         },
     };
     if let Some(out) = &args.page {
         write_page(out, &page::of(&attempts, &courses, &places, &provenance)?)?;
     }
-    answer(&Document { provenance, told }, args.json, || text::of(&attempts, &courses))
+    answer(&Document { provenance, told }, args.json, || text::of(&attempts, &courses, &left_out))
 }
 
 /// The results of an attempt.

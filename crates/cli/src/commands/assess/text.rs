@@ -1,18 +1,19 @@
 //! Assessments as text.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use endowire_assess::{Metric, Trend};
 
-use super::attempt::Attempt;
+use super::attempt::{Attempt, LEFT_OUT};
 use super::course::CourseOf;
 use crate::subjects;
 
 /// Largest number of sessions shown side by side; of more, only the first and the last ones are shown.
 const COLUMNS: usize = 8;
 
-/// Scores or measures of sessions; several sessions are followed by their courses.
-pub(super) fn of(attempts: &[Attempt], courses: &[CourseOf<'_>]) -> String {
+/// Scores or measures of sessions; several sessions are followed by their courses, and by those that are left out.
+pub(super) fn of(attempts: &[Attempt], courses: &[CourseOf<'_>], left_out: &[&Path]) -> String {
     let scores = attempts.iter().filter_map(|attempt| {
         let score = attempt.score.as_ref()?;
         Some(format!("{}\n{}", attempt.session.display(), subjects::text(score)))
@@ -31,6 +32,7 @@ pub(super) fn of(attempts: &[Attempt], courses: &[CourseOf<'_>]) -> String {
         }));
     }
     parts.extend(courses.iter().map(|course| of_course(attempts, course)));
+    parts.extend(left_out.iter().map(|session| format!("{}: {LEFT_OUT}", session.display())));
     parts.join("\n\n")
 }
 

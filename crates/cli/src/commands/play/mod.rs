@@ -167,10 +167,14 @@ fn tell_task(session: &Session) {
     }
 }
 
-/// Prints the score, if the session is a subject.
+/// Prints the score, if the session is a subject. One in which nothing was done has none.
 fn tell_score(session: &Session) {
-    if let Some(score) = session.score() {
-        tell(subjects::text(&score));
+    match (session.score(), session.standing()) {
+        (Some(score), _) => tell(subjects::text(&score)),
+        (None, Some(standing)) => {
+            tell(format_args!("{}: nothing was done: there is no score", standing.subject));
+        }
+        (None, None) => {}
     }
 }
 

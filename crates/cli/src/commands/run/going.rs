@@ -47,6 +47,7 @@ impl SoFar<'_> {
             script_file: self.script_file.map(anywhere),
             method: self.scene.method.name(),
             centreline_found: self.scene.finds_centreline(),
+            start_mm: recorder.start_mm,
             outcome: RunOutcome::new(&self.simulation, &self.hand, steps, tally, failure),
             packing: recorder.packed(),
             step_time_s,

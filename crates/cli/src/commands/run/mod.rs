@@ -69,7 +69,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         draw_again(&mut frames, seen, (&folder, &simulation), times, &mut recorder)?;
         recorder
     } else {
-        let recorder = Recorder::new(&folder, args.force, simulation.stack())?;
+        let recorder = Recorder::new(&folder, args.force, &simulation)?;
         if let Some(path) = &args.save_state {
             forget_state(path)?;
         }
