@@ -121,6 +121,7 @@ fn a_row_for_each_run_also_where_it_failed() {
         };
         if number < 16 {
             assert_eq!(*cell(row, "steps"), Field::Long(30));
+            assert_eq!(*cell(row, "field_mj"), Field::Double(0.0), "without a field");
             assert_eq!(
                 (cell(row, "inserted_mm"), cell(row, "failure")),
                 (&Field::Double(60.0), &Field::Null)
