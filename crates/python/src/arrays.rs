@@ -5,15 +5,18 @@ use numpy::ndarray::ArrayViewD;
 use numpy::ndarray::Dimension;
 use numpy::ndarray::IntoDimension;
 use numpy::{
-    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
-    PyUntypedArrayMethods,
+    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayLikeDyn,
+    PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PySequence, PyString, PyTuple};
+use pyo3::types::{
+    PyBool, PyByteArray, PyBytes, PyComplex, PyDict, PyFloat, PyInt, PyList, PySequence, PyString, PyTuple,
+};
 
-use crate::error::refuse;
+use crate::error::{InputError, refuse};
 
 /// An array of this shape that takes over these numbers.
 pub(crate) fn array<'py, T: Element, D: IntoDimension>(
@@ -64,7 +67,12 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Numbers<'py> {
             Ok(array) if array.len() > MOST_NUMBERS => {
                 return Err(too_many("array", array.len(), MOST_NUMBERS));
             }
-            Ok(_) => {}
+            Ok(array) if char::from(array.dtype().kind()) != OBJECTS => check_real(&object)?,
+            // Its items may be anything.
+            Ok(array) => {
+                let mut left = MOST_NUMBERS;
+                count(&array.call_method0("tolist")?, &mut left, DEEPEST)?;
+            }
             Err(_) => {
                 let mut left = MOST_ITEMS;
                 count(&object, &mut left, DEEPEST)?;
@@ -74,7 +82,46 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Numbers<'py> {
     }
 }
 
-/// Subtracts the items of a sequence, including nested ones, from the number `left`.
+/// Kinds of numpy's types: those of real numbers, and that of any objects.
+const REAL: [char; 4] = ['b', 'i', 'u', 'f'];
+const OBJECTS: char = 'O';
+
+/// Refuses what numpy and Python would take for numbers without a word: text, bytes, None, and the real part of complex
+/// numbers.
+fn check_real(object: &Bound<'_, PyAny>) -> PyResult<()> {
+    let dtype = object.getattr_opt(intern!(object.py(), "dtype"))?;
+    let kind = dtype.as_ref().map(|dtype| dtype.getattr_opt(intern!(object.py(), "kind"))).transpose()?;
+    let given = match kind.flatten().and_then(|kind| kind.extract::<char>().ok()) {
+        Some(kind) if REAL.contains(&kind) || kind == OBJECTS => return Ok(()),
+        Some(_) => {
+            format!("items of type {}", dtype.map_or(Ok(String::new()), |dtype| dtype.str()?.extract())?)
+        }
+        None if object.is_none()
+            || object.is_instance_of::<PyString>()
+            || object.is_instance_of::<PyBytes>()
+            || object.is_instance_of::<PyByteArray>()
+            || object.is_instance_of::<PyComplex>() =>
+        {
+            object.repr()?.to_string()
+        }
+        None => return Ok(()),
+    };
+    Err(PyTypeError::new_err(format!("{given}: must be real numbers")))
+}
+
+/// A real number.
+pub(crate) struct Real(pub(crate) f64);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Real {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        check_real(&object)?;
+        object.extract().map(Self)
+    }
+}
+
+/// Subtracts the items of a sequence, including nested ones, from the number `left`; refuses what is no real number.
 fn count(object: &Bound<'_, PyAny>, left: &mut usize, depth: usize) -> PyResult<()> {
     let items = if object.is_instance_of::<PyFloat>() || object.is_instance_of::<PyInt>() || depth == 0 {
         1
@@ -84,12 +131,13 @@ fn count(object: &Bound<'_, PyAny>, left: &mut usize, depth: usize) -> PyResult<
     } else if let Ok(tuple) = object.cast::<PyTuple>() {
         tuple.iter().try_for_each(|item| count(&item, left, depth - 1))?;
         1
-    } else if let Ok(array) = object.cast::<PyUntypedArray>() {
-        array.len()
-    } else if let Ok(sequence) = object.cast::<PySequence>() {
-        sequence.len()?
     } else {
-        1
+        check_real(object)?;
+        match (object.cast::<PyUntypedArray>(), object.cast::<PySequence>()) {
+            (Ok(array), _) => array.len(),
+            (_, Ok(sequence)) => sequence.len()?,
+            _ => 1,
+        }
     };
     *left = left.checked_sub(items).ok_or_else(|| too_many("sequence", items, MOST_ITEMS))?;
     Ok(())
@@ -97,6 +145,14 @@ fn count(object: &Bound<'_, PyAny>, left: &mut usize, depth: usize) -> PyResult<
 
 pub(crate) fn too_many(what: &str, items: usize, most: usize) -> PyErr {
     refuse(what, format!("{items} items and more"), &format!("at most {most} are taken at once"))
+}
+
+/// Whether something with a length holds no items of its own: text, bytes, and a dictionary.
+fn no_list(object: &Bound<'_, PyAny>) -> bool {
+    object.is_instance_of::<PyString>()
+        || object.is_instance_of::<PyBytes>()
+        || object.is_instance_of::<PyByteArray>()
+        || object.is_instance_of::<PyDict>()
 }
 
 /// The items of a sequence other than text.
@@ -108,7 +164,7 @@ impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for List<T> {
     fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         // Arrays are not a `Sequence`, but are accepted.
         let items = match object.len() {
-            Ok(items) if !object.is_instance_of::<PyString>() && !object.is_instance_of::<PyDict>() => items,
+            Ok(items) if !no_list(&object) => items,
             _ => return Err(PyTypeError::new_err(format!("{} is no list", object.repr()?))),
         };
         if items > MOST_ITEMS {
@@ -118,6 +174,22 @@ impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for List<T> {
         let item = |index| object.get_item(index)?.extract::<T>().map_err(Into::into);
         (0..items).map(item).collect::<PyResult<_>>().map(Self)
     }
+}
+
+/// The numbers of an argument; anything else is a `TypeError` that names it.
+pub(crate) fn numbers<'py>(name: &str, object: &Bound<'py, PyAny>, wanted: &str) -> PyResult<Numbers<'py>> {
+    object.extract::<Numbers<'_>>().map_err(|error| {
+        if error.is_instance_of::<InputError>(object.py()) {
+            return error;
+        }
+        PyTypeError::new_err(format!("{name} = {}: {wanted}", shown(object)))
+    })
+}
+
+/// Something as it is shown in a message, on one line, as arrays are not by themselves.
+pub(crate) fn shown(object: &Bound<'_, PyAny>) -> String {
+    let shown = object.repr().map_or_else(|_| "…".to_owned(), |shown| shown.to_string());
+    shown.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Arc lengths from the tip: the numbers of a one-dimensional array.
@@ -137,9 +209,7 @@ pub(crate) fn lengths_mm(name: &str, list: &Numbers<'_>) -> PyResult<Vec<f64>> {
 /// A place or a direction: three finite numbers.
 pub(crate) fn place(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
     let wanted = "must have the shape (3,): x, y and z";
-    let Ok(numbers) = object.extract::<Numbers<'_>>() else {
-        return Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", object.repr()?)));
-    };
+    let numbers = numbers(name, object, wanted)?;
     let view = numbers.as_array();
     match view.iter().copied().collect::<Vec<f64>>()[..] {
         [x, y, z] if view.ndim() == 1 => {

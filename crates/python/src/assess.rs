@@ -1,10 +1,15 @@
 //! Assessment of sessions and recorded runs.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_assess::{Attempt, Course, Exam, Metric, Record, Score, Site, Subject, Way};
-use endowire_core::vessel::CentrelineTree;
+use endowire_assess::{Attempt, Course, Exam, Metric, Record, Score, SessionFile, Site, Subject, Way};
+use endowire_core::Error;
+use endowire_core::device::Stack;
+use endowire_core::vessel::{CentrelineTree, NoStore};
+use endowire_methods::{Setting, scene_with};
+use endowire_viewer::ViewSpec;
 use pyo3::prelude::*;
 
 use crate::document;
@@ -48,15 +53,65 @@ pub(crate) fn check_within(within_mm: f64) -> PyResult<()> {
     Err(refuse("within_mm", within_mm, "must be a length above 0"))
 }
 
-/// Scores a record by a subject.
-fn scored(path: &Path, subject: &Path, centreline: Option<&Path>) -> endowire_core::Result<Arc<Score>> {
-    let (subject, record) = (Subject::read(subject)?, Record::read(path)?);
-    let tree = centreline.map(CentrelineTree::read).transpose()?;
-    let has_sac = record.samples.iter().any(|sample| sample.packing.is_some());
-    let site = Site { tree: tree.as_ref(), instruments: &record.instruments, has_sac, ..Site::default() };
-    let exam = Exam::new(subject, &site)?;
-    exam.check(&record)?;
-    Ok(exam.score(&record))
+/// A subject in its scene.
+struct InScene {
+    exam: Exam,
+    scene: PathBuf,
+    set: Vec<String>,
+    stack: Stack,
+}
+
+impl InScene {
+    /// Reads a subject and its scene. A centre line, if given, must be that of the scene.
+    fn read(subject: &Path, centreline: Option<&Path>) -> endowire_core::Result<Self> {
+        let subject = Subject::read(subject)?;
+        let of_subject = |error: Error| Error::content(subject.path(), error.to_string());
+        let settings: Vec<Setting> = subject
+            .set
+            .iter()
+            .map(|text| text.parse())
+            .collect::<endowire_core::Result<_>>()
+            .map_err(of_subject)?;
+        let path = subject.resolve(&subject.scene);
+        let scene = scene_with(&path, &settings, |scene| ViewSpec::of_scene(scene, &path).map(drop))?;
+        let stack = scene.stack()?;
+        let tree = subject.goal.target().map(|_| scene.centreline(&NoStore)).transpose()?;
+        if let Some((given, tree)) = centreline.zip(tree)
+            && CentrelineTree::read(given)? != *tree
+        {
+            let refused = format!("is not the centre line of {}: leave it out", path.display());
+            return Err(Error::content(given, refused));
+        }
+        let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
+        let has_sac = scene.vessel.sac.is_some();
+        let site = Site { tree, instruments: &instruments, has_sac, ..Site::default() };
+        let set = settings.iter().map(ToString::to_string).collect();
+        Ok(Self { exam: Exam::new(subject, &site)?, scene: path, set, stack })
+    }
+
+    /// Scores a session, which must be of this scene.
+    fn scored(&self, path: &Path) -> endowire_core::Result<Arc<Score>> {
+        let session = SessionFile::read(path)?;
+        session.check_in((&self.scene, &self.set), &self.stack, path)?;
+        self.exam.check(&session.record)?;
+        Ok(self.exam.clone().score(&session.record))
+    }
+}
+
+/// Refuses a session that is given twice: it would count as two attempts.
+fn check_distinct(paths: &[PathBuf]) -> PyResult<()> {
+    let mut seen = HashMap::new();
+    for (index, path) in paths.iter().enumerate() {
+        if let Some(first) = seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone()), index) {
+            let mend = format!("is paths[{first}] again: give each attempt once");
+            return Err(refuse(
+                &format!("paths[{index}]"),
+                format!("{:?}", path.display().to_string()),
+                &mend,
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Measures a session of `endowire play` (*.session.json) or the folder of a recorded run, as `endowire assess` does.
@@ -81,12 +136,12 @@ pub(crate) fn assess<'py>(
 }
 
 /// Scores a session of `endowire play` (*.session.json) or the folder of a recorded run by the file of a training
-/// subject, as `endowire assess --subject` does. `centreline` is the table of the vessel's centre line with the
-/// subject's target; it is not needed if a sac is to be packed.
+/// subject, as `endowire assess --subject` does: it must have been recorded in the scene of the subject, with its
+/// settings. `centreline` need not be given, since the scene has one; a table that is given must be that of the scene.
 ///
 /// Returns a dictionary: subject, passed, score (0 to 100), ended (None, or reason and time of the end), and metrics,
 /// which are those of assess with threshold and passed (None without a threshold). Raises InputError for invalid
-/// files.
+/// files, and for a session of another scene or in which nothing was done.
 #[pyfunction]
 #[pyo3(signature = (path, subject, *, centreline=None))]
 pub(crate) fn score<'py>(
@@ -95,7 +150,7 @@ pub(crate) fn score<'py>(
     subject: PathBuf,
     centreline: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let scored = interruptible(py, move || scored(&path, &subject, centreline.as_deref()))?;
+    let scored = interruptible(py, move || InScene::read(&subject, centreline.as_deref())?.scored(&path))?;
     document::write(py, &*scored.map_err(exception)?)
 }
 
@@ -105,7 +160,7 @@ pub(crate) fn score<'py>(
 ///
 /// Returns a dictionary: score and passed (None without a subject), and metrics, a list of dictionaries: name, group,
 /// unit, better, values, first, last, best, per_attempt, chance and trend ("better", "worse" or "none"). Raises
-/// InputError for invalid files.
+/// InputError as assess and score, and for a session that is given twice.
 #[pyfunction]
 #[pyo3(signature = (paths, *, subject=None, centreline=None, target=None, within_mm=5.0))]
 pub(crate) fn course<'py>(
@@ -124,12 +179,15 @@ pub(crate) fn course<'py>(
             "a subject says where to go: leave one of the two out",
         ));
     }
+    check_distinct(&paths)?;
     let course = interruptible(py, move || {
+        let subject =
+            subject.map(|subject| InScene::read(&subject, task.centreline.as_deref())).transpose()?;
         let mut all: Vec<(Vec<Metric>, Option<Arc<Score>>)> = vec![];
         for path in &paths {
             all.push(match &subject {
                 Some(subject) => {
-                    let score = scored(path, subject, task.centreline.as_deref())?;
+                    let score = subject.scored(path)?;
                     (score.metrics.iter().map(|one| one.metric).collect(), Some(score))
                 }
                 None => (task.measured(path)?, None),

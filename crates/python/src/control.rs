@@ -130,6 +130,11 @@ impl Controller {
 
 fn path(table: &Numbers<'_>) -> PyResult<CentrelinePath> {
     let rows = rows::<4>("path_mm", table)?;
+    if let Some((row, [.., radius_mm])) =
+        rows.iter().enumerate().find(|(_, [.., radius_mm])| *radius_mm < 0.0)
+    {
+        return Err(refuse(&format!("path_mm[{row}][3]"), radius_mm, "is a radius: must be 0 or more"));
+    }
     let count = rows.len();
     let finite = rows.as_flattened().iter().all(|number| number.is_finite());
     let points = rows.into_iter().map(|[x, y, z, radius_mm]| (Vec3::new(x, y, z), radius_mm)).collect();

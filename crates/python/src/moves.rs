@@ -4,7 +4,7 @@ use endowire_core::insertion::{Command, Move};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::arrays::{List, Numbers, misshapen};
+use crate::arrays::{Numbers, misshapen, numbers, shown};
 use crate::error::refuse;
 
 /// The commands of all `instruments`, for each of `count` entries, or for any number of them: an array of shape
@@ -26,12 +26,12 @@ pub(crate) fn moves(
         );
         return Err(misshapen("moves", view.shape(), &mend));
     }
-    let numbers: Vec<f64> = view.iter().copied().collect();
+    let list: Vec<f64> = view.iter().copied().collect();
     let hands = |row: &[f64]| {
         let pairs = row.chunks_exact(2).map(|pair| Command { advance_mm: pair[0], rotate_rad: pair[1] });
         together(pairs)
     };
-    Ok(numbers.chunks_exact(2 * instruments).map(hands).collect())
+    Ok(list.chunks_exact(2 * instruments).map(hands).collect())
 }
 
 /// Simultaneous moves from the commands of the instruments in order.
@@ -50,12 +50,14 @@ pub(crate) fn of_each(
         1 => "must be a number, or 1: one for each instrument".to_owned(),
         count => format!("must be {count} numbers: one for each instrument, the innermost first"),
     };
-    match (value.extract::<f64>(), value.extract::<List<f64>>()) {
-        (Ok(number), _) if instruments == 1 => Ok(vec![number]),
-        (_, Ok(List(list))) if list.len() == instruments => Ok(list),
-        (Ok(number), _) => Err(refuse(name, number, &wanted)),
-        (_, Ok(List(list))) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
-        (_, Err(error)) if !error.is_instance_of::<PyTypeError>(value.py()) => Err(error),
-        _ => Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", value.repr()?))),
+    let numbers = numbers(name, value, &wanted)?;
+    let view = numbers.as_array();
+    let list: Vec<f64> = view.iter().copied().collect();
+    match (view.ndim(), list.as_slice()) {
+        (0, _) if instruments == 1 => Ok(list),
+        (1, _) if list.len() == instruments => Ok(list),
+        (0, [number]) => Err(refuse(name, number, &wanted)),
+        (1, _) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
+        _ => Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", shown(value)))),
     }
 }

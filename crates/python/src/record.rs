@@ -29,10 +29,16 @@ impl Record {
 
 #[pymethods]
 impl Record {
-    /// An empty record.
+    /// An empty record. With a `simulation` as it is before the first step, the way of its tip begins there, and without
+    /// one at the end of the first step.
     #[new]
-    fn new() -> Self {
-        Self::default()
+    #[pyo3(signature = (simulation=None))]
+    fn new(py: Python<'_>, simulation: Option<&Simulation>) -> Self {
+        let record = Self::default();
+        if let Some(simulation) = simulation {
+            simulation.with(py, |simulation| record.lock().begin(simulation));
+        }
+        record
     }
 
     /// Number of recorded steps; consecutive rests are one.

@@ -14,7 +14,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{List, Numbers, lengths_mm, natural, natural_or, place, points};
+use crate::arrays::{List, Numbers, Real, lengths_mm, natural, natural_or, place, points, shown};
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
@@ -34,8 +34,7 @@ fn instruments(object: &Bound<'_, PyAny>) -> PyResult<Vec<Instrument>> {
             return error;
         }
         let wanted = "must be an Instrument, or a list of them, the innermost first";
-        let shown = object.repr().map_or_else(|_| "…".to_owned(), |shown| shown.to_string());
-        PyTypeError::new_err(format!("instruments = {shown}: {wanted}"))
+        PyTypeError::new_err(format!("instruments = {}: {wanted}", shown(object)))
     })
 }
 
@@ -169,7 +168,7 @@ impl Simulation {
         sheath_friction_n: f64,
         sheath_friction: f64,
         names: Option<List<String>>,
-        friction: Option<List<f64>>,
+        friction: Option<List<Real>>,
         may_lead: Option<List<bool>>,
     ) -> PyResult<Self> {
         let instruments = self::instruments(instruments)?;
@@ -191,7 +190,7 @@ impl Simulation {
             sheath_friction_n,
             sheath_friction,
             names: names.map(|list| list.0),
-            friction: friction.map(|list| list.0),
+            friction: friction.map(|list| list.0.into_iter().map(|one| one.0).collect()),
             may_lead: may_lead.map(|list| list.0),
         };
         Self::begin(py, Start::of_arguments(py, vessel, instruments, arguments)?)

@@ -99,6 +99,20 @@ def test_a_wrong_argument_is_named(vessel, wire, arguments, words):
         (lambda v, s: endowire.Simulation(v, s.instruments[0], position_mm="here"), "position_mm = 'here'"),
         (lambda v, s: endowire.Simulation(v, ["a"]), r"instruments = \['a'\]: must be an Instrument"),
         (lambda v, s: v.path(5.0j), "to = "),
+        # numpy takes these for numbers.
+        (lambda v, s: s.step(advance_mm=b"x"), "advance_mm = b'x': must be a number"),
+        (lambda v, s: s.step("12"), "advance_mm = '12': must be a number"),
+        (lambda v, s: s.step(1.0, rotate_rad=[None]), r"rotate_rad = \[None\]: must be a number"),
+        (lambda v, s: s.step(np.array([1.0 + 2.0j])), r"advance_mm = array\(\[1.\+2.j\]\): must be a number"),
+        (lambda v, s: s.tick(np.complex64(1.0 + 2.0j), solves=8), "advance_mm = .*: must be a number"),
+        (lambda v, s: s.step(np.ones((2, 2))), r"advance_mm = array\(\[\[1., 1.\], \[1., 1.\]\]\): must be"),
+        (lambda v, s: s.points_mm(np.array([1.0 + 2.0j])), "items of type complex128: must be real numbers"),
+        (lambda v, s: s.points_mm(np.array([1.0, "2"], dtype=object)), "'2': must be real numbers"),
+        (lambda v, s: s.run(np.zeros((2, 1, 2), dtype=complex)), "must be real numbers"),
+        (lambda v, s: endowire.Batch([s]).step([[[1.0j, 0.0]]]), "1j: must be real numbers"),
+        (lambda v, s: endowire.Record().note(s, 1.0, [1.0j]), r"advance_mm = \[1j\]: must be a number"),
+        (lambda v, s: endowire.Simulation(v, s.instruments[0], friction=np.array([1.0j])), "must be real numbers"),
+        (lambda v, s: endowire.Simulation(v, s.instruments[0], friction=b"x"), "b'x' is no list"),
         (lambda v, s: endowire.Renderer(v, {}, plane="a"), "plane = 'a': must be a whole"),
     ],
 )
@@ -145,6 +159,10 @@ def test_a_wrong_type_is_named_on_one_line(vessel, simulation, work, words):
             "arrived_mm",
         ),
         (
+            lambda v, s: endowire.Controller.follow_path([[0.0, 0.0, 0.0, 2.0], [0.0, 0.0, 9.0, -5.0]]),
+            r"path_mm\[1\]\[3\] = -5: is a radius",
+        ),
+        (
             lambda v, s: endowire.Controller.follow_path(v.path([0.0, 0.0, 60.0]), followers=[(1, -3.0)]),
             "followers = -3: must be a distance",
         ),
@@ -183,3 +201,10 @@ def test_an_unknown_anatomy_names_those_that_there_are(tmp_path, monkeypatch):
     documented = endowire.Vessel.generate.__doc__
     for name in ("aortic_arch_ii", "aortic_arch_iii", "sidewall_aneurysm", "basilar_aneurysm", "hepatic"):
         assert f'"{name}"' in documented
+
+
+def test_one_number_is_taken_alone_and_in_any_list(simulation):
+    taken = [1.0, 1, np.float32(1.0), [1.0], (1,), np.array(1.0), np.array([1]), range(1, 2)]
+    for number in taken:
+        simulation.step(number, [0.0])
+    assert simulation.inserted_mm == pytest.approx([len(taken)])

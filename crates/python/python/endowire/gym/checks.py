@@ -68,11 +68,17 @@ def place_mm(name: str, values: Any) -> NDArray[np.float64]:
 
 def numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Real numbers of this shape."""
+    array = real(name, values)
+    if array.shape != shape:
+        raise InputError(f"{name} = an array of shape {array.shape}: must have the shape {shape}")
+    return array
+
+
+def real(name: str, values: Any) -> NDArray[np.float64]:
+    """Real numbers of any shape."""
     array = an_array(name, values)
     if array.dtype.kind not in "biuf":
         raise InputError(f"{name} = {values!r}: must be real numbers")
-    if array.shape != shape:
-        raise InputError(f"{name} = an array of shape {array.shape}: must have the shape {shape}")
     return array.astype(np.float64)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import InputError
+from . import checks
 from .episodes import Episodes
 from .pictures import check_mode, picture
 from .task import Task
@@ -48,14 +49,10 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
         ``task.actions``, its values are fractions of the task's limits, from -1 to 1, or velocities, mm/s and rad/s;
         they are clipped to the limits.
 
-        Raises InputError for an action of another shape or with values that are not finite, and Gymnasium's
+        Raises InputError for an action of another shape or with values that are not real and finite, and Gymnasium's
         ResetNeeded before the first `reset`; then nothing has moved.
         """
-        moved = np.asarray(action, dtype=float)
-        if moved.shape != self.action_space.shape:
-            raise InputError(
-                f"action = an array of shape {moved.shape}: must have the shape {self.action_space.shape}"
-            )
+        moved = checks.numbers("action", action, self.action_space.shape)
         if not np.isfinite(moved).all():
             raise InputError(f"action = {moved.tolist()}: every number must be finite")
         self._episodes.step((moved * self._unit)[None], np.array([True]))

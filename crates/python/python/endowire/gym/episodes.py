@@ -95,7 +95,7 @@ class Episodes:
             self.force_n[k] = self.largest_force_n[k] = 0.0
             self.path_length_mm[k], self._begun_s[k] = 0.0, perf_counter()
             self._over[k] = False
-            self.records[k] = Record() if self.task.assessed else None
+            self.records[k] = Record(simulation) if self.task.assessed else None
             self.failures.pop(k, None)
         self._look()
         for k in generators:

@@ -44,7 +44,9 @@ class Outcome:
 
 
 def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8) -> list[Outcome]:
-    """Runs one episode for each seed, in order of the seeds; each equals that of an environment reset with the seed.
+    """Runs one episode for each seed, in order of the seeds. Each equals that of an environment reset with the seed, if
+    what the policy does in an episode depends on that episode alone: one that draws for all environments at once, as
+    `policies.Uniform`, gives other episodes with another ``num_envs``.
 
     Raises InputError for ``num_envs`` below 1.
     """

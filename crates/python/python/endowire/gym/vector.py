@@ -96,14 +96,10 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     ]:
         """Steps all environments like `InsertionEnv.step`; the action has shape (num_envs, n_instruments, 2).
 
-        Raises InputError for actions of another shape, and Gymnasium's ResetNeeded before the first `reset`; then
-        nothing has moved.
+        Raises InputError for actions of another shape or that are not real, and Gymnasium's ResetNeeded before the first
+        `reset`; then nothing has moved.
         """
-        moved = np.asarray(actions, dtype=float)
-        if moved.shape != self.action_space.shape:
-            raise InputError(
-                f"actions = an array of shape {moved.shape}: must have the shape {self.action_space.shape}"
-            )
+        moved = checks.numbers("actions", actions, self.action_space.shape)
         over = self._over
         self._episodes.step(moved * self._unit, ~over)
         rewards = np.where(over, 0.0, self._episodes.rewards())

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import Renderer, Simulation, Vessel
+from . import checks
 from .centreline import Centreline
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ class FixedVessel:
         """
         if centreline is None and vessel.centreline_found and "opening" in sheath:
             vessel = vessel.with_centreline(sheath["opening"])
-        table = vessel.centreline if centreline is None else np.asarray(centreline, dtype=float)
+        table = vessel.centreline if centreline is None else checks.real("centreline", centreline)
         self.site = Site(vessel, Centreline(table), sheath)
         low, high = vessel.vertices_mm.min(axis=0), vessel.vertices_mm.max(axis=0)
         # Instruments may leave through an opening.
