@@ -6,10 +6,9 @@
 
 Of several folders, `out/learn-1 out/learn-2 …`, each is learnt in its turn from a seed of its own, and `evaluate` and `plot` cover all of them.
 
-What is learnt: a correction of what a controller of the library does that follows the centre line (residual policy learning), by SAC, whose memory
-begins with episodes of the controller alone and with random corrections. The policy sees a roadmap of the way ahead from the tip, what the controller
-is about to do, and the last action; nothing of the wall. Each episode is in a new arch. Rewards of learning are its own; evaluation is the task's own
-in all but what is observed. `learnt` draws its actions as in learning, `learnt-mean` takes their mean.
+What is learnt: SAC, whose memory begins with episodes of a hand of the library that follows the centre line and with random ones. The policy sees a
+roadmap of the way ahead from the tip, and its last action; nothing of the wall. Each episode is in a new arch. Rewards of learning are its own;
+evaluation is the task's own in all but what is observed. `learnt` draws its actions as in learning, `learnt-mean` takes their mean.
 """
 
 import argparse
@@ -30,17 +29,9 @@ from endowire.gym.sb3 import Learned, SB3VecEnv
 #: Episodes of evaluation, each in the arch of its seed; arches that are learnt on come from the seed of learning.
 EVALUATED = range(900_000, 901_000)
 ENVIRONMENTS = 16
-#: What is corrected.
-BASE = policies.Steered("follow_path")
-#: Steps of each environment with which the memory begins: without a correction, and with random ones.
-FIRST = {"none": 150, "random": 60}
-#: Standard deviation of the correction's first actions, as a fraction of the limits: SAC's own aim for two numbers is e^(-2.4).
-FIRST_SPREAD = 0.1
-SEEN = {
-    "roadmap": observations.Roadmap(),
-    "advice": observations.Advice(BASE),
-    "last_action": observations.LastAction(),
-}
+#: Steps of each environment with which the memory begins: of the hand, and random ones.
+FIRST = {"follow": 150, "random": 60}
+SEEN = {"roadmap": observations.Roadmap(), "last_action": observations.LastAction()}
 EVALUATION = (
     "policy",
     "seed",
@@ -79,12 +70,12 @@ def unseen_task():
     return tasks.arch_variety(vessels=arches.ArchVariety(count=None), observations=SEEN)
 
 
-def remember(model, normalize, steps, draw):
-    """Puts so many steps into the memory, with corrections drawn by ``draw(shape)`` as fractions of the limits."""
+def remember(model, normalize, policy, steps):
+    """Puts so many steps of a policy into the memory."""
     environments = normalize.venv
-    observed = environments.reset()
+    limits, observed = environments.task.limits(), environments.reset()
     for _ in range(steps):
-        action = draw((environments.num_envs, *environments.action_space.shape))
+        action = np.clip(policy.act(environments.episodes) / limits, -1.0, 1.0)
         following, reward, over, infos = environments.step(action)
         last = {name: values.copy() for name, values in following.items()}
         for k in np.flatnonzero(over):
@@ -94,14 +85,6 @@ def remember(model, normalize, steps, draw):
         for name, values in following.items():
             normalize.obs_rms[name].update(values)
         observed = following
-
-
-def begin_small(actor):
-    """The first corrections are small, so that learning begins with what the controller can do."""
-    with torch.no_grad():
-        for layer, value in ((actor.mu, 0.0), (actor.log_std, np.log(FIRST_SPREAD))):
-            layer.weight.mul_(0.01)
-            layer.bias.fill_(value)
 
 
 class Watch(BaseCallback):
@@ -143,7 +126,7 @@ def save(out, model, normalize):
 
 def train(out, minutes, seed):
     out.mkdir(parents=True, exist_ok=True)
-    environments = SB3VecEnv(learning_task(), ENVIRONMENTS, seed=seed, base=BASE)
+    environments = SB3VecEnv(learning_task(), ENVIRONMENTS, seed=seed)
     if (out / "model.zip").exists():
         normalize = VecNormalize.load(out / "normalize.pkl", environments)
         model = SAC.load(out / "model.zip", env=normalize, device="cpu")
@@ -166,11 +149,8 @@ def train(out, minutes, seed):
             "policy_kwargs": {"net_arch": [128, 128]},
         }
         model = SAC("MultiInputPolicy", normalize, **settings, seed=seed, device="cpu")
-        begin_small(model.actor)
-        rng = np.random.default_rng(seed)
-        draws = {"none": np.zeros, "random": lambda shape: rng.uniform(-1.0, 1.0, shape)}
         for name, steps in FIRST.items():
-            remember(model, normalize, steps, draws[name])
+            remember(model, normalize, known_policy(out, name, seed), steps)
         print(
             f"remembers {sum(FIRST.values()) * ENVIRONMENTS} steps, {time.process_time():.0f} s", flush=True
         )
@@ -202,7 +182,7 @@ def known_policy(out, name, seed):
         return policies.Steered({"follow": "follow_path", "look-ahead": "search_ahead"}[name])
     normalize = VecNormalize.load(out / "normalize.pkl", SB3VecEnv(unseen_task(), 1))
     model = SAC.load(out / "model.zip", device="cpu")
-    return Learned(model, normalize, seed=None if name == "learnt-mean" else seed, base=BASE)
+    return Learned(model, normalize, seed=None if name == "learnt-mean" else seed)
 
 
 def evaluate(out, episodes, names, most_s):

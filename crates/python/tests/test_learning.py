@@ -264,32 +264,6 @@ def test_a_vector_of_stable_baselines_does_what_single_environments_do(task):
     vector.close()
 
 
-def test_a_correction_of_nothing_does_what_its_base_does(task):
-    pytest.importorskip("stable_baselines3")
-    from endowire.gym.sb3 import SB3VecEnv
-
-    base = policies.Steered("follow_path")
-    advised = dataclasses.replace(task, observations={"advice": observations.Advice(base)})
-    vector = SB3VecEnv(advised, 2, seed=5, base=base)
-    observed, last = vector.reset(), {}
-    while len(last) < 2:
-        # Asked again it answers the same.
-        assert np.array_equal(base.act(vector.episodes), base.act(vector.episodes))
-        advice = np.clip(base.act(vector.episodes) / task.limits(), -1.0, 1.0)
-        assert observed["advice"] == pytest.approx(advice, abs=1e-6)
-        observed, _, over, infos = vector.step(np.zeros((2, 1, 2)))
-        for k in np.flatnonzero(over):
-            last.setdefault(int(k), (infos[k]["steps"], infos[k]["way_mm"]))
-    alone = evaluation.evaluate(task, policies.Steered("follow_path"), [5, 6])
-    assert [last[k] for k in range(2)] == [(each.steps, each.way_mm) for each in alone]
-    # Counter-check: a correction changes it.
-    vector.seed(5)
-    vector.reset()
-    for _ in range(alone[0].steps):
-        infos = vector.step(np.full((2, 1, 2), -0.2))[3]
-    assert infos[0]["way_mm"] != alone[0].way_mm
-
-
 def test_a_model_of_stable_baselines_learns_and_acts(task):
     stable_baselines3 = pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.vec_env import VecNormalize

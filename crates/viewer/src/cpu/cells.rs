@@ -145,12 +145,19 @@ struct Band {
     v: usize,
 }
 
+/// Distance from the projected axis of a piece beyond which it is not visible, pixels; infinite for a piece that reaches
+/// behind the source.
+pub(super) fn outer_px(view: &CArm, piece: &Piece) -> f64 {
+    let reach = piece.reach();
+    let near = view.sod_mm() + piece.start.z.min(piece.end.z) - reach;
+    // A sphere beside the axis of the beam is projected to an ellipse.
+    if near > 0.0 { 1.05 * reach * view.focal_px() / near } else { f64::INFINITY }
+}
+
 impl Band {
     fn new(view: &CArm, piece: &Piece) -> Self {
-        let reach = piece.reach();
-        let near = view.sod_mm() + piece.start.z.min(piece.end.z) - reach;
         let ends = [&piece.start, &piece.end].map(|at| view.pixel_of(at));
-        let outer = if near > 0.0 { 1.05 * reach * view.focal_px() / near } else { f64::INFINITY };
+        let outer = outer_px(view, piece);
         let run = [0, 1].map(|k| (ends[1][k] - ends[0][k]).abs());
         let (u, v) = if run[1] >= run[0] { (0, 1) } else { (1, 0) };
         Self { ends, outer, u, v }

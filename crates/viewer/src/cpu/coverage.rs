@@ -12,6 +12,7 @@ use std::ops::Range;
 use endowire_core::Vec3;
 
 use crate::c_arm::CArm;
+use crate::cpu::cells::outer_px;
 use crate::cpu::devices::pixels_of;
 use crate::cpu::piece::chord;
 use crate::device::Piece;
@@ -154,18 +155,18 @@ struct Silhouette {
 impl Silhouette {
     fn new(c_arm: &CArm, piece: &Piece) -> Self {
         let reach = piece.reach();
-        let scale = |z: f64| c_arm.focal_px() / (c_arm.sod_mm() + z).max(f64::MIN_POSITIVE);
-        let [near, far] = [piece.start.z.min(piece.end.z) - reach, piece.start.z.max(piece.end.z) + reach];
+        let far = piece.start.z.max(piece.end.z) + reach;
+        let least_scale = c_arm.focal_px() / (c_arm.sod_mm() + far).max(f64::MIN_POSITIVE);
         let [start, end] = [&piece.start, &piece.end].map(|at| c_arm.pixel_of(at));
         let [dx, dy] = [end[0] - start[0], end[1] - start[1]];
         let length_px = libm::hypot(dx, dy);
         let least = piece.radius.min(piece.radius + piece.slope * (piece.end - piece.start).norm());
-        let outer_px = if c_arm.sod_mm() + near > 0.0 { reach * scale(near) * 1.05 } else { f64::INFINITY };
+        let outer_px = outer_px(c_arm, piece);
         Self {
             start,
             along: [dx / length_px.max(f64::MIN_POSITIVE), dy / length_px.max(f64::MIN_POSITIVE)],
             length_px,
-            inner_px: least * scale(far) * 0.98 - CORNER_PX,
+            inner_px: least * least_scale * 0.98 - CORNER_PX,
             ends_px: outer_px + CORNER_PX,
             outer_px,
         }

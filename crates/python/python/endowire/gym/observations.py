@@ -19,7 +19,6 @@ from . import checks
 if TYPE_CHECKING:
     from .centreline import Path
     from .episodes import Episodes
-    from .policies import Policy
     from .task import Task
 
 
@@ -200,21 +199,6 @@ class LastAction:
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         return episodes.action / episodes.task.action_unit()
-
-
-class Advice:
-    """The action of another policy, clipped to its limits and in the task's unit of actions, shape (n_instruments, 2):
-    what a policy can do, or add to.
-    """
-
-    def __init__(self, policy: Policy) -> None:
-        self.policy = policy
-
-    def space(self, task: Task) -> spaces.Box:
-        return task.action_space()
-
-    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
-        return self.policy.act(episodes) / episodes.task.action_unit()
 
 
 class Fluoroscopy:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +11,6 @@ from .. import Controller, InputError
 from . import checks
 
 if TYPE_CHECKING:
-    from .centreline import Path
     from .episodes import Episodes
 
 
@@ -48,23 +45,12 @@ class Uniform:
         return self.rng.uniform((self.slowest_mm_s, -turn), (push, turn), episodes.action.shape)
 
 
-@dataclass
-class _Asked:
-    """A controller in an episode, and what it answered before the step with this number."""
-
-    path: Path
-    controller: Controller
-    before_step: int
-    action: NDArray[np.float64]
-
-
 class Steered:
     """The library's controllers, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of
     `Controller`, on copies of the simulations. If a controller gives up, its instruments stay.
 
-    A controller is asked once before each step; asked again, the policy answers the same, so that it can act and be
-    observed (`observations.Advice`). Commands of at most 2 mm and 0.35 rad are within a step's limits at 7.5 Hz and
-    35 mm/s. Raises InputError for another ``kind``.
+    Their commands of at most 2 mm and 0.35 rad are within a step's limits at 7.5 Hz and 35 mm/s. Raises InputError
+    for another ``kind``.
     """
 
     def __init__(self, kind: str = "search_ahead") -> None:
@@ -72,21 +58,17 @@ class Steered:
         if kind not in hands:
             raise InputError(f"kind = {kind!r}: give {' or '.join(hands)}")
         self.make = hands[kind]
-        self._asked: WeakKeyDictionary[Episodes, dict[int, _Asked]] = WeakKeyDictionary()
+        self._hands: dict[int, Controller] = {}
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
-        asked = self._asked.setdefault(episodes, {})
+        action = np.zeros_like(episodes.action)
         for k in range(len(episodes.sites)):
-            path, step, last = episodes.paths[k], int(episodes.steps[k]), asked.get(k)
-            assert path is not None
-            if last is None or last.path is not path or last.before_step > step:
+            if episodes.steps[k] == 0:
+                path = episodes.paths[k]
+                assert path is not None
                 # The task decides when an episode ends, so the controller continues to the end of its path.
-                controller = self.make(path.table_mm, arrived_mm=0.0)
-            elif last.before_step < step:
-                controller = last.controller
-            else:
-                continue
-            move = controller.next(episodes.batch.simulation(k))
-            action = np.zeros_like(episodes.action[k]) if move is None else move / episodes.task.control_period_s
-            asked[k] = _Asked(path, controller, step, action)
-        return np.stack([asked[k].action for k in range(len(episodes.sites))])
+                self._hands[k] = self.make(path.table_mm, arrived_mm=0.0)
+            move = self._hands[k].next(episodes.batch.simulation(k))
+            if move is not None:
+                action[k] = move / episodes.task.control_period_s
+        return action

@@ -18,7 +18,6 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from .episodes import Episodes
-from .policies import Policy
 from .task import Task
 
 
@@ -29,15 +28,10 @@ class SB3VecEnv(VecEnv):
     requires, an environment whose episode ends is reset at once: it returns the first observation of the new episode,
     and the last one of the old episode is ``infos[k]["terminal_observation"]``. Environment k has the seed ``seed +
     k``, with the same episodes as `InsertionEnv`.
-
-    With a policy as ``base``, actions are added to its own: what is learnt is a correction (residual policy learning:
-    Silver et al., 2018, arXiv:1812.06298; Johannink et al., 2019, arXiv:1812.03201).
     """
 
-    def __init__(
-        self, task: Task, num_envs: int, seed: int | None = None, base: Policy | None = None
-    ) -> None:
-        self.task, self.base = task, base
+    def __init__(self, task: Task, num_envs: int, seed: int | None = None) -> None:
+        self.task = task
         #: The episodes, for parts of a task and policies.
         self.episodes = Episodes(task, num_envs)
         self._limits = task.limits()
@@ -61,8 +55,6 @@ class SB3VecEnv(VecEnv):
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Stores the actions for the next `step_wait`."""
         self._velocities = np.asarray(actions, dtype=float) * self._limits
-        if self.base is not None:
-            self._velocities += self.base.act(self.episodes)
 
     def step_wait(
         self,
@@ -112,27 +104,21 @@ class Learned:
 
     It takes the mean of its actions or, given a ``seed``, draws them as it did in learning: a tip that is stuck where
     the mean action leads nowhere then comes free. Actions that are drawn depend on all environments that act
-    together, so episodes repeat one by one. A model that was trained with a ``base`` needs it here, too.
+    together, so episodes repeat one by one.
     """
 
     def __init__(
-        self,
-        model: BaseAlgorithm,
-        normalize: VecNormalize | None = None,
-        seed: int | None = None,
-        base: Policy | None = None,
+        self, model: BaseAlgorithm, normalize: VecNormalize | None = None, seed: int | None = None
     ) -> None:
         assert isinstance(model.action_space, spaces.Box)
         self.model, self.normalize, self._high = model, normalize, model.action_space.high
-        self.base = base
         self._drawn = None if seed is None else torch.Generator().manual_seed(seed).get_state()
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         observed: Any = episodes.observe()
         if self.normalize is not None:
             observed = self.normalize.normalize_obs(observed)
-        velocities = self._actions(observed) / self._high * episodes.task.limits()
-        return velocities if self.base is None else velocities + self.base.act(episodes)
+        return self._actions(observed) / self._high * episodes.task.limits()
 
     def _actions(self, observed: Any) -> NDArray[np.float64]:
         if self._drawn is None:
