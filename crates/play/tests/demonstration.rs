@@ -190,6 +190,7 @@ fn what_is_shown_is_measured_as_what_is_run() {
     let mut simulation = scene.simulation(&NoStore).unwrap();
     let mut run = scene.steps(simulation.stack(), &NoStore).unwrap().into_run();
     let (mut record, mut time_s) = (Record::default(), 0.0);
+    record.begin(&simulation);
     while let Some(step) = run.next(&simulation).unwrap().map(|step| step.into_owned()) {
         if !step.moves.is_empty() {
             simulation.step_together(&step.moves).unwrap();
