@@ -82,9 +82,12 @@ impl<'a> Places<'a> {
     }
 }
 
+/// A session with its file.
+type Given<'a> = (&'a Path, SessionFile);
+
 /// The sessions that are assessed, with their files, and the files of those in which nothing was done. These are left
 /// out and told of, unless all are such.
-pub(super) fn read(files: &[PathBuf]) -> Result<(Vec<(&Path, SessionFile)>, Vec<&Path>), Failure> {
+pub(super) fn read(files: &[PathBuf]) -> Result<(Vec<Given<'_>>, Vec<&Path>), Failure> {
     let (mut sessions, mut left_out) = (vec![], vec![]);
     for file in files {
         let session = SessionFile::read(file)?;
@@ -107,7 +110,7 @@ pub(super) fn read(files: &[PathBuf]) -> Result<(Vec<(&Path, SessionFile)>, Vec<
 /// Measures a session on the way to a target.
 pub(super) fn measured(
     args: &AssessArgs,
-    (session, of_file): (&Path, SessionFile),
+    (session, of_file): Given<'_>,
     places: &mut Places<'_>,
 ) -> Result<Attempt, Failure> {
     let (summary, recorded_unix_s) = (RecordedSummary::of_session(&of_file), of_file.recorded_unix_s);
@@ -142,7 +145,7 @@ fn target(scene: &Scene) -> Option<String> {
 /// Scores sessions by a subject; returns the provenance and the attempts.
 pub(super) fn scored(
     subject: &Subject,
-    sessions: Vec<(&Path, SessionFile)>,
+    sessions: Vec<Given<'_>>,
     places: &mut Places<'_>,
 ) -> Result<(Provenance, Vec<Attempt>), Failure> {
     let settings = subjects::settings(subject)?;
