@@ -66,7 +66,7 @@ fn a_hand_follows_a_way_that_was_found_as_the_known_one() {
     let ways = |name: &str| {
         let row = known.target(name).unwrap().row;
         let place = known.nodes()[row].position_mm;
-        (known.path_to(row).unwrap(), found.path_to(found.nearest_row(&place)).unwrap())
+        (known.path_to(row).unwrap(), found.path_to_place(&place).unwrap())
     };
     let start = scene.simulation(&NoStore).unwrap();
     let (known_way, found_way) = ways("left subclavian");

@@ -354,10 +354,9 @@ impl<const C: usize> Tools<C> {
         let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
         let (rubbed_mj, released_mj) = balance.lost_mj(jumps);
         let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(rubbed_mj + released_mj) };
-        let dissipated_mj = rubbed_mj + outside_mj;
+        let (dissipated_mj, residual) = (rubbed_mj + outside_mj, found.residual);
         let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
         self.guess.teach(&after.rod, &mut after.correction);
-        let residual = found.residual;
         Ok(Found { slides, dissipated_mj, borrowed_mj, residual, unsettled, balanced, lacks, off, jump })
     }
 }

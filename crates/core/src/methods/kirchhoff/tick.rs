@@ -119,10 +119,32 @@ impl<'a> Part<'a> {
     }
 }
 
+/// How a tick goes on after a part that has failed.
+enum After {
+    /// With a part from rest.
+    Rest,
+    /// With a relaxation from a fold.
+    Fold,
+    /// In the next tick, with the unfinished solution.
+    UnderWay,
+    /// The device stays where it is.
+    Stays,
+    /// As a step, since what changes does not wait.
+    Overtaken,
+    /// Not at all.
+    Fails,
+}
+
 /// Progress of a tick.
 struct Course {
     /// Largest motion of the hands in the next part, mm.
     longest_mm: f64,
+    /// Relaxation over a part up to this length, mm, may end nearby.
+    let_go_mm: f64,
+    /// What changes around the device.
+    change: Change,
+    /// Whether the vessel moves.
+    vessel_moves: bool,
     /// Accumulated results.
     sum: Sum,
     /// Whether there is a new state.
@@ -132,9 +154,59 @@ struct Course {
 }
 
 impl Course {
+    fn new(environment: &Environment<'_>, from: &KirchhoffState) -> Self {
+        let vessel_moves = environment.surroundings.moves();
+        let is_changed = vessel_moves || environment.surroundings.fields_change();
+        // In a vessel that moves the relaxation goes on at its end.
+        let overtaken = vessel_moves && matches!(from.tick, Ticking::Moving(1..));
+        Self {
+            longest_mm: from.stride.part_mm,
+            let_go_mm: if environment.has_friction() { HELD_MM } else { FOLD_MM },
+            change: Change { done: if is_changed { 0.0 } else { 1.0 }, next: 1.0, overtaken },
+            vessel_moves,
+            sum: Sum::default(),
+            moved: false,
+            rests: true,
+        }
+    }
+
+    /// The linear solves after which no part begins, of those of the tick: with half of them a moving vessel does not
+    /// wait any longer.
+    fn within(&self, solves: usize) -> usize {
+        if self.vessel_moves && self.change.goes_on() { solves / 2 } else { solves }
+    }
+
+    /// Goes on with parts of half this length.
+    fn shorten(&mut self, part_mm: f64) {
+        self.longest_mm = 0.5 * part_mm;
+        self.change.next *= 0.5;
+    }
+
+    /// How to go on after a part that has failed.
+    fn after(&mut self, lost: Lost, part: &Part<'_>) -> After {
+        let change = &mut self.change;
+        match (lost, part.effort) {
+            (Lost::UnderWay, _) if !change.goes_on() || (change.to() == 1.0 && !self.vessel_moves) => {
+                return After::UnderWay;
+            }
+            (Lost::UnderWay, _) => change.overtaken = true,
+            _ if change.overtaken => return After::Overtaken,
+            _ if part.holds_still && !change.goes_on() => return After::Stays,
+            _ if part.holds_still => change.overtaken = true,
+            (_, Effort::Moving) if part.part_mm <= FOLD_MM => return After::Fails,
+            (_, Effort::Near) if part.part_mm <= self.let_go_mm => {
+                self.longest_mm = part.part_mm;
+                return After::Fold;
+            }
+            _ => self.shorten(part.part_mm),
+        }
+        After::Rest
+    }
+
     /// Accepts the result of a part; `lies` tells whether the device hardly moved in it. Returns how to continue.
     fn take(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) -> Ticking {
         self.moved = true;
+        self.change = Change { done: self.change.to(), next: 1.0, overtaken: false };
         self.rests = found.balanced || (part.holds_still && lies && found.residual <= AT_REST);
         self.sum.add(found);
         self.sum.relaxations += u32::from(part.effort == Effort::Moving && !part.holds_still);
@@ -175,38 +247,26 @@ impl<const C: usize> Workspace<C> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
-        let moves = surroundings.moves();
         let mut displaced = surroundings.displacement(0.0);
-        let is_changed = moves || surroundings.fields_change();
-        let mut change = Change { done: if is_changed { 0.0 } else { 1.0 }, next: 1.0, overtaken: false };
-        // With friction, relaxation over a part up to this length may end nearby.
-        let let_go_mm = if environment.has_friction() { HELD_MM } else { FOLD_MM };
-        let mut course =
-            Course { longest_mm: from.stride.part_mm, sum: Sum::default(), moved: false, rests: true };
+        let mut course = Course::new(environment, from);
         let (rest, fold, mut moving);
         (rest, fold) = (Ticking::Rest, Ticking::Moving(0));
-        let mut begun = &from.tick;
-        if moves {
-            // The unfinished solution is of another place of the vessel.
-            change.overtaken = matches!(begun, Ticking::Moving(1..));
-            begun = &rest;
-        }
+        // An unfinished solution is of the vessel where it was.
+        let mut begun = if course.vessel_moves { &rest } else { &from.tick };
         // Remaining work, or the error that ends the tick.
         let ends = loop {
-            let parts = course.sum.substeps;
+            let (parts, within) = (course.sum.substeps, course.within(solves));
             let spent = tools.work.solves + OF_A_PART * parts;
-            if parts > 0 && spent >= solves && !change.goes_on() {
+            if parts > 0 && spent >= solves && !course.change.goes_on() {
                 break Ok(begun.clone());
             }
-            // Where the change cannot wait any longer, it comes to its end.
-            let within = if moves && change.goes_on() { solves / 2 } else { solves };
-            if change.goes_on() && spent >= within && !change.overtaken {
-                (change.overtaken, begun) = (true, &rest);
+            if course.change.goes_on() && spent >= within && !course.change.overtaken {
+                (course.change.overtaken, begun) = (true, &rest);
             }
             let was = if course.moved { now.start() } else { Start { mesh, state: from } };
-            let part = Part::next(begun, (way, course.longest_mm), &change, hands);
+            let part = Part::next(begun, (way, course.longest_mm), &course.change, hands);
             let Part { effort, resumed, part_mm, .. } = part;
-            let to = if part.resumed.is_some() { 1.0 } else { change.to() };
+            let to = course.change.to();
             let then = surroundings.displacement(to);
             let passage = displaced.as_ref().zip(then.as_ref()).filter(|(before, after)| before != after);
             let taken = taken_along(was, passage);
@@ -223,15 +283,14 @@ impl<const C: usize> Workspace<C> {
             }
             let before = tools.work;
             let most = resumed.map_or(MOST_NEAR, |under_way| MOST_NEAR - under_way.iterations);
-            let allowed = if change.overtaken { solves } else { within };
+            let allowed = if course.change.overtaken { solves } else { within };
             let solves_left = allowed.saturating_sub(before.solves).max(1);
             let left = passage.map(|passage| (was, passage));
             let attempted = Attempt { hands, effort, most, solves: solves_left, left, resumed };
-            let tried = tools.try_step(&there, here, attempted, next);
-            match tried {
-                Ok(found) if part.strays(&found) && !change.overtaken => {
-                    (course.longest_mm, begun) = (0.5 * part_mm, &rest);
-                    change.next *= 0.5;
+            match tools.try_step(&there, here, attempted, next) {
+                Ok(found) if part.strays(&found) && !course.change.overtaken => {
+                    course.shorten(part_mm);
+                    begun = &rest;
                 }
                 Ok(found) => {
                     let tip_mm = there.wall().material(&next.state.tip_mm());
@@ -240,47 +299,35 @@ impl<const C: usize> Workspace<C> {
                     }
                     let way_mm = here.state.rod.farthest_mm(&next.state.rod);
                     let lies = way_mm <= REST_RADII * surroundings.device.min_radius_mm();
-                    let iterations = tools.work.since(&before);
-                    moving = course.take(&part, &found, lies, iterations);
+                    moving = course.take(&part, &found, lies, tools.work.since(&before));
                     std::mem::swap(now, next);
                     way.go_on_from(hands);
                     (displaced, begun) = (then, &moving);
-                    change = Change { done: to, next: 1.0, overtaken: false };
-                    if matches!(moving, Ticking::Rest) && way.is_done() && !change.goes_on() {
+                    if matches!(moving, Ticking::Rest) && way.is_done() && !course.change.goes_on() {
                         break Ok(Ticking::Rest);
                     }
                 }
-                Err(Lost::UnderWay) if !change.goes_on() || (to == 1.0 && !moves) => {
-                    let under_way = tools.under_way(&part, hands, &next.state, (from, before));
-                    break Ok(Ticking::Solving(Box::new(under_way)));
-                }
-                Err(Lost::UnderWay) => (change.overtaken, begun) = (true, &rest),
-                Err(_) if change.overtaken => return Ok(Ticked::Overtaken),
-                // It stays where it is.
-                Err(_) if part.holds_still => {
-                    begun = &rest;
-                    if !change.goes_on() {
-                        break Ok(Ticking::Rest);
+                Err(lost) => match course.after(lost, &part) {
+                    After::Rest => begun = &rest,
+                    After::Fold => {
+                        let at_start = environment.displaced(displaced.as_ref());
+                        if let Err(wedged) = refuse_wedged(&at_start, here, &way.commands) {
+                            break Err(wedged);
+                        }
+                        begun = &fold;
                     }
-                    change.overtaken = true;
-                }
-                Err(lost) if effort == Effort::Moving && part_mm <= FOLD_MM => {
-                    let inserted_mm = line_mm(lengths(&way.start));
-                    let told =
-                        format!("kirchhoff: no equilibrium beyond {inserted_mm:.3} mm inserted: {lost}");
-                    break Err(Error::Computation(told));
-                }
-                Err(_) if effort == Effort::Near && part_mm <= let_go_mm => {
-                    let at_start = environment.displaced(displaced.as_ref());
-                    if let Err(wedged) = refuse_wedged(&at_start, here, &way.commands) {
-                        break Err(wedged);
+                    After::UnderWay => {
+                        let under_way = tools.under_way(&part, hands, &next.state, (from, before));
+                        break Ok(Ticking::Solving(Box::new(under_way)));
                     }
-                    (course.longest_mm, begun) = (part_mm, &fold);
-                }
-                Err(_) => {
-                    (course.longest_mm, begun) = (0.5 * part_mm, &rest);
-                    change.next *= 0.5;
-                }
+                    After::Stays => break Ok(Ticking::Rest),
+                    After::Overtaken => return Ok(Ticked::Overtaken),
+                    After::Fails => {
+                        let inserted_mm = line_mm(lengths(&way.start));
+                        let told = format!("no equilibrium beyond {inserted_mm:.3} mm inserted: {lost}");
+                        break Err(Error::Computation(format!("kirchhoff: {told}")));
+                    }
+                },
             }
         };
         if !course.moved {
