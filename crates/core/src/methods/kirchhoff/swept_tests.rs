@@ -1,10 +1,13 @@
 //! Vessels whose walls are given by centre lines.
 
+use super::KirchhoffOptions;
 use crate::Vec3;
 use crate::contact::ContactSurface;
-use crate::device::Device;
+use crate::device::{Device, Section};
 use crate::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
-use crate::vessel::{CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution, SweptVessel, anatomy};
+use crate::vessel::{
+    CentrelineNode, CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution, SweptVessel, anatomy,
+};
 
 fn swept(tree: &CentrelineTree) -> Lumen {
     SweptVessel::new(tree.clone(), Resolution::EdgeMm(1.0)).unwrap().into()
@@ -67,4 +70,30 @@ fn a_centre_line_is_felt_by_a_mesh_where_the_wall_has_regions_or_the_device_fill
         friction: None,
     };
     assert!(meshed(0.2, &WallProperties { region: vec![region], ..plain }));
+}
+
+#[test]
+fn a_soft_bent_wire_is_held_by_the_wall_of_a_widening() {
+    // The radius of the vessel at places on its axis, mm.
+    let profile =
+        [(0.0, 1.5), (5.0, 1.5), (8.0, 3.0), (11.0, 5.0), (15.0, 5.0), (19.0, 3.5), (23.0, 1.5), (28.0, 1.5)];
+    let node = |(row, (z, radius_mm)): (usize, &(f64, f64))| CentrelineNode {
+        position_mm: Vec3::new(0.0, 0.0, *z),
+        radius_mm: *radius_mm,
+        parent: row.checked_sub(1),
+    };
+    let tree = CentrelineTree::new(profile.iter().enumerate().map(node).collect()).unwrap();
+    let tip = Section { rest_curvature_per_mm: [0.4, 0.05], ..Section::straight(74.0, 0.2, 0.05) };
+    let position_mm = Vec3::new(0.0, 0.0, 1.0);
+    let sheath = Sheath { position_mm, direction: Vec3::z(), friction: 0.0, friction_n: 0.0 };
+    let properties = WallProperties { modulus_n_per_mm2: 1.0, friction: 0.0, ..WallProperties::default() };
+    let method = KirchhoffOptions { element_mm: 1.0, self_contact: true, ..KirchhoffOptions::default() };
+    let builder = Simulation::builder(swept(&tree), Device::new(vec![tip]).unwrap(), sheath);
+    let mut simulation = builder.properties(properties).method(&method).build().unwrap();
+    for step in 1..=70 {
+        let report = simulation.step(Command::advance(0.2)).unwrap();
+        assert!(report.converged, "step {step}: {}", report.imbalance);
+        // A force of a hundredth of a newton on a stretch of a millimetre.
+        assert!(report.max_penetration_mm < 0.1, "step {step}: {} mm", report.max_penetration_mm);
+    }
 }

@@ -4,14 +4,23 @@
 //! itself joins them by separate cubics: between those the curvature jumps slightly, and with it the slope of the
 //! wall of a tapering branch. Both pass through the same points and differ by the fourth power of the samples'
 //! distance.
+//!
+//! The foot of a point, where its distance from the course is least, decides which circle it is compared with. A
+//! search along the course that ends before it yields a circle that passes elsewhere: in a lumen that narrows from
+//! there towards the foot a larger one, and the wall appears farther than it is. So a search goes on until it is at a
+//! foot, however far away it begins ([`Axis::nearest`], [`Axis::foot`]).
+//!
+//! Between knots the radius and its slope are polynomials, and so at most as large as the largest of their Bernstein
+//! coefficients: for radii a, b and slopes a′, b′ over a length h these are a, a + h a′/3, b − h b′/3, b, and
+//! a′, 3 (b − a)/h − a′ − b′, b′.
 
 use crate::Vec3;
 use crate::vessel::generate::curve::{Branch, natural_moments};
 
 /// Largest taper of the extension of an open end: its radius changes by at most 4/27 of it.
 const STEEPEST: f64 = 0.67;
-/// Largest number of Newton steps to the foot of a point: from a sample a quarter of the radius away three are
-/// enough.
+/// Largest number of Newton steps to the foot of a point: from the nearest knot, an eighth of the radius away, three
+/// are enough.
 const FOOT_STEPS: usize = 8;
 /// Stride, in knots, of the coarse search for the nearest one, where it is unknown by some radii; and number of steps
 /// from there.
@@ -38,7 +47,7 @@ struct Knot {
     flare: [f64; 2],
 }
 
-/// The knot nearest to a point.
+/// The knot nearest to a point, of those about it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct NearKnot {
     /// Its distance, mm.
@@ -155,14 +164,34 @@ impl Axis {
             && (knot + 1 < self.knots.len() || self.ends[1] == End::Round)
     }
 
+    /// Upper bounds of the radius, mm, and of the size of its slope, from a knot to the next.
+    fn largest(&self, knot: usize) -> (f64, f64) {
+        let (a, b) = (&self.knots[knot], &self.knots[knot + 1]);
+        let between = [a.radius + self.step * a.slope / 3.0, b.radius - self.step * b.slope / 3.0];
+        let slope = 3.0 * (b.radius - a.radius) / self.step - a.slope - b.slope;
+        (
+            between.into_iter().fold(a.radius.max(b.radius), f64::max),
+            [b.slope, slope].into_iter().map(f64::abs).fold(a.slope.abs(), f64::max),
+        )
+    }
+
+    /// Upper bound of the radius from one knot to another, mm, without extensions.
+    pub(super) fn widest(&self, from: usize, to: usize) -> f64 {
+        (from..to).map(|knot| self.largest(knot).0).fold(self.radius(to), f64::max)
+    }
+
     /// Upper bound of the slope of this branch's field in its lumen, relative to a distance.
+    ///
+    /// With the field's gradient u − r′ σ c′, u ⊥ c′, its square is 1 + (r′ σ |c′|)²; in the lumen
+    /// 1/σ ≥ |c′|² − r |c″|, and |c′| is nearly 1. The second derivative is linear between knots.
     pub(super) fn steepness(&self) -> f64 {
         let of = |k: usize| {
-            let Knot { moment, radius, slope, .. } = self.knots[k];
-            let along = slope / (1.0 - radius * moment.norm()).max(0.05);
+            let (radius, slope) = self.largest(k);
+            let bend = self.knots[k].moment.norm().max(self.knots[k + 1].moment.norm());
+            let along = slope / (1.0 - radius * bend).max(0.05);
             (1.0 + along * along).sqrt()
         };
-        (0..self.knots.len()).map(of).fold(1.0, f64::max)
+        (0..self.knots.len() - 1).map(of).fold(1.0, f64::max)
     }
 
     /// The knot nearest to an arc length.
@@ -220,15 +249,23 @@ impl Axis {
         }
     }
 
-    /// Arc length of the foot of a point, starting near it, and the place there.
+    /// Arc length of the foot of a point, and the place there: the one towards which its distance decreases from an
+    /// arc length.
     pub(super) fn foot(&self, x: &Vec3, near: f64) -> (f64, Place) {
         let ([low, high], length) = (self.range(), self.length());
         let mut s = near.clamp(low, high);
         let mut place = self.at(s);
+        let mut is_near = false;
         for _ in 0..FOOT_STEPS {
             let offset = x - place.position;
-            let limit = if s > 0.0 && s < length { self.step } else { f64::INFINITY };
+            let is_inner = s > 0.0 && s < length;
+            let limit = if is_inner { self.step } else { f64::INFINITY };
             let change = offset.dot(&place.first) / stretch(&place, &offset);
+            if is_inner && change.abs() > self.step && !std::mem::replace(&mut is_near, true) {
+                s = self.step * self.follow(x, self.knot_at(s)) as f64;
+                place = self.at(s);
+                continue;
+            }
             let next = (s + change.clamp(-limit, limit)).clamp(low, high);
             let moved = next - s;
             s = next;
@@ -241,8 +278,9 @@ impl Axis {
         (s, place)
     }
 
-    /// The knot nearest to a point among these, its distance, mm, and an arc length near the foot. For a branch that
-    /// returns to where it was, that of the stretch whose middle is nearest.
+    /// A knot near a foot of a point, its distance, mm, and an arc length nearer to the foot, sought from these knots
+    /// on: if the foot is beyond them, so is the knot. For a branch that returns to where it was, that of the stretch
+    /// whose middle is nearest.
     pub(super) fn nearest(&self, x: &Vec3, from: usize, to: usize) -> NearKnot {
         let away = |k: usize| (self.knots[k].position - x).norm_squared();
         let (mut knot, mut least) = (to, away(to));
@@ -269,12 +307,12 @@ impl Axis {
             }
             (knot, least) = (next, here);
         }
-        let knot = self.follow(x, knot).clamp(from, to);
+        let knot = self.follow(x, knot);
         let near = self.step * (knot as f64 + jump(knot).clamp(-1.0, 1.0));
         NearKnot { away: away(knot).sqrt(), knot, near }
     }
 
-    /// The knot nearest to a point, following the axis from another.
+    /// The knot nearest to a point of those about it, following the axis from another.
     pub(super) fn follow(&self, x: &Vec3, from: usize) -> usize {
         let away = |k: usize| (self.knots[k].position - x).norm_squared();
         let mut k = from;

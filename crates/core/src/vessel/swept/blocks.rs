@@ -127,13 +127,15 @@ impl Block {
         let begin = if from == 0 { low } else { step * from as f64 };
         let end = if to + 1 == axis.len() { high } else { step * to as f64 };
         let centre = axis.at(0.5 * (begin + end)).position;
-        let places = (from..=to).map(|k| axis.at(step * k as f64)).chain([axis.at(begin), axis.at(end)]);
+        let knots = (from..=to)
+            .map(|k| (axis.position(k), axis.widest(k.saturating_sub(1).max(from), (k + 1).min(to))));
+        let tips = [begin, end].map(|s| axis.at(s)).map(|place| (place.position, place.radius[0]));
         let (mut reach, mut radius) = (0.0_f64, 0.0_f64);
-        for place in places {
-            radius = radius.max(place.radius[0]);
-            reach = reach.max((place.position - centre).norm() + place.radius[0]);
+        for (position, width) in knots.chain(tips) {
+            radius = radius.max(width);
+            reach = reach.max((position - centre).norm() + width);
         }
-        // Beyond an open end it widens by at most 4/27 of its taper; between knots by almost nothing.
+        // Beyond an open end it widens by at most 4/27 of its taper.
         Self { part, centre, reach: reach + step + 0.1 * radius, radius, near: OnceLock::new() }
     }
 }

@@ -13,6 +13,7 @@
 
 use nalgebra::Matrix3;
 
+use super::axis::NearKnot;
 use super::blocks::Part;
 use super::field::{Depth, Feet, SweptField, Value};
 use crate::Vec3;
@@ -128,13 +129,17 @@ impl SweptField {
 
     /// Depth of a position in that branch. `None` if not finite.
     fn deepest(&self, x: &Vec3) -> Option<Depth> {
-        let mut best: Option<Depth> = None;
+        let mut best: Option<(Depth, usize)> = None;
         let mut ask = |part: Part, lowest: &mut f64| {
             let axis = &self.axes[part.branch as usize];
-            let near = axis.nearest(x, part.from as usize, part.to as usize).near;
+            let NearKnot { knot, near, .. } = axis.nearest(x, part.from as usize, part.to as usize);
+            // From neighbouring parts the search ends at the same foot.
+            if best.is_some_and(|(depth, known)| (depth.branch, known) == (part.branch, knot)) {
+                return;
+            }
             let depth = self.depth(part.branch as usize, x, near);
             if depth.f < *lowest {
-                (*lowest, best) = (depth.f, Some(depth));
+                (*lowest, best) = (depth.f, Some((depth, knot)));
             }
         };
         let mut lowest = f64::INFINITY;
@@ -148,7 +153,7 @@ impl SweptField {
                 ask(part, &mut lowest);
             }
         }
-        best
+        best.map(|(depth, _)| depth)
     }
 
     /// Whether a point is in the lumen, including extensions of open ends.

@@ -173,12 +173,12 @@ impl SweptField {
         let nearest =
             |part: &Part| self.axes[part.branch as usize].nearest(x, part.from as usize, part.to as usize);
         let mut known = [NearKnot::default(); MOST_JOINED];
-        let mut low = (f64::INFINITY, 0.0);
+        let mut low = (f64::INFINITY, 0.0, 1.0);
         for (index, part) in parts.iter().enumerate() {
             let found = nearest(part);
             let radius = self.axes[part.branch as usize].radius(found.knot);
             if found.away - radius < low.0 {
-                low = (found.away - radius, radius);
+                low = (found.away - radius, radius, self.blocks.steepness(part.branch as usize));
             }
             if let Some(known) = known.get_mut(index) {
                 *known = found;
@@ -189,10 +189,11 @@ impl SweptField {
             let axis = &self.axes[part.branch as usize];
             let NearKnot { away, knot, near } = known.get(index).copied().unwrap_or_else(|| nearest(part));
             let radius = axis.radius(knot);
-            // Between knots a branch comes nearer by at most a step, and its radius changes by less; its extensions
-            // excepted. A branch higher than another by the largest width of a joint has no effect; a joint is at
-            // most between a thin branch and the mean of others.
-            let least = away - radius - 2.0 * (axis.step() + way);
+            // Along a step, and on the way, the fields of two branches approach each other by at most the sum of
+            // their slopes; on extensions excepted. A branch higher than another by the largest width of a joint has
+            // no effect; a joint is at most between a thin branch and the mean of others.
+            let approach = self.blocks.steepness(part.branch as usize) + low.2;
+            let least = away - radius - approach * (axis.step() + way);
             if axis.is_inner(knot) && least > low.0 + BLEND * radius.min(WIDER * low.1) {
                 continue;
             }

@@ -203,8 +203,8 @@ fn check_apart(axis: &Axis) -> Result<()> {
         if from >= axis.len() {
             break;
         }
-        let other = axis.nearest(&x, from, axis.len() - 1);
-        if other.away < radius + axis.radius(other.knot) {
+        let other = axis.nearest(&x, from, axis.len() - 1).knot.max(from);
+        if (axis.position(other) - x).norm() < radius + axis.radius(other) {
             return Err(Error::Mesh(wall_cuts_itself(&x)));
         }
     }

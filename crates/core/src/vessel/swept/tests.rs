@@ -265,3 +265,124 @@ fn openings_have_the_numbers_that_they_have_in_an_exported_surface() {
         }
     }
 }
+
+/// A single branch of these radii at these lengths, mm, straight or in an arc of this radius, from either end.
+fn along(profile: &[(f64, f64)], bend_mm: Option<f64>, reversed: bool) -> CentrelineTree {
+    let place = |z: f64| match bend_mm {
+        None => [0.0, 0.0, z],
+        Some(bend) => [bend * (1.0 - (z / bend).cos()), 0.0, bend * (z / bend).sin()],
+    };
+    let mut rows: Vec<[f64; 4]> = Vec::new();
+    for &(z, radius) in profile {
+        let [x, y, z] = place(z);
+        rows.push([x, y, z, radius]);
+    }
+    if reversed {
+        rows.reverse();
+    }
+    let linked = rows.into_iter().enumerate().map(|(k, row)| (row, k.checked_sub(1)));
+    tree(&linked.collect::<Vec<_>>())
+}
+
+/// The distance of a place from the wall of a branch, mm, negative outside: the least over all circles that sweep it.
+fn exact_mm(axis: &Axis, x: &Vec3) -> f64 {
+    let [low, high] = axis.range();
+    let from_circle = |s: f64| {
+        let place = axis.at(s.clamp(low, high));
+        let (offset, along) = (x - place.position, place.first.normalize());
+        let ahead = offset.dot(&along);
+        (ahead.hypot((offset - along * ahead).norm() - place.radius[0]), offset.norm(), place.radius[0])
+    };
+    let fine = axis.step() / 8.0;
+    let samples = (0..=((high - low) / fine).ceil() as usize).map(|k| low + fine * k as f64);
+    let (mut nearest, mut centre) = ((f64::INFINITY, 0.0), (f64::INFINITY, 0.0, 0.0));
+    for s in samples {
+        let (away, off, radius) = from_circle(s);
+        if away < nearest.0 {
+            nearest = (away, s);
+        }
+        if off < centre.0 {
+            centre = (off, s, radius);
+        }
+    }
+    let (mut a, mut b) = (nearest.1 - fine, nearest.1 + fine);
+    for _ in 0..60 {
+        let (c, d) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
+        if from_circle(c).0 < from_circle(d).0 { b = d } else { a = c }
+    }
+    let least = from_circle(0.5 * (a + b)).0;
+    let (mut a, mut b) = (centre.1 - fine, centre.1 + fine);
+    for _ in 0..60 {
+        let (c, d) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
+        if from_circle(c).1 < from_circle(d).1 { b = d } else { a = c }
+    }
+    let (_, off, radius) = from_circle(0.5 * (a + b));
+    if off < radius { least } else { -least }
+}
+
+/// Random radii, each at most this much wider or narrower than the last per length.
+fn random_profile(seed: u64, steepest: f64) -> Vec<(f64, f64)> {
+    let number = |k: u64| unit(splitmix64(seed, k));
+    let mut profile = vec![(0.0, 3.0)];
+    for k in 0..8 {
+        let (z, radius) = profile[profile.len() - 1];
+        let length = 3.0 + 5.0 * number(2 * k);
+        let change = steepest * length * (2.0 * number(2 * k + 1) - 1.0);
+        profile.push((z + length, (radius + change).clamp(1.2, 8.0)));
+    }
+    profile
+}
+
+#[test]
+fn no_stretch_of_a_widening_or_narrowing_wall_is_missed() {
+    let mut profiles = vec![
+        vec![(0.0, 4.0), (10.0, 4.0), (20.0, 7.0), (30.0, 10.0), (50.0, 10.0)],
+        vec![(0.0, 2.0), (10.0, 2.0), (20.0, 5.0), (30.0, 8.0), (50.0, 8.0)],
+        vec![(0.0, 1.5), (6.0, 1.5), (12.0, 3.25), (18.0, 5.0), (24.0, 5.0), (42.0, 5.0)],
+        vec![
+            (0.0, 1.5),
+            (5.0, 1.5),
+            (8.0, 3.0),
+            (11.0, 5.0),
+            (15.0, 5.0),
+            (19.0, 3.5),
+            (23.0, 1.5),
+            (28.0, 1.5),
+        ],
+        vec![(0.0, 3.0), (12.0, 3.0), (18.0, 1.2), (24.0, 3.0), (40.0, 3.0)],
+        vec![(0.0, 3.0), (12.0, 3.0), (18.0, 1.2)],
+        vec![(0.0, 3.0), (12.0, 3.0), (15.0, 6.0)],
+    ];
+    profiles.extend((0..12).map(|seed| random_profile(seed, 0.15 * (1 + seed % 4) as f64)));
+    let (mut asked, mut faults) = (0, Vec::new());
+    for (number, profile) in profiles.iter().enumerate() {
+        for (bend_mm, reversed) in [(None, false), (None, true), (Some(30.0), false), (Some(30.0), true)] {
+            let Ok(vessel) = SweptVessel::new(along(profile, bend_mm, reversed), Resolution::EdgeMm(0.8))
+            else {
+                assert!(number >= 7, "profile {number}");
+                continue;
+            };
+            let field = vessel.field(1.6);
+            let axis = &field.axes[0];
+            for (k, x) in places(&field, 1.0, 300).enumerate() {
+                let exact_mm = exact_mm(axis, &x);
+                let near = field.near(&x);
+                asked += 1;
+                let found = closest(&field, &x).distance_mm();
+                let is_in = vessel.field.contains(&x);
+                if near.clearance_mm > exact_mm + 1e-6
+                    || is_in != (exact_mm > 0.0) && exact_mm.abs() > 1e-6
+                    || (found - exact_mm).abs() > 1e-4 && exact_mm < 0.8
+                {
+                    faults.push(format!(
+                        "profile {number} {bend_mm:?} {reversed} {k}: {exact_mm:.5}, at least {:.5}, found {found:.5}, {is_in}, at {:.3} of {}",
+                        near.clearance_mm,
+                        axis.step() * axis.follow(&x, near.piece as usize) as f64,
+                        axis.length()
+                    ));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{} of {asked}:\n{}", faults.len(), faults.join("\n"));
+}
