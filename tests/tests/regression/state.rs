@@ -318,9 +318,9 @@ fn a_state_of_another_scene_is_refused_and_changes_nothing() {
     for (name, mut here) in [
         ("state.method", start("curved_tube", smooth(), wire(0.0), &banded)),
         ("state.elements", start("curved_tube", smooth(), wire(0.0), &finer)),
-        ("state.angles", start("curved_tube", rubbing(), wire(0.0), &kirchhoff())),
-        ("state.inserted_mm", start("curved_tube", smooth(), short, &kirchhoff())),
-        ("state.sheath", start_at(3.0, "curved_tube", smooth(), wire(0.0), &kirchhoff())),
+        ("state.scene", start("curved_tube", rubbing(), wire(0.0), &kirchhoff())),
+        ("state.scene", start("curved_tube", smooth(), short, &kirchhoff())),
+        ("state.scene", start_at(3.0, "curved_tube", smooth(), wire(0.0), &kirchhoff())),
     ] {
         let before = bytes(&here);
         match here.restore(&saved) {

@@ -245,6 +245,28 @@ fn a_field_that_turns_is_followed_in_steps_and_in_ticks() {
 }
 
 #[test]
+fn a_field_that_turns_while_the_hand_moves_is_followed_in_ticks_with_enough_solves() {
+    let mut wire = simulation(Device::uniform(100.0, 0.3, STIFFNESS).unwrap(), 2.0);
+    wire.step(Command::advance(40.0)).unwrap();
+    let mut ticks = wire.clone();
+    let command = Command { advance_mm: 0.2, rotate_rad: 0.02 };
+    for k in 0..20 {
+        let angle = 0.9 * f64::from(k);
+        let field_t = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0) * 0.01 * f64::from(k);
+        let field = [Arc::new(Magnet::new(0, 0.0..MAGNET_MM, 4.3e-3, field_t).unwrap()) as Arc<dyn Field>];
+        for each in [&mut wire, &mut ticks] {
+            each.set_fields(field.clone()).unwrap();
+        }
+        let relaxations = wire.step(command).unwrap().relaxations;
+        let report = ticks.tick(&[Move { instrument: 0, command }], 2000, None).unwrap();
+        assert!(report.converged && report.behind.is_empty(), "{k}: {report:?}");
+        assert!(report.relaxations <= relaxations, "{k}: {} for {relaxations}", report.relaxations);
+        let (tip, other) = (wire.tip_of_mm(0).unwrap(), ticks.tip_of_mm(0).unwrap());
+        assert!((tip - other).norm() < 1e-4, "{k}: {tip} {other}");
+    }
+}
+
+#[test]
 fn what_cannot_be_a_magnet_or_a_weight_is_refused() {
     let refused = |magnet: Result<Magnet>| magnet.unwrap_err().to_string();
     let field = Vec3::x();

@@ -47,8 +47,8 @@ pub(super) enum Ticked {
 struct Change {
     /// Its part that is over, 0 to 1.
     done: f64,
-    /// Part of the rest that is in the next part.
-    next: f64,
+    /// Largest share of it in the next part.
+    most: f64,
     /// Whether the device relaxes at its end, however far away.
     overtaken: bool,
 }
@@ -56,8 +56,14 @@ struct Change {
 impl Change {
     /// The part of it that is over after the next part.
     fn to(&self) -> f64 {
-        let to = self.done + self.next * (1.0 - self.done);
-        if self.overtaken || self.next == 1.0 { 1.0 } else { to }
+        // A remainder at the level of rounding is ignored.
+        let to = self.done + self.most;
+        if self.overtaken || to > 1.0 - 1e-9 { 1.0 } else { to }
+    }
+
+    /// Its share in the next part.
+    fn share(&self) -> f64 {
+        self.to() - self.done
     }
 
     fn goes_on(&self) -> bool {
@@ -88,7 +94,7 @@ impl<'a> Part<'a> {
     ) -> Self {
         let travel_mm = way.travel_mm(WORK_RAD);
         let part = if travel_mm > longest_mm { longest_mm / travel_mm } else { 1.0 };
-        let of_change_mm = if travel_mm == 0.0 && change.goes_on() { change.next } else { 0.0 };
+        let of_change_mm = if travel_mm == 0.0 { change.share() } else { 0.0 };
         let fresh = |effort: Effort| Self {
             effort,
             resumed: None,
@@ -162,7 +168,7 @@ impl Course {
         Self {
             longest_mm: from.stride.part_mm,
             let_go_mm: if environment.has_friction() { HELD_MM } else { FOLD_MM },
-            change: Change { done: if is_changed { 0.0 } else { 1.0 }, next: 1.0, overtaken },
+            change: Change { done: if is_changed { 0.0 } else { 1.0 }, most: 1.0, overtaken },
             vessel_moves,
             sum: Sum::default(),
             moved: false,
@@ -179,7 +185,7 @@ impl Course {
     /// Goes on with parts of half this length.
     fn shorten(&mut self, part_mm: f64) {
         self.longest_mm = 0.5 * part_mm;
-        self.change.next *= 0.5;
+        self.change.most = 0.5 * self.change.share();
     }
 
     /// How to go on after a part that has failed.
@@ -206,7 +212,8 @@ impl Course {
     /// Accepts the result of a part; `lies` tells whether the device hardly moved in it. Returns how to continue.
     fn take(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) -> Ticking {
         self.moved = true;
-        self.change = Change { done: self.change.to(), next: 1.0, overtaken: false };
+        let share = self.change.share();
+        (self.change.done, self.change.overtaken) = (self.change.to(), false);
         self.rests = found.balanced || (part.holds_still && lies && found.residual <= AT_REST);
         self.sum.add(found);
         self.sum.relaxations += u32::from(part.effort == Effort::Moving && !part.holds_still);
@@ -215,6 +222,7 @@ impl Course {
         }
         if part.effort == Effort::Near && found.off < NEARER {
             self.longest_mm = self.longest_mm.max(2.0 * part.part_mm);
+            self.change.most = self.change.most.max(2.0 * share);
         }
         // A device that does not come to rest is left where it is, and reported as not in equilibrium.
         let goes_on = part.effort == Effort::Moving && !self.rests && part.moving + iterations <= LONGEST;

@@ -94,7 +94,7 @@ fn a_hook_that_slides_takes_what_the_hand_gives() {
         // Coulomb's law: all of it slides along, with forces decreasing from step to step.
         let rub: f64 = report.contacts.iter().map(|c| c.friction_n.norm()).sum();
         let off = report.dissipated_mj / (0.5 * rub) - 1.0;
-        assert!(off.abs() < 0.006, "{}: {off}", report.inserted_mm);
+        assert!(off.abs() < 0.01, "{}: {off}", report.inserted_mm);
         before = report;
     }
     assert!((given - left - taken).abs() < 1e-3 * taken, "{given} {left} {taken}");
