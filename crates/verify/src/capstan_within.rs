@@ -70,9 +70,7 @@ const VALVE_N: f64 = 0.3;
 /// hand feels anything if both move together.
 pub(super) fn valve() -> Result<Vec<Row>> {
     const NAME: &str = "D7 valve of 0.3 N, straight wire";
-    let mut plain = bent(0.0, 0.0)?;
-    let state = plain.state();
-    let mut sealed = bent_within(0.0, 0.0, VALVE_N)?;
+    let starts = [bent(0.0, 0.0)?, bent_within(0.0, 0.0, VALVE_N)?];
     let mut rows = Vec::new();
     let along = 0.2 / 0.2f64.hypot(WIRE_RADIUS_MM * 2.0);
     let around = WIRE_RADIUS_MM * (1.0 - along * along).sqrt();
@@ -81,8 +79,7 @@ pub(super) fn valve() -> Result<Vec<Row>> {
         ("pulled back", -0.2, 0.0, [-1.0, 0.0]),
         ("pushed and turned", 0.2, 2.0, [along, around]),
     ] {
-        plain.restore(&state)?;
-        sealed.restore(&state)?;
+        let [mut plain, mut sealed] = starts.clone();
         let command = Command { advance_mm, rotate_rad: turn_rad };
         for simulation in [&mut plain, &mut sealed] {
             simulation.step_together(&[Move { instrument: WIRE, command }])?;
