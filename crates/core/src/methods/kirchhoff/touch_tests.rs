@@ -91,10 +91,10 @@ fn a_hook_that_slides_takes_what_the_hand_gives() {
         given += 0.25 * (before.push_force_n + report.push_force_n);
         left += report.energy.total() - before.energy.total();
         taken += report.dissipated_mj;
-        // Coulomb's law: all of it slides along, with forces decreasing from step to step.
-        let rub: f64 = report.contacts.iter().map(|c| c.friction_n.norm()).sum();
-        let off = report.dissipated_mj / (0.5 * rub) - 1.0;
-        assert!(off.abs() < 0.01, "{}: {off}", report.inserted_mm);
+        // Coulomb's law: all of it slides along, with the mean of the forces at both ends of the step.
+        let rub = |report: &StepReport| report.contacts.iter().map(|c| c.friction_n.norm()).sum::<f64>();
+        let off = report.dissipated_mj / (0.25 * (rub(&before) + rub(&report))) - 1.0;
+        assert!(off.abs() < 5e-3, "{}: {off}", report.inserted_mm);
         before = report;
     }
     assert!((given - left - taken).abs() < 1e-3 * taken, "{given} {left} {taken}");
