@@ -41,10 +41,7 @@ impl ContactPoint {
 
     /// Position on the device's axis, mm, and unit tangent there.
     pub(crate) fn position_and_tangent(&self, elements: &[ElementData], state: &RodState) -> (Vec3, Vec3) {
-        let e = self.element;
-        let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-        let slope = Point::at(self.xi, 0.0).derivatives(state.chords[e], t0, t1).0;
-        (self.position(elements, state), slope / slope.norm())
+        (self.position(elements, state), state.tangent_in(self.element, self.xi))
     }
 
     /// Position on an element of that length, given positions and tangents of its nodes, mm.

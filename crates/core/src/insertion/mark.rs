@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::simulation::Environment;
 use crate::Vec3;
 use crate::random::splitmix64;
-use crate::vessel::Lumen;
+use crate::vessel::{CentrelineNode, Lumen};
 
 /// A number that differs between scenes: instruments, sheath, wall and vessel. Never 0.
 pub(super) fn of(scene: &Environment) -> u64 {
@@ -19,12 +19,11 @@ pub(super) fn of(scene: &Environment) -> u64 {
             mixed(known, mesh.triangles.iter().flatten().map(|v| u64::from(*v)))
         }
         Lumen::Swept(vessel) => {
-            let of_node = |row: usize| {
-                let node = &vessel.tree().nodes()[row];
+            let of_node = |node: &CentrelineNode| {
                 let [x, y, z] = of_point(&node.position_mm);
                 [x, y, z, node.radius_mm.to_bits(), node.parent.map_or(u64::MAX, |row| row as u64)]
             };
-            let nodes = (0..vessel.tree().nodes().len()).flat_map(of_node);
+            let nodes = vessel.tree().nodes().iter().flat_map(of_node);
             mixed(known, nodes.chain(vessel.tree().closed_ends().iter().map(|row| *row as u64)))
         }
     };

@@ -4,6 +4,7 @@ use super::batch::Lane;
 use super::element::{ElementData, ElementState, mid_slope};
 use super::frame::{Frame, normalised, reference_twist, turn_parts};
 use super::layout::{Layout, MAX_ANGLES};
+use super::quadrature::Point;
 use crate::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -124,6 +125,12 @@ impl RodState {
     /// Angle of the material triad at node `i` in a `set` of angles.
     pub fn angle(&self, i: usize, set: usize) -> f64 {
         self.angles[self.sets() * i + set]
+    }
+
+    /// Unit tangent in element `e` at the local coordinate ξ.
+    pub(crate) fn tangent_in(&self, e: usize, xi: f64) -> Vec3 {
+        let slope = Point::at(xi, 0.0).derivatives(self.chords[e], self.frames[e].t, self.frames[e + 1].t).0;
+        slope / slope.norm()
     }
 
     /// Twist of the whole rod, rad, any number of turns.

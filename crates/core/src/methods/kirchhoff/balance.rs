@@ -7,7 +7,7 @@
 use super::carried::WallWork;
 use super::state::KirchhoffState;
 use crate::device::Stack;
-use crate::methods::{InstrumentReport, StepReport};
+use crate::methods::StepReport;
 
 /// Released or missing energy is significant above this fraction of the energy that is stored in the device and the wall,
 /// exchanged with fields, or released from the sheath.
@@ -42,14 +42,6 @@ impl Balance {
         rubbed_mj: (f64, f64),
     ) -> Self {
         let (before, after) = (&was_state.report, &is_state.report);
-        let inside = |state: &KirchhoffState, index: usize| {
-            let (hand, outside) = (state.report.hand(index), state.outside[index]);
-            InstrumentReport {
-                push_force_n: hand.push_force_n.map(|force_n| force_n - outside.push_n),
-                torque_nmm: hand.torque_nmm - outside.torque_nmm,
-                ..hand
-            }
-        };
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
         // The part that has come out of the sheath was straight in it.
@@ -64,7 +56,7 @@ impl Balance {
             mean_mj += 0.5 * (was + is) * way;
         };
         for index in 0..after.instruments.len().max(1) {
-            let (was, is) = (inside(was_state, index), inside(is_state, index));
+            let (was, is) = (was_state.inside(index), is_state.inside(index));
             let (first_n, last_n) = match (was.push_force_n, is.push_force_n) {
                 (Some(first_n), Some(last_n)) => (first_n, last_n),
                 // Where the force jumps, the one on the side of the motion counts.
@@ -114,15 +106,13 @@ impl Balance {
 /// Equal share of the push force of instruments whose tips are level, N: each alone has none, all together have one, and
 /// they go equally far.
 fn shared_n(state: &KirchhoffState) -> f64 {
-    let report = &state.report;
     let outside_n: f64 = state.outside.iter().map(|friction| friction.push_n).sum();
-    let mut rest_n = report.push_force_n - outside_n;
+    let mut rest_n = state.report.push_force_n - outside_n;
     let mut level = 0.0;
-    for (hand, outside) in
-        report.instruments.iter().zip(&state.outside).filter(|(hand, _)| hand.inserted_mm > 0.0)
-    {
+    let each = (0..state.report.instruments.len()).map(|index| state.inside(index));
+    for hand in each.filter(|hand| hand.inserted_mm > 0.0) {
         match hand.push_force_n {
-            Some(force_n) => rest_n -= force_n - outside.push_n,
+            Some(force_n) => rest_n -= force_n,
             None => level += 1.0,
         }
     }

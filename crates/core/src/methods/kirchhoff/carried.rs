@@ -20,7 +20,7 @@ use crate::Vec3;
 use crate::contact::Contact;
 use crate::methods::StepReport;
 use crate::rod::RodState;
-use crate::rod::quadrature::{Point, hermite};
+use crate::rod::quadrature::hermite;
 use crate::vessel::Displacement;
 
 /// A vessel before and after a sub-step.
@@ -46,8 +46,7 @@ impl Curve {
             let (t0, t1, h) = (state.frames[e].t, state.frames[e + 1].t, data.length);
             let [w0, s0, w1, s1] = hermite(0.5);
             let x = state.positions[e] * w0 + state.positions[e + 1] * w1 + (t0 * s0 + t1 * s1) * h;
-            let slope = Point::at(0.5, 0.0).derivatives(state.chords[e], t0, t1).0;
-            let (middle, along) = carried(&x, &(slope / slope.norm()));
+            let (middle, along) = carried(&x, &state.tangent_in(e, 0.5));
             let (end, ahead) = carried(&state.positions[e + 1], &t1);
             // Simpson's rule.
             end_mm += h / 6.0 * (at + 4.0 * middle + end);

@@ -130,6 +130,16 @@ impl KirchhoffState {
         &self.report
     }
 
+    /// Motion and forces of a hand without friction outside the body.
+    pub(super) fn inside(&self, index: usize) -> InstrumentReport {
+        let (hand, outside) = (self.report.hand(index), self.outside[index]);
+        InstrumentReport {
+            push_force_n: hand.push_force_n.map(|force_n| force_n - outside.push_n),
+            torque_nmm: hand.torque_nmm - outside.torque_nmm,
+            ..hand
+        }
+    }
+
     /// Position of the tip, mm.
     pub(super) fn tip_mm(&self) -> Vec3 {
         self.rod.positions[self.rod.elements()]

@@ -23,9 +23,7 @@ fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut us
     let e = *element;
     let h = mesh.elements[e].length;
     let xi = ((mesh.from_tip_mm[e] - s) / h).clamp(0.0, 1.0);
-    let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-    let slope = Point::at(xi, 0.0).derivatives(state.chords[e], t0, t1).0;
-    slope / slope.norm()
+    state.tangent_in(e, xi)
 }
 
 /// Position and unit tangent at an arc length from the sheath on the curve of `state`, and straight ahead beyond its
@@ -43,8 +41,7 @@ pub(super) fn place_on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64)
     let [t0, t1] = [e, e + 1].map(|i| state.frames[i].t);
     let [w0, s0, w1, s1] = hermite(xi);
     let place = state.positions[e] * w0 + state.positions[e + 1] * w1 + (t0 * s0 + t1 * s1) * length_mm;
-    let slope = Point::at(xi, 0.0).derivatives(state.chords[e], t0, t1).0;
-    (place, slope / slope.norm())
+    (place, state.tangent_in(e, xi))
 }
 
 /// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
