@@ -7,7 +7,7 @@
 
 use super::Skin;
 use crate::Vec3;
-use crate::rod::quadrature::{Point, hermite};
+use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
 
 /// Relative change of the radius between neighbouring elements above which the surface has a shoulder: elements of a
@@ -31,6 +31,29 @@ pub(super) struct Jet {
     pub(super) second: Vec3,
 }
 
+/// The centre line on an element, a polynomial in ξ.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) element: usize,
+    length_mm: f64,
+    /// Coefficients of 1, ξ, ξ² and ξ³, mm.
+    powers: [Vec3; 4],
+}
+
+impl Piece {
+    /// Position and derivatives at ξ.
+    #[inline]
+    pub(super) fn jet(&self, xi: f64) -> Jet {
+        let [c0, c1, c2, c3] = &self.powers;
+        let per_mm = 1.0 / self.length_mm;
+        Jet {
+            at: c0 + (c1 + (c2 + c3 * xi) * xi) * xi,
+            first: (c1 + (c2 * 2.0 + c3 * (3.0 * xi)) * xi) * per_mm,
+            second: (c2 * 2.0 + c3 * (6.0 * xi)) * (per_mm * per_mm),
+        }
+    }
+}
+
 /// The centre lines of all rods.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Curve<'a> {
@@ -44,11 +67,16 @@ pub(super) struct Curve<'a> {
 impl Curve<'_> {
     /// Position and derivatives at a place.
     pub(super) fn jet(&self, place: Place) -> Jet {
-        let h = self.length_mm(place.element);
-        let [(x0, t0), (x1, t1)] = self.nodes(place.element);
-        let [w0, s0, w1, s1] = hermite(place.xi);
-        let (first, second) = Point::at(place.xi, 0.0).derivatives((x1 - x0) / h, t0, t1);
-        Jet { at: x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * h, first, second: second / h }
+        self.piece(place.element).jet(place.xi)
+    }
+
+    /// The centre line on an element.
+    #[inline]
+    pub(super) fn piece(&self, element: usize) -> Piece {
+        let length_mm = self.length_mm(element);
+        let [(x0, t0), (x1, t1)] = self.nodes(element);
+        let (chord, t0, t1) = (x1 - x0, t0 * length_mm, t1 * length_mm);
+        Piece { element, length_mm, powers: [x0, t0, chord * 3.0 - t0 * 2.0 - t1, t0 + t1 - chord * 2.0] }
     }
 
     /// Whether an element is the gap between two rods.
@@ -62,6 +90,7 @@ impl Curve<'_> {
     }
 
     /// Positions and tangents of the nodes of an element.
+    #[inline]
     fn nodes(&self, e: usize) -> [(Vec3, Vec3); 2] {
         // Called a million times per step: arrays of closures cost twice as much.
         let (x, frames) = (&self.state.positions, &self.state.frames);

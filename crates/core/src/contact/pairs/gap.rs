@@ -86,6 +86,7 @@ struct Value {
     between: Vec3,
 }
 
+#[inline]
 fn value(a: &Jet, b: &Jet, slide: f64) -> Value {
     let r = a.at - b.at;
     let straight = [a.first.norm_squared() + SLIDE, -a.first.dot(&b.first), b.first.norm_squared()];
@@ -128,8 +129,17 @@ impl Gap {
         let (first, mut slide) = at(slide);
         let mut places = [first, to];
         let mut free = [true; 2];
-        let mut jets = places.map(|place| curve.jet(place));
-        let mut now = value(&jets[0], &jets[1], slide);
+        // Most steps stay on the elements on which they begin.
+        let mut pieces = places.map(|place| curve.piece(place.element));
+        let mut look = |places: &[Place; 2], slide: f64| {
+            for (piece, place) in pieces.iter_mut().zip(places) {
+                if piece.element != place.element {
+                    *piece = curve.piece(place.element);
+                }
+            }
+            value(&pieces[0].jet(places[0].xi), &pieces[1].jet(places[1].xi), slide)
+        };
+        let mut now = look(&places, slide);
         for _ in 0..STEPS {
             let held = |down: f64, place: Place| down != 0.0 && curve.ends(place, down.signum());
             let down = now.slope.map(|slope| -slope);
@@ -152,10 +162,9 @@ impl Gap {
             loop {
                 let (first, there) = at(slide + part * step[0]);
                 let next = [first, curve.walk(places[1], part * step[1]).0];
-                let reached = next.map(|place| curve.jet(place));
-                let then = value(&reached[0], &reached[1], there);
+                let then = look(&next, there);
                 if then.phi <= now.phi || part < 1e-3 || size <= SHORT * touch {
-                    (slide, places, jets, now) = (there, next, reached, then);
+                    (slide, places, now) = (there, next, then);
                     break;
                 }
                 part *= 0.5;
@@ -164,7 +173,6 @@ impl Gap {
                 break;
             }
         }
-        let _ = jets;
         Self { at: places, slide, free, between: now.between, distance: (2.0 * now.phi).sqrt() }
     }
 

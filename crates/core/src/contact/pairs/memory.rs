@@ -134,7 +134,8 @@ impl SelfContact {
             self.find_between(&curve, (*a, *b), known, &mut pairs);
             self.find_between(&curve, (*b, *a), known, &mut pairs);
         }
-        pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
+        // Pairs are large, so their places are sorted; arc lengths are not negative, so their bits have their order.
+        pairs.sort_by_cached_key(|pair| (pair.site, pair.arc_mm.to_bits()));
         pairs.dedup_by(|q, p| {
             let same = p.site == q.site && (q.arc_mm - p.arc_mm).abs() < TWICE * p.touch_mm;
             // At a shoulder the thicker side is felt.
@@ -163,7 +164,8 @@ impl SelfContact {
     ) {
         let touch_mm = self.touch_mm(a, b);
         let known_mm = [self.known, known].map(|known| known * touch_mm);
-        let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
+        let stretch = curve.piece(b);
+        let [from, to] = [0.0, 1.0].map(|xi| stretch.jet(xi));
         for site in self.first_sites[a]..self.first_sites[a + 1] {
             let x = self.site_positions[site];
             let rises = |end: &super::curve::Jet| -(x - end.at).dot(&end.first);

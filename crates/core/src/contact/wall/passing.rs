@@ -10,13 +10,18 @@ use crate::solve::External;
 const DEEPER: f64 = 0.3;
 
 impl WallContact<'_> {
-    /// Whether the device has passed through the wall at this state: followed from the sheath, a piece of it between
-    /// two points in the lumen crosses the wall, or emerges on its other side. The side of a point that has sunk in
-    /// is known.
+    /// Whether a rod has passed through the wall at this state: followed from its start, a piece of it between two
+    /// points in the lumen crosses the wall, or emerges on its other side. The side of a point that has sunk in is
+    /// known.
     pub(crate) fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let mut last: Option<(Vec3, f64)> = None;
         let mut sunk = false;
         for index in (0..self.points.len()).rev() {
+            // What lies between two rods is neither of them.
+            let next = self.points.get(index + 1);
+            if next.is_some_and(|next| next.element > self.points[index].element) {
+                (last, sunk) = (None, false);
+            }
             let x = self.material(index, elements, state);
             let distance_mm = self.read(index, &x).distance_mm();
             let sunk_mm = SUNK * self.points[index].potential.radius_mm;

@@ -218,12 +218,37 @@ fn behind_a_coarse_facet_is_not_yet_through_the_wall() {
     assert!(flat(&start) > 0.2 && flat(&end) < -SUNK * RADIUS_MM, "{} {}", flat(&start), flat(&end));
     assert!(!has_passed(&coarse, start, end));
     // Through the wall into another vessel beside it.
+    let (both, from) = (side_by_side(), Vec3::new(0.3, 0.0, 20.0));
+    assert!(has_passed(&both, from, from + Vec3::x()));
+    assert!(!has_passed(&both, from, from + Vec3::z()));
+}
+
+/// Two tubes of radius 2 mm along the z axis, 4.4 mm apart.
+fn side_by_side() -> ContactSurface {
     let tube = |x: f64| sweep(&ellipse(2.0, 2.0, 24), 81, |k| (along_z(k).0 + Vec3::x() * x, Vec3::x(), 1.0));
     let (mut both, other) = (tube(0.0), tube(4.4));
     let first = both.vertices_mm.len() as u32;
     both.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
     both.vertices_mm.extend(other.vertices_mm);
-    let (both, from) = (surface(&both), Vec3::new(0.3, 0.0, 20.0));
-    assert!(has_passed(&both, from, from + Vec3::x()));
-    assert!(!has_passed(&both, from, from + Vec3::z()));
+    surface(&both)
+}
+
+#[test]
+fn what_lies_between_two_rods_passes_through_nothing() {
+    let both = side_by_side();
+    // A line in one vessel, and behind its tip a coil that points along `t`.
+    let passed = |start: Vec3, t: Vec3| {
+        let mut rod = rod(&both, 5, &[0.5], 1e4);
+        let (mut state, of_coil) = (rod.at(Vec3::new(0.0, 0.0, 10.0)), rod.elements.clone());
+        state.join(&RodState::straight(&of_coil, start, Frame::new(t, Some(Vec3::y()))));
+        let moved = |point: &ContactPoint| ContactPoint { element: 6 + point.element, ..*point };
+        rod.points.extend(rod.points.iter().map(moved).collect::<Vec<_>>());
+        rod.elements.push(ElementData::BREAK);
+        rod.elements.extend(of_coil);
+        let elements = rod.elements.clone();
+        rod.contact().passes_through(&elements, &state)
+    };
+    let beside = Vec3::new(4.1, 0.0, 20.0);
+    assert!(!passed(beside, Vec3::z()));
+    assert!(passed(beside, -Vec3::x()));
 }

@@ -183,7 +183,7 @@ impl<const C: usize> Workspace<C> {
             }
             let left = passage.map(|passage| (was, passage));
             let most = control.budget();
-            let attempt = Attempt { hands, effort, most, solves: usize::MAX, left, resumed: None };
+            let attempt = Attempt { hands, part_mm, effort, most, solves: usize::MAX, left, resumed: None };
             let before = tools.work;
             let tried = tools.try_step(&there, here, attempt, next);
             control.took(tools.work.since(&before));

@@ -12,6 +12,7 @@ use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::{KirchhoffState, UnderWay};
+use super::step_control::FOLD_MM;
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
@@ -62,7 +63,7 @@ pub(super) enum Lost {
     Beyond,
     /// The solution is.
     Passed,
-    /// Energy appeared from nowhere.
+    /// Energy appeared from nowhere, or disappeared in a part that is too long to show a jump.
     Unbalanced,
     /// No equilibrium was found; with the residual relative to the force scale.
     Unsolved(StopReason, f64),
@@ -92,7 +93,9 @@ impl std::fmt::Display for Lost {
         match self {
             Self::Beyond => f.write_str("the device would be predicted beyond the wall or through itself"),
             Self::Passed => f.write_str("the device would pass through the wall"),
-            Self::Unbalanced => f.write_str("more energy is stored and taken by friction than was put in"),
+            Self::Unbalanced => {
+                f.write_str("what was put in, what is stored and what friction took do not agree")
+            }
             Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
             Self::UnderWay => f.write_str("the linear solves of the tick are used up"),
         }
@@ -104,6 +107,8 @@ impl std::fmt::Display for Lost {
 pub(super) struct Attempt<'a> {
     /// Positions of the hands after it.
     pub(super) hands: &'a [Hand],
+    /// Largest motion of a hand in it, mm.
+    pub(super) part_mm: f64,
     /// How it is solved.
     pub(super) effort: Effort,
     /// Largest number of Newton iterations.
@@ -347,11 +352,12 @@ impl<const C: usize> Tools<C> {
         let rubbed_mj = (least_mj + between_mj, most_mj + between_mj);
         let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
         let after = next.parts().1;
-        let lacks = balance.lacks();
-        if near && lacks {
+        let (lacks, is_set_free) = (balance.lacks(), balance.is_set_free());
+        // Only a short part shows a jump: in a long one forces may go far beyond their values at its ends.
+        if near && (lacks || (is_set_free && attempt.part_mm > FOLD_MM)) {
             return Err(Lost::Unbalanced);
         }
-        let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
+        let jumps = (effort == Effort::Flight && off > 1.0) || is_set_free;
         let (rubbed_mj, released_mj) = balance.lost_mj(jumps);
         let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(rubbed_mj + released_mj) };
         let (dissipated_mj, residual) = (rubbed_mj + outside_mj, found.residual);

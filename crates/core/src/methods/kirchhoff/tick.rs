@@ -294,7 +294,7 @@ impl<const C: usize> Workspace<C> {
             let allowed = if course.change.overtaken { solves } else { within };
             let solves_left = allowed.saturating_sub(before.solves).max(1);
             let left = passage.map(|passage| (was, passage));
-            let attempted = Attempt { hands, effort, most, solves: solves_left, left, resumed };
+            let attempted = Attempt { hands, part_mm, effort, most, solves: solves_left, left, resumed };
             match tools.try_step(&there, here, attempted, next) {
                 Ok(found) if part.strays(&found) && !course.change.overtaken => {
                     course.shorten(part_mm);

@@ -196,3 +196,35 @@ fn a_wire_that_winds_up_takes_what_the_hand_gives() {
     // The force in steps of 0.1 mm; without the turn half as much as friction takes would be missing.
     assert!((given - left - taken).abs() < 0.1 * taken, "{given} {left} {taken}");
 }
+
+#[test]
+fn a_throat_is_passed_without_a_jump() {
+    // The lumen narrows from 3 mm to 0.8 mm and widens again; without friction the push has no instability.
+    let node = |i: usize| CentrelineNode {
+        position_mm: Vec3::z() * i as f64,
+        radius_mm: 3.0 - 2.2 * (-((i as f64 - 30.0) / 4.0).powi(2)).exp(),
+        parent: i.checked_sub(1),
+    };
+    let tree = CentrelineTree::new((0..61).map(node).collect()).unwrap();
+    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.6)).unwrap();
+    let passed = |step_mm: f64| {
+        let sheath = Sheath::new(Vec3::zeros(), Vec3::z()).unwrap();
+        let device = Device::uniform(100.0, 1.2, 50.0).unwrap();
+        let method = KirchhoffOptions { element_mm: 2.0, ..KirchhoffOptions::default() };
+        let builder = Simulation::builder(made.wall.clone(), device, sheath);
+        let mut simulation = builder.method(&method).build().unwrap();
+        let (mut largest_mj, mut jumps) = (0.0f64, 0);
+        for _ in 0..(54.0 / step_mm) as usize {
+            let report = simulation.step(Command::advance(step_mm)).unwrap();
+            assert!(report.converged, "{step_mm}");
+            largest_mj = largest_mj.max(report.energy.total());
+            jumps += usize::from(report.jumped);
+        }
+        (largest_mj, jumps)
+    };
+    for step_mm in [2.0, 1.0] {
+        let (largest_mj, jumps) = passed(step_mm);
+        assert!(largest_mj > 0.01, "{largest_mj}");
+        assert_eq!(jumps, 0, "{step_mm}");
+    }
+}
