@@ -220,7 +220,7 @@ impl ScriptLine {
         if !rotate.is_finite() {
             return Err(Error::parameter(format!("{name}.rotate_deg"), rotate, "must be a finite number"));
         }
-        Ok(Part {
+        let part = Part {
             instrument: self.number(&name, stack)?,
             travel: self.travel(&name)?,
             turn_rad: rotate.to_radians(),
@@ -229,7 +229,28 @@ impl ScriptLine {
             speed_mm_per_s: self.speed_mm_per_s,
             speed_deg_per_s: self.speed_deg_per_s,
             name,
-        })
+        };
+        self.check_speed(&part)?;
+        Ok(part)
+    }
+
+    /// Rejects a part whose only speed is of a motion that it does not make: it would take no time.
+    fn check_speed(&self, part: &Part) -> Result<()> {
+        // An exchange pulls the whole instrument out.
+        let [along, around] = [part.moves()[0] || self.exchange.is_some(), part.moves()[1]];
+        let idle = match (along, around, part.speed_mm_per_s, part.speed_deg_per_s) {
+            (true, false, None, Some(speed)) => (
+                "speed_deg_per_s",
+                speed,
+                "nothing turns in the line: give speed_mm_per_s, how fast it is pushed or pulled",
+            ),
+            (false, true, Some(speed), None) => {
+                ("speed_mm_per_s", speed, "the line only turns: give speed_deg_per_s, how fast")
+            }
+            _ => return Ok(()),
+        };
+        let (key, speed, mend) = idle;
+        Err(Error::parameter(format!("{}.{key}", part.name), speed, mend))
     }
 
     /// Its motion along the device.

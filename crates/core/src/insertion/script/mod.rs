@@ -32,6 +32,8 @@ pub struct Script {
     start_mm: Vec<f64>,
     /// Number of steps if no condition is met.
     most_steps: usize,
+    /// The same of the steps before the first injection, if there is one.
+    before_injection: Option<usize>,
 }
 
 impl Script {
@@ -51,13 +53,17 @@ impl Script {
         inserted_mm: &[f64],
         centreline: Option<&CentrelineTree>,
     ) -> Result<Self> {
-        let mut script = Self { motions: Vec::new(), start_mm: inserted_mm.to_vec(), most_steps: 0 };
+        let start_mm = inserted_mm.to_vec();
+        let mut script = Self { motions: Vec::new(), start_mm, most_steps: 0, before_injection: None };
         for (index, line) in lines.iter().enumerate() {
             script.motions.extend(line.motions(&format!("script[{index}]"), stack, centreline)?);
         }
         script.check_speeds()?;
         let mut bounds = Bounds::at(inserted_mm);
         for motion in &script.motions {
+            if motion.inject.is_some() {
+                script.before_injection.get_or_insert(script.most_steps);
+            }
             script.most_steps += bounds.go(motion, stack)?;
             if script.most_steps as f64 > STEP_LIMIT {
                 let mend = format!("at most {STEP_LIMIT} steps in all");
@@ -124,6 +130,11 @@ impl Script {
     /// The name in messages of the first line that detaches a coil.
     pub(crate) fn detaches(&self) -> Option<&str> {
         self.motions.iter().find(|motion| motion.detach.is_some()).map(|motion| motion.name.as_str())
+    }
+
+    /// Number of steps before its first injection, if no condition is met before; `None` without one.
+    pub fn steps_before_injection(&self) -> Option<usize> {
+        self.before_injection
     }
 
     fn check_speeds(&self) -> Result<()> {

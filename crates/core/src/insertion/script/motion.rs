@@ -133,6 +133,23 @@ impl Part {
         increments(&self.name, count)
     }
 
+    /// Whether it moves its instrument along and around itself.
+    pub(super) fn moves(&self) -> [bool; 2] {
+        let along = match self.travel {
+            Travel::By(mm) => mm != 0.0,
+            Travel::Out | Travel::AsFarAs(_) => true,
+        };
+        [along, self.turn_rad != 0.0]
+    }
+
+    /// Whether its duration is known: it has a speed of a motion that it makes, or any if it makes none.
+    fn is_timed(&self) -> bool {
+        let speeds = [self.speed_mm_per_s, self.speed_deg_per_s];
+        let moves = self.moves();
+        let counts = |k: usize| speeds[k].is_some() && (moves[k] || moves == [false; 2]);
+        counts(0) || counts(1)
+    }
+
     /// Its duration, s.
     fn duration_s(&self, mm: f64) -> f64 {
         let length_s = self.speed_mm_per_s.map_or(0.0, |speed| mm.abs() / speed);
@@ -155,10 +172,11 @@ impl Motion {
         }
     }
 
-    /// Whether its duration is known.
+    /// Whether its duration is known: from a part that moves, if one does.
     pub(super) fn is_timed(&self) -> bool {
-        let has_speed = |part: &Part| part.speed_mm_per_s.is_some() || part.speed_deg_per_s.is_some();
-        self.wait.is_some() || self.parts.iter().any(has_speed)
+        let moves = |part: &Part| part.moves() != [false; 2];
+        let still = !self.parts.iter().any(moves);
+        self.wait.is_some() || self.parts.iter().any(|part| part.is_timed() && (still || moves(part)))
     }
 
     /// The steps of the whole motion from these lengths.

@@ -227,6 +227,46 @@ fn a_script_with_speeds_has_times_and_all_of_its_lines_have_one() {
 }
 
 #[test]
+fn a_speed_of_a_motion_that_a_line_does_not_make_is_refused() {
+    let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
+    let script = |line: ScriptLine| Script::new(&[line], &stack, &[20.0], None);
+    let turning = Some(5.0);
+    let turn = |rotate_deg| ScriptLine { rotate_deg: Some(rotate_deg), ..Default::default() };
+    let pushed = ScriptLine { speed_mm_per_s: Some(5.0), ..Default::default() };
+    for (line, words) in [
+        (
+            ScriptLine { speed_deg_per_s: turning, ..advance(5.0, 1.0) },
+            "script[0].speed_deg_per_s = 5: nothing",
+        ),
+        (
+            ScriptLine { speed_deg_per_s: turning, withdraw: true, ..Default::default() },
+            "script[0].speed_deg_per_s",
+        ),
+        (
+            ScriptLine { rotate_deg: Some(90.0), ..pushed.clone() },
+            "script[0].speed_mm_per_s = 5: the line only turns",
+        ),
+        (
+            ScriptLine { rotate_deg: Some(0.0), speed_deg_per_s: turning, ..advance(5.0, 1.0) },
+            "script[0].speed_deg_per_s",
+        ),
+    ] {
+        let told = script(line).unwrap_err().to_string();
+        assert!(told.starts_with(words), "{told}");
+    }
+    // One speed of two motions, both speeds of one, and a line that a sweep has set to no length are as before.
+    for line in [
+        ScriptLine { rotate_deg: Some(90.0), speed_deg_per_s: turning, ..advance(5.0, 1.0) },
+        ScriptLine { speed_deg_per_s: turning, speed_mm_per_s: Some(5.0), ..advance(5.0, 1.0) },
+        ScriptLine { speed_deg_per_s: turning, ..turn(90.0) },
+        ScriptLine { speed_deg_per_s: turning, ..turn(0.0) },
+        ScriptLine { advance_mm: Some(0.0), ..pushed },
+    ] {
+        assert!(script(line).unwrap().is_timed());
+    }
+}
+
+#[test]
 fn hands_that_rest_take_steps_of_time_and_move_nothing() {
     let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
     let go = ScriptLine { speed_mm_per_s: Some(5.0), ..advance(10.0, 5.0) };
@@ -374,6 +414,12 @@ fn injections_begin_with_their_lines_and_are_had_again_from_the_course_of_the_sc
     ];
     let script = Script::new(&lines, &stack(), &[50.0, 0.0, 40.0], None).unwrap();
     assert!(script.injects() && script.is_timed());
+    let before =
+        |lines| Script::new(lines, &stack(), &[50.0, 0.0, 40.0], None).unwrap().steps_before_injection();
+    assert_eq!(
+        [&lines[..], &lines[1..], &lines[3..], &lines[3..4]].map(before),
+        [Some(0), Some(0), Some(2), None]
+    );
     let mut run = script.begin();
     let mut seen = Vec::new();
     loop {
