@@ -6,7 +6,7 @@ use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3};
 use super::weld::Welding;
-use super::{RepairReport, SurfaceMesh, Wall, opening, sliver};
+use super::{RepairReport, SurfaceMesh, Wall, opening, repair, sliver};
 use crate::{Error, Result};
 
 /// Number of intersecting pairs named in a report; a list of thousands would not help.
@@ -53,6 +53,9 @@ pub struct CheckReport {
     pub inlet: Option<usize>,
     /// Pairs of openings of similar size that face each other within a radius: a vessel that is cut through there.
     pub facing_openings: Vec<[usize; 2]>,
+    /// Closed pieces of the repaired wall inside another piece, among its eight largest: volumes are added, and a device
+    /// between the two is in the outer one.
+    pub nested_pieces: usize,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
     /// Triangles wound against their neighbours or inwards.
@@ -122,6 +125,7 @@ impl CheckReport {
                 "pair of openings that face each other",
                 "pairs of openings that face each other",
             ),
+            (self.nested_pieces, "closed piece inside another", "closed pieces inside another"),
         ];
         let counted = counts
             .iter()
@@ -153,7 +157,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
     // If only welding and turning over was needed, the wall is the surface as given: it is neither welded nor
     // searched again.
     let as_given = wall.report().is_as_given();
-    let given = if as_given { None } else { Some(Wall::mended(welding.clone(), false)?) };
+    let given = if as_given { None } else { Some(Wall::report_on(welding.clone())?) };
     let Welding { mesh: welded, bounds_mm: (low, high), tolerance_mm, merged } = welding;
     let degenerate = |i: &usize| sliver::is_degenerate(&welded.corners(*i), tolerance_mm);
     let table = EdgeTable::new(&welded.triangles);
@@ -173,7 +177,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
         true => 0.0,
         false => *edges.select_nth_unstable_by(k, f64::total_cmp).1,
     });
-    let (report, repair) = (given.as_ref().unwrap_or(&wall).report(), wall.report().clone());
+    let (report, repair) = (given.as_ref().unwrap_or(wall.report()), wall.report().clone());
     let survey = survey(&wall, septum_mm)?;
     let volume_mm3 = wall.volume_mm3();
     let rounding_mm3 = flat_volume_mm3(wall.mesh());
@@ -202,6 +206,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
             .collect(),
         inlet: wall.inlet().map(|opening| opening.index),
         facing_openings: opening::facing(wall.openings()),
+        nested_pieces: repair::nested(wall.mesh(), &EdgeTable::new(&wall.mesh().triangles)),
         non_manifold_edges,
         flipped_triangles: report.triangles_flipped,
         inside_out: report.inside_out,
@@ -225,11 +230,21 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
     })
 }
 
+/// Number of openings and of pieces above which a surface is rather one whose vertices were not merged.
+const MANY: usize = 100;
+
 /// What the user may want to know or change, a sentence each.
 fn hints(wall: &Wall, survey: &Survey, diagonal_mm: f64, unit_mm: f64) -> Vec<String> {
     let half_lumen_mm = survey.lumen.as_ref().map(|lumen| lumen.median_mm);
     let unit = unit_hint(diagonal_mm, half_lumen_mm, unit_mm);
     let mut hints: Vec<String> = unit.into_iter().chain(opening_hints(wall.openings())).collect();
+    let (openings, pieces) = (wall.openings().len(), wall.report().components);
+    if openings.min(pieces) > MANY {
+        hints.push(format!(
+            "{openings} openings in {pieces} pieces: triangles of the surface do not share their vertices: merge those closer than a \
+             fraction of an edge in a program for meshes (\"merge by distance\"), or write the file with more digits"
+        ));
+    }
     if wall.openings().is_empty() {
         let list = |v: &[f64; 3]| format!("[{:.3}, {:.3}, {:.3}]", v[0], v[1], v[2]);
         hints.push(match &survey.start {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::opening::{MOST_BEYOND_MM, OWN_RIM};
+use super::opening::OWN_RIM;
 use super::topology::NONE;
 use super::{Opening, SurfaceMesh};
 use crate::Vec3;
@@ -39,7 +39,7 @@ impl<'a> Ends<'a> {
     }
 
     /// Calls `see` with sample points of the surface where a straight extension of an opening may be, and whether they
-    /// are of the stretch that ends there.
+    /// are of the stretch that ends there. What is too far away to shorten the extension is left out.
     pub(super) fn sample(&self, number: usize, opening: &Opening, see: &mut dyn FnMut(Vec3, bool)) {
         let reach_mm = ASIDE * opening.radius_mm;
         for t in 0..self.mesh.triangles.len() {
@@ -47,7 +47,7 @@ impl<'a> Ends<'a> {
             let middle = corners.iter().sum::<Vec3>() / 3.0;
             let size_mm = corners.iter().map(|x| (x - middle).norm()).fold(0.0, f64::max);
             let (along, aside) = opening.beyond_and_aside_mm(&middle);
-            let within = -reach_mm - size_mm..=MOST_BEYOND_MM + 2.0 * reach_mm + size_mm;
+            let within = -reach_mm - size_mm..=opening.beyond_mm + 2.0 * reach_mm + size_mm;
             if aside > reach_mm + size_mm || !within.contains(&along) {
                 continue;
             }

@@ -373,6 +373,60 @@ fn vertices_apart_by_more_than_any_crack_tear_the_surface() {
     assert!(Wall::from_surface(&torn).unwrap().openings().len() > 2);
 }
 
+#[test]
+fn a_surface_whose_triangles_share_no_vertices_is_checked_in_a_moment_and_told() {
+    // Farther apart than vertices that are merged, and nearer than cracks that are joined.
+    let mut cracked = soup(tube().mesh());
+    jitter(&mut cracked, 1e-3);
+    let clock = std::time::Instant::now();
+    let told = check(&cracked).unwrap();
+    assert_eq!((told.openings.len(), told.repair.components), (2, 1), "{:?}", told.repair);
+    assert!(told.components > 1000 && told.open_edges > 3000, "{} {}", told.components, told.open_edges);
+    // And farther apart than those.
+    let mut torn = soup(tube().mesh());
+    jitter(&mut torn, 0.8);
+    let report = check(&torn).unwrap();
+    assert!(report.hints.iter().any(|hint| hint.contains("merge by distance")), "{:?}", report.hints);
+    let took_s = clock.elapsed().as_secs_f64();
+    assert!(took_s < 20.0, "{took_s} s");
+}
+
+#[test]
+fn more_openings_than_a_vessel_can_have_are_refused_with_what_to_do() {
+    let corner = |k: u32| Vec3::new(f64::from(k % 100), f64::from(k / 100), 0.0);
+    let apart = |count: u32| SurfaceMesh {
+        vertices_mm: (0..count)
+            .flat_map(|k| [[0.0; 3], [0.5, 0.0, 0.1], [0.0, 0.5, 0.2]].map(|off| corner(k) + Vec3::from(off)))
+            .collect(),
+        triangles: (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
+    };
+    let told = check(&apart(10_001)).unwrap_err().to_string();
+    assert!(told.contains("10001 openings in 10001 pieces") && told.contains("merge those"), "{told}");
+    assert!(Wall::from_surface(&apart(10_001)).is_err());
+}
+
+#[test]
+fn a_closed_piece_inside_another_is_told() {
+    // Tetrahedra: too few triangles and too unlike for a wall of two skins.
+    let corners = [[1., 1., 1.], [-1., -1., 1.], [-1., 1., -1.], [1., -1., -1.]].map(Vec3::from);
+    let triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let of = |size: f64, at: Vec3, first: u32| -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let moved = |t: [u32; 3]| t.map(|v| v + first);
+        (corners.iter().map(|c| at + *c * size).collect(), triangles.map(moved).to_vec())
+    };
+    let two = |at: Vec3| {
+        let ((mut vertices_mm, mut triangles), other) = (of(9.0, Vec3::zeros(), 0), of(2.5, at, 4));
+        vertices_mm.extend(other.0);
+        triangles.extend(other.1);
+        check(&SurfaceMesh { vertices_mm, triangles }).unwrap()
+    };
+    let inside = two(Vec3::zeros());
+    assert_eq!((inside.nested_pieces, inside.is_sound()), (1, false), "{inside:?}");
+    assert!(inside.faults().contains(&"1 closed piece inside another".to_owned()), "{:?}", inside.faults());
+    let beside = two(Vec3::x() * 30.0);
+    assert_eq!((beside.nested_pieces, beside.is_sound()), (0, true), "{:?}", beside.faults());
+}
+
 /// The folder of shared data, if present.
 fn shared(file: &str) -> Option<PathBuf> {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");

@@ -4,7 +4,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::in_front::Ends;
 use super::mesh::retain_numbered;
-use super::opening::{self, Opening};
+use super::opening::{self, Boundary, Opening};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;
@@ -13,6 +13,8 @@ use crate::{Error, Result, Vec3};
 
 /// Ratio of volume to the cube of the surface's size below which it is a sheet without an inside.
 const FLAT: f64 = 1e-14;
+/// Largest number of openings of a wall: beyond it, triangles do not share their vertices.
+const MOST_OPENINGS: usize = 10_000;
 
 /// A vessel wall: triangles counter-clockwise seen from outside the lumen, with numbered openings.
 #[derive(Debug, Clone)]
@@ -151,7 +153,8 @@ impl Wall {
     /// faults.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate that is used is not finite.
+    /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate that is used is not
+    /// finite, and for more than 10,000 openings.
     pub fn from_surface(surface: &SurfaceMesh) -> Result<Self> {
         Self::mended(Welding::of(surface)?, true)
     }
@@ -167,6 +170,29 @@ impl Wall {
 
     /// [`Wall::from_surface`], or only [`Wall::welded`], of a surface whose vertices are merged.
     pub(super) fn mended(welding: Welding, whole: bool) -> Result<Self> {
+        let (mesh, mut edges, mut report) = Self::prepared(welding, whole)?;
+        let boundary = count(&mesh, &mut edges, &mut report);
+        if report.openings > MOST_OPENINGS {
+            return Err(Error::Mesh(format!(
+                "{} openings in {} pieces of {} triangles, at most {MOST_OPENINGS} openings are read: its triangles do not share their vertices: merge those closer than a \
+                 fraction of an edge in a program for meshes (\"merge by distance\"), or write the file with more digits",
+                report.openings,
+                report.components,
+                mesh.triangles.len()
+            )));
+        }
+        Ok(Self::ending(mesh, boundary, report))
+    }
+
+    /// The report on a surface of which only vertices were merged, whatever number of openings it has.
+    pub(super) fn report_on(welding: Welding) -> Result<RepairReport> {
+        let (mesh, mut edges, mut report) = Self::prepared(welding, false)?;
+        count(&mesh, &mut edges, &mut report);
+        Ok(report)
+    }
+
+    /// The mesh of [`Self::mended`] with its edges, and what was changed.
+    fn prepared(welding: Welding, whole: bool) -> Result<(SurfaceMesh, Edges, RepairReport)> {
         let Welding { mut mesh, tolerance_mm, merged, .. } = welding;
         let mut report = RepairReport {
             triangles_given: mesh.triangles.len(),
@@ -199,23 +225,11 @@ impl Wall {
         if whole {
             repair::cure(&mut mesh, &mut edges, tolerance_mm, &mut report);
         }
-        Ok(Self::finished(mesh, edges, report))
+        Ok((mesh, edges, report))
     }
 
-    /// Completes the report on `mesh`, with these edges, and finds its openings.
-    fn finished(mesh: SurfaceMesh, mut edges: Edges, mut report: RepairReport) -> Self {
-        let table = edges.of(&mesh.triangles);
-        report.non_manifold_edges = table.non_manifold();
-        let (component, count) = table.components(mesh.triangles.len());
-        let mut sizes = vec![0; count];
-        for c in component {
-            sizes[c as usize] += 1;
-        }
-        report.components = count;
-        report.smallest_component = sizes.into_iter().min().unwrap_or(0);
-        let mut boundary = opening::boundary(&mesh, table);
-        report.openings = boundary.openings.len();
-        report.stray_edges = boundary.stray_edges;
+    /// The wall of `mesh` with this boundary, whose openings are kept apart.
+    fn ending(mesh: SurfaceMesh, mut boundary: Boundary, report: RepairReport) -> Self {
         let rims_mm: Vec<f64> = boundary.openings.iter().map(|opening| opening.rim_mm(&mesh)).collect();
         let ends = Ends::new(&mesh, &boundary.across, &boundary.openings);
         let see = |number: usize, opening: &Opening, see: &mut dyn FnMut(Vec3, bool)| {
@@ -307,10 +321,28 @@ impl Serialize for Wall {
 
 impl<'de> Deserialize<'de> for Wall {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        let (mesh, report) = Deserialize::deserialize(deserializer)?;
+        let (mesh, mut report): (SurfaceMesh, RepairReport) = Deserialize::deserialize(deserializer)?;
         validate(&mesh).map_err(de::Error::custom)?;
-        Ok(Self::finished(mesh, Edges::default(), report))
+        let boundary = count(&mesh, &mut Edges::default(), &mut report);
+        Ok(Self::ending(mesh, boundary, report))
     }
+}
+
+/// Completes the report on `mesh`, with these edges, and finds its boundary.
+fn count(mesh: &SurfaceMesh, edges: &mut Edges, report: &mut RepairReport) -> Boundary {
+    let table = edges.of(&mesh.triangles);
+    report.non_manifold_edges = table.non_manifold();
+    let (component, pieces) = table.components(mesh.triangles.len());
+    let mut sizes = vec![0; pieces];
+    for c in component {
+        sizes[c as usize] += 1;
+    }
+    report.components = pieces;
+    report.smallest_component = sizes.into_iter().min().unwrap_or(0);
+    let boundary = opening::boundary(mesh, table);
+    report.openings = boundary.openings.len();
+    report.stray_edges = boundary.stray_edges;
+    boundary
 }
 
 /// Volume in mm³ up to which a surface is a flat sheet that encloses only rounding.

@@ -13,6 +13,8 @@ mod sheets;
 #[cfg(test)]
 mod tests;
 
+pub(super) use pieces::nested;
+
 use super::SurfaceMesh;
 use super::sliver;
 use super::topology::Edges;

@@ -22,6 +22,10 @@ const SKIN: f64 = 0.15;
 const ASKED: usize = 16;
 const INSIDE: f64 = 0.8;
 
+/// Number of pieces, the largest, that are compared: they are few once specks are removed; if not, this is not a
+/// vessel with two skins.
+const MOST: usize = 8;
+
 /// The result of [`drop_pieces`].
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct Dropped {
@@ -44,6 +48,34 @@ struct Piece {
     /// Whether all its loops are borders of a sheet.
     sheet: bool,
     gone: bool,
+}
+
+impl Piece {
+    /// Whether its bounds are within those of another one.
+    fn may_be_in(&self, outer: &Self) -> bool {
+        let [low, high] = outer.bounds;
+        let slack = 1e-3 * (high - low).norm();
+        (0..3).all(|k| low[k] - slack <= self.bounds[0][k] && self.bounds[1][k] <= high[k] + slack)
+    }
+}
+
+/// Number of closed pieces of a consistently oriented mesh that lie inside another one, among the largest few; `table`
+/// holds its edges.
+pub(in crate::vessel) fn nested(mesh: &SurfaceMesh, table: &EdgeTable) -> usize {
+    let (piece_of, count) = table.components(mesh.triangles.len());
+    if count < 2 {
+        return 0;
+    }
+    let pieces = measure(mesh, table, &piece_of, count);
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
+    order.truncate(MOST);
+    let lies_in = |inner: usize, outer: usize| {
+        let (a, b) = (&pieces[inner], &pieces[outer]);
+        a.may_be_in(b) && is_inside(mesh, &piece_of, inner, outer, a.triangles)
+    };
+    let closed = (1..order.len()).filter(|rank| pieces[order[*rank]].loops == 0);
+    closed.filter(|rank| order[..*rank].iter().any(|outer| lies_in(order[*rank], *outer))).count()
 }
 
 /// Drops the pieces of a consistently oriented mesh that are not vessels; `table` holds its edges.
@@ -119,19 +151,13 @@ fn drop_skins(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece]) -> usi
     let mut order: Vec<usize> = (0..pieces.len()).filter(|p| !pieces[*p].gone).collect();
     order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
     let mut skins = 0;
-    // Pieces are few once specks are removed; if not, this is not a vessel with two skins.
-    const MOST: usize = 8;
     order.truncate(MOST);
     for (rank, &outer) in order.iter().enumerate() {
         let holds = order[rank + 1..].iter().any(|&inner| {
             let (a, b) = (&pieces[outer], &pieces[inner]);
-            let slack = 1e-3 * (a.bounds[1] - a.bounds[0]).norm();
-            let nested = (0..3).all(|k| {
-                a.bounds[0][k] - slack <= b.bounds[0][k] && b.bounds[1][k] <= a.bounds[1][k] + slack
-            });
             let alike = b.area_mm2 >= SKIN * a.area_mm2
                 && (b.bounds[1] - b.bounds[0]).norm() >= 0.7 * (a.bounds[1] - a.bounds[0]).norm();
-            nested && alike && is_inside(mesh, piece_of, inner, outer, b.triangles)
+            alike && b.may_be_in(a) && is_inside(mesh, piece_of, inner, outer, b.triangles)
         });
         if holds {
             pieces[outer].gone = true;
