@@ -49,7 +49,8 @@ pub struct DeviceView {
     pub points: Vec<DevicePoint>,
     /// Material of parts without one; `None`: the scene's `device_material`.
     pub material: Option<Material>,
-    /// Its parts, which must not overlap; none: one solid rod.
+    /// Its parts; a later one takes the place of what it covers of earlier ones, its lumen covers nothing. None: one
+    /// solid rod.
     pub parts: Vec<DevicePart>,
 }
 
@@ -185,6 +186,16 @@ pub(crate) struct Layer {
     pieces: Range<usize>,
     outer_radius_mm: Option<f64>,
     inner_radius_mm: f64,
+    /// Later layers over the same pieces, which take the place of this one.
+    covers: Vec<Cover>,
+}
+
+/// Where a layer has material.
+#[derive(Debug, Clone, PartialEq)]
+struct Cover {
+    pieces: Range<usize>,
+    outer_radius_mm: Option<f64>,
+    inner_radius_mm: f64,
 }
 
 /// A device with its centre line refined and divided where its parts start and end.
@@ -194,6 +205,8 @@ pub(crate) struct RefinedDevice {
     pub(crate) layers: Vec<Layer>,
 }
 
+/// Thickness up to which what a later layer leaves of a layer is rounding.
+const THINNEST_MM: f64 = 1e-9;
 /// Distance from a point within which a division is made at the point.
 const SAME_PLACE_MM: f64 = 1e-6;
 
@@ -223,6 +236,7 @@ impl RefinedDevice {
                 pieces,
                 outer_radius_mm: None,
                 inner_radius_mm: 0.0,
+                covers: vec![],
             };
             return Ok(Self { points, layers: vec![layer] });
         }
@@ -252,7 +266,7 @@ impl RefinedDevice {
                 }
             }
         }
-        let mut layers = Vec::with_capacity(device.parts.len());
+        let mut layers: Vec<Layer> = Vec::with_capacity(device.parts.len());
         for (i, part) in device.parts.iter().enumerate() {
             part.validate(&format!("device.parts[{i}]"))?;
             let [near, far] = part.from_tip_mm.unwrap_or([0.0, f64::MAX]);
@@ -264,14 +278,21 @@ impl RefinedDevice {
                 if part.inner_radius_mm >= outer {
                     return Err(bore_too_wide(&format!("device.parts[{i}]"), part.inner_radius_mm, outer));
                 }
-                layers.push(Layer {
+                let layer = Layer {
                     material: part.material.or(device.material),
                     part: Some(i),
                     from_tip_mm: part.from_tip_mm,
                     pieces: first..last,
                     outer_radius_mm: part.outer_radius_mm,
                     inner_radius_mm: part.inner_radius_mm,
-                });
+                    covers: vec![],
+                };
+                for under in
+                    layers.iter_mut().filter(|under| under.pieces.start < last && first < under.pieces.end)
+                {
+                    under.covers.push(layer.cover());
+                }
+                layers.push(layer);
             }
         }
         Ok(Self { points, layers })
@@ -304,13 +325,30 @@ impl Layer {
     /// The frusta that form this layer out of all `pieces` of its device, each with the sign of its length.
     pub(crate) fn signed(&self, pieces: &[Piece]) -> Vec<(Piece, f64)> {
         let mut signed = Vec::with_capacity(2 * self.pieces.len());
-        for piece in &pieces[self.pieces.clone()] {
-            signed.push((self.outer_radius_mm.map_or(*piece, |radius| piece.with_radius(radius)), 1.0));
-            if self.inner_radius_mm > 0.0 {
-                signed.push((piece.with_radius(self.inner_radius_mm), -1.0));
+        for (index, piece) in self.pieces.clone().zip(&pieces[self.pieces.clone()]) {
+            let own = piece.middle_radius();
+            // Inner and outer radii of the rings of it that are left.
+            let mut rings = vec![[self.inner_radius_mm, self.outer_radius_mm.unwrap_or(own)]];
+            for cover in self.covers.iter().filter(|cover| cover.pieces.contains(&index)) {
+                let [low, high] = [cover.inner_radius_mm, cover.outer_radius_mm.unwrap_or(own)];
+                let left = rings.into_iter().flat_map(|[a, b]| [[a, b.min(low)], [a.max(high), b]]);
+                rings = left.filter(|[a, b]| b - a > THINNEST_MM).collect();
+            }
+            for [inner, outer] in rings {
+                let is_own = self.outer_radius_mm.is_none() && outer == own;
+                signed.push((if is_own { *piece } else { piece.with_radius(outer) }, 1.0));
+                if inner > 0.0 {
+                    signed.push((piece.with_radius(inner), -1.0));
+                }
             }
         }
         signed
+    }
+
+    /// What it covers of earlier layers.
+    fn cover(&self) -> Cover {
+        let (outer_radius_mm, inner_radius_mm) = (self.outer_radius_mm, self.inner_radius_mm);
+        Cover { pieces: self.pieces.clone(), outer_radius_mm, inner_radius_mm }
     }
 }
 
@@ -372,6 +410,48 @@ mod tests {
         assert!(device.refined().unwrap().is_empty());
         device.points[0].radius_mm = f64::NAN;
         assert!(device.refined().unwrap_err().to_string().contains("device.points[0]"));
+    }
+
+    #[test]
+    fn a_later_part_takes_the_place_of_what_it_covers() {
+        let mut wire = arc(50.0, 90.0, 9, 0.445);
+        let part = |from_tip_mm, outer_radius_mm, inner_radius_mm| DevicePart {
+            from_tip_mm,
+            outer_radius_mm,
+            inner_radius_mm,
+            ..DevicePart::default()
+        };
+        // A core, a coil in it, a band about both, and a tube in the core that leaves its inside.
+        let near = Some([0.0, 30.0]);
+        wire.parts = vec![
+            part(None, None, 0.0),
+            part(near, Some(0.445), 0.4),
+            part(Some([10.0, 20.0]), Some(0.5), 0.445),
+            part(Some([40.0, 50.0]), Some(0.3), 0.2),
+        ];
+        let refined = RefinedDevice::all(std::slice::from_ref(&wire)).unwrap().remove(0);
+        let pieces = pieces(&refined.points);
+        let total: f64 = pieces.iter().map(|p| (p.end - p.start).norm()).sum();
+        // Volumes over π of the layers, and what they are made of.
+        let volume = |layer: &Layer| -> f64 {
+            layer
+                .signed(&pieces)
+                .iter()
+                .map(|(p, sign)| sign * p.radius * p.radius * (p.end - p.start).norm())
+                .sum()
+        };
+        let square = |r: f64| r * r;
+        let exact = [
+            30.0 * square(0.4)
+                + 10.0 * (square(0.445) - square(0.3) + square(0.2))
+                + (total - 40.0) * square(0.445),
+            30.0 * (square(0.445) - square(0.4)),
+            10.0 * (square(0.5) - square(0.445)),
+            10.0 * (square(0.3) - square(0.2)),
+        ];
+        for (layer, exact) in refined.layers.iter().zip(exact) {
+            assert!((volume(layer) - exact).abs() < 1e-6, "{} {exact}", volume(layer));
+        }
     }
 
     #[test]

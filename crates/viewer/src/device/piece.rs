@@ -35,6 +35,15 @@ impl Piece {
         self.largest * self.mitre
     }
 
+    /// Radius in its middle.
+    pub(crate) fn middle_radius(&self) -> f64 {
+        if self.slope == 0.0 {
+            self.radius
+        } else {
+            self.radius + 0.5 * self.slope * (self.end - self.start).norm()
+        }
+    }
+
     /// The piece as a cylinder of another radius.
     pub(crate) fn with_radius(&self, radius: f64) -> Self {
         Self { radius, slope: 0.0, largest: radius, ..*self }
