@@ -147,8 +147,10 @@ impl Recordings<'_> {
         let scene = Scene::read(&scene_file)?;
         recorder.pack(scene.sac(simulation.lumen(), self.store)?)?;
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
+        let frames = FrameWriter::new(&scene_file, &scene, drawn, self.store)?;
+        frames.check_angiogram(None)?;
         Ok(Recording {
-            frames: FrameWriter::new(&scene_file, &scene, drawn, self.store)?,
+            frames,
             provenance: Provenance::of_scene(&scene, &[])?,
             scene_file,
             scene,

@@ -3,12 +3,12 @@
 use std::io;
 use std::path::Path;
 
-use endowire_core::insertion::Simulation;
+use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{VesselMotion, Wall};
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
-use endowire_viewer::{Exposure, FrameTime, Pushed, Renderer, Seen, View, ViewSpec};
+use endowire_viewer::{Exposure, FrameTime, Mode, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
 
 use super::film;
@@ -86,6 +86,30 @@ impl FrameWriter {
         let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
         Ok(Self { spec, pushed, wall, motion, planes, before: None, injected: false, tips: vec![] })
+    }
+
+    /// Refuses a roadmap whose first frame may be drawn before anything is injected, by the scene or by its script: there
+    /// would be no angiogram to show.
+    pub(crate) fn check_angiogram(&self, script: Option<&Script>) -> Result<(), Error> {
+        let shows = self.spec.xray.mode == Mode::Roadmap && self.spec.wants(View::Fluoro);
+        if self.planes.is_empty() || !shows || !self.spec.injection.is_empty() {
+            return Ok(());
+        }
+        let refused = |mend: String| Err(Error::parameter("view.xray.mode", "roadmap", mend));
+        let injects = script.and_then(|script| Some((script.steps_before_injection()?, script.len())));
+        let Some((before, all)) = injects else {
+            let mend = "a roadmap shows an angiogram: give a [[view.injection]], or in endowire run inject in a line of the script";
+            return refused(mend.to_owned());
+        };
+        let first = (self.spec.every as usize).min(all);
+        if before < first {
+            return Ok(());
+        }
+        let later = if before < all { format!(", or set view.every above {before}") } else { String::new() };
+        refused(format!(
+            "a roadmap shows an angiogram, and the script injects after as many as {before} steps, when that of step {first} is drawn already: \
+             inject before, give a [[view.injection]]{later}"
+        ))
     }
 
     /// Name of the backend, for the summary.

@@ -526,3 +526,27 @@ fn a_motion_of_the_vessel_that_cannot_be_is_refused_by_its_key() {
     let other = scene(good).with("[[script]]", "[method]\nname = \"li2011-banded\"\n\n[[script]]");
     other.is_refused(&["vessel.motion = given", "the paper's method", "kirchhoff"]);
 }
+
+#[test]
+fn a_roadmap_whose_first_picture_comes_before_any_injection_is_refused_before_the_first_step() {
+    let view = "[view]\nviews = [\"fluoro\"]\nsize_px = [32, 32]\nbackend = \"cpu\"\nevery = EVERY\nxray.mode = \"roadmap\"\n";
+    let scene = |every: usize, injects: &str| {
+        let last = format!(
+            "step_mm = 2.0\n{injects}[[script]]\nadvance_mm = 4.0\nstep_mm = 2.0\n{}",
+            view.replace("EVERY", &every.to_string())
+        );
+        Scene::good()
+            .with("radius_mm = 0.5", "radius_mm = 0.5\ninner_radius_mm = 0.3")
+            .with("step_mm = 2.0\n", &last)
+    };
+    let injects = "[[script]]\ninject = { ml = 4.0, ml_per_s = 4.0 }\n";
+    let without = scene(5, "");
+    without.is_refused(&["view.xray.mode = roadmap", "shows an angiogram", "[[view.injection]]"]);
+    assert!(!without.path("out").exists());
+    // The script injects after its first ten steps.
+    scene(5, injects).is_refused(&["view.xray.mode = roadmap", "10 steps", "step 5 ", "view.every above 10"]);
+    for every in [11, 200] {
+        let output = scene(every, injects).run();
+        assert_eq!(output.status.code(), Some(0), "{every}: {}", said(&output));
+    }
+}

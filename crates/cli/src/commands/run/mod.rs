@@ -45,6 +45,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let sac = scene.sac(simulation.lumen(), &cache).map_err(in_scene)?;
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, (&scene, sac.as_ref()), &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation), &cache)?;
+    frames.check_angiogram(Some(&script)).map_err(in_scene)?;
     if !args.quiet {
         scenes::tell_found_centreline(&args.scene, &scene);
     }
