@@ -3,6 +3,7 @@
 use endowire_core::Vec3;
 use endowire_core::device::{Stack, line_mm};
 use endowire_core::insertion::DetachedCoil;
+use endowire_core::vessel::VesselMotion;
 
 use crate::args::ExportArgs;
 use crate::cache::Cache;
@@ -17,7 +18,7 @@ use crate::scenes;
 /// Value that contact points have instead of an instrument's index.
 const CONTACT: f64 = -1.0;
 
-/// Writes the vessel, a file for each step, and the list of these files.
+/// Writes the vessel, a file for each step, and the list of these files; a vessel that moves once for each step.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     scenes::check_recorded(&args.set)?;
@@ -38,20 +39,30 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
         let path = out.join(name);
         data.write(&path).map_err(|e| Failure::write(&path, &e))
     };
-    let mesh = wall.mesh();
-    let vessel = PolyData {
-        points_mm: mesh.vertices_mm.clone(),
-        triangles: mesh.triangles.clone(),
-        ..PolyData::default()
+    let motion = VesselMotion::new(&scene.vessel.motion).map_err(in_scene)?;
+    let moves = motion.as_ref().is_some_and(VesselMotion::changes);
+    let vessel = |time_s: f64| {
+        let displacement = motion.as_ref().map(|motion| motion.at(time_s));
+        let place = |v: &Vec3| displacement.as_ref().map_or(*v, |displacement| displacement.place(v));
+        let points_mm = wall.mesh().vertices_mm.iter().map(place).collect();
+        PolyData { points_mm, triangles: wall.mesh().triangles.clone(), ..PolyData::default() }
     };
-    write("vessel.vtp", &vessel)?;
+    if !moves {
+        write("vessel.vtp", &vessel(0.0))?;
+    }
     let bar = progress::bar(recording.steps(), "step");
     let mut files = Vec::new();
     for (row, (step, time_s)) in (1..=recording.steps()).zip(steps) {
         let lengths_mm = lengths.after(step, &recording.shape(row))?;
         let name = format!("step_{step:06}.vtp");
         write(&name, &step_data(&recording, row, &stack, (&lengths_mm, &coils::after(&left, step))))?;
-        files.push((time_s, name));
+        let mut names = vec![name];
+        if moves {
+            let name = format!("vessel_{step:06}.vtp");
+            write(&name, &vessel(time_s))?;
+            names.push(name);
+        }
+        files.push((time_s, names));
         bar.inc(1);
     }
     bar.finish_and_clear();

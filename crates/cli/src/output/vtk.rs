@@ -64,10 +64,12 @@ impl PolyData {
 }
 
 /// Writes a `.pvd` file: times in seconds, with the files for them, which lie beside it.
-pub(crate) fn write_series(path: &Path, files: &[(f64, String)]) -> io::Result<()> {
+pub(crate) fn write_series(path: &Path, times: &[(f64, Vec<String>)]) -> io::Result<()> {
     let mut text = head("Collection");
-    for (time_s, name) in files {
-        let _ = writeln!(text, "<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{name}\"/>");
+    for (time_s, names) in times {
+        for (part, name) in names.iter().enumerate() {
+            let _ = writeln!(text, "<DataSet timestep=\"{time_s}\" part=\"{part}\" file=\"{name}\"/>");
+        }
     }
     text += "</Collection>\n</VTKFile>\n";
     whole::write(path, |part| std::fs::write(part, text))

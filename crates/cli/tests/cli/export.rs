@@ -99,3 +99,45 @@ fn a_run_is_exported_as_it_was_recorded() {
     let said = said(&output);
     assert!(output.status.code() == Some(2) && said.contains("folder of a recorded run"), "{said}");
 }
+
+#[test]
+fn a_vessel_that_moves_is_exported_where_it_is_at_the_end_of_each_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let tube = folder.path().join("tube.csv");
+    std::fs::write(&tube, "0 0 0 4 -1\n0 0 80 4 0\n").unwrap();
+    let exported = |motion: &str| {
+        let scene = folder.path().join("scene.toml");
+        // It is still at the sheath's mouth.
+        let still = "still = { centre_mm = [0.0, 0.0, 20.0], radius_mm = 2.0, fade_mm = 30.0 }";
+        let moved = format!("{motion}\ndisplacement_mm = [0.0, 0.0, 6.0]\n{still}\n");
+        let vessel = format!("tree = {tube:?}\n[[vessel.motion]]\n{moved}");
+        let text = SCENE
+            .replace("file = \"VESSEL\"\n", &vessel)
+            .replace("position_mm = [0.0, 0.0, 1.0]", "position_mm = [0.0, 0.0, 20.0]");
+        let text = text.replace("= 150.0", "= 40.0").replace("= 120.0", "= 20.0");
+        std::fs::write(&scene, text).unwrap();
+        let (run, out) = (folder.path().join("run"), folder.path().join("vtk"));
+        let command = |arguments: &[&std::ffi::OsStr]| {
+            let output = endowire().args(arguments).output().unwrap();
+            assert!(output.status.success(), "{}", said(&output));
+        };
+        command(&["run".as_ref(), scene.as_ref(), "--out".as_ref(), run.as_ref()]);
+        let _ = std::fs::remove_dir_all(&out);
+        command(&["export".as_ref(), run.as_ref(), "--vtk".as_ref(), out.as_ref()]);
+        out
+    };
+    // The far end of the tube.
+    let highest = |file: &str, out: &Path| {
+        let points = array(&std::fs::read_to_string(out.join(file)).unwrap(), "points_mm", "Points");
+        points.chunks(3).map(|point| point[2]).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let out = exported("waveform = \"steady\"");
+    assert!((highest("vessel.vtp", &out) - 86.0).abs() < 1e-9, "{}", highest("vessel.vtp", &out));
+    let out = exported("waveform = \"breathing\"\nperiod_s = 4.0");
+    assert!(!out.join("vessel.vtp").exists());
+    let high: Vec<f64> = (1..=4).map(|step| highest(&format!("vessel_{step:06}.vtp"), &out)).collect();
+    // Half a second each: at half of the period the breath is in.
+    assert!(high[0] > 80.0 && high[1] > high[0] && (high[3] - 86.0).abs() < 1e-9, "{high:?}");
+    let series = std::fs::read_to_string(out.join("run.pvd")).unwrap();
+    assert!(series.contains("timestep=\"2\" part=\"1\" file=\"vessel_000004.vtp\""), "{series}");
+}
