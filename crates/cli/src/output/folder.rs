@@ -17,7 +17,7 @@ use crate::failure::Failure;
 pub(crate) const TABLE: &str = "steps.csv";
 /// Start of its first line.
 const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
-/// Locked by the run that records; by a session, with the name of its script before it. The empty file remains
+/// Locked by the run that records, and by what draws a data set; by a session, with the name of its script before it. The empty file remains
 /// afterwards: only the lock counts, and it is released when a program dies.
 const LOCK: &str = ".endowire-lock";
 
@@ -59,6 +59,16 @@ pub(crate) fn claim_again(folder: &Path) -> Result<Claim, Failure> {
         let folder = folder.display();
         format!(
             "--out {folder}: another run is recording into this folder: wait until it has ended, or give another folder"
+        )
+    })
+}
+
+/// Locks the folder of a data set.
+pub(crate) fn claim_dataset(folder: &Path) -> Result<Claim, Failure> {
+    lock(&folder.join(LOCK), || {
+        let folder = folder.display();
+        format!(
+            "--out {folder}: another endowire dataset is drawing into this folder: wait until it has ended, or give another folder"
         )
     })
 }

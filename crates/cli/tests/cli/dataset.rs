@@ -54,6 +54,13 @@ fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
     told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
     let whole = files(&one);
     assert!(whole == files(&two));
+    // One call at a time draws into a folder.
+    let lock = std::fs::File::options().write(true).open(two.join(".endowire-lock")).unwrap();
+    lock.try_lock().unwrap();
+    let refused = endowire(&["dataset", text(&spec), "--out", text(&two)], "2");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("another endowire dataset is drawing"), "{}", said(&refused));
+    drop(lock);
     // What a call that was ended has left: a shot without its list, and a picture that is half there.
     std::fs::remove_file(two.join("parts/000001.json")).unwrap();
     std::fs::write(two.join("images/0000007.png"), "half").unwrap();

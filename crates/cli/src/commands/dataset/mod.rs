@@ -20,7 +20,7 @@ use serde_json::Value;
 use crate::args::DatasetArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::folder::refuse_recording;
+use crate::output::folder::{Claim, claim_dataset, refuse_recording};
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{print_json, progress, tell, to_json, whole};
 use crate::scenes;
@@ -67,7 +67,7 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let spec = Spec::read(&args.spec)?;
     let provenance = provenance(args, &spec)?;
     let folder = &args.out;
-    claim(&provenance, folder)?;
+    let _claim = claim(&provenance, folder)?;
     let pairs: Vec<_> = spec
         .scenes
         .iter()
@@ -166,13 +166,26 @@ fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
 const FOLDERS: [&str; 3] = ["images", "arrays", "parts"];
 const ANNOTATIONS: &str = "annotations.json";
 
-/// Claims a folder for a dataset; it is refused if it contains another dataset, or foreign files with names of a
-/// dataset.
-fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
+/// Claims a folder for a dataset until the claim is dropped; it is refused while another call draws into it.
+fn claim(provenance: &Provenance, folder: &Path) -> Result<Claim, Failure> {
+    // Checked before locking, because the lock would add a file to a folder that is no data set.
+    check(provenance, folder)?;
+    let made = FOLDERS.iter().try_for_each(|name| std::fs::create_dir_all(folder.join(name)));
+    made.map_err(|e| Failure::write(folder, &e))?;
+    let claim = claim_dataset(folder)?;
+    // Another call may have been faster.
+    check(provenance, folder)?;
+    let (path, told) = (folder.join("dataset.json"), to_json(provenance)?);
+    if !path.exists() {
+        whole::write_bytes(&path, told.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
+    }
+    Ok(claim)
+}
+
+/// Refuses a folder that contains another dataset, or foreign files with names of a dataset.
+fn check(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     refuse_recording(folder)?;
-    let path = folder.join("dataset.json");
-    let told = to_json(provenance)?;
-    if let Ok(text) = std::fs::read_to_string(&path) {
+    if let Ok(text) = std::fs::read_to_string(folder.join("dataset.json")) {
         let there: Value = serde_json::from_str(&text).unwrap_or_default();
         if there["scene_hash"] != provenance.scene_hash() {
             return Err(Failure::Input(format!(
@@ -186,11 +199,6 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
             folder.display(),
             theirs.display()
         )));
-    }
-    let made = FOLDERS.iter().try_for_each(|name| std::fs::create_dir_all(folder.join(name)));
-    made.map_err(|e| Failure::write(folder, &e))?;
-    if !path.exists() {
-        whole::write_bytes(&path, told.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
     }
     Ok(())
 }
