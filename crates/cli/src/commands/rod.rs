@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use crate::args::RodArgs;
 use crate::failure::Failure;
+use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::{print_json, printable};
 
 #[derive(Serialize)]
 struct Document {
@@ -23,65 +23,63 @@ pub(crate) fn rod(args: &RodArgs) -> Result<(), Failure> {
     let case = StaticCase::from_file(&args.case)?;
     let solution = case.solve().map_err(|e| Failure::from(e).at(args.case.display()))?;
     let document = Document { provenance, case: args.case.display().to_string(), solution };
-    if args.json {
-        print_json(&document)?;
-    } else {
-        print_solution(&document);
-    }
+    answer(&document, args.json, || lines(&document).join("\n"))?;
     match document.solution.failure() {
         Some(reason) => Err(Failure::Computation(format!("{}: {reason}", args.case.display()))),
         None => Ok(()),
     }
 }
 
-fn print_solution(document: &Document) {
+fn lines(document: &Document) -> Vec<String> {
     let s = &document.solution;
     let verdict = match (s.converged, s.stable) {
         (true, true) => "stable equilibrium".to_owned(),
         (true, false) => format!("unstable equilibrium, {} unstable directions", s.negative_modes),
         (false, _) => "no equilibrium".to_owned(),
     };
-    println!("{}: {verdict}", printable(&document.case));
-    println!("  solver        {} iterations, residual {:.1e}: {}", s.iterations, s.residual, s.stop);
-    println!("  elements      {}", s.tensions.len());
-    println!("  tip           {}", vector(&s.tip));
-    println!("  tip tangent   {}, {:.9} rad from the start's", vector(&s.tip_tangent), s.tip_angle);
+    let mut lines = vec![
+        format!("{}: {verdict}", document.case),
+        format!("  solver        {} iterations, residual {:.1e}: {}", s.iterations, s.residual, s.stop),
+        format!("  elements      {}", s.tensions.len()),
+        format!("  tip           {}", vector(&s.tip)),
+        format!("  tip tangent   {}, {:.9} rad from the start's", vector(&s.tip_tangent), s.tip_angle),
+    ];
     if s.twisted && s.instruments.is_empty() {
-        println!("  twist         {:.9} rad", s.twist);
+        lines.push(format!("  twist         {:.9} rad", s.twist));
     }
     let e = &s.energy;
-    println!(
+    lines.push(format!(
         "  energy        {:.9} = bend {:.9} + twist {:.9} + axial {:.9}; load {:.9}",
         e.total, e.bend, e.twist, e.axial, e.load
-    );
-    print_reaction("start", &s.reactions.start);
-    print_reaction("end", &s.reactions.end);
+    ));
+    lines.extend(reaction("start", &s.reactions.start));
+    lines.extend(reaction("end", &s.reactions.end));
     if let Some(force) = s.push_force {
-        println!("  push force    {force:.9} if the clamped start is a sleeve without friction");
+        lines.push(format!("  push force    {force:.9} if the clamped start is a sleeve without friction"));
     }
-    for i in &s.instruments {
+    lines.extend(s.instruments.iter().map(|i| {
         let push = i.push_force.map_or("jumps here".to_owned(), |force| format!("{force:.9}"));
-        println!(
+        format!(
             "  {:<13} {} beyond the start, tip {}, twist {:.9} rad, push force {push}, torque {:.9}",
-            printable(&i.name),
+            i.name,
             i.inserted,
             vector(&i.tip),
             i.twist,
             i.torque
-        );
-    }
+        )
+    }));
+    lines
 }
 
-fn print_reaction(end: &str, r: &Reaction) {
-    if *r == Reaction::default() {
-        return;
-    }
-    println!(
-        "  {end:<5} exerts  force {}, moment {}, torque {:.6}",
-        vector(&r.force),
-        vector(&r.moment),
-        r.torque
-    );
+fn reaction(end: &str, r: &Reaction) -> Option<String> {
+    (*r != Reaction::default()).then(|| {
+        format!(
+            "  {end:<5} exerts  force {}, moment {}, torque {:.6}",
+            vector(&r.force),
+            vector(&r.moment),
+            r.torque
+        )
+    })
 }
 
 fn vector(v: &[f64; 3]) -> String {

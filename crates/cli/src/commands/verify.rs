@@ -13,9 +13,8 @@ use serde::Serialize;
 use super::parallel::in_parallel;
 use crate::args::VerifyArgs;
 use crate::failure::Failure;
-use crate::output::print_json;
-use crate::output::progress;
 use crate::output::provenance::Provenance;
+use crate::output::{answer, progress};
 
 #[derive(Serialize)]
 struct Document {
@@ -125,11 +124,7 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
         sequences: args.stress.then_some(random),
         deployments: args.stress.then_some(deployments),
     };
-    if args.json {
-        print_json(&document)?;
-    } else {
-        print_cases(&document);
-    }
+    answer(&document, args.json, || table(&document).join("\n"))?;
     let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count()
         + document.insertion_stress.iter().flatten().filter(|row| !row.pass).count()
         + document.instrument_stress.iter().flatten().filter(|one| !one.row.pass).count()
@@ -145,14 +140,16 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
     Ok(())
 }
 
-fn print_cases(document: &Document) {
-    println!(
+/// The lines of the table.
+fn table(document: &Document) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.push(format!(
         "{:<6}{:<30} {:<31} {:>15} {:>15} {:>8} {:>8} {:>5} {:>5}",
         "", "case", "quantity", "computed", "expected", "error", "bound", "order", "iter."
-    );
+    ));
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
     for row in &document.cases {
-        println!(
+        lines.push(format!(
             "{:<6}{:<30} {:<31} {:>15.10} {:>15.10} {:>8.1e} {:>8.1e} {:>5} {:>5}",
             if row.pass { "pass" } else { "FAIL" },
             row.name,
@@ -163,34 +160,35 @@ fn print_cases(document: &Document) {
             row.bound,
             or_dash(row.order.map(|order| format!("{order:.2}"))),
             or_dash(row.iterations.map(|iterations| iterations.to_string())),
-        );
+        ));
     }
-    println!("{} passed, {} failed", document.passed, document.failed);
+    lines.push(format!("{} passed, {} failed", document.passed, document.failed));
     if let Some(rows) = &document.stress {
-        print_stress(rows);
+        tell_stress(rows, &mut lines);
     }
     if let Some(rows) = &document.insertion_stress {
-        print_insertions(rows);
+        tell_insertions(rows, &mut lines);
     }
     if let Some(rows) = &document.instrument_stress {
-        print_instruments(rows);
+        tell_instruments(rows, &mut lines);
     }
     if let Some(rows) = &document.sequences {
-        println!();
-        println!("{}", SequenceRow::HEAD);
-        rows.iter().for_each(|row| println!("{row}"));
+        lines.push(String::new());
+        lines.push(SequenceRow::HEAD.to_owned());
+        lines.extend(rows.iter().map(ToString::to_string));
     }
     if let Some(rows) = &document.deployments {
-        println!();
-        println!("{}", DeploymentRow::HEAD);
-        rows.iter().for_each(|row| println!("{row}"));
+        lines.push(String::new());
+        lines.push(DeploymentRow::HEAD.to_owned());
+        lines.extend(rows.iter().map(ToString::to_string));
     }
+    lines
 }
 
-/// Prints the results of random commands on several instruments.
-fn print_instruments(rows: &[Instruments]) {
-    println!();
-    println!(
+/// Tells the results of random commands on several instruments.
+fn tell_instruments(rows: &[Instruments], lines: &mut Vec<String>) {
+    lines.push(String::new());
+    lines.push(format!(
         "{:<16} {:>8} {:>10} {:>10} {:>8} {:>8} {:>11} {:>7} {:>11} {:>7} {:>6} {:>6} {:>7}  first",
         "three in",
         "edge mm",
@@ -205,9 +203,9 @@ fn print_instruments(rows: &[Instruments]) {
         "iter.",
         "parts",
         "time s"
-    );
+    ));
     for Instruments { row, time_s } in rows {
-        println!(
+        lines.push(format!(
             "{:<16} {:>8} {:>10} {:>10} {:>8} {:>8} {:>11} {:>7} {:>11} {:>7} {:>6} {:>6} {:>7.1}  {}",
             row.case.vessel,
             row.case.edge_mm,
@@ -223,22 +221,22 @@ fn print_instruments(rows: &[Instruments]) {
             row.most_substeps,
             time_s,
             row.first
-        );
+        ));
     }
 }
 
-/// Prints the combinations that stopped, and counts of all.
-fn print_insertions(rows: &[InsertionRow]) {
-    println!();
-    println!(
+/// Tells the combinations that stopped, and counts of all.
+fn tell_insertions(rows: &[InsertionRow], lines: &mut Vec<String>) {
+    lines.push(String::new());
+    lines.push(format!(
         "{:>10} {:>10} {:>10} {:>10} {:>9} {:>6} {:>6} {:>6}  insertion that stopped",
         "wall N/mm²", "EI N·mm²", "element mm", "step mm", "friction", "steps", "iter.", "parts"
-    );
+    ));
     let mut outcomes: Vec<(&str, usize)> = Vec::new();
     for row in rows {
         let case = &row.case;
         if !row.converged {
-            println!(
+            lines.push(format!(
                 "{:>10.0e} {:>10.0e} {:>10} {:>10} {:>9} {:>6} {:>6} {:>6}  {}{}",
                 case.modulus_n_per_mm2,
                 case.bending_stiffness_nmm2,
@@ -250,7 +248,7 @@ fn print_insertions(rows: &[InsertionRow]) {
                 row.most_substeps,
                 row.outcome,
                 if row.pass { "" } else { ", and cannot be pulled back" }
-            );
+            ));
         }
         match outcomes.iter_mut().find(|(known, _)| *known == row.outcome) {
             Some((_, count)) => *count += 1,
@@ -258,19 +256,19 @@ fn print_insertions(rows: &[InsertionRow]) {
         }
     }
     let counts: Vec<String> = outcomes.iter().map(|(outcome, count)| format!("{count} {outcome}")).collect();
-    println!("{} insertions: {}", rows.len(), counts.join(", "));
+    lines.push(format!("{} insertions: {}", rows.len(), counts.join(", ")));
 }
 
-fn print_stress(rows: &[Stress]) {
-    println!();
-    println!(
+fn tell_stress(rows: &[Stress], lines: &mut Vec<String>) {
+    lines.push(String::new());
+    lines.push(format!(
         "{:<54} {:<28} {:>8} {:>9} {:>5} {:>9}",
         "stressed", "outcome", "residual", "next bend", "iter.", "time ms"
-    );
+    ));
     let mut outcomes: Vec<(String, usize)> = Vec::new();
     for Stress { row, time_s } in rows {
         let outcome = row.outcome();
-        println!(
+        lines.push(format!(
             "{:<54} {:<28} {:>8.1e} {:>9.1e} {:>5} {:>9.2}",
             row.name,
             outcome,
@@ -278,12 +276,12 @@ fn print_stress(rows: &[Stress]) {
             row.next_bend,
             row.iterations,
             1e3 * time_s
-        );
+        ));
         match outcomes.iter_mut().find(|(known, _)| *known == outcome) {
             Some((_, count)) => *count += 1,
             None => outcomes.push((outcome, 1)),
         }
     }
     let counts: Vec<String> = outcomes.iter().map(|(outcome, count)| format!("{count} {outcome}")).collect();
-    println!("{} stressed cases: {}", rows.len(), counts.join(", "));
+    lines.push(format!("{} stressed cases: {}", rows.len(), counts.join(", ")));
 }

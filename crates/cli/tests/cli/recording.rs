@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::common::{SHORT, endowire, said, scene_text};
+use crate::common::{SHORT, assets, endowire, said, scene_text};
 use npyz::NpyFile;
 use serde_json::Value;
 use zip::ZipArchive;
@@ -276,7 +276,10 @@ fn a_reader_that_leaves_is_no_failure_and_a_full_disk_is() {
     };
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
-    let output = command(writer.into()).output().unwrap();
+    let output = command(writer.try_clone().unwrap().into()).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let case = assets().join("cases/tip_force.toml");
+    let output = endowire().arg("rod").arg(case).stdout(writer).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let full = File::options().write(true).open("/dev/full").unwrap();
     let output = command(full.into()).output().unwrap();
