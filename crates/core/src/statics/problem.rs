@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
-use super::guess;
+use super::guess::{self, Between};
 use super::loads::Loads;
 use super::mesh::{self, ASSUMED_GJ_RATIO};
 use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
@@ -110,6 +110,7 @@ impl StaticProblem {
         let angles = stack.as_ref().map_or(usize::from(twisted), Stack::angles);
 
         let supports = supports(case, &frame, angles > 0);
+        let touching = self_contact(case, &elements);
         let initial = match (&stack, &case.initial) {
             (Some(stack), _) => stack.untwisted(&elements, start, frame),
             (None, Some(shape)) if !shape.points.is_empty() => {
@@ -117,22 +118,15 @@ impl StaticProblem {
             }
             (None, Some(shape)) => guess::arc(&elements, start, frame, shape.curvature),
             (None, None) if supports.conditions() > 0 => {
-                guess::towards_end(&elements, start, frame, &supports)
+                let (rod, nodes, elements) = (&case.rod, &nodes[..], &elements[..]);
+                let (supports, touching) = (&supports, touching.as_ref());
+                Between { rod, nodes, elements, start, frame, supports, shaped, touching }.shape()
             }
             (None, None) => guess::rest_shape(&elements, start, frame),
         };
         let (max_iterations, tolerance) = (case.solver.max_iterations, case.solver.tolerance);
         let options = NewtonOptions { max_iterations, tolerance, ..NewtonOptions::default() };
         let load_steps = case.solver.load_steps;
-        let touching = case.self_contact.as_ref().map(|surface| {
-            let skin = |element: &ElementData| {
-                let rigid = Skin::rigid(surface.radius, element.bending[1]);
-                Skin { modulus_n_per_mm2: surface.modulus.unwrap_or(rigid.modulus_n_per_mm2), ..rigid }
-            };
-            let touching = SelfContact::new(&elements, elements.iter().map(skin).collect());
-            let closed = case.end.position == Some(case.start.position);
-            if closed { touching.closed() } else { touching }
-        });
         Ok(Self {
             elements,
             supports,
@@ -382,6 +376,18 @@ fn outside<'a>(
     let touching = touching.as_mut().map(|touching| touching as &mut dyn External);
     let field = field.map(|field| field as &mut dyn External);
     Together(std::iter::once(loads as &mut dyn External).chain(touching).chain(field).collect())
+}
+
+/// Contact between loops of the rod of a case, if modelled.
+fn self_contact(case: &StaticCase, elements: &[ElementData]) -> Option<SelfContact> {
+    let surface = case.self_contact.as_ref()?;
+    let skin = |element: &ElementData| {
+        let rigid = Skin::rigid(surface.radius, element.bending[1]);
+        Skin { modulus_n_per_mm2: surface.modulus.unwrap_or(rigid.modulus_n_per_mm2), ..rigid }
+    };
+    let touching = SelfContact::new(elements, elements.iter().map(skin).collect());
+    let closed = case.end.position == Some(case.start.position);
+    Some(if closed { touching.closed() } else { touching })
 }
 
 /// The loads of a case on the nodes at these arc lengths.

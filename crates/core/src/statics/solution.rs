@@ -141,7 +141,8 @@ impl StaticSolution {
     pub fn failure(&self) -> Option<String> {
         (!self.converged).then(|| {
             format!(
-                "no equilibrium after {} iterations, residual {:.1e}: {}",
+                "no equilibrium after {} iterations, residual {:.1e}: {}; `[initial] points` sets the shape that \
+                 the search starts from, `[solver] load_steps` a way to it",
                 self.iterations, self.residual, self.stop
             )
         })
