@@ -16,6 +16,11 @@ const FEWEST_INTERVALS: f64 = 2.0;
 pub(super) const NEAR: f64 = 1e-3;
 /// Largest angle by which the rest shape bends in an element, rad.
 const LARGEST_TURN: f64 = 0.75;
+/// What is in by less than this fraction of an element is not yet in.
+const JUST_IN: f64 = 1e-9;
+/// Contact points are known up to the mark behind the sheath's mouth, which is nearer than this number of elements:
+/// none is longer than one and a half, and the last half is not needed.
+const BEHIND_MOUTH: f64 = 3.0;
 /// Largest number of contact points that an element at the tip has beside the evenly spaced ones: their spacing
 /// doubles from 4·10⁻⁹ mm to at most half of the longest element, ten metres, in at most 42 steps.
 pub(super) const MOST_POINTS: usize = 64;
@@ -57,6 +62,8 @@ pub struct Mesh {
     pub points: Vec<ContactPoint>,
     /// Inserted lengths of several instruments; empty for a single device.
     pub(super) inserted_mm: Vec<f64>,
+    /// As `from_tip_mm`, for more than is inserted: between what contact points are.
+    pub(super) ahead_mm: Vec<f64>,
 }
 
 /// A stretch of device between ends of sections.
@@ -189,6 +196,10 @@ impl Mesh {
     }
 
     /// Sets nodes and contact points like [`Mesh::build`], without changing the elements.
+    ///
+    /// Contact points are marks on the device as well, those of whole elements, and enter with it: points that slid
+    /// in an element growing at the mouth would put energy into the wall that no hand has given. Each counts by
+    /// what is inserted behind it, up to the length that it represents, so that none comes in with a jump.
     pub(super) fn build_points(
         &mut self,
         device: &Device,
@@ -198,12 +209,17 @@ impl Mesh {
     ) {
         let Fineness { element_mm, contact_spacing_radii } = fineness;
         nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
+        let ahead_mm = (inserted_mm + BEHIND_MOUTH * element_mm).min(device.length_mm());
+        nodes_from_tip(device, ahead_mm.max(inserted_mm), element_mm, &mut self.ahead_mm);
         self.points.clear();
         let most = 1.0 + fineness.points(device) as f64;
         // Half of the interval beyond the current point; beyond the tip this is its cap.
         let mut half_beyond = device.section_at(0.0).radius_mm;
-        let last = self.from_tip_mm.len() - 2;
-        for (e, ends) in self.from_tip_mm.windows(2).enumerate().rev() {
+        let first = self.from_tip_mm.len() - 2;
+        for (k, ends) in self.ahead_mm.windows(2).rev().enumerate().take_while(|(_, e)| e[1] < inserted_mm) {
+            // Whole elements that are not all in are in the one at the mouth.
+            let element = first.saturating_sub(k);
+            let [near, far] = [self.from_tip_mm[element], self.from_tip_mm[element + 1]];
             let length = ends[0] - ends[1];
             let radius_mm = device.section_at(ends[1]).radius_mm;
             // A thin tip too short for an element of its own determines the element's radius, without requiring more
@@ -213,20 +229,25 @@ impl Mesh {
             let spacing = length / intervals;
             // Distance from the element's far end.
             let mut at = 0.0;
-            let mut fine = if e == last { TIP_SPACING_RADII * radius_mm } else { spacing };
+            let mut fine = if k == 0 { TIP_SPACING_RADII * radius_mm } else { spacing };
             while at < (1.0 - 1e-9) * length {
                 let left = length - at;
                 let step = fine.min(spacing);
                 // Where the fine intervals end, the remaining ones are made equal.
                 let step =
                     if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
+                let from_tip_mm = ends[1] + at;
+                let behind_mm = inserted_mm - from_tip_mm;
+                if behind_mm <= JUST_IN * length {
+                    break;
+                }
                 self.points.push(ContactPoint {
-                    element: e,
-                    xi: 1.0 - at / length,
+                    element,
+                    xi: 1.0 - (ends[1] - far + at) / (near - far),
                     instrument: 0,
                     set: 0,
-                    from_tip_mm: ends[1] + at,
-                    weight_mm: half_beyond + 0.5 * step,
+                    from_tip_mm,
+                    weight_mm: (half_beyond + 0.5 * step).min(behind_mm),
                     potential: WallPotential { modulus_n_per_mm2, radius_mm },
                 });
                 half_beyond = 0.5 * step;
@@ -234,6 +255,13 @@ impl Mesh {
                 fine *= 2.0;
             }
         }
+    }
+
+    /// Whether a contact point of a single device counts by more with every piece that is inserted. One that has just
+    /// come in completely still does: what follows is not yet in.
+    pub(super) fn is_coming_in(&self, point: &ContactPoint) -> bool {
+        let behind_mm = self.from_tip_mm[0] - point.from_tip_mm;
+        behind_mm - point.weight_mm <= JUST_IN * self.elements[0].length
     }
 }
 
@@ -264,11 +292,38 @@ mod tests {
             let gaps = mesh.points.windows(2).map(|pair| pair[1].from_tip_mm - pair[0].from_tip_mm);
             (points[k], widest[k]) = (mesh.points.len(), gaps.fold(0.0, f64::max) / 0.445);
             assert!(widest[k] <= contact_spacing_radii && widest[k] > 0.9 * contact_spacing_radii);
-            // Their weights sum to the whole device and its cap.
+            // Their weights sum to the whole device and its cap, less what the last ones lack.
             let all_mm: f64 = mesh.points.iter().map(|point| point.weight_mm).sum();
-            assert!((all_mm - 50.0 - 0.445).abs() < 0.5 * contact_spacing_radii * 0.445 + 1e-9, "{all_mm}");
+            let lacks_mm = 50.0 + 0.445 - all_mm;
+            assert!((0.0..1.5 * contact_spacing_radii * 0.445 + 1e-9).contains(&lacks_mm), "{all_mm}");
         }
         assert!(points[1] < 3 * points[0] / 4, "{points:?}");
+    }
+
+    #[test]
+    fn contact_points_come_in_with_the_device_and_count_by_what_is_behind_them() {
+        let wire = Section::straight(60.0, 0.4, 5.0);
+        let tip = Section { length_mm: 7.3, radius_mm: 0.2, ..wire };
+        let device = Device::new(vec![tip, Section::straight(0.4, 0.3, 5.0), wire]).unwrap();
+        let (mut mesh, mut before) = (Mesh::default(), Vec::<ContactPoint>::new());
+        for element_mm in [1.0, 4.0] {
+            before.clear();
+            for step in 1..=1000 {
+                let inserted_mm = 0.02 * f64::from(step);
+                mesh.build(&device, inserted_mm, Fineness::of_elements(element_mm), 1.0);
+                let came = &mesh.points[before.len()..];
+                assert!(came.iter().all(|point| point.weight_mm <= 0.02 + 1e-9), "{inserted_mm}");
+                for (was, is) in before.iter().zip(&mesh.points) {
+                    assert_eq!(was.from_tip_mm, is.from_tip_mm, "{inserted_mm}");
+                    let more_mm = is.weight_mm - was.weight_mm;
+                    assert!((0.0..=0.02 + 1e-9).contains(&more_mm), "{inserted_mm}: {was:?} {is:?}");
+                    let ends = [is.element, is.element + 1].map(|i| mesh.from_tip_mm[i]);
+                    let at = ends[0] - is.xi * (ends[0] - ends[1]);
+                    assert!((at - is.from_tip_mm).abs() < 1e-12 * inserted_mm.max(1.0), "{is:?}");
+                }
+                before.clone_from(&mesh.points);
+            }
+        }
     }
 
     #[test]

@@ -87,7 +87,13 @@ impl<const C: usize> Tools<C> {
         let frame = rod.material_frame(0);
         let data = &mesh.elements[0].materials[0];
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
-        report.push_force_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
+        // What comes in where the wall presses stores energy in it.
+        let coming_in = self.touches.iter().filter_map(|(index, touch)| {
+            let point = mesh.points.get(*index).filter(|point| mesh.is_coming_in(point))?;
+            Some(touch.energy_mj / point.weight_mm)
+        });
+        report.push_force_n =
+            clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest) + coming_in.sum::<f64>();
         report.torque_nmm = clamp.torque;
         if Layout::<C>::ANGLES > 0 {
             report.tip_rotation_rad += rod.twist();

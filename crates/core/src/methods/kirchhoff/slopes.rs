@@ -107,9 +107,12 @@ fn push_force<const C: usize>(
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
-    // If an active point appears or vanishes on one side, the other side's slope is used.
+    // If an active point vanishes on one side, or another one appears there, the other side's slope is used.
+    let gains = |side: &Beside| side.mesh.points.len() > at.mesh.points.len();
     let wall = match (on.wall_slope(acting.wall, at, step), back.wall_slope(acting.wall, at, -step)) {
-        (Some(on), Some(back)) => 0.5 * (on + back),
+        (Some(one), Some(_)) if gains(&back) && !gains(&on) => one,
+        (Some(_), Some(other)) if gains(&on) && !gains(&back) => other,
+        (Some(one), Some(other)) => 0.5 * (one + other),
         (one, other) => one.or(other)?,
     };
     let loops = (on.pressing_mj(acting.loops, at) - back.pressing_mj(acting.loops, at)) / (2.0 * step);
@@ -267,8 +270,8 @@ impl Beside {
         near.find(|p| p.instrument == was.instrument && (p.weight_mm - was.weight_mm).abs() <= within)
     }
 
-    /// Motion of the material at a contact point in this change of lengths, if the point still exists. Points next to
-    /// the mouth lag behind: the first elements grow as material enters.
+    /// Motion of the material at a contact point in this change of lengths, if the point still exists. The point where
+    /// an instrument comes out of another is always there, and its material goes on.
     fn moved_mm(&self, was: &ContactPoint, at: Start<'_>, step_mm: f64) -> Option<Vec3> {
         let is = self.same_point(was, step_mm.abs())?;
         let from_tip_mm = |p: &ContactPoint, mesh: &Mesh| {

@@ -5,7 +5,9 @@ use crate::device::{Device, Section};
 use crate::insertion::{Command, Sheath, Simulation, WallProperties};
 use crate::methods::StepReport;
 use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
+use crate::vessel::{
+    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, SweptVessel, Wall,
+};
 
 /// A device in a straight tube along z, with a sheath at this place and direction.
 fn in_tube(
@@ -226,5 +228,54 @@ fn a_throat_is_passed_without_a_jump() {
         let (largest_mj, jumps) = passed(step_mm);
         assert!(largest_mj > 0.01, "{largest_mj}");
         assert_eq!(jumps, 0, "{step_mm}");
+    }
+}
+
+/// A straight wire of radius 0.4 mm without friction, from a mouth at `from_mm` through a throat of radius 0.3 mm from
+/// 11 to 12 mm along its axis.
+fn in_throat(from_mm: f64, element_mm: f64) -> Simulation {
+    let rows = [(0.0, 1.0), (8.0, 1.0), (11.0, 0.3), (12.0, 0.3), (15.0, 1.0), (60.0, 1.0)];
+    let node = |(row, (z, radius_mm)): (usize, &(f64, f64))| CentrelineNode {
+        position_mm: Vec3::z() * *z,
+        radius_mm: *radius_mm,
+        parent: row.checked_sub(1),
+    };
+    let tree = CentrelineTree::new(rows.iter().enumerate().map(node).collect()).unwrap();
+    let vessel = SweptVessel::new(tree, Resolution::EdgeMm(0.2)).unwrap();
+    let sheath = Sheath::new(Vec3::z() * from_mm, Vec3::z()).unwrap();
+    let wire = Device::uniform(100.0, 0.4, 2.0).unwrap();
+    let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
+    let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
+    let builder = Simulation::builder(vessel, wire, sheath).properties(properties);
+    builder.method(&method).build().unwrap()
+}
+
+/// A narrow place near the sheath's mouth, where elements grow: what the hand gives is what is stored, and a wire that
+/// is already through feels nothing on average. Where the mouth itself is in it, the part that comes in presses.
+#[test]
+fn what_comes_in_at_a_narrow_mouth_stores_what_the_hand_gives() {
+    const STEP_MM: f64 = 0.04;
+    for (from_mm, element_mm) in [(9.5, 4.0), (9.5, 1.0), (10.9, 4.0), (3.0, 4.0)] {
+        let mut simulation = in_throat(from_mm, element_mm);
+        // The tip, whose points are close together, has come in.
+        let mut before = go_on(&mut simulation, 1.0, STEP_MM);
+        let (first_mj, mut given_mj, mut most_mj) = (before.energy.wall, 0.0, 0.0f64);
+        let (mut through_mj, mut was_mj) = (0.0, 0.0);
+        while before.inserted_mm < 20.0 - 1e-9 {
+            let report = simulation.step(Command::advance(STEP_MM)).unwrap().clone();
+            let work_mj = 0.5 * STEP_MM * (before.push_force_n + report.push_force_n);
+            given_mj += work_mj;
+            most_mj = most_mj.max(report.energy.wall);
+            if before.inserted_mm < 13.0 - 1e-9 {
+                was_mj = report.energy.wall;
+            } else {
+                through_mj += work_mj;
+            }
+            before = report;
+        }
+        let stored_mj = before.energy.wall - first_mj;
+        let told = format!("{from_mm}, {element_mm}: {given_mj} {stored_mj} {most_mj}, {through_mj}");
+        assert!(most_mj > 1e-3 && (given_mj - stored_mj).abs() < 0.02 * most_mj, "{told}");
+        assert!((through_mj + was_mj - before.energy.wall).abs() < 0.01 * most_mj, "{told}");
     }
 }
