@@ -24,7 +24,7 @@
 use endowire_core::Vec3;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector};
 
-use crate::{Chain, NodalLoad, Outcome, Posture, RodModel};
+use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, Strain};
 
 type Block = SMatrix<f64, 6, 6>;
 type Six = SVector<f64, 6>;
@@ -67,6 +67,20 @@ impl BeamFem {
 impl RodModel for BeamFem {
     fn name(&self) -> &'static str {
         if self.damping > 0.0 { "beam-fem-damped" } else { "beam-fem" }
+    }
+
+    fn strain(&self, chain: &Chain, posture: &Posture) -> Strain {
+        (0..chain.segments()).fold(Strain::default(), |sum, i| {
+            let Element { length, bending, torsion, turns: [p, q], .. } =
+                Element::new(self.axial_ratio, chain, posture, i);
+            let bent = |p: f64, q: f64| 2.0 * bending / length * (p * p + p * q + q * q);
+            let twist = q.x - p.x;
+            Strain {
+                bend_mj: sum.bend_mj + bent(p.y, q.y) + bent(p.z, q.z),
+                twist_mj: sum.twist_mj + 0.5 * torsion / length * twist * twist,
+                twist_rad: sum.twist_rad + twist,
+            }
+        })
     }
 
     fn relax(

@@ -1,6 +1,7 @@
 //! A device as a chain of nodes, and the loads on it.
 
 use endowire_core::Vec3;
+use endowire_core::rod::Frame;
 use nalgebra::Rotation3;
 
 /// The segments of a clamped chain. Node 0 is the clamp, segment i (from 0) is between nodes i and i + 1.
@@ -10,6 +11,9 @@ pub struct Chain {
     pub start_mm: Vec3,
     /// Direction of the clamp, unit length.
     pub direction: Vec3,
+    /// Direction towards which the clamp's first material direction points at rotation zero, as for a
+    /// [`Sheath`](endowire_core::insertion::Sheath).
+    pub bends_towards: Option<Vec3>,
     /// Rotation of the clamp about its direction, rad.
     pub turn_rad: f64,
     /// Lengths of the segments, mm.
@@ -75,22 +79,29 @@ impl Chain {
 
     /// The clamp's triad, rotated: tangent, first and second material direction as columns.
     pub(crate) fn clamp_frame(&self) -> Rotation3<f64> {
-        let t = self.direction;
-        // As in the core's rods: the axis farthest from the tangent, y for a tangent along x.
-        let axis = if t.y.abs() <= t.x.abs().max(t.z.abs()) { Vec3::y() } else { Vec3::z() };
-        let d1 = (axis - t * axis.dot(&t)).normalize();
-        let d2 = t.cross(&d1);
+        let Frame { t, u, v } = Frame::new(self.direction, self.bends_towards);
         let (s, c) = self.turn_rad.sin_cos();
-        Rotation3::from_basis_unchecked(&[t, d1 * c + d2 * s, d2 * c - d1 * s])
+        Rotation3::from_basis_unchecked(&[t, u * c + v * s, v * c - u * s])
     }
 
-    /// Bending energy in mJ of springs at the joints, ½ k θ².
+    /// Bending energy in mJ of springs at the joints of a straight device, ½ k θ².
     pub fn bending_energy_mj(&self, posture: &Posture) -> f64 {
+        self.bending_energy_from_mj(posture, &[])
+    }
+
+    /// As [`Self::bending_energy_mj`], ½ k |ω − b|² with the bend ω of a joint and the bend `b` in which it is at rest,
+    /// both in the direction in which the chord turns, rad.
+    pub(crate) fn bending_energy_from_mj(&self, posture: &Posture, at_rest: &[Vec3]) -> f64 {
         let mut before = self.direction;
         let mut energy = 0.0;
         for i in 0..self.segments() {
             let d = posture.chord(i).normalize();
-            let angle = before.cross(&d).norm().atan2(before.dot(&d));
+            let (sine, cosine) = (before.cross(&d).norm(), before.dot(&d));
+            let mut angle = sine.atan2(cosine);
+            if let Some(rest) = at_rest.get(i) {
+                let way = (d - before * cosine).try_normalize(1e-12).unwrap_or_else(Vec3::zeros);
+                angle = (way * angle - rest).norm();
+            }
             energy += 0.5 * self.joint_stiffness(i) * angle * angle;
             before = d;
         }

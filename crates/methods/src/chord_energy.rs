@@ -24,7 +24,7 @@ use endowire_core::Vec3;
 use nalgebra::Matrix3;
 
 use crate::links::Links;
-use crate::{Chain, NodalLoad, Outcome, Posture, Push, RodModel};
+use crate::{Chain, NodalLoad, Outcome, Posture, Push, RodModel, Strain};
 
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +42,13 @@ impl Default for ChordEnergy {
 impl RodModel for ChordEnergy {
     fn name(&self) -> &'static str {
         "chord-energy"
+    }
+
+    fn strain(&self, chain: &Chain, posture: &Posture) -> Strain {
+        let directions: Vec<Vec3> = (0..chain.segments()).map(|i| posture.chord(i).normalize()).collect();
+        let mut bends = vec![Vec3::zeros(); directions.len()];
+        intrinsic_bends(chain, &directions, &mut bends);
+        Strain { bend_mj: chain.bending_energy_from_mj(posture, &bends), ..Strain::default() }
     }
 
     fn relax(

@@ -14,7 +14,7 @@ use nalgebra::Rotation3;
 
 use crate::beam_fem::smallest_rotation;
 use crate::wall_load::WallLoad;
-use crate::{Chain, Outcome, Posture, RodModel};
+use crate::{Chain, Outcome, Posture, RodModel, Strain};
 
 /// Discretisation and tolerance of an insertion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,7 +115,12 @@ impl Insertion {
             ));
         }
         let sheath = surroundings.sheath;
-        let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
+        let chain = Chain {
+            start_mm: sheath.position_mm,
+            direction: sheath.direction,
+            bends_towards: sheath.bends_towards,
+            ..Chain::default()
+        };
         let progress = Progress { posture: chain.straight(), chain, from_tip_mm: vec![0.0] };
         let Surroundings { lumen, stack, properties, .. } = surroundings;
         let wall = ContactSurface::of(lumen, stack.radii_mm(), properties, store)?;
@@ -170,13 +175,15 @@ impl Insertion {
             left_through(surroundings.lumen.openings(), &tip).map(|(opening, _)| opening.index);
         let mut load = WallLoad::new(&self.wall, surroundings, from_tip_mm);
         let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
-        let bend = chain.bending_energy_mj(posture);
-        report.energy = Energy { bend, wall, ..Energy::default() };
+        let Strain { bend_mj, twist_mj, twist_rad } = self.model.strain(chain, posture);
+        report.energy = Energy { bend: bend_mj, twist: twist_mj, wall, ..Energy::default() };
+        report.tip_rotation_rad = report.rotation_rad + twist_rad;
         report.max_penetration_mm = report.contacts.iter().map(|c| c.penetration_mm).fold(0.0, f64::max);
         report.push_force_n = 0.0;
         if chain.segments() > 0 {
             let held: Vec3 = report.contacts.iter().map(|c| c.normal * c.force_n).sum();
             let (t, d) = (chain.direction, posture.chord(0).normalize());
+            // EI times the curvature, that at rest included: the first joint is half a segment.
             let moment = chain.joint_stiffness(0) * t.cross(&d).norm().atan2(t.dot(&d));
             report.push_force_n = -held.dot(&t) - 0.5 * moment * moment / chain.bending_nmm2[0];
         }

@@ -67,6 +67,17 @@ pub struct Outcome {
     pub converged: bool,
 }
 
+/// What a chain stores.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Strain {
+    /// Energy of bending, from its shape at rest, mJ.
+    pub bend_mj: f64,
+    /// Energy of twist, mJ.
+    pub twist_mj: f64,
+    /// Twist from the clamp to the tip, rad.
+    pub twist_rad: f64,
+}
+
 /// A discrete rod with the solver of its paper.
 pub trait RodModel: Debug + Send + Sync {
     /// The name used in tables and scenes.
@@ -78,6 +89,12 @@ pub trait RodModel: Debug + Send + Sync {
     /// [`Error::Parameter`] naming the unsupported feature.
     fn check(&self, _device: &Device) -> Result<()> {
         Ok(())
+    }
+
+    /// What a chain stores in this posture; by default, one that is straight at rest and knows no twist, so that its tip
+    /// turns with the clamp.
+    fn strain(&self, chain: &Chain, posture: &Posture) -> Strain {
+        Strain { bend_mj: chain.bending_energy_mj(posture), ..Strain::default() }
     }
 
     /// Moves `posture` to equilibrium under `load`.

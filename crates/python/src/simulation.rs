@@ -143,7 +143,8 @@ impl Simulation {
     ///
     /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 by default), or at `position_mm` with a
     /// `direction`. By default it is at the inlet of the vessel's centre line, or without one at the lowest of the
-    /// wide openings. `wall` has the keys of `[vessel.wall]` of a scene file (modulus_n_per_mm2, friction, region),
+    /// wide openings. A positive first rest curvature bends instruments towards `bends_towards` at rotation zero, by
+    /// default towards the coordinate axis least aligned with the sheath. `wall` has the keys of `[vessel.wall]` of a scene file (modulus_n_per_mm2, friction, region),
     /// `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the friction of the sheath's valve,
     /// N, and `sheath_friction` the friction coefficient in its mouth.
     ///
@@ -153,7 +154,7 @@ impl Simulation {
     ///
     /// Raises InputError for values that are out of range or inconsistent.
     #[new]
-    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, wall=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
+    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, bends_towards=None, wall=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn py_new(
         py: Python<'_>,
@@ -163,6 +164,7 @@ impl Simulation {
         depth_mm: Option<f64>,
         position_mm: Option<&Bound<'_, PyAny>>,
         direction: Option<&Bound<'_, PyAny>>,
+        bends_towards: Option<&Bound<'_, PyAny>>,
         wall: Option<&Bound<'_, PyAny>>,
         method: Option<&Bound<'_, PyAny>>,
         sheath_friction_n: f64,
@@ -174,6 +176,7 @@ impl Simulation {
         let instruments = self::instruments(instruments)?;
         let position_mm = position_mm.map(|at| place("position_mm", at)).transpose()?;
         let direction = direction.map(|along| place("direction", along)).transpose()?;
+        let bends_towards = bends_towards.map(|towards| place("bends_towards", towards)).transpose()?;
         let opening = opening.map(|opening| natural("opening", opening)).transpose()?;
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
         let inlet = || {
@@ -185,6 +188,7 @@ impl Simulation {
             depth_mm,
             position_mm,
             direction,
+            bends_towards,
             wall: wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default(),
             method: method.map(read_method).transpose()?.unwrap_or_default(),
             sheath_friction_n,

@@ -38,6 +38,8 @@ pub(crate) struct Arguments {
     pub(crate) depth_mm: Option<f64>,
     pub(crate) position_mm: Option<[f64; 3]>,
     pub(crate) direction: Option<[f64; 3]>,
+    #[serde(default)]
+    pub(crate) bends_towards: Option<[f64; 3]>,
     pub(crate) wall: WallProperties,
     pub(crate) method: AnyMethod,
     pub(crate) sheath_friction_n: f64,
@@ -56,9 +58,10 @@ impl Start {
         arguments: Arguments,
     ) -> PyResult<Self> {
         let (stack, lumen) = (arguments.stack(&instruments)?, vessel.get().lumen.clone());
-        let Arguments { opening, depth_mm, position_mm, direction, .. } = arguments;
+        let Arguments { opening, depth_mm, position_mm, direction, bends_towards, .. } = arguments;
         let (friction_n, friction) = (arguments.sheath_friction_n, arguments.sheath_friction);
-        let sheath = SheathSpec { opening, depth_mm, position_mm, direction, friction_n, friction };
+        let sheath =
+            SheathSpec { opening, depth_mm, position_mm, direction, bends_towards, friction_n, friction };
         let (properties, method) = (arguments.wall.clone(), arguments.method.clone());
         let built = interruptible(py, move || {
             let sheath = sheath.place(&lumen)?;

@@ -134,6 +134,7 @@ def test_wrong_stacks_are_named(vessel):
         ({"may_lead": [True]}, "may_lead = 1: there are 2"),
         ({"method": {"name": "li2011-banded"}}, "pushes one device and no more"),
         ({"sheath_friction_n": -1.0}, "friction_n = -1"),
+        ({"bends_towards": [0.0, 0.0, 0.0]}, "sheath.bends_towards = "),
     ):
         with pytest.raises(endowire.InputError, match=words):
             endowire.Simulation(vessel, instruments, **options)

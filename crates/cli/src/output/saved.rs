@@ -56,7 +56,8 @@ impl Parts {
         let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline(&NoStore).ok());
         let sheath = simulation.sheath();
         let place = sheath.position_mm.iter().chain(&sheath.direction);
-        let sheath = place.chain([&sheath.friction_n, &sheath.friction]).flat_map(|c| c.to_le_bytes());
+        let roll = sheath.bends_towards.iter().flatten();
+        let sheath = place.chain([&sheath.friction_n, &sheath.friction]).chain(roll);
         Self {
             vessel: vessel(simulation.lumen()),
             motion: json(serde_json::to_vec(&scene.vessel.motion)),
@@ -65,7 +66,7 @@ impl Parts {
             sac: json(serde_json::to_vec(&sac)),
             field: json(serde_json::to_vec(&scene.field)),
             device: json(pushed(scene, simulation)),
-            sheath: hash(sheath.collect()),
+            sheath: hash(sheath.flat_map(|c| c.to_le_bytes()).collect()),
             method: json(serde_json::to_vec(&scene.method)),
         }
     }

@@ -1,6 +1,7 @@
 //! The introducer sheath: position and direction of the device's entry.
 
 use crate::contact::{check_friction, check_valve};
+use crate::rod::Frame;
 use crate::vessel::Opening;
 use crate::{Error, Result, Vec3};
 
@@ -12,6 +13,11 @@ use crate::{Error, Result, Vec3};
 /// ```
 ///
 /// with the force n⊥ between mouth and device across the axis. Only the hand feels it; nothing inside moves.
+///
+/// At rotation zero the first material direction of a device, towards which a positive first rest curvature bends it,
+/// lies in the plane of `direction` and `bends_towards`, on the side of the latter; the second is `direction` × the
+/// first. Without `bends_towards` it lies towards the coordinate axis least aligned with `direction`, the first of them
+/// if there are several: that axis may change with the least tilt of the sheath, and does not turn with a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sheath {
     /// Mouth of the sheath, mm.
@@ -22,7 +28,13 @@ pub struct Sheath {
     pub friction_n: f64,
     /// μ: Coulomb coefficient of the mouth.
     pub friction: f64,
+    /// Direction towards which the first material direction points at rotation zero, of any length; that of the
+    /// coordinate axis least aligned with `direction` if absent.
+    pub bends_towards: Option<Vec3>,
 }
+
+/// Smallest angle between `bends_towards` and the sheath's axis, rad: below it rounding would determine the roll.
+const LEAST_ANGLE: f64 = 1e-6;
 
 impl Sheath {
     /// The same sheath with friction; 0 for none.
@@ -33,6 +45,30 @@ impl Sheath {
         check_valve("sheath.friction_n", friction_n)?;
         check_friction("sheath.friction", friction)?;
         Ok(Self { friction_n, friction, ..self })
+    }
+
+    /// The same sheath with devices rolled in it so that, at rotation zero, a positive first rest curvature bends them
+    /// towards this direction, of any length.
+    ///
+    /// # Errors
+    /// A direction that is zero, not finite, or along the sheath's.
+    pub fn bending_towards(self, towards: Vec3) -> Result<Self> {
+        let refused =
+            |mend: &str| Err(Error::parameter("sheath.bends_towards", crate::error::vector(&towards), mend));
+        let Some(unit) = unit(&towards) else {
+            return refused("must be a direction, not all zero");
+        };
+        if unit.cross(&self.direction).norm() < LEAST_ANGLE {
+            return refused(
+                "is along sheath.direction, and says nothing about the roll: give a direction across it",
+            );
+        }
+        Ok(Self { bends_towards: Some(unit), ..self })
+    }
+
+    /// The triad of a device in it at rotation zero: its tangent, and its two material directions.
+    pub fn frame(&self) -> Frame {
+        Frame::new(self.direction, self.bends_towards)
     }
 
     /// Whether it has friction.
@@ -71,17 +107,14 @@ impl Sheath {
                 "must be three finite numbers",
             ));
         }
-        // Of any length: the largest component is factored out first, so that squares neither overflow nor underflow.
-        let largest = direction.amax();
-        let unit = (direction / largest).normalize();
-        if !(direction.iter().all(|c| c.is_finite()) && unit.iter().all(|c| c.is_finite())) {
+        let Some(unit) = unit(&direction) else {
             return Err(Error::parameter(
                 "sheath.direction",
                 show(&direction),
                 "must be a direction, not all zero",
             ));
-        }
-        Ok(Self { position_mm, direction: unit, friction_n: 0.0, friction: 0.0 })
+        };
+        Ok(Self { position_mm, direction: unit, friction_n: 0.0, friction: 0.0, bends_towards: None })
     }
 
     /// A sheath in the middle of an opening of a vessel ([`Lumen`](crate::vessel::Lumen) or [`Wall`](crate::vessel::Wall)), pointing into it.
@@ -113,9 +146,37 @@ impl Sheath {
     }
 }
 
+/// The unit vector along a finite vector of any length but zero.
+fn unit(direction: &Vec3) -> Option<Vec3> {
+    // The largest component is factored out first, so that squares neither overflow nor underflow.
+    let unit = (direction / direction.amax()).normalize();
+    let is_finite = direction.iter().chain(unit.iter()).all(|c| c.is_finite());
+    is_finite.then_some(unit)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_roll_is_towards_a_direction_across_the_sheath() {
+        let sheath = Sheath::new(Vec3::zeros(), Vec3::new(0.0, 0.0, 3.0)).unwrap();
+        // By default towards the first of the axes across it.
+        assert_eq!((sheath.frame().u, sheath.frame().v), (Vec3::x(), Vec3::y()));
+        let rolled = sheath.bending_towards(Vec3::new(0.0, 1e-200, 5e-200)).unwrap();
+        assert!((rolled.frame().u - Vec3::y()).norm() < 1e-15, "{rolled:?}");
+        assert!((rolled.frame().v + Vec3::x()).norm() < 1e-15, "{rolled:?}");
+        for towards in [
+            Vec3::zeros(),
+            Vec3::new(0.0, f64::NAN, 1.0),
+            Vec3::new(f64::INFINITY, 0.0, 0.0),
+            Vec3::z() * -2.0,
+            Vec3::new(1e-8, 0.0, 1.0),
+        ] {
+            let told = sheath.bending_towards(towards).unwrap_err();
+            assert!(told.is_input() && told.to_string().starts_with("sheath.bends_towards = "), "{told}");
+        }
+    }
 
     #[test]
     fn a_direction_of_any_length_will_do_and_none_will_not() {

@@ -155,6 +155,9 @@ pub struct SheathSpec {
     pub position_mm: Option<[f64; 3]>,
     /// Direction of insertion, any length.
     pub direction: Option<[f64; 3]>,
+    /// Direction towards which a positive first rest curvature bends a device at rotation zero, any length; that of the
+    /// coordinate axis least aligned with the direction of insertion if absent.
+    pub bends_towards: Option<[f64; 3]>,
     /// Friction of the valve, N; 0 disables it.
     #[serde(default)]
     pub friction_n: f64,
@@ -197,6 +200,7 @@ impl SheathSpec {
                 "give either opening (with depth_mm if wanted) or position_mm and direction",
             )),
         }?;
-        sheath.rubbing(self.friction_n, self.friction)
+        let sheath = sheath.rubbing(self.friction_n, self.friction)?;
+        self.bends_towards.map_or(Ok(sheath), |towards| sheath.bending_towards(Vec3::from(towards)))
     }
 }

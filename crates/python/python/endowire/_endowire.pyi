@@ -151,6 +151,7 @@ class Simulation:
         depth_mm: float | None = None,
         position_mm: ArrayLike | None = None,
         direction: ArrayLike | None = None,
+        bends_towards: ArrayLike | None = None,
         wall: Mapping[str, Any] | None = None,
         method: Mapping[str, Any] | None = None,
         sheath_friction_n: float = 0.0,

@@ -42,6 +42,9 @@ impl Cell {
         }
         line(format_args!("\n[sheath]\nposition_mm = {}", list(place.sheath.position_mm.into())));
         line(format_args!("direction = {}", list(place.sheath.direction.into())));
+        if let Some(towards) = place.sheath.bends_towards {
+            line(format_args!("bends_towards = {}", list(towards.into())));
+        }
         line(format_args!("\n[method]\nname = \"kirchhoff\"\nelement_mm = {:?}", self.element_mm));
         line(format_args!("\n[[script]]"));
         let script = self.script(surface);

@@ -105,7 +105,10 @@ pub(super) fn inside(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(
         widest = widest.or(Some(room));
         let (way, direction) = longest_way(query, position_mm, size);
         if best.is_none_or(|(longest, _)| way > longest) {
-            best = Some((way, Sheath { position_mm, direction, friction_n: 0.0, friction: 0.0 }));
+            best = Some((
+                way,
+                Sheath { position_mm, direction, friction_n: 0.0, friction: 0.0, bends_towards: None },
+            ));
         }
     }
     let (_, sheath) = best?;

@@ -23,7 +23,8 @@ pub(super) fn parts(tube_mm: f64) -> (GeneratedWall, Device, Sheath) {
     let tree = CentrelineTree::new((0..4).map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap();
     let position_mm = Vec3::new(-0.5 * tube_mm, 0.0, 30.0);
-    let sheath = Sheath { position_mm, direction: Vec3::x(), friction: 0.0, friction_n: 0.0 };
+    let sheath =
+        Sheath { position_mm, direction: Vec3::x(), friction: 0.0, friction_n: 0.0, bends_towards: None };
     let wire = Section::straight(200.0, RADIUS_MM, 0.05);
     let section = Section { rest_curvature_per_mm: [1.0 / 3.0, 0.02], ..wire };
     (made, Device::new(vec![section]).unwrap(), sheath)

@@ -12,7 +12,7 @@ use super::step_control::Stride;
 use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
-use crate::rod::{Frame, RodState};
+use crate::rod::RodState;
 use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
 
@@ -102,7 +102,7 @@ impl KirchhoffState {
     pub(super) fn at(surroundings: &Surroundings<'_>) -> Self {
         let (sheath, stack) = (surroundings.sheath, surroundings.stack);
         let mut rod = RodState::default();
-        rod.frames.push(Frame::new(sheath.direction, None));
+        rod.frames.push(sheath.frame());
         rod.angles.resize(stack.angles().max(1), 0.0);
         rod.positions.push(sheath.position_mm);
         let instruments = if stack.is_several() {
@@ -243,10 +243,11 @@ impl KirchhoffState {
                 format!("{n} elements or none have learnt"),
             ));
         }
-        let (position, direction) = (belongs.sheath.position_mm, r.frames[0].t);
-        if r.positions[0] != position || (direction - belongs.sheath.direction).norm() > SAME_DIRECTION {
+        let (position, frame, was) = (belongs.sheath.position_mm, belongs.sheath.frame(), &r.frames[0]);
+        let turned = (frame.t - was.t).norm().max((frame.u - was.u).norm());
+        if r.positions[0] != position || turned > SAME_DIRECTION {
             let mend = format!(
-                "the sheath's mouth is at {} here, and its direction must be the same",
+                "the sheath's mouth is at {} here, and its direction and bends_towards must be the same",
                 show(&position)
             );
             return Err(other("sheath", show(&r.positions[0]), mend));

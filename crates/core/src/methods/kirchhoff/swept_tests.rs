@@ -85,7 +85,8 @@ fn a_soft_bent_wire_is_held_by_the_wall_of_a_widening() {
     let tree = CentrelineTree::new(profile.iter().enumerate().map(node).collect()).unwrap();
     let tip = Section { rest_curvature_per_mm: [0.4, 0.05], ..Section::straight(74.0, 0.2, 0.05) };
     let position_mm = Vec3::new(0.0, 0.0, 1.0);
-    let sheath = Sheath { position_mm, direction: Vec3::z(), friction: 0.0, friction_n: 0.0 };
+    let sheath =
+        Sheath { position_mm, direction: Vec3::z(), friction: 0.0, friction_n: 0.0, bends_towards: None };
     let properties = WallProperties { modulus_n_per_mm2: 1.0, friction: 0.0, ..WallProperties::default() };
     let method = KirchhoffOptions { element_mm: 1.0, self_contact: true, ..KirchhoffOptions::default() };
     let builder = Simulation::builder(swept(&tree), Device::new(vec![tip]).unwrap(), sheath);

@@ -23,7 +23,7 @@ fn in_tube(
     };
     let tree = CentrelineTree::new((0..4).map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap();
-    let sheath = Sheath { position_mm, direction, friction: 0.0, friction_n: 0.0 };
+    let sheath = Sheath { position_mm, direction, friction: 0.0, friction_n: 0.0, bends_towards: None };
     let properties = WallProperties { friction, modulus_n_per_mm2, ..WallProperties::default() };
     let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
     Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
@@ -169,6 +169,7 @@ fn a_wire_that_winds_up_takes_what_the_hand_gives() {
         direction: Vec3::new(0.01, 0.02, 1.0).normalize(),
         friction: 0.0,
         friction_n: 0.0,
+        bends_towards: None,
     };
     let properties = WallProperties { friction: 0.3, modulus_n_per_mm2: 50.0, ..WallProperties::default() };
     let method = KirchhoffOptions { element_mm: 1.0, ..KirchhoffOptions::default() };
