@@ -55,8 +55,8 @@ fn all_methods_bend_to_the_same_side_and_there_where_the_sheath_says() {
                 simulation.step(Command::advance(10.0)).unwrap();
                 let aside = aside(&simulation);
                 assert!((aside.norm() - (1.0 - 1.0f64.cos()) / TIP.1).abs() < 0.1, "{name}: {aside}");
-                if towards.is_some() {
-                    let (t, way) = (simulation.sheath().direction, towards.unwrap());
+                if let Some(way) = towards {
+                    let t = simulation.sheath().direction;
                     let across = (way - t * way.dot(&t)).normalize();
                     assert!((aside.normalize() - across).norm() < 1e-3, "{name}: {aside} {across}");
                 }

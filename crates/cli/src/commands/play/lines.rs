@@ -2,7 +2,8 @@
 
 use std::io::{self, BufRead, Read};
 use std::path::PathBuf;
-use std::sync::mpsc::Sender;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::time::Duration;
 
 use endowire_core::error::nearest_name;
 use endowire_core::input::plain;
@@ -77,6 +78,30 @@ fn checked(order: Order) -> Result<Order, String> {
     }
 }
 
+/// Time in which the last answer can be written, after which the session ends without its being read.
+const LAST_ANSWER: Duration = Duration::from_secs(2);
+
+/// Where the answer to a line goes.
+#[derive(Debug)]
+pub(crate) struct Reply {
+    to: Sender<String>,
+    /// Disconnected when the answer is written.
+    written: Receiver<()>,
+}
+
+impl Reply {
+    /// Hands over an answer. Its client may have left, which does not matter.
+    pub(crate) fn send(&self, answer: String) {
+        let _ = self.to.send(answer);
+    }
+
+    /// Hands over the last answer, and waits until it is written: the end of the program would overtake it.
+    pub(crate) fn send_last(&self, answer: String) {
+        self.send(answer);
+        let _ = self.written.recv_timeout(LAST_ANSWER);
+    }
+}
+
 /// The answer to a line.
 #[derive(Serialize)]
 struct Answer<'a> {
@@ -106,8 +131,8 @@ pub(crate) fn read(
             continue;
         }
         let line = text.and_then(|text| parse(&text)).and_then(&allowed);
-        let (reply, answered) = std::sync::mpsc::channel();
-        if to.send(Message::Line(line, reply)).is_err() {
+        let ((answer, answered), (_writing, written)) = (mpsc::channel(), mpsc::channel());
+        if to.send(Message::Line(line, Reply { to: answer, written })).is_err() {
             return;
         }
         match answered.recv() {

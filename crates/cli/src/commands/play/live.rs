@@ -12,7 +12,7 @@ use endowire_viewer::Image;
 use serde::Serialize;
 
 use super::Channel;
-use super::lines::{self, Line, Order};
+use super::lines::{self, Line, Order, Reply};
 use super::record::Record;
 use crate::commands::run::interrupts;
 use crate::failure::Failure;
@@ -31,7 +31,7 @@ pub(crate) enum Message {
     /// From the window.
     Input(Input),
     /// A line of the protocol, or why it is invalid, with the receiver of its answer.
-    Line(std::result::Result<Line, String>, Sender<String>),
+    Line(std::result::Result<Line, String>, Reply),
     /// Standard input has ended.
     Ended,
     /// The window was closed.
@@ -196,8 +196,14 @@ pub(crate) fn physics(
                 }
                 Ok(Message::Line(line, reply)) => {
                     input_at.get_or_insert_with(Instant::now);
-                    goes_on &= !matches!(line, Ok(Line::Order(Order::Quit {})));
-                    let _ = reply.send(lines::answer(said(line, &mut session), &session.readout()));
+                    let quits = matches!(line, Ok(Line::Order(Order::Quit {})));
+                    let answer = lines::answer(said(line, &mut session), &session.readout());
+                    if quits {
+                        reply.send_last(answer);
+                        goes_on = false;
+                    } else {
+                        reply.send(answer);
+                    }
                 }
             }
             if !goes_on {

@@ -50,10 +50,12 @@ pub(crate) fn run(
                         picture(&file, window, &session, &mut pictures)
                     }
                 };
-                let _ = reply.send(lines::answer(done, &session.readout()));
+                let answer = lines::answer(done, &session.readout());
                 if quits {
+                    reply.send_last(answer);
                     break;
                 }
+                reply.send(answer);
             }
         }
         record.keep(&session)?;
