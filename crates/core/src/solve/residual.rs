@@ -2,7 +2,8 @@
 
 use super::external::External;
 use super::newton::Newton;
-use crate::rod::{ElementData, Layout, Supports};
+use crate::Vec3;
+use crate::rod::{ElementData, Layout, RodState, Supports};
 
 /// Size of a residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +85,19 @@ impl<const C: usize> Newton<C> {
             relative = larger(relative, value);
         }
         ResidualSize { relative, small, rounding }
+    }
+}
+
+impl<const C: usize> Newton<C> {
+    /// Forces that the assembled system leaves unbalanced at free nodes, along the rod, N.
+    ///
+    /// A hand holds them too. By the envelope theorem a state off its equilibrium by a residual r has a push force off
+    /// by r · dx/ds, and a rod that advances moves nearly along itself. A stiff rod along which little acts is an
+    /// equilibrium within its tolerance before its axial force is known: all of its push force is here.
+    pub(crate) fn unbalanced_along_n(&self, state: &RodState) -> f64 {
+        let rows = |i: usize| &self.assembly.residual[Layout::<C>.position(i)..][..3];
+        let along = (1..=state.elements()).map(|i| Vec3::from_column_slice(rows(i)).dot(&state.frames[i].t));
+        along.sum()
     }
 }
 

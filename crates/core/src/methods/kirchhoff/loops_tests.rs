@@ -95,6 +95,28 @@ fn loops_lie_on_each_other_and_do_not_pass() {
     assert!(touching == 0 && least_mm < RADIUS_MM, "{least_mm}");
 }
 
+/// Energy of the wire with 36 mm out, mJ, and whether it touches itself.
+fn curled(element_mm: f64, step_mm: f64, self_contact: bool) -> (f64, bool) {
+    let (made, device, sheath) = parts(4.0);
+    let builder = Simulation::builder(made.wall, device, sheath).properties(properties());
+    let method = KirchhoffOptions { element_mm, ..method(self_contact) };
+    let mut simulation = builder.method(&method).build().unwrap();
+    for _ in 0..(36.0 / step_mm) as usize {
+        assert!(simulation.step(Command::advance(step_mm)).unwrap().converged);
+    }
+    (simulation.report().energy.total(), !simulation.touching().is_empty())
+}
+
+#[test]
+fn steps_and_elements_do_not_change_the_energy_of_loops() {
+    let (mj, touches) = curled(1.0, 0.5, true);
+    assert!(touches);
+    let off = |(other_mj, _): (f64, bool)| (other_mj / mj - 1.0).abs();
+    let found = [curled(1.0, 0.25, true), curled(0.5, 0.5, true), curled(1.0, 0.5, false)].map(off);
+    assert!(found[0] < 1e-4 && found[1] < 0.01, "{found:?}");
+    assert!(found[2] > 0.02, "the twin, which passes through itself: {found:?}");
+}
+
 #[test]
 fn nothing_is_built_where_nothing_can_touch() {
     let (made, device, sheath) = parts(4.0);

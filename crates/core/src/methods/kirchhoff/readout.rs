@@ -92,8 +92,8 @@ impl<const C: usize> Tools<C> {
             let point = mesh.points.get(*index).filter(|point| mesh.is_coming_in(point))?;
             Some(touch.energy_mj / point.weight_mm)
         });
-        report.push_force_n =
-            clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest) + coming_in.sum::<f64>();
+        let clamped_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
+        report.push_force_n = clamped_n + coming_in.sum::<f64>() + self.newton.unbalanced_along_n(rod);
         report.torque_nmm = clamp.torque;
         if Layout::<C>::ANGLES > 0 {
             report.tip_rotation_rad += rod.twist();
