@@ -108,6 +108,9 @@ pub(crate) struct CoilArgs {
     /// Coefficient of friction of coils on themselves and on each other
     #[arg(long, default_value_t = 0.2, value_name = "MU", allow_negative_numbers = true)]
     pub(crate) self_friction: f64,
+    /// Height of the catheter's tip above the plane of the neck, as a fraction of the height of the sac; 0.25 if absent
+    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    pub(crate) tip_height: Option<f64>,
     /// Folder for coil.csv, .json, .svg and .png
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

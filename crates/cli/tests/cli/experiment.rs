@@ -187,9 +187,27 @@ fn coils_follow_each_other_into_a_sac_and_what_it_cannot_hold_is_refused() {
     for (flags, word) in [
         (["--length-mm", "900"], "holds no more than 50 %"),
         (["--volume-mm3", "1"], "--volume-mm3 1: give a number from 5 to 2000"),
+        (["--tip-height", "1.5"], "--tip-height 1.5: give a number from 0.1 to 0.8"),
     ] {
         let refused = experiment(&[&small[..1], &flags[..]].concat());
         assert_eq!(refused.status.code(), Some(2));
         assert!(said(&refused).contains(word), "{}", said(&refused));
+    }
+}
+
+/// Lamano et al. (2014): push forces are largest with framing coils, and with the catheter's tip at the top of the sac.
+#[test]
+fn coils_are_harder_to_push_if_they_are_stiff_and_if_the_catheter_is_near_the_dome() {
+    let largest_n = |kind: &str, height: &str| {
+        let coil = ["coil", "--coils", kind, "--volume-mm3", "30", "--length-mm", "12", "--step-mm", "1"];
+        let found = told(&experiment(&[&coil[..], &["--tip-height", height, "--json"]].concat()));
+        let forces = rows(&found).iter().map(|row| row["push_force_n"].as_f64().unwrap());
+        forces.fold(f64::MIN, f64::max)
+    };
+    let framing_n = ["0.15", "0.45", "0.75"].map(|height| largest_n("framing", height));
+    assert!(framing_n.is_sorted() && framing_n[2] > 10.0 * framing_n[0], "{framing_n:?}");
+    for (height, framing_n) in ["0.15", "0.45"].into_iter().zip(framing_n) {
+        let finishing_n = largest_n("finishing", height);
+        assert!(finishing_n < 0.1 * framing_n, "{finishing_n} {framing_n}");
     }
 }

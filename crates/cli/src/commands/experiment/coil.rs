@@ -42,6 +42,8 @@ const PUSHER_MM: f64 = 60.0;
 const BEYOND_MM: f64 = 0.6;
 /// Smallest and largest volume of a sac, mm³.
 const SACS_MM3: (f64, f64) = (5.0, 2000.0);
+/// Smallest and largest height of the catheter's tip, as fractions of the sac's.
+const TIP_HEIGHTS: (f64, f64) = (0.1, 0.8);
 /// Largest number of coils: instruments of a stack, less the catheter.
 const MOST_COILS: usize = 15;
 
@@ -108,9 +110,7 @@ pub(super) fn coil(args: &CoilArgs) -> Result<(), Failure> {
         }
     }
     bar.finish_and_clear();
-    let arguments =
-        format!("experiment coil {:?} {} {} {}", args.coils, args.volume_mm3, args.length_mm, args.step_mm);
-    let provenance = Provenance::of_program(&arguments);
+    let provenance = Provenance::of_program(&arguments(args));
     let frames = args.out.as_deref().map_or_else(|| Ok(Vec::new()), |folder| picture(args, &rows, folder))?;
     let document = Document { provenance, sac, rows, largest_void_mm, frames, failure };
     if let Some(folder) = &args.out {
@@ -118,6 +118,15 @@ pub(super) fn coil(args: &CoilArgs) -> Result<(), Failure> {
     }
     answer(&document, args.json, || table(args, &document))?;
     document.failure.map_or(Ok(()), |reason| Err(Failure::Computation(reason)))
+}
+
+/// All that the result depends on.
+fn arguments(args: &CoilArgs) -> String {
+    let CoilArgs { coils, volume_mm3, length_mm, step_mm, element_mm, friction, self_friction, tip_height, .. } =
+        args;
+    format!(
+        "experiment coil {coils:?} {volume_mm3} {length_mm} {step_mm} {element_mm} {friction} {self_friction} {tip_height:?}"
+    )
 }
 
 fn check(args: &CoilArgs) -> Result<(), Failure> {
@@ -133,6 +142,7 @@ fn check(args: &CoilArgs) -> Result<(), Failure> {
     within("--element-mm", args.element_mm, (0.1, 2.0))?;
     within("--friction", args.friction, (0.0, 2.0))?;
     within("--self-friction", args.self_friction, (0.0, 2.0))?;
+    args.tip_height.map_or(Ok(()), |height| within("--tip-height", height, TIP_HEIGHTS))?;
     if args.coils.is_empty() || args.coils.len() > MOST_COILS {
         return Err(Failure::Input(format!("--coils: give 1 to {MOST_COILS}")));
     }
@@ -217,8 +227,15 @@ fn begin(args: &CoilArgs) -> Result<(Simulation, Sac), Failure> {
     let generated = GeneratedWall::new(&scaled, Resolution::EdgeMm(EDGE_MM * by))?;
     let place = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z) * by;
     let sac = Sac::measure(&generated.wall, place(DOME_MM), place(ARTERY_MM))?;
-    let (mouth, tip) = (place(ARTERY_MM), place(TIP_MM));
-    let sheath = Sheath::new(mouth, tip - mouth)?;
+    let mouth = place(ARTERY_MM);
+    let sheath = Sheath::new(mouth, place(TIP_MM) - mouth)?;
+    let way_mm = match args.tip_height {
+        Some(height) => {
+            let above_mm = height * sac.height_mm + (sac.neck_mm - mouth).dot(&sac.normal);
+            above_mm / sheath.direction.dot(&sac.normal)
+        }
+        None => (place(TIP_MM) - mouth).norm(),
+    };
     let mut instruments = Vec::new();
     for (number, kind) in args.coils.iter().enumerate() {
         let device = kind.device(args.length_mm, BALL_MM * by)?;
@@ -243,7 +260,6 @@ fn begin(args: &CoilArgs) -> Result<(Simulation, Sac), Failure> {
     };
     let builder = Simulation::builder(generated.wall, Stack::new(instruments)?, sheath);
     let mut simulation = builder.properties(properties).method(&method).build()?;
-    let way_mm = (tip - mouth).norm();
     let count = (way_mm / args.step_mm).ceil();
     for _ in 0..count as usize {
         let command = Command::advance(way_mm / count);
