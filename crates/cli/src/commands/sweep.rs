@@ -145,7 +145,7 @@ impl Recordings<'_> {
         let text = run.standalone()?;
         whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
         let scene = Scene::read(&scene_file)?;
-        recorder.pack(scene.sac(simulation.lumen(), self.store)?)?;
+        recorder.pack(scene.sac(simulation.lumen(), self.store)?, simulation)?;
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
         let frames = FrameWriter::new(&scene_file, &scene, drawn, self.store)?;
         frames.check_angiogram(None)?;

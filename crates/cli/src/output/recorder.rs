@@ -219,8 +219,9 @@ impl Recorder {
     }
 
     /// Also records the packing of the scene's sac, if it has one, from the next step on.
-    pub(crate) fn pack(&mut self, sac: Option<Sac>) -> Result<(), Failure> {
-        self.packing = sac.map(|sac| PackingTable::go_on(&self.folder, sac, self.steps)).transpose()?;
+    pub(crate) fn pack(&mut self, sac: Option<Sac>, simulation: &Simulation) -> Result<(), Failure> {
+        let table = |sac| PackingTable::go_on(&self.folder, sac, self.steps, simulation);
+        self.packing = sac.map(table).transpose()?;
         Ok(())
     }
 

@@ -193,6 +193,10 @@ fn coils_follow_each_other_into_a_sac_and_what_it_cannot_hold_is_refused() {
         assert_eq!(refused.status.code(), Some(2));
         assert!(said(&refused).contains(word), "{}", said(&refused));
     }
+    let file = folder.path().join("coil.csv");
+    let refused = experiment(&["coil", "--out", file.to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(2), "before it computes for minutes");
+    assert!(said(&refused).contains("is a file: give a folder"), "{}", said(&refused));
 }
 
 /// Lamano et al. (2014): push forces are largest with framing coils, and with the catheter's tip at the top of the sac.

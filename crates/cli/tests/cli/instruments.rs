@@ -194,6 +194,11 @@ fn what_a_coil_fills_of_a_sac_is_told_step_by_step_and_by_a_run_that_goes_on() {
     let second = run(&["--resume", text(&state)]);
     assert_eq!(table().len(), 16);
     assert!(second["packing"]["density"].as_f64().unwrap() > density);
+    // Nothing more of it, into a folder without the earlier rows.
+    let other = folder.path().join("other");
+    let args = ["run", text(&file), "--resume", text(&state), "--out", text(&other), "--json"];
+    let third = told(&endowire().args(args).output().unwrap());
+    assert_eq!(third["packing"]["density"], second["packing"]["density"]);
     // A place that is not in the vessel, by its key.
     scene("advance_mm = 6.0\nstep_mm = 0.5", "dome_mm = [90.0, 6.0, 36.0]");
     let refused = endowire().args(["run", text(&file), "--out", text(&out)]).output().unwrap();

@@ -122,8 +122,17 @@ pub(super) fn coil(args: &CoilArgs) -> Result<(), Failure> {
 
 /// All that the result depends on.
 fn arguments(args: &CoilArgs) -> String {
-    let CoilArgs { coils, volume_mm3, length_mm, step_mm, element_mm, friction, self_friction, tip_height, .. } =
-        args;
+    let CoilArgs {
+        coils,
+        volume_mm3,
+        length_mm,
+        step_mm,
+        element_mm,
+        friction,
+        self_friction,
+        tip_height,
+        ..
+    } = args;
     format!(
         "experiment coil {coils:?} {volume_mm3} {length_mm} {step_mm} {element_mm} {friction} {self_friction} {tip_height:?}"
     )

@@ -20,6 +20,16 @@ use crate::output::to_json;
 
 /// Runs the requested experiment.
 pub(crate) fn experiment(command: &ExperimentCommand) -> Result<(), Failure> {
+    let out = match command {
+        ExperimentCommand::Timing(args) => &args.out,
+        ExperimentCommand::Navigation(args) => &args.out,
+        ExperimentCommand::Loop(args) => &args.out,
+        ExperimentCommand::Coil(args) => &args.out,
+        ExperimentCommand::Deformation(args) => &args.out,
+    };
+    if let Some(file) = out.as_ref().filter(|path| path.is_file()) {
+        return Err(Failure::Input(format!("--out {}: is a file: give a folder", file.display())));
+    }
     match command {
         ExperimentCommand::Timing(args) => timing::timing(args),
         ExperimentCommand::Navigation(args) => navigation::navigation(args),

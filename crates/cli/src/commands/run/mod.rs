@@ -76,7 +76,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
         recorder
     };
-    recorder.pack(sac)?;
+    recorder.pack(sac, &simulation)?;
 
     // From here on data are recorded and must be kept, whatever happens.
     let so_far = SoFar {
