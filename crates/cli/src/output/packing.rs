@@ -61,19 +61,28 @@ impl PackingTable {
     ) -> Result<Self, Failure> {
         let path = folder.join(PACKING);
         let table = StepTable::go_on(&path, steps).map_err(|e| Failure::write(&path, &e))?;
-        let mut told = Packed::none(&sac);
+        let (mut told, rows) = (Packed::none(&sac), rows::read::<Row>(&path)?);
         // In a new folder earlier steps have no rows, and the state is all that is known of them.
-        if steps > 0 {
-            told.add(&row(steps, simulation, &sac)?);
-            told = Packed { herniated_steps: 0, first_herniated_step: None, ..told };
+        if steps > 0 && rows.is_empty() {
+            let Packing { density, neck_coverage, outside_mm, .. } = Packing::of(simulation, &sac)?;
+            told = Packed { density, neck_coverage, outside_mm, ..told };
         }
-        rows::read::<Row>(&path)?.iter().for_each(|row| told.add(row));
+        rows.iter().for_each(|row| told.add(row));
         Ok(Self { table, told, sac })
     }
 
     /// Adds the row of a step.
     pub(crate) fn push(&mut self, step: usize, simulation: &Simulation) -> io::Result<()> {
-        let row = row(step, simulation, &self.sac).map_err(io::Error::other)?;
+        let packing = Packing::of(simulation, &self.sac).map_err(io::Error::other)?;
+        let row = Row {
+            step,
+            coils_mm3: packing.coils_mm3,
+            packing: packing.density,
+            neck_coverage: packing.neck_coverage,
+            outside_mm: packing.outside_mm,
+            herniated: packing.herniated,
+            dome_force_n: packing.dome_force_n,
+        };
         self.told.add(&row);
         self.table.push(row)?;
         self.table.flush()
@@ -88,19 +97,6 @@ impl PackingTable {
     pub(crate) fn sync(&self) -> io::Result<()> {
         self.table.sync()
     }
-}
-
-fn row(step: usize, simulation: &Simulation, sac: &Sac) -> endowire_core::Result<Row> {
-    let packing = Packing::of(simulation, sac)?;
-    Ok(Row {
-        step,
-        coils_mm3: packing.coils_mm3,
-        packing: packing.density,
-        neck_coverage: packing.neck_coverage,
-        outside_mm: packing.outside_mm,
-        herniated: packing.herniated,
-        dome_force_n: packing.dome_force_n,
-    })
 }
 
 impl Packed {

@@ -86,9 +86,7 @@ impl<const C: usize> Newton<C> {
         }
         ResidualSize { relative, small, rounding }
     }
-}
 
-impl<const C: usize> Newton<C> {
     /// Forces that the assembled system leaves unbalanced at free nodes, along the rod, N.
     ///
     /// A hand holds them too. By the envelope theorem a state off its equilibrium by a residual r has a push force off

@@ -131,6 +131,7 @@ pub(crate) fn read(
             continue;
         }
         let line = text.and_then(|text| parse(&text)).and_then(&allowed);
+        // `_writing` lives until the answer is written.
         let ((answer, answered), (_writing, written)) = (mpsc::channel(), mpsc::channel());
         if to.send(Message::Line(line, Reply { to: answer, written })).is_err() {
             return;
