@@ -67,7 +67,7 @@ impl Sheath {
     }
 
     /// The triad of a device in it at rotation zero: its tangent, and its two material directions.
-    pub fn frame(&self) -> Frame {
+    pub(crate) fn frame(&self) -> Frame {
         Frame::new(self.direction, self.bends_towards)
     }
 
