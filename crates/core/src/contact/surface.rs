@@ -91,9 +91,12 @@ impl ContactSurface {
         Ok(Self { reach_mm: mesh.reach_mm, felt: Felt::Mesh(Box::new(mesh)), thinnest_mm })
     }
 
-    /// Prepares the wall of `lumen`. One given by a centre line is used directly, unless the device nearly fills it
-    /// somewhere (then the distance has a crest along the axis, which the smooth wall of a mesh rounds off), or the
-    /// wall has regions, which are defined on the vertices of a mesh.
+    /// Prepares the wall of `lumen`. One given by a centre line is used directly, unless the device is thicker than
+    /// its lumen somewhere, or it has regions, which are defined on the vertices of a mesh.
+    ///
+    /// The distance from it has a crest along the axis. A device that fits does not touch the wall there, however
+    /// little play it has; one that is thicker is pressed by the crest itself, which the smooth wall of a mesh rounds
+    /// off. Where it fits a mesh is no substitute: the depth of its facets is a large part of a small play.
     ///
     /// # Errors
     /// As [`Lumen::wall`] and [`ContactSurface::new`].
@@ -104,9 +107,7 @@ impl ContactSurface {
         store: &dyn WallStore,
     ) -> Result<Self> {
         match lumen {
-            Lumen::Swept(vessel)
-                if properties.region.is_empty() && vessel.least_radius_mm() > (1.0 + FOLLOW) * radii_mm.1 =>
-            {
+            Lumen::Swept(vessel) if properties.region.is_empty() && vessel.least_radius_mm() > radii_mm.1 => {
                 let reach_mm = reach_mm(radii_mm.1, 0.0);
                 let felt = Felt::Swept(vessel.field(reach_mm), radii_mm.1);
                 Ok(Self { felt, thinnest_mm: radii_mm.0, reach_mm })

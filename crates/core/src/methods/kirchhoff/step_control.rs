@@ -11,6 +11,9 @@ use super::substep::{Effort, Found, Lost};
 
 /// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
 pub(super) const FOLD_MM: f64 = 0.05;
+/// Largest motion of the hands in a part that may end in a snap, in radii of the thinnest device: the place of the snap
+/// on the way of the hands is known as well as that. Shorter parts mostly find the same equilibrium again.
+pub(super) const SNAP_RADII: f64 = 2.0;
 /// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.
 pub(super) const HELD_MM: f64 = 0.5;
 /// Smallest motion of the hands in a part with relaxation, mm.

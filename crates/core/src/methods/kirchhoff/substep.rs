@@ -12,7 +12,7 @@ use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::{KirchhoffState, UnderWay};
-use super::step_control::FOLD_MM;
+use super::step_control::SNAP_RADII;
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
@@ -72,15 +72,15 @@ pub(super) enum Lost {
 }
 
 impl Lost {
-    /// The failure of a solution, if it is one. `off` is its distance from the prediction, `near` whether it must be
-    /// near, and `used_up` whether its linear solves are.
-    fn of(found: &NewtonReport, (near, used_up): (bool, bool), balanced: bool, off: f64) -> Option<Self> {
+    /// The failure of a solution, if it is one. `near` is whether it must be an equilibrium, `used_up` whether its
+    /// linear solves are, and `left` whether it is farther from its prediction than allowed.
+    fn of(found: &NewtonReport, (near, used_up): (bool, bool), balanced: bool, left: bool) -> Option<Self> {
         let folded = !found.residual.is_finite() || found.reason == StopReason::Folded;
         let reason = match (near, found.converged) {
             (true, false) if used_up => return Some(Self::UnderWay),
             (true, false) => found.reason,
             (true, true) if !balanced => StopReason::Unsettled,
-            (true, true) if off > 1.0 => StopReason::Left,
+            (true, true) if left => StopReason::Left,
             (false, _) if folded => found.reason,
             _ => return None,
         };
@@ -274,6 +274,7 @@ impl<const C: usize> Tools<C> {
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
         let mut loops = options.self_contact.then_some(&mut self.loops);
         let near = matches!(effort, Effort::Near | Effort::Held);
+        let may_snap = attempt.part_mm <= SNAP_RADII * surroundings.device.min_radius_mm();
         if let Some(resumed) = resumed {
             let mut under_way = resumed.state.rod.clone();
             join(&mut under_way, &resumed.state.coils);
@@ -323,7 +324,7 @@ impl<const C: usize> Tools<C> {
         // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let used_up = found.reason == StopReason::MaxIterations && taken.1 >= attempt.solves;
-        let wrong = Lost::of(&found, (near, used_up), balanced, off).or_else(|| {
+        let wrong = Lost::of(&found, (near, used_up), balanced, off > 1.0 && !may_snap).or_else(|| {
             contact.know_whole_base(&mesh.elements);
             contact.passes_through(&mesh.elements, rod).then_some(Lost::Passed)
         });
@@ -354,10 +355,10 @@ impl<const C: usize> Tools<C> {
         let after = next.parts().1;
         let (lacks, is_set_free) = (balance.lacks(), balance.is_set_free());
         // Only a short part shows a jump: in a long one forces may go far beyond their values at its ends.
-        if near && (lacks || (is_set_free && attempt.part_mm > FOLD_MM)) {
+        if near && (lacks || (is_set_free && !may_snap)) {
             return Err(Lost::Unbalanced);
         }
-        let jumps = (effort == Effort::Flight && off > 1.0) || is_set_free;
+        let jumps = (effort != Effort::Moving && off > 1.0) || is_set_free;
         let (rubbed_mj, released_mj) = balance.lost_mj(jumps);
         let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(rubbed_mj + released_mj) };
         let (dissipated_mj, residual) = (rubbed_mj + outside_mj, found.residual);
