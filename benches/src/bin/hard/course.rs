@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use endowire_core::Result;
 use endowire_core::insertion::{Move, Simulation};
 use endowire_verify::sequences::part_of;
 
@@ -33,22 +34,34 @@ impl Course {
                 return;
             }
             let time_s = times_s.map(|(from, to)| from + (to - from) * k as f64 / parts as f64);
-            let begun = Instant::now();
-            let done = self.simulation.step_until(&part, time_s);
-            let took_s = begun.elapsed().as_secs_f64();
-            self.seconds += took_s;
-            self.slowest_s = self.slowest_s.max(took_s);
-            match done {
-                Ok(report) => {
-                    self.commands += 1;
-                    self.iterations += u64::from(report.iterations);
-                    self.flights += u64::from(report.relaxations);
-                    self.jumps += usize::from(report.jumped);
-                    self.unconverged += usize::from(!report.converged);
-                }
-                Err(error) => self.end = Some(error.to_string()),
-            }
+            self.record(|simulation| simulation.step_until(&part, time_s).map(drop));
         }
+    }
+
+    /// Carries out a tick of so many solves; not once something has ended the way.
+    pub(crate) fn tick(&mut self, moves: &[Move], solves: usize) {
+        if self.end.is_none() {
+            self.record(|simulation| simulation.tick(moves, solves, None).map(drop));
+        }
+    }
+
+    /// Carries out a command, and adds what it took.
+    fn record(&mut self, command: impl FnOnce(&mut Simulation) -> Result<()>) {
+        let begun = Instant::now();
+        let done = command(&mut self.simulation);
+        let took_s = begun.elapsed().as_secs_f64();
+        self.seconds += took_s;
+        self.slowest_s = self.slowest_s.max(took_s);
+        if let Err(error) = done {
+            self.end = Some(error.to_string());
+            return;
+        }
+        let report = self.simulation.report();
+        self.commands += 1;
+        self.iterations += u64::from(report.iterations);
+        self.flights += u64::from(report.relaxations);
+        self.jumps += usize::from(report.jumped);
+        self.unconverged += usize::from(report.has_failed());
     }
 
     /// Distance of its tip from that of another, mm.

@@ -5,6 +5,7 @@
 //! cargo run --release -p endowire-benches --bin hard -- lines [NAME]         # what each of them takes, for `benches/ablation.sh`
 //! cargo run --release -p endowire-benches --bin hard -- turned [SCENE]       # 480 insertions of four scenes against steps of 0.25 mm
 //! cargo run --release -p endowire-benches --bin hard -- sequences [SEEDS]    # random commands, each against its parts of 1 mm
+//! cargo run --release -p endowire-benches --bin hard -- ticks [DEVICE]       # steps, ticks and small steps of one motion of the hand
 //! cargo run --release -p endowire-benches --bin hard -- deployments [SEEDS]  # two coils out of a catheter and detached, by random commands
 //! ```
 //!
@@ -13,6 +14,7 @@
 
 mod cases;
 mod course;
+mod ticks;
 mod turned;
 
 use std::ops::Range;
@@ -47,8 +49,7 @@ fn seeded<R: std::fmt::Display>(
 
 fn main() -> Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mend =
-        "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]`, `sequences [SEEDS]` or `deployments [SEEDS]`";
+    let mend = "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]`, `ticks [DEVICE]`, `sequences [SEEDS]` or `deployments [SEEDS]`";
     let second = arguments.get(1).map(String::as_str);
     let seeds = |all: u64| {
         let Some(told) = second else { return Ok(0..all) };
@@ -64,6 +65,7 @@ fn main() -> Result<ExitCode> {
             cases::lines(second)?;
             return Ok(ExitCode::SUCCESS);
         }
+        Some("ticks") => ticks::ticks(second)?,
         Some("turned") => turned::turned(second)?,
         Some("sequences") => {
             let head = sequences::SequenceRow::HEAD;

@@ -4,6 +4,8 @@
 //! between bounds from the forces at the ends; and so does the dissipation of friction. Work that is neither stored
 //! nor dissipated was released: the device has jumped.
 
+use serde::{Deserialize, Serialize};
+
 use super::carried::WallWork;
 use super::state::KirchhoffState;
 use crate::device::Stack;
@@ -16,7 +18,7 @@ const NOTABLE: f64 = 0.02;
 const NOTABLE_FLOOR_MJ: f64 = 1e-6;
 
 /// Energy between two states, mJ.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Balance {
     /// Lower bound of the work put in.
     least_mj: f64,
@@ -76,6 +78,25 @@ impl Balance {
         let sizes_mj = [elastic_was, elastic_is, (is.field - was.field).abs(), from_sheath_mj.abs()];
         let notable_mj = NOTABLE * sizes_mj.into_iter().fold(NOTABLE_FLOOR_MJ, f64::max);
         Self { least_mj, mean_mj, most_mj, stored_mj, rubbed_mj, notable_mj }
+    }
+
+    /// The balance of this way and the next one together.
+    pub(super) fn and(&self, next: &Self) -> Self {
+        Self {
+            least_mj: self.least_mj + next.least_mj,
+            mean_mj: self.mean_mj + next.mean_mj,
+            most_mj: self.most_mj + next.most_mj,
+            stored_mj: self.stored_mj + next.stored_mj,
+            rubbed_mj: (self.rubbed_mj.0 + next.rubbed_mj.0, self.rubbed_mj.1 + next.rubbed_mj.1),
+            notable_mj: self.notable_mj.max(next.notable_mj),
+        }
+    }
+
+    /// Whether all its numbers are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        let (least_mj, most_mj) = self.rubbed_mj;
+        let work = [self.least_mj, self.mean_mj, self.most_mj];
+        work.into_iter().chain([self.stored_mj, least_mj, most_mj, self.notable_mj]).all(f64::is_finite)
     }
 
     /// Whether energy that had been put in was released.

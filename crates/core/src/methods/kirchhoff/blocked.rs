@@ -132,7 +132,7 @@ mod tests {
         let environment = Environment::new(&surroundings, &wire.surface, &wire.options);
         let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
         let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
-        workspace.carry_out(&environment, &wire.state, &moves).unwrap();
+        workspace.carry_out(&environment, &wire.state, &moves, usize::MAX).unwrap();
         let forward = [Command::advance(1.0)];
         match refuse_narrow(&environment, workspace.now.start(), &forward) {
             Err(Error::End(end)) => Some(end),

@@ -1,5 +1,12 @@
-//! One command: solved in one sub-step if possible, else in several, and by relaxation to rest where the path of
-//! equilibria ends.
+//! The driver of the exact rod: one command, as a step or as ticks.
+//!
+//! A command is gone through in parts. Each part is proposed, solved, and then accepted or rejected
+//! ([`super::course`]): a step goes on until the command is done, a tick until so many linear solves are used up. What
+//! a tick leaves unfinished (a solution, a relaxation, motion of the hands) is kept with the state, and the next tick
+//! or step goes on with it. A tick with enough solves therefore is the step.
+//!
+//! An error after an accepted part of a tick is postponed to the next tick, which repeats it. A step that fails leaves
+//! the state as it was.
 
 use std::sync::Arc;
 
@@ -7,91 +14,29 @@ use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::taken_along;
 use super::configuration::Start;
-use super::hands::{lengths, motions};
-use super::state::{KirchhoffState, Ticking};
-use super::step_control::StepControl;
-use super::substep::{Attempt, Effort, Found};
-use super::workspace::{Work, Workspace};
+use super::course::{Course, Next, Rest};
+use super::extrapolation::Correction;
+use super::hands::{Hand, lengths, motions};
+use super::state::{KirchhoffState, UnderWay};
+use super::substep::{Attempt, Effort, Part};
+use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
-use crate::methods::{Jump, Move, StepReport, Surroundings};
+use crate::methods::{Move, StepReport, Surroundings};
 use crate::{Error, Result};
 
-/// Largest number of sub-steps of one command.
-const SUBSTEP_LIMIT: usize = 4096;
-/// Newton iterations allowed for a command per millimetre and per [`WORK_RAD`], including failed attempts, before it
-/// is relaxed: this bounds its cost.
-const WORK: f64 = 280.0;
-/// Rotation that counts like a millimetre in [`WORK`], rad.
-pub(super) const WORK_RAD: f64 = 0.1;
-/// Upper limit of these iterations, as a multiple of those of one solution.
-const WORK_OF_ONE: usize = 10;
-/// Number of further relaxations, with the hands held still, of a device that rests at the end of its command but not
-/// in equilibrium.
-const AGAIN: usize = 4;
 /// Motion in a further relaxation, in the smallest radius of the device, below which it is at rest.
-pub(super) const REST_RADII: f64 = 1e-3;
-/// Residual, relative to the force scale, above which a device that does not move is not at rest.
-pub(super) const AT_REST: f64 = 0.05;
+const REST_RADII: f64 = 1e-3;
 
-/// Accumulated results of the sub-steps of a command or a tick.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sum {
-    pub(super) substeps: usize,
-    pub(super) relaxations: u32,
-    slides: u32,
-    imbalance: f64,
-    dissipated_mj: f64,
-    borrowed_mj: f64,
-    jump: Option<Jump>,
-    largest_mj: f64,
-}
-
-impl Sum {
-    /// Adds the results of a sub-step.
-    pub(super) fn add(&mut self, found: &Found) {
-        self.imbalance = 0.0;
-        self.slides += found.slides;
-        self.dissipated_mj += found.dissipated_mj;
-        self.borrowed_mj += found.borrowed_mj;
-        if let Some(jump) = found.jump {
-            let so_far = self.jump.get_or_insert(Jump { released_mj: 0.0, ..jump });
-            // The position is that of the largest jump.
-            if jump.released_mj > self.largest_mj {
-                (self.largest_mj, so_far.position_mm) = (jump.released_mj, jump.position_mm);
-            }
-            so_far.released_mj += jump.released_mj;
-        }
-    }
-
-    /// Adds energy dissipated by friction, mJ.
-    pub(super) fn rub(&mut self, dissipated_mj: f64) {
-        self.dissipated_mj += dissipated_mj;
-    }
-
-    /// Records the imbalance of a device that was relaxed from a fold.
-    pub(super) fn note_imbalance(&mut self, found: &Found) {
-        self.imbalance = found.residual.max(found.unsettled);
-    }
-
-    pub(super) fn write(&self, report: &mut StepReport) {
-        report.substeps = self.substeps as u32;
-        (report.relaxations, report.slides) = (self.relaxations, self.slides);
-        (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
-        let released =
-            |jump: Jump| Jump { released_mj: (jump.released_mj - self.borrowed_mj).max(0.0), ..jump };
-        (report.jump, report.jumped) = (self.jump.map(released), self.jump.is_some());
-    }
-}
-
-/// Initial step control for a command from a state, whose hands move by up to `travel_mm`.
-fn control(environment: &Environment<'_>, from: &KirchhoffState, travel_mm: f64) -> StepControl {
-    let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
-    let work = (WORK * travel_mm.max(1.0)) as usize;
-    let control = StepControl::new(work.min(most), from.stride, environment.has_friction());
-    let surroundings = &environment.surroundings;
-    let set_free = travel_mm == 0.0 && !surroundings.moves() && !surroundings.fields_change();
-    if set_free { control.set_free() } else { control }
+/// Result of a command.
+#[derive(Debug)]
+pub(super) enum Driven {
+    /// There is a new state.
+    Moved,
+    /// The device has not moved yet; with what goes on in the next tick.
+    Waits(Rest),
+    /// The solves of a tick do not suffice to follow what changes around the device.
+    Overtaken,
 }
 
 impl<const C: usize> Workspace<C> {
@@ -99,12 +44,7 @@ impl<const C: usize> Workspace<C> {
     ///
     /// # Errors
     /// [`PhysicalEnd`](crate::PhysicalEnd) if the tip has left the vessel and would be pushed on.
-    pub(super) fn begin(
-        &mut self,
-        environment: &Environment<'_>,
-        from: &KirchhoffState,
-        moves: &[Move],
-    ) -> Result<()> {
+    fn begin(&mut self, environment: &Environment<'_>, from: &KirchhoffState, moves: &[Move]) -> Result<()> {
         let Self { tools, now, next, most: (elements, points), way, .. } = self;
         now.own(*elements, *points);
         next.own(*elements, *points);
@@ -125,7 +65,8 @@ impl<const C: usize> Workspace<C> {
         Ok(())
     }
 
-    /// Carries out a command from the state `from`; the new state is in `now`.
+    /// Carries out moves, and what ticks have left over, from the state `from`: all of it with `solves` =
+    /// `usize::MAX`, else as far as about that many linear solves go. A new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::step`](crate::methods::Method::step).
@@ -134,110 +75,127 @@ impl<const C: usize> Workspace<C> {
         environment: &Environment<'_>,
         from: &KirchhoffState,
         moves: &[Move],
-    ) -> Result<()> {
+        solves: usize,
+    ) -> Result<Driven> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
-        let displacement = |part: f64| surroundings.displacement(part);
-        let mut displaced = displacement(0.0);
-        let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
-        let (mut sum, mut balanced) = (Sum::default(), true);
-        let travel = way.travel_mm(WORK_RAD);
-        let mut control = control(environment, from, travel);
-        // Without hand motion the vessel or a field changes, time passes, or something was released.
-        let travel = if travel > 0.0 { travel } else { 1.0 };
-        let mut moved = false;
-        // Progress of the command, 0 to 1: advance and rotation are proportional.
-        let mut done = 0.0f64;
-        let mut again = AGAIN;
-        let thinnest_mm = surroundings.device.min_radius_mm();
-        while done < 1.0 || (!balanced && again > 0) {
-            // A device that rests at the end of the command, but not in equilibrium, continues from there.
-            again -= usize::from(done >= 1.0);
-            // A step of a single part takes milliseconds and is not interrupted.
-            if sum.substeps > 0 {
+        let (start_mm, target_mm) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
+        let mut displaced = surroundings.displacement(0.0);
+        let mut course = Course::new(environment, from, (way, moves));
+        let ends = loop {
+            if course.is_over(way) || course.pauses(&tools.work, solves) {
+                break Ok(());
+            }
+            // A command of a single part takes milliseconds and is not interrupted.
+            if course.parts() > 0 {
                 surroundings.check_stop()?;
             }
-            let was = if moved { now.start() } else { Start { mesh, state: from } };
-            let rest = 1.0 - done;
-            let (effort, part_mm) = control.next(rest * travel);
-            let part = part_mm / travel;
+            let was = if course.moved { now.start() } else { Start { mesh, state: from } };
+            let part = course.propose(way, hands);
             let at_start = environment.displaced(displaced.as_ref());
-            if effort == Effort::Flight {
-                refuse_wedged(&at_start, was, &way.commands)?;
+            if part.effort == Effort::Flight
+                && let Err(wedged) = refuse_wedged(&at_start, was, &way.commands)
+            {
+                break Err(wedged);
             }
-            // A remainder at the level of rounding is ignored.
-            let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
-            way.at(to, hands);
-            let then = displacement(to);
+            let then = surroundings.displacement(part.to);
             let passage = displaced.as_ref().zip(then.as_ref()).filter(|(before, after)| before != after);
             let taken = taken_along(was, passage);
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
-            let there = environment.displaced(then.as_ref()).with_fields_at(to);
-            sum.substeps += 1;
+            let there = environment.displaced(then.as_ref()).with_fields_at(part.to);
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 motions(&was.state.report, hands, &mut tools.guess.motions);
                 now.withdraw(surroundings.stack, hands);
-                sum.rub(tools.write_report(&there, hands, now));
-                break;
+                course.withdrawn(tools.write_report(&there, hands, now));
+                way.go_on_from(hands);
+                break Ok(());
             }
-            let left = passage.map(|passage| (was, passage));
-            let most = control.budget();
-            let attempt = Attempt { hands, part_mm, effort, most, solves: usize::MAX, left, resumed: None };
             let before = tools.work;
+            let left = passage.map(|passage| (was, passage));
+            let attempt = Attempt { hands, left, limits: course.limits(&part, &before, solves), part };
             let tried = tools.try_step(&there, here, attempt, next);
-            control.took(tools.work.since(&before));
-            match tried {
-                // The device came to rest with energy that nobody put in, so the equilibrium was too far away.
-                Ok(found) if found.lacks && control.can_shorten(part_mm) => control.shorten(part_mm),
+            let iterations = tools.work.since(&before);
+            course.took(iterations);
+            let lost = match tried {
+                Ok(found) if course.shortens(&part, &found) => continue,
                 Ok(found) => {
-                    sum.add(&found);
-                    if effort == Effort::Flight {
-                        sum.relaxations += 1;
-                        sum.note_imbalance(&found);
+                    let tip_mm = there.wall().material(&next.state.tip_mm());
+                    if let Err(left) = check_inside(surroundings.lumen.openings(), &tip_mm, 0.0) {
+                        break Err(left);
                     }
-                    // At a crease of the wall forces switch between both sides and never balance; if nothing moves
-                    // any more the device is at rest all the same.
-                    let rests = done >= 1.0
-                        && found.residual <= AT_REST
-                        && was.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
-                    balanced = (found.balanced && !found.lacks) || rests;
-                    check_inside(
-                        surroundings.lumen.openings(),
-                        &there.wall().material(&next.state.tip_mm()),
-                        0.0,
-                    )?;
+                    let way_mm = was.state.rod.farthest_mm(&next.state.rod);
+                    let lies = way_mm <= REST_RADII * surroundings.device.min_radius_mm();
+                    course.accept(&part, &found, lies, iterations);
                     std::mem::swap(now, next);
+                    way.go_on_from(hands);
                     displaced = then;
-                    moved = true;
-                    done = to;
-                    control.succeeded(part_mm, &found);
+                    continue;
                 }
-                // A retry from the same state would give the same result.
-                Err(_) if done >= 1.0 => break,
-                Err(lost) => {
-                    // No equilibrium: if the vessel is too narrow to go on, the error says so, here and below.
-                    if control.failed(part_mm, lost) || sum.substeps > SUBSTEP_LIMIT {
-                        refuse_narrow(&at_start, was, &way.commands)?;
-                        return Err(Error::Computation(format!(
-                            "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"
-                        )));
-                    }
+                Err(lost) => lost,
+            };
+            match course.reject(&part, lost) {
+                Next::Part => {}
+                Next::Tick => {
+                    course.under_way = Some(tools.under_way(&part, hands, &next.state, (from, before)));
+                    break Ok(());
+                }
+                Next::Nothing => break Ok(()),
+                Next::Step => return Ok(Driven::Overtaken),
+                Next::Error => {
+                    // If the vessel is too narrow to go on, the error says so.
+                    let narrow = refuse_narrow(&at_start, was, &way.commands);
+                    break narrow.and_then(|()| {
+                        Err(Error::Computation(format!(
+                            "kirchhoff: no equilibrium between {start_mm:.3} and {target_mm:.3} mm inserted: {lost}"
+                        )))
+                    });
                 }
             }
+        };
+        // Of a tick, what has been reached so far is kept.
+        if ends.is_err() && (solves == usize::MAX || !course.moved) {
+            return ends.map(|()| Driven::Moved);
         }
-        if !balanced {
+        if course.has_failed(way) {
             let there = environment.displaced(displaced.as_ref());
             refuse_narrow(&there, now.start(), &way.commands)?;
         }
+        if !course.moved {
+            return Ok(Driven::Waits(course.rest(way)));
+        }
         let state = now.parts().1;
-        (state.stride, state.tick) = (control.stride(), Ticking::Rest);
-        let report = &mut state.report;
-        sum.write(report);
-        report.converged = balanced;
-        report.behind.clear();
-        report.angles = from.report.angles;
-        tools.work.write(report, from.report.nodes_solved);
-        Ok(())
+        course.write(way, state);
+        state.report.angles = from.report.angles;
+        tools.work.write(&mut state.report, from.report.nodes_solved);
+        Ok(Driven::Moved)
+    }
+}
+
+impl<const C: usize> Tools<C> {
+    /// Stores an unfinished part, with the state `to` of its solution; `before` is the work of the command before the
+    /// part.
+    fn under_way(
+        &mut self,
+        part: &Part<'_>,
+        hands: &[Hand],
+        to: &KirchhoffState,
+        (from, before): (&KirchhoffState, Work),
+    ) -> UnderWay {
+        let iterations = self.work.since(&before) + part.resumed.map_or(0, |resumed| resumed.iterations);
+        // They are counted once, with the state that the part leads to.
+        self.work.nodes_solved = before.nodes_solved;
+        // Only its configuration and knowledge of the wall matter.
+        let report = StepReport { angles: from.report.angles, ..StepReport::default() };
+        let (correction, stride, unfinished) = (Correction::default(), from.stride, None);
+        UnderWay {
+            hands: hands.to_vec(),
+            part_mm: part.part_mm,
+            effort: part.effort,
+            state: KirchhoffState { correction, stride, unfinished, report, ..to.clone() },
+            neighbourhood: self.newton.neighbourhood.clone(),
+            shift: self.newton.last_shift,
+            iterations,
+        }
     }
 }

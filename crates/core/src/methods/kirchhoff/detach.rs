@@ -68,6 +68,7 @@ impl<const C: usize> Workspace<C> {
         state.inner_friction.clear();
         state.pairs.clear();
         state.correction.clear();
+        state.unfinished = None;
         state.report.inserted_mm = mesh.from_tip_mm[0];
         if let Some(told) = state.report.instruments.get_mut(instrument) {
             *told = InstrumentReport::default();
@@ -85,7 +86,7 @@ impl<const C: usize> Workspace<C> {
         Arc::make_mut(&mut state.coils).push(coil);
         let Configuration { mesh, state } = left;
         let was = std::mem::replace(&mut self.mesh, mesh);
-        let done = self.carry_out(environment, &state, &[]);
+        let done = self.carry_out(environment, &state, &[], usize::MAX).map(drop);
         self.mesh = was;
         // The released energy stays in the coil.
         let report = &mut self.now.parts().1.report;

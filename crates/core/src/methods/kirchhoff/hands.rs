@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::state::Ticking;
 use crate::contact::HandMotion;
 use crate::device::Stack;
 use crate::methods::{Command, Move, StepReport};
@@ -56,11 +55,11 @@ pub(super) fn lengths(hands: &[Hand]) -> impl Iterator<Item = f64> {
 /// The simultaneous motion of all hands in a command.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Way {
-    /// Positions at its start.
+    /// Positions where it goes on.
     pub(super) start: Vec<Hand>,
     /// Positions at its end.
     pub(super) target: Vec<Hand>,
-    /// The motion of each hand.
+    /// The whole motion of each hand, with what ticks had left over.
     pub(super) commands: Vec<Command>,
 }
 
@@ -84,27 +83,23 @@ impl Way {
         }
     }
 
-    /// Sets `hands` to the positions at this fraction of the motion, 0 to 1.
+    /// Sets `hands` to the positions at this fraction of the remaining motion, 0 to 1.
     pub(super) fn at(&self, part: f64, hands: &mut Vec<Hand>) {
         if part == 1.0 {
             hands.clone_from(&self.target);
             return;
         }
         hands.clear();
-        hands.extend(self.start.iter().zip(&self.target).zip(&self.commands).map(
-            |((start, target), command)| Hand {
-                inserted_mm: start.inserted_mm + (target.inserted_mm - start.inserted_mm) * part,
-                turn_rad: start.turn_rad + command.rotate_rad * part,
-            },
-        ));
+        hands.extend(self.start.iter().zip(&self.target).map(|(start, target)| Hand {
+            inserted_mm: start.inserted_mm + (target.inserted_mm - start.inserted_mm) * part,
+            turn_rad: start.turn_rad + (target.turn_rad - start.turn_rad) * part,
+        }));
     }
 
-    /// Continues from `hands`: keeps only the remaining motion.
+    /// Continues from `hands`: the motion before them is over.
     pub(super) fn go_on_from(&mut self, hands: &[Hand]) {
         self.start.clear();
         self.start.extend_from_slice(hands);
-        self.commands.clear();
-        self.commands.extend(hands.iter().zip(&self.target).map(|(hand, target)| hand.to(target)));
     }
 
     /// Whether no motion remains.
@@ -112,20 +107,17 @@ impl Way {
         self.start == self.target
     }
 
-    /// What is left of it for each hand; empty where nothing is, and the device is at rest. Hands may rest while it is not.
-    pub(super) fn left(&self, ticking: &Ticking) -> Vec<Command> {
-        if self.is_done() && matches!(ticking, Ticking::Rest) {
-            return Vec::new();
-        }
+    /// What remains of it for each hand.
+    pub(super) fn left(&self) -> Vec<Command> {
         self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)).collect()
     }
 
-    /// Largest motion of a hand, mm; a rotation of `turn_rad` counts as one.
+    /// Largest remaining motion of a hand, mm; a rotation of `turn_rad` counts as one.
     pub(super) fn travel_mm(&self, turn_rad: f64) -> f64 {
-        let each =
-            self.start.iter().zip(&self.target).zip(&self.commands).map(|((start, target), command)| {
-                (target.inserted_mm - start.inserted_mm).abs().max(command.rotate_rad.abs() / turn_rad)
-            });
+        let each = self.start.iter().zip(&self.target).map(|(hand, target)| {
+            let left = hand.to(target);
+            left.advance_mm.abs().max(left.rotate_rad.abs() / turn_rad)
+        });
         each.fold(0.0, f64::max)
     }
 }

@@ -24,6 +24,7 @@ mod coaxial_friction_tests;
 mod coaxial_tests;
 mod command;
 mod configuration;
+mod course;
 mod detach;
 #[cfg(test)]
 mod detach_tests;
@@ -50,9 +51,9 @@ mod slopes;
 mod state;
 mod step_control;
 mod substep;
+mod sum;
 #[cfg(test)]
 mod swept_tests;
-mod tick;
 #[cfg(test)]
 mod tick_tests;
 #[cfg(test)]
@@ -78,11 +79,11 @@ use crate::shape::Shape;
 use crate::vessel::{Displacement, WallStore};
 use crate::{Error, Result};
 use coaxial::Nodes;
+use command::Driven;
 use hands::{Hand, lengths};
 use joined::{FreeCoil, Joined, join};
 use lateral::Line;
-use state::{Belongs, Ticking};
-use tick::Ticked;
+use state::Belongs;
 use workspace::Workspace;
 
 impl MethodChoice for KirchhoffOptions {
@@ -315,6 +316,32 @@ impl<const C: usize> Kirchhoff<C> {
         done.map(|(_, told)| told)
     }
 
+    /// Carries out moves as far as so many linear solves go, `usize::MAX` for all of it.
+    fn drive(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
+        if self.rests(surroundings, moves) {
+            return Ok(());
+        }
+        let driven = self.work_on(surroundings, |workspace, environment, state| {
+            let driven = workspace.carry_out(environment, state, moves, solves)?;
+            Ok((matches!(driven, Driven::Moved), driven))
+        });
+        match driven? {
+            Driven::Moved => {}
+            // Time proceeds, so the motion of the vessel cannot be postponed.
+            Driven::Overtaken => return self.drive(surroundings, moves, usize::MAX),
+            Driven::Waits(rest) => {
+                let state = Arc::make_mut(&mut self.state);
+                let nodes_solved = state.report.nodes_solved;
+                state.report.rest();
+                rest.write(state);
+                if let Some(Workspace { tools, .. }) = self.workspace.as_deref() {
+                    tools.work.write(&mut state.report, nodes_solved);
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Checks that a state is possible for this simulation with the hands at `hands`, and returns its mesh.
     fn check(&self, surroundings: &Surroundings<'_>, state: &KirchhoffState, hands: &[Hand]) -> Result<Mesh> {
         let devices = surroundings.stack.devices();
@@ -377,49 +404,20 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
-        if self.rests(surroundings, moves) {
-            return Ok(());
-        }
-        self.work_on(surroundings, |workspace, environment, state| {
-            workspace.carry_out(environment, state, moves).map(|()| (true, ()))
-        })
+        self.drive(surroundings, moves, usize::MAX)
     }
 
     fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
-        if self.rests(surroundings, moves) {
-            return Ok(());
+        let done = self.drive(surroundings, moves, solves);
+        if done.is_err() && self.state.report.is_under_way() {
+            // The wall has stopped the hands.
+            let state = Arc::make_mut(&mut self.state);
+            state.unfinished = None;
+            state.report.rest();
+            state.report.behind.clear();
+            state.report.converged = false;
         }
-        let ticked = self.work_on(surroundings, |workspace, environment, state| {
-            let ticked = workspace.tick(environment, state, moves, solves)?;
-            Ok((matches!(ticked, Ticked::Moved), ticked))
-        });
-        match ticked {
-            Ok(Ticked::Moved) => Ok(()),
-            // Time proceeds, so the motion of the vessel cannot be postponed.
-            Ok(Ticked::Overtaken) => self.step_together(surroundings, moves),
-            Ok(Ticked::Rests(longest_mm, begun)) => {
-                let state = Arc::make_mut(&mut self.state);
-                (state.stride.part_mm, state.tick) = (longest_mm, begun);
-                let nodes_solved = state.report.nodes_solved;
-                state.report.rest();
-                if let Some(Workspace { tools, way, .. }) = self.workspace.as_deref() {
-                    state.report.behind = way.left(&state.tick);
-                    tools.work.write(&mut state.report, nodes_solved);
-                }
-                Ok(())
-            }
-            Err(error) => {
-                // The wall has stopped the hands.
-                if self.state.report.is_under_way() {
-                    let state = Arc::make_mut(&mut self.state);
-                    state.tick = Ticking::Rest;
-                    state.report.rest();
-                    state.report.behind.clear();
-                    state.report.converged = false;
-                }
-                Err(error)
-            }
-        }
+        done
     }
 
     fn detach(&mut self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
@@ -493,7 +491,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let mut hands = Vec::new();
         hands::read(&state.report, &mut hands);
         let mesh = self.check(surroundings, state, &hands)?;
-        if let Ticking::Solving(under_way) = &state.tick {
+        if let Some(under_way) = state.unfinished.as_ref().and_then(|unfinished| unfinished.part.as_ref()) {
             self.check(surroundings, &under_way.state, &under_way.hands)?;
         }
         self.state = Arc::clone(state);

@@ -62,8 +62,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) most: usize,
     /// Largest number of linear solves.
     pub(super) most_solves: usize,
-    /// Shift of the last step of an earlier tick, for the first solution.
-    pub(super) last_shift: f64,
+    /// Newton iterations and last shift of earlier ticks in the first solution.
+    pub(super) resumed: Option<(usize, f64)>,
     /// Newton iterations taken.
     pub(super) iterations: usize,
     /// Linear solves taken.
@@ -76,9 +76,6 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Searches, with the drag of the blood if that flows. The report is not converged if nothing was found; with
     /// friction it may be unsettled.
     pub(super) fn run(&mut self, flow: Option<&BloodFlow>) -> NewtonReport {
-        if self.effort == Effort::Flight {
-            self.most = LONGEST;
-        }
         if self.effort != Effort::Near {
             self.contact.hold_friction();
             self.with_loops(SelfContact::hold_friction);
@@ -101,12 +98,13 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// From the state to the nearest equilibrium.
     pub(super) fn on(&mut self) -> NewtonReport {
+        let was_resumed = self.resumed.is_some();
         let found = self.newton();
         if self.effort == Effort::Near || !found.converged || self.is_settled() {
             return found;
         }
-        // Following friction in vain might take all solves of a tick.
-        if self.effort == Effort::Moving {
+        // Following friction in vain might take all solves of every tick.
+        if was_resumed {
             return self.slide(found);
         }
         self.guess.other.copy_from(self.state);
@@ -128,12 +126,14 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Newton's method from the state.
     fn newton(&mut self) -> NewtonReport {
-        let most = if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR };
+        let (before, last_shift) = self.resumed.take().unwrap_or_default();
+        let most =
+            if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR - before.min(MOST_NEAR - 1) };
         let options = NewtonOptions {
             max_iterations: most.min(self.most.saturating_sub(self.iterations)),
             max_solves: self.most_solves.saturating_sub(self.solves),
             tolerance: self.tolerance,
-            last_shift: std::mem::take(&mut self.last_shift),
+            last_shift,
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);

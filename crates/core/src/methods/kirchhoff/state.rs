@@ -4,11 +4,13 @@ use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 
+use super::balance::Balance;
 use super::extrapolation::Correction;
 use super::hands::Hand;
 use super::joined::Coils;
 use super::mesh::Fineness;
-use super::step_control::Stride;
+use super::step_control::{StepControl, Stride};
+use super::substep::{Effort, Found};
 use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
@@ -32,8 +34,8 @@ pub struct KirchhoffState {
     pub(super) correction: Correction,
     /// Step size of the next part of a command.
     pub(super) stride: Stride,
-    /// Unfinished work of ticks.
-    pub(super) tick: Ticking,
+    /// What ticks have left unfinished.
+    pub(super) unfinished: Option<Box<Unfinished>>,
     /// Detached coils.
     #[serde(with = "crate::methods::state::shared")]
     pub(super) coils: Coils,
@@ -52,16 +54,55 @@ pub(super) struct OutsideFriction {
     pub(super) torque_nmm: f64,
 }
 
-/// Progress of ticks.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) enum Ticking {
-    /// The device is at rest, and nothing has begun.
-    #[default]
-    Rest,
-    /// It is at rest, and a part of the motion is being solved for.
-    Solving(Box<UnderWay>),
-    /// It is relaxing to where it comes to rest; number of Newton iterations so far.
-    Moving(usize),
+/// A command that ticks have begun.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Unfinished {
+    /// Step size control.
+    pub(super) control: StepControl,
+    /// The part of the motion that is being solved for.
+    pub(super) part: Option<UnderWay>,
+    /// The relaxation in progress.
+    pub(super) flight: Option<Flight>,
+}
+
+/// The way of a device to an equilibrium, or to where it comes to rest.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) struct Flight {
+    /// The largest motion of a hand before it, mm.
+    pub(super) part_mm: f64,
+    /// Newton iterations taken.
+    pub(super) iterations: usize,
+    /// Energy balance of the way so far.
+    pub(super) balance: Option<Balance>,
+    /// Its length, as a sum of fractions of the distance allowed from a prediction.
+    off: f64,
+    /// Its longest part.
+    longest: f64,
+    /// The node that moved farthest in that, mm.
+    pub(super) farthest_mm: Vec3,
+}
+
+impl Flight {
+    /// Begins with a motion of the hands.
+    pub(super) fn over(part_mm: f64) -> Self {
+        let (off, longest, farthest_mm) = (0.0, 0.0, Vec3::zeros());
+        Self { part_mm, iterations: 0, balance: None, off, longest, farthest_mm }
+    }
+
+    /// Goes on by a part, solved for in so many iterations.
+    pub(super) fn with(self, found: &Found, iterations: usize) -> Self {
+        let is_longest = found.off > self.longest || self.balance.is_none();
+        let (longest, farthest_mm) =
+            if is_longest { (found.off, found.farthest_mm) } else { (self.longest, self.farthest_mm) };
+        let balance = Some(self.balance.map_or(found.balance, |so_far| so_far.and(&found.balance)));
+        let (iterations, off) = (self.iterations + iterations, self.off + found.off);
+        Self { iterations, balance, off, longest, farthest_mm, ..self }
+    }
+
+    /// Whether the device has jumped: it is far from where its hands have led it, or has released energy.
+    pub(super) fn jumps(&self) -> bool {
+        self.off > 1.0 || self.balance.is_some_and(|balance| balance.is_set_free())
+    }
 }
 
 /// A part of a command whose solution ticks have begun.
@@ -71,6 +112,8 @@ pub(super) struct UnderWay {
     pub(super) hands: Vec<Hand>,
     /// The largest motion of a hand in it, mm.
     pub(super) part_mm: f64,
+    /// How it is solved.
+    pub(super) effort: Effort,
     /// The device's state in the unfinished solution, with its normal forces.
     pub(super) state: KirchhoffState,
     /// The neighbourhood of its prediction.
@@ -119,7 +162,7 @@ impl KirchhoffState {
             correction: Correction::default(),
             coils: Coils::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
-            tick: Ticking::Rest,
+            unfinished: None,
             outside: vec![OutsideFriction::default(); instruments.len().max(1)],
             report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
@@ -227,10 +270,8 @@ impl KirchhoffState {
         if self.outside.len() != hands {
             return Err(other("outside", self.outside.len(), format!("there are {hands} instruments here")));
         }
-        if let Ticking::Solving(under_way) = &self.tick
-            && !(0.0..f64::INFINITY).contains(&under_way.shift)
-        {
-            return Err(other("tick.shift", under_way.shift, "must be finite and at least 0"));
+        if let Some(unfinished) = self.unfinished.as_deref() {
+            unfinished.check()?;
         }
         let part_mm = self.stride.part_mm;
         if !(part_mm.is_finite() && part_mm > 0.0) {
@@ -259,6 +300,28 @@ impl KirchhoffState {
             r.is_finite() && outside.all(f64::is_finite) && self.pairs.iter().all(PairForce::is_finite);
         if !(is_finite && inner_friction.all(f64::is_finite)) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
+        }
+        Ok(())
+    }
+}
+
+impl Unfinished {
+    fn check(&self) -> Result<()> {
+        let length = |what: &str, value: f64| match value >= 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => Err(other(&format!("unfinished.{what}"), value, "must be finite and at least 0")),
+        };
+        length("control.part_mm", self.control.stride().part_mm)?;
+        length("control.flight_mm", self.control.flight_mm().unwrap_or(0.0))?;
+        if let Some(part) = &self.part {
+            length("part.shift", part.shift)?;
+            length("part.part_mm", part.part_mm)?;
+        }
+        let Some(flight) = &self.flight else { return Ok(()) };
+        length("flight.part_mm", flight.part_mm)?;
+        length("flight.off", flight.off)?;
+        if flight.balance.is_some_and(|balance| !balance.is_finite()) {
+            return Err(other("unfinished.flight", "not finite", "all its numbers must be finite"));
         }
         Ok(())
     }

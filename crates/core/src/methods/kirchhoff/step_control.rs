@@ -10,17 +10,20 @@ use serde::{Deserialize, Serialize};
 use super::substep::{Effort, Found, Lost};
 
 /// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
-pub(super) const FOLD_MM: f64 = 0.05;
+const FOLD_MM: f64 = 0.05;
 /// Largest motion of the hands in a part that may end in a snap, in radii of the thinnest device: the place of the snap
 /// on the way of the hands is known as well as that. Shorter parts mostly find the same equilibrium again.
 pub(super) const SNAP_RADII: f64 = 2.0;
 /// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.
-pub(super) const HELD_MM: f64 = 0.5;
+const HELD_MM: f64 = 0.5;
+/// Number of further solutions, with the hands held still, of a device that rests at the end of its command but not in
+/// equilibrium.
+const AGAIN: usize = 4;
 /// Smallest motion of the hands in a part with relaxation, mm.
 const LEAST_MM: f64 = 1e-3;
 /// Distance from the prediction, as a fraction of the allowed one, below which the next part is doubled. Errors of
 /// first-order predictions then double, those of second order quadruple.
-pub(super) const NEARER: f64 = 0.2;
+const NEARER: f64 = 0.2;
 
 /// Step size passed from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -32,7 +35,7 @@ pub(super) struct Stride {
 }
 
 /// Step size control within a command.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct StepControl {
     /// Newton iterations left.
     budget: usize,
@@ -42,22 +45,44 @@ pub(super) struct StepControl {
     has_friction: bool,
     /// Largest motion of the hands in the next part, mm, if the device relaxes in it.
     flight_mm: Option<f64>,
+    /// How often a device that rests at the end of its command, but not in equilibrium, goes on from there.
+    again: usize,
 }
 
 impl StepControl {
     /// With a budget of Newton iterations, and the step size of the command before.
     pub(super) fn new(budget: usize, stride: Stride, has_friction: bool) -> Self {
-        Self { budget, stride, has_friction, flight_mm: None }
+        Self { budget, stride, has_friction, flight_mm: None, again: AGAIN }
+    }
+
+    /// The same with more Newton iterations, up to `most`, for more motion.
+    pub(super) fn more(self, iterations: usize, most: usize) -> Self {
+        Self { budget: self.budget.saturating_add(iterations).min(most), ..self }
     }
 
     /// For something that was released without hand motion: relaxes at once.
     pub(super) fn set_free(self) -> Self {
-        Self { flight_mm: Some(f64::INFINITY), ..self }
+        Self { flight_mm: Some(f64::MAX), ..self }
     }
 
     /// Step size for the next command.
     pub(super) fn stride(&self) -> Stride {
         self.stride
+    }
+
+    /// Largest motion of the hands in the next part, mm, if the device relaxes in it.
+    pub(super) fn flight_mm(&self) -> Option<f64> {
+        self.flight_mm
+    }
+
+    /// Goes on from where the device rests at the end of the command.
+    pub(super) fn try_again(&mut self) {
+        self.again = self.again.saturating_sub(1);
+    }
+
+    /// Whether it has gone on from there often enough.
+    pub(super) fn has_tried_again(&self) -> bool {
+        self.again == 0
     }
 
     /// Newton iterations left.
@@ -72,7 +97,9 @@ impl StepControl {
             // Equal parts, so that no small remainder is left.
             None => {
                 let effort = if self.stride.held { Effort::Held } else { Effort::Near };
-                (effort, rest_mm / (rest_mm / self.stride.part_mm).ceil().max(1.0))
+                // A remainder at the level of rounding makes no further part.
+                let parts = (rest_mm / self.stride.part_mm * (1.0 - 1e-9)).ceil().max(1.0);
+                (effort, rest_mm / parts)
             }
         }
     }
@@ -132,6 +159,7 @@ impl StepControl {
 
 #[cfg(test)]
 mod tests {
+    use super::super::balance::Balance;
     use super::*;
 
     const FAR: Lost = Lost::Unbalanced;
@@ -143,14 +171,15 @@ mod tests {
     fn found(off: f64) -> Found {
         Found {
             slides: 0,
-            dissipated_mj: 0.0,
-            borrowed_mj: 0.0,
+            outside_mj: 0.0,
             residual: 0.0,
             unsettled: 0.0,
             balanced: true,
+            is_interrupted: false,
             lacks: false,
             off,
-            jump: None,
+            farthest_mm: crate::Vec3::zeros(),
+            balance: Balance::default(),
         }
     }
 

@@ -2,27 +2,32 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::balance::Balance;
 use super::carried::{Passage, WallWork};
-use super::command::AT_REST;
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
 use super::joined::{Resistance, join};
 use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
-use super::search::Search;
+use super::search::{MOST_NEAR, Search};
 use super::state::{KirchhoffState, UnderWay};
 use super::step_control::SNAP_RADII;
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
+use crate::Vec3;
 use crate::contact::{ContactPoint, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
-use crate::methods::{Jump, StepReport};
+use crate::methods::StepReport;
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
 
+/// Residual, relative to the force scale, above which a device that does not move is not at rest.
+pub(super) const AT_REST: f64 = 0.05;
+
 /// How a part of a command is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Effort {
     /// For the equilibrium near the prediction, with friction following the contact forces.
     Near,
@@ -30,30 +35,54 @@ pub(super) enum Effort {
     Held,
     /// By relaxation to where the device comes to rest, however far away.
     Flight,
-    /// By relaxation as far as a tick allows.
-    Moving,
+}
+
+/// A part of a command.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part<'a> {
+    /// How it is solved.
+    pub(super) effort: Effort,
+    /// Largest motion of a hand in it, mm.
+    pub(super) part_mm: f64,
+    /// How much of what changes around the device is over after it, 0 to 1.
+    pub(super) to: f64,
+    /// Whether it only goes on from where the last part has left the device, with the hands held still.
+    pub(super) holds_still: bool,
+    /// Earlier ticks' progress in it.
+    pub(super) resumed: Option<&'a UnderWay>,
+}
+
+/// Limits of the cost of a part.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Largest number of Newton iterations.
+    pub(super) iterations: usize,
+    /// Largest number of linear solves, unlimited except in ticks.
+    pub(super) solves: usize,
 }
 
 /// Result of a part of a command.
 pub(super) struct Found {
     /// Number of slides with the hand held still.
     pub(super) slides: u32,
-    /// Energy dissipated by friction, mJ.
-    pub(super) dissipated_mj: f64,
-    /// Energy by which an intermediate state of a relaxation exceeds what was put in, mJ: the rest of the relaxation gives it back.
-    pub(super) borrowed_mj: f64,
+    /// Energy dissipated by friction outside the body, mJ.
+    pub(super) outside_mj: f64,
     /// Residual, relative to the force scale.
     pub(super) residual: f64,
     /// Relative difference of the normal forces of friction from the contact forces.
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
+    /// Whether a tick has ended on the way to where the device comes to rest.
+    pub(super) is_interrupted: bool,
     /// Whether more energy is stored and dissipated than was put in: then the motion of this part cannot lead there.
     pub(super) lacks: bool,
     /// Distance from the prediction, as a fraction of the allowed one.
     pub(super) off: f64,
-    /// The jump, if any.
-    pub(super) jump: Option<Jump>,
+    /// The node that is farthest from its prediction, mm.
+    pub(super) farthest_mm: Vec3,
+    /// Energy balance of the part.
+    pub(super) balance: Balance,
 }
 
 /// Why a part failed.
@@ -105,18 +134,10 @@ impl std::fmt::Display for Lost {
 /// A part to be solved.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Attempt<'a> {
+    pub(super) part: Part<'a>,
     /// Positions of the hands after it.
     pub(super) hands: &'a [Hand],
-    /// Largest motion of a hand in it, mm.
-    pub(super) part_mm: f64,
-    /// How it is solved.
-    pub(super) effort: Effort,
-    /// Largest number of Newton iterations.
-    pub(super) most: usize,
-    /// Largest number of linear solves, unlimited except in ticks.
-    pub(super) solves: usize,
-    /// Earlier ticks' progress in this part.
-    pub(super) resumed: Option<&'a UnderWay>,
+    pub(super) limits: Limits,
     /// If the vessel moves: the start before its motion, and the motion. The part then starts with the displaced
     /// device.
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
@@ -129,7 +150,7 @@ impl<const C: usize> Tools<C> {
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
-        Attempt { hands, left, resumed, .. }: Attempt<'_>,
+        Attempt { hands, left, part: Part { resumed, .. }, .. }: Attempt<'_>,
         next: &mut Configuration,
     ) {
         let (mesh, after) = next.parts();
@@ -262,7 +283,7 @@ impl<const C: usize> Tools<C> {
         next: &mut Configuration,
     ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { hands, effort, most, left, resumed, .. } = attempt;
+        let Attempt { part: Part { effort, part_mm, resumed, .. }, hands, limits, left } = attempt;
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
@@ -273,8 +294,7 @@ impl<const C: usize> Tools<C> {
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
         let mut loops = options.self_contact.then_some(&mut self.loops);
-        let near = matches!(effort, Effort::Near | Effort::Held);
-        let may_snap = attempt.part_mm <= SNAP_RADII * surroundings.device.min_radius_mm();
+        let may_snap = part_mm <= SNAP_RADII * surroundings.device.min_radius_mm();
         if let Some(resumed) = resumed {
             let mut under_way = resumed.state.rod.clone();
             join(&mut under_way, &resumed.state.coils);
@@ -290,7 +310,7 @@ impl<const C: usize> Tools<C> {
             contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
             self.newton.neighbourhood.begin(rod, &self.guess.room_mm);
         }
-        self.newton.neighbourhood.bounds = near;
+        self.newton.neighbourhood.bounds = effort != Effort::Flight;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let mut free =
             (!self.joined.is_empty()).then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1));
@@ -309,9 +329,12 @@ impl<const C: usize> Tools<C> {
             has_friction: environment.has_friction(),
             tolerance: options.tolerance,
             effort,
-            most: most.min(options.max_iterations),
-            most_solves: attempt.solves,
-            last_shift: resumed.map_or(0.0, |resumed| resumed.shift),
+            most: match effort {
+                Effort::Near | Effort::Held => limits.iterations.min(options.max_iterations),
+                Effort::Flight => limits.iterations,
+            },
+            most_solves: limits.solves,
+            resumed: resumed.map(|resumed| (resumed.iterations, resumed.shift)),
             iterations: 0,
             solves: 0,
             slides: 0,
@@ -321,16 +344,20 @@ impl<const C: usize> Tools<C> {
         let unsettled = search.unsettled().max(lagging);
         let (taken, slides) = ((search.iterations, search.solves), search.slides);
         let off = self.newton.neighbourhood.off(rod);
+        let used_up = found.reason == StopReason::MaxIterations && taken.1 >= limits.solves;
+        // A device that slides or relaxes when the solves are used up is seen on its way.
+        let is_interrupted = used_up && (effort == Effort::Flight || slides > 0);
+        let near = effort != Effort::Flight && !is_interrupted;
         // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
-        let used_up = found.reason == StopReason::MaxIterations && taken.1 >= attempt.solves;
-        let wrong = Lost::of(&found, (near, used_up), balanced, off > 1.0 && !may_snap).or_else(|| {
+        let goes_on = used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < MOST_NEAR;
+        let wrong = Lost::of(&found, (near, goes_on), balanced, off > 1.0 && !may_snap).or_else(|| {
             contact.know_whole_base(&mesh.elements);
             contact.passes_through(&mesh.elements, rod).then_some(Lost::Passed)
         });
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut self.touches);
-            if effort == Effort::Moving && !balanced {
+            if is_interrupted {
                 // The next tick continues from here, with these normal forces.
                 contact.anchor_friction(&mesh.elements, rod);
             }
@@ -353,18 +380,25 @@ impl<const C: usize> Tools<C> {
         let rubbed_mj = (least_mj + between_mj, most_mj + between_mj);
         let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
         let after = next.parts().1;
-        let (lacks, is_set_free) = (balance.lacks(), balance.is_set_free());
+        let lacks = balance.lacks();
         // Only a short part shows a jump: in a long one forces may go far beyond their values at its ends.
-        if near && (lacks || (is_set_free && !may_snap)) {
+        if near && (lacks || (balance.is_set_free() && !may_snap)) {
             return Err(Lost::Unbalanced);
         }
-        let jumps = (effort != Effort::Moving && off > 1.0) || is_set_free;
-        let (rubbed_mj, released_mj) = balance.lost_mj(jumps);
-        let borrowed_mj = if near { 0.0 } else { balance.borrowed_mj(rubbed_mj + released_mj) };
-        let (dissipated_mj, residual) = (rubbed_mj + outside_mj, found.residual);
-        let jump = jumps.then_some(Jump { released_mj, position_mm: farthest_mm });
+        let residual = found.residual;
         self.guess.teach(&after.rod, &mut after.correction);
-        Ok(Found { slides, dissipated_mj, borrowed_mj, residual, unsettled, balanced, lacks, off, jump })
+        Ok(Found {
+            slides,
+            outside_mj,
+            residual,
+            unsettled,
+            balanced,
+            is_interrupted,
+            lacks,
+            off,
+            farthest_mm,
+            balance,
+        })
     }
 }
 

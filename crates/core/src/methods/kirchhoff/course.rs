@@ -1,0 +1,295 @@
+//! The course of a command: which part comes next, and what has become of the parts so far.
+
+use super::Environment;
+use super::hands::{Hand, Way};
+use super::search::LONGEST;
+use super::state::{Flight, KirchhoffState, UnderWay, Unfinished};
+use super::step_control::{StepControl, Stride};
+use super::substep::{AT_REST, Effort, Found, Limits, Lost, Part};
+use super::sum::Sum;
+use super::workspace::Work;
+use crate::methods::{Command, Move};
+
+/// Largest number of parts of one command.
+const PART_LIMIT: usize = 4096;
+/// Newton iterations allowed for a command per millimetre and per [`WORK_RAD`], including failed attempts, before it
+/// is relaxed: this bounds its cost.
+const WORK: f64 = 280.0;
+/// Rotation that counts like a millimetre in [`WORK`], rad.
+const WORK_RAD: f64 = 0.1;
+/// Upper limit of these iterations, as a multiple of those of one solution.
+const WORK_OF_ONE: usize = 10;
+/// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall once.
+const OF_A_PART: usize = 2;
+
+/// What changes around the device while a command is carried out: the vessel and fields. It does not wait.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    /// How much of it is over, 0 to 1.
+    done: f64,
+    /// Whether the vessel moves.
+    vessel_moves: bool,
+    /// Whether the solves do not suffice to go through it in parts: the device then relaxes at its end.
+    overtakes: bool,
+}
+
+impl Change {
+    fn goes_on(&self) -> bool {
+        self.done < 1.0
+    }
+}
+
+/// How a command goes on after a rejected part.
+pub(super) enum Next {
+    /// With another part.
+    Part,
+    /// In the next tick, with the unfinished solution.
+    Tick,
+    /// Not at all: the device stays where it is.
+    Nothing,
+    /// Again from its start, with as many solves as it needs: what changes does not wait.
+    Step,
+    /// With an error.
+    Error,
+}
+
+/// The course of a command.
+pub(super) struct Course<'a> {
+    control: StepControl,
+    /// The solution that the last tick has begun.
+    begun: Option<&'a UnderWay>,
+    /// The solution that this tick leaves unfinished.
+    pub(super) under_way: Option<UnderWay>,
+    /// The relaxation in progress.
+    flight: Option<Flight>,
+    change: Change,
+    /// Results of the parts so far.
+    sum: Sum,
+    /// Whether a part was accepted.
+    pub(super) moved: bool,
+    /// Whether the device rests in equilibrium after it.
+    balanced: bool,
+}
+
+impl<'a> Course<'a> {
+    /// Begins with the motion of a command, or goes on with that of the last tick.
+    pub(super) fn new(
+        environment: &Environment<'_>,
+        from: &'a KirchhoffState,
+        (way, moves): (&Way, &[Move]),
+    ) -> Self {
+        let surroundings = &environment.surroundings;
+        let (vessel_moves, fields_change) = (surroundings.moves(), surroundings.fields_change());
+        let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
+        let work = |travel_mm: f64| ((WORK * travel_mm) as usize).min(most);
+        let travel_mm = way.travel_mm(WORK_RAD);
+        let unfinished = from.unfinished.as_deref();
+        let control = match unfinished {
+            Some(unfinished) => unfinished.control.more(work(asked_mm(moves)), most),
+            None => {
+                let control =
+                    StepControl::new(work(travel_mm.max(1.0)), from.stride, environment.has_friction());
+                // Something was released.
+                let set_free = travel_mm == 0.0 && !vessel_moves && !fields_change;
+                if set_free { control.set_free() } else { control }
+            }
+        };
+        let done = if vessel_moves || fields_change { 0.0 } else { 1.0 };
+        Self {
+            control,
+            // An unfinished solution is of the vessel where it was.
+            begun: unfinished.filter(|_| !vessel_moves).and_then(|unfinished| unfinished.part.as_ref()),
+            under_way: None,
+            flight: unfinished.and_then(|unfinished| unfinished.flight),
+            change: Change { done, vessel_moves, overtakes: false },
+            sum: Sum::default(),
+            moved: false,
+            balanced: true,
+        }
+    }
+
+    /// Number of parts tried.
+    pub(super) fn parts(&self) -> usize {
+        self.sum.parts
+    }
+
+    /// Whether hands and what changes are where they should be, after at least one part.
+    fn is_there(&self, way: &Way) -> bool {
+        self.moved && way.is_done() && !self.change.goes_on()
+    }
+
+    /// Whether the command is done. A device that is not in equilibrium at its end goes on from there.
+    pub(super) fn is_over(&self, way: &Way) -> bool {
+        let rests = self.balanced || self.control.has_tried_again();
+        self.is_there(way) && self.flight.is_none() && rests
+    }
+
+    /// Whether a tick of so many solves ends here. A change that goes on is completed, by relaxation.
+    pub(super) fn pauses(&mut self, work: &Work, solves: usize) -> bool {
+        let used = work.solves.saturating_add(OF_A_PART * self.sum.parts);
+        if self.change.goes_on() {
+            self.change.overtakes |= used >= self.within(solves);
+            return false;
+        }
+        self.sum.parts > 0 && used >= solves
+    }
+
+    /// The linear solves of a tick after which no part begins: with half of them a moving vessel does not wait any
+    /// longer.
+    fn within(&self, solves: usize) -> usize {
+        if self.change.vessel_moves && self.change.goes_on() { solves / 2 } else { solves }
+    }
+
+    /// What a part may cost in a tick of so many solves, with this work before it.
+    pub(super) fn limits(&self, part: &Part<'_>, before: &Work, solves: usize) -> Limits {
+        let most = if self.change.overtakes { solves } else { self.within(solves) };
+        let iterations = match part.effort {
+            Effort::Near | Effort::Held => self.control.budget(),
+            Effort::Flight => LONGEST - self.flight.map_or(0, |flight| flight.iterations.min(LONGEST - 1)),
+        };
+        Limits { iterations, solves: most.saturating_sub(before.solves).max(1) }
+    }
+
+    /// The next part, and the positions of the hands after it in `hands`: the unfinished one, the relaxation in
+    /// progress, or another part of the motion. What changes around the device goes on in proportion.
+    pub(super) fn propose(&mut self, way: &Way, hands: &mut Vec<Hand>) -> Part<'a> {
+        self.sum.parts += 1;
+        let still = Part { effort: Effort::Flight, part_mm: 0.0, to: 1.0, holds_still: true, resumed: None };
+        if let Some(begun) = self.begun.take() {
+            hands.clone_from(&begun.hands);
+            let (effort, part_mm) = (begun.effort, begun.part_mm);
+            return Part { effort, part_mm, resumed: Some(begun), holds_still: false, ..still };
+        }
+        if self.flight.is_some() {
+            hands.clone_from(&way.start);
+            return still;
+        }
+        if self.is_there(way) {
+            self.control.try_again();
+        }
+        let travel_mm = way.travel_mm(WORK_RAD);
+        // A change without motion of the hands counts as a millimetre.
+        let rest_mm = if travel_mm > 0.0 { travel_mm } else { 1.0 - self.change.done };
+        let (effort, part_mm) = self.control.next(rest_mm);
+        // A remainder at the level of rounding is ignored.
+        let part = if part_mm >= (1.0 - 1e-9) * rest_mm { 1.0 } else { part_mm / rest_mm };
+        way.at(part, hands);
+        let to = if part == 1.0 { 1.0 } else { self.change.done + part * (1.0 - self.change.done) };
+        match self.change.overtakes {
+            true => Part { part_mm, holds_still: false, ..still },
+            false => Part { effort, part_mm, to, holds_still: self.is_there(way), resumed: None },
+        }
+    }
+
+    /// Subtracts the Newton iterations of a part from those allowed.
+    pub(super) fn took(&mut self, iterations: usize) {
+        self.control.took(iterations);
+    }
+
+    /// Whether the device came to rest with energy that nobody put in, so that the part was too long: then it is
+    /// shortened.
+    pub(super) fn shortens(&mut self, part: &Part<'_>, found: &Found) -> bool {
+        let shortens = found.lacks && !found.is_interrupted && self.control.can_shorten(part.part_mm);
+        if shortens && !self.change.overtakes {
+            self.control.shorten(part.part_mm);
+        }
+        shortens && !self.change.overtakes
+    }
+
+    /// Takes the result of a part, in which the device hardly moved if it `lies` still, after so many iterations.
+    pub(super) fn accept(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) {
+        // At a crease of the wall forces switch between both sides and never balance; if nothing moves any more the
+        // device is at rest all the same.
+        let rests = part.holds_still && lies && found.residual <= AT_REST;
+        self.balanced = (found.balanced && !found.lacks) || rests;
+        let overtook = self.change.overtakes;
+        (self.moved, self.change.done, self.change.overtakes) = (true, part.to, false);
+        let begun = self.flight.take();
+        self.sum.relaxations += u32::from(part.effort == Effort::Flight && begun.is_none());
+        let flight = begun.unwrap_or(Flight::over(part.part_mm)).with(found, iterations);
+        if found.is_interrupted && !rests && flight.iterations < LONGEST {
+            self.flight = Some(flight);
+        } else {
+            self.sum.add(&flight, part.effort);
+            if !overtook {
+                self.control.succeeded(flight.part_mm, found);
+            }
+        }
+        self.sum.go_on(found, part.effort);
+    }
+
+    /// How to go on after a part that has failed.
+    pub(super) fn reject(&mut self, part: &Part<'_>, lost: Lost) -> Next {
+        if lost == Lost::UnderWay && (!self.change.goes_on() || (part.to == 1.0 && !self.change.vessel_moves))
+        {
+            return Next::Tick;
+        }
+        if self.change.overtakes {
+            return Next::Step;
+        }
+        if self.change.goes_on() && (lost == Lost::UnderWay || part.holds_still) {
+            self.change.overtakes = true;
+            return Next::Part;
+        }
+        // A second attempt from the same state would give the same result.
+        if part.holds_still {
+            self.flight = None;
+            self.balanced = false;
+            return Next::Nothing;
+        }
+        if self.control.failed(part.part_mm, lost) || self.sum.parts > PART_LIMIT {
+            return Next::Error;
+        }
+        Next::Part
+    }
+
+    /// All instruments were pulled out, with this energy dissipated by friction outside the body, mJ.
+    pub(super) fn withdrawn(&mut self, dissipated_mj: f64) {
+        self.sum.rub(dissipated_mj);
+        (self.moved, self.balanced, self.flight, self.change.done) = (true, true, None, 1.0);
+    }
+
+    /// Whether the command ends without an equilibrium.
+    pub(super) fn has_failed(&self, way: &Way) -> bool {
+        self.is_there(way) && !self.balanced && self.flight.is_none()
+    }
+
+    /// Step size, remaining motion of the hands, and what the next tick goes on with; neither if the command is done.
+    pub(super) fn rest(self, way: &Way) -> Rest {
+        let Self { control, under_way: part, flight, .. } = self;
+        let stride = control.stride();
+        if way.is_done() && part.is_none() && flight.is_none() {
+            return Rest { stride, behind: Vec::new(), unfinished: None };
+        }
+        let unfinished = Some(Box::new(Unfinished { control, part, flight }));
+        Rest { stride, behind: way.left(), unfinished }
+    }
+
+    /// Writes the results into the new state.
+    pub(super) fn write(self, way: &Way, state: &mut KirchhoffState) {
+        self.sum.write(&mut state.report);
+        state.report.converged = self.balanced;
+        self.rest(way).write(state);
+    }
+}
+
+/// What is left of a command.
+#[derive(Debug)]
+pub(super) struct Rest {
+    stride: Stride,
+    behind: Vec<Command>,
+    unfinished: Option<Box<Unfinished>>,
+}
+
+impl Rest {
+    pub(super) fn write(self, state: &mut KirchhoffState) {
+        (state.stride, state.report.behind, state.unfinished) = (self.stride, self.behind, self.unfinished);
+    }
+}
+
+/// Largest motion of a hand in moves, mm.
+fn asked_mm(moves: &[Move]) -> f64 {
+    let each =
+        moves.iter().map(|one| one.command.advance_mm.abs().max(one.command.rotate_rad.abs() / WORK_RAD));
+    each.fold(0.0, f64::max)
+}
