@@ -17,22 +17,6 @@ use crate::device::line_mm;
 use crate::methods::{Jump, Move, StepReport, Surroundings};
 use crate::{Error, Result};
 
-/// Largest number of sub-steps of one command.
-const SUBSTEP_LIMIT: usize = 4096;
-/// Newton iterations allowed for a command per millimetre and per [`WORK_RAD`], including failed attempts, before it
-/// is relaxed: this bounds its cost.
-const WORK: f64 = 280.0;
-/// Rotation that counts like a millimetre in [`WORK`], rad.
-pub(super) const WORK_RAD: f64 = 0.1;
-/// Upper limit of these iterations, as a multiple of those of one solution.
-const WORK_OF_ONE: usize = 10;
-/// Number of further relaxations, with the hands held still, of a device that rests at the end of its command but not
-/// in equilibrium.
-const AGAIN: usize = 4;
-/// Motion in a further relaxation, in the smallest radius of the device, below which it is at rest.
-pub(super) const REST_RADII: f64 = 1e-3;
-/// Residual, relative to the force scale, above which a device that does not move is not at rest.
-pub(super) const AT_REST: f64 = 0.05;
 
 /// Accumulated results of the sub-steps of a command or a tick.
 #[derive(Debug, Clone, Copy, Default)]
@@ -86,9 +70,10 @@ impl Sum {
 
 /// Initial step control for a command from a state, whose hands move by up to `travel_mm`.
 fn control(environment: &Environment<'_>, from: &KirchhoffState, travel_mm: f64) -> StepControl {
-    let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
-    let work = (WORK * travel_mm.max(1.0)) as usize;
-    let control = StepControl::new(work.min(most), from.stride, environment.has_friction());
+    let tuning = &environment.options.tuning.steps;
+    let most = tuning.work_of_one.saturating_mul(environment.options.max_iterations);
+    let work = (tuning.work * travel_mm.max(1.0)) as usize;
+    let control = StepControl::new(work.min(most), from.stride, environment.has_friction(), tuning);
     let surroundings = &environment.surroundings;
     let set_free = travel_mm == 0.0 && !surroundings.moves() && !surroundings.fields_change();
     if set_free { control.set_free() } else { control }
@@ -142,14 +127,15 @@ impl<const C: usize> Workspace<C> {
         let mut displaced = displacement(0.0);
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         let (mut sum, mut balanced) = (Sum::default(), true);
-        let travel = way.travel_mm(WORK_RAD);
+        let tuning = &environment.options.tuning.steps;
+        let travel = way.travel_mm(tuning.work_rad);
         let mut control = control(environment, from, travel);
         // Without hand motion the vessel or a field changes, time passes, or something was released.
         let travel = if travel > 0.0 { travel } else { 1.0 };
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and rotation are proportional.
         let mut done = 0.0f64;
-        let mut again = AGAIN;
+        let mut again = tuning.again;
         let thinnest_mm = surroundings.device.min_radius_mm();
         while done < 1.0 || (!balanced && again > 0) {
             // A device that rests at the end of the command, but not in equilibrium, continues from there.
@@ -199,8 +185,8 @@ impl<const C: usize> Workspace<C> {
                     // At a crease of the wall forces switch between both sides and never balance; if nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0
-                        && found.residual <= AT_REST
-                        && was.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
+                        && found.residual <= tuning.at_rest
+                        && was.state.rod.farthest_mm(&next.state.rod) <= tuning.rest_radii * thinnest_mm;
                     balanced = (found.balanced && !found.lacks) || rests;
                     check_inside(
                         surroundings.lumen.openings(),
@@ -217,7 +203,7 @@ impl<const C: usize> Workspace<C> {
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
                     // No equilibrium: if the vessel is too narrow to go on, the error says so, here and below.
-                    if control.failed(part_mm, lost) || sum.substeps > SUBSTEP_LIMIT {
+                    if control.failed(part_mm, lost) || sum.substeps > tuning.substep_limit {
                         refuse_narrow(&at_start, was, &way.commands)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"

@@ -8,19 +8,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::substep::{Effort, Found, Lost};
+use crate::tuning::StepTuning;
 
-/// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
-pub(super) const FOLD_MM: f64 = 0.05;
-/// Largest motion of the hands in a part that may end in a snap, in radii of the thinnest device: the place of the snap
-/// on the way of the hands is known as well as that. Shorter parts mostly find the same equilibrium again.
-pub(super) const SNAP_RADII: f64 = 2.0;
-/// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.
-pub(super) const HELD_MM: f64 = 0.5;
-/// Smallest motion of the hands in a part with relaxation, mm.
-const LEAST_MM: f64 = 1e-3;
-/// Distance from the prediction, as a fraction of the allowed one, below which the next part is doubled. Errors of
-/// first-order predictions then double, those of second order quadruple.
-pub(super) const NEARER: f64 = 0.2;
 
 /// Step size passed from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -42,12 +31,13 @@ pub(super) struct StepControl {
     has_friction: bool,
     /// Largest motion of the hands in the next part, mm, if the device relaxes in it.
     flight_mm: Option<f64>,
+    tuning: StepTuning,
 }
 
 impl StepControl {
     /// With a budget of Newton iterations, and the step size of the command before.
-    pub(super) fn new(budget: usize, stride: Stride, has_friction: bool) -> Self {
-        Self { budget, stride, has_friction, flight_mm: None }
+    pub(super) fn new(budget: usize, stride: Stride, has_friction: bool, tuning: &StepTuning) -> Self {
+        Self { budget, stride, has_friction, flight_mm: None, tuning: *tuning }
     }
 
     /// For something that was released without hand motion: relaxes at once.
@@ -84,11 +74,11 @@ impl StepControl {
 
     /// A part of this length reached an equilibrium, or came to rest.
     pub(super) fn succeeded(&mut self, part_mm: f64, found: &Found) {
-        let nearer = found.off < NEARER;
+        let nearer = found.off < self.tuning.nearer;
         match self.flight_mm {
             // The budget is used up in a jam.
             Some(_) if self.budget == 0 => {
-                self.flight_mm = Some(if nearer { 2.0 * part_mm } else { FOLD_MM });
+                self.flight_mm = Some(if nearer { 2.0 * part_mm } else { self.tuning.fold_mm });
             }
             Some(_) => self.flight_mm = None,
             None => {
@@ -106,12 +96,12 @@ impl StepControl {
         if self.flight_mm.is_some() {
             // A tip that would be pushed through a loop goes less far in a shorter part.
             self.flight_mm = Some(0.5 * part_mm);
-            return lost != Lost::Beyond || part_mm <= LEAST_MM;
+            return lost != Lost::Beyond || part_mm <= self.tuning.least_mm;
         }
-        if self.has_friction && !self.stride.held && part_mm <= HELD_MM && self.budget > 0 {
+        if self.has_friction && !self.stride.held && part_mm <= self.tuning.held_mm && self.budget > 0 {
             self.stride = Stride { part_mm, held: true };
-        } else if part_mm <= FOLD_MM || self.budget == 0 {
-            self.flight_mm = Some(part_mm.min(FOLD_MM));
+        } else if part_mm <= self.tuning.fold_mm || self.budget == 0 {
+            self.flight_mm = Some(part_mm.min(self.tuning.fold_mm));
             self.stride.held = false;
         } else {
             self.stride.part_mm = 0.5 * part_mm;
@@ -121,7 +111,7 @@ impl StepControl {
 
     /// Whether a part of this length, in which the device relaxed, can be shortened.
     pub(super) fn can_shorten(&self, part_mm: f64) -> bool {
-        part_mm > LEAST_MM && self.budget > 0
+        part_mm > self.tuning.least_mm && self.budget > 0
     }
 
     /// Continues with parts of half that length, seeking a nearby equilibrium again.
@@ -135,9 +125,11 @@ mod tests {
     use super::*;
 
     const FAR: Lost = Lost::Unbalanced;
+    const FOLD_MM: f64 = StepTuning::DEFAULT.fold_mm;
+    const LEAST_MM: f64 = StepTuning::DEFAULT.least_mm;
 
     fn control(part_mm: f64) -> StepControl {
-        StepControl::new(100, Stride { part_mm, held: false }, false)
+        StepControl::new(100, Stride { part_mm, held: false }, false, &StepTuning::DEFAULT)
     }
 
     fn found(off: f64) -> Found {

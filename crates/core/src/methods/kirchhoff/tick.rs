@@ -15,22 +15,19 @@
 use super::Environment;
 use super::blocked::refuse_wedged;
 use super::carried::taken_along;
-use super::command::{AT_REST, REST_RADII, Sum, WORK_RAD};
+use super::command::Sum;
 use super::configuration::Start;
 use super::extrapolation::Correction;
 use super::hands::{Hand, Way, lengths, motions};
-use super::search::{LONGEST, MOST_NEAR};
 use super::state::{KirchhoffState, Ticking, UnderWay};
-use super::step_control::{FOLD_MM, HELD_MM, NEARER};
 use super::substep::{Attempt, Effort, Found, Lost};
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
 use crate::methods::{Move, StepReport};
+use crate::tuning::StepTuning;
 use crate::{Error, Result};
 
-/// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall once.
-const OF_A_PART: usize = 2;
 
 /// Result of a tick.
 #[derive(Debug)]
@@ -90,9 +87,9 @@ impl<'a> Part<'a> {
         begun: &'a Ticking,
         (way, longest_mm): (&Way, f64),
         change: &Change,
-        hands: &mut Vec<Hand>,
+        (hands, tuning): (&mut Vec<Hand>, &StepTuning),
     ) -> Self {
-        let travel_mm = way.travel_mm(WORK_RAD);
+        let travel_mm = way.travel_mm(tuning.work_rad);
         let part = if travel_mm > longest_mm { longest_mm / travel_mm } else { 1.0 };
         let of_change_mm = if travel_mm == 0.0 { change.share() } else { 0.0 };
         let fresh = |effort: Effort| Self {
@@ -120,8 +117,9 @@ impl<'a> Part<'a> {
     }
 
     /// Whether the result must be rejected: a device relaxed before a fold stays near.
-    fn strays(&self, found: &Found) -> bool {
-        self.effort == Effort::Moving && !self.holds_still && self.part_mm > FOLD_MM && found.off > 1.0
+    fn strays(&self, found: &Found, tuning: &StepTuning) -> bool {
+        let moves = self.effort == Effort::Moving && !self.holds_still;
+        moves && self.part_mm > tuning.fold_mm && found.off > 1.0
     }
 }
 
@@ -157,22 +155,25 @@ struct Course {
     moved: bool,
     /// Whether the device rests there.
     rests: bool,
+    tuning: StepTuning,
 }
 
 impl Course {
     fn new(environment: &Environment<'_>, from: &KirchhoffState) -> Self {
+        let tuning = environment.options.tuning.steps;
         let vessel_moves = environment.surroundings.moves();
         let is_changed = vessel_moves || environment.surroundings.fields_change();
         // In a vessel that moves the relaxation goes on at its end.
         let overtaken = vessel_moves && matches!(from.tick, Ticking::Moving(1..));
         Self {
             longest_mm: from.stride.part_mm,
-            let_go_mm: if environment.has_friction() { HELD_MM } else { FOLD_MM },
+            let_go_mm: if environment.has_friction() { tuning.held_mm } else { tuning.fold_mm },
             change: Change { done: if is_changed { 0.0 } else { 1.0 }, most: 1.0, overtaken },
             vessel_moves,
             sum: Sum::default(),
             moved: false,
             rests: true,
+            tuning,
         }
     }
 
@@ -199,7 +200,7 @@ impl Course {
             _ if change.overtaken => return After::Overtaken,
             _ if part.holds_still && !change.goes_on() => return After::Stays,
             _ if part.holds_still => change.overtaken = true,
-            (_, Effort::Moving) if part.part_mm <= FOLD_MM => return After::Fails,
+            (_, Effort::Moving) if part.part_mm <= self.tuning.fold_mm => return After::Fails,
             (_, Effort::Near) if part.part_mm <= self.let_go_mm => {
                 self.longest_mm = part.part_mm;
                 return After::Fold;
@@ -214,18 +215,19 @@ impl Course {
         self.moved = true;
         let share = self.change.share();
         (self.change.done, self.change.overtaken) = (self.change.to(), false);
-        self.rests = found.balanced || (part.holds_still && lies && found.residual <= AT_REST);
+        self.rests = found.balanced || (part.holds_still && lies && found.residual <= self.tuning.at_rest);
         self.sum.add(found);
         self.sum.relaxations += u32::from(part.effort == Effort::Moving && !part.holds_still);
         if !self.rests {
             self.sum.note_imbalance(found);
         }
-        if part.effort == Effort::Near && found.off < NEARER {
+        if part.effort == Effort::Near && found.off < self.tuning.nearer {
             self.longest_mm = self.longest_mm.max(2.0 * part.part_mm);
             self.change.most = self.change.most.max(2.0 * share);
         }
         // A device that does not come to rest is left where it is, and reported as not in equilibrium.
-        let goes_on = part.effort == Effort::Moving && !self.rests && part.moving + iterations <= LONGEST;
+        let is_short = part.moving + iterations <= self.tuning.longest;
+        let goes_on = part.effort == Effort::Moving && !self.rests && is_short;
         if goes_on { Ticking::Moving(part.moving + iterations) } else { Ticking::Rest }
     }
 
@@ -254,6 +256,7 @@ impl<const C: usize> Workspace<C> {
     ) -> Result<Ticked> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
+        let tuning = &environment.options.tuning.steps;
         let surroundings = &environment.surroundings;
         let mut displaced = surroundings.displacement(0.0);
         let mut course = Course::new(environment, from);
@@ -264,7 +267,7 @@ impl<const C: usize> Workspace<C> {
         // Remaining work, or the error that ends the tick.
         let ends = loop {
             let (parts, within) = (course.sum.substeps, course.within(solves));
-            let spent = tools.work.solves + OF_A_PART * parts;
+            let spent = tools.work.solves + tuning.of_a_part * parts;
             if parts > 0 && spent >= solves && !course.change.goes_on() {
                 break Ok(begun.clone());
             }
@@ -272,7 +275,7 @@ impl<const C: usize> Workspace<C> {
                 (course.change.overtaken, begun) = (true, &rest);
             }
             let was = if course.moved { now.start() } else { Start { mesh, state: from } };
-            let part = Part::next(begun, (way, course.longest_mm), &course.change, hands);
+            let part = Part::next(begun, (way, course.longest_mm), &course.change, (hands, tuning));
             let Part { effort, resumed, part_mm, .. } = part;
             let to = course.change.to();
             let then = surroundings.displacement(to);
@@ -290,13 +293,13 @@ impl<const C: usize> Workspace<C> {
                 break Ok(Ticking::Rest);
             }
             let before = tools.work;
-            let most = resumed.map_or(MOST_NEAR, |under_way| MOST_NEAR - under_way.iterations);
+            let most = tuning.most_near.saturating_sub(resumed.map_or(0, |under_way| under_way.iterations));
             let allowed = if course.change.overtaken { solves } else { within };
             let solves_left = allowed.saturating_sub(before.solves).max(1);
             let left = passage.map(|passage| (was, passage));
             let attempted = Attempt { hands, part_mm, effort, most, solves: solves_left, left, resumed };
             match tools.try_step(&there, here, attempted, next) {
-                Ok(found) if part.strays(&found) && !course.change.overtaken => {
+                Ok(found) if part.strays(&found, tuning) && !course.change.overtaken => {
                     course.shorten(part_mm);
                     begun = &rest;
                 }
@@ -306,7 +309,7 @@ impl<const C: usize> Workspace<C> {
                         break Err(left);
                     }
                     let way_mm = here.state.rod.farthest_mm(&next.state.rod);
-                    let lies = way_mm <= REST_RADII * surroundings.device.min_radius_mm();
+                    let lies = way_mm <= tuning.rest_radii * surroundings.device.min_radius_mm();
                     moving = course.take(&part, &found, lies, tools.work.since(&before));
                     std::mem::swap(now, next);
                     way.go_on_from(hands);
@@ -325,7 +328,7 @@ impl<const C: usize> Workspace<C> {
                         begun = &fold;
                     }
                     After::UnderWay => {
-                        let under_way = tools.under_way(&part, hands, &next.state, (from, before));
+                        let under_way = tools.under_way(&part, hands, &next.state, (from, before), tuning.most_near);
                         break Ok(Ticking::Solving(Box::new(under_way)));
                     }
                     After::Stays => break Ok(Ticking::Rest),
@@ -352,13 +355,14 @@ impl<const C: usize> Workspace<C> {
 
 impl<const C: usize> Tools<C> {
     /// Stores an unfinished part, with the state `to` of its solution; `before` is the work of the tick before the
-    /// part.
+    /// part, and `most` the largest number of iterations of it.
     fn under_way(
         &mut self,
         part: &Part<'_>,
         hands: &[Hand],
         to: &KirchhoffState,
         (from, before): (&KirchhoffState, Work),
+        most: usize,
     ) -> UnderWay {
         let iterations = self.work.since(&before) + part.resumed.map_or(0, |resumed| resumed.iterations);
         // They are counted once, with the state that the part leads to.
@@ -372,7 +376,7 @@ impl<const C: usize> Tools<C> {
             state: KirchhoffState { correction, stride, tick, report, ..to.clone() },
             neighbourhood: self.newton.neighbourhood.clone(),
             shift: self.newton.last_shift,
-            iterations: iterations.min(MOST_NEAR - 1),
+            iterations: iterations.min(most.saturating_sub(1)),
         }
     }
 }
