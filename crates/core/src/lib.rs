@@ -65,6 +65,7 @@ pub mod scene;
 pub mod shape;
 pub mod solve;
 pub mod statics;
+pub mod tuning;
 pub mod vessel;
 
 pub use device::{Device, DeviceFile, Instrument, Section, Stack};

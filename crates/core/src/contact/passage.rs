@@ -18,16 +18,8 @@ use super::ContactSurface;
 use super::extension::left_through;
 use crate::Vec3;
 use crate::rod::Frame;
+use crate::tuning::PassageTuning;
 use crate::vessel::Opening;
-
-/// Grid spacings, in radii of the device.
-const SPACINGS: [f64; 2] = [0.25, 0.0625];
-/// A path ends at this distance from the front, in radii of the device: what is farther ahead does not block it.
-const AHEAD: f64 = 6.0;
-/// Smallest length of the front, and distance beside it within which paths begin, in radii.
-const BESIDE: f64 = 2.0;
-/// Largest number of grid points per query: if undecided by then, the passage counts as wide.
-const MOST_ASKED: usize = 400_000;
 
 /// Index of a grid point.
 type Cell = [i32; 3];
@@ -49,10 +41,11 @@ pub(crate) fn narrow_ahead(
     openings: &[Opening],
     axis_mm: &[Vec3],
     radius_mm: f64,
+    tuning: &PassageTuning,
 ) -> Option<Narrow> {
-    let front = front(axis_mm, radius_mm)?;
-    for spacing in SPACINGS {
-        let grid = Grid::new((surface, openings), front, radius_mm, spacing * radius_mm)?;
+    let front = front(axis_mm, tuning.beside * radius_mm)?;
+    for spacing in tuning.spacings {
+        let grid = Grid::new((surface, openings), front, radius_mm, spacing * radius_mm, tuning)?;
         let widest = grid.widest()?;
         if widest.radius_mm >= radius_mm {
             return None;
@@ -64,15 +57,14 @@ pub(crate) fn narrow_ahead(
     None
 }
 
-/// The last piece of a device, from its tip to a cross-section that all of it is ahead of, and one point more.
-fn front(axis_mm: &[Vec3], radius_mm: f64) -> Option<&[Vec3]> {
+/// The last piece of a device, at least `least_mm` long, from its tip to a cross-section that all of it is ahead of,
+/// and one point more.
+fn front(axis_mm: &[Vec3], least_mm: f64) -> Option<&[Vec3]> {
     let mut length_mm = 0.0;
     for last in 1..axis_mm.len().checked_sub(1)? {
         length_mm += (axis_mm[last] - axis_mm[last - 1]).norm();
         let along = axis_mm[last - 1] - axis_mm[last + 1];
-        if length_mm >= BESIDE * radius_mm
-            && axis_mm[..last].iter().all(|x| (x - axis_mm[last]).dot(&along) > 0.0)
-        {
+        if length_mm >= least_mm && axis_mm[..last].iter().all(|x| (x - axis_mm[last]).dot(&along) > 0.0) {
             return Some(&axis_mm[..last + 2]);
         }
     }
@@ -91,6 +83,7 @@ struct Grid<'a> {
     frame: Frame,
     radius_mm: f64,
     spacing_mm: f64,
+    tuning: &'a PassageTuning,
 }
 
 /// A path to a grid point.
@@ -123,11 +116,12 @@ impl<'a> Grid<'a> {
         front: &'a [Vec3],
         radius_mm: f64,
         spacing_mm: f64,
+        tuning: &'a PassageTuning,
     ) -> Option<Self> {
         let [piece @ .., behind] = front else { return None };
         let [.., ahead, middle] = piece else { return None };
         let frame = Frame::new(ahead - behind, None);
-        Some(Self { surface, openings, piece, middle: *middle, frame, radius_mm, spacing_mm })
+        Some(Self { surface, openings, piece, middle: *middle, frame, radius_mm, spacing_mm, tuning })
     }
 
     /// The narrowest position of the widest path; `None` if the front is not in the lumen, or if the search takes too
@@ -141,11 +135,12 @@ impl<'a> Grid<'a> {
         let mut seen: FxHashSet<Cell> = ways.iter().map(|way| way.to).collect();
         while let Some(way) = ways.pop() {
             let at = self.place(way.to);
-            if self.distance_mm(&at).0 >= AHEAD * self.radius_mm || left_through(self.openings, &at).is_some()
+            if self.distance_mm(&at).0 >= self.tuning.ahead * self.radius_mm
+                || left_through(self.openings, &at).is_some()
             {
                 return Some(Narrow { radius_mm: way.least_mm, place_mm: self.place(way.narrowest) });
             }
-            if seen.len() > MOST_ASKED {
+            if seen.len() > self.tuning.most_asked {
                 return None;
             }
             for to in around(way.to) {
@@ -201,7 +196,11 @@ impl<'a> Grid<'a> {
             let x = self.place(to);
             let (distance_mm, ahead) = self.distance_mm(&x);
             let least_mm = self.clearance_mm(&x);
-            if ahead || distance_mm > BESIDE * self.radius_mm || self.ahead_mm(&x) < 0.0 || least_mm <= 0.0 {
+            if ahead
+                || distance_mm > self.tuning.beside * self.radius_mm
+                || self.ahead_mm(&x) < 0.0
+                || least_mm <= 0.0
+            {
                 continue;
             }
             ways.push(Way { least_mm, narrowest: to, to });
@@ -219,7 +218,7 @@ impl<'a> Grid<'a> {
     /// device.
     fn section(&self) -> FxHashSet<[i32; 2]> {
         let Frame { u, v, .. } = self.frame;
-        let most = (AHEAD / self.spacing_mm * self.radius_mm) as i32;
+        let most = (self.tuning.ahead / self.spacing_mm * self.radius_mm) as i32;
         let mut seen = FxHashSet::default();
         let mut left: Vec<[i32; 2]> = vec![[0, 0]];
         while let Some([i, j]) = left.pop() {
@@ -280,7 +279,7 @@ mod tests {
     /// The result for a wire of radius 0.4 mm whose tip is at z, offset by x.
     fn ahead((surface, wall): &(ContactSurface, Wall), z: f64, x: f64) -> Option<Narrow> {
         let axis: Vec<Vec3> = (0..20).map(|k| Vec3::new(x, 0.0, z - 0.6 * f64::from(k))).collect();
-        narrow_ahead(surface, wall.openings(), &axis, 0.4)
+        narrow_ahead(surface, wall.openings(), &axis, 0.4, &PassageTuning::DEFAULT)
     }
 
     #[test]

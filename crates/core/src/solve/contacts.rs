@@ -26,31 +26,21 @@ use super::external::{ContactMerit, Contacts, Moved};
 use super::line_search::LineSearch;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::StopReason;
-use super::shift::{SHIFT_GROWTH, SHIFTS};
 use crate::Vec3;
 use crate::rod::scatter::{element_step, point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
-
-/// Largest number of rounds, one factorisation each, in which the active set at the end of a step is sought.
-const ROUNDS: usize = 100;
-/// Largest rotation of a step, rad, in a round: the linearised planes are no model farther away.
-const LARGEST_TURN: f64 = 1.0;
-
-/// A search ends when the slope has fallen to this part of the initial slope.
-const SEARCHED: f64 = 1e-3;
-/// Largest number of trials of a search.
-const SEARCHES: usize = 60;
+use crate::tuning::NewtonTuning;
 
 /// Fraction of the way, at most 1, up to which a convex function with the given slope decreases (the Illinois
 /// method).
-pub(crate) fn falls_until(mut slope: impl FnMut(f64) -> f64) -> f64 {
+pub(crate) fn falls_until(tuning: &NewtonTuning, mut slope: impl FnMut(f64) -> f64) -> f64 {
     let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
     if high.1 <= 0.0 || low.1 >= 0.0 {
         return 1.0;
     }
-    let least = SEARCHED * -low.1;
+    let least = tuning.searched * -low.1;
     let mut last = 0.0;
-    for _ in 0..SEARCHES {
+    for _ in 0..tuning.searches {
         let part = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
         let here = slope(part);
         if here.abs() <= least {
@@ -101,7 +91,7 @@ impl<const C: usize> Newton<C> {
         }
         let models = problem.minimum && self.assembly.hessian;
         let least = self.first_shift(elements);
-        for _ in 0..SHIFTS {
+        for _ in 0..self.tuning.shifts {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
@@ -109,9 +99,9 @@ impl<const C: usize> Newton<C> {
                     return Ok(merit);
                 }
             }
-            *shift = (SHIFT_GROWTH * *shift).max(least);
+            *shift = (self.tuning.shift_growth * *shift).max(least);
             while !self.factors_minimum(problem, *shift) {
-                *shift *= SHIFT_GROWTH;
+                *shift *= self.tuning.shift_growth;
                 if !shift.is_finite() {
                     return Err(StopReason::Singular);
                 }
@@ -148,7 +138,8 @@ impl<const C: usize> Newton<C> {
     /// it has no minimum.
     fn contacts_at_end(&mut self, problem: &mut Problem<'_>, state: &RodState, shift: f64) -> bool {
         let elements = problem.elements;
-        for _ in 0..ROUNDS {
+        let tuning = self.tuning;
+        for _ in 0..tuning.contact_rounds {
             // With the same active set the next round would take the same direction, and this one went as far as the
             // model decreases.
             if self.change_contacts(problem, state) == 0 {
@@ -159,10 +150,10 @@ impl<const C: usize> Newton<C> {
                 return false;
             }
             let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
-            let most = if turn > LARGEST_TURN { LARGEST_TURN / turn } else { 1.0 };
+            let most = if turn > tuning.contact_turn_rad { tuning.contact_turn_rad / turn } else { 1.0 };
             let part = self.with_contacts(problem, state, |contacts, moved| {
                 contacts.look_towards(moved);
-                let part = falls_until(|part| contacts.slope_towards(part)).min(most);
+                let part = falls_until(&tuning, |part| contacts.slope_towards(part)).min(most);
                 contacts.go_towards(part);
                 part
             });

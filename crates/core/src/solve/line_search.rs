@@ -9,17 +9,8 @@ use super::external::ContactMerit;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::REGULARISATION;
-use super::stop::SHORT;
 use crate::rod::{ElementData, Layout, RodState};
-
-/// Largest number of trials.
-const TRIALS: usize = 24;
-/// Armijo's constant: the fraction of the decrease predicted by the slope that a trial must reach.
-const ARMIJO: f64 = 1e-4;
-/// Changes of axial force count as rotation: STIFFENING times their ratio to EI/L², in radians.
-const STIFFENING: f64 = 1e-2;
-/// Number of trials after which the residual may grow if loads have no potential.
-const PATIENCE: usize = 6;
+use crate::tuning::NewtonTuning;
 
 /// State kept from one line search to the next.
 #[derive(Debug, Clone, Copy)]
@@ -78,15 +69,16 @@ impl Merit {
     }
 
     /// Whether a change at a fraction of the step satisfies Armijo's condition.
-    fn falls_enough(&self, change: f64, part: f64) -> bool {
-        change <= ARMIJO * part * self.slope.min(0.0) + self.rounding()
+    fn falls_enough(&self, change: f64, part: f64, armijo: f64) -> bool {
+        change <= armijo * part * self.slope.min(0.0) + self.rounding()
     }
 
     /// Fraction of the step at which the parabola through value, slope and the `change` at `part` has its minimum.
-    fn parabola(&self, change: f64, part: f64) -> f64 {
+    fn parabola(&self, change: f64, part: f64, tuning: &NewtonTuning) -> f64 {
+        let (least, largest) = (tuning.least_cut, tuning.largest_cut);
         let curve = change - self.slope * part;
         let minimum = if curve > 0.0 { -0.5 * self.slope * part / curve } else { 0.5 };
-        part * if minimum.is_finite() { minimum.clamp(0.1, 0.6) } else { 0.1 }
+        part * if minimum.is_finite() { minimum.max(least).min(largest) } else { least }
     }
 }
 
@@ -105,13 +97,14 @@ impl<const C: usize> Newton<C> {
             self.stride(problem, state, search, shift, contacts)?;
         let free = problem.supports.conditions() == 0;
         // The predicted decrease is below rounding, so evaluating the energies would be useless.
-        let below_rounding = problem.minimum && free && turn <= SHORT && -merit.slope <= merit.rounding();
+        let below_rounding =
+            problem.minimum && free && turn <= self.tuning.short_rad && -merit.slope <= merit.rounding();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
             problem.supports.multipliers[j] += self.step[first + j];
         }
-        for attempt in 0..TRIALS {
+        for attempt in 0..self.tuning.trials {
             part = self.place_trial(problem, state, part);
             search.assembled = false;
             let (energy_change, change);
@@ -122,7 +115,7 @@ impl<const C: usize> Newton<C> {
                 energy_change = self.energy(problem.elements, problem.external, state) - merit.energy;
                 change = energy_change + search.weigh(&problem.supports.gaps(&self.trial)) - merit.gaps;
                 if !self.accepts(problem, search, &merit, (residual, change, part), attempt) {
-                    part = merit.parabola(change, part);
+                    part = merit.parabola(change, part, &self.tuning);
                     continue;
                 }
             }
@@ -162,7 +155,7 @@ impl<const C: usize> Newton<C> {
         if !turn.is_finite() {
             return Err(StopReason::NotFinite);
         }
-        let most = problem.options.max_turn;
+        let most = self.tuning.largest_turn_rad;
         let part = if turn > most { most / turn } else { 1.0 };
         Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
     }
@@ -209,14 +202,14 @@ impl<const C: usize> Newton<C> {
         let l = Layout::<C>;
         let elements = problem.elements;
         let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-        turn.max(STIFFENING * pulled * REGULARISATION / Self::regularisation(elements))
+        turn.max(self.tuning.stiffening * pulled * REGULARISATION / Self::regularisation(elements))
     }
 
     /// Sets the trial to a fraction of the step, at most `part`, that crosses no surface; returns the fraction.
     fn place_trial(&mut self, problem: &mut Problem<'_>, state: &RodState, mut part: f64) -> f64 {
         let Problem { elements, supports, external, .. } = problem;
         self.trial.advance::<C>(elements, state, &self.step, part);
-        for _ in 0..4 {
+        for _ in 0..self.tuning.safe_cuts {
             let safe = external.safe_fraction(elements, &self.trial);
             if safe >= 1.0 {
                 break;
@@ -248,7 +241,7 @@ impl<const C: usize> Newton<C> {
         if !change.is_finite() {
             return false;
         }
-        if !problem.options.minimum || merit.falls_enough(change, part) {
+        if !problem.options.minimum || merit.falls_enough(change, part, self.tuning.armijo) {
             return true;
         }
         if problem.external.is_conservative() {
@@ -261,6 +254,7 @@ impl<const C: usize> Newton<C> {
         self.assemble(elements, supports, *external, &trial);
         self.trial = trial;
         let found = self.residual(elements, *external, supports, options.tolerance).relative;
-        found < 0.9 * residual || (attempt > PATIENCE && found < 2.0 * residual)
+        let NewtonTuning { residual_falls, patience, residual_grows, .. } = self.tuning;
+        found < residual_falls * residual || (attempt > patience && found < residual_grows * residual)
     }
 }

@@ -10,14 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::rod::RodState;
-
-/// Largest distance of a node from its prediction, as a multiple of its room.
-const ROOMS: f64 = 2.0;
-/// Largest difference of a node's material angle from its prediction, rad.
-const LARGEST_TURN: f64 = 1.0;
-/// An iterate this many times farther than allowed does not return. Below that it may: the first steps from a
-/// prediction can be long where contacts open.
-const STRAY: f64 = 3.0;
+use crate::tuning::NewtonTuning;
 
 /// The predicted nodes of a rod, and how far each may be from its prediction.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -36,19 +29,20 @@ impl Neighbourhood {
     }
 
     /// Centres the neighbourhood on a prediction whose nodes, the first one included, have this room, mm.
-    pub(crate) fn begin(&mut self, state: &RodState, room_mm: &[f64]) {
+    pub(crate) fn begin(&mut self, state: &RodState, room_mm: &[f64], tuning: &NewtonTuning) {
         let places = state.positions.iter().zip(room_mm);
         self.nodes.clear();
-        self.nodes.extend(places.map(|(at_mm, room_mm)| (*at_mm, ROOMS * room_mm)));
+        self.nodes.extend(places.map(|(at_mm, room_mm)| (*at_mm, tuning.rooms * room_mm)));
         self.angles.clear();
         self.angles.extend(carried(state));
     }
 
     /// Largest deviation of a state from the prediction, as a fraction of the allowed one.
-    pub(crate) fn off(&self, state: &RodState) -> f64 {
+    pub(crate) fn off(&self, state: &RodState, tuning: &NewtonTuning) -> f64 {
         let places = state.positions.iter().zip(&self.nodes);
         let off = places.map(|(x, (at_mm, most_mm))| (x - at_mm).norm() / most_mm).fold(0.0, f64::max);
-        let turns = carried(state).zip(&self.angles).map(|(angle, was)| (angle - was).abs() / LARGEST_TURN);
+        let turn = |(angle, was): (f64, &f64)| (angle - was).abs() / tuning.room_rad;
+        let turns = carried(state).zip(&self.angles).map(turn);
         turns.fold(off, f64::max)
     }
 
@@ -61,8 +55,8 @@ impl Neighbourhood {
     }
 
     /// Whether Newton's method should stop because this iterate is too far away.
-    pub(crate) fn is_left_by(&self, state: &RodState) -> bool {
-        self.bounds && self.off(state) > STRAY
+    pub(crate) fn is_left_by(&self, state: &RodState, tuning: &NewtonTuning) -> bool {
+        self.bounds && self.off(state, tuning) > tuning.stray
     }
 }
 
@@ -82,25 +76,26 @@ mod tests {
         let elements = [ElementData::plain(2.0, 1.0); 2];
         let rod = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::z(), None));
         let mut near = Neighbourhood { bounds: true, ..Neighbourhood::default() };
-        near.begin(&rod, &[0.5, 0.5, 4.0]);
+        let tuning = NewtonTuning::DEFAULT;
+        near.begin(&rod, &[0.5, 0.5, 4.0], &tuning);
         let moved = |node: usize, by_mm: f64| {
             let mut there = rod.clone();
             there.positions[node].x += by_mm;
             there
         };
-        assert_eq!(near.off(&rod), 0.0);
+        assert_eq!(near.off(&rod, &tuning), 0.0);
         assert!(
-            (near.off(&moved(1, 0.5)) - 0.5).abs() < 1e-12
-                && (near.off(&moved(2, 0.5)) - 0.0625).abs() < 1e-12
+            (near.off(&moved(1, 0.5), &tuning) - 0.5).abs() < 1e-12
+                && (near.off(&moved(2, 0.5), &tuning) - 0.0625).abs() < 1e-12
         );
-        assert!(!near.is_left_by(&moved(1, 2.9)) && near.is_left_by(&moved(1, 3.1)));
+        assert!(!near.is_left_by(&moved(1, 2.9), &tuning) && near.is_left_by(&moved(1, 3.1), &tuning));
         near.bounds = false;
-        assert!(!near.is_left_by(&moved(1, 3.1)));
+        assert!(!near.is_left_by(&moved(1, 3.1), &tuning));
         let mut turned = rod.clone();
         turned.angles[2] += 0.3;
-        assert!((near.off(&turned) - 0.3).abs() < 1e-12);
+        assert!((near.off(&turned, &tuning) - 0.3).abs() < 1e-12);
         // The reference triads have turned back by the same angle.
         turned.reference_twists[1] -= 0.3;
-        assert!(near.off(&turned) < 1e-12);
+        assert!(near.off(&turned, &tuning) < 1e-12);
     }
 }

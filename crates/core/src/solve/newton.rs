@@ -19,10 +19,10 @@ use super::line_search::LineSearch;
 use super::neighbourhood::Neighbourhood;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use super::residual::ResidualSize;
-use super::shift::SHIFT_DECAY;
 use super::stop::Progress;
 use crate::banded::{Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
+use crate::tuning::NewtonTuning;
 
 /// Changes of energy below this fraction of the energies' magnitude are rounding.
 pub(super) const ENERGY_ROUNDING: f64 = 1e-13;
@@ -51,6 +51,8 @@ pub struct Newton<const C: usize> {
     pub(super) solves: usize,
     /// The neighbourhood in which solutions are sought.
     pub(crate) neighbourhood: Neighbourhood,
+    /// Numbers of the solution under way, or of the last one.
+    pub(super) tuning: NewtonTuning,
 }
 
 impl<const C: usize> Newton<C> {
@@ -71,6 +73,7 @@ impl<const C: usize> Newton<C> {
             steps: Vec::with_capacity(STEPS),
             solves: 0,
             neighbourhood: Neighbourhood::default(),
+            tuning: NewtonTuning::DEFAULT,
         }
     }
 
@@ -135,7 +138,7 @@ impl<const C: usize> Newton<C> {
         state: &mut RodState,
         options: &NewtonOptions,
     ) -> NewtonReport {
-        self.solves = 0;
+        (self.solves, self.tuning) = (0, options.tuning);
         // Loads without potential make the stiffness unsymmetric: the inertia of its symmetric part does not indicate
         // minima.
         let minimum = options.minimum && external.is_conservative();
@@ -152,7 +155,7 @@ impl<const C: usize> Newton<C> {
         self.other.copy_from(state);
         self.steps.clear();
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
-        let mut progress = Progress::default();
+        let mut progress = Progress::new(&options.tuning);
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
         self.last_shift = options.last_shift;
@@ -170,7 +173,7 @@ impl<const C: usize> Newton<C> {
                 if report.iterations >= options.max_iterations {
                     return report.stopped(StopReason::Unsettled);
                 }
-                progress = Progress::default();
+                progress = Progress::new(&options.tuning);
                 // If renewing the base does not settle the contacts, take a step: contact forces change only in
                 // steps.
                 if !std::mem::replace(&mut renewed, true) {
@@ -204,7 +207,7 @@ impl<const C: usize> Newton<C> {
                     return report.converged(size.reason());
                 };
                 self.steps.push(StepRecord { residual: size.relative, shift, ..step });
-                progress = Progress::default();
+                progress = Progress::new(&options.tuning);
                 report.iterations += 1;
                 continue;
             }
@@ -216,10 +219,12 @@ impl<const C: usize> Newton<C> {
                     let step = (size.relative, shift);
                     self.line_search(&mut problem, state, &mut search, step, &contacts)
                 });
-            self.last_shift = shift.max(SHIFT_DECAY * self.last_shift);
+            self.last_shift = shift.max(self.tuning.shift_decay * self.last_shift);
             match searched {
                 Ok(_) if state.is_folded(elements) => return report.stopped(StopReason::Folded),
-                Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
+                Ok(_) if self.neighbourhood.is_left_by(state, &self.tuning) => {
+                    return report.stopped(StopReason::Left);
+                }
                 Ok(turn) => progress.has_turned(turn),
                 Err(StopReason::NoDescent) => {
                     return self.without_descent(&mut problem, state, &progress, natural, report);

@@ -1,6 +1,7 @@
 //! Options and results of Newton's method.
 
 use crate::banded::Inertia;
+use crate::tuning::NewtonTuning;
 
 /// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,14 +13,13 @@ pub struct NewtonOptions {
     pub max_solves: usize,
     /// Residual, relative to the force scale, below which a state is an equilibrium.
     pub tolerance: f64,
-    /// Largest rotation of a node in one step, rad. Slightly less than a right angle is best: a dead load across a
-    /// rod turns it by no more.
-    pub max_turn: f64,
     /// Whether to find a minimum (or any equilibrium, as continuation does).
     pub minimum: bool,
-    /// Shift of the last step of a solution that this one continues, 0 if there is none: shifts are tried from an
-    /// eighth of it on.
+    /// Shift of the last step of a solution that this one continues, 0 if there is none: shifts are tried from a
+    /// fraction of it on.
     pub last_shift: f64,
+    /// Numbers of the method that are choices.
+    pub tuning: NewtonTuning,
 }
 
 impl Default for NewtonOptions {
@@ -28,9 +28,9 @@ impl Default for NewtonOptions {
             max_iterations: 500,
             max_solves: usize::MAX,
             tolerance: 1e-10,
-            max_turn: 1.4,
             minimum: true,
             last_shift: 0.0,
+            tuning: NewtonTuning::DEFAULT,
         }
     }
 }

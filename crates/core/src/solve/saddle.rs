@@ -26,7 +26,7 @@ impl<const C: usize> Newton<C> {
             self.step[l.tangent(i)] = w.y;
             self.step[l.tangent(i) + 1] = w.z;
         }
-        for _ in 0..6 {
+        for _ in 0..self.tuning.saddle_iterations {
             self.spare.fill(0.0);
             for i in 0..=n {
                 let h = elements[i.min(n - 1)].length;
@@ -64,11 +64,11 @@ impl<const C: usize> Newton<C> {
         let l = Layout::<C>;
         let first = l.support(elements.len());
         let (turn, twist) = RodState::largest_turn::<C>(elements, state, &self.step);
-        let unit = 0.5 / turn.max(twist).max(1e-300);
+        let unit = self.tuning.saddle_rad / turn.max(twist).max(1e-300);
         let before = self.assembly.energy.total() + self.assembly.external_energy;
         let scale = self.assembly.energy.total().abs() + self.assembly.external_energy.abs();
         let mut alpha = unit;
-        for _ in 0..20 {
+        for _ in 0..self.tuning.saddle_halvings {
             for sign in [1.0, -1.0] {
                 self.trial.advance::<C>(elements, state, &self.step, sign * alpha);
                 if supports.conditions() > 0 {

@@ -11,15 +11,6 @@ use crate::rod::{Assembly, ElementData, Supports};
 
 /// Regularisation that is always added: a uniform tension, as a fraction of EI/L².
 pub(super) const REGULARISATION: f64 = 1e-8;
-/// Smallest shift, as a multiple of the regularisation.
-const LEAST_SHIFT: f64 = 1e5;
-/// Factor by which an insufficient shift grows.
-pub(super) const SHIFT_GROWTH: f64 = 4.0;
-/// The search for a shift starts at this fraction of the last one, to which that also decays in an iteration without
-/// shift.
-pub(super) const SHIFT_DECAY: f64 = 1.0 / 8.0;
-/// Number of shifts tried before a matrix is reported as singular.
-pub(super) const SHIFTS: usize = 60;
 
 impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
@@ -93,7 +84,7 @@ impl<const C: usize> Newton<C> {
             return Ok((0.0, natural));
         }
         let mut sigma = self.first_shift(problem.elements);
-        for attempt in 0..SHIFTS {
+        for attempt in 0..self.tuning.shifts {
             let found = self.factor_step(regularisation + sigma);
             if right(&found) {
                 return Ok((sigma, natural));
@@ -101,14 +92,15 @@ impl<const C: usize> Newton<C> {
             if attempt > 20 && matches!(found, Err(FactorError::NotFinite { .. })) {
                 return Err(StopReason::NotFinite);
             }
-            sigma *= SHIFT_GROWTH;
+            sigma *= self.tuning.shift_growth;
         }
         Err(StopReason::Singular)
     }
 
     /// The first shift to try.
     pub(super) fn first_shift(&self, elements: &[ElementData]) -> f64 {
-        (LEAST_SHIFT * Self::regularisation(elements)).max(SHIFT_DECAY * self.last_shift)
+        let Self { tuning, last_shift, .. } = self;
+        (tuning.least_shift * Self::regularisation(elements)).max(tuning.shift_decay * last_shift)
     }
 
     /// Factors the assembled matrix with a shift, and solves for the step.

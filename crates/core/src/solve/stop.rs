@@ -6,20 +6,8 @@
 use super::newton::ENERGY_ROUNDING;
 use super::report::{StepRecord, StopReason};
 use super::residual::ResidualSize;
+use crate::tuning::NewtonTuning;
 
-/// After a full Newton step with a largest rotation below this, rad, only the residual is assembled, as the
-/// equilibrium is near.
-pub(super) const SHORT: f64 = 1e-5;
-/// The same holds below this rotation, rad, if by quadratic convergence the state is within the tolerance: if
-/// `QUADRATIC` times the square of the rotation is at most the tolerance.
-const NEAR: f64 = 1e-3;
-/// Assumed constant of quadratic convergence, 1/rad.
-const QUADRATIC: f64 = 10.0;
-/// Another step with the same factors is assumed to leave a residual smaller by this times the last rotation, 1/rad.
-const CHORD: f64 = 10.0;
-/// Number of consecutive states at rounding without halving the residual after which it counts as minimal, even
-/// though steps still turn nodes by more than the tolerance.
-const HIDDEN: usize = 3;
 /// A relative residual below this that no longer decreases is rounding.
 const ROUNDED: f64 = 1e-6;
 
@@ -33,15 +21,14 @@ pub(super) struct Progress {
     /// Rotation of the last step, rad, if it was a full Newton step; otherwise infinite. Changes of axial force count
     /// as rotations.
     last_turn: f64,
-}
-
-impl Default for Progress {
-    fn default() -> Self {
-        Self { best: f64::INFINITY, stalled: 0, last_turn: f64::INFINITY }
-    }
+    tuning: NewtonTuning,
 }
 
 impl Progress {
+    pub(super) fn new(tuning: &NewtonTuning) -> Self {
+        Self { best: f64::INFINITY, stalled: 0, last_turn: f64::INFINITY, tuning: *tuning }
+    }
+
     /// Records a step.
     pub(super) fn has_turned(&mut self, turn: f64) {
         self.last_turn = turn;
@@ -49,14 +36,14 @@ impl Progress {
 
     /// Whether the next state is assembled with its matrix.
     pub(super) fn wants_hessian(&self, tolerance: f64) -> bool {
-        !residual_alone(self.last_turn, tolerance)
+        !residual_alone(self.last_turn, tolerance, &self.tuning)
     }
 
     /// Whether another step with the factors of an earlier state will reach the tolerance. If steps no longer reduce
     /// the residual, the matrix of the state itself is needed: with factors from before a contact opened or closed,
     /// steps may alternate for ever.
     pub(super) fn shrinks_enough(&self, size: &ResidualSize, tolerance: f64) -> bool {
-        size.relative < 0.5 * self.best && CHORD * self.last_turn * size.relative <= tolerance
+        size.relative < 0.5 * self.best && self.tuning.chord * self.last_turn * size.relative <= tolerance
     }
 
     /// Records the residual of a state; returns whether it is an equilibrium.
@@ -69,7 +56,8 @@ impl Progress {
         let is_rounding = |s: &StepRecord| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale;
         let tiny_steps = steps.len() >= 3 && steps.iter().rev().take(3).all(is_rounding);
         size.small
-            || (size.rounding && self.stalled >= if self.last_turn <= tolerance { 1 } else { HIDDEN })
+            || (size.rounding
+                && self.stalled >= if self.last_turn <= tolerance { 1 } else { self.tuning.hidden })
             || (self.stalled >= 3 && tiny_steps && size.relative < ROUNDED)
     }
 
@@ -87,8 +75,9 @@ impl ResidualSize {
 }
 
 /// Whether, after a full Newton step that turned nodes by at most `last_turn`, only the residual is assembled.
-fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
-    last_turn <= SHORT || (last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= tolerance)
+fn residual_alone(last_turn: f64, tolerance: f64, tuning: &NewtonTuning) -> bool {
+    last_turn <= tuning.short_rad
+        || (last_turn <= tuning.near_rad && tuning.quadratic * last_turn * last_turn <= tolerance)
 }
 
 #[cfg(test)]

@@ -4,9 +4,6 @@ use super::external::External;
 use super::newton::Newton;
 use crate::rod::{ElementData, Layout, RodState, Supports, stored_energy};
 
-/// Largest rotation of a node in a correction, rad; larger corrections are rejected.
-const LARGEST_CORRECTION: f64 = 0.3;
-
 impl<const C: usize> Newton<C> {
     /// Undoes the substitution of the multiplier in [`crate::rod::assembly`]: dN = m/(1 − γD).
     pub(crate) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
@@ -31,7 +28,7 @@ impl<const C: usize> Newton<C> {
     /// Second-order corrections of the end conditions with the current factorisation.
     pub(super) fn correct(&mut self, elements: &[ElementData], supports: &Supports, first: usize) {
         let mut last = f64::INFINITY;
-        for _ in 0..4 {
+        for _ in 0..self.tuning.corrections {
             let gaps = supports.gaps(&self.trial);
             let size = gaps.iter().fold(0.0f64, |m, g| m.max(g.abs()));
             if size.is_nan() || size >= last || size < 1e-14 {
@@ -46,7 +43,7 @@ impl<const C: usize> Newton<C> {
             Self::restore_tensions(elements, &mut self.spare);
             self.other.copy_from(&self.trial);
             let (turn, _) = RodState::largest_turn::<C>(elements, &self.other, &self.spare);
-            if turn.is_nan() || turn > LARGEST_CORRECTION {
+            if turn.is_nan() || turn > self.tuning.correction_rad {
                 break;
             }
             self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);

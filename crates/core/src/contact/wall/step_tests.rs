@@ -6,6 +6,7 @@ use crate::contact::{ContactSurface, HandMotion};
 use crate::rod::{Assembly, PLAIN, Supports};
 use crate::solve::contacts::falls_until;
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
+use crate::tuning::NewtonTuning;
 
 /// A wall and a force on the tip; unless `foreseeing`, the contacts at the end of a step are hidden from Newton's
 /// method.
@@ -137,11 +138,11 @@ fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
 fn a_search_ends_where_a_convex_function_falls_no_more() {
     // (x − 3)² / 2 and springs that press from 0.2 and 0.5 on.
     let slope = |x: f64| x - 3.0 + 4.0 * (x - 0.2f64).max(0.0) + 40.0 * (x - 0.5f64).max(0.0);
-    let part = falls_until(slope);
+    let part = falls_until(&NewtonTuning::DEFAULT, slope);
     assert!(slope(part).abs() < 1e-2 && (part - 23.8 / 45.0).abs() < 1e-3, "{part}");
     // Without springs it decreases all the way; if it increases from the start there is nothing to search.
-    assert_eq!(falls_until(|x| x - 3.0), 1.0);
-    assert_eq!(falls_until(|x| x + 3.0), 1.0);
+    assert_eq!(falls_until(&NewtonTuning::DEFAULT, |x| x - 3.0), 1.0);
+    assert_eq!(falls_until(&NewtonTuning::DEFAULT, |x| x + 3.0), 1.0);
 }
 
 #[test]

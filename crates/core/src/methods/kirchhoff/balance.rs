@@ -11,9 +11,6 @@ use super::state::KirchhoffState;
 use crate::device::Stack;
 use crate::methods::StepReport;
 
-/// Released or missing energy is significant above this fraction of the energy that is stored in the device and the wall,
-/// exchanged with fields, or released from the sheath.
-const NOTABLE: f64 = 0.02;
 /// Energy below which none is significant, mJ.
 const NOTABLE_FLOOR_MJ: f64 = 1e-6;
 
@@ -36,12 +33,15 @@ pub(super) struct Balance {
 
 impl Balance {
     /// The balance between two states, given the work of wall and blood and the bounds of the dissipation. Friction
-    /// outside the body is not part of it: what hands do against that is lost at once.
+    /// outside the body is not part of it: what hands do against that is lost at once. Energy is significant above the
+    /// fraction `notable` of the energy that is stored in the device and the wall, exchanged with fields, or released
+    /// from the sheath.
     pub(super) fn new(
         stack: &Stack,
         (was_state, is_state): (&KirchhoffState, &KirchhoffState),
         by_wall: WallWork,
         rubbed_mj: (f64, f64),
+        notable: f64,
     ) -> Self {
         let (before, after) = (&was_state.report, &is_state.report);
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
@@ -76,7 +76,7 @@ impl Balance {
         // The energy in a field has an arbitrary zero: its change counts.
         let [elastic_was, elastic_is] = [was, is].map(|energy| energy.total() - energy.field);
         let sizes_mj = [elastic_was, elastic_is, (is.field - was.field).abs(), from_sheath_mj.abs()];
-        let notable_mj = NOTABLE * sizes_mj.into_iter().fold(NOTABLE_FLOOR_MJ, f64::max);
+        let notable_mj = notable * sizes_mj.into_iter().fold(NOTABLE_FLOOR_MJ, f64::max);
         Self { least_mj, mean_mj, most_mj, stored_mj, rubbed_mj, notable_mj }
     }
 

@@ -14,11 +14,6 @@ use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// Penetration, as a fraction of its radius, from which a device counts as wedged.
-const WEDGED: f64 = 0.5;
-/// Length of the device searched for its front, in radii: a hooked tip that is folded back is as long.
-const FRONT: usize = 60;
-
 /// After no equilibrium was found: rejects commands that advance an instrument where its passage is too narrow.
 ///
 /// # Errors
@@ -52,7 +47,7 @@ pub(super) fn refuse_wedged(
     commands: &[Command],
 ) -> Result<()> {
     let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    if from.state.report.max_penetration_mm < WEDGED * thinnest_mm {
+    if from.state.report.max_penetration_mm < environment.options.tuning.passage.wedged * thinnest_mm {
         return Ok(());
     }
     refuse_narrow(environment, from, commands)
@@ -74,9 +69,11 @@ fn narrow(
     let tip_mm = line_mm - inserted_mm;
     let radius_mm = stack.felt_radius_mm(lengths_mm, tip_mm);
     let wall = environment.wall();
-    let places = (0..FRONT).map(|k| tip_mm + k as f64 * radius_mm).take_while(|mm| *mm < line_mm);
+    let tuning = &environment.options.tuning.passage;
+    let places = (0..tuning.front).map(|k| tip_mm + k as f64 * radius_mm).take_while(|mm| *mm < line_mm);
     let axis_mm: Vec<Vec3> = places.map(|mm| wall.material(&place(mesh, &state.rod, mm))).collect();
-    let narrow = narrow_ahead(&wall, environment.surroundings.lumen.openings(), &axis_mm, radius_mm)?;
+    let openings = environment.surroundings.lumen.openings();
+    let narrow = narrow_ahead(&wall, openings, &axis_mm, radius_mm, tuning)?;
     Some((narrow, radius_mm))
 }
 

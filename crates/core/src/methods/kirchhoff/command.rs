@@ -25,9 +25,6 @@ use crate::device::line_mm;
 use crate::methods::{Move, StepReport, Surroundings};
 use crate::{Error, Result};
 
-/// Motion in a further relaxation, in the smallest radius of the device, below which it is at rest.
-const REST_RADII: f64 = 1e-3;
-
 /// Result of a command.
 #[derive(Debug)]
 pub(super) enum Driven {
@@ -125,7 +122,8 @@ impl<const C: usize> Workspace<C> {
                         break Err(left);
                     }
                     let way_mm = was.state.rod.farthest_mm(&next.state.rod);
-                    let lies = way_mm <= REST_RADII * surroundings.device.min_radius_mm();
+                    let lies = way_mm
+                        <= environment.options.tuning.steps.rest_radii * surroundings.device.min_radius_mm();
                     course.accept(&part, &found, lies, iterations);
                     std::mem::swap(now, next);
                     way.go_on_from(hands);

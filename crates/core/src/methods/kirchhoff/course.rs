@@ -2,25 +2,13 @@
 
 use super::Environment;
 use super::hands::{Hand, Way};
-use super::search::LONGEST;
 use super::state::{Flight, KirchhoffState, UnderWay, Unfinished};
 use super::step_control::{StepControl, Stride};
-use super::substep::{AT_REST, Effort, Found, Limits, Lost, Part};
+use super::substep::{Effort, Found, Limits, Lost, Part};
 use super::sum::Sum;
 use super::workspace::Work;
 use crate::methods::{Command, Move};
-
-/// Largest number of parts of one command.
-const PART_LIMIT: usize = 4096;
-/// Newton iterations allowed for a command per millimetre and per [`WORK_RAD`], including failed attempts, before it
-/// is relaxed: this bounds its cost.
-const WORK: f64 = 280.0;
-/// Rotation that counts like a millimetre in [`WORK`], rad.
-const WORK_RAD: f64 = 0.1;
-/// Upper limit of these iterations, as a multiple of those of one solution.
-const WORK_OF_ONE: usize = 10;
-/// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall once.
-const OF_A_PART: usize = 2;
+use crate::tuning::StepTuning;
 
 /// What changes around the device while a command is carried out: the vessel and fields. It does not wait.
 #[derive(Debug, Clone, Copy)]
@@ -55,6 +43,7 @@ pub(super) enum Next {
 
 /// The course of a command.
 pub(super) struct Course<'a> {
+    tuning: &'a StepTuning,
     control: StepControl,
     /// The solution that the last tick has begun.
     begun: Option<&'a UnderWay>,
@@ -74,21 +63,26 @@ pub(super) struct Course<'a> {
 impl<'a> Course<'a> {
     /// Begins with the motion of a command, or goes on with that of the last tick.
     pub(super) fn new(
-        environment: &Environment<'_>,
+        environment: &Environment<'a>,
         from: &'a KirchhoffState,
         (way, moves): (&Way, &[Move]),
     ) -> Self {
         let surroundings = &environment.surroundings;
         let (vessel_moves, fields_change) = (surroundings.moves(), surroundings.fields_change());
-        let most = WORK_OF_ONE.saturating_mul(environment.options.max_iterations);
-        let work = |travel_mm: f64| ((WORK * travel_mm) as usize).min(most);
-        let travel_mm = way.travel_mm(WORK_RAD);
+        let tuning = &environment.options.tuning.steps;
+        let most = tuning.work_of_one.saturating_mul(environment.options.max_iterations);
+        let work = |travel_mm: f64| ((tuning.work * travel_mm) as usize).min(most);
+        let travel_mm = way.travel_mm(tuning.work_rad);
         let unfinished = from.unfinished.as_deref();
         let control = match unfinished {
-            Some(unfinished) => unfinished.control.more(work(asked_mm(moves)), most),
+            Some(unfinished) => unfinished.control.more(work(asked_mm(moves, tuning.work_rad)), most),
             None => {
-                let control =
-                    StepControl::new(work(travel_mm.max(1.0)), from.stride, environment.has_friction());
+                let control = StepControl::new(
+                    work(travel_mm.max(1.0)),
+                    from.stride,
+                    environment.has_friction(),
+                    tuning.again,
+                );
                 // Something was released.
                 let set_free = travel_mm == 0.0 && !vessel_moves && !fields_change;
                 if set_free { control.set_free() } else { control }
@@ -96,6 +90,7 @@ impl<'a> Course<'a> {
         };
         let done = if vessel_moves || fields_change { 0.0 } else { 1.0 };
         Self {
+            tuning,
             control,
             // An unfinished solution is of the vessel where it was.
             begun: unfinished.filter(|_| !vessel_moves).and_then(|unfinished| unfinished.part.as_ref()),
@@ -126,7 +121,7 @@ impl<'a> Course<'a> {
 
     /// Whether a tick of so many solves ends here. A change that goes on is completed, by relaxation.
     pub(super) fn pauses(&mut self, work: &Work, solves: usize) -> bool {
-        let used = work.solves.saturating_add(OF_A_PART * self.sum.parts);
+        let used = work.solves.saturating_add(self.tuning.of_a_part * self.sum.parts);
         if self.change.goes_on() {
             self.change.overtakes |= used >= self.within(solves);
             return false;
@@ -145,7 +140,10 @@ impl<'a> Course<'a> {
         let most = if self.change.overtakes { solves } else { self.within(solves) };
         let iterations = match part.effort {
             Effort::Near | Effort::Held => self.control.budget(),
-            Effort::Flight => LONGEST - self.flight.map_or(0, |flight| flight.iterations.min(LONGEST - 1)),
+            Effort::Flight => {
+                let taken = self.flight.map_or(0, |flight| flight.iterations);
+                self.tuning.longest.saturating_sub(taken).max(1)
+            }
         };
         Limits { iterations, solves: most.saturating_sub(before.solves).max(1) }
     }
@@ -167,7 +165,7 @@ impl<'a> Course<'a> {
         if self.is_there(way) {
             self.control.try_again();
         }
-        let travel_mm = way.travel_mm(WORK_RAD);
+        let travel_mm = way.travel_mm(self.tuning.work_rad);
         // A change without motion of the hands counts as a millimetre.
         let rest_mm = if travel_mm > 0.0 { travel_mm } else { 1.0 - self.change.done };
         let (effort, part_mm) = self.control.next(rest_mm);
@@ -189,7 +187,8 @@ impl<'a> Course<'a> {
     /// Whether the device came to rest with energy that nobody put in, so that the part was too long: then it is
     /// shortened.
     pub(super) fn shortens(&mut self, part: &Part<'_>, found: &Found) -> bool {
-        let shortens = found.lacks && !found.is_interrupted && self.control.can_shorten(part.part_mm);
+        let shortens =
+            found.lacks && !found.is_interrupted && self.control.can_shorten(part.part_mm, self.tuning);
         if shortens && !self.change.overtakes {
             self.control.shorten(part.part_mm);
         }
@@ -200,19 +199,19 @@ impl<'a> Course<'a> {
     pub(super) fn accept(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) {
         // At a crease of the wall forces switch between both sides and never balance; if nothing moves any more the
         // device is at rest all the same.
-        let rests = part.holds_still && lies && found.residual <= AT_REST;
+        let rests = part.holds_still && lies && found.residual <= self.tuning.at_rest;
         self.balanced = (found.balanced && !found.lacks) || rests;
         let overtook = self.change.overtakes;
         (self.moved, self.change.done, self.change.overtakes) = (true, part.to, false);
         let begun = self.flight.take();
         self.sum.relaxations += u32::from(part.effort == Effort::Flight && begun.is_none());
         let flight = begun.unwrap_or(Flight::over(part.part_mm)).with(found, iterations);
-        if found.is_interrupted && !rests && flight.iterations < LONGEST {
+        if found.is_interrupted && !rests && flight.iterations < self.tuning.longest {
             self.flight = Some(flight);
         } else {
             self.sum.add(&flight, part.effort);
             if !overtook {
-                self.control.succeeded(flight.part_mm, found);
+                self.control.succeeded(flight.part_mm, found, self.tuning);
             }
         }
         self.sum.go_on(found, part.effort);
@@ -237,7 +236,8 @@ impl<'a> Course<'a> {
             self.balanced = false;
             return Next::Nothing;
         }
-        if self.control.failed(part.part_mm, lost) || self.sum.parts > PART_LIMIT {
+        if self.control.failed(part.part_mm, lost, self.tuning) || self.sum.parts > self.tuning.substep_limit
+        {
             return Next::Error;
         }
         Next::Part
@@ -287,9 +287,9 @@ impl Rest {
     }
 }
 
-/// Largest motion of a hand in moves, mm.
-fn asked_mm(moves: &[Move]) -> f64 {
+/// Largest motion of a hand in moves, mm; a rotation of `turn_rad` counts as one.
+fn asked_mm(moves: &[Move], turn_rad: f64) -> f64 {
     let each =
-        moves.iter().map(|one| one.command.advance_mm.abs().max(one.command.rotate_rad.abs() / WORK_RAD));
+        moves.iter().map(|one| one.command.advance_mm.abs().max(one.command.rotate_rad.abs() / turn_rad));
     each.fold(0.0, f64::max)
 }

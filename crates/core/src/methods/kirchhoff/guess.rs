@@ -33,7 +33,7 @@ impl Guess {
         self.room_mm.reserve((elements + 1).saturating_sub(self.room_mm.len()));
     }
 
-    /// Adds the correction to the slid device in `state`, unless the result is beyond the wall or passes through
+    /// If `repeats`, adds the correction to the slid device in `state`, unless the result is beyond the wall or passes through
     /// itself. With friction, angles are then measured from the triads of the device where its slip begins. Returns
     /// whether the prediction is valid.
     pub(super) fn choose(
@@ -41,9 +41,10 @@ impl Guess {
         contact: &mut WallContact<'_>,
         loops: Option<&mut SelfContact>,
         (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
+        repeats: bool,
     ) -> bool {
         self.slid.copy_from(state);
-        let corrected = self.correct(contact, loops, (start, mesh, &mut *state));
+        let corrected = repeats && self.correct(contact, loops, (start, mesh, &mut *state));
         if contact.rubs() {
             if !self.before_motion.is_empty() {
                 state.measure_from(&self.before_motion);

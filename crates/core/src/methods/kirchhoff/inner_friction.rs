@@ -9,14 +9,12 @@ use super::configuration::Start;
 use super::lateral::{Line, comes_out, lateral_forces};
 use super::mesh::Mesh;
 use super::search::Search;
-use crate::contact::{Between, HandMotion, InnerFriction, Place, SETTLED};
+use crate::contact::{Between, HandMotion, InnerFriction, Place};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::RodState;
 use crate::solve::NewtonReport;
 
-/// Largest number of renewals of normal forces; two or three are typical.
-const RENEWALS: usize = 20;
 /// Smallest slip, mm; less is rounding of lengths.
 pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
 
@@ -109,10 +107,11 @@ impl<const C: usize> Search<'_, '_, C> {
             return (found, change);
         }
         let mut inner_friction = Vec::new();
-        for round in 0..=RENEWALS {
+        let renewals = self.tuning.steps.inner_renewals;
+        for round in 0..=renewals {
             change = self.press(stack, mesh, &mut inner_friction);
-            let there = change < SETTLED && found.is_within(self.tolerance);
-            if !found.converged || there || round == RENEWALS {
+            let there = change < self.tuning.friction.settled && found.is_within(self.tolerance);
+            if !found.converged || there || round == renewals {
                 break;
             }
             found = self.on();

@@ -26,10 +26,6 @@ use crate::shape::Shape;
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
-/// c: the resistance to a motion of 1 mm of a coil of 60 mm is a thousandth of the force that bends it to a radius of
-/// 1 mm.
-const RESISTANCE_PER_MM4: f64 = 1e-5;
-
 /// The configuration of a detached coil.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct FreeCoil {
@@ -234,11 +230,11 @@ pub(super) struct Resistance {
 }
 
 impl Resistance {
-    /// For the rods from element `first` on, at their positions.
-    pub(super) fn of(elements: &[ElementData], rod: &RodState, from: usize) -> Self {
+    /// For the rods from element `first` on, at their positions, with c in 1/mm⁴.
+    pub(super) fn of(elements: &[ElementData], rod: &RodState, from: usize, per_mm4: f64) -> Self {
         let mut nodes: Vec<_> = rod.positions[from..].iter().map(|x| (*x, 0.0)).collect();
         for (e, element) in elements[from..].iter().enumerate().filter(|(_, data)| !data.is_break()) {
-            let half = 0.5 * RESISTANCE_PER_MM4 * element.bending[1] * element.length;
+            let half = 0.5 * per_mm4 * element.bending[1] * element.length;
             nodes[e].1 += half;
             nodes[e + 1].1 += half;
         }

@@ -4,13 +4,8 @@ use crate::contact::{ContactPoint, WallPotential};
 use crate::device::Device;
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material};
+use crate::tuning::MeshTuning;
 
-/// Spacing of contact points at the tip, in radii, from which it doubles: a tip that touches the wall at an angle
-/// leaves it within a tenth of its radius.
-const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
-/// Smallest number of intervals between contact points in an element: a wire that is thick relative to its elements
-/// needs points within them too.
-const FEWEST_INTERVALS: f64 = 2.0;
 /// Ends of sections closer than this fraction of an element share a node: in shorter elements, differences of unit
 /// vectors lose the digits that determine curvature.
 pub(super) const NEAR: f64 = 1e-3;
@@ -32,6 +27,8 @@ pub struct Fineness {
     pub element_mm: f64,
     /// Largest spacing of contact points, in radii of the device.
     pub contact_spacing_radii: f64,
+    /// Numbers of the mesh that are choices.
+    pub tuning: MeshTuning,
 }
 
 impl Fineness {
@@ -47,7 +44,8 @@ impl Fineness {
 
     /// Elements of this length, with contact points dense enough for any crest.
     pub fn of_elements(element_mm: f64) -> Self {
-        Self { element_mm, contact_spacing_radii: Self::CONTACT_SPACING_RADII }
+        let contact_spacing_radii = Self::CONTACT_SPACING_RADII;
+        Self { element_mm, contact_spacing_radii, tuning: MeshTuning::DEFAULT }
     }
 }
 
@@ -207,7 +205,7 @@ impl Mesh {
         fineness: Fineness,
         modulus_n_per_mm2: f64,
     ) {
-        let Fineness { element_mm, contact_spacing_radii } = fineness;
+        let Fineness { element_mm, contact_spacing_radii, tuning } = fineness;
         nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
         let ahead_mm = (inserted_mm + BEHIND_MOUTH * element_mm).min(device.length_mm());
         nodes_from_tip(device, ahead_mm.max(inserted_mm), element_mm, &mut self.ahead_mm);
@@ -225,11 +223,11 @@ impl Mesh {
             // A thin tip too short for an element of its own determines the element's radius, without requiring more
             // points than the device has in all.
             let intervals = (length / (contact_spacing_radii * radius_mm)).ceil();
-            let intervals = intervals.min(most).max(FEWEST_INTERVALS);
+            let intervals = intervals.min(most).max(tuning.fewest_intervals);
             let spacing = length / intervals;
             // Distance from the element's far end.
             let mut at = 0.0;
-            let mut fine = if k == 0 { TIP_SPACING_RADII * radius_mm } else { spacing };
+            let mut fine = if k == 0 { tuning.tip_spacing_radii * radius_mm } else { spacing };
             while at < (1.0 - 1e-9) * length {
                 let left = length - at;
                 let step = fine.min(spacing);
@@ -288,7 +286,7 @@ mod tests {
         let (mut points, mut widest) = ([0; 2], [0.0; 2]);
         for (k, contact_spacing_radii) in [1.5, 3.0].into_iter().enumerate() {
             let mut mesh = Mesh::default();
-            mesh.build(&device, 50.0, Fineness { element_mm: 5.0, contact_spacing_radii }, 1.0);
+            mesh.build(&device, 50.0, Fineness { contact_spacing_radii, ..Fineness::of_elements(5.0) }, 1.0);
             let gaps = mesh.points.windows(2).map(|pair| pair[1].from_tip_mm - pair[0].from_tip_mm);
             (points[k], widest[k]) = (mesh.points.len(), gaps.fold(0.0, f64::max) / 0.445);
             assert!(widest[k] <= contact_spacing_radii && widest[k] > 0.9 * contact_spacing_radii);

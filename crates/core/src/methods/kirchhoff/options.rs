@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::mesh::Fineness;
+use crate::tuning::Tuning;
 
 /// Accuracy of equilibria: `method.accuracy` sets element length, spacing of contact points and tolerance together.
 ///
@@ -47,6 +48,7 @@ impl From<Written> for KirchhoffOptions {
             contact_spacing_radii: written.contact_spacing_radii.unwrap_or(of.contact_spacing_radii),
             self_contact: written.self_contact.unwrap_or(of.self_contact),
             self_friction: written.self_friction.unwrap_or(of.self_friction),
+            tuning: of.tuning,
         }
     }
 }
@@ -71,6 +73,9 @@ pub struct KirchhoffOptions {
     pub self_contact: bool,
     /// Coefficient of friction between loops, and with detached coils; about 0.2 for platinum on platinum in blood.
     pub self_friction: f64,
+    /// Numbers of solver and contact that are choices; scene files cannot set them.
+    #[serde(skip)]
+    pub tuning: Tuning,
 }
 
 impl KirchhoffOptions {
@@ -88,12 +93,14 @@ impl KirchhoffOptions {
             max_iterations: 500,
             self_contact: false,
             self_friction: 0.0,
+            tuning: Tuning::default(),
         }
     }
 
     /// The resolution of the mesh.
     pub(super) fn fineness(&self) -> Fineness {
-        Fineness { element_mm: self.element_mm, contact_spacing_radii: self.contact_spacing_radii }
+        let Self { element_mm, contact_spacing_radii, .. } = *self;
+        Fineness { element_mm, contact_spacing_radii, tuning: self.tuning.mesh }
     }
 }
 

@@ -20,25 +20,11 @@
 
 use super::guess::Guess;
 use super::substep::Effort;
-use crate::contact::{SETTLED, SelfContact, WallContact};
+use crate::contact::{SelfContact, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
-
-/// Largest number of Newton iterations of a solution near its prediction: shortening the part takes fewer.
-pub(super) const MOST_NEAR: usize = 60;
-/// Largest number of Newton iterations of a solution in a relaxation.
-const MOST_MOVING: usize = 300;
-/// Largest number of Newton iterations of all solutions in a relaxation.
-pub(super) const LONGEST: usize = 2000;
-/// Largest number of Newton iterations from an equilibrium with held friction to one with friction that follows.
-const FOLLOWING: usize = 20;
-/// Largest number of slides with the hand held still; two or three are typical.
-const SLIDES: u32 = 400;
-/// Relative change of the drag up to which it is not renewed at an equilibrium.
-const DRAG_CHANGED: f64 = 1e-4;
-/// Largest number of renewals of the drag.
-const DRAG_RENEWALS: usize = 5;
+use crate::tuning::Tuning;
 
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
@@ -58,6 +44,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     /// Residual of an equilibrium, relative to the force scale.
     pub(super) tolerance: f64,
     pub(super) effort: Effort,
+    /// Numbers that are choices.
+    pub(super) tuning: &'a Tuning,
     /// Largest number of Newton iterations.
     pub(super) most: usize,
     /// Largest number of linear solves.
@@ -87,8 +75,11 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Iterates from an equilibrium with the drag at its start to one with its own, if blood flows.
     fn dragged(&mut self, mut found: NewtonReport, flow: Option<&BloodFlow>) -> NewtonReport {
         let Some(flow) = flow else { return found };
-        for _ in 0..DRAG_RENEWALS {
-            if !found.converged || self.contact.renew_drag(flow, self.elements, self.state) < DRAG_CHANGED {
+        let steps = &self.tuning.steps;
+        for _ in 0..steps.drag_renewals {
+            if !found.converged
+                || self.contact.renew_drag(flow, self.elements, self.state) < steps.drag_changed
+            {
                 break;
             }
             found = self.on();
@@ -109,7 +100,7 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         self.guess.other.copy_from(self.state);
         let most = self.most;
-        self.most = most.min(self.iterations + FOLLOWING);
+        self.most = most.min(self.iterations + self.tuning.steps.following);
         self.contact.release_friction();
         self.with_loops(SelfContact::release_friction);
         let found = self.newton();
@@ -126,14 +117,19 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Newton's method from the state.
     fn newton(&mut self) -> NewtonReport {
+        let steps = &self.tuning.steps;
         let (before, last_shift) = self.resumed.take().unwrap_or_default();
-        let most =
-            if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR - before.min(MOST_NEAR - 1) };
+        let most = if self.effort == Effort::Flight {
+            steps.most_moving
+        } else {
+            steps.most_near - before.min(steps.most_near - 1)
+        };
         let options = NewtonOptions {
             max_iterations: most.min(self.most.saturating_sub(self.iterations)),
             max_solves: self.most_solves.saturating_sub(self.solves),
             tolerance: self.tolerance,
             last_shift,
+            tuning: self.tuning.newton,
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);
@@ -165,13 +161,13 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Whether friction has the normal forces of the result.
     fn is_settled(&self) -> bool {
-        self.unsettled() < SETTLED
+        self.unsettled() < self.tuning.friction.settled
     }
 
     /// With the hand held still, relaxes an equilibrium with the normal forces of another state to where the device
     /// rests.
     fn slide(&mut self, mut found: NewtonReport) -> NewtonReport {
-        while found.converged && !self.is_settled() && self.slides < SLIDES {
+        while found.converged && !self.is_settled() && self.slides < self.tuning.steps.slides {
             self.contact.anchor_friction(self.elements, self.state);
             self.with_loops(SelfContact::anchor_friction);
             found = self.newton();

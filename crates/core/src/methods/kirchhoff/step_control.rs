@@ -8,22 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::substep::{Effort, Found, Lost};
-
-/// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
-const FOLD_MM: f64 = 0.05;
-/// Largest motion of the hands in a part that may end in a snap, in radii of the thinnest device: the place of the snap
-/// on the way of the hands is known as well as that. Shorter parts mostly find the same equilibrium again.
-pub(super) const SNAP_RADII: f64 = 2.0;
-/// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.
-const HELD_MM: f64 = 0.5;
-/// Number of further solutions, with the hands held still, of a device that rests at the end of its command but not in
-/// equilibrium.
-const AGAIN: usize = 4;
-/// Smallest motion of the hands in a part with relaxation, mm.
-const LEAST_MM: f64 = 1e-3;
-/// Distance from the prediction, as a fraction of the allowed one, below which the next part is doubled. Errors of
-/// first-order predictions then double, those of second order quadruple.
-const NEARER: f64 = 0.2;
+use crate::tuning::StepTuning;
 
 /// Step size passed from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,8 +36,8 @@ pub(super) struct StepControl {
 
 impl StepControl {
     /// With a budget of Newton iterations, and the step size of the command before.
-    pub(super) fn new(budget: usize, stride: Stride, has_friction: bool) -> Self {
-        Self { budget, stride, has_friction, flight_mm: None, again: AGAIN }
+    pub(super) fn new(budget: usize, stride: Stride, has_friction: bool, again: usize) -> Self {
+        Self { budget, stride, has_friction, flight_mm: None, again }
     }
 
     /// The same with more Newton iterations, up to `most`, for more motion.
@@ -110,12 +95,12 @@ impl StepControl {
     }
 
     /// A part of this length reached an equilibrium, or came to rest.
-    pub(super) fn succeeded(&mut self, part_mm: f64, found: &Found) {
-        let nearer = found.off < NEARER;
+    pub(super) fn succeeded(&mut self, part_mm: f64, found: &Found, tuning: &StepTuning) {
+        let nearer = found.off < tuning.nearer;
         match self.flight_mm {
             // The budget is used up in a jam.
             Some(_) if self.budget == 0 => {
-                self.flight_mm = Some(if nearer { 2.0 * part_mm } else { FOLD_MM });
+                self.flight_mm = Some(if nearer { 2.0 * part_mm } else { tuning.fold_mm });
             }
             Some(_) => self.flight_mm = None,
             None => {
@@ -129,16 +114,16 @@ impl StepControl {
     }
 
     /// A part of this length failed. Returns whether there is nothing else to try.
-    pub(super) fn failed(&mut self, part_mm: f64, lost: Lost) -> bool {
+    pub(super) fn failed(&mut self, part_mm: f64, lost: Lost, tuning: &StepTuning) -> bool {
         if self.flight_mm.is_some() {
             // A tip that would be pushed through a loop goes less far in a shorter part.
             self.flight_mm = Some(0.5 * part_mm);
-            return lost != Lost::Beyond || part_mm <= LEAST_MM;
+            return lost != Lost::Beyond || part_mm <= tuning.least_mm;
         }
-        if self.has_friction && !self.stride.held && part_mm <= HELD_MM && self.budget > 0 {
+        if self.has_friction && !self.stride.held && part_mm <= tuning.held_mm && self.budget > 0 {
             self.stride = Stride { part_mm, held: true };
-        } else if part_mm <= FOLD_MM || self.budget == 0 {
-            self.flight_mm = Some(part_mm.min(FOLD_MM));
+        } else if part_mm <= tuning.fold_mm || self.budget == 0 {
+            self.flight_mm = Some(part_mm.min(tuning.fold_mm));
             self.stride.held = false;
         } else {
             self.stride.part_mm = 0.5 * part_mm;
@@ -147,8 +132,8 @@ impl StepControl {
     }
 
     /// Whether a part of this length, in which the device relaxed, can be shortened.
-    pub(super) fn can_shorten(&self, part_mm: f64) -> bool {
-        part_mm > LEAST_MM && self.budget > 0
+    pub(super) fn can_shorten(&self, part_mm: f64, tuning: &StepTuning) -> bool {
+        part_mm > tuning.least_mm && self.budget > 0
     }
 
     /// Continues with parts of half that length, seeking a nearby equilibrium again.
@@ -163,9 +148,12 @@ mod tests {
     use super::*;
 
     const FAR: Lost = Lost::Unbalanced;
+    const T: StepTuning = StepTuning::DEFAULT;
+    const FOLD_MM: f64 = T.fold_mm;
+    const LEAST_MM: f64 = T.least_mm;
 
     fn control(part_mm: f64) -> StepControl {
-        StepControl::new(100, Stride { part_mm, held: false }, false)
+        StepControl::new(100, Stride { part_mm, held: false }, false, T.again)
     }
 
     fn found(off: f64) -> Found {
@@ -187,11 +175,11 @@ mod tests {
     fn what_is_far_is_halved_and_what_is_much_nearer_doubled() {
         let mut control = control(10.0);
         assert_eq!(control.next(4.0), (Effort::Near, 4.0));
-        assert!(!control.failed(4.0, FAR));
+        assert!(!control.failed(4.0, FAR, &T));
         assert_eq!(control.next(4.0), (Effort::Near, 2.0));
-        control.succeeded(2.0, &found(0.5));
+        control.succeeded(2.0, &found(0.5), &T);
         assert_eq!(control.next(2.0), (Effort::Near, 2.0));
-        control.succeeded(2.0, &found(0.01));
+        control.succeeded(2.0, &found(0.01), &T);
         // In equal parts.
         assert_eq!(control.next(6.0), (Effort::Near, 3.0));
         assert_eq!(control.stride().part_mm, 4.0);
@@ -200,32 +188,32 @@ mod tests {
     #[test]
     fn friction_is_held_in_short_parts_until_the_device_need_not_slide() {
         let mut control = StepControl { has_friction: true, ..control(1.0) };
-        assert!(!control.failed(1.0, FAR));
+        assert!(!control.failed(1.0, FAR, &T));
         assert_eq!(control.next(1.0), (Effort::Near, 0.5));
-        assert!(!control.failed(0.5, FAR));
+        assert!(!control.failed(0.5, FAR, &T));
         assert_eq!(control.next(1.0), (Effort::Held, 0.5));
-        control.succeeded(0.5, &Found { slides: 2, ..found(0.1) });
+        control.succeeded(0.5, &Found { slides: 2, ..found(0.1) }, &T);
         assert_eq!(control.next(1.0), (Effort::Held, 1.0));
-        control.succeeded(1.0, &found(0.5));
+        control.succeeded(1.0, &found(0.5), &T);
         assert_eq!(control.next(1.0), (Effort::Near, 1.0));
         // If that fails too, it is a fold.
-        assert!(!control.failed(FOLD_MM, FAR) && !control.failed(FOLD_MM, FAR));
+        assert!(!control.failed(FOLD_MM, FAR, &T) && !control.failed(FOLD_MM, FAR, &T));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
     }
 
     #[test]
     fn at_a_fold_it_moves_once_and_goes_on_as_before() {
         let mut control = control(0.06);
-        assert!(!control.failed(0.06, FAR));
+        assert!(!control.failed(0.06, FAR, &T));
         assert_eq!(control.next(1.0).0, Effort::Near);
-        assert!(!control.failed(0.03, FAR));
+        assert!(!control.failed(0.03, FAR, &T));
         assert_eq!(control.next(1.0), (Effort::Flight, 0.03));
         // With energy that nobody put in the part is shortened.
-        assert!(control.can_shorten(0.03) && !control.can_shorten(LEAST_MM));
+        assert!(control.can_shorten(0.03, &T) && !control.can_shorten(LEAST_MM, &T));
         control.shorten(0.03);
         assert!(matches!(control.next(1.0), (Effort::Near, part_mm) if part_mm <= 0.015));
-        assert!(!control.failed(0.015, FAR));
-        control.succeeded(0.015, &found(7.0));
+        assert!(!control.failed(0.015, FAR, &T));
+        control.succeeded(0.015, &found(7.0), &T);
         assert_eq!(control.next(1.0).0, Effort::Near);
     }
 
@@ -233,22 +221,22 @@ mod tests {
     fn in_a_jam_it_moves_on_and_what_does_not_come_to_rest_is_the_end() {
         let mut control = control(1.0);
         control.took(200);
-        assert!(!control.failed(1.0, FAR));
+        assert!(!control.failed(1.0, FAR, &T));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
-        control.succeeded(FOLD_MM, &found(0.01));
+        control.succeeded(FOLD_MM, &found(0.01), &T);
         assert_eq!(control.next(1.0), (Effort::Flight, 2.0 * FOLD_MM));
-        control.succeeded(2.0 * FOLD_MM, &found(0.9));
+        control.succeeded(2.0 * FOLD_MM, &found(0.9), &T);
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
-        assert!(control.failed(FOLD_MM, FAR));
+        assert!(control.failed(FOLD_MM, FAR, &T));
     }
 
     #[test]
     fn a_tip_that_would_pass_a_loop_moves_less_and_less() {
         let mut control = control(FOLD_MM);
-        assert!(!control.failed(FOLD_MM, Lost::Beyond));
+        assert!(!control.failed(FOLD_MM, Lost::Beyond, &T));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
-        assert!(!control.failed(FOLD_MM, Lost::Beyond));
+        assert!(!control.failed(FOLD_MM, Lost::Beyond, &T));
         assert_eq!(control.next(1.0), (Effort::Flight, 0.5 * FOLD_MM));
-        assert!(control.failed(LEAST_MM, Lost::Beyond));
+        assert!(control.failed(LEAST_MM, Lost::Beyond, &T));
     }
 }

@@ -11,20 +11,16 @@ use super::hands::{Hand, motions};
 use super::joined::{Resistance, join};
 use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
-use super::search::{MOST_NEAR, Search};
+use super::search::Search;
 use super::state::{KirchhoffState, UnderWay};
-use super::step_control::SNAP_RADII;
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::Vec3;
-use crate::contact::{ContactPoint, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{ContactPoint, Rubs, WallContact, least_force_n, stick_mm};
 use crate::methods::StepReport;
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
-
-/// Residual, relative to the force scale, above which a device that does not move is not at rest.
-pub(super) const AT_REST: f64 = 0.05;
 
 /// How a part of a command is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -271,7 +267,8 @@ impl<const C: usize> Tools<C> {
         let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
         let by_fields = work_of_fields(environment, was, is);
-        Balance::new(environment.surroundings.stack, states, by_wall.with(by_fields), rubbed_mj)
+        let notable = environment.options.tuning.steps.notable;
+        Balance::new(environment.surroundings.stack, states, by_wall.with(by_fields), rubbed_mj, notable)
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
@@ -283,6 +280,7 @@ impl<const C: usize> Tools<C> {
         next: &mut Configuration,
     ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
+        let tuning = &options.tuning;
         let Attempt { part: Part { effort, part_mm, resumed, .. }, hands, limits, left } = attempt;
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
@@ -294,26 +292,28 @@ impl<const C: usize> Tools<C> {
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
         let mut loops = options.self_contact.then_some(&mut self.loops);
-        let may_snap = part_mm <= SNAP_RADII * surroundings.device.min_radius_mm();
+        let may_snap = part_mm <= tuning.steps.snap_radii * surroundings.device.min_radius_mm();
         if let Some(resumed) = resumed {
             let mut under_way = resumed.state.rod.clone();
             join(&mut under_way, &resumed.state.coils);
             self.guess.resume(&under_way, rod);
             self.newton.neighbourhood.clone_from(&resumed.neighbourhood);
         } else {
-            let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), (start, &*mesh, &mut *rod));
+            let (slid, repeats) = ((start, &*mesh, &mut *rod), tuning.steps.repeats);
+            let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), slid, repeats);
             let inside = guessed && !in_its_own_way;
             if in_its_own_way || (effort != Effort::Flight && !inside) {
                 self.counters.add(&contact.count());
                 return Err(Lost::Beyond);
             }
             contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
-            self.newton.neighbourhood.begin(rod, &self.guess.room_mm);
+            self.newton.neighbourhood.begin(rod, &self.guess.room_mm, &tuning.newton);
         }
         self.newton.neighbourhood.bounds = effort != Effort::Flight;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+        let per_mm4 = tuning.steps.coil_resistance_per_mm4;
         let mut free =
-            (!self.joined.is_empty()).then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1));
+            (!self.joined.is_empty()).then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1, per_mm4));
         let mut fields = environment.field_load(&*mesh);
         let free = free.as_mut().map(|free| free as &mut dyn External);
         let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
@@ -329,6 +329,7 @@ impl<const C: usize> Tools<C> {
             has_friction: environment.has_friction(),
             tolerance: options.tolerance,
             effort,
+            tuning,
             most: match effort {
                 Effort::Near | Effort::Held => limits.iterations.min(options.max_iterations),
                 Effort::Flight => limits.iterations,
@@ -343,17 +344,20 @@ impl<const C: usize> Tools<C> {
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
         let unsettled = search.unsettled().max(lagging);
         let (taken, slides) = ((search.iterations, search.solves), search.slides);
-        let off = self.newton.neighbourhood.off(rod);
+        let off = self.newton.neighbourhood.off(rod, &tuning.newton);
         let used_up = found.reason == StopReason::MaxIterations && taken.1 >= limits.solves;
         // A device that slides or relaxes when the solves are used up is seen on its way.
         let is_interrupted = used_up && (effort == Effort::Flight || slides > 0);
         let near = effort != Effort::Flight && !is_interrupted;
         // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
-        let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
-        let goes_on = used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < MOST_NEAR;
+        let settled = tuning.friction.settled;
+        let balanced = (found.converged || (!near && found.residual < settled)) && unsettled < settled;
+        let goes_on =
+            used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < tuning.steps.most_near;
         let wrong = Lost::of(&found, (near, goes_on), balanced, off > 1.0 && !may_snap).or_else(|| {
             contact.know_whole_base(&mesh.elements);
-            contact.passes_through(&mesh.elements, rod).then_some(Lost::Passed)
+            let passes = tuning.steps.tests_passing && contact.passes_through(&mesh.elements, rod);
+            passes.then_some(Lost::Passed)
         });
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut self.touches);
@@ -376,7 +380,9 @@ impl<const C: usize> Tools<C> {
         let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
         let outside_mj = self.write_report(environment, hands, next);
-        hold_hands(found.residual, start.state, next.parts().1);
+        if found.residual > tuning.steps.at_rest {
+            hold_hands(start.state, next.parts().1);
+        }
         let rubbed_mj = (least_mj + between_mj, most_mj + between_mj);
         let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
         let after = next.parts().1;
@@ -404,10 +410,7 @@ impl<const C: usize> Tools<C> {
 
 /// Keeps the hand forces of the last equilibrium where the residual says that the device is not at rest: its own are arbitrary, and would
 /// count as work.
-fn hold_hands(residual: f64, before: &KirchhoffState, after: &mut KirchhoffState) {
-    if residual <= AT_REST {
-        return;
-    }
+fn hold_hands(before: &KirchhoffState, after: &mut KirchhoffState) {
     after.outside.copy_from_slice(&before.outside);
     let (before, after) = (&before.report, &mut after.report);
     (after.push_force_n, after.torque_nmm) = (before.push_force_n, before.torque_nmm);

@@ -1,0 +1,46 @@
+//! Numbers of friction.
+
+/// How friction is regularised, and when its normal forces count as those of contacts (`contact/friction`,
+/// `contact/pairs/rubbing.rs`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionTuning {
+    /// Slip below which a point sticks, as a fraction of the hand's motion, or of the device's radius if the hand
+    /// rests: the error of the regularisation.
+    pub stick: f64,
+    /// Factor by which it shrinks in every relaxation while the hand holds still.
+    pub stick_at_rest: f64,
+    /// Smallest slip after shrinking, as a fraction of that of the step: a smaller one would make friction stiffer
+    /// than any wall.
+    pub least_at_rest: f64,
+    /// Friction at a point causes another round in a step where its force is wrong by more than this fraction of its
+    /// bound.
+    pub changed: f64,
+    /// A round updates friction where it is wrong by more than this fraction: without the update, the error would make
+    /// steps uphill.
+    pub renewed: f64,
+    /// Points nearer to the tip than this many radii (plus the advance) keep their own normal force; the others take
+    /// the one felt before at their new position, since the wall does not move.
+    pub tip_radii: f64,
+    /// Normal forces are settled once their relative change, and their relative difference from the contact forces,
+    /// is below this.
+    pub settled: f64,
+}
+
+impl FrictionTuning {
+    /// The numbers the method is tested with.
+    pub const DEFAULT: Self = Self {
+        stick: 1e-3,
+        stick_at_rest: 0.3,
+        least_at_rest: 0.01,
+        changed: 0.05,
+        renewed: 5e-3,
+        tip_radii: 10.0,
+        settled: 1e-4,
+    };
+}
+
+impl Default for FrictionTuning {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}

@@ -1,0 +1,23 @@
+//! Numbers of a device's mesh.
+
+/// Where elements and contact points of a device are ([`crate::methods::kirchhoff::Mesh`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshTuning {
+    /// Spacing of contact points at the tip, in radii, from which it doubles: a tip that touches the wall at an angle
+    /// leaves it within a tenth of its radius.
+    pub tip_spacing_radii: f64,
+    /// Smallest number of intervals between contact points in an element: a wire that is thick relative to its
+    /// elements needs points within them too.
+    pub fewest_intervals: f64,
+}
+
+impl MeshTuning {
+    /// The numbers the method is tested with.
+    pub const DEFAULT: Self = Self { tip_spacing_radii: 1.0 / 256.0, fewest_intervals: 2.0 };
+}
+
+impl Default for MeshTuning {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}

@@ -1,0 +1,104 @@
+//! Numbers of parts of commands and ticks.
+
+/// How a command is cut into parts, and how long an equilibrium is sought for one (`methods/kirchhoff`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepTuning {
+    /// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
+    pub fold_mm: f64,
+    /// Largest motion of the hands in a part that may end in a snap, in radii of the thinnest device: the place of the
+    /// snap on the way of the hands is known as well as that. Shorter parts mostly find the same equilibrium again.
+    /// At 0 no part may.
+    pub snap_radii: f64,
+    /// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.
+    /// At 0 friction is held in no part.
+    pub held_mm: f64,
+    /// Smallest motion of the hands in a part with relaxation, mm.
+    pub least_mm: f64,
+    /// Distance from the prediction, as a fraction of the allowed one, below which the next part is doubled. Errors of
+    /// first-order predictions then double, those of second order quadruple.
+    pub nearer: f64,
+    /// Largest number of sub-steps of one command.
+    pub substep_limit: usize,
+    /// Newton iterations allowed for a command per millimetre and per `work_rad`, including failed attempts, before it
+    /// is relaxed: this bounds its cost.
+    pub work: f64,
+    /// Rotation that counts like a millimetre, rad.
+    pub work_rad: f64,
+    /// Upper limit of these iterations, as a multiple of those of one solution.
+    pub work_of_one: usize,
+    /// Number of further relaxations, with the hands held still, of a device that rests at the end of its command but
+    /// not in equilibrium.
+    pub again: usize,
+    /// Motion in a further relaxation, in the smallest radius of the device, below which it is at rest.
+    pub rest_radii: f64,
+    /// Residual, relative to the force scale, above which a device that does not move is not at rest.
+    pub at_rest: f64,
+    /// Cost of a part of a tick beside its own linear solves, in linear solves: it builds a mesh and evaluates the
+    /// whole wall once.
+    pub of_a_part: usize,
+    /// Largest number of Newton iterations of a solution near its prediction: shortening the part takes fewer.
+    pub most_near: usize,
+    /// Largest number of Newton iterations of a solution in a relaxation.
+    pub most_moving: usize,
+    /// Largest number of Newton iterations of all solutions in a relaxation.
+    pub longest: usize,
+    /// Largest number of Newton iterations from an equilibrium with held friction to one with friction that follows.
+    /// At 0 the device slides at once.
+    pub following: usize,
+    /// Largest number of slides with the hand held still; two or three are typical.
+    pub slides: u32,
+    /// Relative change of the drag up to which it is not renewed at an equilibrium.
+    pub drag_changed: f64,
+    /// Largest number of renewals of the drag.
+    pub drag_renewals: usize,
+    /// Largest number of renewals of the normal forces between instruments at an equilibrium: each needs few
+    /// iterations.
+    pub inner_renewals: usize,
+    /// Whether the prediction repeats what the last step changed; otherwise it is the device slid along its own curve.
+    pub repeats: bool,
+    /// Whether a solution is tested for having passed through the wall.
+    pub tests_passing: bool,
+    /// Released or missing energy is significant above this fraction of the energy that is stored in the device and
+    /// the wall, exchanged with fields, or released from the sheath. If infinite, energies are not compared.
+    pub notable: f64,
+    /// Resistance to motion of a detached coil, over its bending stiffness and length, 1/mm⁴: that to a motion of
+    /// 1 mm of a coil of 60 mm is a thousandth of the force that bends it to a radius of 1 mm.
+    pub coil_resistance_per_mm4: f64,
+}
+
+impl StepTuning {
+    /// The numbers the method is tested with.
+    pub const DEFAULT: Self = Self {
+        fold_mm: 0.05,
+        snap_radii: 2.0,
+        held_mm: 0.5,
+        least_mm: 1e-3,
+        nearer: 0.2,
+        substep_limit: 4096,
+        work: 280.0,
+        work_rad: 0.1,
+        work_of_one: 10,
+        again: 4,
+        rest_radii: 1e-3,
+        at_rest: 0.05,
+        of_a_part: 2,
+        most_near: 60,
+        most_moving: 300,
+        longest: 2000,
+        following: 20,
+        slides: 400,
+        drag_changed: 1e-4,
+        drag_renewals: 5,
+        inner_renewals: 20,
+        repeats: true,
+        tests_passing: true,
+        notable: 0.02,
+        coil_resistance_per_mm4: 1e-5,
+    };
+}
+
+impl Default for StepTuning {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
