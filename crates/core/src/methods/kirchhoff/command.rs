@@ -7,7 +7,8 @@ use super::Environment;
 use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::taken_along;
 use super::configuration::Start;
-use super::hands::{lengths, motions};
+use super::hands::{lengths, line_advance_mm, set_motions};
+use super::report::Took;
 use super::state::{KirchhoffState, Ticking};
 use super::step_control::StepControl;
 use super::substep::{Attempt, Effort, Found};
@@ -64,6 +65,11 @@ impl Sum {
         }
     }
 
+    /// The same without a jump.
+    pub(super) fn without_jump(self) -> Self {
+        Self { jump: None, ..self }
+    }
+
     /// Adds energy dissipated by friction, mJ.
     pub(super) fn rub(&mut self, dissipated_mj: f64) {
         self.dissipated_mj += dissipated_mj;
@@ -115,8 +121,9 @@ impl<const C: usize> Workspace<C> {
         tools.joined.renew(&from.coils, stack, fineness, properties.modulus_n_per_mm2);
         tools.work = Work::default();
         let surroundings = &environment.surroundings;
-        way.begin(surroundings.stack, &from.report, moves);
-        let advance_mm = line_mm(lengths(&way.target)) - line_mm(lengths(&way.start));
+        way.begin(surroundings.stack, from, moves);
+        set_motions(&way.start, &way.target, &mut tools.guess.motions);
+        let advance_mm = line_advance_mm(&tools.guess.motions);
         if advance_mm > 0.0 {
             let displaced = surroundings.displacement(0.0);
             let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
@@ -125,7 +132,7 @@ impl<const C: usize> Workspace<C> {
         Ok(())
     }
 
-    /// Carries out a command from the state `from`; the new state is in `now`.
+    /// Carries out a command from the state `from`; the new state is in `now`. Returns what it took.
     ///
     /// # Errors
     /// As [`Method::step`](crate::methods::Method::step).
@@ -134,7 +141,7 @@ impl<const C: usize> Workspace<C> {
         environment: &Environment<'_>,
         from: &KirchhoffState,
         moves: &[Move],
-    ) -> Result<()> {
+    ) -> Result<Took> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
@@ -176,9 +183,9 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(then.as_ref()).with_fields_at(to);
             sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
-                motions(&was.state.report, hands, &mut tools.guess.motions);
+                set_motions(&was.state.hands, hands, &mut tools.guess.motions);
                 now.withdraw(surroundings.stack, hands);
-                sum.rub(tools.write_report(&there, hands, now));
+                sum.rub(tools.write_forces(&there, now));
                 break;
             }
             let left = passage.map(|passage| (was, passage));
@@ -232,12 +239,7 @@ impl<const C: usize> Workspace<C> {
         }
         let state = now.parts().1;
         (state.stride, state.tick) = (control.stride(), Ticking::Rest);
-        let report = &mut state.report;
-        sum.write(report);
-        report.converged = balanced;
-        report.behind.clear();
-        report.angles = from.report.angles;
-        tools.work.write(report, from.report.nodes_solved);
-        Ok(())
+        state.behind.clear();
+        Ok(Took { sum, work: tools.work, converged: balanced })
     }
 }

@@ -18,7 +18,8 @@ use super::carried::taken_along;
 use super::command::{AT_REST, REST_RADII, Sum, WORK_RAD};
 use super::configuration::Start;
 use super::extrapolation::Correction;
-use super::hands::{Hand, Way, lengths, motions};
+use super::hands::{Hand, Way, lengths, set_motions};
+use super::report::Took;
 use super::search::{LONGEST, MOST_NEAR};
 use super::state::{KirchhoffState, Ticking, UnderWay};
 use super::step_control::{FOLD_MM, HELD_MM, NEARER};
@@ -26,8 +27,8 @@ use super::substep::{Attempt, Effort, Found, Lost};
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
-use crate::methods::{Move, StepReport};
-use crate::{Error, Result};
+use crate::methods::{Energy, Move};
+use crate::{Error, Result, Vec3};
 
 /// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall once.
 const OF_A_PART: usize = 2;
@@ -35,8 +36,8 @@ const OF_A_PART: usize = 2;
 /// Result of a tick.
 #[derive(Debug)]
 pub(super) enum Ticked {
-    /// A new state.
-    Moved,
+    /// A new state, and what it took.
+    Moved(Took),
     /// The device has not moved; with the largest motion of the hands in its next part, mm, and the unfinished work.
     Rests(f64, Ticking),
     /// The solves do not suffice to follow the vessel.
@@ -104,7 +105,7 @@ impl<'a> Part<'a> {
         };
         match begun {
             Ticking::Solving(under_way) => {
-                hands.clone_from(&under_way.hands);
+                hands.clone_from(&under_way.state.hands);
                 Self { resumed: Some(under_way), part_mm: under_way.part_mm, ..fresh(Effort::Near) }
             }
             Ticking::Moving(moving @ 1..) => {
@@ -228,15 +229,6 @@ impl Course {
         let goes_on = part.effort == Effort::Moving && !self.rests && part.moving + iterations <= LONGEST;
         if goes_on { Ticking::Moving(part.moving + iterations) } else { Ticking::Rest }
     }
-
-    /// Writes the results, and the remaining motion of the hands, into the new state.
-    fn write(&self, way: &Way, state: &mut KirchhoffState) {
-        state.stride.part_mm = self.longest_mm;
-        let report = &mut state.report;
-        self.sum.write(report);
-        report.converged = self.rests;
-        report.behind = way.left(&state.tick);
-    }
 }
 
 impl<const C: usize> Workspace<C> {
@@ -282,9 +274,9 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(then.as_ref()).with_fields_at(to);
             course.sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
-                motions(&was.state.report, hands, &mut tools.guess.motions);
+                set_motions(&was.state.hands, hands, &mut tools.guess.motions);
                 now.withdraw(surroundings.stack, hands);
-                course.sum.rub(tools.write_report(&there, hands, now));
+                course.sum.rub(tools.write_forces(&there, now));
                 (course.moved, course.rests) = (true, true);
                 way.go_on_from(hands);
                 break Ok(Ticking::Rest);
@@ -325,7 +317,7 @@ impl<const C: usize> Workspace<C> {
                         begun = &fold;
                     }
                     After::UnderWay => {
-                        let under_way = tools.under_way(&part, hands, &next.state, (from, before));
+                        let under_way = tools.under_way(&part, &next.state, (from, before));
                         break Ok(Ticking::Solving(Box::new(under_way)));
                     }
                     After::Stays => break Ok(Ticking::Rest),
@@ -343,10 +335,9 @@ impl<const C: usize> Workspace<C> {
         }
         let state = now.parts().1;
         state.tick = ends.unwrap_or_default();
-        course.write(way, state);
-        state.report.angles = from.report.angles;
-        tools.work.write(&mut state.report, from.report.nodes_solved);
-        Ok(Ticked::Moved)
+        state.stride.part_mm = course.longest_mm;
+        state.behind = way.left(&state.tick);
+        Ok(Ticked::Moved(Took { sum: course.sum, work: tools.work, converged: course.rests }))
     }
 }
 
@@ -356,20 +347,27 @@ impl<const C: usize> Tools<C> {
     fn under_way(
         &mut self,
         part: &Part<'_>,
-        hands: &[Hand],
         to: &KirchhoffState,
         (from, before): (&KirchhoffState, Work),
     ) -> UnderWay {
         let iterations = self.work.since(&before) + part.resumed.map_or(0, |resumed| resumed.iterations);
         // They are counted once, with the state that the part leads to.
         self.work.nodes_solved = before.nodes_solved;
-        // Only its configuration and knowledge of the wall matter.
-        let report = StepReport { angles: from.report.angles, ..StepReport::default() };
-        let (correction, stride, tick) = (Correction::default(), from.stride, Ticking::Rest);
+        // Only its hands, configuration and knowledge of the wall matter.
+        let state = KirchhoffState {
+            hand_forces: from.hand_forces.clone(),
+            behind: Vec::new(),
+            energy: Energy::default(),
+            touches: Vec::new(),
+            drag_n: Vec3::zeros(),
+            correction: Correction::default(),
+            stride: from.stride,
+            tick: Ticking::Rest,
+            ..to.clone()
+        };
         UnderWay {
-            hands: hands.to_vec(),
             part_mm: part.part_mm,
-            state: KirchhoffState { correction, stride, tick, report, ..to.clone() },
+            state,
             neighbourhood: self.newton.neighbourhood.clone(),
             shift: self.newton.last_shift,
             iterations: iterations.min(MOST_NEAR - 1),
