@@ -339,17 +339,26 @@ fn a_state_with_numbers_out_of_place_is_refused() {
     let mut simulation = start("curved_tube", rubbing(), wire(0.0), &kirchhoff());
     (0..40).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
     let whole = serde_json::to_value(simulation.state()).unwrap();
-    let rod = |change: &dyn Fn(&mut serde_json::Value)| {
+    let spoilt = |change: &dyn Fn(&mut serde_json::Value)| {
         let mut spoilt = whole.clone();
         change(&mut spoilt["content"]["Kirchhoff"]);
         serde_json::from_value::<State>(spoilt).unwrap()
     };
+    let rod = |change: &dyn Fn(&mut serde_json::Value)| spoilt(&|both| change(&mut both["state"]));
     for (change, told) in [
         (rod(&|s| drop(s["rod"]["angles"].as_array_mut().unwrap().pop())), "state.rod"),
         (rod(&|s| s["known"]["points"][0]["piece"] = 4_000_000_000u32.into()), "state.known"),
         (rod(&|s| drop(s["forces"].as_array_mut().unwrap().pop())), "state.forces"),
         (rod(&|s| drop(s["correction"]["turns"].as_array_mut().unwrap().pop())), "state.correction"),
-        (rod(&|s| s["report"]["inserted_mm"] = (-1.0).into()), "state.inserted_mm"),
+        (rod(&|s| s["hands"][0]["inserted_mm"] = (-1.0).into()), "state.inserted_mm"),
+        (rod(&|s| drop(s["hands"].as_array_mut().unwrap().pop())), "state.instruments"),
+        (rod(&|s| drop(s["hand_forces"].as_array_mut().unwrap().pop())), "state.hands"),
+        (
+            rod(&|s| s["behind"] = vec![serde_json::json!({"advance_mm": 1.0, "rotate_rad": 0.0}); 2].into()),
+            "state.hands",
+        ),
+        (rod(&|s| s["touches"][0][0] = 1_000_000.into()), "state.touches"),
+        (spoilt(&|both| both["report"]["inserted_mm"] = 1.0.into()), "state.report"),
     ] {
         let error = simulation.clone().restore(&change).unwrap_err();
         assert!(error.is_input() && error.to_string().starts_with(told), "{told}: {error}");

@@ -101,7 +101,7 @@ impl Contact {
 }
 
 /// A contact point that presses on the wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Touch {
     /// Energy stored in the wall there, mJ.
     pub energy_mj: f64,
@@ -109,6 +109,16 @@ pub struct Touch {
     pub contact: Contact,
     /// Moment of friction on the device about its axis, N·mm.
     pub friction_nmm: f64,
+}
+
+impl Touch {
+    /// Whether all its numbers are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Self { energy_mj, contact, friction_nmm } = self;
+        let vectors = [&contact.position_mm, &contact.normal, &contact.friction_n];
+        let sizes = [*energy_mj, contact.force_n, contact.penetration_mm, *friction_nmm];
+        vectors.into_iter().flatten().chain(&sizes).all(|part| part.is_finite())
+    }
 }
 
 /// Wall queries made and avoided. They measure work, which depends on what a simulation still remembers of earlier

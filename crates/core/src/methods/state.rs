@@ -32,7 +32,14 @@ pub struct State {
 #[non_exhaustive]
 pub enum Content {
     /// The exact rod.
-    Kirchhoff(#[serde(with = "shared")] Arc<KirchhoffState>),
+    Kirchhoff {
+        /// All that the next step depends on.
+        #[serde(with = "shared")]
+        state: Arc<KirchhoffState>,
+        /// The report of the step that led to it.
+        #[serde(with = "shared")]
+        report: Arc<StepReport>,
+    },
     /// A method with nodes, tangents and the planes that hold them.
     Chain(Box<ChainState>),
     /// A method with nodes and triads alone.
@@ -129,7 +136,7 @@ impl State {
     /// The report of the step that led to this state.
     pub fn report(&self) -> &StepReport {
         match &self.content {
-            Content::Kirchhoff(state) => state.report(),
+            Content::Kirchhoff { report, .. } => report,
             Content::Chain(state) => &state.report,
             Content::Nodes(state) => &state.report,
         }

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::carried::WallWork;
 use super::state::KirchhoffState;
+use crate::contact::HandMotion;
 use crate::device::Stack;
-use crate::methods::StepReport;
 
 /// Energy below which none is significant, mJ.
 const NOTABLE_FLOOR_MJ: f64 = 1e-6;
@@ -32,24 +32,23 @@ pub(super) struct Balance {
 }
 
 impl Balance {
-    /// The balance between two states, given the work of wall and blood and the bounds of the dissipation. Friction
-    /// outside the body is not part of it: what hands do against that is lost at once. Energy is significant above the
-    /// fraction `notable` of the energy that is stored in the device and the wall, exchanged with fields, or released
-    /// from the sheath.
+    /// The balance of these motions between two states, given the work of wall and blood and the bounds of the
+    /// dissipation. Friction outside the body is not part of it: what hands do against that is lost at once. Energy is
+    /// significant above the fraction `notable` of the energy that is stored in the device and the wall, exchanged with
+    /// fields, or released from the sheath.
     pub(super) fn new(
         stack: &Stack,
-        (was_state, is_state): (&KirchhoffState, &KirchhoffState),
+        motions: &[HandMotion],
+        (before, after): (&KirchhoffState, &KirchhoffState),
         by_wall: WallWork,
         rubbed_mj: (f64, f64),
         notable: f64,
     ) -> Self {
-        let (before, after) = (&was_state.report, &is_state.report);
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
         // The part that has come out of the sheath was straight in it.
-        let each = stack.devices().enumerate().map(|(index, device)| {
-            let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
-            straightening(after) - straightening(before)
+        let each = stack.devices().zip(motions).map(|(device, motion)| {
+            device.straightening_mj(motion.to_mm) - device.straightening_mj(motion.from_mm)
         });
         let from_sheath_mj: f64 = each.sum();
         let mut add = |was: f64, is: f64, way: f64| {
@@ -57,19 +56,15 @@ impl Balance {
             most_mj += (was * way).max(is * way);
             mean_mj += 0.5 * (was + is) * way;
         };
-        for index in 0..after.instruments.len().max(1) {
-            let (was, is) = (was_state.inside(index), is_state.inside(index));
-            let (first_n, last_n) = match (was.push_force_n, is.push_force_n) {
-                (Some(first_n), Some(last_n)) => (first_n, last_n),
-                // Where the force jumps, the one on the side of the motion counts.
-                (Some(force_n), None) | (None, Some(force_n)) => (force_n, force_n),
-                (None, None) => (shared_n(was_state), shared_n(is_state)),
-            };
+        for ((was, is), motion) in before.hand_forces.iter().zip(&after.hand_forces).zip(motions) {
+            // Where the force jumps at one end, that at the other counts.
+            let first_n = if was.jumps && !is.jumps { is.push_n } else { was.push_n };
+            let last_n = if is.jumps && !was.jumps { was.push_n } else { is.push_n };
             // With nothing inserted a hand feels nothing, and all that comes out of the sheath may pull.
-            let comes_in = was.inserted_mm == 0.0 && is.inserted_mm > 0.0;
-            let first_n = if comes_in { -from_sheath_mj.abs() / is.inserted_mm } else { first_n };
-            add(first_n, last_n, is.inserted_mm - was.inserted_mm);
-            add(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
+            let comes_in = motion.from_mm == 0.0 && motion.to_mm > 0.0;
+            let first_n = if comes_in { -from_sheath_mj.abs() / motion.to_mm } else { first_n };
+            add(first_n, last_n, motion.advance_mm());
+            add(was.torque_nmm, is.torque_nmm, motion.turn_rad);
         }
         let (was, is) = (before.energy, after.energy);
         let stored_mj = is.total() - was.total() - from_sheath_mj;
@@ -122,20 +117,4 @@ impl Balance {
     pub(super) fn borrowed_mj(&self, lost_mj: f64) -> f64 {
         (lost_mj - (self.mean_mj - self.stored_mj)).max(0.0)
     }
-}
-
-/// Equal share of the push force of instruments whose tips are level, N: each alone has none, all together have one, and
-/// they go equally far.
-fn shared_n(state: &KirchhoffState) -> f64 {
-    let outside_n: f64 = state.outside.iter().map(|friction| friction.push_n).sum();
-    let mut rest_n = state.report.push_force_n - outside_n;
-    let mut level = 0.0;
-    let each = (0..state.report.instruments.len()).map(|index| state.inside(index));
-    for hand in each.filter(|hand| hand.inserted_mm > 0.0) {
-        match hand.push_force_n {
-            Some(force_n) => rest_n -= force_n,
-            None => level += 1.0,
-        }
-    }
-    rest_n / f64::max(level, 1.0)
 }

@@ -6,6 +6,7 @@
 
 use super::Environment;
 use super::configuration::Start;
+use super::hands::lengths;
 use super::mesh::Mesh;
 use crate::contact::passage::{Narrow, narrow_ahead};
 use crate::device::line_mm;
@@ -23,7 +24,7 @@ pub(super) fn refuse_narrow(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    let lengths_mm = from.state.report.lengths_mm();
+    let lengths_mm: Vec<f64> = lengths(&from.state.hands).collect();
     for (instrument, command) in commands.iter().enumerate() {
         if command.advance_mm > 0.0
             && let Some((narrow, device_radius_mm)) = narrow(environment, from, &lengths_mm, instrument)
@@ -47,7 +48,7 @@ pub(super) fn refuse_wedged(
     commands: &[Command],
 ) -> Result<()> {
     let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    if from.state.report.max_penetration_mm < environment.options.tuning.passage.wedged * thinnest_mm {
+    if from.state.deepest_mm() < environment.options.tuning.passage.wedged * thinnest_mm {
         return Ok(());
     }
     refuse_narrow(environment, from, commands)

@@ -17,8 +17,7 @@ use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use super::transport::lay;
 use crate::Vec3;
-use crate::contact::Contact;
-use crate::methods::StepReport;
+use crate::contact::Touch;
 use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
 use crate::vessel::Displacement;
@@ -113,12 +112,12 @@ pub(super) struct WallWork {
 
 impl WallWork {
     /// Zero if the wall rests.
-    pub(super) fn new(passage: Option<Passage<'_>>, reports: (&StepReport, &StepReport)) -> Self {
+    pub(super) fn new(passage: Option<Passage<'_>>, states: (&KirchhoffState, &KirchhoffState)) -> Self {
         let Some((before, after)) = passage else { return Self::default() };
         let there = |x: &Vec3| after.place(&before.material(x)) - x;
         let back = |x: &Vec3| x - before.place(&after.material(x));
-        let was = done(&reports.0.contacts, there);
-        let is = done(&reports.1.contacts, back);
+        let was = done(&states.0.touches, there);
+        let is = done(&states.1.touches, back);
         Self { least_mj: was.0.min(is.0), most_mj: was.1.max(is.1) }
     }
 
@@ -134,7 +133,8 @@ impl WallWork {
 }
 
 /// Work of contact forces over the motion of the wall there, mJ: signed, and by magnitude.
-fn done(contacts: &[Contact], way_mm: impl Fn(&Vec3) -> Vec3) -> (f64, f64) {
-    let each = contacts.iter().map(|contact| contact.total_n().dot(&way_mm(&contact.position_mm)));
+fn done(touches: &[(usize, Touch)], way_mm: impl Fn(&Vec3) -> Vec3) -> (f64, f64) {
+    let contacts = touches.iter().map(|(_, touch)| &touch.contact);
+    let each = contacts.map(|contact| contact.total_n().dot(&way_mm(&contact.position_mm)));
     each.fold((0.0, 0.0), |(sum, most), work| (sum + work, most + work.abs()))
 }

@@ -16,20 +16,21 @@ use super::carried::taken_along;
 use super::configuration::Start;
 use super::course::{Course, Next, Rest};
 use super::extrapolation::Correction;
-use super::hands::{Hand, lengths, motions};
+use super::hands::{lengths, line_advance_mm, set_motions};
+use super::report::Took;
 use super::state::{KirchhoffState, UnderWay};
 use super::substep::{Attempt, Effort, Part};
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
-use crate::methods::{Move, StepReport, Surroundings};
-use crate::{Error, Result};
+use crate::methods::{Energy, Move, Surroundings};
+use crate::{Error, Result, Vec3};
 
 /// Result of a command.
 #[derive(Debug)]
 pub(super) enum Driven {
-    /// There is a new state.
-    Moved,
+    /// There is a new state; with what it took.
+    Moved(Took),
     /// The device has not moved yet; with what goes on in the next tick.
     Waits(Rest),
     /// The solves of a tick do not suffice to follow what changes around the device.
@@ -52,8 +53,9 @@ impl<const C: usize> Workspace<C> {
         tools.joined.renew(&from.coils, stack, fineness, properties.modulus_n_per_mm2);
         tools.work = Work::default();
         let surroundings = &environment.surroundings;
-        way.begin(surroundings.stack, &from.report, moves);
-        let advance_mm = line_mm(lengths(&way.target)) - line_mm(lengths(&way.start));
+        way.begin(surroundings.stack, from, moves);
+        set_motions(&way.start, &way.target, &mut tools.guess.motions);
+        let advance_mm = line_advance_mm(&tools.guess.motions);
         if advance_mm > 0.0 {
             let displaced = surroundings.displacement(0.0);
             let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
@@ -102,9 +104,9 @@ impl<const C: usize> Workspace<C> {
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
             let there = environment.displaced(then.as_ref()).with_fields_at(part.to);
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
-                motions(&was.state.report, hands, &mut tools.guess.motions);
+                set_motions(&was.state.hands, hands, &mut tools.guess.motions);
                 now.withdraw(surroundings.stack, hands);
-                course.withdrawn(tools.write_report(&there, hands, now));
+                course.withdrawn(tools.write_forces(&there, now));
                 way.go_on_from(hands);
                 break Ok(());
             }
@@ -135,7 +137,7 @@ impl<const C: usize> Workspace<C> {
             match course.reject(&part, lost) {
                 Next::Part => {}
                 Next::Tick => {
-                    course.under_way = Some(tools.under_way(&part, hands, &next.state, (from, before)));
+                    course.under_way = Some(tools.under_way(&part, &next.state, (from, before)));
                     break Ok(());
                 }
                 Next::Nothing => break Ok(()),
@@ -152,21 +154,17 @@ impl<const C: usize> Workspace<C> {
             }
         };
         // Of a tick, what has been reached so far is kept.
-        if ends.is_err() && (solves == usize::MAX || !course.moved) {
-            return ends.map(|()| Driven::Moved);
+        if solves == usize::MAX || !course.moved {
+            ends?;
         }
         if course.has_failed(way) {
             let there = environment.displaced(displaced.as_ref());
             refuse_narrow(&there, now.start(), &way.commands)?;
         }
-        if !course.moved {
-            return Ok(Driven::Waits(course.rest(way)));
-        }
-        let state = now.parts().1;
-        course.write(way, state);
-        state.report.angles = from.report.angles;
-        tools.work.write(&mut state.report, from.report.nodes_solved);
-        Ok(Driven::Moved)
+        Ok(match course.moved {
+            true => Driven::Moved(course.end(way, tools.work, now.parts().1)),
+            false => Driven::Waits(course.rest(way)),
+        })
     }
 }
 
@@ -176,21 +174,28 @@ impl<const C: usize> Tools<C> {
     fn under_way(
         &mut self,
         part: &Part<'_>,
-        hands: &[Hand],
         to: &KirchhoffState,
         (from, before): (&KirchhoffState, Work),
     ) -> UnderWay {
         let iterations = self.work.since(&before) + part.resumed.map_or(0, |resumed| resumed.iterations);
         // They are counted once, with the state that the part leads to.
         self.work.nodes_solved = before.nodes_solved;
-        // Only its configuration and knowledge of the wall matter.
-        let report = StepReport { angles: from.report.angles, ..StepReport::default() };
-        let (correction, stride, unfinished) = (Correction::default(), from.stride, None);
+        // Only its hands, configuration and knowledge of the wall matter.
+        let state = KirchhoffState {
+            hand_forces: from.hand_forces.clone(),
+            behind: Vec::new(),
+            energy: Energy::default(),
+            touches: Vec::new(),
+            drag_n: Vec3::zeros(),
+            correction: Correction::default(),
+            stride: from.stride,
+            unfinished: None,
+            ..to.clone()
+        };
         UnderWay {
-            hands: hands.to_vec(),
             part_mm: part.part_mm,
             effort: part.effort,
-            state: KirchhoffState { correction, stride, unfinished, report, ..to.clone() },
+            state,
             neighbourhood: self.newton.neighbourhood.clone(),
             shift: self.newton.last_shift,
             iterations,

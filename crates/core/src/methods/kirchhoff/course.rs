@@ -2,6 +2,7 @@
 
 use super::Environment;
 use super::hands::{Hand, Way};
+use super::report::Took;
 use super::state::{Flight, KirchhoffState, UnderWay, Unfinished};
 use super::step_control::{StepControl, Stride};
 use super::substep::{Effort, Found, Limits, Lost, Part};
@@ -154,7 +155,7 @@ impl<'a> Course<'a> {
         self.sum.parts += 1;
         let still = Part { effort: Effort::Flight, part_mm: 0.0, to: 1.0, holds_still: true, resumed: None };
         if let Some(begun) = self.begun.take() {
-            hands.clone_from(&begun.hands);
+            hands.clone_from(&begun.state.hands);
             let (effort, part_mm) = (begun.effort, begun.part_mm);
             return Part { effort, part_mm, resumed: Some(begun), holds_still: false, ..still };
         }
@@ -265,11 +266,11 @@ impl<'a> Course<'a> {
         Rest { stride, behind: way.left(), unfinished }
     }
 
-    /// Writes the results into the new state.
-    pub(super) fn write(self, way: &Way, state: &mut KirchhoffState) {
-        self.sum.write(&mut state.report);
-        state.report.converged = self.balanced;
+    /// Writes what is left into the new state, and returns what the command took.
+    pub(super) fn end(self, way: &Way, work: Work, state: &mut KirchhoffState) -> Took {
+        let took = Took { sum: self.sum, work, converged: self.balanced };
         self.rest(way).write(state);
+        took
     }
 }
 
@@ -283,7 +284,7 @@ pub(super) struct Rest {
 
 impl Rest {
     pub(super) fn write(self, state: &mut KirchhoffState) {
-        (state.stride, state.report.behind, state.unfinished) = (self.stride, self.behind, self.unfinished);
+        (state.stride, state.behind, state.unfinished) = (self.stride, self.behind, self.unfinished);
     }
 }
 

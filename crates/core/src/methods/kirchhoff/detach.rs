@@ -5,16 +5,18 @@
 
 use std::sync::Arc;
 
+use super::command::Driven;
 use super::configuration::Configuration;
-use super::hands::{Hand, lengths, read};
+use super::hands::{Hand, HandForce, lengths};
 use super::joined::FreeCoil;
 use super::mesh::Mesh;
+use super::report::Took;
 use super::state::KirchhoffState;
 use super::transport::transport_together;
 use super::workspace::Workspace;
 use super::{Environment, meshed};
 use crate::device::{LENGTH_SLACK_MM, line_mm};
-use crate::methods::{InstrumentReport, MethodChoice};
+use crate::methods::MethodChoice;
 use crate::{Error, Result};
 
 /// Refuses a coil that cannot be detached; returns the length of one that can, mm.
@@ -34,7 +36,7 @@ pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instru
         return refused("is detached already: push the next coil".into());
     }
     environment.options.check_detach()?;
-    let inserted_mm = from.report.lengths_mm();
+    let inserted_mm: Vec<f64> = lengths(&from.hands).collect();
     let left_mm = stack.out_mm(instrument, &inserted_mm) - inserted_mm[instrument];
     if left_mm > LENGTH_SLACK_MM {
         return refused(format!("is not out yet: advance it by {left_mm:.3} mm"));
@@ -52,11 +54,10 @@ impl<const C: usize> Workspace<C> {
         environment: &Environment<'_>,
         from: &KirchhoffState,
         instrument: usize,
-    ) -> Result<()> {
+    ) -> Result<Took> {
         let coil_mm = check(environment, from, instrument)?;
         let stack = environment.surroundings.stack;
-        let mut hands = Vec::new();
-        read(&from.report, &mut hands);
+        let mut hands = from.hands.clone();
         hands[instrument] = Hand::default();
         // The remaining line, before it comes to rest.
         let mut left = Configuration { mesh: Mesh::default(), state: Arc::new(from.clone()) };
@@ -69,15 +70,12 @@ impl<const C: usize> Workspace<C> {
         state.pairs.clear();
         state.correction.clear();
         state.unfinished = None;
-        state.report.inserted_mm = mesh.from_tip_mm[0];
-        if let Some(told) = state.report.instruments.get_mut(instrument) {
-            *told = InstrumentReport::default();
-        }
+        state.hand_forces[instrument] = HandForce { jumps: stack.is_several(), ..HandForce::default() };
         if mesh.elements.is_empty() {
             state.withdraw(stack, &hands);
         } else {
             transport_together((&self.mesh, &from.rod), mesh, stack.sets(), &mut state.rod);
-            state.turn_tails(stack, &hands);
+            state.move_hands(stack, &hands);
             // The axial force of the coil is gone: in a straight catheter its energy is too small for descent to find
             // that.
             state.rod.tensions.fill(0.0);
@@ -86,11 +84,12 @@ impl<const C: usize> Workspace<C> {
         Arc::make_mut(&mut state.coils).push(coil);
         let Configuration { mesh, state } = left;
         let was = std::mem::replace(&mut self.mesh, mesh);
-        let done = self.carry_out(environment, &state, &[], usize::MAX).map(drop);
+        let done = self.carry_out(environment, &state, &[], usize::MAX);
         self.mesh = was;
+        let Driven::Moved(took) = done? else {
+            return Err(Error::Computation("kirchhoff: what was released does not come to rest".into()));
+        };
         // The released energy stays in the coil.
-        let report = &mut self.now.parts().1.report;
-        (report.jump, report.jumped) = (None, false);
-        done
+        Ok(took.without_jump())
     }
 }

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::state::KirchhoffState;
 use crate::contact::HandMotion;
-use crate::device::Stack;
-use crate::methods::{Command, Move, StepReport};
+use crate::device::{Stack, line_mm};
+use crate::methods::{Command, Move};
 
 /// Retracting to within this distance of the sheath, mm, counts as retracting completely.
 const ZERO_LENGTH_MM: f64 = 1e-9;
@@ -28,23 +29,56 @@ impl Hand {
     }
 }
 
-/// Sets `motions` to those from the hands of a state to `hands`.
-pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<HandMotion>) {
+/// Force and torque of a hand at an equilibrium. The energy balance of the device leaves out what acts outside the
+/// body, which moves nothing inside.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct HandForce {
+    /// Push force inside the body, N; where it jumps the hand's share of that of all instruments with level tips.
+    pub(super) push_n: f64,
+    /// Whether the push force of this hand alone jumps: its instrument's tip is at that of another, or it is not
+    /// inserted.
+    pub(super) jumps: bool,
+    /// Torque inside the body, N·mm.
+    pub(super) torque_nmm: f64,
+    /// Friction of the sheath's mouth and of valves.
+    pub(super) outside: OutsideFriction,
+}
+
+/// Friction outside the body on a hand.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct OutsideFriction {
+    /// On its push force, N.
+    pub(super) push_n: f64,
+    /// On its torque, N·mm.
+    pub(super) torque_nmm: f64,
+}
+
+impl HandForce {
+    /// Whether all numbers are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        let Self { push_n, torque_nmm, outside, .. } = self;
+        [push_n, torque_nmm, &outside.push_n, &outside.torque_nmm].into_iter().all(|part| part.is_finite())
+    }
+}
+
+/// Sets `motions` to those from the hands `before` to those `after`.
+pub(super) fn set_motions(before: &[Hand], after: &[Hand], motions: &mut Vec<HandMotion>) {
     motions.clear();
-    motions.extend(hands.iter().enumerate().map(|(index, hand)| {
-        let was = report.hand(index);
-        let turn_rad = hand.turn_rad - was.rotation_rad;
-        HandMotion { from_mm: was.inserted_mm, to_mm: hand.inserted_mm, turn_rad }
+    motions.extend(before.iter().zip(after).map(|(was, is)| HandMotion {
+        from_mm: was.inserted_mm,
+        to_mm: is.inserted_mm,
+        turn_rad: is.turn_rad - was.turn_rad,
     }));
 }
 
-/// Sets `hands` to those of a state.
-pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
-    hands.clear();
-    hands.extend((0..report.instruments.len().max(1)).map(|index| {
-        let own = report.hand(index);
-        Hand { inserted_mm: own.inserted_mm, turn_rad: own.rotation_rad }
-    }));
+/// Advance of the line in these motions, mm: of the instrument inserted farthest before to that after.
+pub(super) fn line_advance_mm(motions: &[HandMotion]) -> f64 {
+    line_mm(motions.iter().map(|hand| hand.to_mm)) - line_mm(motions.iter().map(|hand| hand.from_mm))
+}
+
+/// Largest advance of a hand, either way, mm.
+pub(super) fn longest_mm(motions: &[HandMotion]) -> f64 {
+    motions.iter().fold(0.0, |most_mm, hand| hand.advance_mm().abs().max(most_mm))
 }
 
 /// The lengths inserted, mm.
@@ -65,11 +99,11 @@ pub(super) struct Way {
 
 impl Way {
     /// Sets the motion from a state, with what ticks have left over.
-    pub(super) fn begin(&mut self, stack: &Stack, report: &StepReport, moves: &[Move]) {
-        read(report, &mut self.start);
+    pub(super) fn begin(&mut self, stack: &Stack, from: &KirchhoffState, moves: &[Move]) {
+        self.start.clone_from(&from.hands);
         self.commands.clear();
         self.commands.resize(self.start.len(), Command::default());
-        self.commands.iter_mut().zip(&report.behind).for_each(|(command, behind)| *command = *behind);
+        self.commands.iter_mut().zip(&from.behind).for_each(|(command, behind)| *command = *behind);
         for one in moves {
             let command = &mut self.commands[one.instrument];
             command.advance_mm += one.command.advance_mm;

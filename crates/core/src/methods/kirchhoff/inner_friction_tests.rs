@@ -202,7 +202,7 @@ fn a_step_that_turns_can_be_taken_again() {
     assert_eq!(bytes(&other), after);
     // A state with more friction entries than nodes is rejected.
     let mut wrong: serde_json::Value = serde_json::from_slice(&before).unwrap();
-    wrong["content"]["Kirchhoff"]["inner_friction"].as_array_mut().unwrap().pop();
+    wrong["content"]["Kirchhoff"]["state"]["inner_friction"].as_array_mut().unwrap().pop();
     let error = other.restore(&serde_json::from_value(wrong).unwrap()).unwrap_err().to_string();
     assert!(error.contains("state.inner_friction"), "{error}");
 }

@@ -22,7 +22,7 @@ use super::coaxial::element;
 use super::inner_friction::{pair, radius_mm};
 use super::mesh::Mesh;
 use crate::Vec3;
-use crate::contact::{Contact, ContactPoint, InnerFriction};
+use crate::contact::InnerFriction;
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::quadrature::{Point, hermite};
@@ -78,16 +78,6 @@ impl Line<'_> {
         let radius_mm = radius_mm(self.stack, self.mesh, (at.0, inner));
         [rub.along, radius_mm * rub.around].map(|part| -self.stack.friction(inner) * part)
     }
-}
-
-/// Contact points of a mesh that are in contact, in the same order.
-pub(super) fn pressing(mesh: &Mesh, rod: &RodState, contacts: &[Contact]) -> Vec<(usize, Vec3)> {
-    let mut contacts = contacts.iter().peekable();
-    let at = |(index, point): (usize, &ContactPoint)| {
-        let there = |contact: &&Contact| point.position(&mesh.elements, rod) == contact.position_mm;
-        contacts.next_if(there).map(|contact| (index, contact.total_n()))
-    };
-    mesh.points.iter().enumerate().filter_map(at).collect()
 }
 
 /// The node where an instrument, or one inside it, comes out of those outside it; `None` if none does.

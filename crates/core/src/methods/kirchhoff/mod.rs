@@ -13,6 +13,9 @@
 //! of which the terms after the first are configurational: the energy that the next piece stores as it leaves the
 //! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with
 //! respect to the inserted length.
+//!
+//! All that the next part of a command depends on is in the state ([`KirchhoffState`]); the report is written from it at the end, and nothing here
+//! reads it.
 
 mod balance;
 mod blocked;
@@ -46,6 +49,7 @@ mod mesh;
 mod motion_tests;
 mod options;
 mod readout;
+mod report;
 mod search;
 mod slopes;
 mod state;
@@ -72,7 +76,7 @@ use std::sync::Arc;
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
 use crate::field::FieldLoad;
-use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{Command, DetachedCoil, InstrumentReport, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, RodState, TWISTED};
 use crate::shape::Shape;
@@ -80,9 +84,11 @@ use crate::vessel::{Displacement, WallStore};
 use crate::{Error, Result};
 use coaxial::Nodes;
 use command::Driven;
+use configuration::Start;
 use hands::{Hand, lengths};
 use joined::{FreeCoil, Joined, join};
 use lateral::Line;
+use report::Took;
 use state::Belongs;
 use workspace::Workspace;
 
@@ -145,6 +151,7 @@ pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
     surface: Arc<ContactSurface>,
     state: Arc<KirchhoffState>,
+    report: Arc<StepReport>,
     /// The centre line of the state, for reports.
     shape: Shape,
     /// The detached coils.
@@ -259,14 +266,21 @@ impl<const C: usize> Kirchhoff<C> {
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
-        let mut state = KirchhoffState::at(surroundings);
-        state.report.angles = Layout::<C>::ANGLES > 0;
+        let state = KirchhoffState::at(surroundings, Layout::<C>::ANGLES > 0);
+        let hands = if surroundings.stack.is_several() { state.hands.len() } else { 0 };
+        let report = StepReport {
+            converged: true,
+            angles: state.has_angles,
+            instruments: vec![InstrumentReport::default(); hands],
+            ..StepReport::default()
+        };
         let Surroundings { lumen, properties, stack, .. } = *surroundings;
         let surface = ContactSurface::of(lumen, stack.radii_mm(), properties, store)?;
         let mut method = Self {
             options,
             surface: Arc::new(surface),
             state: Arc::new(state),
+            report: Arc::new(report),
             shape: Shape::default(),
             coils: Vec::new(),
             counters: Counters::default(),
@@ -279,22 +293,20 @@ impl<const C: usize> Kirchhoff<C> {
     /// Whether nothing remains to be done: hands, vessel and device are at rest; its report then says so.
     fn rests(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
         let still = moves.iter().all(|one| one.command == Command::default());
-        let rests = still
-            && !surroundings.moves()
-            && !surroundings.fields_change()
-            && self.state.report.behind.is_empty();
+        let rests =
+            still && !surroundings.moves() && !surroundings.fields_change() && self.state.behind.is_empty();
         if rests {
-            Arc::make_mut(&mut self.state).report.rest();
+            Arc::make_mut(&mut self.report).rest();
         }
         rests
     }
 
-    /// Runs `work` in the workspace, and moves to its new state if it reports one; on an error the state is
-    /// unchanged.
+    /// Runs `work` in the workspace, and moves to its new state if it reports what that took; on an error the state
+    /// is unchanged.
     fn work_on<T>(
         &mut self,
         surroundings: &Surroundings<'_>,
-        work: impl FnOnce(&mut Workspace<C>, &Environment<'_>, &KirchhoffState) -> Result<(bool, T)>,
+        work: impl FnOnce(&mut Workspace<C>, &Environment<'_>, &KirchhoffState) -> Result<(Option<Took>, T)>,
     ) -> Result<T> {
         let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut workspace = match self.workspace.take() {
@@ -307,9 +319,11 @@ impl<const C: usize> Kirchhoff<C> {
         };
         let done = work(&mut workspace, &environment, &self.state);
         self.counters.add(&std::mem::take(&mut workspace.tools.counters));
-        if let Ok((true, _)) = done {
+        if let Ok((Some(took), _)) = &done {
             std::mem::swap(&mut self.state, &mut workspace.now.state);
             std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
+            let to = Start { mesh: &workspace.mesh, state: &self.state };
+            took.write(&environment, to, Arc::make_mut(&mut self.report));
             self.write_shape(&workspace.mesh.from_tip_mm);
         }
         self.workspace = Some(workspace);
@@ -321,29 +335,32 @@ impl<const C: usize> Kirchhoff<C> {
         if self.rests(surroundings, moves) {
             return Ok(());
         }
-        let driven = self.work_on(surroundings, |workspace, environment, state| {
-            let driven = workspace.carry_out(environment, state, moves, solves)?;
-            Ok((matches!(driven, Driven::Moved), driven))
-        });
-        match driven? {
-            Driven::Moved => {}
+        let waits = self.work_on(surroundings, |workspace, environment, state| {
+            Ok(match workspace.carry_out(environment, state, moves, solves)? {
+                Driven::Moved(took) => (Some(took), None),
+                others => (None, Some(others)),
+            })
+        })?;
+        match waits {
             // Time proceeds, so the motion of the vessel cannot be postponed.
-            Driven::Overtaken => return self.drive(surroundings, moves, usize::MAX),
-            Driven::Waits(rest) => {
-                let state = Arc::make_mut(&mut self.state);
-                let nodes_solved = state.report.nodes_solved;
-                state.report.rest();
+            Some(Driven::Overtaken) => return self.drive(surroundings, moves, usize::MAX),
+            Some(Driven::Waits(rest)) => {
+                let (state, report) = (Arc::make_mut(&mut self.state), Arc::make_mut(&mut self.report));
                 rest.write(state);
+                report.rest();
+                report.behind.clone_from(&state.behind);
                 if let Some(Workspace { tools, .. }) = self.workspace.as_deref() {
-                    tools.work.write(&mut state.report, nodes_solved);
+                    tools.work.write(report);
                 }
             }
+            Some(Driven::Moved(_)) | None => {}
         }
         Ok(())
     }
 
-    /// Checks that a state is possible for this simulation with the hands at `hands`, and returns its mesh.
-    fn check(&self, surroundings: &Surroundings<'_>, state: &KirchhoffState, hands: &[Hand]) -> Result<Mesh> {
+    /// Checks that a state is possible for this simulation, and returns its mesh.
+    fn check(&self, surroundings: &Surroundings<'_>, state: &KirchhoffState) -> Result<Mesh> {
+        let hands = &state.hands;
         let devices = surroundings.stack.devices();
         if hands.len() != devices.len() {
             let mend = format!("there are {} instruments here: restore a state of this scene", devices.len());
@@ -390,6 +407,7 @@ impl<const C: usize> Clone for Kirchhoff<C> {
             options: self.options,
             surface: Arc::clone(&self.surface),
             state: Arc::clone(&self.state),
+            report: Arc::clone(&self.report),
             shape: self.shape.clone(),
             coils: self.coils.clone(),
             counters: self.counters,
@@ -409,20 +427,20 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
         let done = self.drive(surroundings, moves, solves);
-        if done.is_err() && self.state.report.is_under_way() {
+        if done.is_err() && !self.state.behind.is_empty() {
             // The wall has stopped the hands.
-            let state = Arc::make_mut(&mut self.state);
-            state.unfinished = None;
-            state.report.rest();
-            state.report.behind.clear();
-            state.report.converged = false;
+            let (state, report) = (Arc::make_mut(&mut self.state), Arc::make_mut(&mut self.report));
+            (state.unfinished, state.behind) = (None, Vec::new());
+            report.rest();
+            report.behind.clear();
+            report.converged = false;
         }
         done
     }
 
     fn detach(&mut self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
         self.work_on(surroundings, |workspace, environment, state| {
-            workspace.detach(environment, state, instrument).map(|()| (true, ()))
+            workspace.detach(environment, state, instrument).map(|took| (Some(took), ()))
         })
     }
 
@@ -444,7 +462,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn report(&self) -> &StepReport {
-        &self.state.report
+        &self.report
     }
 
     fn counters(&self) -> Counters {
@@ -453,12 +471,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
         let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut hands = Vec::new();
-        hands::read(&self.state.report, &mut hands);
+        let KirchhoffState { hands, rod, inner_friction, touches, .. } = &*self.state;
         let mut mesh = Mesh::default();
-        meshed(&environment, &hands, &mut mesh);
-        let KirchhoffState { rod, inner_friction, report, .. } = &*self.state;
-        let pressing = lateral::pressing(&mesh, rod, &report.contacts);
+        meshed(&environment, hands, &mut mesh);
+        let on_line = touches.iter().take_while(|(point, _)| *point < mesh.points.len());
+        let pressing: Vec<_> = on_line.map(|(point, touch)| (*point, touch.contact.total_n())).collect();
         let line = Line { stack: surroundings.stack, mesh: &mesh, rod, pressing: &pressing, inner_friction };
         lateral::lateral_forces::<C>(&line, instrument)
     }
@@ -468,10 +485,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
             return Vec::new();
         }
         let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut hands = Vec::new();
-        hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
-        meshed(&environment, &hands, &mut mesh);
+        meshed(&environment, &self.state.hands, &mut mesh);
         let mut joined = Joined::default();
         let Surroundings { stack, properties, .. } = surroundings;
         joined.renew(&self.state.coils, stack, self.options.fineness(), properties.modulus_n_per_mm2);
@@ -483,18 +498,20 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn state(&self) -> State {
-        State::new(NAME, Content::Kirchhoff(Arc::clone(&self.state)))
+        let (state, report) = (Arc::clone(&self.state), Arc::clone(&self.report));
+        State::new(NAME, Content::Kirchhoff { state, report })
     }
 
     fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
-        let Content::Kirchhoff(state) = state.of(NAME)? else { return Err(state.of_another(NAME)) };
-        let mut hands = Vec::new();
-        hands::read(&state.report, &mut hands);
-        let mesh = self.check(surroundings, state, &hands)?;
+        let Content::Kirchhoff { state, report } = state.of(NAME)? else {
+            return Err(state.of_another(NAME));
+        };
+        let mesh = self.check(surroundings, state)?;
         if let Some(under_way) = state.unfinished.as_ref().and_then(|unfinished| unfinished.part.as_ref()) {
-            self.check(surroundings, &under_way.state, &under_way.hands)?;
+            self.check(surroundings, &under_way.state)?;
         }
-        self.state = Arc::clone(state);
+        report::check(report, state)?;
+        (self.state, self.report) = (Arc::clone(state), Arc::clone(report));
         self.write_shape(&mesh.from_tip_mm);
         if let Some(workspace) = &mut self.workspace {
             workspace.mesh = mesh;

@@ -11,12 +11,10 @@
 use super::Environment;
 use super::coaxial::{Nodes, at_mouth};
 use super::configuration::{Configuration, Start};
-use super::hands::{Hand, lengths};
+use super::hands::{HandForce, lengths};
 use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::{ContactPoint, Drag, Place, Pressing, RodPlace, Touch};
-use crate::device::line_mm;
-use crate::methods::InstrumentReport;
 use crate::rod::quadrature::hermite;
 use crate::rod::{Clamp, ElementData, RodState, element_energy};
 
@@ -25,13 +23,9 @@ const STEP: f64 = 1e-5;
 /// Number of steps within which ends count as flush, and by which a contact point or its weight changes at most.
 const MEET: f64 = 4.0;
 
-/// A contact point in contact with the wall, by its index.
-pub(super) type Pressed = (usize, Touch);
-
-/// External forces on the instruments, and friction between them.
-#[derive(Clone, Copy, Default)]
+/// Forces on the instruments beside those of the wall, and friction between them.
+#[derive(Clone, Copy)]
 pub(super) struct Acting<'a> {
-    pub(super) wall: &'a [Pressed],
     /// Friction between instruments.
     pub(super) between: &'a [Place],
     /// Contacts between loops.
@@ -39,50 +33,41 @@ pub(super) struct Acting<'a> {
     pub(super) drag: Option<&'a Drag>,
 }
 
-/// Writes the reports of several instruments with these hands.
-pub(super) fn write_instruments<const C: usize>(
+/// Sets the forces of the hands of several instruments.
+pub(super) fn set_hand_forces<const C: usize>(
     environment: &Environment<'_>,
-    hands: &[Hand],
-    clamp: Option<&Clamp>,
+    clamp: &Clamp,
     acting: Acting<'_>,
     at: &mut Configuration,
 ) {
-    let sets = environment.surroundings.stack.sets();
-    let inserted: Vec<f64> = lengths(hands).collect();
-    let line = line_mm(lengths(hands));
-    let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.fineness());
+    let stack = environment.surroundings.stack;
+    let inserted: Vec<f64> = lengths(&at.state.hands).collect();
+    let nodes = Nodes::new(stack, &inserted, environment.options.fineness());
     let turning = turning(acting.between, at.start());
-    let touching = (acting, &turning[..]);
-    let mut told = Vec::with_capacity(hands.len());
-    for (index, hand) in hands.iter().enumerate() {
-        let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
-        let twist = set.map_or(0.0, |set| {
-            let tip = at.mesh.nearest_node(line - hand.inserted_mm);
-            at.state.rod.twist_to(tip, set)
-        });
-        told.push(InstrumentReport {
-            inserted_mm: hand.inserted_mm,
-            rotation_rad: hand.turn_rad,
-            tip_rotation_rad: hand.turn_rad + twist,
-            push_force_n: push_force::<C>(environment, &nodes, (&[index], &inserted), touching, at.start()),
-            torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
-        });
-    }
+    let push_force = |together: &[usize]| {
+        push_force::<C>(environment, &nodes, (together, &inserted), (acting, &turning), at.start())
+    };
+    let each = stack.sets().iter().zip(&inserted).enumerate().map(|(index, (set, inserted_mm))| {
+        let push_n = push_force(&[index]);
+        let set = set.filter(|_| *inserted_mm > 0.0);
+        HandForce {
+            push_n: push_n.unwrap_or(0.0),
+            jumps: push_n.is_none(),
+            torque_nmm: set.map_or(0.0, |set| clamp.torques[set]),
+            ..HandForce::default()
+        }
+    });
+    let mut forces: Vec<HandForce> = each.collect();
     // Where ends are flush the force of a single hand jumps; that of all flush instruments together has a value.
-    let flush: Vec<usize> = (0..told.len())
-        .filter(|index| told[*index].push_force_n.is_none() && inserted[*index] > 0.0)
-        .collect();
+    let flush: Vec<usize> =
+        (0..forces.len()).filter(|index| forces[*index].jumps && inserted[*index] > 0.0).collect();
     let together =
         flush.chunk_by(|a, b| (inserted[*a] - inserted[*b]).abs() <= MEET * difference_mm(at.start()));
-    let flush_n = together
-        .filter(|flush| flush.len() > 1)
-        .filter_map(|flush| push_force::<C>(environment, &nodes, (flush, &inserted), touching, at.start()))
-        .sum::<f64>();
-    let report = &mut at.parts().1.report;
-    (report.rotation_rad, report.tip_rotation_rad) = (told[0].rotation_rad, told[0].tip_rotation_rad);
-    report.push_force_n = told.iter().filter_map(|i| i.push_force_n).sum::<f64>() + flush_n;
-    report.torque_nmm = told.iter().map(|i| i.torque_nmm).sum();
-    report.instruments = told;
+    for flush in together.filter(|flush| flush.len() > 1) {
+        let share_n = push_force(flush).unwrap_or(0.0) / flush.len() as f64;
+        flush.iter().for_each(|index| forces[*index].push_n = share_n);
+    }
+    at.parts().1.hand_forces = forces;
 }
 
 /// Push force of the hands of instruments that move `together`, with flush ends if they are several; `None` where it
@@ -107,9 +92,12 @@ fn push_force<const C: usize>(
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
+    // Contacts of coils come last.
+    let on_line = at.state.touches.partition_point(|(point, _)| *point < at.mesh.points.len());
+    let pressed = &at.state.touches[..on_line];
     // If an active point vanishes on one side, or another one appears there, the other side's slope is used.
     let gains = |side: &Beside| side.mesh.points.len() > at.mesh.points.len();
-    let wall = match (on.wall_slope(acting.wall, at, step), back.wall_slope(acting.wall, at, -step)) {
+    let wall = match (on.wall_slope(pressed, at, step), back.wall_slope(pressed, at, -step)) {
         (Some(one), Some(_)) if gains(&back) && !gains(&on) => one,
         (Some(_), Some(other)) if gains(&on) && !gains(&back) => other,
         (Some(one), Some(other)) => 0.5 * (one + other),
@@ -285,7 +273,7 @@ impl Beside {
 
     /// Slope of the wall's energy towards these lengths, N: active points move against their forces, and represent
     /// more or less length. `None` if one of them does not exist here.
-    fn wall_slope(&self, pressed: &[Pressed], at: Start<'_>, step_mm: f64) -> Option<f64> {
+    fn wall_slope(&self, pressed: &[(usize, Touch)], at: Start<'_>, step_mm: f64) -> Option<f64> {
         let each = pressed.iter().map(|(index, touch)| {
             let was = &at.mesh.points[*index];
             let is = self.same_point(was, step_mm.abs())?;

@@ -6,23 +6,37 @@ use serde::{Deserialize, Serialize};
 
 use super::balance::Balance;
 use super::extrapolation::Correction;
-use super::hands::Hand;
+use super::hands::{Hand, HandForce};
 use super::joined::Coils;
 use super::mesh::Fineness;
 use super::step_control::{StepControl, Stride};
 use super::substep::{Effort, Found};
-use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce};
+use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce, Touch};
 use crate::device::Stack;
-use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
+use crate::methods::{Command, Energy, Sheath, Surroundings};
 use crate::rod::RodState;
 use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
 
-/// The state of the exact rod: configuration and forces, the predictor's correction, what its contact points know of
-/// the wall, and the report of the last step.
+/// The state of the exact rod: hands, configuration and forces, the predictor's correction, and what its contact
+/// points know of the wall.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct KirchhoffState {
+    /// Positions of the hands.
+    pub(super) hands: Vec<Hand>,
+    /// Their forces.
+    pub(super) hand_forces: Vec<HandForce>,
+    /// Motion of the hands that ticks have not yet carried out; empty if the device is at rest where they are.
+    pub(super) behind: Vec<Command>,
     pub(super) rod: RodState,
+    /// Whether it has material angles.
+    pub(super) has_angles: bool,
+    /// Stored energy.
+    pub(super) energy: Energy,
+    /// Contacts with the wall, in the order of their contact points, whose indices come first; those of coils follow.
+    pub(super) touches: Vec<(usize, Touch)>,
+    /// Drag of the blood, N.
+    pub(super) drag_n: Vec3,
     /// Normal forces at the contact points, tip first; empty without friction.
     pub(super) forces: Vec<NormalForce>,
     /// Friction between instruments: for each node those that have one outside them, the innermost first; empty
@@ -39,19 +53,6 @@ pub struct KirchhoffState {
     /// Detached coils.
     #[serde(with = "crate::methods::state::shared")]
     pub(super) coils: Coils,
-    pub(super) report: StepReport,
-    /// Friction outside the body, for each hand.
-    pub(super) outside: Vec<OutsideFriction>,
-}
-
-/// Friction of the sheath's mouth and of valves on a hand, part of its forces in the report. It moves nothing inside, so
-/// the energy balance of the device leaves it out.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct OutsideFriction {
-    /// On its push force, N.
-    pub(super) push_n: f64,
-    /// On its torque, N·mm.
-    pub(super) torque_nmm: f64,
 }
 
 /// A command that ticks have begun.
@@ -108,13 +109,11 @@ impl Flight {
 /// A part of a command whose solution ticks have begun.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct UnderWay {
-    /// Positions of the hands after it.
-    pub(super) hands: Vec<Hand>,
     /// The largest motion of a hand in it, mm.
     pub(super) part_mm: f64,
     /// How it is solved.
     pub(super) effort: Effort,
-    /// The device's state in the unfinished solution, with its normal forces.
+    /// The device's state in the unfinished solution, with its normal forces, and the hands after the part.
     pub(super) state: KirchhoffState,
     /// The neighbourhood of its prediction.
     pub(super) neighbourhood: Neighbourhood,
@@ -142,19 +141,22 @@ pub(super) struct Belongs<'a> {
 
 impl KirchhoffState {
     /// Nothing inserted.
-    pub(super) fn at(surroundings: &Surroundings<'_>) -> Self {
+    pub(super) fn at(surroundings: &Surroundings<'_>, has_angles: bool) -> Self {
         let (sheath, stack) = (surroundings.sheath, surroundings.stack);
         let mut rod = RodState::default();
         rod.frames.push(sheath.frame());
         rod.angles.resize(stack.angles().max(1), 0.0);
         rod.positions.push(sheath.position_mm);
-        let instruments = if stack.is_several() {
-            vec![InstrumentReport::default(); stack.instruments().len()]
-        } else {
-            Vec::new()
-        };
+        let hands = stack.instruments().len();
         Self {
+            hands: vec![Hand::default(); hands],
+            hand_forces: vec![HandForce { jumps: stack.is_several(), ..HandForce::default() }; hands],
+            behind: Vec::new(),
             rod,
+            has_angles,
+            energy: Energy::default(),
+            touches: Vec::new(),
+            drag_n: Vec3::zeros(),
             forces: Vec::new(),
             inner_friction: Vec::new(),
             known: KnownPoints::default(),
@@ -163,24 +165,12 @@ impl KirchhoffState {
             coils: Coils::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
             unfinished: None,
-            outside: vec![OutsideFriction::default(); instruments.len().max(1)],
-            report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }
 
-    /// The report of the step that led to this state.
-    pub fn report(&self) -> &StepReport {
-        &self.report
-    }
-
-    /// Motion and forces of a hand without friction outside the body.
-    pub(super) fn inside(&self, index: usize) -> InstrumentReport {
-        let (hand, outside) = (self.report.hand(index), self.outside[index]);
-        InstrumentReport {
-            push_force_n: hand.push_force_n.map(|force_n| force_n - outside.push_n),
-            torque_nmm: hand.torque_nmm - outside.torque_nmm,
-            ..hand
-        }
+    /// Deepest penetration of the device's surface into the wall, mm; 0 without contact.
+    pub(super) fn deepest_mm(&self) -> f64 {
+        self.touches.iter().fold(0.0, |deepest_mm, (_, touch)| touch.contact.penetration_mm.max(deepest_mm))
     }
 
     /// Position of the tip, mm.
@@ -194,14 +184,14 @@ impl KirchhoffState {
         self.forces.reserve(points.saturating_sub(self.forces.len()));
         self.known.reserve(points);
         self.correction.reserve(elements);
-        let contacts = &mut self.report.contacts;
-        contacts.reserve(points.saturating_sub(contacts.len()));
+        self.touches.reserve(points.saturating_sub(self.touches.len()));
     }
 
     /// Resets to nothing inserted: only the angles of the tails remain.
     pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
         self.rod.truncate(1);
-        self.turn_tails(stack, hands);
+        self.move_hands(stack, hands);
+        self.touches.clear();
         self.forces.clear();
         self.inner_friction.clear();
         self.known.clear();
@@ -209,8 +199,10 @@ impl KirchhoffState {
         self.correction.clear();
     }
 
-    /// Sets the angles of the tails to those of the hands.
-    pub(super) fn turn_tails(&mut self, stack: &Stack, hands: &[Hand]) {
+    /// Sets the positions of the hands, and the angles of the tails to theirs.
+    pub(super) fn move_hands(&mut self, stack: &Stack, hands: &[Hand]) {
+        self.hands.clear();
+        self.hands.extend_from_slice(hands);
         if !stack.is_several() {
             self.rod.angles[0] = hands[0].turn_rad;
             return;
@@ -238,9 +230,9 @@ impl KirchhoffState {
             let mend = format!("its lists are not those of {n} elements");
             return Err(other("rod", r.positions.len(), mend));
         }
-        if self.report.angles != (belongs.sets > 0) {
+        if self.has_angles != (belongs.sets > 0) {
             let mend = "it has material angles where this simulation has none, or none where it has: another device or friction";
-            return Err(other("angles", self.report.angles, mend));
+            return Err(other("has_angles", self.has_angles, mend));
         }
         let forces = if belongs.inner_friction { belongs.points } else { 0 };
         if self.forces.len() != forces {
@@ -267,8 +259,18 @@ impl KirchhoffState {
             .iter()
             .try_for_each(|coil| coil.check(belongs.stack, felt, (sets, belongs.inner_friction)))?;
         let hands = belongs.stack.instruments().len();
-        if self.outside.len() != hands {
-            return Err(other("outside", self.outside.len(), format!("there are {hands} instruments here")));
+        let counts = [self.hands.len(), self.hand_forces.len(), self.behind.len()];
+        if counts != [hands, hands, if self.behind.is_empty() { 0 } else { hands }] {
+            return Err(other("hands", format!("{counts:?}"), format!("there are {hands} instruments here")));
+        }
+        let points = belongs.points + self.coils.iter().map(|coil| coil.known.len()).sum::<usize>();
+        let is_next = |touches: &[(usize, Touch)]| touches[0].0 < touches[1].0;
+        if !self.touches.windows(2).all(is_next) || self.touches.last().is_some_and(|last| last.0 >= points) {
+            return Err(other(
+                "touches",
+                self.touches.len(),
+                format!("there are {points} contact points here"),
+            ));
         }
         if let Some(unfinished) = self.unfinished.as_deref() {
             unfinished.check()?;
@@ -295,10 +297,18 @@ impl KirchhoffState {
         }
         let mut inner_friction =
             self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
-        let mut outside = self.outside.iter().flat_map(|friction| [friction.push_n, friction.torque_nmm]);
-        let is_finite =
-            r.is_finite() && outside.all(f64::is_finite) && self.pairs.iter().all(PairForce::is_finite);
-        if !(is_finite && inner_friction.all(f64::is_finite)) {
+        let motions = self.behind.iter().flat_map(|left| [left.advance_mm, left.rotate_rad]);
+        let turns = self.hands.iter().flat_map(|hand| [hand.inserted_mm, hand.turn_rad]);
+        let is_finite = r.is_finite()
+            && motions
+                .chain(turns)
+                .chain([self.energy.total()])
+                .chain(self.drag_n.iter().copied())
+                .all(f64::is_finite)
+            && self.hand_forces.iter().all(HandForce::is_finite)
+            && self.touches.iter().all(|(_, touch)| touch.is_finite())
+            && self.pairs.iter().all(PairForce::is_finite);
+        if !(is_finite && inner_friction.all(|part| part.is_finite())) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
         }
         Ok(())

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::balance::Balance;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
-use super::hands::{Hand, motions};
+use super::hands::{Hand, line_advance_mm, longest_mm, set_motions};
 use super::joined::{Resistance, join};
 use super::loops::{advances_mm, skins};
 use super::mesh::Mesh;
@@ -18,7 +18,6 @@ use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::Vec3;
 use crate::contact::{ContactPoint, Rubs, WallContact, least_force_n, stick_mm};
-use crate::methods::StepReport;
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
 
@@ -163,7 +162,7 @@ impl<const C: usize> Tools<C> {
                 transport(from, mesh, rod);
             }
         };
-        motions(&start.state.report, hands, &mut self.guess.motions);
+        set_motions(&start.state.hands, hands, &mut self.guess.motions);
         self.guess.before_motion.clear();
         if self.friction.acts() {
             // Slip is measured from where the device was before the vessel moved.
@@ -185,7 +184,7 @@ impl<const C: usize> Tools<C> {
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
         let pressed = resumed.map_or(start, |resumed| Start { mesh, state: &resumed.state });
         inner_friction::begin(stack, pressed, (mesh, &after.rod), moves, places);
-        after.turn_tails(stack, hands);
+        after.move_hands(stack, hands);
         let on_line = mesh.points.len();
         self.joined.add_to(mesh);
         join(&mut after.rod, &start.state.coils);
@@ -201,7 +200,7 @@ impl<const C: usize> Tools<C> {
             self.cache.resume(&state.known);
             state.coils.iter().for_each(|coil| self.cache.go_on(&coil.known));
         } else {
-            let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+            let advance_mm = line_advance_mm(moves);
             let points = &mesh.points[..on_line];
             self.cache.begin(&start.state.known, &start.mesh.points, points, advance_mm);
             start.state.coils.iter().for_each(|coil| self.cache.go_on(&coil.known));
@@ -224,7 +223,6 @@ impl<const C: usize> Tools<C> {
             least_n: least_force_n(stack.softest_nmm2()),
         };
         self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
-        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
         let place = |from_tip_mm: &f64| {
             place_on_curve(start.mesh, &start.state.rod, mesh.from_tip_mm[0] - from_tip_mm).0
         };
@@ -232,7 +230,7 @@ impl<const C: usize> Tools<C> {
         self.loops.begin_friction(rod, places, advances_mm(mesh, stack, motions), friction);
         let pressed = &resumed.map_or(start.state, |resumed| &resumed.state).pairs;
         self.loops.recall(&mesh.elements, pressed);
-        self.loops.blocks_its_tip(&mesh.elements, rod, advance_mm)
+        self.loops.blocks_its_tip(&mesh.elements, rod, line_advance_mm(motions))
     }
 
     /// Stores what the next sub-step starts with, and removes the coils from the line.
@@ -263,12 +261,13 @@ impl<const C: usize> Tools<C> {
         (left, aside_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
         rubbed_mj: (f64, f64),
     ) -> Balance {
-        let (states, reports) = ((was.state, is.state), (&was.state.report, &is.state.report));
-        let flow_mj = aside_mj + self.drag.size_n() * longest_mm(reports);
-        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
+        let (states, motions) = ((was.state, is.state), &self.guess.motions);
+        let flow_mj = aside_mj + self.drag.size_n() * longest_mm(motions);
+        let by_wall = WallWork::new(left.map(|(_, passage)| passage), states).with_flow(flow_mj);
         let by_fields = work_of_fields(environment, was, is);
+        let by_wall = by_wall.with(by_fields);
         let notable = environment.options.tuning.steps.notable;
-        Balance::new(environment.surroundings.stack, states, by_wall.with(by_fields), rubbed_mj, notable)
+        Balance::new(environment.surroundings.stack, motions, states, by_wall, rubbed_mj, notable)
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
@@ -281,7 +280,7 @@ impl<const C: usize> Tools<C> {
     ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
         let tuning = &options.tuning;
-        let Attempt { part: Part { effort, part_mm, resumed, .. }, hands, limits, left } = attempt;
+        let Attempt { part: Part { effort, part_mm, resumed, .. }, limits, left, .. } = attempt;
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
@@ -360,7 +359,7 @@ impl<const C: usize> Tools<C> {
             passes.then_some(Lost::Passed)
         });
         if wrong.is_none() {
-            contact.touches(&mesh.elements, rod, &mut self.touches);
+            contact.touches(&mesh.elements, rod, &mut after.touches);
             if is_interrupted {
                 // The next tick continues from here, with these normal forces.
                 contact.anchor_friction(&mesh.elements, rod);
@@ -379,9 +378,10 @@ impl<const C: usize> Tools<C> {
         let farthest_mm = self.newton.neighbourhood.farthest(rod);
         let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
-        let outside_mj = self.write_report(environment, hands, next);
+        let outside_mj = self.write_forces(environment, next);
+        // Where the device is not at rest its own are arbitrary, and would count as work.
         if found.residual > tuning.steps.at_rest {
-            hold_hands(start.state, next.parts().1);
+            next.parts().1.hand_forces.clone_from(&start.state.hand_forces);
         }
         let rubbed_mj = (least_mj + between_mj, most_mj + between_mj);
         let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
@@ -408,29 +408,12 @@ impl<const C: usize> Tools<C> {
     }
 }
 
-/// Keeps the hand forces of the last equilibrium where the residual says that the device is not at rest: its own are arbitrary, and would
-/// count as work.
-fn hold_hands(before: &KirchhoffState, after: &mut KirchhoffState) {
-    after.outside.copy_from_slice(&before.outside);
-    let (before, after) = (&before.report, &mut after.report);
-    (after.push_force_n, after.torque_nmm) = (before.push_force_n, before.torque_nmm);
-    for (was, is) in before.instruments.iter().zip(&mut after.instruments) {
-        (is.push_force_n, is.torque_nmm) = (was.push_force_n, was.torque_nmm);
-    }
-}
-
 /// Work of changing fields, mJ: the change of the field energy at the old and at the new configuration.
 fn work_of_fields(environment: &Environment<'_>, was: Start<'_>, is: Start<'_>) -> [f64; 2] {
-    let at_first = environment.field_mj(was.mesh, &was.state.rod) - was.state.report.energy.field;
+    let at_first = environment.field_mj(was.mesh, &was.state.rod) - was.state.energy.field;
     if !environment.surroundings.fields_change() {
         return [at_first; 2];
     }
     let before = environment.with_fields_at(0.0);
-    [at_first, is.state.report.energy.field - before.field_mj(is.mesh, &is.state.rod)]
-}
-
-/// The largest motion of a hand, mm.
-fn longest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
-    let way = |index: usize| (after.hand(index).inserted_mm - before.hand(index).inserted_mm).abs();
-    (0..after.instruments.len().max(1)).map(way).fold(0.0, f64::max)
+    [at_first, is.state.energy.field - before.field_mj(is.mesh, &is.state.rod)]
 }

@@ -50,6 +50,11 @@ impl Sum {
         self.imbalance = if relaxed { found.residual.max(found.unsettled) } else { 0.0 };
     }
 
+    /// The same without a jump.
+    pub(super) fn without_jump(self) -> Self {
+        Self { jump: None, ..self }
+    }
+
     /// Adds energy dissipated by friction, mJ.
     pub(super) fn rub(&mut self, dissipated_mj: f64) {
         self.dissipated_mj += dissipated_mj;

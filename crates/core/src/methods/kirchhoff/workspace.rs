@@ -7,7 +7,7 @@ use super::joined::Joined;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
-use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact, Touch};
+use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact};
 use crate::methods::StepReport;
 use crate::solve::Newton;
 
@@ -40,8 +40,6 @@ pub(super) struct Tools<const C: usize> {
     pub(super) loops: SelfContact,
     /// Detached coils, solved together with the line.
     pub(super) joined: Joined,
-    /// Points in contact at the last equilibrium, and their forces.
-    pub(super) touches: Vec<(usize, Touch)>,
     /// Work of the command's sub-steps.
     pub(super) work: Work,
     /// Wall queries.
@@ -72,10 +70,10 @@ impl Work {
         (self.iterations - before.iterations).max(1)
     }
 
-    /// Writes the work into the report; nodes are added to those solved before.
-    pub(super) fn write(&self, report: &mut StepReport, nodes_solved: u64) {
+    /// Writes the work into the report of the step before; nodes are added to those solved until then.
+    pub(super) fn write(&self, report: &mut StepReport) {
         (report.iterations, report.solves) = (self.iterations as u32, self.solves as u32);
-        report.nodes_solved = nodes_solved + self.nodes_solved;
+        report.nodes_solved = report.nodes_solved.saturating_add(self.nodes_solved);
     }
 }
 
@@ -84,7 +82,7 @@ impl<const C: usize> Workspace<C> {
     pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
         let surroundings = environment.surroundings;
         let (elements, points) = largest(surroundings.stack, environment.options.fineness());
-        let nothing = Configuration::at(&surroundings);
+        let nothing = Configuration::at(&surroundings, state.has_angles);
         let mut tools = Tools {
             newton: Newton::new(1),
             guess: Guess::default(),
@@ -93,7 +91,6 @@ impl<const C: usize> Workspace<C> {
             drag: Drag::default(),
             loops: SelfContact::default(),
             joined: Joined::default(),
-            touches: Vec::new(),
             work: Work::default(),
             counters: Counters::default(),
         };
@@ -101,11 +98,8 @@ impl<const C: usize> Workspace<C> {
         tools.guess.reserve(elements);
         tools.friction.reserve(points);
         tools.cache.reserve(points);
-        tools.touches.reserve(points);
         let mut mesh = Mesh::default();
-        let mut hands = Vec::new();
-        super::hands::read(state.report(), &mut hands);
-        meshed(environment, &hands, &mut mesh);
+        meshed(environment, &state.hands, &mut mesh);
         Box::new(Self {
             tools,
             mesh,
@@ -113,7 +107,7 @@ impl<const C: usize> Workspace<C> {
             next: nothing,
             most: (elements, points),
             way: Way::default(),
-            hands,
+            hands: state.hands.clone(),
         })
     }
 }

@@ -1,0 +1,93 @@
+//! The report of a step, written from the state that it led to and what it took.
+
+use super::Environment;
+use super::configuration::Start;
+use super::hands::{Hand, lengths};
+use super::state::KirchhoffState;
+use super::sum::Sum;
+use super::workspace::Work;
+use crate::contact::extension::left_through;
+use crate::device::line_mm;
+use crate::methods::{InstrumentReport, StepReport};
+use crate::{Error, Result};
+
+/// What a step or a tick took.
+#[derive(Debug)]
+pub(super) struct Took {
+    pub(super) sum: Sum,
+    pub(super) work: Work,
+    /// Whether it has ended at an equilibrium.
+    pub(super) converged: bool,
+}
+
+impl Took {
+    /// The same without a jump.
+    pub(super) fn without_jump(self) -> Self {
+        Self { sum: self.sum.without_jump(), ..self }
+    }
+
+    /// Writes the report of the step over that of the step before.
+    pub(super) fn write(&self, environment: &Environment<'_>, to: Start<'_>, report: &mut StepReport) {
+        self.sum.write(report);
+        self.work.write(report);
+        report.converged = self.converged;
+        write_state(environment, to, report);
+    }
+}
+
+/// Checks that a restored report is of this state, in what users of a simulation rely on.
+pub(super) fn check(report: &StepReport, state: &KirchhoffState) -> Result<()> {
+    let hands = report.hands();
+    let is_at = |(hand, own): (&InstrumentReport, &Hand)| {
+        hand.inserted_mm == own.inserted_mm && hand.rotation_rad == own.turn_rad
+    };
+    let agrees = hands.len() == state.hands.len()
+        && hands.iter().zip(&state.hands).all(is_at)
+        && report.inserted_mm == line_mm(lengths(&state.hands))
+        && report.behind == state.behind;
+    let mend = "is of another state: restore one as it was saved";
+    if agrees { Ok(()) } else { Err(Error::parameter("state.report", report.inserted_mm, mend)) }
+}
+
+/// Writes what is known of a state into a report.
+fn write_state(environment: &Environment<'_>, Start { mesh, state }: Start<'_>, report: &mut StepReport) {
+    let surroundings = &environment.surroundings;
+    let stack = surroundings.stack;
+    report.inserted_mm = mesh.from_tip_mm[0];
+    report.energy = state.energy;
+    report.max_penetration_mm = state.deepest_mm();
+    report.contacts.clear();
+    report.contacts.extend(state.touches.iter().map(|(_, touch)| touch.contact));
+    report.drag_n = state.drag_n;
+    report.angles = state.has_angles;
+    report.behind.clone_from(&state.behind);
+    let displacement = surroundings.displacement(1.0);
+    let tip_mm = environment.displaced(displacement.as_ref()).wall().material(&state.tip_mm());
+    report.left_through =
+        left_through(surroundings.lumen.openings(), &tip_mm).map(|(opening, _)| opening.index);
+    let each = state.hands.iter().zip(&state.hand_forces).enumerate().map(|(index, (hand, force))| {
+        // Without a set of its own a single device has the first one if there are any.
+        let set = if stack.is_several() { stack.sets()[index] } else { state.has_angles.then_some(0) };
+        let twist = set.filter(|_| hand.inserted_mm > 0.0).map_or(0.0, |set| {
+            state.rod.twist_to(mesh.nearest_node(mesh.from_tip_mm[0] - hand.inserted_mm), set)
+        });
+        InstrumentReport {
+            inserted_mm: hand.inserted_mm,
+            rotation_rad: hand.turn_rad,
+            tip_rotation_rad: hand.turn_rad + twist,
+            push_force_n: (!force.jumps).then_some(force.push_n + force.outside.push_n),
+            torque_nmm: force.torque_nmm + force.outside.torque_nmm,
+        }
+    });
+    report.instruments.clear();
+    report.instruments.extend(each);
+    let [inner, ..] = report.instruments[..] else { return };
+    (report.rotation_rad, report.tip_rotation_rad) = (inner.rotation_rad, inner.tip_rotation_rad);
+    let forces = || state.hand_forces.iter();
+    report.push_force_n = forces().map(|force| force.push_n).sum::<f64>()
+        + forces().map(|force| force.outside.push_n).sum::<f64>();
+    report.torque_nmm = report.instruments.iter().map(|hand| hand.torque_nmm).sum();
+    if !stack.is_several() {
+        report.instruments.clear();
+    }
+}
