@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use endowire_core::insertion::{Move, Simulation};
+use endowire_core::Result;
+use endowire_core::insertion::{Move, Simulation, Step};
+use endowire_core::methods::StepReport;
 use endowire_verify::sequences::part_of;
 
 /// One way through commands, and what it took.
@@ -33,21 +35,30 @@ impl Course {
                 return;
             }
             let time_s = times_s.map(|(from, to)| from + (to - from) * k as f64 / parts as f64);
-            let begun = Instant::now();
-            let done = self.simulation.step_until(&part, time_s);
-            let took_s = begun.elapsed().as_secs_f64();
-            self.seconds += took_s;
-            self.slowest_s = self.slowest_s.max(took_s);
-            match done {
-                Ok(report) => {
-                    self.commands += 1;
-                    self.iterations += u64::from(report.iterations);
-                    self.flights += u64::from(report.relaxations);
-                    self.jumps += usize::from(report.jumped);
-                    self.unconverged += usize::from(!report.converged);
-                }
-                Err(error) => self.end = Some(error.to_string()),
+            self.measure(|simulation| simulation.step_until(&part, time_s));
+        }
+    }
+
+    /// Carries out a step of a script as it is: a tick as a tick.
+    pub(crate) fn carry_out(&mut self, step: &Step<'_>) {
+        self.measure(|simulation| step.carry_out(simulation));
+    }
+
+    fn measure(&mut self, step: impl FnOnce(&mut Simulation) -> Result<&StepReport>) {
+        let begun = Instant::now();
+        let done = step(&mut self.simulation);
+        let took_s = begun.elapsed().as_secs_f64();
+        self.seconds += took_s;
+        self.slowest_s = self.slowest_s.max(took_s);
+        match done {
+            Ok(report) => {
+                self.commands += 1;
+                self.iterations += u64::from(report.iterations);
+                self.flights += u64::from(report.relaxations);
+                self.jumps += usize::from(report.jumped);
+                self.unconverged += usize::from(!report.converged);
             }
+            Err(error) => self.end = Some(error.to_string()),
         }
     }
 

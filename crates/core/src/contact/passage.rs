@@ -64,9 +64,7 @@ fn front(axis_mm: &[Vec3], least_mm: f64) -> Option<&[Vec3]> {
     for last in 1..axis_mm.len().checked_sub(1)? {
         length_mm += (axis_mm[last] - axis_mm[last - 1]).norm();
         let along = axis_mm[last - 1] - axis_mm[last + 1];
-        if length_mm >= least_mm
-            && axis_mm[..last].iter().all(|x| (x - axis_mm[last]).dot(&along) > 0.0)
-        {
+        if length_mm >= least_mm && axis_mm[..last].iter().all(|x| (x - axis_mm[last]).dot(&along) > 0.0) {
             return Some(&axis_mm[..last + 2]);
         }
     }
@@ -137,7 +135,8 @@ impl<'a> Grid<'a> {
         let mut seen: FxHashSet<Cell> = ways.iter().map(|way| way.to).collect();
         while let Some(way) = ways.pop() {
             let at = self.place(way.to);
-            if self.distance_mm(&at).0 >= self.tuning.ahead * self.radius_mm || left_through(self.openings, &at).is_some()
+            if self.distance_mm(&at).0 >= self.tuning.ahead * self.radius_mm
+                || left_through(self.openings, &at).is_some()
             {
                 return Some(Narrow { radius_mm: way.least_mm, place_mm: self.place(way.narrowest) });
             }
@@ -197,7 +196,11 @@ impl<'a> Grid<'a> {
             let x = self.place(to);
             let (distance_mm, ahead) = self.distance_mm(&x);
             let least_mm = self.clearance_mm(&x);
-            if ahead || distance_mm > self.tuning.beside * self.radius_mm || self.ahead_mm(&x) < 0.0 || least_mm <= 0.0 {
+            if ahead
+                || distance_mm > self.tuning.beside * self.radius_mm
+                || self.ahead_mm(&x) < 0.0
+                || least_mm <= 0.0
+            {
                 continue;
             }
             ways.push(Way { least_mm, narrowest: to, to });

@@ -31,8 +31,6 @@ use crate::rod::scatter::{element_step, point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
 use crate::tuning::NewtonTuning;
 
-
-
 /// Fraction of the way, at most 1, up to which a convex function with the given slope decreases (the Illinois
 /// method).
 pub(crate) fn falls_until(tuning: &NewtonTuning, mut slope: impl FnMut(f64) -> f64) -> f64 {
@@ -93,7 +91,7 @@ impl<const C: usize> Newton<C> {
         }
         let models = problem.minimum && self.assembly.hessian;
         let least = self.first_shift(elements);
-        for _ in 0..self.tuning.shifts {
+        for _ in 0..=self.tuning.shifts {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));

@@ -12,7 +12,6 @@ use super::shift::REGULARISATION;
 use crate::rod::{ElementData, Layout, RodState};
 use crate::tuning::NewtonTuning;
 
-
 /// State kept from one line search to the next.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LineSearch {
@@ -98,7 +97,8 @@ impl<const C: usize> Newton<C> {
             self.stride(problem, state, search, shift, contacts)?;
         let free = problem.supports.conditions() == 0;
         // The predicted decrease is below rounding, so evaluating the energies would be useless.
-        let below_rounding = problem.minimum && free && turn <= self.tuning.short_rad && -merit.slope <= merit.rounding();
+        let below_rounding =
+            problem.minimum && free && turn <= self.tuning.short_rad && -merit.slope <= merit.rounding();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {

@@ -12,7 +12,6 @@ use crate::Vec3;
 use crate::rod::RodState;
 use crate::tuning::NewtonTuning;
 
-
 /// The predicted nodes of a rod, and how far each may be from its prediction.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Neighbourhood {

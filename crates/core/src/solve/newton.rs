@@ -222,7 +222,9 @@ impl<const C: usize> Newton<C> {
             self.last_shift = shift.max(self.tuning.shift_decay * self.last_shift);
             match searched {
                 Ok(_) if state.is_folded(elements) => return report.stopped(StopReason::Folded),
-                Ok(_) if self.neighbourhood.is_left_by(state, &self.tuning) => return report.stopped(StopReason::Left),
+                Ok(_) if self.neighbourhood.is_left_by(state, &self.tuning) => {
+                    return report.stopped(StopReason::Left);
+                }
                 Ok(turn) => progress.has_turned(turn),
                 Err(StopReason::NoDescent) => {
                     return self.without_descent(&mut problem, state, &progress, natural, report);

@@ -56,7 +56,8 @@ impl Progress {
         let is_rounding = |s: &StepRecord| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale;
         let tiny_steps = steps.len() >= 3 && steps.iter().rev().take(3).all(is_rounding);
         size.small
-            || (size.rounding && self.stalled >= if self.last_turn <= tolerance { 1 } else { self.tuning.hidden })
+            || (size.rounding
+                && self.stalled >= if self.last_turn <= tolerance { 1 } else { self.tuning.hidden })
             || (self.stalled >= 3 && tiny_steps && size.relative < ROUNDED)
     }
 

@@ -4,7 +4,6 @@ use super::external::External;
 use super::newton::Newton;
 use crate::rod::{ElementData, Layout, RodState, Supports, stored_energy};
 
-
 impl<const C: usize> Newton<C> {
     /// Undoes the substitution of the multiplier in [`crate::rod::assembly`]: dN = m/(1 − γD).
     pub(crate) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {

@@ -14,7 +14,6 @@ use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-
 /// After no equilibrium was found: rejects commands that advance an instrument where its passage is too narrow.
 ///
 /// # Errors

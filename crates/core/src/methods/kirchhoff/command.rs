@@ -17,7 +17,6 @@ use crate::device::line_mm;
 use crate::methods::{Jump, Move, StepReport, Surroundings};
 use crate::{Error, Result};
 
-
 /// Accumulated results of the sub-steps of a command or a tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sum {

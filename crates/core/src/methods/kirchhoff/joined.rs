@@ -26,7 +26,6 @@ use crate::shape::Shape;
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
-
 /// The configuration of a detached coil.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct FreeCoil {

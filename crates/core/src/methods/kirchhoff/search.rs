@@ -26,7 +26,6 @@ use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 use crate::tuning::Tuning;
 
-
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) newton: &'a mut Newton<C>,

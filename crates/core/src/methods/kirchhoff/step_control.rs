@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::substep::{Effort, Found, Lost};
 use crate::tuning::StepTuning;
 
-
 /// Step size passed from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stride {

@@ -28,7 +28,6 @@ use crate::methods::{Move, StepReport};
 use crate::tuning::StepTuning;
 use crate::{Error, Result};
 
-
 /// Result of a tick.
 #[derive(Debug)]
 pub(super) enum Ticked {
@@ -328,7 +327,8 @@ impl<const C: usize> Workspace<C> {
                         begun = &fold;
                     }
                     After::UnderWay => {
-                        let under_way = tools.under_way(&part, hands, &next.state, (from, before), tuning.most_near);
+                        let under_way =
+                            tools.under_way(&part, hands, &next.state, (from, before), tuning.most_near);
                         break Ok(Ticking::Solving(Box::new(under_way)));
                     }
                     After::Stays => break Ok(Ticking::Rest),
