@@ -35,12 +35,17 @@ const FAR: f64 = 1e30;
 /// Part of the solver, and its rows.
 type Group = (&'static str, Vec<(String, fn(&mut Tuning))>);
 
+#[allow(clippy::too_many_lines, reason = "a table")]
 fn groups() -> [Group; 12] {
     [
         (
             "Parts of a command",
             vec![
-                without!("any equilibrium that is found is taken", newton.rooms = FAR, newton.room_rad = FAR),
+                without!(
+                    "a limit to the distance from the prediction",
+                    newton.rooms = FAR,
+                    newton.room_rad = FAR
+                ),
                 other!(newton.rooms = 1.0),
                 other!(newton.rooms = 8.0),
                 other!(newton.room_rad = 0.5),
@@ -65,7 +70,7 @@ fn groups() -> [Group; 12] {
                 other!(steps.most_near = 120),
             ],
         ),
-        ("The prediction", vec![without!("repeat what the last step changed", steps.repeats = false)]),
+        ("The prediction", vec![without!("what the last step changed", steps.repeats = false)]),
         (
             "Friction near a fold",
             vec![
@@ -92,9 +97,9 @@ fn groups() -> [Group; 12] {
                 other!(friction.tip_radii = 2.0),
                 other!(friction.settled = 1e-3),
                 other!(friction.settled = 1e-6),
-                without!("renew friction between instruments", steps.inner_renewals = 0),
+                without!("renewals of friction between instruments", steps.inner_renewals = 0),
                 other!(steps.inner_renewals = 5),
-                without!("renew the drag of the blood", steps.drag_renewals = 0),
+                without!("renewals of the drag of the blood", steps.drag_renewals = 0),
                 other!(steps.drag_changed = 1e-2),
             ],
         ),
@@ -114,7 +119,7 @@ fn groups() -> [Group; 12] {
                 other!(contact.steepest = 1.0),
                 other!(contact.sunk = 0.0),
                 other!(contact.deeper = 1.0),
-                without!("trials are cut before the wall", newton.safe_cuts = 0),
+                without!("cuts of trials before the wall", newton.safe_cuts = 0),
                 other!(newton.safe_cuts = 1),
                 without!("the test for a way through the wall", steps.tests_passing = false),
             ],
@@ -143,7 +148,7 @@ fn groups() -> [Group; 12] {
                 other!(newton.least_shift = 1e6),
                 other!(newton.shift_growth = 2.0),
                 other!(newton.shift_growth = 10.0),
-                without!("begin with a part of the last shift", newton.shift_decay = 0.0),
+                without!("a beginning at a part of the last shift", newton.shift_decay = 0.0),
                 other!(newton.shift_decay = 0.5),
                 without!("the line search", newton.armijo = ALL),
                 other!(newton.armijo = 1e-2),
@@ -199,7 +204,7 @@ fn groups() -> [Group; 12] {
                 other!(steps.work = 560.0),
                 other!(steps.work_of_one = 2),
                 other!(steps.work_rad = 0.02),
-                without!("go on at the end of a command until the device rests", steps.again = 0),
+                without!("further relaxations at the end of a command", steps.again = 0),
                 other!(steps.again = 10),
                 other!(steps.rest_radii = 1e-2),
                 other!(steps.at_rest = 0.5),
@@ -209,7 +214,7 @@ fn groups() -> [Group; 12] {
                 other!(steps.substep_limit = 256),
                 without!("what a part of a tick counts of its own", steps.of_a_part = 0),
                 other!(steps.of_a_part = 4),
-                without!("wedged devices are refused before they fly", passage.wedged = f64::INFINITY),
+                without!("the refusal of wedged devices before a flight", passage.wedged = f64::INFINITY),
                 other!(passage.wedged = 0.0),
                 other!(passage.ahead = 3.0),
                 other!(passage.beside = 1.0),

@@ -80,6 +80,8 @@ impl Hard {
     /// Makes the walls, once.
     pub(crate) fn prepare(&mut self) -> Result<()> {
         if self.walls.is_none() {
+            // A script with a mistake ends here, not as a scene that fails.
+            self.scene.steps(&self.scene.stack()?, &NoStore)?;
             self.walls = Some((self.scene.lumen(&NoStore)?, Felt::default()));
         }
         Ok(())
