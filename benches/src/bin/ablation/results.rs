@@ -49,8 +49,9 @@ impl Results {
     }
 
     fn path(&self, row: &Row) -> PathBuf {
-        let name = row.name.chars().map(|c| if c.is_alphanumeric() || c == '.' { c } else { '_' });
-        self.folder.join(name.collect::<String>()).with_extension("tsv")
+        let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '.' | '-');
+        let name: String = row.name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect();
+        self.folder.join(format!("{name}.tsv"))
     }
 
     /// What is known of a row, by scene. A line that a kill has cut short is none.
