@@ -58,7 +58,7 @@ measure loop experiment loop
 
 processor=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -1)
 origin="Written by \`benches/benchmarks.sh\` on $(date -u +%Y-%m-%d) from commit $commit, on ${processor:-an unknown processor}, $(nproc) cores, $(uname -s), $(rustc --version | cut -d' ' -f1,2)."
-# What benches/ablation.sh has written stays.
+# What the program `ablation` has written stays.
 parts=$(sed -n '/^## What each part brings/,$p' "$target/BENCHMARKS.md" 2>/dev/null || true)
 block() {
   printf '## %s\n```sh\n' "$1"; cat "$out/$2.cmd"; printf '```\n```text\n'; cat "$out/$2.txt"; printf '```\n\n'

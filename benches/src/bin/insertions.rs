@@ -1,7 +1,7 @@
 //! Insertions that tell what a part of the solver brings: iterations, questions to the hierarchy, and the time of a step.
 //!
-//! `benches/ablation.sh` runs it on copies of the sources that lack the part. Prints a line a scene: name, commands that ended in an
-//! equilibrium, Newton iterations, last resorts, questions, and the median and the whole time of the commands, ms.
+//! Prints a line a scene: name, commands that ended in an equilibrium, Newton iterations, last resorts, questions, and the
+//! median and the whole time of the commands, ms.
 #![allow(clippy::print_stdout, reason = "a table is what it is for")]
 
 use std::time::Instant;

@@ -37,6 +37,7 @@ pub const MODEL_NAMES: &[&str] = NAMES.split_at(3).1;
 /// A method with its options.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name")]
+#[allow(clippy::large_enum_variant, reason = "there is one of a scene, and it is copied as it is")]
 pub enum AnyMethod {
     /// The exact rod in equilibrium with the wall.
     #[serde(rename = "kirchhoff")]

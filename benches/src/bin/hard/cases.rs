@@ -33,13 +33,22 @@ fn case(path: &Path) -> Result<bool> {
     let mut apart: (f64, usize) = (0.0, 0);
     let mut left: Option<usize> = None;
     while let Some(step) = run.next(&given.simulation)? {
-        let moves = step.moves.to_vec();
+        let step = step.into_owned();
+        let moves = &step.moves;
         let times_s = step.time_s.map(|to| (std::mem::replace(&mut now_s, to), to));
         run.carried_out();
-        given.go(&moves, times_s, 1);
-        small.go(&moves, times_s, parts(&moves).max(if times_s.is_some() { 5 } else { 1 }));
+        given.carry_out(&step);
+        if step.detach.is_some() {
+            small.carry_out(&step);
+        } else {
+            small.go(moves, times_s, parts(moves).max(if times_s.is_some() { 5 } else { 1 }));
+        }
         if given.end.is_some() || small.end.is_some() {
             break;
+        }
+        // Ticks are compared where they have followed the hands.
+        if given.simulation.report().is_under_way() {
+            continue;
         }
         let apart_mm = given.apart_mm(&small);
         if apart_mm > apart.0 {
@@ -84,13 +93,11 @@ fn line(path: &Path) -> Result<()> {
     let script = scene.steps(start.stack(), &NoStore)?;
     let (mut course, mut times_ms) = (Course::new(start), Vec::new());
     let mut run = script.begin();
-    let mut now_s = 0.0;
     while let Some(step) = run.next(&course.simulation)? {
-        let moves = step.moves.to_vec();
-        let times_s = step.time_s.map(|to| (std::mem::replace(&mut now_s, to), to));
+        let step = step.into_owned();
         run.carried_out();
         let before_s = course.seconds;
-        course.go(&moves, times_s, 1);
+        course.carry_out(&step);
         if course.end.is_some() {
             break;
         }

@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use endowire_core::Result;
-use endowire_core::insertion::{Move, Simulation};
+use endowire_core::insertion::{Move, Simulation, Step};
+use endowire_core::methods::StepReport;
 use endowire_verify::sequences::part_of;
 
 /// One way through commands, and what it took.
@@ -34,34 +35,38 @@ impl Course {
                 return;
             }
             let time_s = times_s.map(|(from, to)| from + (to - from) * k as f64 / parts as f64);
-            self.record(|simulation| simulation.step_until(&part, time_s).map(drop));
+            self.measure(|simulation| simulation.step_until(&part, time_s));
         }
+    }
+
+    /// Carries out a step of a script as it is: a tick as a tick.
+    pub(crate) fn carry_out(&mut self, step: &Step<'_>) {
+        self.measure(|simulation| step.carry_out(simulation));
     }
 
     /// Carries out a tick of so many solves; not once something has ended the way.
     pub(crate) fn tick(&mut self, moves: &[Move], solves: usize) {
         if self.end.is_none() {
-            self.record(|simulation| simulation.tick(moves, solves, None).map(drop));
+            self.measure(|simulation| simulation.tick(moves, solves, None));
         }
     }
 
-    /// Carries out a command, and adds what it took.
-    fn record(&mut self, command: impl FnOnce(&mut Simulation) -> Result<()>) {
+    fn measure(&mut self, step: impl FnOnce(&mut Simulation) -> Result<&StepReport>) {
         let begun = Instant::now();
-        let done = command(&mut self.simulation);
+        let done = step(&mut self.simulation);
         let took_s = begun.elapsed().as_secs_f64();
         self.seconds += took_s;
         self.slowest_s = self.slowest_s.max(took_s);
-        if let Err(error) = done {
-            self.end = Some(error.to_string());
-            return;
+        match done {
+            Ok(report) => {
+                self.commands += 1;
+                self.iterations += u64::from(report.iterations);
+                self.flights += u64::from(report.relaxations);
+                self.jumps += usize::from(report.jumped);
+                self.unconverged += usize::from(report.has_failed());
+            }
+            Err(error) => self.end = Some(error.to_string()),
         }
-        let report = self.simulation.report();
-        self.commands += 1;
-        self.iterations += u64::from(report.iterations);
-        self.flights += u64::from(report.relaxations);
-        self.jumps += usize::from(report.jumped);
-        self.unconverged += usize::from(report.has_failed());
     }
 
     /// Distance of its tip from that of another, mm.

@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo run --release -p endowire-benches --bin hard -- cases [NAME]         # scenes of benches/hard, each against steps of 0.1 mm
-//! cargo run --release -p endowire-benches --bin hard -- lines [NAME]         # what each of them takes, for `benches/ablation.sh`
+//! cargo run --release -p endowire-benches --bin hard -- lines [NAME]         # what each of them takes
 //! cargo run --release -p endowire-benches --bin hard -- turned [SCENE]       # 480 insertions of four scenes against steps of 0.25 mm
 //! cargo run --release -p endowire-benches --bin hard -- sequences [SEEDS]    # random commands, each against its parts of 1 mm
 //! cargo run --release -p endowire-benches --bin hard -- ticks [DEVICE]       # steps, ticks and small steps of one motion of the hand

@@ -91,7 +91,7 @@ impl<const C: usize> Newton<C> {
         }
         let models = problem.minimum && self.assembly.hessian;
         let least = self.first_shift(elements);
-        for _ in 0..self.tuning.shifts {
+        for _ in 0..=self.tuning.shifts {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));

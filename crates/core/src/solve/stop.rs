@@ -91,7 +91,7 @@ mod tests {
         let size = |relative: f64| ResidualSize { relative, small: false, rounding: true };
         // Number of states at rounding before the iteration stops, each after a step with this rotation.
         let looks = |turn: f64| {
-            let mut progress = Progress::default();
+            let mut progress = Progress::new(&NewtonTuning::DEFAULT);
             assert!(!progress.has_arrived(&size(2e-8), TOLERANCE, &[]));
             let arrives = |progress: &mut Progress| {
                 progress.has_turned(turn);
@@ -99,6 +99,9 @@ mod tests {
             };
             (1..10).find(|_| arrives(&mut progress))
         };
-        assert_eq!((looks(0.9 * TOLERANCE), looks(2.0 * TOLERANCE)), (Some(1), Some(HIDDEN)));
+        assert_eq!(
+            (looks(0.9 * TOLERANCE), looks(2.0 * TOLERANCE)),
+            (Some(1), Some(NewtonTuning::DEFAULT.hidden))
+        );
     }
 }

@@ -271,6 +271,7 @@ impl<const C: usize> Tools<C> {
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
+    #[allow(clippy::too_many_lines, reason = "what is borrowed for the search lives through all of it")]
     pub(super) fn try_step(
         &mut self,
         environment: &Environment<'_>,

@@ -1,0 +1,152 @@
+//! What each mechanism of the solver, and each of its numbers, brings: hard scenes without it, or with another value, over
+//! those with all of them as they are.
+//!
+//! ```sh
+//! cargo run --release -p endowire-benches --bin ablation                     # all rows in all scenes; writes the table
+//! cargo run --release -p endowire-benches --bin ablation -- PATTERN          # rows with this in their name; prints it
+//! cargo run --release -p endowire-benches --bin ablation -- --scenes PATTERN # scenes with this in their name; prints it
+//! cargo run --release -p endowire-benches --bin ablation -- --print          # prints it in place of writing it
+//! cargo run --release -p endowire-benches --bin ablation -- --measured       # prints what is measured so far
+//! cargo run --release -p endowire-benches --bin ablation -- --repeats N      # times are the smallest of N runs
+//! cargo run --release -p endowire-benches --bin ablation -- --rows           # prints the rows
+//! ```
+//!
+//! A row (`rows.rs`) changes one number of [`Tuning`](endowire_core::tuning::Tuning). A scene of `benches/hard` is run in
+//! turn with all numbers as they are and with the row's. The table is written at the end of BENCHMARKS.md.
+//!
+//! Results are kept in `target/ablation`, in a folder for each commit, a file for each row, a line for each scene: a run
+//! that was killed goes on where it was. With uncommitted changes it begins anew.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a table is what it is for")]
+
+mod results;
+mod rows;
+mod scenes;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::{Error, Result};
+
+use results::{Measured, Results};
+use rows::Row;
+use scenes::{Hard, Outcome};
+
+/// What was asked for.
+#[derive(Default)]
+struct Arguments {
+    rows: Option<String>,
+    scenes: Option<String>,
+    prints: bool,
+    is_measured: bool,
+    lists: bool,
+    repeats: usize,
+}
+
+impl Arguments {
+    fn read() -> Result<Self> {
+        let mut told = Self { repeats: 1, ..Self::default() };
+        let mut words = std::env::args().skip(1);
+        while let Some(word) = words.next() {
+            let mut value = || {
+                let mend = "say which after it";
+                words.next().ok_or_else(|| Error::parameter(word.as_str(), "nothing", mend))
+            };
+            match word.as_str() {
+                "--print" => told.prints = true,
+                "--measured" => told.is_measured = true,
+                "--rows" => told.lists = true,
+                "--scenes" => told.scenes = Some(value()?),
+                "--repeats" => {
+                    let count = value()?;
+                    let mend = "say how many times, at least once";
+                    told.repeats = count
+                        .parse()
+                        .ok()
+                        .filter(|repeats| *repeats > 0)
+                        .ok_or_else(|| Error::parameter("--repeats", count.as_str(), mend))?;
+                }
+                option if option.starts_with("--") => {
+                    let mend = "say --print, --measured, --rows, --scenes PATTERN or --repeats N";
+                    return Err(Error::parameter("option", option, mend));
+                }
+                pattern => told.rows = Some(pattern.to_owned()),
+            }
+        }
+        Ok(told)
+    }
+
+    /// Whether the table is of all rows and all scenes, and is to be written.
+    fn writes(&self) -> bool {
+        self.rows.is_none() && self.scenes.is_none() && !self.prints && !self.is_measured
+    }
+}
+
+/// The root of the repository.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Whether a name has a pattern in it.
+fn has(name: &str, pattern: Option<&str>) -> bool {
+    pattern.is_none_or(|pattern| name.contains(pattern))
+}
+
+/// Runs a scene with all numbers as they are and with those of a row, in turn; of each the fastest run.
+fn pair(scene: &Hard, row: &Row, repeats: usize) -> Result<Measured> {
+    let mut measured: Option<Measured> = None;
+    for _ in 0..repeats {
+        let whole = scene.run(None, None)?;
+        if let Some(end) = &whole.end {
+            eprintln!("{} ends as it is: {end}", scene.name);
+        }
+        let limit_s = SLOWER * whole.seconds + GRACE_S;
+        let changed = scene.run(Some(row), Some(limit_s))?;
+        let before = measured.take();
+        let fastest = |now: Outcome, before: Option<Outcome>| match before {
+            Some(before) if before.seconds < now.seconds => before,
+            _ => now,
+        };
+        let (first, second) = before.map_or((None, None), |pair| (Some(pair.whole), Some(pair.changed)));
+        measured = Some(Measured { whole: fastest(whole, first), changed: fastest(changed, second) });
+    }
+    measured.ok_or_else(|| Error::parameter("--repeats", 0, "say how many times, at least once"))
+}
+
+/// A scene that takes this many times as long as the whole, and some seconds more, is stopped.
+const SLOWER: f64 = 20.0;
+/// See [`SLOWER`].
+const GRACE_S: f64 = 10.0;
+
+fn main() -> Result<()> {
+    let told = Arguments::read()?;
+    let mut rows = rows::all()?;
+    rows.retain(|row| has(&row.name, told.rows.as_deref()));
+    if told.lists {
+        rows.iter().for_each(|row| println!("{}: {}", row.group, row.name));
+        return Ok(());
+    }
+    let mut hard = scenes::all()?;
+    hard.retain(|scene| has(&scene.name, told.scenes.as_deref()));
+    let results = Results::of_this_commit(&root(), told.is_measured)?;
+    if !told.is_measured {
+        for (k, row) in rows.iter().enumerate() {
+            let known = results.of(row)?;
+            for scene in &mut hard {
+                if known.contains_key(&scene.name) {
+                    continue;
+                }
+                eprintln!("{}/{} {}: {}", k + 1, rows.len(), row.name, scene.name);
+                scene.prepare()?;
+                results.keep(row, &scene.name, &pair(scene, row, told.repeats)?)?;
+            }
+        }
+    }
+    let lines = rows.iter().map(|row| Ok((row, results.of(row)?))).collect::<Result<Vec<_>>>()?;
+    let table = table::table(&lines, &hard);
+    if told.writes() {
+        table::write(&root().join("BENCHMARKS.md"), &results.commit, hard.len(), &table)?;
+    } else {
+        println!("{table}");
+    }
+    Ok(())
+}
