@@ -174,7 +174,6 @@ impl<'a> WallContact<'a> {
         let material = self.surface.material(&x);
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
-        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let stiffness = self.surface.stiffness(&material, self.cache.points[index].piece);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
@@ -182,7 +181,7 @@ impl<'a> WallContact<'a> {
             force_n = force.norm();
             normal = force / force_n;
         }
-        let rub = self.friction.derivatives(index, &x, angle, radius_mm);
+        let rub = self.friction.derivatives(index, &x, point.angle(state));
         Some(Touch {
             energy_mj: stiffness.factor * point.weight_mm * point.potential.value(distance.value_mm),
             contact: Contact {

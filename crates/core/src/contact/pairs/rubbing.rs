@@ -18,28 +18,18 @@ use nalgebra::Matrix3;
 use super::curve::Curve;
 use super::{Pair, SelfContact};
 use crate::Vec3;
-use crate::contact::SETTLED;
-use crate::contact::friction::{
-    CHANGED, RENEWED, Renewal, STICK_AT_REST, force_of_slip, phi, resistance, rubbed_mm,
-};
+use crate::contact::friction::{CHANGED, Coulomb, RENEWED, Slider, unsettled};
 use crate::rod::{Couple, ElementData, RodState, Stencils};
 
 /// Friction of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Rub {
-    /// n, from the second point to the first, and N. A recalled force has no direction before the first base.
-    pub(super) normal: Vec3,
-    pub(super) force_n: f64,
-    /// N at the start of the part.
-    pub(super) begun_n: f64,
-    /// The same at the base.
-    seen: (Vec3, f64),
-    /// a − b, mm.
-    from_mm: Vec3,
+    /// Slip of the first point relative to the second.
+    pub(super) slider: Slider,
     /// Its slip when slip was reset, mm.
     kept_mm: Vec3,
-    /// Slip at the base, mm.
-    slip_mm: Vec3,
+    /// A − B at the base, mm.
+    apart_mm: Vec3,
     /// Relative displacement of the two points in the step, mm.
     way_mm: Vec3,
     /// Linearised friction force in the system at zero displacement, N; its derivative there, N/mm.
@@ -55,20 +45,13 @@ pub(super) struct Rub {
 /// Friction of all pairs in a part of a command.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rubbing {
-    /// μ.
-    coefficient: f64,
-    /// ε, mm, and its lower bound while hands hold still.
-    stick_mm: f64,
-    least_stick_mm: f64,
+    law: Coulomb,
     /// A negligible force, N.
     least_n: f64,
-    renewal: Renewal,
     /// State of the rods at the start of the part, after devices have slid along their own curves.
     begun: RodState,
     /// Advance of each element, mm.
     advances_mm: Vec<f64>,
-    /// Energy dissipated before slip was reset, mJ.
-    taken_mj: f64,
 }
 
 /// Parameters of friction in a part of a command.
@@ -83,17 +66,14 @@ pub(crate) struct Rubs {
 }
 
 impl Rub {
-    /// With the normal force of an earlier part.
+    /// With the normal force of an earlier part, whose direction is known from the first base on.
     fn recalled(force_n: f64) -> Self {
-        Self { force_n, begun_n: force_n, ..Self::default() }
+        Self { slider: Slider::default().with(Vec3::zeros(), force_n), ..Self::default() }
     }
 
-    fn plane(&self) -> Matrix3<f64> {
-        Matrix3::identity() - self.normal * self.normal.transpose()
-    }
-
-    fn along(&self, way_mm: &Vec3) -> Vec3 {
-        way_mm - self.normal * self.normal.dot(way_mm)
+    /// Slip at the base, mm.
+    fn slip_mm(&self) -> Vec3 {
+        self.slider.slip(&self.apart_mm, 0.0).0
     }
 
     /// Force in the system at the end of a step, N.
@@ -104,7 +84,7 @@ impl Rub {
 
 impl Pair {
     pub(super) fn rubs(&self) -> bool {
-        self.rub.force_n > 0.0
+        self.rub.slider.holds()
     }
 
     /// A − B, mm, of its material points.
@@ -135,15 +115,15 @@ impl SelfContact {
         state: &RodState,
         places: impl Iterator<Item = Vec3>,
         advances_mm: impl Iterator<Item = f64>,
-        Rubs { coefficient, stick_mm: [stick_mm, least_stick_mm], least_n }: Rubs,
+        Rubs { coefficient, stick_mm, least_n }: Rubs,
     ) {
         let rubbing = &mut self.rubbing;
-        (rubbing.coefficient, rubbing.least_n, rubbing.taken_mj) = (coefficient, least_n, 0.0);
-        (rubbing.stick_mm, rubbing.least_stick_mm) = (stick_mm, least_stick_mm);
-        if coefficient == 0.0 {
+        rubbing.law = Coulomb::new(coefficient);
+        rubbing.law.stick_within(stick_mm);
+        rubbing.least_n = least_n;
+        if !rubbing.law.acts() {
             return;
         }
-        rubbing.renewal = Renewal::Begins;
         rubbing.begun.copy_from(state);
         rubbing.begun.positions.iter_mut().zip(places).for_each(|(to, place)| *to = place);
         rubbing.advances_mm.clear();
@@ -157,7 +137,7 @@ impl SelfContact {
 
     /// Whether there is friction.
     fn rubs(&self) -> bool {
-        self.rubbing.coefficient > 0.0
+        self.rubbing.law.acts()
     }
 
     /// Renews friction from the pairs active at the base, unless it is settled or held.
@@ -165,46 +145,31 @@ impl SelfContact {
         if !self.rubs() {
             return;
         }
-        let Rubbing { begun, advances_mm, renewal, least_n, .. } = &self.rubbing;
-        let follows = renewal.follows();
+        let Rubbing { law, least_n, begun, advances_mm } = &mut self.rubbing;
         let (now, was) = (
             Curve { elements, state, skins: &self.skins, closed: self.closed },
             Curve { elements, state: begun, skins: &self.skins, closed: self.closed },
         );
-        let (mut change_n, mut sum_n) = (0.0, *least_n);
-        for pair in &mut self.pairs {
+        let all = self.pairs.iter_mut().map(|pair| {
             let size = pair.gap.direction().norm();
-            let (presses_n, force_n) = (
-                pair.spring_n_per_mm * pair.depth_mm().max(0.0) * size,
-                if pair.at_base { pair.force_n * size } else { 0.0 },
-            );
+            let forces_n = [pair.force_n, pair.spring_n_per_mm * pair.depth_mm().max(0.0)];
             let normal = pair.gap.direction() / size;
             let [a, b] = pair.gap.at.map(|place| {
                 let jet = was.jet(place);
                 jet.at - jet.first * (advances_mm[place.element] / jet.first.norm())
             });
-            let apart_mm = pair.apart_mm(&now);
-            let rub = &mut pair.rub;
-            rub.seen = (normal, presses_n);
-            if follows {
-                change_n += (rub.normal * rub.force_n - normal * force_n).norm();
-                sum_n += force_n;
-                (rub.normal, rub.force_n) = (normal, force_n);
-            } else if rub.normal == Vec3::zeros() {
-                rub.normal = normal;
-            }
-            rub.from_mm = a - b - rub.kept_mm;
-            rub.slip_mm = rub.along(&(apart_mm - rub.from_mm));
-        }
-        let steady = change_n < SETTLED * sum_n && self.unsettled() < SETTLED;
-        self.rubbing.renewal = self.rubbing.renewal.after(steady);
+            pair.rub.apart_mm = pair.apart_mm(&now);
+            pair.rub.slider.from_mm = a - b - pair.rub.kept_mm;
+            (&mut pair.rub.slider, normal, forces_n.map(|force_n| force_n * size))
+        });
+        law.follow(all, *least_n);
     }
 
     /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
     /// again.
     pub(super) fn friction_settles(&mut self) -> bool {
-        let settled = self.unsettled() < SETTLED;
-        !self.rubs() || self.rubbing.renewal.settles(settled)
+        let unsettled = self.unsettled();
+        self.rubbing.law.settles(unsettled)
     }
 
     /// Relative difference of the normal forces of friction from the contact forces at the last base.
@@ -212,28 +177,23 @@ impl SelfContact {
         if !self.rubs() {
             return 0.0;
         }
-        let (mut change_n, mut sum_n) = (0.0, self.rubbing.least_n);
-        for Pair { rub, .. } in &self.pairs {
-            change_n += (rub.normal * rub.force_n - rub.seen.0 * rub.seen.1).norm();
-            sum_n += rub.seen.1;
-        }
-        change_n / sum_n
+        unsettled(self.pairs.iter().map(|pair| &pair.rub.slider), self.rubbing.least_n)
     }
 
     /// Stops renewing normal forces.
     pub(crate) fn hold_friction(&mut self) {
-        self.rubbing.renewal = Renewal::Held;
+        self.rubbing.law.hold();
     }
 
     /// Resumes renewing normal forces.
     pub(crate) fn release_friction(&mut self) {
-        self.rubbing.renewal = Renewal::Begins;
+        self.rubbing.law.release();
     }
 
     /// Resets normal forces to those of the start of the part, and holds them.
     pub(crate) fn rewind_friction(&mut self) {
         self.hold_friction();
-        self.pairs.iter_mut().for_each(|Pair { rub, .. }| *rub = Rub::recalled(rub.begun_n));
+        self.pairs.iter_mut().for_each(|Pair { rub, .. }| *rub = Rub::recalled(rub.slider.begun.1));
     }
 
     /// Resets slip at the base and holds the normal forces there: see
@@ -242,59 +202,35 @@ impl SelfContact {
         if !self.rubs() {
             return;
         }
-        self.hold_friction();
         let rubbing = &mut self.rubbing;
-        let stick_mm = (rubbing.stick_mm * STICK_AT_REST).max(rubbing.least_stick_mm);
+        let rubs = self.pairs.iter_mut().map(|pair| &mut pair.rub);
+        rubbing.law.anchor(rubs.map(|rub| (&mut rub.slider, rub.apart_mm, 0.0)));
         for Pair { rub, .. } in &mut self.pairs {
-            let slip_mm = rub.slip_mm.norm();
-            let way_mm = rubbed_mm(slip_mm, rubbing.stick_mm);
-            rubbing.taken_mj += rubbing.coefficient * rub.force_n * way_mm;
-            rub.kept_mm = rub.slip_mm * (stick_mm / slip_mm.max(rubbing.stick_mm));
-            if rub.seen.1 > 0.0 {
-                rub.normal = rub.seen.0;
-            }
-            rub.force_n = rub.seen.1;
-            let way_mm = rubbed_mm(rub.kept_mm.norm(), stick_mm);
-            rubbing.taken_mj -= rubbing.coefficient * rub.force_n * way_mm;
+            rub.kept_mm = rub.apart_mm - rub.slider.from_mm;
         }
-        rubbing.stick_mm = stick_mm;
         rubbing.begun.copy_from(&self.base);
         rubbing.advances_mm.fill(0.0);
     }
 
-    /// Lower and upper estimate of the energy dissipated in the part, mJ: with the normal forces of its start and of its
-    /// end.
+    /// Lower and upper estimate of the energy dissipated in the part, mJ.
     pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
-        let Rubbing { coefficient, stick_mm, taken_mj, .. } = self.rubbing;
-        let (mut at_start_mj, mut at_end_mj) = (0.0, 0.0);
-        for Pair { rub, .. } in &self.pairs {
-            let way_mm = rubbed_mm(rub.slip_mm.norm(), stick_mm);
-            at_start_mj += coefficient * rub.begun_n * way_mm;
-            at_end_mj += coefficient * rub.force_n * way_mm;
-        }
-        // After slip was reset, the forces of the start no longer apply.
-        if taken_mj != 0.0 {
-            return (taken_mj + at_end_mj, taken_mj + at_end_mj);
-        }
-        (f64::min(at_start_mj, at_end_mj), f64::max(at_start_mj, at_end_mj))
+        let rubs = self.pairs.iter().map(|pair| &pair.rub);
+        self.rubbing.law.dissipated_mj(rubs.map(|rub| (&rub.slider, rub.apart_mm, 0.0)))
     }
 
     /// Friction force on the first point of a pair at the base, N.
     pub(super) fn friction_n(&self, pair: &Pair) -> Vec3 {
-        if !pair.rubs() {
-            return Vec3::zeros();
-        }
-        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
-        -pair.rub.slip_mm * resistance(coefficient * pair.rub.force_n, &pair.rub.slip_mm, stick_mm)
+        let slip_mm = pair.rub.slip_mm();
+        -slip_mm * self.rubbing.law.resistance(&pair.rub.slider, &slip_mm)
     }
 
     /// Adds friction at the base to a pair's contribution, and returns its energy, mJ.
     pub(super) fn add_friction(&self, pair: &Pair, to: &mut Couple) -> f64 {
-        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
-        let largest_n = coefficient * pair.rub.force_n;
-        let (force_n, stiffness) = force_of_slip(largest_n, &pair.rub.plane(), &pair.rub.slip_mm, stick_mm);
-        pair.add_friction(to, &force_n, &stiffness);
-        largest_n * phi(pair.rub.slip_mm.norm(), stick_mm)
+        let Rub { slider, apart_mm, .. } = &pair.rub;
+        if let Some(f) = self.rubbing.law.derivatives(slider, apart_mm, 0.0) {
+            pair.add_friction(to, &f.gradient, &f.hessian);
+        }
+        self.rubbing.law.value(slider, apart_mm, 0.0)
     }
 
     /// Friction energy of a pair on the way to a state, mJ.
@@ -302,22 +238,19 @@ impl SelfContact {
         if !pair.rubs() {
             return 0.0;
         }
-        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
-        let slip_mm = pair.rub.along(&(pair.apart_mm(curve) - pair.rub.from_mm));
-        coefficient * pair.rub.force_n * phi(slip_mm.norm(), stick_mm)
+        self.rubbing.law.value(&pair.rub.slider, &pair.apart_mm(curve), 0.0)
     }
 
     /// Stores the friction in a step from the base that solves the current system; the counterpart of
     /// [`crate::contact::wall`] (`wall/slipping.rs`).
     pub(super) fn foresee_slipping(&mut self) {
-        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let law = self.rubbing.law;
         let begins = !std::mem::replace(&mut self.slips_known, true);
         for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
             let way_mm = pair.way(&self.ways);
             let rub = &mut pair.rub;
-            if begins {
-                (rub.at_rest_n, rub.stiffness) =
-                    force_of_slip(coefficient * rub.force_n, &rub.plane(), &rub.slip_mm, stick_mm);
+            if begins && let Some(f) = law.derivatives(&rub.slider, &rub.apart_mm, 0.0) {
+                (rub.at_rest_n, rub.stiffness) = (f.gradient, f.hessian);
             }
             rub.way_mm = way_mm;
             rub.carried_n = rub.linear_n(&rub.way_mm);
@@ -331,14 +264,13 @@ impl SelfContact {
         base: &RodState,
         into: &mut dyn Stencils,
     ) -> usize {
-        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let law = self.rubbing.law;
         let mut changed = 0;
         for pair in self.pairs.iter_mut().filter(|pair| pair.rubs()) {
-            let largest_n = coefficient * pair.rub.force_n;
             let rub = &mut pair.rub;
-            let way_mm = rub.way_mm;
-            let slip_mm = rub.slip_mm + rub.along(&way_mm);
-            let (force_n, stiffness) = force_of_slip(largest_n, &rub.plane(), &slip_mm, stick_mm);
+            let (way_mm, largest_n) = (rub.way_mm, law.largest_n(&rub.slider));
+            let Some(f) = law.derivatives(&rub.slider, &(rub.apart_mm + way_mm), 0.0) else { continue };
+            let (force_n, stiffness) = (f.gradient, f.hessian);
             let off_n = (force_n - rub.linear_n(&way_mm)).norm();
             changed += usize::from(off_n > CHANGED * largest_n);
             if off_n > RENEWED * largest_n {
@@ -363,11 +295,11 @@ impl SelfContact {
 
     /// Slope of the friction energy at a `part` of a round, minus the work of the balanced forces.
     pub(super) fn slipping_slope(&self, part: f64) -> f64 {
-        let Rubbing { coefficient, stick_mm, .. } = self.rubbing;
+        let law = self.rubbing.law;
         let each = self.pairs.iter().filter(|pair| pair.rubs()).map(|Pair { rub, .. }| {
             let way_mm = rub.end_mm - rub.way_mm;
-            let slip_mm = rub.slip_mm + rub.along(&(rub.way_mm + way_mm * part));
-            let against = resistance(coefficient * rub.force_n, &slip_mm, stick_mm) * slip_mm.dot(&way_mm);
+            let slip_mm = rub.slider.slip(&(rub.apart_mm + rub.way_mm + way_mm * part), 0.0).0;
+            let against = law.resistance(&rub.slider, &slip_mm) * slip_mm.dot(&way_mm);
             against - (rub.carried_n + (rub.end_n - rub.carried_n) * part).dot(&way_mm)
         });
         each.sum()

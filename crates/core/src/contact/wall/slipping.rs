@@ -105,11 +105,12 @@ impl WallContact<'_> {
     pub(super) fn foresee_slipping(&mut self, base: &RodState, moved: &dyn Moved) {
         let mut slipping = std::mem::take(&mut self.cache.slipping);
         if slipping.is_empty() && self.friction.acts() {
-            let rubbing = self.points.iter().enumerate().filter(|(index, _)| self.friction.holds(*index));
+            let rubbing =
+                self.points.iter().enumerate().filter(|(index, _)| self.friction.holding(*index).is_some());
             slipping.extend(rubbing.filter_map(|(index, point)| {
                 let x = self.surface.place(&self.cache.points[index].base);
-                let (angle, radius_mm) = (point.angle(base), point.potential.radius_mm);
-                let f = self.friction.derivatives(index, &x, angle, radius_mm)?;
+                let angle = point.angle(base);
+                let f = self.friction.derivatives(index, &x, angle)?;
                 Some(Slipping {
                     index,
                     base: (x, angle),
@@ -140,11 +141,12 @@ impl WallContact<'_> {
             let (index, point) = (slipping.index, &self.points[slipping.index]);
             slipping.way = moved.point(point.place());
             let (x, angle) = plus(&slipping.base, 1.0, &slipping.way);
-            let Some(f) = self.friction.derivatives(index, &x, angle, point.potential.radius_mm) else {
+            let Some(f) = self.friction.derivatives(index, &x, angle) else {
                 continue;
             };
             let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&slipping.way));
-            let (off_n, largest_n) = (off.0.norm(), self.friction.largest_n(index));
+            let (off_n, largest_n) =
+                (off.0.norm(), self.friction.law.largest_n(&self.friction.sliders[index]));
             changed += usize::from(off_n > CHANGED * largest_n);
             if off_n > RENEWED * largest_n {
                 slipping.switch(&f, (point, &elements[point.element]), base, into);
@@ -157,8 +159,7 @@ impl WallContact<'_> {
     pub(super) fn slips_to(&self, moved: &dyn Moved, slips: &mut Vec<Slip>) {
         let slip = |slipping: &Slipping, way: &Motion| {
             let (x, angle) = plus(&slipping.base, 1.0, way);
-            let radius_mm = self.points[slipping.index].potential.radius_mm;
-            self.friction.slip(slipping.index, &x, angle, radius_mm).0
+            self.friction.sliders[slipping.index].slip(&x, angle).0
         };
         let of = |slipping: &Slipping| {
             let point = &self.points[slipping.index];
@@ -181,7 +182,8 @@ impl WallContact<'_> {
     pub(super) fn slipping_slope(&self, slips: &[Slip], part: f64) -> f64 {
         let each = self.cache.slipping.iter().zip(slips).map(|(slipping, slip)| {
             let there = slip.begin_mm + slip.change_mm * part;
-            let against = self.friction.resistance(slipping.index, &there) * there.dot(&slip.change_mm);
+            let against = self.friction.law.resistance(&self.friction.sliders[slipping.index], &there)
+                * there.dot(&slip.change_mm);
             against - (slip.work_mj[0] + part * slip.work_mj[1])
         });
         each.sum()
