@@ -225,21 +225,25 @@ impl Friction {
     }
 
     /// The friction of a point, if it may be held.
+    #[inline]
     pub(super) fn holding(&self, index: usize) -> Option<&Slider> {
         self.sliders.get(index).filter(|slider| slider.holds())
     }
 
     /// Friction energy of a point, mJ.
+    #[inline]
     pub(super) fn value(&self, index: usize, x: &Vec3, angle: f64) -> f64 {
         self.holding(index).map_or(0.0, |slider| self.law.value(slider, x, angle))
     }
 
     /// Derivatives of the friction energy of a point; `None` without a normal force.
+    #[inline]
     pub(super) fn derivatives(&self, index: usize, x: &Vec3, angle: f64) -> Option<FrictionDerivatives> {
         self.law.derivatives(self.holding(index)?, x, angle)
     }
 
     /// Whether a point has no friction, now and at the start of the step.
+    #[inline]
     pub(super) fn is_free(&self, index: usize) -> bool {
         self.sliders.get(index).is_none_or(Slider::is_free)
     }

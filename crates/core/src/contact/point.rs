@@ -75,6 +75,7 @@ impl ContactPoint {
     }
 
     /// Material angle, rad, and radius, mm: what spin turns.
+    #[inline]
     pub(super) fn turned(&self, state: &RodState) -> (f64, f64) {
         (self.angle(state), self.potential.radius_mm)
     }

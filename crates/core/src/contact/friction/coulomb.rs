@@ -45,6 +45,7 @@ impl Coulomb {
     }
 
     /// Whether there is friction.
+    #[inline]
     pub(in crate::contact) fn acts(&self) -> bool {
         self.coefficient > 0.0
     }
@@ -61,16 +62,19 @@ impl Coulomb {
     }
 
     /// The largest force of friction, N.
+    #[inline]
     pub(in crate::contact) fn largest_n(&self, slider: &Slider) -> f64 {
         self.coefficient * slider.force_n
     }
 
     /// Friction force divided by its `slip`, N/mm.
+    #[inline]
     pub(in crate::contact) fn resistance(&self, slider: &Slider, slip: &Vec3) -> f64 {
         self.largest_n(slider) * rates(slip.norm(), self.stick_mm).0
     }
 
     /// Friction energy of a contact at a place and an angle, mJ.
+    #[inline]
     pub(in crate::contact) fn value(&self, slider: &Slider, x: &Vec3, angle: f64) -> f64 {
         let force = self.largest_n(slider);
         if force == 0.0 {
@@ -80,6 +84,7 @@ impl Coulomb {
     }
 
     /// Derivatives of the friction energy; `None` without a normal force.
+    #[inline]
     pub(in crate::contact) fn derivatives(
         &self,
         slider: &Slider,
@@ -133,13 +138,16 @@ impl Coulomb {
     pub(in crate::contact) fn anchor<'a>(&mut self, at: impl Iterator<Item = (&'a mut Slider, Vec3, f64)>) {
         self.hold();
         let smaller = Self { stick_mm: (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm), ..*self };
+        let (mut before_mj, mut after_mj) = (0.0, 0.0);
         for (slider, x, angle) in at {
-            self.taken_mj += self.largest_n(slider) * self.dissipating_mm(slider, &x, angle);
+            before_mj += self.largest_n(slider) * self.dissipating_mm(slider, &x, angle);
             let slip = slider.slip(&x, angle).0;
             let kept = slip * (smaller.stick_mm / slip.norm().max(self.stick_mm));
             slider.anchor(x - kept, angle);
-            self.taken_mj -= self.largest_n(slider) * smaller.dissipating_mm(slider, &x, angle);
+            after_mj += self.largest_n(slider) * smaller.dissipating_mm(slider, &x, angle);
         }
+        self.taken_mj += before_mj;
+        self.taken_mj -= after_mj;
         self.stick_mm = smaller.stick_mm;
     }
 }
@@ -150,6 +158,7 @@ pub(super) fn sticking_mm(stick_mm: f64) -> [f64; 2] {
 }
 
 /// Gradient of μ N φ in a slip in the wall's plane, N, and its derivative, N/mm.
+#[inline]
 fn force_of_slip(
     largest_n: f64,
     plane: &Matrix3<f64>,
@@ -164,11 +173,13 @@ fn force_of_slip(
 }
 
 /// φ(y) with ε = `e`.
+#[inline]
 pub(super) fn phi(y: f64, e: f64) -> f64 {
     if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
 }
 
 /// φ′/y and φ″.
+#[inline]
 pub(super) fn rates(y: f64, e: f64) -> (f64, f64) {
     if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) }
 }

@@ -38,6 +38,7 @@ impl Difference {
     }
 
     /// Adds the difference of one force from another.
+    #[inline]
     fn add(&mut self, from: (Vec3, f64), to: (Vec3, f64)) {
         self.change_n += (from.0 * from.1 - to.0 * to.1).norm();
         self.sum_n += to.1;
@@ -62,10 +63,11 @@ impl Coulomb {
         for (slider, normal, [force_n, presses_n]) in contacts {
             slider.seen = (normal, presses_n);
             if follows {
-                change.add((slider.normal, slider.force_n), (normal, force_n));
+                // Most points are clear of the wall.
+                if slider.force_n != 0.0 || force_n != 0.0 {
+                    change.add((slider.normal, slider.force_n), (normal, force_n));
+                }
                 (slider.normal, slider.force_n) = (normal, force_n);
-            } else if slider.normal == Vec3::zeros() {
-                slider.normal = normal;
             }
             if slider.force_n != 0.0 || presses_n > 0.0 {
                 off.add((slider.normal, slider.force_n), slider.seen);

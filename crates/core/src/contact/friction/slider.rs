@@ -38,20 +38,35 @@ pub struct NormalForce {
 impl Slider {
     /// A point of a device of that radius at x̄ with direction t̄, to where it has moved by `advance_mm` along its own
     /// curve, without normal force yet.
+    #[inline]
     pub(super) fn at(
         (place_mm, along): (Vec3, Vec3),
         (from_rad, radius_mm): (f64, f64),
         advance_mm: f64,
     ) -> Self {
-        Self { from_mm: place_mm - along * advance_mm, from_rad, along, radius_mm, ..Self::default() }
+        let none = (Vec3::zeros(), 0.0);
+        Self {
+            from_mm: place_mm - along * advance_mm,
+            from_rad,
+            along,
+            radius_mm,
+            normal: none.0,
+            force_n: none.1,
+            begun: none,
+            seen: none,
+        }
     }
 
     /// With the normal force of the start of the step.
-    pub(in crate::contact) fn with(self, normal: Vec3, force_n: f64) -> Self {
-        Self { normal, force_n, begun: (normal, force_n), ..self }
+    #[inline]
+    pub(in crate::contact) fn with(mut self, normal: Vec3, force_n: f64) -> Self {
+        (self.normal, self.force_n) = (normal, force_n);
+        self.begun = (normal, force_n);
+        self
     }
 
     /// Slip at a place and an angle, and the direction in which its surface moves when it spins.
+    #[inline]
     pub(in crate::contact) fn slip(&self, x: &Vec3, angle: f64) -> (Vec3, Vec3) {
         let spin = self.normal.cross(&self.along) * self.radius_mm;
         let way = x - self.from_mm;
@@ -59,11 +74,13 @@ impl Slider {
     }
 
     /// Whether it may be held by friction.
+    #[inline]
     pub(in crate::contact) fn holds(&self) -> bool {
         self.force_n > 0.0
     }
 
     /// Whether it has no friction, now and at the start of the step.
+    #[inline]
     pub(super) fn is_free(&self) -> bool {
         self.force_n == 0.0 && self.begun.1 == 0.0
     }

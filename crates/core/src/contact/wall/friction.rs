@@ -1,6 +1,7 @@
 //! Friction of the device on the wall: its normal forces, and its contribution at a point.
 
 use super::{ROUNDING, WallContact};
+use crate::contact::set::Geometry;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 impl WallContact<'_> {
@@ -15,12 +16,17 @@ impl WallContact<'_> {
             return;
         }
         let least_n = self.least_force_n();
-        let pressed = self.cache.all_pressed().map(|(index, d)| {
+        let pressed = self.cache.set.at_base().filter_map(|contact| {
+            let index = contact.key;
+            let d = self.cache.pressed(index)?;
             let known = &self.cache.points[index];
             let factor = self.surface.stiffness(&known.base, known.base_piece).factor;
             let rough = self.surface.rough(&known.base, known.base_piece);
             let (normal, presses_n) = self.points[index].pressed(d, factor);
-            (index, (normal, [known.force_n * d.gradient.norm(), presses_n].map(|force_n| force_n * rough)))
+            Some((
+                index,
+                (normal, [known.force_n * d.gradient.norm(), presses_n].map(|force_n| force_n * rough)),
+            ))
         });
         self.friction.follow(pressed, least_n);
     }
