@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::ProximityCache;
+use super::set::ContactSet;
 use super::surface::Hint;
-use super::wall::{Aside, Foreseen, Slip, Slipping, Span};
+use super::wall::{PointPlace, Span};
 use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
 
@@ -93,22 +94,12 @@ pub struct ContactCache {
     pub(super) points: Vec<KnownPoint>,
     /// The points element by element.
     pub(super) spans: Vec<Span>,
-    /// Indices of the points that press at the base.
-    pub(super) pressing: Vec<usize>,
     /// The last reading of each point near the wall. Stored apart from `points` for speed: most points are free, and
     /// all of them are visited many times per step.
     pub(super) readings: Vec<TakenReading>,
     pub(super) proximity: ProximityCache,
-    /// Points that the step moves to the wall, with their linearised gaps.
-    pub(super) foreseen: Vec<Foreseen>,
-    /// Points near the wall that no step has moved there yet.
-    pub(super) aside: Vec<Aside>,
-    /// Points with friction, and their motion in the step.
-    pub(super) slipping: Vec<Slipping>,
-    /// Whether contact forces have a target.
-    pub(super) aimed: bool,
-    /// Changes of gaps in a round, mm, and slips of the points with friction.
-    pub(super) ends: (Vec<f64>, Vec<Slip>),
+    /// Contacts in the step from a base.
+    pub(super) set: ContactSet<PointPlace>,
 }
 
 /// What the points of a device know of the wall at an equilibrium.
@@ -164,14 +155,9 @@ impl ContactCache {
         Self {
             points: Vec::new(),
             spans: Vec::new(),
-            pressing: Vec::new(),
             readings: Vec::new(),
             proximity,
-            foreseen: Vec::new(),
-            aside: Vec::new(),
-            slipping: Vec::new(),
-            aimed: false,
-            ends: (Vec::new(), Vec::new()),
+            set: ContactSet::default(),
         }
     }
 
@@ -179,12 +165,7 @@ impl ContactCache {
     pub(crate) fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
         self.spans.reserve(points.saturating_sub(self.spans.len()));
-        self.pressing.reserve(points.saturating_sub(self.pressing.len()));
-        self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
-        self.aside.reserve(points.saturating_sub(self.aside.len()));
-        self.slipping.reserve(points.saturating_sub(self.slipping.len()));
-        self.ends.0.reserve(points.saturating_sub(self.ends.0.len()));
-        self.ends.1.reserve(points.saturating_sub(self.ends.1.len()));
+        self.set.reserve(points);
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }
 
@@ -194,7 +175,7 @@ impl ContactCache {
         self.readings.resize(points.len(), TakenReading::NONE);
         self.spans.clear();
         self.spans.extend(Span::all(points));
-        self.pressing.clear();
+        self.set.clear();
     }
 
     /// The distance that point `index` read at its base, if it is active there.
@@ -203,11 +184,6 @@ impl ContactCache {
             Nearness::Within(distance) if self.points[index].presses => Some(distance),
             _ => None,
         }
-    }
-
-    /// The points active at the base, ascending, with the distance that each read there.
-    pub(super) fn all_pressed(&self) -> impl Iterator<Item = (usize, &Distance)> {
-        self.pressing.iter().filter_map(|&index| Some((index, self.pressed(index)?)))
     }
 
     /// Transfers the knowledge from before the device advanced along its own curve: the wall does not move, so what

@@ -27,26 +27,29 @@
 //! coefficient over μ, which is lagged with the force.
 
 mod between;
+mod coulomb;
 mod follow;
 mod moving;
+mod slider;
 
 pub use between::{Between, InnerFriction, Place};
-pub(in crate::contact) use follow::Renewal;
+pub(in crate::contact) use coulomb::{Coulomb, FrictionDerivatives};
 pub use follow::SETTLED;
-
-use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
+pub(in crate::contact) use follow::unsettled;
+pub use slider::NormalForce;
+pub(in crate::contact) use slider::Slider;
 
 use super::ContactPoint;
 use crate::Vec3;
 use crate::rod::{ElementData, RodState};
 use crate::vessel::Displacement;
+use coulomb::sticking_mm;
 
 /// Slip below which a point sticks, as a fraction of the hand's motion, or of the device's radius if the hand rests:
 /// the error of the regularisation.
 const STICK: f64 = 1e-3;
 /// Factor by which it shrinks in every relaxation while the hand holds still.
-pub(in crate::contact) const STICK_AT_REST: f64 = 0.3;
+const STICK_AT_REST: f64 = 0.3;
 /// Smallest slip after shrinking, as a fraction of that of the step: a smaller one would make friction stiffer than
 /// any wall.
 const LEAST_AT_REST: f64 = 0.01;
@@ -62,77 +65,12 @@ pub(in crate::contact) const RENEWED: f64 = 5e-3;
 /// one felt before at their new position, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
 
-/// A contact point in a step with friction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Slider {
-    /// a: where the point slips from.
-    from_mm: Vec3,
-    /// θₐ: its material angle before the step.
-    from_rad: f64,
-    /// Direction of the device.
-    along: Vec3,
-    /// Normal of the wall, into the lumen.
-    normal: Vec3,
-    /// N: normal force, scaled down where the coefficient is below its largest value.
-    force_n: f64,
-    /// Normal and force at the start of the step.
-    begun: (Vec3, f64),
-    /// Normal and force at the last base.
-    seen: (Vec3, f64),
-}
-
-impl Slider {
-    /// A point at x̄ with direction t̄, to where it has moved by `advance_mm` along its own curve, without normal force
-    /// yet.
-    fn at((place_mm, along): (Vec3, Vec3), from_rad: f64, advance_mm: f64) -> Self {
-        Self {
-            from_mm: place_mm - along * advance_mm,
-            from_rad,
-            along,
-            normal: Vec3::zeros(),
-            force_n: 0.0,
-            begun: (Vec3::zeros(), 0.0),
-            seen: (Vec3::zeros(), 0.0),
-        }
-    }
-}
-
-/// Normal force on a contact point at an equilibrium.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct NormalForce {
-    /// Normal of the wall, into the lumen.
-    normal: Vec3,
-    /// Force, scaled down where the coefficient is below its largest value, N.
-    force_n: f64,
-}
-
-/// Derivatives of a point's friction energy in its position and its angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FrictionDerivatives {
-    /// In the position, N: minus the friction force on the device.
-    pub gradient: Vec3,
-    /// Second derivative in the position, N/mm.
-    pub hessian: Matrix3<f64>,
-    /// In the angle, N·mm.
-    pub turn: f64,
-    /// Second derivative in the angle, N·mm.
-    pub turn2: f64,
-    /// Mixed derivative, N.
-    pub mixed: Vec3,
-}
-
 /// Friction at all contact points of a device in one step.
 #[derive(Debug, Clone, Default)]
 pub struct Friction {
-    coefficient: f64,
-    /// ε, mm.
-    stick_mm: f64,
-    /// Lower bound of ε as it shrinks while the hand holds still, mm.
-    least_stick_mm: f64,
-    renewal: follow::Renewal,
-    /// Energy dissipated before slip was reset, mJ.
-    taken_mj: f64,
-    sliders: Vec<Slider>,
+    pub(in crate::contact) law: Coulomb,
+    /// One for each contact point; none without friction.
+    pub(in crate::contact) sliders: Vec<Slider>,
     /// Friction between instruments.
     pub(crate) between: Between,
 }
@@ -163,7 +101,7 @@ impl HandMotion {
 impl Friction {
     /// Friction of coefficient μ ≥ 0; 0 disables it.
     pub fn new(coefficient: f64) -> Self {
-        Self { coefficient, ..Self::default() }
+        Self { law: Coulomb::new(coefficient), ..Self::default() }
     }
 
     /// Allocates for `points` points.
@@ -175,7 +113,7 @@ impl Friction {
 
     /// Whether there is friction.
     pub(crate) fn acts(&self) -> bool {
-        self.coefficient > 0.0
+        self.law.acts()
     }
 
     /// Begins a step: `state` is the device after it has slid along its own curve, with the angles it had before.
@@ -204,22 +142,21 @@ impl Friction {
         hands: &[HandMotion],
     ) {
         self.sliders.clear();
-        self.release();
-        self.taken_mj = 0.0;
+        self.law.begin();
         if !self.acts() {
             return;
         }
         let line_mm = |length: fn(&HandMotion) -> f64| hands.iter().map(length).fold(0.0, f64::max);
         let advance = line_mm(|hand| hand.to_mm) - line_mm(|hand| hand.from_mm);
         let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
-        [self.stick_mm, self.least_stick_mm] = stick_mm(hands, radius);
+        self.law.stick_within(stick_mm(hands, radius));
         let (old_points, old) = before;
         let count = old_points.len().min(old.len());
         let near_tip = TIP_RADII * radius + advance.abs();
         let mut k = 0;
         for (index, point) in points.iter().enumerate() {
             let advance_mm = hands[point.instrument].advance_mm();
-            let mut slider = Slider::at(slid(point), point.angle(state), advance_mm);
+            let mut slider = Slider::at(slid(point), point.turned(state), advance_mm);
             let same = |old: &ContactPoint| old.instrument == point.instrument;
             if point.from_tip_mm < near_tip && old_points.get(index).is_none_or(same) {
                 if index < count {
@@ -240,8 +177,7 @@ impl Friction {
                     slider.force_n = point.weight_mm * pressure;
                 }
             }
-            slider.begun = (slider.normal, slider.force_n);
-            self.sliders.push(slider);
+            self.sliders.push(slider.with(slider.normal, slider.force_n));
         }
     }
 
@@ -258,12 +194,11 @@ impl Friction {
         }
         // With no hand on the rod, ε follows from its radius.
         if let ([], Some(first)) = (&self.sliders[..], points.first()) {
-            self.stick_within(STICK * first.potential.radius_mm);
+            self.law.stick_within(sticking_mm(STICK * first.potential.radius_mm));
         }
         self.sliders.extend(points.iter().zip(forces).map(|(point, NormalForce { normal, force_n })| {
-            let (normal, force_n) = (*normal, *force_n);
-            let at = Slider::at(point.position_and_tangent(elements, state), point.angle(state), 0.0);
-            Slider { normal, force_n, begun: (normal, force_n), ..at }
+            let at = Slider::at(point.position_and_tangent(elements, state), point.turned(state), 0.0);
+            at.with(*normal, *force_n)
         }));
     }
 
@@ -278,13 +213,9 @@ impl Friction {
         let moves = hands.iter().any(|hand| hand.parts() != [0.0; 2]);
         let stick_mm = STICK * farthest_mm;
         if farthest_mm > 0.0 {
-            self.stick_within(if moves { self.stick_mm.max(stick_mm) } else { stick_mm });
+            let stick_mm = if moves { self.law.stick_mm.max(stick_mm) } else { stick_mm };
+            self.law.stick_within(sticking_mm(stick_mm));
         }
-    }
-
-    /// Sets the ε of a step.
-    fn stick_within(&mut self, stick_mm: f64) {
-        [self.stick_mm, self.least_stick_mm] = sticking_mm(stick_mm);
     }
 
     /// Stores the normal forces at the end of a step.
@@ -293,126 +224,94 @@ impl Friction {
         forces.extend(self.sliders.iter().map(|s| NormalForce { normal: s.normal, force_n: s.force_n }));
     }
 
-    /// Friction force on a point divided by its `slip`, N/mm.
-    pub(crate) fn resistance(&self, index: usize, slip: &Vec3) -> f64 {
-        resistance(self.largest_n(index), slip, self.stick_mm)
+    /// The friction of a point, if it may be held.
+    #[inline]
+    pub(super) fn holding(&self, index: usize) -> Option<&Slider> {
+        self.sliders.get(index).filter(|slider| slider.holds())
     }
 
-    /// Slip vector of a point and the direction in which its surface moves when it spins.
-    pub(crate) fn slip(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> (Vec3, Vec3) {
-        let s = &self.sliders[index];
-        let spin = s.normal.cross(&s.along) * radius_mm;
-        let way = x - s.from_mm;
-        (way - s.normal * s.normal.dot(&way) + spin * (angle - s.from_rad), spin)
+    /// Friction energy of a point, mJ.
+    #[inline]
+    pub(super) fn value(&self, index: usize, x: &Vec3, angle: f64) -> f64 {
+        self.holding(index).map_or(0.0, |slider| self.law.value(slider, x, angle))
     }
 
-    /// The largest force of friction on a point, N.
-    pub(crate) fn largest_n(&self, index: usize) -> f64 {
-        self.sliders.get(index).map_or(0.0, |slider| self.coefficient * slider.force_n)
-    }
-
-    /// Whether a point may be held by friction.
-    pub(super) fn holds(&self, index: usize) -> bool {
-        self.sliders.get(index).is_some_and(|slider| slider.force_n > 0.0)
+    /// Derivatives of the friction energy of a point; `None` without a normal force.
+    #[inline]
+    pub(super) fn derivatives(&self, index: usize, x: &Vec3, angle: f64) -> Option<FrictionDerivatives> {
+        self.law.derivatives(self.holding(index)?, x, angle)
     }
 
     /// Whether a point has no friction, now and at the start of the step.
+    #[inline]
     pub(super) fn is_free(&self, index: usize) -> bool {
-        self.sliders.get(index).is_none_or(|slider| slider.force_n == 0.0 && slider.begun.1 == 0.0)
+        self.sliders.get(index).is_none_or(Slider::is_free)
     }
 
-    /// Friction energy of a point.
-    pub fn value(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> f64 {
-        let force = self.largest_n(index);
-        if force == 0.0 {
-            return 0.0;
-        }
-        force * phi(self.slip(index, x, angle, radius_mm).0.norm(), self.stick_mm)
+    /// Renews the normal forces from the active points: ascending indices, each with its normal, its force unknown,
+    /// and the force of its depth, N.
+    pub(super) fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
+        let mut active = active.peekable();
+        let all = self.sliders.iter_mut().enumerate().map(|(index, slider)| {
+            let now = active.next_if(|(point, _)| *point == index);
+            let (normal, forces_n) = now.map_or((slider.normal, [0.0; 2]), |(_, now)| now);
+            (slider, normal, forces_n)
+        });
+        self.law.follow(all, least_n);
     }
 
-    /// Energy dissipated by friction in the step, with the normal forces of its end, mJ.
-    fn taken_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
-        self.taken_mj + self.rubbed_mj(elements, state, points)[1]
+    /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
+    /// again.
+    pub(super) fn settles(&mut self, least_n: f64) -> bool {
+        let unsettled = self.unsettled(least_n);
+        self.law.settles(unsettled)
     }
 
-    /// Lower and upper estimate of the energy dissipated in the step, mJ: with the normal forces of its start and of
-    /// its end.
+    /// Relative difference of normal forces from the contact forces at the last base.
+    pub(super) fn unsettled(&self, least_n: f64) -> f64 {
+        unsettled(self.sliders.iter(), least_n)
+    }
+
+    /// Stops renewing normal forces.
+    pub(super) fn hold(&mut self) {
+        self.law.hold();
+    }
+
+    /// Resumes renewing normal forces.
+    pub fn release(&mut self) {
+        self.law.release();
+    }
+
+    /// Sets the normal forces to those of a solution, one per point, and renews them from there.
+    pub fn resume<'a>(&mut self, forces: impl IntoIterator<Item = &'a NormalForce>) {
+        self.release();
+        self.sliders.iter_mut().zip(forces).for_each(|(s, f)| (s.normal, s.force_n) = (f.normal, f.force_n));
+    }
+
+    /// Resets and holds the normal forces of the start of the step.
+    pub(super) fn rewind(&mut self) {
+        self.hold();
+        self.sliders.iter_mut().for_each(Slider::rewind);
+    }
+
+    /// Lower and upper estimate of the energy dissipated in the step, mJ.
     pub(crate) fn dissipated_mj(
         &self,
         elements: &[ElementData],
         state: &RodState,
         points: &[ContactPoint],
     ) -> (f64, f64) {
-        let [at_start_mj, at_end_mj] = self.rubbed_mj(elements, state, points);
-        // After slip was reset, the forces of the start no longer apply.
-        if self.taken_mj != 0.0 {
-            let taken_mj = self.taken_mj + at_end_mj;
-            return (taken_mj, taken_mj);
-        }
-        (at_start_mj.min(at_end_mj), at_start_mj.max(at_end_mj))
+        let held = self.sliders.iter().zip(points).filter(|(slider, _)| !slider.is_free());
+        self.law.dissipated_mj(
+            held.map(|(slider, point)| (slider, point.position(elements, state), point.angle(state))),
+        )
     }
 
-    /// Energy dissipated since slip was last reset, mJ: with the normal forces of the step's start and of its end.
-    fn rubbed_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> [f64; 2] {
-        let mut sums_mj = [0.0; 2];
-        for (index, (slider, point)) in self.sliders.iter().zip(points).enumerate() {
-            let forces_n = [slider.begun.1, slider.force_n];
-            if forces_n.iter().all(|force_n| *force_n <= 0.0) {
-                continue;
-            }
-            let x = point.position(elements, state);
-            let slip_mm = self.slip(index, &x, point.angle(state), point.potential.radius_mm).0.norm();
-            let way_mm = rubbed_mm(slip_mm, self.stick_mm);
-            for (sum_mj, force_n) in sums_mj.iter_mut().zip(forces_n) {
-                *sum_mj += self.coefficient * force_n.max(0.0) * way_mm;
-            }
-        }
-        sums_mj
-    }
-
-    /// Resets slip at `state` and holds the normal forces there: the hand holds still, and the device slides on until
-    /// it rests. Slip of a stuck point is scaled to the new, smaller ε, so that friction holds it as before.
-    pub(crate) fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
-        self.hold();
-        let taken_mj = self.taken_mj(elements, state, points);
-        let stick_mm = (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm);
-        for (index, point) in points.iter().enumerate().take(self.sliders.len()) {
-            let (x, angle) = (point.position(elements, state), point.angle(state));
-            let slip = self.slip(index, &x, angle, point.potential.radius_mm).0;
-            let kept = slip * (stick_mm / slip.norm().max(self.stick_mm));
-            let slider = &mut self.sliders[index];
-            (slider.from_mm, slider.from_rad) = (x - kept, angle);
-            slider.force_n = slider.seen.1;
-            if slider.seen.1 > 0.0 {
-                slider.normal = slider.seen.0;
-            }
-        }
-        self.stick_mm = stick_mm;
-        self.taken_mj = 0.0;
-        self.taken_mj = taken_mj - self.taken_mj(elements, state, points);
-    }
-
-    /// Derivatives of a point's friction energy; `None` without a normal force.
-    pub(crate) fn derivatives(
-        &self,
-        index: usize,
-        x: &Vec3,
-        angle: f64,
-        radius_mm: f64,
-    ) -> Option<FrictionDerivatives> {
-        let slider = self.sliders.get(index).filter(|_| self.holds(index))?;
-        let force = self.coefficient * slider.force_n;
-        let (slip, spin) = self.slip(index, x, angle, radius_mm);
-        let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();
-        let (gradient, hessian) = force_of_slip(force, &plane, &slip, self.stick_mm);
-        let mixed = hessian * spin;
-        Some(FrictionDerivatives {
-            gradient,
-            hessian,
-            turn: gradient.dot(&spin),
-            turn2: mixed.dot(&spin),
-            mixed,
-        })
+    /// Resets slip at `state` and holds the normal forces there.
+    pub(super) fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
+        let all = self.sliders.iter_mut().zip(points);
+        self.law
+            .anchor(all.map(|(slider, point)| (slider, point.position(elements, state), point.angle(state))));
     }
 }
 
@@ -422,44 +321,6 @@ pub(crate) fn stick_mm(hands: &[HandMotion], radius_mm: f64) -> [f64; 2] {
     let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius_mm * hand.turn_rad.abs());
     let way_mm = ways.fold(0.0, f64::max);
     sticking_mm(STICK * if way_mm > 0.0 { way_mm } else { radius_mm })
-}
-
-fn sticking_mm(stick_mm: f64) -> [f64; 2] {
-    [stick_mm, LEAST_AT_REST * stick_mm].map(|mm| mm.max(LEAST_STICK_MM))
-}
-
-/// Gradient of μ N φ in a slip in the wall's plane, N, and its derivative, N/mm.
-pub(in crate::contact) fn force_of_slip(
-    largest_n: f64,
-    plane: &Matrix3<f64>,
-    slip_mm: &Vec3,
-    stick_mm: f64,
-) -> (Vec3, Matrix3<f64>) {
-    let y = slip_mm.norm();
-    let (over, second) = rates(y, stick_mm);
-    let unit = if y > 0.0 { slip_mm / y } else { Vec3::zeros() };
-    let hessian = (plane * over + unit * unit.transpose() * (second - over)) * largest_n;
-    (slip_mm * (largest_n * over), hessian)
-}
-
-/// Friction force divided by its slip, N/mm.
-pub(in crate::contact) fn resistance(largest_n: f64, slip_mm: &Vec3, stick_mm: f64) -> f64 {
-    largest_n * rates(slip_mm.norm(), stick_mm).0
-}
-
-/// The slip length over which friction dissipates energy, mm: 0 while sticking.
-pub(in crate::contact) fn rubbed_mm(slip_mm: f64, stick_mm: f64) -> f64 {
-    phi(slip_mm, stick_mm) - phi(0.0, stick_mm)
-}
-
-/// φ(y) with ε = `e`.
-pub(in crate::contact) fn phi(y: f64, e: f64) -> f64 {
-    if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
-}
-
-/// φ′/y and φ″.
-fn rates(y: f64, e: f64) -> (f64, f64) {
-    if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) }
 }
 
 #[cfg(test)]

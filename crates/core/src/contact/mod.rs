@@ -4,7 +4,6 @@ mod cache;
 pub mod distance;
 mod drag;
 pub mod extension;
-mod force;
 pub mod friction;
 mod moved;
 pub mod pairs;
@@ -21,6 +20,7 @@ pub mod regions;
 mod ridge_tests;
 #[cfg(test)]
 mod rim_tests;
+mod set;
 pub mod surface;
 pub mod wall;
 

@@ -73,6 +73,12 @@ impl ContactPoint {
         let e = sets * self.element + self.set;
         w0 * state.angles[e] + w1 * state.angles[e + sets] + wb * state.bubbles[e]
     }
+
+    /// Material angle, rad, and radius, mm: what spin turns.
+    #[inline]
+    pub(super) fn turned(&self, state: &RodState) -> (f64, f64) {
+        (self.angle(state), self.potential.radius_mm)
+    }
 }
 
 /// A contact with the wall.

@@ -7,32 +7,30 @@
 //!
 //! On a wall with regions ψ is multiplied by the local eˢ ([`super::regions`]), and so is the cap's.
 //!
-//! Whether a point is active does not depend on depth alone: points have forces of their own (`wall/forces.rs`), for
+//! Whether a point is active does not depend on depth alone: contacts have forces of their own ([`super::set`]), for
 //! which Newton's method solves.
 //!
 //! A point queries the bounding volume hierarchy only when it may have come near something new: while it has moved
 //! less than its last clearance, it cannot touch anything.
 
 mod clear;
-mod forces;
-mod model;
+mod contacts;
+mod friction;
 mod passing;
 mod reading;
-mod rubbing;
-mod slipping;
 
 use super::cache::ContactCache;
 use super::point::{Contact, ContactPoint, Counters, Touch};
 use crate::Vec3;
+use crate::contact::set::Geometry;
 use crate::contact::{Between, Drag, Friction, MovedWall};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
-use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
+use crate::solve::{Contacts, External, Sizes};
 
 pub(super) use clear::Span;
-pub(super) use model::{Aside, Foreseen};
+pub(super) use contacts::PointPlace;
 use reading::Reading;
-pub(super) use slipping::{Slip, Slipping};
 
 /// Radius of the gentlest relevant bend, mm.
 const LEAST_BEND_MM: f64 = 100.0;
@@ -162,11 +160,6 @@ impl<'a> WallContact<'a> {
         }
     }
 
-    /// See [`least_force_n`].
-    fn least_force_n(&self) -> f64 {
-        self.least_moment_nmm / LEAST_BEND_MM
-    }
-
     /// Contact at point `index` at a state, if it presses on the wall.
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
@@ -174,7 +167,6 @@ impl<'a> WallContact<'a> {
         let material = self.surface.material(&x);
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
-        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let stiffness = self.surface.stiffness(&material, self.cache.points[index].piece);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
@@ -182,7 +174,7 @@ impl<'a> WallContact<'a> {
             force_n = force.norm();
             normal = force / force_n;
         }
-        let rub = self.friction.derivatives(index, &x, angle, radius_mm);
+        let rub = self.friction.derivatives(index, &x, point.angle(state));
         Some(Touch {
             energy_mj: stiffness.factor * point.weight_mm * point.potential.value(distance.value_mm),
             contact: Contact {
@@ -276,48 +268,6 @@ impl External for WallContact<'_> {
             }
         }
         fraction
-    }
-}
-
-impl Contacts for WallContact<'_> {
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
-        self.foresee_contacts(elements, base, moved);
-        self.foresee_slipping(base, moved);
-    }
-
-    fn press_or_let_go(
-        &mut self,
-        elements: &[ElementData],
-        base: &RodState,
-        moved: &dyn Moved,
-        into: &mut dyn Stencils,
-    ) -> usize {
-        self.press_or_let_go_contacts(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
-    }
-
-    fn look_towards(&mut self, moved: &dyn Moved) {
-        self.look_towards_contacts(moved);
-    }
-
-    fn slope_towards(&mut self, part: f64) -> f64 {
-        self.slope_towards_contacts(part)
-    }
-
-    fn go_towards(&mut self, part: f64) {
-        self.go_towards_contacts(part);
-    }
-
-    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
-        self.contact_merit(moved)
-    }
-
-    fn take(&mut self, part: f64) {
-        self.take_forces(part);
-    }
-
-    fn settled(&mut self, tolerance: f64) -> bool {
-        let least_n = self.least_force_n();
-        self.let_go_of_pulling(tolerance) && self.friction.settles(least_n)
     }
 }
 

@@ -92,7 +92,7 @@ impl<const C: usize> Newton<C> {
         let models = problem.minimum && self.assembly.hessian;
         let least = self.first_shift(elements);
         for _ in 0..=self.tuning.shifts {
-            self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
+            self.with_contacts(problem, state, |contacts, moved| contacts.predict(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
                 if !(models && self.is_uphill(problem, state, search, &merit)) {
@@ -152,9 +152,9 @@ impl<const C: usize> Newton<C> {
             let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
             let most = if turn > tuning.contact_turn_rad { tuning.contact_turn_rad / turn } else { 1.0 };
             let part = self.with_contacts(problem, state, |contacts, moved| {
-                contacts.look_towards(moved);
-                let part = falls_until(&tuning, |part| contacts.slope_towards(part)).min(most);
-                contacts.go_towards(part);
+                contacts.set_direction(moved);
+                let part = falls_until(&tuning, |part| contacts.slope(part)).min(most);
+                contacts.advance(part);
                 part
             });
             if part < 1.0 {
@@ -182,7 +182,7 @@ impl<const C: usize> Newton<C> {
         let moved = StepOf::<C> { elements, state, step: &self.step };
         let into: &mut Assembly<C> = &mut self.assembly;
         std::mem::swap(&mut into.residual, &mut into.correction);
-        let changed = contacts.press_or_let_go(elements, state, &moved, into);
+        let changed = contacts.update_active_set(elements, state, &moved, into);
         std::mem::swap(&mut into.residual, &mut into.correction);
         supports.hold(into);
         changed

@@ -74,11 +74,11 @@ pub struct Sizes {
 /// Forces that push and never pull, as unknowns beside the rod's shape, and their response to a step.
 pub trait Contacts {
     /// Stores a step from the base that solves the assembled system.
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved);
+    fn predict(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved);
 
     /// Adds the springs of contacts that become active by another step, and removes those of contacts that become
     /// inactive. Returns how many changed.
-    fn press_or_let_go(
+    fn update_active_set(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
@@ -87,21 +87,21 @@ pub trait Contacts {
     ) -> usize;
 
     /// Stores another step, which solves the system as it is now.
-    fn look_towards(&mut self, moved: &dyn Moved);
+    fn set_direction(&mut self, moved: &dyn Moved);
 
     /// Slope of the model at a fraction of the way from the first stored step to the second: of the energy with
     /// springs where contacts press and none where they would pull.
-    fn slope_towards(&mut self, part: f64) -> f64;
+    fn slope(&mut self, part: f64) -> f64;
 
     /// Moves the first stored step by a fraction of that way.
-    fn go_towards(&mut self, part: f64);
+    fn advance(&mut self, part: f64);
 
     /// Takes the forces at the end of a step as target. Until the next base, the value is the merit of these
     /// contacts.
     fn merit(&mut self, moved: &dyn Moved) -> ContactMerit;
 
     /// Moves the forces by a fraction of the way to their target.
-    fn take(&mut self, part: f64);
+    fn accept_forces(&mut self, part: f64);
 
     /// Whether an equilibrium at the base is valid for the contacts: none pulls by more than `tolerance` times the
     /// largest pressing force, and friction follows the current normal forces. If not, the next base corrects it.

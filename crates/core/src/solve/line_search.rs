@@ -128,7 +128,7 @@ impl<const C: usize> Newton<C> {
                 shift,
             });
             if let Some(contacts) = problem.external.contacts() {
-                contacts.take(part);
+                contacts.accept_forces(part);
             }
             std::mem::swap(state, &mut self.trial);
             problem.supports.follow(state);

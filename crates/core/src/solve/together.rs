@@ -48,30 +48,30 @@ impl External for Together<'_> {
 }
 
 impl Contacts for Together<'_> {
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
-        self.each().for_each(|part| part.foresee(elements, base, moved));
+    fn predict(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
+        self.each().for_each(|part| part.predict(elements, base, moved));
     }
 
-    fn press_or_let_go(
+    fn update_active_set(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
         moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
-        self.each().map(|part| part.press_or_let_go(elements, base, moved, into)).sum()
+        self.each().map(|part| part.update_active_set(elements, base, moved, into)).sum()
     }
 
-    fn look_towards(&mut self, moved: &dyn Moved) {
-        self.each().for_each(|part| part.look_towards(moved));
+    fn set_direction(&mut self, moved: &dyn Moved) {
+        self.each().for_each(|part| part.set_direction(moved));
     }
 
-    fn slope_towards(&mut self, part: f64) -> f64 {
-        self.each().map(|one| one.slope_towards(part)).sum()
+    fn slope(&mut self, part: f64) -> f64 {
+        self.each().map(|one| one.slope(part)).sum()
     }
 
-    fn go_towards(&mut self, part: f64) {
-        self.each().for_each(|one| one.go_towards(part));
+    fn advance(&mut self, part: f64) {
+        self.each().for_each(|one| one.advance(part));
     }
 
     fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
@@ -82,8 +82,8 @@ impl Contacts for Together<'_> {
         })
     }
 
-    fn take(&mut self, part: f64) {
-        self.each().for_each(|one| one.take(part));
+    fn accept_forces(&mut self, part: f64) {
+        self.each().for_each(|one| one.accept_forces(part));
     }
 
     fn settled(&mut self, tolerance: f64) -> bool {

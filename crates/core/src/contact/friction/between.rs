@@ -26,7 +26,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LEAST_STICK_MM, STICK, STICK_AT_REST, phi, rates};
+use super::coulomb::{phi, rates};
+use super::{LEAST_STICK_MM, STICK, STICK_AT_REST};
 use crate::rod::{RodState, Stencils};
 
 /// Friction of one instrument on the next one outside it at a node, at the end of the last step.

@@ -4,7 +4,8 @@
 //! until they match the contact forces and hardly change, and again after an equilibrium at which they turn out to
 //! differ.
 
-use super::{Friction, NormalForce};
+use super::coulomb::Coulomb;
+use super::slider::Slider;
 use crate::Vec3;
 
 /// Normal forces are settled once their relative change, and their relative difference from the contact forces, is
@@ -13,7 +14,7 @@ pub const SETTLED: f64 = 1e-4;
 
 /// Whether normal forces are renewed at the next base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::contact) enum Renewal {
+pub(super) enum Renewal {
     /// Renewed for the first time: whether they settle shows from the second base on.
     #[default]
     Begins,
@@ -25,91 +26,87 @@ pub(in crate::contact) enum Renewal {
     Held,
 }
 
-impl Renewal {
-    /// Whether they are renewed.
-    pub(in crate::contact) fn follows(self) -> bool {
-        matches!(self, Self::Begins | Self::Follows)
+/// A sum of differences of forces, relative to a sum of forces.
+struct Difference {
+    change_n: f64,
+    sum_n: f64,
+}
+
+impl Difference {
+    fn new(least_n: f64) -> Self {
+        Self { change_n: 0.0, sum_n: least_n }
     }
 
-    /// The mode after a base at which they were steady or not.
-    pub(in crate::contact) fn after(self, steady: bool) -> Self {
-        match self {
-            Self::Begins => Self::Follows,
-            Self::Follows if steady => Self::Settled,
-            same => same,
-        }
+    /// Adds the difference of one force from another.
+    #[inline]
+    fn add(&mut self, from: (Vec3, f64), to: (Vec3, f64)) {
+        self.change_n += (from.0 * from.1 - to.0 * to.1).norm();
+        self.sum_n += to.1;
     }
 
-    /// Whether normal forces are valid at an equilibrium, given whether they match the contact forces; otherwise they
-    /// are renewed again.
-    pub(in crate::contact) fn settles(&mut self, settled: bool) -> bool {
-        if *self == Self::Held || settled {
-            return true;
-        }
-        *self = Self::Follows;
-        false
+    fn relative(&self) -> f64 {
+        self.change_n / self.sum_n
     }
 }
 
-impl Friction {
-    /// Renews the normal forces, unless they are settled or held, and records the contact forces at the base.
-    /// `active` gives the ascending indices of the active points, each with its normal, its force unknown, and the
-    /// force of its depth, N. `least_n` is a negligible force.
-    pub(crate) fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
-        let mut active = active.peekable();
-        let follows = self.renewal.follows();
-        let (mut change_n, mut sum_n) = (0.0, least_n);
-        for (index, slider) in self.sliders.iter_mut().enumerate() {
-            let (normal, [force_n, presses_n]) = active
-                .next_if(|(point, _)| *point == index)
-                .map_or((slider.normal, [0.0; 2]), |(_, now)| now);
+impl Coulomb {
+    /// Renews the normal forces, unless they are settled or held, and records the contact forces at the base. Each
+    /// contact comes with its normal, its force unknown, and the force of its depth, N. `least_n` is a negligible
+    /// force.
+    pub(in crate::contact) fn follow<'a>(
+        &mut self,
+        contacts: impl Iterator<Item = (&'a mut Slider, Vec3, [f64; 2])>,
+        least_n: f64,
+    ) {
+        let follows = matches!(self.renewal, Renewal::Begins | Renewal::Follows);
+        let (mut change, mut off) = (Difference::new(least_n), Difference::new(least_n));
+        for (slider, normal, [force_n, presses_n]) in contacts {
             slider.seen = (normal, presses_n);
             if follows {
-                change_n += (slider.normal * slider.force_n - normal * force_n).norm();
-                sum_n += force_n;
+                // Most points are clear of the wall.
+                if slider.force_n != 0.0 || force_n != 0.0 {
+                    change.add((slider.normal, slider.force_n), (normal, force_n));
+                }
                 (slider.normal, slider.force_n) = (normal, force_n);
             }
+            if slider.force_n != 0.0 || presses_n > 0.0 {
+                off.add((slider.normal, slider.force_n), slider.seen);
+            }
         }
-        let steady = change_n < SETTLED * sum_n && self.unsettled(least_n) < SETTLED;
-        self.renewal = self.renewal.after(steady);
+        let steady = change.change_n < SETTLED * change.sum_n && off.relative() < SETTLED;
+        self.renewal = match self.renewal {
+            Renewal::Begins => Renewal::Follows,
+            Renewal::Follows if steady => Renewal::Settled,
+            same => same,
+        };
     }
 
     /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
     /// again.
-    pub(crate) fn settles(&mut self, least_n: f64) -> bool {
-        let settled = self.unsettled(least_n) < SETTLED;
-        self.renewal.settles(settled)
-    }
-
-    /// Relative difference of normal forces from the contact forces at the last base.
-    pub(crate) fn unsettled(&self, least_n: f64) -> f64 {
-        let (mut change_n, mut sum_n) = (0.0, least_n);
-        for slider in self.sliders.iter().filter(|slider| slider.force_n != 0.0 || slider.seen.1 > 0.0) {
-            change_n += (slider.normal * slider.force_n - slider.seen.0 * slider.seen.1).norm();
-            sum_n += slider.seen.1;
+    pub(in crate::contact) fn settles(&mut self, unsettled: f64) -> bool {
+        if self.renewal == Renewal::Held || unsettled < SETTLED {
+            return true;
         }
-        change_n / sum_n
+        self.renewal = Renewal::Follows;
+        false
     }
 
     /// Stops renewing normal forces.
-    pub(crate) fn hold(&mut self) {
+    pub(in crate::contact) fn hold(&mut self) {
         self.renewal = Renewal::Held;
     }
 
     /// Resumes renewing normal forces.
-    pub fn release(&mut self) {
+    pub(in crate::contact) fn release(&mut self) {
         self.renewal = Renewal::Begins;
     }
+}
 
-    /// Sets the normal forces to those of a solution, one per point, and renews them from there.
-    pub fn resume<'a>(&mut self, forces: impl IntoIterator<Item = &'a NormalForce>) {
-        self.release();
-        self.sliders.iter_mut().zip(forces).for_each(|(s, f)| (s.normal, s.force_n) = (f.normal, f.force_n));
+/// Relative difference of normal forces from the contact forces at the last base.
+pub(in crate::contact) fn unsettled<'a>(sliders: impl Iterator<Item = &'a Slider>, least_n: f64) -> f64 {
+    let mut off = Difference::new(least_n);
+    for slider in sliders.filter(|slider| slider.force_n != 0.0 || slider.seen.1 > 0.0) {
+        off.add((slider.normal, slider.force_n), slider.seen);
     }
-
-    /// Resets and holds the normal forces of the start of the step.
-    pub(crate) fn rewind(&mut self) {
-        self.hold();
-        self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.begun);
-    }
+    off.relative()
 }

@@ -10,7 +10,7 @@
 //!
 //! which is the rotation angle of G if G is a rotation about t; (A)^∨ is the vector with (A)^∨ × v = A v.
 
-use super::Slider;
+use super::slider::Slider;
 use crate::Vec3;
 use crate::vessel::Displacement;
 

@@ -13,13 +13,13 @@ fn friction(slip: Vec3) -> (Friction, Vec3) {
         from_mm: Vec3::new(1.0, 2.0, 3.0),
         from_rad: 0.7,
         along,
-        normal,
-        force_n: 2.0,
-        begun: (normal, 2.0),
+        radius_mm: RADIUS_MM,
         seen: (normal, 2.0),
+        ..Slider::default().with(normal, 2.0)
     };
     let at = slider.from_mm + (slip - normal * normal.dot(&slip));
-    (Friction { coefficient: 0.25, stick_mm: 0.01, sliders: vec![slider], ..Friction::default() }, at)
+    let law = Coulomb { stick_mm: 0.01, ..Coulomb::new(0.25) };
+    (Friction { law, sliders: vec![slider], ..Friction::default() }, at)
 }
 
 #[test]
@@ -28,10 +28,9 @@ fn derivatives_are_those_of_the_value() {
     for slip in [Vec3::new(0.3, 0.2, -0.1), Vec3::new(0.003, -0.002, 0.001), Vec3::new(0.0, 0.01, 0.002)] {
         let (friction, x) = friction(slip);
         let (angle, h) = (0.705, 1e-6);
-        let here = friction.derivatives(0, &x, angle, RADIUS_MM).unwrap();
-        let at = |x: &Vec3, angle: f64| {
-            (friction.value(0, x, angle, RADIUS_MM), friction.derivatives(0, x, angle, RADIUS_MM).unwrap())
-        };
+        let here = friction.derivatives(0, &x, angle).unwrap();
+        let at =
+            |x: &Vec3, angle: f64| (friction.value(0, x, angle), friction.derivatives(0, x, angle).unwrap());
         for k in 0..3 {
             let e = Vec3::ith(k, h);
             let (plus, minus) = (at(&(x + e), angle), at(&(x - e), angle));
@@ -49,10 +48,10 @@ fn derivatives_are_those_of_the_value() {
 #[test]
 fn a_slipping_point_is_held_by_mu_times_its_normal_force_and_a_stuck_one_by_less() {
     let (sliding, x) = friction(Vec3::new(0.3, 0.2, -0.1));
-    let force = sliding.derivatives(0, &x, 0.7, RADIUS_MM).unwrap().gradient;
+    let force = sliding.derivatives(0, &x, 0.7).unwrap().gradient;
     assert!((force.norm() - 0.5).abs() < 1e-12 && force.dot(&(x - Vec3::new(1.0, 2.0, 3.0))) > 0.0);
     let (stuck, x) = friction(Vec3::new(0.002, 0.0, 0.0));
-    assert!(stuck.derivatives(0, &x, 0.7, RADIUS_MM).unwrap().gradient.norm() < 0.4);
+    assert!(stuck.derivatives(0, &x, 0.7).unwrap().gradient.norm() < 0.4);
 }
 
 /// A point at the end of a rod that has slipped to the end of `state`, after a step in which it stuck within
@@ -66,7 +65,7 @@ struct Slipped {
 
 fn slipped(slip: Vec3, stick_mm: f64) -> Slipped {
     let (mut friction, at) = friction(slip);
-    friction.stick_mm = stick_mm;
+    friction.law.stick_mm = stick_mm;
     let elements = vec![ElementData::plain(1.0, 1.0)];
     let tangent = Vec3::new(0.6, 0.0, 0.8);
     let state = RodState::straight(&elements, at - tangent, Frame::new(tangent, Some(Vec3::y())));
@@ -88,11 +87,11 @@ fn slipped(slip: Vec3, stick_mm: f64) -> Slipped {
 impl Slipped {
     fn surface(&self) -> FrictionDerivatives {
         let x = self.points[0].position(&self.elements, &self.state);
-        self.friction.derivatives(0, &x, self.points[0].angle(&self.state), RADIUS_MM).unwrap()
+        self.friction.derivatives(0, &x, self.points[0].angle(&self.state)).unwrap()
     }
 
     fn dissipated_mj(&self) -> f64 {
-        self.friction.taken_mj(&self.elements, &self.state, &self.points)
+        self.friction.dissipated_mj(&self.elements, &self.state, &self.points).1
     }
 
     fn anchor(&mut self) {
@@ -112,10 +111,10 @@ const SLIPS: [Vec3; 3] =
 #[test]
 fn what_comes_to_rest_sticks_within_a_hundredth_and_no_less() {
     let mut point = slipped(SLIPS[0], 0.01);
-    point.friction.stick_within(0.01);
+    point.friction.law.stick_within(sticking_mm(0.01));
     let mut within_mm = || {
         point.anchor();
-        point.friction.stick_mm
+        point.friction.law.stick_mm
     };
     assert!((within_mm() - 0.003).abs() < 1e-15 && (within_mm() - 0.0009).abs() < 1e-15);
     for _ in 0..10 {
@@ -131,7 +130,7 @@ fn what_is_anchored_anew_is_held_as_before_and_has_taken_as_much() {
         let (before, taken_mj) = (point.surface(), point.dissipated_mj());
         assert_eq!((before.gradient.norm() - 0.5).abs() < 1e-12, slips, "{}", before.gradient.norm());
         point.anchor();
-        assert!(point.friction.stick_mm < 0.004);
+        assert!(point.friction.law.stick_mm < 0.004);
         let after = point.surface();
         assert!((after.gradient - before.gradient).norm() < 1e-12, "{before:?} {after:?}");
         assert!((after.turn - before.turn).abs() < 1e-12 && before.turn.abs() > 1e-3, "{before:?} {after:?}");
@@ -173,7 +172,7 @@ fn a_hand_that_rests_sticks_within_a_part_of_the_radius() {
         let hand = HandMotion { from_mm: 10.0, to_mm, turn_rad: 0.0 };
         let Slipped { friction, elements, state, points } = &mut point;
         friction.begin(elements, state, points, (&[], &[]), &[hand]);
-        friction.stick_mm
+        friction.law.stick_mm
     };
     assert_eq!(sticks(10.0), STICK * RADIUS_MM);
     assert_eq!(sticks(12.0), STICK * 2.0);

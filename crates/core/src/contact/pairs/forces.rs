@@ -5,9 +5,8 @@ use super::curve::{Curve, Place};
 use super::gap::Gap;
 use super::{Pair, SelfContact};
 use crate::Vec3;
-use crate::contact::force::merit;
+use crate::contact::set::merit;
 use crate::rod::{Couple, ElementData, RodState, Stencils};
-use crate::solve::ContactMerit;
 
 /// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;
@@ -61,9 +60,13 @@ impl SelfContact {
     pub(super) fn press(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         let mut rounding_n: f64 = 0.0;
         let curve = self.curve(elements, state);
-        for pair in self.pairs.iter().filter(|pair| pair.at_base || pair.rubs()) {
+        for pair in &self.pairs {
+            let at_base = self.contact(pair).is_some_and(|contact| contact.at_base);
+            if !(at_base || pair.rubs()) {
+                continue;
+            }
             let mut couple = Couple::none(pair.gap.at.map(|place| place.element));
-            if pair.at_base {
+            if at_base {
                 let depth_mm = pair.depth_mm();
                 into.add_value(0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2));
                 let farthest_mm =
@@ -87,64 +90,23 @@ impl SelfContact {
         self.know_pairs_within(elements, motion_mm);
         let curve = self.curve(elements, state);
         let of = |pair: &Pair| {
-            if -pair.depth_mm() > motion_mm && !(self.aimed && pair.foreseen && pair.aim_n > 0.0) {
+            let force_n = self.contact(pair).map_or(0.0, |contact| contact.target_n);
+            if -pair.depth_mm() > motion_mm && force_n == 0.0 {
                 return 0.0;
             }
             let [_, to] = pair.gap.at;
             let site = self.sites[pair.site].place;
             let gap = Gap::find(&curve, site, pair.gap.slide, to, (pair.touch_mm, f64::INFINITY));
             let depth_mm = pair.touch_mm - gap.distance;
-            if !self.aimed {
+            if !self.set.has_targets {
                 return 0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2);
             }
-            let force_n = if pair.foreseen { pair.aim_n } else { 0.0 };
             if force_n == 0.0 && depth_mm <= 0.0 {
                 return 0.0;
             }
             merit(pair.spring_n_per_mm, pair.penalty_n_per_mm, force_n, depth_mm).0
         };
         self.pairs.iter().map(|pair| of(pair) + self.friction_mj(pair, &curve)).sum()
-    }
-
-    /// See [`Contacts::merit`](crate::solve::Contacts::merit).
-    pub(super) fn aim(&mut self) -> ContactMerit {
-        let mut sum = ContactMerit::default();
-        for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
-            pair.change_mm = pair.change(&self.ways);
-            // The force that balances the rod's own stiffness, which is κ (p − ∇G·δx) once the contacts at the end
-            // are found.
-            pair.aim_n = (-pair.carried_n).max(0.0);
-            let (kappa, rho, depth_mm) = (pair.spring_n_per_mm, pair.penalty_n_per_mm, pair.depth_mm());
-            let (value_mj, force_n, _) = merit(kappa, rho, pair.aim_n, depth_mm);
-            let (assembled_n, stored_mj) = if pair.at_base {
-                (kappa * depth_mm, 0.5 * kappa * depth_mm.max(0.0).powi(2))
-            } else {
-                (0.0, 0.0)
-            };
-            sum.slope_mj += (assembled_n - force_n) * pair.change_mm;
-            sum.excess_mj += value_mj - stored_mj;
-            sum.size_mj += value_mj.abs() + pair.aim_n * pair.aim_n / rho;
-        }
-        self.aimed = true;
-        sum
-    }
-
-    /// Releases pairs that pull by more than this fraction of the largest pressing force. Returns whether there were
-    /// none.
-    pub(super) fn let_go_of_pulling(&mut self, tolerance: f64) -> bool {
-        let (mut pull_n, mut press_n) = (0.0, 0.0);
-        for pair in self.pairs.iter().filter(|pair| pair.at_base) {
-            let force_n = pair.spring_n_per_mm * pair.depth_mm();
-            pull_n -= force_n.min(0.0);
-            press_n += force_n.max(0.0);
-        }
-        if pull_n <= tolerance * press_n {
-            return true;
-        }
-        for pair in self.pairs.iter_mut().filter(|pair| pair.depth_mm() < 0.0) {
-            pair.force_n = 0.0;
-        }
-        false
     }
 
     /// Contact energy at the base, mJ.
@@ -176,7 +138,7 @@ impl SelfContact {
             force_n: pair.spring_n_per_mm * pair.depth_mm() * pair.gap.direction().norm(),
             penetration_mm: pair.touch_mm - pair.gap.between.norm(),
         };
-        self.pairs.iter().filter(|pair| pair.at_base && pair.depth_mm() > 0.0).map(of).collect()
+        self.pairs.iter().filter(|pair| pair.depth_mm() > 0.0).map(of).collect()
     }
 }
 

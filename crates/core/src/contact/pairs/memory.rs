@@ -6,10 +6,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::curve::{Curve, Place};
+use super::friction::PairFriction;
 use super::gap::{Gap, reach};
-use super::rubbing::Rub;
 use super::{KNOWN, NEAR, Pair, SelfContact, Site, tree};
-use crate::contact::force::PENALTY;
+use crate::contact::set::penalty_n_per_mm;
 use crate::rod::{ElementData, RodState};
 
 /// Two pairs of successive bases are the same if the nearest points of the stretch are within this distance, in
@@ -25,7 +25,7 @@ pub(super) struct Remembered {
     /// Arc length of the nearest point of the stretch, mm.
     arc_mm: f64,
     force_n: f64,
-    rub: Rub,
+    friction: PairFriction,
 }
 
 /// The force of a pair at the end of a part.
@@ -77,8 +77,8 @@ impl SelfContact {
             let around = next.saturating_sub(1)..(next + 1).min(self.sites.len());
             let off_mm = |site: &usize| (arc_mm(&self.sites[*site]) - here_mm).abs();
             if let Some(site) = around.min_by(|a, b| off_mm(a).total_cmp(&off_mm(b))) {
-                let (arc_mm, force_n, rub) = (other_mm, *force_n, self.recalled_friction(*force_n));
-                self.before.push(Remembered { site, arc_mm, force_n, rub });
+                let (arc_mm, force_n, friction) = (other_mm, *force_n, self.recalled_friction(*force_n));
+                self.before.push(Remembered { site, arc_mm, force_n, friction });
             }
         }
         self.before.sort_by_key(|pair| pair.site);
@@ -86,8 +86,7 @@ impl SelfContact {
 
     /// Makes a state the base, and finds the pairs there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
-        self.aimed = false;
-        self.slips_known = false;
+        self.set.clear();
         self.checked.1 = f64::NAN;
         self.base.copy_from(state);
         self.is_placed = false;
@@ -101,8 +100,8 @@ impl SelfContact {
         self.counters.searches += 1;
         // At the first base of a part there are no pairs, but perhaps recalled forces.
         self.before.extend(self.pairs.drain(..).map(|pair| {
-            let Pair { site, arc_mm, force_n, rub, .. } = pair;
-            Remembered { site, arc_mm, force_n, rub }
+            let Pair { site, arc_mm, force_n, friction, .. } = pair;
+            Remembered { site, arc_mm, force_n, friction }
         }));
         let curve = Curve { elements, state, skins: &self.skins, closed: self.closed };
         self.site_positions.clear();
@@ -110,6 +109,7 @@ impl SelfContact {
         self.known = 0.0;
         self.seek(elements, state, NEAR);
         self.remember();
+        self.find_contacts();
         self.before.clear();
     }
 
@@ -195,28 +195,21 @@ impl SelfContact {
         let softer = 2.0 / (1.0 / one.modulus_n_per_mm2 + 1.0 / other.modulus_n_per_mm2);
         // Both stretches have sites that feel the other.
         let weight_mm = 0.5 * self.sites[site].weight_mm;
-        let element = &curve.elements[a];
         Some(Pair {
             site,
             weights: gap.weights(),
             gap,
             touch_mm,
             spring_n_per_mm: weight_mm * softer,
-            penalty_n_per_mm: weight_mm * element.bending[1] * PENALTY / element.length.powi(4),
+            penalty_n_per_mm: penalty_n_per_mm(weight_mm, &curve.elements[a]),
             arc_mm,
             force_n: 0.0,
-            at_base: false,
-            presses: false,
-            foreseen: false,
-            change_mm: 0.0,
-            end_mm: 0.0,
-            carried_n: 0.0,
-            aim_n: 0.0,
-            rub: Rub::default(),
+            contact: None,
+            friction: PairFriction::default(),
         })
     }
 
-    /// Transfers forces from the pairs of the previous base, and activates those that press.
+    /// Transfers forces from the pairs of the previous base.
     fn remember(&mut self) {
         for pair in &mut self.pairs {
             let first = self.before.partition_point(|old| old.site < pair.site);
@@ -225,12 +218,7 @@ impl SelfContact {
                 same.min_by(|p, q| (p.arc_mm - pair.arc_mm).abs().total_cmp(&(q.arc_mm - pair.arc_mm).abs()));
             let kept = nearest.filter(|old| (old.arc_mm - pair.arc_mm).abs() < SAME * pair.touch_mm);
             pair.force_n = kept.map_or(0.0, |old| old.force_n);
-            pair.rub = kept.map_or_else(Rub::default, |old| old.rub);
-            pair.at_base = pair.force_n + pair.penalty_n_per_mm * pair.depth_mm() > 0.0;
-            pair.presses = pair.at_base;
-            if !pair.at_base {
-                pair.force_n = 0.0;
-            }
+            pair.friction = kept.map_or_else(PairFriction::default, |old| old.friction);
         }
     }
 

@@ -12,12 +12,7 @@
 //! a rod cannot be bent to a radius smaller than its own. Stretches of different rods that are solved together are
 //! always distinct.
 //!
-//! Forces of pairs are unknowns, like those of the wall: derived in [`super::wall`] (`wall/forces.rs`), with G in
-//! place of d,
-//!
-//! ```text
-//! (∇∇E − Σ f ∇∇G + Σ κ ∇G ∇Gᵀ) δx = −(∇E − Σ κ p ∇G),    f⁺ = κ (p − ∇G·δx),    κ = ½ w k
-//! ```
+//! Forces of pairs are unknowns ([`super::set`]), with κ = ½ w k.
 //!
 //! **Pairs** are sought anew at every base (`tree.rs`). **No crossing**: along a step no two points of different
 //! stretches come nearer to each other by more than half their distance, by a bound on all pairs of elements, so axes
@@ -25,36 +20,38 @@
 //! cannot be reached in this way has an infinite energy.
 
 mod clear;
+mod contacts;
 mod curve;
 mod forces;
+mod friction;
+#[cfg(test)]
+mod friction_tests;
 mod gap;
 mod memory;
-mod model;
-mod rubbing;
-#[cfg(test)]
-mod rubbing_tests;
 #[cfg(test)]
 mod tests;
 mod tree;
 
 use crate::Vec3;
+use crate::contact::set::ContactSet;
 use crate::rod::couples::PLACES;
 use crate::rod::{ElementData, RodState, Stencils};
-use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
+use crate::solve::{Contacts, External, Sizes};
 
+use contacts::Difference;
 use curve::{Curve, Place};
 pub use forces::Touching;
 pub(crate) use forces::{Pressing, RodPlace};
+pub(crate) use friction::Rubs;
+use friction::{FrictionOfPairs, PairFriction};
 use gap::Gap;
 pub(crate) use memory::PairForce;
 use memory::Remembered;
-pub(crate) use rubbing::Rubs;
-use rubbing::{Rub, Rubbing};
 use tree::Tree;
 
 /// Largest distance between sites, in radii.
 const SPACING_RADII: f64 = 0.5;
-/// Pairs at a base are sought up to this many touching distances, more than a step foresees.
+/// Pairs at a base are sought up to this many touching distances, more than a step may close.
 const NEAR: f64 = 1.5;
 /// They are sought up to this many before a trial that moves points so far that others may touch: a step approaches by
 /// at most half.
@@ -113,21 +110,9 @@ struct Pair {
     arc_mm: f64,
     /// Its force unknown, N.
     force_n: f64,
-    /// Whether it is active in the system at the base.
-    at_base: bool,
-    /// Whether it is active now.
-    presses: bool,
-    /// Whether a step may activate it.
-    foreseen: bool,
-    /// Change of the gap in the full step, to first order, mm.
-    change_mm: f64,
-    /// Change of the gap in the other step, mm.
-    end_mm: f64,
-    /// The force that balances the rod's own stiffness, N; negative where it presses.
-    carried_n: f64,
-    /// f⁺: the force at the end of the step, N.
-    aim_n: f64,
-    rub: Rub,
+    /// Number of its contact in a step, if there may be one.
+    contact: Option<usize>,
+    friction: PairFriction,
 }
 
 impl Pair {
@@ -174,15 +159,13 @@ pub struct SelfContact {
     before: Vec<Remembered>,
     /// Changes of what points of each element depend on, in the step looked at last: x₀, h t₀, x₁ and h t₁, mm.
     ways: Vec<[Vec3; 4]>,
-    /// Whether forces have a target.
-    aimed: bool,
+    /// Contacts in the step from a base.
+    set: ContactSet<Difference>,
     /// The last state tested at which nothing was near, if so.
     clear: Option<clear::Clear>,
     /// The last safe trial, and the safe fraction of its way.
     checked: (RodState, f64),
-    rubbing: Rubbing,
-    /// Whether friction at the base has been prepared in this step.
-    slips_known: bool,
+    friction: FrictionOfPairs,
     rounding_n: f64,
     counters: PairCounters,
 }
@@ -219,7 +202,7 @@ impl SelfContact {
             radii_mm().filter(|radius_mm| *radius_mm > 0.0).fold(f64::INFINITY, f64::min);
         self.pairs.clear();
         self.before.clear();
-        self.aimed = false;
+        self.set.clear();
         self.checked.1 = f64::NAN;
         self.clear = None;
     }
@@ -249,7 +232,7 @@ impl SelfContact {
 impl External for SelfContact {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         self.look_at_base(elements, state);
-        self.rub_with_pairs(elements, state);
+        self.follow_pairs(elements, state);
         self.press(elements, state, into);
     }
 
@@ -273,59 +256,5 @@ impl External for SelfContact {
 
     fn contacts(&mut self) -> Option<&mut dyn Contacts> {
         Some(self)
-    }
-}
-
-impl Contacts for SelfContact {
-    fn foresee(&mut self, _elements: &[ElementData], _base: &RodState, moved: &dyn Moved) {
-        self.follow(moved);
-        self.foresee_pairs();
-        self.foresee_slipping();
-    }
-
-    fn press_or_let_go(
-        &mut self,
-        elements: &[ElementData],
-        base: &RodState,
-        _moved: &dyn Moved,
-        into: &mut dyn Stencils,
-    ) -> usize {
-        // The step is the one that was foreseen, moved by fractions of the ways to others.
-        self.press_or_let_go_pairs(elements, base, into) + self.slip_on(elements, base, into)
-    }
-
-    fn look_towards(&mut self, moved: &dyn Moved) {
-        self.follow(moved);
-        for pair in &mut self.pairs {
-            pair.end_mm = pair.change(&self.ways);
-        }
-        self.look_towards_slips();
-    }
-
-    fn slope_towards(&mut self, part: f64) -> f64 {
-        self.pairs.iter().map(|pair| pair.slope_towards(part)).sum::<f64>() + self.slipping_slope(part)
-    }
-
-    fn go_towards(&mut self, part: f64) {
-        for pair in &mut self.pairs {
-            pair.carried_n += part * (pair.linear_n(pair.end_mm) - pair.carried_n);
-            pair.change_mm += part * (pair.end_mm - pair.change_mm);
-        }
-        self.carry_slipping(part);
-    }
-
-    fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
-        self.follow(moved);
-        self.aim()
-    }
-
-    fn take(&mut self, part: f64) {
-        for pair in &mut self.pairs {
-            pair.force_n += part * (pair.aim_n - pair.force_n);
-        }
-    }
-
-    fn settled(&mut self, tolerance: f64) -> bool {
-        self.let_go_of_pulling(tolerance) && self.friction_settles()
     }
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::Vec3;
+use crate::contact::set::Stencil;
 use crate::rod::{Assembly, Frame, Layout, PLAIN, TWISTED};
 
 /// A rod along a curve, with nodes at equal steps of its parameter.
@@ -57,11 +58,11 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
     touching.look_at_base(elements, state);
     // With the forces of the energy itself.
     for pair in &mut touching.pairs {
-        pair.force_n = if pair.at_base { pair.spring_n_per_mm * pair.depth_mm() } else { 0.0 };
+        pair.force_n = pair.spring_n_per_mm * pair.depth_mm().max(0.0);
     }
-    touching.rub_with_pairs(elements, state);
+    touching.follow_pairs(elements, state);
     touching.press(elements, state, &mut assembly);
-    assert!(touching.pairs.iter().filter(|pair| pair.at_base).count() > 3);
+    assert!(touching.pairs.iter().filter(|pair| pair.depth_mm() > 0.0).count() > 3);
     assert!(!assembly.couplings.is_empty());
     let l = Layout::<C>;
     let rows: Vec<usize> = (0..=elements.len())
@@ -125,7 +126,8 @@ fn a_linear_spring_is_a_couple_without_curvature() {
             &state,
             &pair.couple(&touching.curve(&elements, &state), first, 0.0, second),
         );
-        other.add_link(&elements, &state, &pair.link(m * first, second * m * m.transpose()));
+        let spring = (m * first, second * m * m.transpose());
+        pair.difference().add(&elements, &state, &mut other, &spring.0, &spring.1);
     }
     let n = one.residual.len();
     let largest = one.residual.iter().fold(0.0, |most, r| f64::max(most, r.abs()));

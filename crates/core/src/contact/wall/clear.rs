@@ -184,11 +184,7 @@ impl WallContact<'_> {
 
     /// Makes a state the base, and evaluates the points that may touch there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
-        self.cache.pressing.clear();
-        self.cache.foreseen.clear();
-        self.cache.aside.clear();
-        self.cache.slipping.clear();
-        self.cache.aimed = false;
+        self.cache.set.clear();
         for span in 0..self.cache.spans.len() {
             let free = self.is_free(&self.cache.spans[span], elements, state);
             let known = &mut self.cache.spans[span];
@@ -202,8 +198,10 @@ impl WallContact<'_> {
             for index in points {
                 let x = self.material(index, elements, state);
                 let reading = self.read_base(index, elements, &x);
-                if self.cache.points[index].presses {
-                    self.cache.pressing.push(index);
+                if let (Reading::Pressed(d), true) = (&reading, self.cache.points[index].presses) {
+                    let penalty_n_per_mm = self.penalty_n_per_mm(index, elements);
+                    let contact = self.contact(index, (d.value_mm, d.gradient), penalty_n_per_mm);
+                    self.cache.set.contacts.push(contact);
                 }
                 room.take(self.room(index, &x, &reading));
             }

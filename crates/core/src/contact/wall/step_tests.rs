@@ -5,15 +5,15 @@ use super::*;
 use crate::contact::{ContactSurface, HandMotion};
 use crate::rod::{Assembly, PLAIN, Supports};
 use crate::solve::contacts::falls_until;
-use crate::solve::{Newton, NewtonOptions, NewtonReport};
+use crate::solve::{ContactMerit, Moved, Newton, NewtonOptions, NewtonReport};
 use crate::tuning::NewtonTuning;
 
-/// A wall and a force on the tip; unless `foreseeing`, the contacts at the end of a step are hidden from Newton's
+/// A wall and a force on the tip; unless `predicting`, the contacts at the end of a step are hidden from Newton's
 /// method.
 struct Pushed<'a> {
     wall: WallContact<'a>,
     force_n: Vec3,
-    foreseeing: bool,
+    predicting: bool,
 }
 
 impl External for Pushed<'_> {
@@ -38,32 +38,32 @@ impl External for Pushed<'_> {
 }
 
 impl Contacts for Pushed<'_> {
-    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
-        self.wall.foresee(elements, base, moved);
+    fn predict(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved) {
+        self.wall.predict(elements, base, moved);
     }
-    fn press_or_let_go(
+    fn update_active_set(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
         moved: &dyn Moved,
         into: &mut dyn Stencils,
     ) -> usize {
-        if self.foreseeing { self.wall.press_or_let_go(elements, base, moved, into) } else { 0 }
+        if self.predicting { self.wall.update_active_set(elements, base, moved, into) } else { 0 }
     }
-    fn look_towards(&mut self, moved: &dyn Moved) {
-        self.wall.look_towards(moved);
+    fn set_direction(&mut self, moved: &dyn Moved) {
+        self.wall.set_direction(moved);
     }
-    fn slope_towards(&mut self, part: f64) -> f64 {
-        self.wall.slope_towards(part)
+    fn slope(&mut self, part: f64) -> f64 {
+        self.wall.slope(part)
     }
-    fn go_towards(&mut self, part: f64) {
-        self.wall.go_towards(part);
+    fn advance(&mut self, part: f64) {
+        self.wall.advance(part);
     }
     fn merit(&mut self, moved: &dyn Moved) -> ContactMerit {
         self.wall.merit(moved)
     }
-    fn take(&mut self, part: f64) {
-        self.wall.take(part);
+    fn accept_forces(&mut self, part: f64) {
+        self.wall.accept_forces(part);
     }
     fn settled(&mut self, tolerance: f64) -> bool {
         self.wall.settled(tolerance)
@@ -71,13 +71,13 @@ impl Contacts for Pushed<'_> {
 }
 
 /// Presses the tip of a rod of 20 mm on the practically rigid wall of a tube, and rotates the force about the axis.
-fn turned(surface: &ContactSurface, foreseeing: bool) -> (NewtonReport, RodState) {
+fn turned(surface: &ContactSurface, predicting: bool) -> (NewtonReport, RodState) {
     let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
     let mut supports = Supports { start_tangent: true, ..Supports::default() };
     let mut newton = Newton::<PLAIN>::new(20);
     let options = NewtonOptions::default();
-    let mut pushed = Pushed { wall: rod.contact(), force_n: Vec3::x() * 0.2, foreseeing };
+    let mut pushed = Pushed { wall: rod.contact(), force_n: Vec3::x() * 0.2, predicting };
     let report = newton.solve(&elements, &mut supports, &mut pushed, &mut state, &options);
     assert!(report.converged, "{}", report.reason);
     pushed.force_n = Vec3::new(0.5, 0.866, 0.0) * 0.2;
@@ -92,12 +92,12 @@ fn a_rod_slides_around_a_hard_wall_in_few_steps() {
     assert!(with.converged && with.stable && without.converged, "{} {}", with.reason, without.reason);
     assert!(end.positions[20].y > 0.8 && (end.positions[20] - same.positions[20]).norm() < 1e-6);
     let (few, many) = (with.iterations, without.iterations);
-    assert!(few <= 12 && many > few, "{few} iterations, {many} without contacts foreseen");
+    assert!(few <= 12 && many > few, "{few} iterations, {many} without contacts predicted");
 }
 
 /// Pushes the tip of a rod along the wall of a tube with friction, and releases it; returns the iterations of both,
 /// and how far the tip went and came back, mm.
-fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
+fn rubbed(surface: &ContactSurface, predicting: bool) -> ([usize; 2], [f64; 2]) {
     let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     rod.friction = Friction::new(0.3);
     let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
@@ -107,7 +107,7 @@ fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) 
     let mut newton = Newton::<PLAIN>::new(20);
     let options = NewtonOptions::default();
     let down = Vec3::x() * 0.2;
-    let mut pushed = Pushed { wall: rod.contact(), force_n: down, foreseeing };
+    let mut pushed = Pushed { wall: rod.contact(), force_n: down, predicting };
     let mut solve = |pushed: &mut Pushed<'_>, force_n: Vec3| {
         pushed.force_n = force_n;
         let report = newton.solve(&elements, &mut supports, pushed, &mut state, &options);
@@ -156,7 +156,7 @@ fn a_point_is_active_by_its_depth_and_by_its_force() {
     let mut at = |force_n: f64| {
         contact.cache.points[0].force_n = force_n;
         contact.linearise(&elements, &off, &mut Assembly::<PLAIN>::new(1));
-        let active = contact.cache.pressing.len();
+        let active = contact.cache.set.at_base().count();
         (active, contact.settled(1e-9), contact.cache.points[0].force_n)
     };
     // ρ is 1 N/mm: a force of 0.1 N is active up to a gap of 0.1 mm.
@@ -167,7 +167,7 @@ fn a_point_is_active_by_its_depth_and_by_its_force() {
     let sunk = rod.at(Vec3::new(2.0 - RADIUS_MM + 1e-3, 0.0, 20.0));
     let mut contact = rod.contact();
     contact.linearise(&elements, &sunk, &mut Assembly::<PLAIN>::new(1));
-    assert!(contact.cache.pressing.len() == 1 && contact.settled(1e-9));
+    assert!(contact.cache.set.at_base().count() == 1 && contact.settled(1e-9));
 }
 
 /// A motion of the whole rod along x, mm.
@@ -196,10 +196,10 @@ fn forces_go_where_the_step_leads_as_far_as_it_is_taken() {
         let mut assembly = Assembly::<PLAIN>::new(1);
         contact.linearise(&elements, &base, &mut assembly);
         let on = Sideways(way_mm);
-        contact.foresee(&elements, &base, &on);
-        let changed = contact.press_or_let_go(&elements, &base, &on, &mut assembly);
+        contact.predict(&elements, &base, &on);
+        let changed = contact.update_active_set(&elements, &base, &on, &mut assembly);
         contact.merit(&on);
-        contact.take(part);
+        contact.accept_forces(part);
         (changed, contact.cache.points[0].force_n)
     };
     let spring = 1e4;

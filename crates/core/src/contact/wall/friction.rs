@@ -1,6 +1,7 @@
 //! Friction of the device on the wall: its normal forces, and its contribution at a point.
 
 use super::{ROUNDING, WallContact};
+use crate::contact::set::Geometry;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 impl WallContact<'_> {
@@ -15,12 +16,17 @@ impl WallContact<'_> {
             return;
         }
         let least_n = self.least_force_n();
-        let pressed = self.cache.all_pressed().map(|(index, d)| {
+        let pressed = self.cache.set.at_base().filter_map(|contact| {
+            let index = contact.key;
+            let d = self.cache.pressed(index)?;
             let known = &self.cache.points[index];
             let factor = self.surface.stiffness(&known.base, known.base_piece).factor;
             let rough = self.surface.rough(&known.base, known.base_piece);
             let (normal, presses_n) = self.points[index].pressed(d, factor);
-            (index, (normal, [known.force_n * d.gradient.norm(), presses_n].map(|force_n| force_n * rough)))
+            Some((
+                index,
+                (normal, [known.force_n * d.gradient.norm(), presses_n].map(|force_n| force_n * rough)),
+            ))
         });
         self.friction.follow(pressed, least_n);
     }
@@ -60,9 +66,9 @@ impl WallContact<'_> {
         index: usize,
     ) {
         let (point, x) = (&self.points[index], &self.surface.place(&self.cache.points[index].base));
-        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
-        into.add_value(self.friction.value(index, x, angle, radius_mm));
+        let angle = point.angle(state);
+        let Some(f) = self.friction.derivatives(index, x, angle) else { return };
+        into.add_value(self.friction.value(index, x, angle));
         self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * f.hessian.norm() * x.amax());
         let e = point.element;
         sum.add(point.xi, &f.gradient, into.wants_hessian().then_some(&f.hessian));
@@ -71,11 +77,11 @@ impl WallContact<'_> {
 
     /// Energy dissipated by friction at point `index` on its way to a state, mJ.
     pub(super) fn friction_mj(&self, elements: &[ElementData], state: &RodState, index: usize) -> f64 {
-        if !self.friction.holds(index) {
+        if self.friction.holding(index).is_none() {
             return 0.0;
         }
         let point = &self.points[index];
         let x = point.position(elements, state);
-        self.friction.value(index, &x, point.angle(state), point.potential.radius_mm)
+        self.friction.value(index, &x, point.angle(state))
     }
 }

@@ -47,7 +47,7 @@ fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
     first.keep(&mut kept);
     let sums_n = |contact: &SelfContact| {
         let sum = |of: fn(&Pair) -> f64| contact.pairs.iter().map(of).sum::<f64>();
-        (sum(|pair| pair.rub.force_n), sum(|pair| pair.rub.begun_n))
+        (sum(|pair| pair.friction.slider.force_n), sum(|pair| pair.friction.slider.begun.1))
     };
     for (coefficient, share) in [(0.3, 1.0), (0.0, 0.0)] {
         let mut next = coil();
@@ -56,16 +56,18 @@ fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
         next.recall(&elements, &kept);
         next.hold_friction();
         next.look_at_base(&elements, &state);
-        next.rub_with_pairs(&elements, &state);
+        next.follow_pairs(&elements, &state);
         let wanted_n = share * 0.5 * kept.len() as f64;
         let (force_n, begun_n) = sums_n(&next);
         assert!((force_n - wanted_n).abs() <= 1e-9 * wanted_n && force_n == begun_n, "{force_n}");
         let rubbing = next.pairs.iter().filter(|pair| pair.rubs());
         assert!(
-            rubbing.clone().all(|pair| (pair.rub.normal - pair.gap.direction().normalize()).norm() < 1e-12)
+            rubbing
+                .clone()
+                .all(|pair| (pair.friction.slider.normal - pair.gap.direction().normalize()).norm() < 1e-12)
         );
         // Another force, then back to that of the start.
-        next.pairs.iter_mut().for_each(|pair| pair.rub.force_n *= 3.0);
+        next.pairs.iter_mut().for_each(|pair| pair.friction.slider.force_n *= 3.0);
         next.rewind_friction();
         assert_eq!(sums_n(&next), (force_n, begun_n));
     }

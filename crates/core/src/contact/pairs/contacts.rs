@@ -1,0 +1,120 @@
+//! What pairs supply to a [`ContactSet`]: contacts in the difference of their two points.
+
+use nalgebra::Matrix3;
+
+use super::{Pair, SelfContact};
+use crate::Vec3;
+use crate::contact::friction::Coulomb;
+use crate::contact::point::FOLLOW;
+use crate::contact::set::{ContactSet, Geometry, LinearContact, Motion, Slipping, Stencil};
+use crate::rod::couples::PLACES;
+use crate::rod::{ElementData, Link, RodState, Stencils};
+use crate::solve::Moved;
+
+/// The difference of two points of a centre line, first minus second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::contact) struct Difference {
+    /// The elements of both.
+    elements: [usize; 2],
+    /// Weights in it of what both points depend on.
+    weights: [f64; PLACES],
+}
+
+impl Stencil for Difference {
+    fn add(
+        &self,
+        elements: &[ElementData],
+        base: &RodState,
+        into: &mut dyn Stencils,
+        force_n: &Vec3,
+        stiffness: &Matrix3<f64>,
+    ) {
+        let Self { elements: ends, weights } = *self;
+        into.add_link(
+            elements,
+            base,
+            &Link { elements: ends, weights, gradient: *force_n, hessian: *stiffness },
+        );
+    }
+}
+
+impl Pair {
+    pub(super) fn difference(&self) -> Difference {
+        Difference { elements: self.gap.at.map(|place| place.element), weights: self.weights }
+    }
+}
+
+impl SelfContact {
+    /// Finds the contacts of the pairs at the base: those that are active, and those that a step may close.
+    pub(super) fn find_contacts(&mut self) {
+        self.set.clear();
+        for (key, pair) in self.pairs.iter_mut().enumerate() {
+            let contact = LinearContact::new(
+                (key, pair.difference()),
+                (-pair.depth_mm(), pair.gap.direction()),
+                (pair.spring_n_per_mm, pair.penalty_n_per_mm),
+                pair.force_n,
+            );
+            pair.contact = None;
+            if contact.at_base || -pair.depth_mm() < 0.5 * FOLLOW * pair.touch_mm {
+                pair.contact = Some(self.set.contacts.len());
+                self.set.contacts.push(contact);
+            }
+            if !contact.at_base {
+                pair.force_n = 0.0;
+            }
+        }
+    }
+
+    /// The contact of a pair in a step, if there may be one.
+    pub(super) fn contact(&self, pair: &Pair) -> Option<&LinearContact<Difference>> {
+        self.set.contacts.get(pair.contact?)
+    }
+}
+
+impl Geometry for SelfContact {
+    type Stencil = Difference;
+
+    fn set(&mut self) -> &mut ContactSet<Difference> {
+        &mut self.set
+    }
+
+    fn follow(&mut self, moved: &dyn Moved) {
+        self.ways.clear();
+        self.ways.extend((0..self.skins.len()).map(|e| moved.element(e)));
+    }
+
+    fn motion(&self, difference: &Difference, _moved: &dyn Moved) -> Motion {
+        let [a, b] = difference.elements.map(|e| &self.ways[e]);
+        let each = difference.weights.iter().zip(a.iter().chain(b));
+        (each.fold(Vec3::zeros(), |sum, (weight, way)| sum + way * *weight), 0.0)
+    }
+
+    fn law(&self) -> Coulomb {
+        self.friction.law
+    }
+
+    fn find_slipping(&self, _base: &RodState, into: &mut Vec<Slipping<Difference>>) {
+        into.extend(self.pairs.iter().filter_map(|pair| {
+            let at = (pair.friction.apart_mm, 0.0);
+            Slipping::new(pair.difference(), &pair.friction.slider, at, &self.friction.law)
+        }));
+    }
+
+    fn store_forces(&mut self) {
+        for pair in &mut self.pairs {
+            if let Some(contact) = pair.contact.and_then(|k| self.set.contacts.get(k)) {
+                pair.force_n = contact.force_n;
+            }
+        }
+    }
+
+    fn least_force_n(&self) -> f64 {
+        0.0
+    }
+
+    fn friction_settles(&mut self) -> bool {
+        let unsettled = self.unsettled();
+        self.friction.law.settles(unsettled)
+    }
+}
