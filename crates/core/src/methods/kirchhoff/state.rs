@@ -160,10 +160,6 @@ impl KirchhoffState {
     pub(super) fn move_hands(&mut self, stack: &Stack, hands: &[Hand]) {
         self.hands.clear();
         self.hands.extend_from_slice(hands);
-        if !stack.is_several() {
-            self.rod.angles[0] = hands[0].turn_rad;
-            return;
-        }
         // Where coils share a set of angles, it is that of the inserted one.
         for is_in in [false, true] {
             for (set, hand) in stack.sets().iter().zip(hands) {
