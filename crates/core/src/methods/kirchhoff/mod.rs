@@ -300,7 +300,7 @@ impl<const C: usize> Kirchhoff<C> {
                 let (elements, points) = workspace.most;
                 self.shape.reserve(elements + 1);
                 let contacts = &mut Arc::make_mut(&mut self.report).contacts;
-                contacts.reserve(points.saturating_sub(contacts.len()));
+                contacts.reserve((points / state::TOUCHING).saturating_sub(contacts.len()));
                 workspace
             }
         };

@@ -141,7 +141,7 @@ impl KirchhoffState {
         self.forces.reserve(points.saturating_sub(self.forces.len()));
         self.known.reserve(points);
         self.correction.reserve(elements);
-        self.touches.reserve(points.saturating_sub(self.touches.len()));
+        self.touches.reserve((points / TOUCHING).saturating_sub(self.touches.len()));
     }
 
     /// Resets to nothing inserted: only the angles of the tails remain.
@@ -270,6 +270,8 @@ impl KirchhoffState {
     }
 }
 
+/// Memory is kept for one contact in as many contact points, as few touch the wall at a time.
+pub(super) const TOUCHING: usize = 8;
 /// Rounding of the length of a unit vector.
 const SAME_DIRECTION: f64 = 1e-12;
 
