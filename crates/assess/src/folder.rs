@@ -140,7 +140,8 @@ fn by_step<T>(rows: Vec<T>, step: impl Fn(&T) -> usize, most: usize) -> BTreeMap
 /// Hands by step.
 type Hands = BTreeMap<usize, Vec<Hand>>;
 
-/// Names and motions of several instruments, by step; none if there is no table of them, as of a single device.
+/// Names and motions of the instruments, by step; none if there is no table of them, as in recordings of a single device
+/// by earlier versions.
 fn hands(folder: &Path, steps: &[Step]) -> Result<(Vec<String>, Hands)> {
     let path = folder.join(INSTRUMENTS);
     let Some(rows) = optional::<InstrumentRow>(&path)? else { return Ok((vec![], BTreeMap::new())) };

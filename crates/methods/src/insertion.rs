@@ -287,6 +287,7 @@ impl Method for Insertion {
         (report.iterations, report.converged, report.substeps) = (iterations, converged, parts as u32);
         report.rotation_rad = rotation_rad + command.rotate_rad;
         self.write_report(surroundings);
+        self.report.write_alone();
         self.write_shape();
         Ok(())
     }

@@ -30,7 +30,7 @@ pub struct RunOutcome {
     /// Script lines with a condition that have ended.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub until: Vec<UntilOutcome>,
-    /// The instruments at the end, if there are several.
+    /// The instruments at the end.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<InstrumentOutcome>,
     /// Energy at the end, mJ.
@@ -57,7 +57,7 @@ pub struct UntilOutcome {
     pub met: Option<Met>,
 }
 
-/// State of one of several instruments at the end of a run.
+/// State of an instrument at the end of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentOutcome {
     /// Its name.
@@ -149,7 +149,7 @@ impl RunOutcome {
     ) -> Self {
         let report = simulation.report();
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone());
-        let instruments = names.zip(&report.instruments);
+        let instruments = names.zip(report.hands());
         let condition = || hand.course().motions.last().and_then(|line| line.met);
         let at_its_end = || hand.has_ended().then(|| condition().map_or(EndedBy::Script, EndedBy::from));
         Self {
@@ -172,9 +172,7 @@ impl RunOutcome {
                     met: course.met,
                 })
                 .collect(),
-            instruments: instruments
-                .map(|(name, report)| InstrumentOutcome { name, report: *report })
-                .collect(),
+            instruments: instruments.map(|(name, report)| InstrumentOutcome { name, report }).collect(),
             energy_mj: report.energy,
             wall_force: simulation.wall_force(),
             tally,

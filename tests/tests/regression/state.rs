@@ -345,6 +345,11 @@ fn a_state_with_numbers_out_of_place_is_refused() {
         serde_json::from_value::<State>(spoilt).unwrap()
     };
     let rod = |change: &dyn Fn(&mut serde_json::Value)| spoilt(&|both| change(&mut both["state"]));
+    let contact = serde_json::json!({
+        "position_mm": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0], "force_n": 0.0, "friction_n": [0.0, 0.0, 0.0],
+        "penetration_mm": 0.0, "triangle": 0,
+    });
+    let touch = serde_json::json!({"energy_mj": 0.0, "contact": contact, "friction_nmm": 0.0});
     for (change, told) in [
         (rod(&|s| drop(s["rod"]["angles"].as_array_mut().unwrap().pop())), "state.rod"),
         (rod(&|s| s["known"]["points"][0]["piece"] = 4_000_000_000u32.into()), "state.known"),
@@ -357,7 +362,7 @@ fn a_state_with_numbers_out_of_place_is_refused() {
             rod(&|s| s["behind"] = vec![serde_json::json!({"advance_mm": 1.0, "rotate_rad": 0.0}); 2].into()),
             "state.hands",
         ),
-        (rod(&|s| s["touches"][0][0] = 1_000_000.into()), "state.touches"),
+        (rod(&|s| s["touches"] = serde_json::json!([[1_000_000, touch]])), "state.touches"),
         (spoilt(&|both| both["report"]["inserted_mm"] = 1.0.into()), "state.report"),
     ] {
         let error = simulation.clone().restore(&change).unwrap_err();

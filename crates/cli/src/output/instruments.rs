@@ -1,4 +1,4 @@
-//! State of each of several instruments, step by step: instruments.csv, beside steps.csv.
+//! State of each instrument, step by step: instruments.csv, beside steps.csv.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -39,33 +39,30 @@ struct Row {
     lateral_n: f64,
 }
 
-/// Writes the table of a run; a single device has none.
+/// Writes the table of a run.
 pub(crate) struct InstrumentTable {
     table: StepTable,
 }
 
 impl InstrumentTable {
     /// The table of a new recording in `folder`.
-    pub(crate) fn new(folder: &Path, stack: &Stack) -> io::Result<Option<Self>> {
-        let several = stack.is_several().then(|| StepTable::new(&folder.join(INSTRUMENTS)));
-        Ok(several.transpose()?.map(|table| Self { table }))
+    pub(crate) fn new(folder: &Path) -> io::Result<Self> {
+        StepTable::new(&folder.join(INSTRUMENTS)).map(|table| Self { table })
     }
 
     /// The table of a recording that resumes after step `steps`; rows of later steps are dropped.
-    pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> io::Result<Option<Self>> {
-        let several = stack.is_several().then(|| StepTable::go_on(&folder.join(INSTRUMENTS), steps));
-        Ok(several.transpose()?.map(|table| Self { table }))
+    pub(crate) fn go_on(folder: &Path, steps: usize) -> io::Result<Self> {
+        StepTable::go_on(&folder.join(INSTRUMENTS), steps).map(|table| Self { table })
     }
 
     /// Adds the rows of a step.
     pub(crate) fn push(&mut self, step: usize, moves: &[Move], simulation: &Simulation) -> io::Result<()> {
-        let report = simulation.report();
-        let stack = simulation.stack();
-        for (index, (instrument, told)) in stack.instruments().iter().zip(&report.instruments).enumerate() {
+        let (hands, stack) = (simulation.report().hands(), simulation.stack());
+        for (index, (instrument, told)) in stack.instruments().iter().zip(&hands).enumerate() {
             let moved = moves.iter().find(|one| one.instrument == index);
             let command = moved.map(|one| one.command).unwrap_or_default();
             let tip = simulation.tip_of_mm(index);
-            let outside = report.instruments[index + 1..].iter().map(|other| other.inserted_mm);
+            let outside = hands[index + 1..].iter().map(|other| other.inserted_mm);
             let felt_mm = (told.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
             let lateral = simulation.lateral_forces(index).into_iter().map(|at| at.force_n.norm());
             self.table.push(Row {
@@ -98,7 +95,7 @@ impl InstrumentTable {
 /// Inserted lengths of the instruments after the steps of a recording.
 pub(crate) struct Lengths {
     folder: PathBuf,
-    /// By step; `None` for a single device, whose length is that of the line.
+    /// By step; `None` for a single device, whose length is that of the line: earlier versions did not write its table.
     steps: Option<BTreeMap<usize, Vec<f64>>>,
 }
 

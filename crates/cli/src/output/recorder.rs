@@ -113,7 +113,7 @@ const CHECKPOINT_S: f64 = 1.0;
 pub(crate) struct Recorder {
     folder: PathBuf,
     table: csv::Writer<File>,
-    instruments: Option<InstrumentTable>,
+    instruments: InstrumentTable,
     packing: Option<PackingTable>,
     arrays: ShapeArrays,
     steps: usize,
@@ -133,7 +133,7 @@ impl Recorder {
         let claim = folder::claim(folder, force)?;
         let start = || -> io::Result<_> {
             let table = File::create(folder.join(folder::TABLE))?;
-            Ok((table, InstrumentTable::new(folder, at.stack())?, ShapeArrays::new(folder)?))
+            Ok((table, InstrumentTable::new(folder)?, ShapeArrays::new(folder)?))
         };
         let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
         Ok(Self {
@@ -193,7 +193,7 @@ impl Recorder {
             let table = OpenOptions::new().append(true).open(&table_path)?;
             table.set_len(kept.bytes)?;
             folder::remove_frames(folder)?;
-            Ok((table, InstrumentTable::go_on(folder, at.stack(), steps)?, arrays))
+            Ok((table, InstrumentTable::go_on(folder, steps)?, arrays))
         };
         let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
         let start_mm = match recording {
@@ -274,9 +274,7 @@ impl Recorder {
         };
         // Written last, so that every step of the table is also in the arrays.
         let write_row = || {
-            if let Some(instruments) = &mut self.instruments {
-                instruments.push(row.step, moves, simulation)?;
-            }
+            self.instruments.push(row.step, moves, simulation)?;
             if let Some(packing) = &mut self.packing {
                 packing.push(row.step, simulation)?;
             }
@@ -314,9 +312,8 @@ impl Recorder {
 
     /// Syncs all steps to disk.
     pub(crate) fn sync(&self) -> Result<(), Failure> {
-        let instruments = || self.instruments.as_ref().map_or(Ok(()), InstrumentTable::sync);
         let packing = || self.packing.as_ref().map_or(Ok(()), PackingTable::sync);
-        let synced = self.arrays.sync().and_then(|()| instruments()).and_then(|()| packing());
+        let synced = self.arrays.sync().and_then(|()| self.instruments.sync()).and_then(|()| packing());
         let synced = synced.and_then(|()| self.coils.sync());
         let synced = synced.and_then(|()| self.table.get_ref().sync_data());
         synced.map_err(|e| Failure::write(&self.folder, &e))

@@ -125,7 +125,7 @@ fn the_same_scene_gives_the_same_bytes() {
     let (a, b) = (folder.path().join("a"), folder.path().join("b"));
     let summary = run(&scene, &a).1;
     run(&scene, &b);
-    let mut names = vec!["steps.csv".to_owned(), "shapes.npz".to_owned()];
+    let mut names = ["steps.csv", "instruments.csv", "shapes.npz"].map(str::to_owned).to_vec();
     names.extend(summary["frames"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().to_owned()));
     for name in names {
         assert!(

@@ -86,7 +86,7 @@ impl<'a> SimulationBuilder<'a> {
         motion.iter().try_for_each(|motion| check_still(room_mm, motion, &stack, &sheath))?;
         // With more than three instruments, those without a rest shape have friction along the line only.
         let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
-        let twists = stack.is_several() && (properties.has_friction() || rub);
+        let twists = properties.has_friction() || rub;
         let stack = if twists { stack.twisted()? } else { stack };
         let scene = Environment { lumen, properties, sheath, stack, motion, flow, mark: OnceLock::new() };
         let own = KirchhoffOptions::default();

@@ -126,12 +126,7 @@ impl Simulation {
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
         let surroundings = surroundings!(self, time_s);
-        if self.scene.stack.is_several() {
-            self.method.step_together(&surroundings, moves)?;
-        } else {
-            let command = moves.first().map_or_else(Command::default, |one| one.command);
-            self.method.step(&surroundings, command)?;
-        }
+        self.method.step_together(&surroundings, moves)?;
         self.time_s = time_s;
         self.fields_before = Arc::clone(&self.fields);
         Ok(self.method.report())

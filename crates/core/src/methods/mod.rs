@@ -114,13 +114,12 @@ pub trait Method: Send {
     /// A command that the device or the method cannot follow (input), or no equilibrium found (computation).
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()>;
 
-    /// Moves several instruments at the same time; only called for methods that support several.
+    /// Moves instruments at the same time; a method of one device takes the step of that.
     ///
     /// # Errors
     /// As [`Method::step`].
-    fn step_together(&mut self, _surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
-        let mend = "this method pushes one device: use step";
-        Err(Error::parameter("moves", moves.len(), mend))
+    fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
+        self.step(surroundings, moves.first().map_or_else(Command::default, |one| one.command))
     }
 
     /// Moves instruments within about `solves` linear solves, whether the device comes to rest in them or not: no
@@ -131,10 +130,7 @@ pub trait Method: Send {
     /// # Errors
     /// As [`Method::step`], except that a missing equilibrium is not an error.
     fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], _solves: usize) -> Result<()> {
-        if surroundings.stack.is_several() {
-            return self.step_together(surroundings, moves);
-        }
-        self.step(surroundings, moves.first().map_or_else(Command::default, |one| one.command))
+        self.step_together(surroundings, moves)
     }
 
     /// Detaches the coil of an instrument and withdraws its pusher; only called for methods that support coils.

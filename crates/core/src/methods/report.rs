@@ -48,6 +48,13 @@ impl StepReport {
         !self.converged && !self.is_under_way()
     }
 
+    /// Writes the single device as the only instrument, for a method that has no others.
+    pub fn write_alone(&mut self) {
+        self.instruments.clear();
+        let alone = self.hand(0);
+        self.instruments.push(alone);
+    }
+
     /// Motion and forces of one hand: of an instrument, or of a single device.
     pub fn hand(&self, index: usize) -> InstrumentReport {
         self.instruments.get(index).copied().unwrap_or(InstrumentReport {
@@ -93,7 +100,7 @@ impl StepReport {
     }
 }
 
-/// Motion and forces of one of several instruments after a step.
+/// Motion and forces of an instrument after a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InstrumentReport {
     /// Length inside the sheath's mouth, mm.
@@ -103,7 +110,7 @@ pub struct InstrumentReport {
     /// Rotation of its tip, transported along the axis without twist, rad.
     pub tip_rotation_rad: f64,
     /// Push force of its hand, N: derivative of the energy in its inserted length. `None` where it jumps: its tip is
-    /// at that of another, or it is not inserted.
+    /// at that of another, or it is one of several that is not inserted.
     pub push_force_n: Option<f64>,
     /// Holding torque of its hand, N·mm: derivative of the energy in its rotation.
     pub torque_nmm: f64,
@@ -167,7 +174,7 @@ pub struct StepReport {
     pub push_force_n: f64,
     /// Torque of the hand that holds the tail, N·mm; with several instruments, the sum.
     pub torque_nmm: f64,
-    /// Each of several instruments, the innermost first; empty for a single device.
+    /// Each instrument, the innermost first; a single device is the only one.
     pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,

@@ -150,6 +150,7 @@ impl Method for Li2011 {
                 // Without twist the tip rotates with the hand.
                 report.tip_rotation_rad = report.rotation_rad;
                 (report.iterations, report.substeps, report.converged) = (solves, inputs, converged);
+                report.write_alone();
                 Ok(())
             }
             Err(error) => {

@@ -92,7 +92,8 @@ fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
         format!("  tip            [{:.2}, {:.2}, {:.2}] mm", tip[0], tip[1], tip[2]),
         format!("  push force     {:.4} N, torque {:.4} N·mm", outcome.push_force_n, outcome.torque_nmm),
     ];
-    lines.extend(outcome.instruments.iter().map(|one| {
+    let several = if outcome.instruments.len() > 1 { &outcome.instruments[..] } else { &[] };
+    lines.extend(several.iter().map(|one| {
         let push = one.report.push_force_n.map_or_else(|| "jumps".to_owned(), |n| format!("{n:.4} N"));
         let (mm, torque) = (one.report.inserted_mm, one.report.torque_nmm);
         format!("    {:<12} {mm:.2} mm, push {push}, torque {torque:.4} N·mm", one.name)

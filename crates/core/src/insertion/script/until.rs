@@ -86,10 +86,7 @@ impl Condition {
         if self.near.is_some_and(|(target, mm)| tip().is_some_and(|tip| (tip - now(target)).norm() <= mm)) {
             return Some(Met::TipWithinMm);
         }
-        let push_n = match report.instruments.get(self.instrument) {
-            Some(instrument) => instrument.push_force_n,
-            None => Some(report.push_force_n),
-        };
+        let push_n = report.hand(self.instrument).push_force_n;
         let pushed = |least: f64| push_n.is_some_and(|push_n| push_n >= least);
         self.push_force_n.is_some_and(pushed).then_some(Met::PushForceN)
     }

@@ -26,9 +26,7 @@ pub(super) struct Start<'a> {
 impl Configuration {
     /// Nothing inserted.
     pub(super) fn at(surroundings: &Surroundings<'_>, has_angles: bool) -> Self {
-        let mut mesh = Mesh::default();
-        mesh.clear();
-        Self { mesh, state: Arc::new(KirchhoffState::at(surroundings, has_angles)) }
+        Self { mesh: Mesh::withdrawn(), state: Arc::new(KirchhoffState::at(surroundings, has_angles)) }
     }
 
     /// The start of the next sub-step.

@@ -67,7 +67,7 @@ impl Guess {
         let correction = &start.state.correction;
         let Some(factor) = correction.repeats(&self.motions) else { return false };
         // Nodes of a single device are the same marks in every step.
-        if mesh.inserted_mm.is_empty() {
+        if mesh.inserted_mm.len() == 1 {
             correction.apply(factor, line, state);
         } else {
             correction.transfer(start.mesh, mesh, &mut self.learnt);

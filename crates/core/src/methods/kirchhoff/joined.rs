@@ -72,7 +72,7 @@ impl FreeCoil {
     /// Its elements and contact points; elements are counted from its first one.
     fn mesh(&self, stack: &Stack, fineness: Fineness, modulus_n_per_mm2: f64) -> Mesh {
         let device = &stack.instruments()[self.instrument].device;
-        let set = stack.sets()[self.instrument].or((!stack.is_several()).then_some(0));
+        let set = stack.sets()[self.instrument];
         let mut mesh = Mesh::default();
         // The contact points are those of the whole instrument there.
         mesh.build_points(device, device.length_mm(), fineness, modulus_n_per_mm2);

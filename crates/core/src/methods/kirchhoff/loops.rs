@@ -8,10 +8,8 @@ use crate::rod::ElementData;
 /// The surface of each element of the line: with the radius of its outermost instrument in the middle, practically
 /// rigid.
 pub(super) fn skins<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item = Skin> + 'a {
-    let alone = [mesh.from_tip_mm[0]];
     middles(mesh).zip(&mesh.elements).map(move |(middle_mm, element)| {
-        let inserted_mm = if mesh.inserted_mm.is_empty() { &alone[..] } else { &mesh.inserted_mm };
-        Skin::rigid(stack.felt_radius_mm(inserted_mm, middle_mm), element.bending[1])
+        Skin::rigid(stack.felt_radius_mm(&mesh.inserted_mm, middle_mm), element.bending[1])
     })
 }
 

@@ -58,7 +58,7 @@ pub struct Mesh {
     pub elements: Vec<ElementData>,
     /// Contact points, tip first.
     pub points: Vec<ContactPoint>,
-    /// Inserted lengths of several instruments; empty for a single device.
+    /// Inserted lengths of the instruments; empty where nothing is inserted.
     pub(super) inserted_mm: Vec<f64>,
     /// As `from_tip_mm`, for more than is inserted: between what contact points are.
     pub(super) ahead_mm: Vec<f64>,
@@ -134,6 +134,11 @@ fn nodes_from_tip(device: &Device, inserted_mm: f64, element_mm: f64, from_tip_m
 }
 
 impl Mesh {
+    /// Nothing inserted.
+    pub(super) fn withdrawn() -> Self {
+        Self { from_tip_mm: vec![0.0], ..Self::default() }
+    }
+
     /// Resets to nothing inserted: one node. Keeps the memory.
     pub(super) fn clear(&mut self) {
         self.from_tip_mm.clear();
@@ -176,6 +181,8 @@ impl Mesh {
     /// Nodes are the ends of its sections, and equally spaced marks between them.
     pub fn build(&mut self, device: &Device, inserted_mm: f64, fineness: Fineness, modulus_n_per_mm2: f64) {
         self.build_points(device, inserted_mm, fineness, modulus_n_per_mm2);
+        self.inserted_mm.clear();
+        self.inserted_mm.push(inserted_mm);
         // Only fields for a single device are written: the rest of earlier elements is empty.
         self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
         for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {

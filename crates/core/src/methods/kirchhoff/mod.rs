@@ -76,7 +76,7 @@ use std::sync::Arc;
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
 use crate::field::FieldLoad;
-use crate::methods::{Command, DetachedCoil, InstrumentReport, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, RodState, TWISTED};
 use crate::shape::Shape;
@@ -98,15 +98,11 @@ impl MethodChoice for KirchhoffOptions {
     }
 
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
-        if surroundings.stack.is_several() {
-            return several(*self, surroundings, store);
-        }
-        // A rest shape rotates with the device, and friction twists it.
-        let twists = surroundings.device.is_shaped() || surroundings.properties.has_friction();
-        Ok(if twists {
-            Box::new(Kirchhoff::<TWISTED>::new(*self, surroundings, store)?)
-        } else {
-            Box::new(Kirchhoff::<PLAIN>::new(*self, surroundings, store)?)
+        Ok(match surroundings.stack.angles() {
+            0 => Box::new(Kirchhoff::<PLAIN>::new(*self, surroundings, store)?),
+            1 => Box::new(Kirchhoff::<TWISTED>::new(*self, surroundings, store)?),
+            2 => Box::new(Kirchhoff::<{ PLAIN + 8 }>::new(*self, surroundings, store)?),
+            _ => Box::new(Kirchhoff::<{ PLAIN + 12 }>::new(*self, surroundings, store)?),
         })
     }
 
@@ -121,20 +117,6 @@ impl MethodChoice for KirchhoffOptions {
         let mend = "what follows a detached coil would pass through it: set it to true";
         Err(Error::parameter("method.self_contact", false, mend))
     }
-}
-
-/// The method for several instruments, given the number of their sets of angles.
-fn several(
-    options: KirchhoffOptions,
-    surroundings: &Surroundings<'_>,
-    store: &dyn WallStore,
-) -> Result<Box<dyn Method>> {
-    Ok(match surroundings.stack.angles() {
-        0 => Box::new(Kirchhoff::<PLAIN>::new(options, surroundings, store)?),
-        1 => Box::new(Kirchhoff::<TWISTED>::new(options, surroundings, store)?),
-        2 => Box::new(Kirchhoff::<{ PLAIN + 8 }>::new(options, surroundings, store)?),
-        _ => Box::new(Kirchhoff::<{ PLAIN + 12 }>::new(options, surroundings, store)?),
-    })
 }
 
 /// Largest tolerance: a larger residual does not indicate an equilibrium.
@@ -267,11 +249,14 @@ impl<const C: usize> Kirchhoff<C> {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
         let state = KirchhoffState::at(surroundings, Layout::<C>::ANGLES > 0);
-        let hands = if surroundings.stack.is_several() { state.hands.len() } else { 0 };
         let report = StepReport {
             converged: true,
             angles: state.has_angles,
-            instruments: vec![InstrumentReport::default(); hands],
+            instruments: report::instruments(
+                Start { mesh: &Mesh::withdrawn(), state: &state },
+                surroundings.stack,
+            )
+            .collect(),
             ..StepReport::default()
         };
         let Surroundings { lumen, properties, stack, .. } = *surroundings;
@@ -313,7 +298,10 @@ impl<const C: usize> Kirchhoff<C> {
             Some(workspace) => workspace,
             None => {
                 let workspace = Workspace::new(&environment, &self.state);
-                self.shape.reserve(workspace.most.0 + 1);
+                let (elements, points) = workspace.most;
+                self.shape.reserve(elements + 1);
+                let contacts = &mut Arc::make_mut(&mut self.report).contacts;
+                contacts.reserve((points / state::TOUCHING).saturating_sub(contacts.len()));
                 workspace
             }
         };
@@ -470,8 +458,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
-        let environment = Environment::new(surroundings, &self.surface, &self.options);
         let KirchhoffState { hands, rod, inner_friction, touches, .. } = &*self.state;
+        if instrument + 1 >= hands.len() {
+            return vec![LateralForce::default(); self.shape.len()];
+        }
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut mesh = Mesh::default();
         meshed(&environment, hands, &mut mesh);
         let on_line = touches.iter().take_while(|(point, _)| *point < mesh.points.len());

@@ -54,7 +54,7 @@ impl<const C: usize> Tools<C> {
                 false => Vec::new(),
             };
             set_hand_forces::<C>(environment, &clamp, Acting { between, loops: &loops, drag }, at);
-            self.rub_between(at);
+            self.add_inner_friction(at);
             return Some(clamp);
         }
         let frame = rod.material_frame(0);
@@ -136,7 +136,7 @@ impl<const C: usize> Tools<C> {
 
     /// Adds friction along the line between instruments to the hands' forces; couples about it already act through the
     /// rod.
-    fn rub_between(&self, at: &mut Configuration) {
+    fn add_inner_friction(&self, at: &mut Configuration) {
         let state = at.parts().1;
         for place in self.friction.between.places() {
             let friction_n = place.coefficient * place.force_n * place.parts(&state.rod)[0];

@@ -7,7 +7,7 @@ use super::state::KirchhoffState;
 use super::sum::Sum;
 use super::workspace::Work;
 use crate::contact::extension::left_through;
-use crate::device::line_mm;
+use crate::device::{Stack, line_mm};
 use crate::methods::{InstrumentReport, StepReport};
 use crate::{Error, Result};
 
@@ -50,8 +50,8 @@ pub(super) fn check(report: &StepReport, state: &KirchhoffState) -> Result<()> {
 }
 
 /// Writes what is known of a state into a report.
-fn write_state(environment: &Environment<'_>, Start { mesh, state }: Start<'_>, report: &mut StepReport) {
-    let surroundings = &environment.surroundings;
+fn write_state(environment: &Environment<'_>, to: Start<'_>, report: &mut StepReport) {
+    let (surroundings, Start { mesh, state }) = (&environment.surroundings, to);
     let stack = surroundings.stack;
     report.inserted_mm = mesh.from_tip_mm[0];
     report.energy = state.energy;
@@ -65,9 +65,22 @@ fn write_state(environment: &Environment<'_>, Start { mesh, state }: Start<'_>, 
     let tip_mm = environment.displaced(displacement.as_ref()).wall().material(&state.tip_mm());
     report.left_through =
         left_through(surroundings.lumen.openings(), &tip_mm).map(|(opening, _)| opening.index);
-    let each = state.hands.iter().zip(&state.hand_forces).enumerate().map(|(index, (hand, force))| {
-        // Without a set of its own a single device has the first one if there are any.
-        let set = if stack.is_several() { stack.sets()[index] } else { state.has_angles.then_some(0) };
+    report.instruments.clear();
+    report.instruments.extend(instruments(to, stack));
+    let inner = report.hand(0);
+    (report.rotation_rad, report.tip_rotation_rad) = (inner.rotation_rad, inner.tip_rotation_rad);
+    let forces = || state.hand_forces.iter();
+    report.push_force_n = forces().map(|force| force.push_n).sum::<f64>()
+        + forces().map(|force| force.outside.push_n).sum::<f64>();
+    report.torque_nmm = report.instruments.iter().map(|hand| hand.torque_nmm).sum();
+}
+
+/// The instruments in a state, the innermost first.
+pub(super) fn instruments<'a>(
+    Start { mesh, state }: Start<'a>,
+    stack: &'a Stack,
+) -> impl Iterator<Item = InstrumentReport> + 'a {
+    state.hands.iter().zip(&state.hand_forces).zip(stack.sets()).map(move |((hand, force), set)| {
         let twist = set.filter(|_| hand.inserted_mm > 0.0).map_or(0.0, |set| {
             state.rod.twist_to(mesh.nearest_node(mesh.from_tip_mm[0] - hand.inserted_mm), set)
         });
@@ -78,16 +91,5 @@ fn write_state(environment: &Environment<'_>, Start { mesh, state }: Start<'_>, 
             push_force_n: (!force.jumps).then_some(force.push_n + force.outside.push_n),
             torque_nmm: force.torque_nmm + force.outside.torque_nmm,
         }
-    });
-    report.instruments.clear();
-    report.instruments.extend(each);
-    let [inner, ..] = report.instruments[..] else { return };
-    (report.rotation_rad, report.tip_rotation_rad) = (inner.rotation_rad, inner.tip_rotation_rad);
-    let forces = || state.hand_forces.iter();
-    report.push_force_n = forces().map(|force| force.push_n).sum::<f64>()
-        + forces().map(|force| force.outside.push_n).sum::<f64>();
-    report.torque_nmm = report.instruments.iter().map(|hand| hand.torque_nmm).sum();
-    if !stack.is_several() {
-        report.instruments.clear();
-    }
+    })
 }

@@ -184,7 +184,7 @@ impl KirchhoffState {
         self.forces.reserve(points.saturating_sub(self.forces.len()));
         self.known.reserve(points);
         self.correction.reserve(elements);
-        self.touches.reserve(points.saturating_sub(self.touches.len()));
+        self.touches.reserve((points / TOUCHING).saturating_sub(self.touches.len()));
     }
 
     /// Resets to nothing inserted: only the angles of the tails remain.
@@ -203,10 +203,6 @@ impl KirchhoffState {
     pub(super) fn move_hands(&mut self, stack: &Stack, hands: &[Hand]) {
         self.hands.clear();
         self.hands.extend_from_slice(hands);
-        if !stack.is_several() {
-            self.rod.angles[0] = hands[0].turn_rad;
-            return;
-        }
         // Where coils share a set of angles, it is that of the inserted one.
         for is_in in [false, true] {
             for (set, hand) in stack.sets().iter().zip(hands) {
@@ -337,6 +333,8 @@ impl Unfinished {
     }
 }
 
+/// Memory is kept for one contact in as many contact points, as few touch the wall at a time.
+pub(super) const TOUCHING: usize = 8;
 /// Rounding of the length of a unit vector.
 const SAME_DIRECTION: f64 = 1e-12;
 

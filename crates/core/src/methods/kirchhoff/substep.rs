@@ -246,11 +246,13 @@ impl<const C: usize> Tools<C> {
         inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
     }
 
-    /// Energy dissipated by friction on the wall, and of loops on each other, at least and at most, mJ.
+    /// Energy dissipated by friction on the wall, of loops on each other and between instruments, at least and at most,
+    /// mJ.
     fn dissipated_mj(&self, mesh: &Mesh, rod: &RodState) -> (f64, f64) {
         let on_wall = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
         let on_loops = self.loops.dissipated_mj();
-        (on_wall.0 + on_loops.0, on_wall.1 + on_loops.1)
+        let between_mj = self.friction.between.taken_mj(rod);
+        (on_wall.0 + on_loops.0 + between_mj, on_wall.1 + on_loops.1 + between_mj)
     }
 
     /// The energy balance of a part in which the wall moved, the drag did `aside_mj`, and friction dissipated this at least and at most.
@@ -375,16 +377,14 @@ impl<const C: usize> Tools<C> {
             }
             return Err(wrong);
         }
-        let (least_mj, most_mj) = self.dissipated_mj(mesh, rod);
+        let rubbed_mj = self.dissipated_mj(mesh, rod);
         let farthest_mm = self.newton.neighbourhood.farthest(rod);
-        let between_mj = self.friction.between.taken_mj(rod);
         self.keep(start, mesh, after);
         let outside_mj = self.write_forces(environment, next);
         // Where the device is not at rest its own are arbitrary, and would count as work.
         if found.residual > tuning.steps.at_rest {
             next.parts().1.hand_forces.clone_from(&start.state.hand_forces);
         }
-        let rubbed_mj = (least_mj + between_mj, most_mj + between_mj);
         let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
         let after = next.parts().1;
         let lacks = balance.lacks();
