@@ -259,8 +259,8 @@ fn every_file_that_a_decision_names_is_there() {
         let end = format!("/{}", path.replace("/src/", "/"));
         files.iter().any(|file| file.ends_with(&end))
     };
-    assert!(is_there("kirchhoff/tick.rs") && is_there("cli/src/main.rs") && is_there("contact/pairs/"));
-    assert!(!is_there("kirchhoff/tock.rs") && !is_there("ick.rs"));
+    assert!(is_there("kirchhoff/command.rs") && is_there("cli/src/main.rs") && is_there("contact/pairs/"));
+    assert!(!is_there("kirchhoff/commend.rs") && !is_there("mmand.rs"));
     let mut documents = vec![root.join("ARCHITECTURE.md"), root.join("docs/glossary.md")];
     documents.extend(std::fs::read_dir(root.join("docs/decisions")).unwrap().map(|e| e.unwrap().path()));
     let mut count = 0;

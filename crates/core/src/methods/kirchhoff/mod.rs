@@ -14,6 +14,21 @@
 //! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with
 //! respect to the inserted length.
 //!
+//! # The algorithm of a step
+//!
+//! ```text
+//! until the hands are where they should be, and the device rests in equilibrium:     command.rs
+//!     propose a part of the remaining motion, and how it is solved                   course.rs, step_control.rs
+//!     slide the device along its own curve; add what the last part changed           transport.rs, guess.rs
+//!     Newton's method to a minimum, contacts and friction in the model of each step  search.rs, solve/, contact/set/
+//!     near its prediction, energies in balance, not through a wall?                  substep.rs, balance.rs
+//!         accept: the next part may be longer
+//!     otherwise
+//!         halve the part; if short, hold friction; if shorter still, relax
+//!     if the solves of a tick are used up: keep what is unfinished with the state
+//! write the report                                                                   report.rs
+//! ```
+//!
 //! All that the next part of a command depends on is in the state ([`KirchhoffState`]); the report is written from it at the end, and nothing here
 //! reads it.
 
