@@ -253,8 +253,8 @@ impl External for WallContact<'_> {
         }
     }
 
-    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
-        Some(self)
+    fn visit_contacts(&mut self, ask: &mut dyn FnMut(&mut dyn Contacts)) {
+        ask(self);
     }
 
     /// A point may move by nearly its clearance in any direction: the ball about it contains no wall. Farther it may

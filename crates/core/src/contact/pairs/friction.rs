@@ -80,7 +80,7 @@ impl Pair {
 
     /// Adds a friction force as a gradient, and its derivative, to the pair's contribution.
     fn add_friction(&self, to: &mut Couple, force_n: &Vec3, stiffness: &Matrix3<f64>) {
-        let c = &self.weights;
+        let c = &self.difference.weights;
         for k in 0..c.len() {
             to.gradient[k] += force_n * c[k];
             to.carried[k] += force_n * c[k];
