@@ -11,7 +11,7 @@ impl WallContact<'_> {
     }
 
     /// Renews the normal forces of friction from the contact forces at the base, unless held.
-    pub(super) fn rub_with_contacts(&mut self) {
+    pub(super) fn follow_contacts(&mut self) {
         if !self.friction.acts() {
             return;
         }
