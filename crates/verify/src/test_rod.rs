@@ -81,8 +81,8 @@ impl External for Outside<'_> {
         Sizes { rounding_n: self.contact.sizes().rounding_n, ..self.loads.sizes() }
     }
 
-    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
-        self.contact.contacts()
+    fn visit_contacts(&mut self, ask: &mut dyn FnMut(&mut dyn Contacts)) {
+        self.contact.visit_contacts(ask);
     }
 }
 

@@ -260,23 +260,6 @@ impl Friction {
         self.law.follow(all, least_n);
     }
 
-    /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
-    /// again.
-    pub(super) fn settles(&mut self, least_n: f64) -> bool {
-        let unsettled = self.unsettled(least_n);
-        self.law.settles(unsettled)
-    }
-
-    /// Relative difference of normal forces from the contact forces at the last base.
-    pub(super) fn unsettled(&self, least_n: f64) -> f64 {
-        unsettled(self.sliders.iter(), least_n)
-    }
-
-    /// Stops renewing normal forces.
-    pub(super) fn hold(&mut self) {
-        self.law.hold();
-    }
-
     /// Resumes renewing normal forces.
     pub fn release(&mut self) {
         self.law.release();
@@ -290,7 +273,7 @@ impl Friction {
 
     /// Resets and holds the normal forces of the start of the step.
     pub(super) fn rewind(&mut self) {
-        self.hold();
+        self.law.hold();
         self.sliders.iter_mut().for_each(Slider::rewind);
     }
 

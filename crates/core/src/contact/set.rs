@@ -70,30 +70,25 @@ use crate::solve::{ContactMerit, Contacts, Moved};
 /// Displacement, mm, and rotation about its own axis, rad, of what a contact depends on.
 pub(super) type Motion = (Vec3, f64);
 
-/// What a contact depends on: a point of an element, or the difference of two.
-pub(super) trait Stencil: Copy {
-    /// Adds a force that is linear in the displacement: its value at the base as a gradient, N, and its derivative,
-    /// N/mm. It has no effect on the rotation of tangents.
-    fn add(
-        &self,
-        elements: &[ElementData],
-        base: &RodState,
-        into: &mut dyn Stencils,
-        force_n: &Vec3,
-        stiffness: &Matrix3<f64>,
-    );
+/// The system at a base, to which contacts are added and from which they are removed.
+pub(super) struct System<'a> {
+    pub(super) elements: &'a [ElementData],
+    pub(super) base: &'a RodState,
+    pub(super) into: &'a mut dyn Stencils,
+}
 
-    /// Adds a moment about the axis, with its derivatives in displacement and rotation; nothing by default, for what
-    /// has no rotation.
-    fn add_spin(
-        &self,
-        _elements: &[ElementData],
-        _base: &RodState,
-        _into: &mut dyn Stencils,
-        _mixed: &Vec3,
-        _spin: (f64, f64),
-    ) {
-    }
+/// A force, N, and a moment about the axis, N·mm.
+pub(super) type Wrench = (Vec3, f64);
+
+/// Derivatives of a wrench in a motion: of the force in the displacement, of either in the other, and of the moment in
+/// the rotation.
+pub(super) type Stiffness = (Matrix3<f64>, Vec3, f64);
+
+/// What a contact depends on: a point of an element, or the difference of two.
+pub(super) trait Stencil: Copy + Default {
+    /// Adds a spring that is linear in the motion: its wrench at the base, as a gradient. It has no effect on the
+    /// rotation of tangents.
+    fn add(&self, to: &mut System<'_>, spring: &Wrench, stiffness: &Stiffness);
 }
 
 /// A point near a surface that no step has brought into contact.
@@ -118,7 +113,7 @@ impl<S> Nearby<S> {
 }
 
 /// The contacts in a step from a base.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct ContactSet<S> {
     /// Those that are active at the base, or that a step may close; keys ascend.
     pub(super) contacts: Vec<LinearContact<S>>,
@@ -130,18 +125,6 @@ pub(super) struct ContactSet<S> {
     is_complete: bool,
     /// Whether forces have targets: the value of the energy is then the merit.
     pub(super) has_targets: bool,
-}
-
-impl<S> Default for ContactSet<S> {
-    fn default() -> Self {
-        Self {
-            contacts: Vec::new(),
-            nearby: Vec::new(),
-            slipping: Vec::new(),
-            is_complete: false,
-            has_targets: false,
-        }
-    }
 }
 
 impl<S> ContactSet<S> {
@@ -189,7 +172,7 @@ pub(super) trait Geometry {
     }
 
     /// The law of friction.
-    fn law(&self) -> Coulomb;
+    fn law(&mut self) -> &mut Coulomb;
 
     /// Adds the contacts that friction may hold, at the base.
     fn find_slipping(&self, base: &RodState, into: &mut Vec<Slipping<Self::Stencil>>);
@@ -200,8 +183,8 @@ pub(super) trait Geometry {
     /// A negligible force, N.
     fn least_force_n(&self) -> f64;
 
-    /// Whether friction at an equilibrium follows the contact forces; otherwise it is renewed at the next base.
-    fn friction_settles(&mut self) -> bool;
+    /// Relative difference of the normal forces of friction from the contact forces at the last base.
+    fn friction_off(&self) -> f64;
 }
 
 /// Moves to the contacts what a step may close. The planes of the others are out of its reach.
@@ -228,8 +211,7 @@ impl<G: Geometry> Contacts for G {
             self.find_nearby(elements, base);
         }
         let mut set = std::mem::take(self.set());
-        let law = self.law();
-        if completes && law.acts() {
+        if completes && self.law().acts() {
             self.find_slipping(base, &mut set.slipping);
         }
         meet(self, &mut set, moved);
@@ -250,19 +232,19 @@ impl<G: Geometry> Contacts for G {
         into: &mut dyn Stencils,
     ) -> usize {
         self.follow(moved);
-        let mut set = std::mem::take(self.set());
+        let (mut set, law) = (std::mem::take(self.set()), *self.law());
         for point in &mut set.nearby {
             point.way = self.motion(&point.stencil, moved).0;
         }
+        let mut system = System { elements, base, into };
         let mut changed = 0;
         for contact in &mut set.contacts {
             let way = self.motion(&contact.stencil, moved).0;
-            changed += usize::from(contact.switches(&way, (elements, base), into));
+            changed += usize::from(contact.switches(&way, &mut system));
         }
-        let law = self.law();
         for slipping in &mut set.slipping {
             let way = self.motion(&slipping.stencil, moved);
-            changed += usize::from(slipping.switches(way, &law, (elements, base), into));
+            changed += usize::from(slipping.switches(way, &law, &mut system));
         }
         *self.set() = set;
         changed
@@ -282,7 +264,7 @@ impl<G: Geometry> Contacts for G {
     }
 
     fn slope(&mut self, part: f64) -> f64 {
-        let law = self.law();
+        let law = *self.law();
         let set = self.set();
         set.contacts.iter().map(|contact| contact.slope(part)).sum::<f64>()
             + set.slipping.iter().map(|slipping| slipping.slope(part, &law)).sum::<f64>()
@@ -321,7 +303,8 @@ impl<G: Geometry> Contacts for G {
             press_n += force_n.max(0.0);
         }
         if pull_n <= tolerance * press_n {
-            return self.friction_settles();
+            let off = self.friction_off();
+            return self.law().settles(off);
         }
         // What pulls lets go.
         let pulling = self.set().contacts.iter_mut().filter(|contact| contact.gap_mm > 0.0);

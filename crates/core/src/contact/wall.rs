@@ -174,18 +174,18 @@ impl<'a> WallContact<'a> {
             force_n = force.norm();
             normal = force / force_n;
         }
-        let rub = self.friction.derivatives(index, &x, point.angle(state));
+        let friction = self.friction.derivatives(index, &x, point.angle(state));
         Some(Touch {
             energy_mj: stiffness.factor * point.weight_mm * point.potential.value(distance.value_mm),
             contact: Contact {
                 position_mm: x,
                 normal,
                 force_n,
-                friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
+                friction_n: friction.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
                 triangle: self.cache.points[index].piece.unwrap_or(0),
             },
-            friction_nmm: rub.map_or(0.0, |f| -f.turn),
+            friction_nmm: friction.map_or(0.0, |f| -f.turn),
         })
     }
 
@@ -208,7 +208,7 @@ impl<'a> WallContact<'a> {
 impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         self.look_at_base(elements, state);
-        self.rub_with_contacts();
+        self.follow_contacts();
         self.friction.between.add(state, into);
         if let Some(drag) = &self.drag {
             drag.add(elements, state, into);
@@ -253,8 +253,8 @@ impl External for WallContact<'_> {
         }
     }
 
-    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
-        Some(self)
+    fn visit_contacts(&mut self, ask: &mut dyn FnMut(&mut dyn Contacts)) {
+        ask(self);
     }
 
     /// A point may move by nearly its clearance in any direction: the ball about it contains no wall. Farther it may

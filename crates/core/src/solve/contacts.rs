@@ -86,7 +86,9 @@ impl<const C: usize> Newton<C> {
         shift: &mut f64,
     ) -> Result<ContactMerit, StopReason> {
         let elements = problem.elements;
-        if problem.external.contacts().is_none() {
+        let mut has_contacts = false;
+        problem.external.visit_contacts(&mut |_| has_contacts = true);
+        if !has_contacts {
             return Ok(ContactMerit::default());
         }
         let models = problem.minimum && self.assembly.hessian;
@@ -94,7 +96,8 @@ impl<const C: usize> Newton<C> {
         for _ in 0..=self.tuning.shifts {
             self.with_contacts(problem, state, |contacts, moved| contacts.predict(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
-                let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
+                let mut merit = ContactMerit::default();
+                self.with_contacts(problem, state, |contacts, moved| merit += contacts.merit(moved));
                 if !(models && self.is_uphill(problem, state, search, &merit)) {
                     return Ok(merit);
                 }
@@ -111,14 +114,14 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Calls the contacts with the motion of the step.
-    fn with_contacts<T: Default>(
+    fn with_contacts(
         &self,
         problem: &mut Problem<'_>,
         state: &RodState,
-        ask: impl FnOnce(&mut dyn Contacts, &dyn Moved) -> T,
-    ) -> T {
+        mut ask: impl FnMut(&mut dyn Contacts, &dyn Moved),
+    ) {
         let moved = StepOf::<C> { elements: problem.elements, state, step: &self.step };
-        problem.external.contacts().map_or_else(T::default, |contacts| ask(contacts, &moved))
+        problem.external.visit_contacts(&mut |contacts| ask(contacts, &moved));
     }
 
     /// Whether the slope of the merit along the step, with this contribution of contacts, is positive beyond
@@ -151,12 +154,15 @@ impl<const C: usize> Newton<C> {
             }
             let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
             let most = if turn > tuning.contact_turn_rad { tuning.contact_turn_rad / turn } else { 1.0 };
-            let part = self.with_contacts(problem, state, |contacts, moved| {
-                contacts.set_direction(moved);
-                let part = falls_until(&tuning, |part| contacts.slope(part)).min(most);
-                contacts.advance(part);
-                part
-            });
+            self.with_contacts(problem, state, |contacts, moved| contacts.set_direction(moved));
+            let external = &mut *problem.external;
+            let slope = |part: f64| {
+                let mut sum = 0.0;
+                external.visit_contacts(&mut |contacts| sum += contacts.slope(part));
+                sum
+            };
+            let part = falls_until(&tuning, slope).min(most);
+            problem.external.visit_contacts(&mut |contacts| contacts.advance(part));
             if part < 1.0 {
                 for (step, before) in self.step.iter_mut().zip(&self.spare) {
                     *step = before + part * (*step - before);
@@ -178,11 +184,13 @@ impl<const C: usize> Newton<C> {
     /// of the energy stays that at the base: the change enters the right-hand side alone.
     fn change_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState) -> usize {
         let Problem { elements, supports, external, .. } = problem;
-        let Some(contacts) = external.contacts() else { return 0 };
         let moved = StepOf::<C> { elements, state, step: &self.step };
         let into: &mut Assembly<C> = &mut self.assembly;
+        let mut changed = 0;
         std::mem::swap(&mut into.residual, &mut into.correction);
-        let changed = contacts.update_active_set(elements, state, &moved, into);
+        external.visit_contacts(&mut |contacts| {
+            changed += contacts.update_active_set(elements, state, &moved, into);
+        });
         std::mem::swap(&mut into.residual, &mut into.correction);
         supports.hold(into);
         changed

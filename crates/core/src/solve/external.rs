@@ -18,7 +18,7 @@ pub trait Moved {
 /// Newton's method calls in this order:
 ///
 /// 1. [`linearise`](External::linearise) at a state, which is the *base* until the next call.
-/// 2. [`contacts`](External::contacts), if there are any, with the step.
+/// 2. its [contacts](External::visit_contacts), if there are any, with the step.
 /// 3. [`safe_fraction`](External::safe_fraction) of the way from the base to a trial.
 /// 4. [`value`](External::value) at that trial; repeated as the line search moves trials towards the base.
 /// 5. [`linearise`](External::linearise) at the accepted trial.
@@ -54,10 +54,9 @@ pub trait External {
         0.0
     }
 
-    /// Its contacts: forces that push and never pull. `None` by default.
-    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
-        None
-    }
+    /// Calls `ask` with its contacts, forces that push and never pull, if it has some; several energies together have
+    /// several. None by default.
+    fn visit_contacts(&mut self, _ask: &mut dyn FnMut(&mut dyn Contacts)) {}
 }
 
 /// Magnitudes of forces at the base.
@@ -117,4 +116,12 @@ pub struct ContactMerit {
     pub slope_mj: f64,
     /// Magnitude of the terms that are summed, mJ: the scale of its rounding.
     pub size_mj: f64,
+}
+
+impl std::ops::AddAssign for ContactMerit {
+    fn add_assign(&mut self, other: Self) {
+        self.excess_mj += other.excess_mj;
+        self.slope_mj += other.slope_mj;
+        self.size_mj += other.size_mj;
+    }
 }

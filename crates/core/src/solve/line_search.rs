@@ -127,9 +127,7 @@ impl<const C: usize> Newton<C> {
                 fraction: part,
                 shift,
             });
-            if let Some(contacts) = problem.external.contacts() {
-                contacts.accept_forces(part);
-            }
+            problem.external.visit_contacts(&mut |contacts| contacts.accept_forces(part));
             std::mem::swap(state, &mut self.trial);
             problem.supports.follow(state);
             return Ok(if part == 1.0 { whole_turn } else { f64::INFINITY });

@@ -330,7 +330,10 @@ impl Problem<'_> {
     /// Whether an equilibrium is valid for the contacts, if there are any.
     fn settles(&mut self) -> bool {
         let tolerance = self.options.tolerance;
-        self.external.contacts().is_none_or(|contacts| contacts.settled(tolerance))
+        let mut settles = true;
+        // All are asked, since those that pull let go then.
+        self.external.visit_contacts(&mut |contacts| settles &= contacts.settled(tolerance));
+        settles
     }
 
     /// Negative pivots of a minimum: one for each multiplier.

@@ -1,22 +1,18 @@
-//! The numbers of the solver and of contact that are choices.
+//! The numbers of the solver that are choices.
 //!
 //! Each field is a number that could be another one, or a switch of a mechanism; its default is what the method is
 //! tested with. Units, limits on what a user may ask for, rounding bounds and mathematical constants are constants
-//! where they are used. So are the numbers that shape the felt wall: they are part of the recipe by which walls are
-//! stored ([`WallRecipe`](crate::vessel::WallRecipe)).
+//! where they are used. So are the numbers of contacts and of friction (`contact/`), and those that shape the felt
+//! wall: they are part of the recipe by which walls are stored ([`WallRecipe`](crate::vessel::WallRecipe)).
 //!
 //! Scene files cannot set these numbers. `cargo run --release -p endowire-benches --bin ablation` changes them one by
 //! one and measures what becomes of hard insertions.
 
-mod contact;
-mod friction;
 mod mesh;
 mod newton;
 mod passage;
 mod steps;
 
-pub use contact::ContactTuning;
-pub use friction::FrictionTuning;
 pub use mesh::MeshTuning;
 pub use newton::NewtonTuning;
 pub use passage::PassageTuning;
@@ -29,10 +25,6 @@ pub struct Tuning {
     pub steps: StepTuning,
     /// Newton's method.
     pub newton: NewtonTuning,
-    /// Friction on the wall, between loops, and between instruments.
-    pub friction: FrictionTuning,
-    /// Contact with the wall and between loops.
-    pub contact: ContactTuning,
     /// Elements and contact points.
     pub mesh: MeshTuning,
     /// The search for a way ahead of a device that found no equilibrium.

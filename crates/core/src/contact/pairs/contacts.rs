@@ -1,46 +1,30 @@
 //! What pairs supply to a [`ContactSet`]: contacts in the difference of their two points.
 
-use nalgebra::Matrix3;
-
 use super::{Pair, SelfContact};
 use crate::Vec3;
 use crate::contact::friction::Coulomb;
 use crate::contact::point::FOLLOW;
-use crate::contact::set::{ContactSet, Geometry, LinearContact, Motion, Slipping, Stencil};
+use crate::contact::set::{
+    ContactSet, Geometry, LinearContact, Motion, Slipping, Stencil, Stiffness, System, Wrench,
+};
 use crate::rod::couples::PLACES;
-use crate::rod::{ElementData, Link, RodState, Stencils};
+use crate::rod::{Link, RodState};
 use crate::solve::Moved;
 
 /// The difference of two points of a centre line, first minus second.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(in crate::contact) struct Difference {
     /// The elements of both.
-    elements: [usize; 2],
+    pub(super) elements: [usize; 2],
     /// Weights in it of what both points depend on.
-    weights: [f64; PLACES],
+    pub(super) weights: [f64; PLACES],
 }
 
 impl Stencil for Difference {
-    fn add(
-        &self,
-        elements: &[ElementData],
-        base: &RodState,
-        into: &mut dyn Stencils,
-        force_n: &Vec3,
-        stiffness: &Matrix3<f64>,
-    ) {
-        let Self { elements: ends, weights } = *self;
-        into.add_link(
-            elements,
-            base,
-            &Link { elements: ends, weights, gradient: *force_n, hessian: *stiffness },
-        );
-    }
-}
-
-impl Pair {
-    pub(super) fn difference(&self) -> Difference {
-        Difference { elements: self.gap.at.map(|place| place.element), weights: self.weights }
+    fn add(&self, to: &mut System<'_>, spring: &Wrench, stiffness: &Stiffness) {
+        let Self { elements, weights } = *self;
+        let link = Link { elements, weights, gradient: spring.0, hessian: stiffness.0 };
+        to.into.add_link(to.elements, to.base, &link);
     }
 }
 
@@ -50,7 +34,7 @@ impl SelfContact {
         self.set.clear();
         for (key, pair) in self.pairs.iter_mut().enumerate() {
             let contact = LinearContact::new(
-                (key, pair.difference()),
+                (key, pair.difference),
                 (-pair.depth_mm(), pair.gap.direction()),
                 (pair.spring_n_per_mm, pair.penalty_n_per_mm),
                 pair.force_n,
@@ -90,14 +74,14 @@ impl Geometry for SelfContact {
         (each.fold(Vec3::zeros(), |sum, (weight, way)| sum + way * *weight), 0.0)
     }
 
-    fn law(&self) -> Coulomb {
-        self.friction.law
+    fn law(&mut self) -> &mut Coulomb {
+        &mut self.friction.law
     }
 
     fn find_slipping(&self, _base: &RodState, into: &mut Vec<Slipping<Difference>>) {
         into.extend(self.pairs.iter().filter_map(|pair| {
             let at = (pair.friction.apart_mm, 0.0);
-            Slipping::new(pair.difference(), &pair.friction.slider, at, &self.friction.law)
+            Slipping::new(pair.difference, &pair.friction.slider, at, &self.friction.law)
         }));
     }
 
@@ -113,8 +97,7 @@ impl Geometry for SelfContact {
         0.0
     }
 
-    fn friction_settles(&mut self) -> bool {
-        let unsettled = self.unsettled();
-        self.friction.law.settles(unsettled)
+    fn friction_off(&self) -> f64 {
+        self.unsettled()
     }
 }

@@ -62,7 +62,7 @@ impl SelfContact {
         let curve = self.curve(elements, state);
         for pair in &self.pairs {
             let at_base = self.contact(pair).is_some_and(|contact| contact.at_base);
-            if !(at_base || pair.rubs()) {
+            if !(at_base || pair.is_held()) {
                 continue;
             }
             let mut couple = Couple::none(pair.gap.at.map(|place| place.element));
@@ -75,7 +75,7 @@ impl SelfContact {
                 let force_n = pair.spring_n_per_mm * depth_mm;
                 couple = pair.couple(&curve, -force_n, pair.force_n, pair.spring_n_per_mm);
             }
-            if pair.rubs() {
+            if pair.is_held() {
                 into.add_value(self.add_friction(pair, &mut couple));
             }
             into.add_couple(elements, state, &couple);

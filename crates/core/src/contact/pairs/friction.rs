@@ -68,7 +68,8 @@ impl PairFriction {
 }
 
 impl Pair {
-    pub(super) fn rubs(&self) -> bool {
+    /// Whether friction may hold it.
+    pub(super) fn is_held(&self) -> bool {
         self.friction.slider.holds()
     }
 
@@ -80,7 +81,7 @@ impl Pair {
 
     /// Adds a friction force as a gradient, and its derivative, to the pair's contribution.
     fn add_friction(&self, to: &mut Couple, force_n: &Vec3, stiffness: &Matrix3<f64>) {
-        let c = &self.weights;
+        let c = &self.difference.weights;
         for k in 0..c.len() {
             to.gradient[k] += force_n * c[k];
             to.carried[k] += force_n * c[k];
@@ -117,17 +118,17 @@ impl SelfContact {
 
     /// Friction of a pair with the normal force of an earlier part.
     pub(super) fn recalled_friction(&self, force_n: f64) -> PairFriction {
-        if self.rubs() { PairFriction::recalled(force_n) } else { PairFriction::default() }
+        if self.has_friction() { PairFriction::recalled(force_n) } else { PairFriction::default() }
     }
 
     /// Whether there is friction.
-    fn rubs(&self) -> bool {
+    fn has_friction(&self) -> bool {
         self.friction.law.acts()
     }
 
     /// Renews friction from the pairs active at the base, unless it is settled or held.
     pub(super) fn follow_pairs(&mut self, elements: &[ElementData], state: &RodState) {
-        if !self.rubs() {
+        if !self.has_friction() {
             return;
         }
         let FrictionOfPairs { law, least_n, begun, advances_mm } = &mut self.friction;
@@ -157,7 +158,7 @@ impl SelfContact {
 
     /// Relative difference of the normal forces of friction from the contact forces at the last base.
     pub(crate) fn unsettled(&self) -> f64 {
-        if !self.rubs() {
+        if !self.has_friction() {
             return 0.0;
         }
         unsettled(self.pairs.iter().map(|pair| &pair.friction.slider), self.friction.least_n)
@@ -184,12 +185,12 @@ impl SelfContact {
     /// Resets slip at the base and holds the normal forces there: see
     /// [`Coulomb::anchor`].
     pub(crate) fn anchor_friction(&mut self) {
-        if !self.rubs() {
+        if !self.has_friction() {
             return;
         }
         let friction = &mut self.friction;
-        let rubs = self.pairs.iter_mut().map(|pair| &mut pair.friction);
-        friction.law.anchor(rubs.map(|rub| (&mut rub.slider, rub.apart_mm, 0.0)));
+        let all = self.pairs.iter_mut().map(|pair| &mut pair.friction);
+        friction.law.anchor(all.map(|one| (&mut one.slider, one.apart_mm, 0.0)));
         for Pair { friction, .. } in &mut self.pairs {
             friction.kept_mm = friction.apart_mm - friction.slider.from_mm;
         }
@@ -199,8 +200,8 @@ impl SelfContact {
 
     /// Lower and upper estimate of the energy dissipated in the part, mJ.
     pub(crate) fn dissipated_mj(&self) -> (f64, f64) {
-        let rubs = self.pairs.iter().map(|pair| &pair.friction);
-        self.friction.law.dissipated_mj(rubs.map(|rub| (&rub.slider, rub.apart_mm, 0.0)))
+        let all = self.pairs.iter().map(|pair| &pair.friction);
+        self.friction.law.dissipated_mj(all.map(|one| (&one.slider, one.apart_mm, 0.0)))
     }
 
     /// Friction force on the first point of a pair at the base, N.
@@ -220,7 +221,7 @@ impl SelfContact {
 
     /// Friction energy of a pair on the way to a state, mJ.
     pub(super) fn friction_mj(&self, pair: &Pair, curve: &Curve<'_>) -> f64 {
-        if !pair.rubs() {
+        if !pair.is_held() {
             return 0.0;
         }
         self.friction.law.value(&pair.friction.slider, &pair.apart_mm(curve), 0.0)

@@ -23,8 +23,8 @@ fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
     let mut held = Held { force: (N, Vec3::new(0.0, along, -down)), springs, stiffness: 2000.0 };
     let skin = |data: &ElementData| if data.is_break() { Skin::NONE } else { Skin::rigid(RADIUS, 1.0) };
     let mut loops = SelfContact::new(&all, all.iter().map(skin).collect());
-    let rubs = Rubs { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
-    loops.begin_friction(&rods, std::iter::empty(), all.iter().map(|_| 0.0), rubs);
+    let law = Rubs { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
+    loops.begin_friction(&rods, std::iter::empty(), all.iter().map(|_| 0.0), law);
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
     let options = NewtonOptions { tolerance: 1e-9, ..NewtonOptions::default() };
     let mut outside = Together(vec![&mut loops, &mut held]);
@@ -51,8 +51,8 @@ fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
     };
     for (coefficient, share) in [(0.3, 1.0), (0.0, 0.0)] {
         let mut next = coil();
-        let rubs = Rubs { coefficient, stick_mm: [1e-3, 1e-5], least_n: 1e-9 };
-        next.begin_friction(&state, std::iter::empty(), elements.iter().map(|_| 0.0), rubs);
+        let law = Rubs { coefficient, stick_mm: [1e-3, 1e-5], least_n: 1e-9 };
+        next.begin_friction(&state, std::iter::empty(), elements.iter().map(|_| 0.0), law);
         next.recall(&elements, &kept);
         next.hold_friction();
         next.look_at_base(&elements, &state);
@@ -60,10 +60,9 @@ fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
         let wanted_n = share * 0.5 * kept.len() as f64;
         let (force_n, begun_n) = sums_n(&next);
         assert!((force_n - wanted_n).abs() <= 1e-9 * wanted_n && force_n == begun_n, "{force_n}");
-        let rubbing = next.pairs.iter().filter(|pair| pair.rubs());
+        let held = next.pairs.iter().filter(|pair| pair.is_held());
         assert!(
-            rubbing
-                .clone()
+            held.clone()
                 .all(|pair| (pair.friction.slider.normal - pair.gap.direction().normalize()).norm() < 1e-12)
         );
         // Another force, then back to that of the start.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::curve::{Curve, Place};
 use super::friction::PairFriction;
 use super::gap::{Gap, reach};
-use super::{KNOWN, NEAR, Pair, SelfContact, Site, tree};
+use super::{Difference, KNOWN, NEAR, Pair, SelfContact, Site, tree};
 use crate::contact::set::penalty_n_per_mm;
 use crate::rod::{ElementData, RodState};
 
@@ -197,7 +197,7 @@ impl SelfContact {
         let weight_mm = 0.5 * self.sites[site].weight_mm;
         Some(Pair {
             site,
-            weights: gap.weights(),
+            difference: Difference { elements: [a, b], weights: gap.weights() },
             gap,
             touch_mm,
             spring_n_per_mm: weight_mm * softer,

@@ -34,7 +34,6 @@ mod tree;
 
 use crate::Vec3;
 use crate::contact::set::ContactSet;
-use crate::rod::couples::PLACES;
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::{Contacts, External, Sizes};
 
@@ -98,8 +97,8 @@ struct Pair {
     site: usize,
     /// The gap at the base.
     gap: Gap,
-    /// Weights in the difference of both points of what they depend on.
-    weights: [f64; PLACES],
+    /// The difference of both points.
+    difference: Difference,
     /// D, the touching distance, mm.
     touch_mm: f64,
     /// κ, N/mm.
@@ -254,7 +253,7 @@ impl External for SelfContact {
         Sizes { rounding_n: self.rounding_n, ..Sizes::default() }
     }
 
-    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
-        Some(self)
+    fn visit_contacts(&mut self, ask: &mut dyn FnMut(&mut dyn Contacts)) {
+        ask(self);
     }
 }

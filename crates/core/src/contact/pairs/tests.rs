@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Vec3;
-use crate::contact::set::Stencil;
+use crate::contact::set::{Stencil, System};
 use crate::rod::{Assembly, Frame, Layout, PLAIN, TWISTED};
 
 /// A rod along a curve, with nodes at equal steps of its parameter.
@@ -126,8 +126,9 @@ fn a_linear_spring_is_a_couple_without_curvature() {
             &state,
             &pair.couple(&touching.curve(&elements, &state), first, 0.0, second),
         );
-        let spring = (m * first, second * m * m.transpose());
-        pair.difference().add(&elements, &state, &mut other, &spring.0, &spring.1);
+        let mut system = System { elements: &elements, base: &state, into: &mut other };
+        let stiffness = (second * m * m.transpose(), Vec3::zeros(), 0.0);
+        pair.difference.add(&mut system, &(m * first, 0.0), &stiffness);
     }
     let n = one.residual.len();
     let largest = one.residual.iter().fold(0.0, |most, r| f64::max(most, r.abs()));

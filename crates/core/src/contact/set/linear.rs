@@ -1,9 +1,9 @@
 //! A contact in a step: its gap to first order, a spring where that closes, and the merit of its force.
 //! Derived in [`super`].
 
-use super::Stencil;
+use super::{Stencil, System};
 use crate::Vec3;
-use crate::rod::{ElementData, RodState, Stencils};
+use crate::rod::ElementData;
 use crate::solve::ContactMerit;
 
 /// c: penalty ρ over the stiffness of the element. With a larger one contacts activate and release at smaller depths,
@@ -108,12 +108,7 @@ impl<S: Stencil> LinearContact<S> {
     /// Adds its spring to the system if the step closes it, or removes it if the step opens it. Returns whether
     /// either is so.
     #[inline]
-    pub(super) fn switches(
-        &mut self,
-        way: &Vec3,
-        (elements, base): (&[ElementData], &RodState),
-        into: &mut dyn Stencils,
-    ) -> bool {
+    pub(super) fn switches(&mut self, way: &Vec3, system: &mut System<'_>) -> bool {
         self.change_mm = way.dot(&self.gradient);
         let closes = self.gap_mm + self.change_mm < 0.0;
         if closes == self.is_active {
@@ -121,7 +116,8 @@ impl<S: Stencil> LinearContact<S> {
         }
         self.is_active = closes;
         let along = self.gradient * if closes { self.spring_n_per_mm } else { -self.spring_n_per_mm };
-        self.stencil.add(elements, base, into, &(along * self.gap_mm), &(along * self.gradient.transpose()));
+        let stiffness = (along * self.gradient.transpose(), Vec3::zeros(), 0.0);
+        self.stencil.add(system, &(along * self.gap_mm, 0.0), &stiffness);
         true
     }
 

@@ -12,15 +12,9 @@
 //!
 //! and as far along the round as the model decreases.
 
-use nalgebra::Matrix3;
-
-use super::{Motion, Stencil};
+use super::{Motion, Stencil, Stiffness, System, Wrench};
 use crate::Vec3;
 use crate::contact::friction::{CHANGED, Coulomb, FrictionDerivatives, RENEWED, Slider};
-use crate::rod::{ElementData, RodState, Stencils};
-
-/// A force, N, and a moment, N·mm.
-type Wrench = (Vec3, f64);
 
 /// A contact with friction in a step.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +29,7 @@ pub(in crate::contact) struct Slipping<S> {
     /// Linearised force and moment of friction in the system at zero motion.
     at_rest: Wrench,
     /// Their derivatives in the system.
-    stiffness: (Matrix3<f64>, Vec3, f64),
+    stiffness: Stiffness,
     /// The friction that balances the rod's own stiffness.
     carried: Wrench,
     round: Round,
@@ -54,7 +48,7 @@ struct Round {
     work_mj: [f64; 2],
 }
 
-fn times((hessian, mixed, turn2): &(Matrix3<f64>, Vec3, f64), (way, turn): &Motion) -> Wrench {
+fn times((hessian, mixed, turn2): &Stiffness, (way, turn): &Motion) -> Wrench {
     (hessian * way + mixed * *turn, mixed.dot(way) + turn2 * turn)
 }
 
@@ -67,7 +61,7 @@ fn work(force: &Wrench, (way, turn): &Motion) -> f64 {
 }
 
 /// Stiffness of friction in place and angle.
-fn stiffness(f: &FrictionDerivatives) -> (Matrix3<f64>, Vec3, f64) {
+fn stiffness(f: &FrictionDerivatives) -> Stiffness {
     (f.hessian, f.mixed, f.turn2)
 }
 
@@ -102,13 +96,7 @@ impl<S: Stencil> Slipping<S> {
 
     /// Changes the system to the friction at the end of the step, where that is another one. Returns whether the
     /// difference requires another round.
-    pub(super) fn switches(
-        &mut self,
-        way: Motion,
-        law: &Coulomb,
-        (elements, base): (&[ElementData], &RodState),
-        into: &mut dyn Stencils,
-    ) -> bool {
+    pub(super) fn switches(&mut self, way: Motion, law: &Coulomb, system: &mut System<'_>) -> bool {
         self.way = way;
         let (x, angle) = plus(&self.base, 1.0, &way);
         let Some(f) = law.derivatives(&self.slider, &x, angle) else { return false };
@@ -116,11 +104,9 @@ impl<S: Stencil> Slipping<S> {
         let (off_n, largest_n) = (off.0.norm(), law.largest_n(&self.slider));
         if off_n > RENEWED * largest_n {
             let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness(&f), &way));
-            let force = plus(&at_rest, -1.0, &self.at_rest);
-            let (old_hessian, old_mixed, old_turn2) = self.stiffness;
-            self.stencil.add(elements, base, into, &force.0, &(f.hessian - old_hessian));
-            let spin = (force.1, f.turn2 - old_turn2);
-            self.stencil.add_spin(elements, base, into, &(f.mixed - old_mixed), spin);
+            let more = plus(&at_rest, -1.0, &self.at_rest);
+            let (hessian, mixed, turn2) = self.stiffness;
+            self.stencil.add(system, &more, &(f.hessian - hessian, f.mixed - mixed, f.turn2 - turn2));
             (self.at_rest, self.stiffness) = (at_rest, stiffness(&f));
         }
         off_n > CHANGED * largest_n

@@ -6,11 +6,12 @@ use nalgebra::Matrix3;
 
 use super::{LEAST_BEND_MM, ROUNDING, Reading, WallContact};
 use crate::Vec3;
-use crate::contact::friction::Coulomb;
+use crate::contact::friction::{Coulomb, unsettled};
 use crate::contact::point::FOLLOW;
-use crate::contact::regions::Stiffness;
+use crate::contact::regions;
 use crate::contact::set::{
-    ContactSet, Geometry, LinearContact, Motion, Nearby, Slipping, Stencil, merit, penalty_n_per_mm,
+    ContactSet, Geometry, LinearContact, Motion, Nearby, Slipping, Stencil, Stiffness, System, Wrench, merit,
+    penalty_n_per_mm,
 };
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
@@ -23,30 +24,17 @@ const STEEPEST: f64 = 2.0;
 pub(in crate::contact) type PointPlace = (usize, f64, usize);
 
 impl Stencil for PointPlace {
-    fn add(
-        &self,
-        elements: &[ElementData],
-        base: &RodState,
-        into: &mut dyn Stencils,
-        force_n: &Vec3,
-        stiffness: &Matrix3<f64>,
-    ) {
+    fn add(&self, to: &mut System<'_>, (force, moment): &Wrench, (hessian, mixed, turn2): &Stiffness) {
+        let System { elements, base, into } = to;
         let (e, xi, _) = *self;
-        straighten((e, xi), &elements[e], base, force_n, into);
+        straighten((e, xi), &elements[e], base, force, *into);
         let mut sum = PointSum::default();
-        sum.add(xi, force_n, Some(stiffness));
+        sum.add(xi, force, Some(hessian));
         into.add_points(base, &elements[e], e, &sum);
-    }
-
-    fn add_spin(
-        &self,
-        elements: &[ElementData],
-        base: &RodState,
-        into: &mut dyn Stencils,
-        mixed: &Vec3,
-        spin: (f64, f64),
-    ) {
-        into.add_spin(base, &elements[self.0], *self, mixed, spin);
+        // A normal force has no moment.
+        if (*moment, *turn2) != (0.0, 0.0) || *mixed != Vec3::zeros() {
+            into.add_spin(base, &elements[e], *self, mixed, (*moment, *turn2));
+        }
     }
 }
 
@@ -103,8 +91,8 @@ impl Geometry for WallContact<'_> {
         Some(self.contact(index, (d.value_mm, d.gradient), nearby.penalty_n_per_mm))
     }
 
-    fn law(&self) -> Coulomb {
-        self.friction.law
+    fn law(&mut self) -> &mut Coulomb {
+        &mut self.friction.law
     }
 
     fn find_slipping(&self, base: &RodState, into: &mut Vec<Slipping<PointPlace>>) {
@@ -126,9 +114,8 @@ impl Geometry for WallContact<'_> {
         self.least_moment_nmm / LEAST_BEND_MM
     }
 
-    fn friction_settles(&mut self) -> bool {
-        let least_n = self.least_force_n();
-        self.friction.settles(least_n)
+    fn friction_off(&self) -> f64 {
+        unsettled(self.friction.sliders.iter(), self.least_force_n())
     }
 }
 
@@ -140,13 +127,13 @@ impl WallContact<'_> {
     }
 
     /// The wall's modulus at the base position of a point.
-    fn stiffness_at_base(&self, index: usize) -> Stiffness {
+    fn stiffness_at_base(&self, index: usize) -> regions::Stiffness {
         let known = &self.cache.points[index];
         self.surface.stiffness(&known.base, known.base_piece)
     }
 
     /// κ of a point for this modulus of the wall, N/mm.
-    fn spring_with(&self, index: usize, stiffness: &Stiffness) -> f64 {
+    fn spring_with(&self, index: usize, stiffness: &regions::Stiffness) -> f64 {
         let point = &self.points[index];
         stiffness.factor * point.weight_mm * point.potential.modulus_n_per_mm2
     }

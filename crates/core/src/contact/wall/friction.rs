@@ -11,7 +11,7 @@ impl WallContact<'_> {
     }
 
     /// Renews the normal forces of friction from the contact forces at the base, unless held.
-    pub(super) fn rub_with_contacts(&mut self) {
+    pub(super) fn follow_contacts(&mut self) {
         if !self.friction.acts() {
             return;
         }
@@ -33,7 +33,7 @@ impl WallContact<'_> {
 
     /// Holds the normal forces of friction.
     pub(crate) fn hold_friction(&mut self) {
-        self.friction.hold();
+        self.friction.law.hold();
     }
 
     /// Normal forces of friction follow the contact forces again.
@@ -53,7 +53,7 @@ impl WallContact<'_> {
 
     /// Relative difference of the normal forces of friction from those of the state assembled last.
     pub(crate) fn unsettled(&self) -> f64 {
-        self.friction.unsettled(self.least_force_n())
+        self.friction_off()
     }
 
     /// Adds friction of point `index` at its base.

@@ -32,8 +32,8 @@ impl External for Pushed<'_> {
     fn sizes(&self) -> Sizes {
         self.wall.sizes()
     }
-    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
-        Some(self)
+    fn visit_contacts(&mut self, ask: &mut dyn FnMut(&mut dyn Contacts)) {
+        ask(self);
     }
 }
 

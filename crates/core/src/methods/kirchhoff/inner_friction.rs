@@ -9,7 +9,7 @@ use super::configuration::Start;
 use super::lateral::{Line, comes_out, lateral_forces};
 use super::mesh::Mesh;
 use super::search::Search;
-use crate::contact::{Between, HandMotion, InnerFriction, Place};
+use crate::contact::{Between, HandMotion, InnerFriction, Place, SETTLED};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::RodState;
@@ -110,7 +110,7 @@ impl<const C: usize> Search<'_, '_, C> {
         let renewals = self.tuning.steps.inner_renewals;
         for round in 0..=renewals {
             change = self.press(stack, mesh, &mut inner_friction);
-            let there = change < self.tuning.friction.settled && found.is_within(self.tolerance);
+            let there = change < SETTLED && found.is_within(self.tolerance);
             if !found.converged || there || round == renewals {
                 break;
             }

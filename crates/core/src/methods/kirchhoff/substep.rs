@@ -17,7 +17,7 @@ use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::Vec3;
-use crate::contact::{ContactPoint, Rubs, WallContact, least_force_n, stick_mm};
+use crate::contact::{ContactPoint, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
 
@@ -352,8 +352,7 @@ impl<const C: usize> Tools<C> {
         let is_interrupted = used_up && (effort == Effort::Flight || slides > 0);
         let near = effort != Effort::Flight && !is_interrupted;
         // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
-        let settled = tuning.friction.settled;
-        let balanced = (found.converged || (!near && found.residual < settled)) && unsettled < settled;
+        let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let goes_on =
             used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < tuning.steps.most_near;
         let wrong = Lost::of(&found, (near, goes_on), balanced, off > 1.0 && !may_snap).or_else(|| {
