@@ -169,7 +169,7 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
     std::fs::write(out.join("frames/step_999999_3d.png"), "old").unwrap();
     let said = told(&[]);
     assert!(said.contains("replaces the earlier recording in ") && said.contains("out: "), "{said}");
-    assert!(said.contains("summary.json, steps.csv, shapes.npz, 7 frames"), "{said}");
+    assert!(said.contains("summary.json, steps.csv, instruments.csv, shapes.npz, 7 frames"), "{said}");
     assert!(mine.iter().all(|name| out.join(name).exists()));
     assert!(!out.join("frames/step_999999_3d.png").exists());
 }
