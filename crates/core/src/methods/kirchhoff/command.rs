@@ -94,6 +94,7 @@ impl<const C: usize> Workspace<C> {
             let part = course.propose(way, hands);
             let at_start = environment.displaced(displaced.as_ref());
             if part.effort == Effort::Flight
+                && !part.holds_still
                 && let Err(wedged) = refuse_wedged(&at_start, was, &way.commands)
             {
                 break Err(wedged);

@@ -116,7 +116,7 @@ impl<'a> Course<'a> {
 
     /// Whether the command is done. A device that is not in equilibrium at its end goes on from there.
     pub(super) fn is_over(&self, way: &Way) -> bool {
-        let rests = self.balanced || self.control.has_tried_again();
+        let rests = self.balanced || self.control.again() == 0;
         self.is_there(way) && self.flight.is_none() && rests
     }
 

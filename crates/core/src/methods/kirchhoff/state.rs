@@ -317,22 +317,35 @@ impl Unfinished {
             true => Ok(()),
             false => Err(other(&format!("unfinished.{what}"), value, "must be finite and at least 0")),
         };
+        let count = |what: &str, value: usize| match value <= LARGEST_COUNT {
+            true => Ok(()),
+            false => {
+                Err(other(&format!("unfinished.{what}"), value, format!("must be at most {LARGEST_COUNT}")))
+            }
+        };
+        count("control.again", self.control.again())?;
         length("control.part_mm", self.control.stride().part_mm)?;
         length("control.flight_mm", self.control.flight_mm().unwrap_or(0.0))?;
         if let Some(part) = &self.part {
+            count("part.iterations", part.iterations)?;
             length("part.shift", part.shift)?;
             length("part.part_mm", part.part_mm)?;
         }
         let Some(flight) = &self.flight else { return Ok(()) };
+        count("flight.iterations", flight.iterations)?;
         length("flight.part_mm", flight.part_mm)?;
         length("flight.off", flight.off)?;
-        if flight.balance.is_some_and(|balance| !balance.is_finite()) {
+        length("flight.longest", flight.longest)?;
+        let is_finite = flight.farthest_mm.iter().all(|x| x.is_finite());
+        if !is_finite || flight.balance.is_some_and(|balance| !balance.is_finite()) {
             return Err(other("unfinished.flight", "not finite", "all its numbers must be finite"));
         }
         Ok(())
     }
 }
 
+/// Largest number of iterations or attempts in a restored state.
+const LARGEST_COUNT: usize = 1_000_000;
 /// Memory is kept for one contact in as many contact points, as few touch the wall at a time.
 pub(super) const TOUCHING: usize = 8;
 /// Rounding of the length of a unit vector.

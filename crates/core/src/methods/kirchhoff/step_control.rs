@@ -65,9 +65,9 @@ impl StepControl {
         self.again = self.again.saturating_sub(1);
     }
 
-    /// Whether it has gone on from there often enough.
-    pub(super) fn has_tried_again(&self) -> bool {
-        self.again == 0
+    /// How often it may still do so.
+    pub(super) fn again(&self) -> usize {
+        self.again
     }
 
     /// Newton iterations left.
