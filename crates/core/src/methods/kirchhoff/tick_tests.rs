@@ -145,7 +145,7 @@ fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
     let endless = text.replace("\"again\":4", "\"again\":9999999999");
     assert!(endless != text);
     let refused = restored.restore(&serde_json::from_str(&endless).unwrap()).unwrap_err().to_string();
-    assert!(refused.contains("state.unfinished.control.again = 9999999999"), "{refused}");
+    assert!(refused.contains("state.unfinished.control.again"), "{refused}");
     let hands = text.rfind("\"inserted_mm\"").unwrap();
     let wrong = format!("{}\"inserted_mm\":99.0,\"was\"{}", &text[..hands], &text[hands + 13..]);
     assert!(serde_json::from_str::<State>(&wrong).map_or(true, |state| restored.restore(&state).is_err()));
