@@ -7,7 +7,7 @@
 //!
 //! On a wall with regions ψ is multiplied by the local eˢ ([`super::regions`]), and so is the cap's.
 //!
-//! Whether a point is active does not depend on depth alone: contacts have forces of their own ([`super::set`]), for
+//! Whether a point is active does not depend on depth alone: contacts have forces of their own (`contact/set.rs`), for
 //! which Newton's method solves.
 //!
 //! A point queries the bounding volume hierarchy only when it may have come near something new: while it has moved

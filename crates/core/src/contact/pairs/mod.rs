@@ -12,7 +12,7 @@
 //! a rod cannot be bent to a radius smaller than its own. Stretches of different rods that are solved together are
 //! always distinct.
 //!
-//! Forces of pairs are unknowns ([`super::set`]), with κ = ½ w k.
+//! Forces of pairs are unknowns (`contact/set.rs`), with κ = ½ w k.
 //!
 //! **Pairs** are sought anew at every base (`tree.rs`). **No crossing**: along a step no two points of different
 //! stretches come nearer to each other by more than half their distance, by a bound on all pairs of elements, so axes
