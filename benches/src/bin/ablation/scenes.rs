@@ -2,7 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use endowire_core::methods::OwnMethod;
@@ -62,18 +62,13 @@ impl WallStore for Felt {
 
 /// All scenes of `benches/hard`, by name.
 pub(crate) fn all() -> Result<Vec<Hard>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hard");
-    let entries = std::fs::read_dir(&folder).map_err(|error| Error::file(&folder, error))?;
-    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
-    paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
-    paths.sort();
     let read = |path: PathBuf| {
         let scene = Scene::read(&path)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let apart_mm = APART_MM[usize::from(scene.vessel.wall.friction > 0.0)];
         Ok(Hard { name, apart_mm, path, scene, walls: None })
     };
-    paths.into_iter().map(read).collect()
+    endowire_benches::hard_scenes()?.into_iter().map(read).collect()
 }
 
 impl Hard {

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_core::Result;
 use endowire_core::insertion::Move;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
-use endowire_core::{Error, Result};
 use endowire_verify::sequences::APART_MM;
 
 use crate::course::Course;
@@ -124,12 +124,8 @@ pub(crate) fn lines(only: Option<&str>) -> Result<()> {
 
 /// Scenes of `benches/hard`.
 fn scenes(only: Option<&str>) -> Result<Vec<PathBuf>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hard");
-    let entries = std::fs::read_dir(&folder).map_err(|error| Error::file(&folder, error))?;
-    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
-    paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    let mut paths = endowire_benches::hard_scenes()?;
     paths.retain(|path| only.is_none_or(|only| path.to_string_lossy().contains(only)));
-    paths.sort();
     Ok(paths)
 }
 

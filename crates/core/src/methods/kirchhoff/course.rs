@@ -1,7 +1,7 @@
 //! The course of a command: which part comes next, and what has become of the parts so far.
 
 use super::Environment;
-use super::hands::{Hand, Way};
+use super::hands::{Hand, Way, largest_mm};
 use super::report::Took;
 use super::state::{Flight, KirchhoffState, UnderWay, Unfinished};
 use super::step_control::{StepControl, Stride};
@@ -76,7 +76,10 @@ impl<'a> Course<'a> {
         let travel_mm = way.travel_mm(tuning.work_rad);
         let unfinished = from.unfinished.as_deref();
         let control = match unfinished {
-            Some(unfinished) => unfinished.control.more(work(asked_mm(moves, tuning.work_rad)), most),
+            Some(unfinished) => {
+                let asked = moves.iter().map(|one| one.command);
+                unfinished.control.more(work(largest_mm(asked, tuning.work_rad)), most)
+            }
             None => {
                 let control = StepControl::new(
                     work(travel_mm.max(1.0)),
@@ -188,12 +191,12 @@ impl<'a> Course<'a> {
     /// Whether the device came to rest with energy that nobody put in, so that the part was too long: then it is
     /// shortened.
     pub(super) fn shortens(&mut self, part: &Part<'_>, found: &Found) -> bool {
-        let shortens =
-            found.lacks && !found.is_interrupted && self.control.can_shorten(part.part_mm, self.tuning);
-        if shortens && !self.change.overtakes {
+        let is_too_long = found.lacks && !found.is_interrupted && !self.change.overtakes;
+        let shortens = is_too_long && self.control.can_shorten(part.part_mm, self.tuning);
+        if shortens {
             self.control.shorten(part.part_mm);
         }
-        shortens && !self.change.overtakes
+        shortens
     }
 
     /// Takes the result of a part, in which the device hardly moved if it `lies` still, after so many iterations.
@@ -286,11 +289,4 @@ impl Rest {
     pub(super) fn write(self, state: &mut KirchhoffState) {
         (state.stride, state.behind, state.unfinished) = (self.stride, self.behind, self.unfinished);
     }
-}
-
-/// Largest motion of a hand in moves, mm; a rotation of `turn_rad` counts as one.
-fn asked_mm(moves: &[Move], turn_rad: f64) -> f64 {
-    let each =
-        moves.iter().map(|one| one.command.advance_mm.abs().max(one.command.rotate_rad.abs() / turn_rad));
-    each.fold(0.0, f64::max)
 }

@@ -81,6 +81,12 @@ pub(super) fn longest_mm(motions: &[HandMotion]) -> f64 {
     motions.iter().fold(0.0, |most_mm, hand| hand.advance_mm().abs().max(most_mm))
 }
 
+/// Largest motion in commands, mm; a rotation of `turn_rad` counts as one.
+pub(super) fn largest_mm(commands: impl Iterator<Item = Command>, turn_rad: f64) -> f64 {
+    let each = commands.map(|one| one.advance_mm.abs().max(one.rotate_rad.abs() / turn_rad));
+    each.fold(0.0, f64::max)
+}
+
 /// The lengths inserted, mm.
 pub(super) fn lengths(hands: &[Hand]) -> impl Iterator<Item = f64> {
     hands.iter().map(|hand| hand.inserted_mm)
@@ -148,10 +154,6 @@ impl Way {
 
     /// Largest remaining motion of a hand, mm; a rotation of `turn_rad` counts as one.
     pub(super) fn travel_mm(&self, turn_rad: f64) -> f64 {
-        let each = self.start.iter().zip(&self.target).map(|(hand, target)| {
-            let left = hand.to(target);
-            left.advance_mm.abs().max(left.rotate_rad.abs() / turn_rad)
-        });
-        each.fold(0.0, f64::max)
+        largest_mm(self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)), turn_rad)
     }
 }
