@@ -1,4 +1,4 @@
-//! An insertion in parts: closest points and smooth distances, the felt wall made from a surface, whole steps against the number
+//! An insertion in parts: closest points and smooth distances, the contact surface made from a surface, whole steps against the number
 //! of elements, and clones.
 #![allow(missing_docs, reason = "the macros of criterion expand to undocumented items")]
 
@@ -104,7 +104,7 @@ fn wire_in_catheter([between, wall]: [f64; 2]) -> Result<Simulation> {
     };
     let catheter = Section { inner_radius_mm: Some(0.3), ..Section::straight(200.0, RADIUS_MM, 10.0) };
     let both = vec![one("wire", Section::straight(230.0, 0.2, 10.0))?, one("catheter", catheter)?];
-    let stack = Stack::new(both)?.rubbing(vec![between, 0.0])?;
+    let stack = Stack::new(both)?.with_friction(vec![between, 0.0])?;
     let method = KirchhoffOptions { element_mm: INSERTED_MM / 512.0, ..Default::default() };
     let properties = WallProperties { friction: wall, ..Default::default() };
     let mut simulation =

@@ -63,8 +63,8 @@ impl Wire {
 }
 
 /// A surface file, `FILE` or `FILE@UNIT_MM`.
-fn read(told: &str) -> Result<Wall> {
-    let (file, unit) = told.rsplit_once('@').unwrap_or((told, "1"));
+fn read(reported: &str) -> Result<Wall> {
+    let (file, unit) = reported.rsplit_once('@').unwrap_or((reported, "1"));
     let unit_mm = unit.parse().map_err(|_| Error::parameter("UNIT_MM", unit, "must be a number"))?;
     Wall::from_surface(&SurfaceMesh::read(Path::new(file), SurfaceFrame { unit_mm, axes: None })?)
 }
@@ -91,12 +91,12 @@ fn follow(name: &str, wall: &Wall, inlet: usize) -> Result<[usize; 2]> {
             Ok(())
         })?;
         reached += usize::from(matches!(outcome, Outcome::Arrived));
-        let told = match outcome {
+        let reported = match outcome {
             Outcome::Failed(error) => format!("failed: {error}"),
             other => format!("{other:?}").to_lowercase(),
         };
         println!(
-            "{name:<24} {:<12} {length_mm:>8.0} mm {narrow_mm:>7.2} mm {steps:>6} {:>8}  {told}",
+            "{name:<24} {:<12} {length_mm:>8.0} mm {narrow_mm:>7.2} mm {steps:>6} {:>8}  {reported}",
             target.name,
             hand.retries()
         );

@@ -35,7 +35,8 @@ fn main() -> Result<ExitCode> {
         match Row::new(number) {
             Ok(row) => {
                 agree += u64::from(row.against.is_none());
-                *ends.entry(format!("{:?} and {:?}", row.told.passage, row.pushed.ended)).or_default() += 1;
+                *ends.entry(format!("{:?} and {:?}", row.reported.passage, row.pushed.ended)).or_default() +=
+                    1;
                 println!("{row}");
             }
             Err(error) => println!("{number:>4}  AGAINST: {error}"),

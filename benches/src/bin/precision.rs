@@ -129,9 +129,9 @@ impl Setting {
     }
 }
 
-/// What a run told of each command, and the time, s, and iterations of all.
+/// What a run reported of each command, and the time, s, and iterations of all.
 struct Run {
-    told: Vec<Told>,
+    reported: Vec<Told>,
     seconds: f64,
     iterations: u64,
 }
@@ -155,7 +155,7 @@ impl Run {
     fn of(scene: &Scene, mut simulation: Simulation) -> Result<Self> {
         let script = scene.steps(simulation.stack(), &NoStore)?;
         let mut script = script.begin();
-        let mut run = Self { told: Vec::new(), seconds: 0.0, iterations: 0 };
+        let mut run = Self { reported: Vec::new(), seconds: 0.0, iterations: 0 };
         while let Some(step) = script.next(&simulation)? {
             let begun = Instant::now();
             let done = step.carry_out(&mut simulation).map(|report| (report.push_force_n, report.iterations));
@@ -169,27 +169,30 @@ impl Run {
             let line = simulation.shape();
             let count = (report.inserted_mm / PLACES_MM) as usize;
             let line_mm = (0..count).filter_map(|k| line.position_at(PLACES_MM * k as f64)).collect();
-            run.told.push(Told { hands, line_mm, push_force_n });
+            run.reported.push(Told { hands, line_mm, push_force_n });
         }
         Ok(run)
     }
 
     /// How far it is off another: lines, mm, at nine of ten commands and at most, and push forces at nine of ten, over the largest.
     fn off(&self, exact: &Self) -> [f64; 3] {
-        let largest_n =
-            exact.told.iter().map(|told| told.push_force_n.abs()).fold(f64::MIN_POSITIVE, f64::max);
+        let largest_n = exact
+            .reported
+            .iter()
+            .map(|reported| reported.push_force_n.abs())
+            .fold(f64::MIN_POSITIVE, f64::max);
         let (mut lines, mut pushes) = (Vec::new(), Vec::new());
         // Hands go to and fro: of commands with the same place, the next.
-        let mut rest = exact.told.iter();
-        for told in &self.told {
+        let mut rest = exact.reported.iter();
+        for reported in &self.reported {
             let ahead = rest.clone();
-            let Some(same) = rest.find(|other| told.same_hands(other)) else {
+            let Some(same) = rest.find(|other| reported.same_hands(other)) else {
                 rest = ahead;
                 continue;
             };
-            let apart = told.line_mm.iter().zip(&same.line_mm).map(|(a, b)| (a - b).norm());
+            let apart = reported.line_mm.iter().zip(&same.line_mm).map(|(a, b)| (a - b).norm());
             lines.push(apart.fold(0.0, f64::max));
-            pushes.push((told.push_force_n - same.push_force_n).abs() / largest_n);
+            pushes.push((reported.push_force_n - same.push_force_n).abs() / largest_n);
         }
         lines.sort_by(f64::total_cmp);
         pushes.sort_by(f64::total_cmp);
@@ -208,8 +211,8 @@ fn main() -> Result<()> {
     let chosen: Vec<&str> =
         SCENES.into_iter().filter(|name| only.as_deref().is_none_or(|only| name.contains(only))).collect();
     if chosen.is_empty() {
-        let mend = format!("is in none of {}", SCENES.join(", "));
-        return Err(Error::parameter("SCENE", only.unwrap_or_default(), mend));
+        let remedy = format!("is in none of {}", SCENES.join(", "));
+        return Err(Error::parameter("SCENE", only.unwrap_or_default(), remedy));
     }
     println!("scene\tsetting\tms\titerations\toff_90_mm\toff_most_mm\tpush_90\tcommands");
     for path in chosen {
@@ -221,12 +224,12 @@ fn main() -> Result<()> {
             let run = setting.run(&path, RUNS)?;
             let stepped = (setting.steps - 1.0).abs() > f64::EPSILON;
             let [near, most, push] = run.off(if stepped { &exact_steps } else { &exact });
-            let commands = run.told.len().max(1) as f64;
+            let commands = run.reported.len().max(1) as f64;
             println!(
                 "{name}\t{of}\t{:.4}\t{:.2}\t{near:.5}\t{most:.4}\t{push:.5}\t{}",
                 1e3 * run.seconds / commands,
                 run.iterations as f64 / commands,
-                run.told.len(),
+                run.reported.len(),
             );
         }
     }

@@ -49,8 +49,8 @@ fn values(entry: &str, asked: impl IntoIterator<Item = Asked>) -> Result<()> {
     match asked.into_iter().find(|(_, value, must)| !must.holds(*value)) {
         None => Ok(()),
         Some((key, value, must)) => {
-            let mend = format!("{}, and at most {LARGEST:e} in size", must.words());
-            Err(Error::parameter(format!("{entry}.{key}"), value, mend))
+            let remedy = format!("{}, and at most {LARGEST:e} in size", must.words());
+            Err(Error::parameter(format!("{entry}.{key}"), value, remedy))
         }
     }
 }
@@ -62,8 +62,8 @@ pub(crate) fn place(name: &str, place: Option<Vec3>) -> Result<()> {
         None => Ok(()),
         Some(place) => {
             let value = format!("[{}, {}, {}]", number(place.x), number(place.y), number(place.z));
-            let mend = format!("must be three finite numbers, from -{FARTHEST_MM} to {FARTHEST_MM}");
-            Err(Error::parameter(name, value, mend))
+            let remedy = format!("must be three finite numbers, from -{FARTHEST_MM} to {FARTHEST_MM}");
+            Err(Error::parameter(name, value, remedy))
         }
     }
 }
@@ -73,10 +73,10 @@ pub(crate) fn forward(list: &str, times_s: impl Iterator<Item = (usize, f64)>) -
     let mut before_s = 0.0;
     for (number, time_s) in times_s {
         if time_s < before_s {
-            let mend = format!(
+            let remedy = format!(
                 "comes after {before_s}: put {list} in order of time, or leave out what is not of this session"
             );
-            return Err(Error::parameter(format!("{list}[{number}].time_s"), time_s, mend));
+            return Err(Error::parameter(format!("{list}[{number}].time_s"), time_s, remedy));
         }
         before_s = time_s;
     }
@@ -89,16 +89,16 @@ fn named(key: String, name: &str, names: &[String]) -> Result<()> {
         return Ok(());
     }
     let nearest = nearest_name(names.iter().map(String::as_str), name).unwrap_or_default();
-    let mend =
+    let remedy =
         format!("is no instrument of the record, which has {}; did you mean {nearest:?}?", names.join(", "));
-    Err(Error::parameter(key, format!("{name:?}"), mend))
+    Err(Error::parameter(key, format!("{name:?}"), remedy))
 }
 
 /// Refuses a record in which nothing was done.
 pub(crate) fn done(record: &Record) -> Result<()> {
     if record.is_empty() {
-        let mend = "nothing was done: give a session in which time went by";
-        return Err(Error::parameter("samples", "[]", mend));
+        let remedy = "nothing was done: give a session in which time went by";
+        return Err(Error::parameter("samples", "[]", remedy));
     }
     Ok(())
 }
@@ -108,8 +108,8 @@ pub(crate) fn samples(record: &Record) -> Result<()> {
     let Record { instruments, samples, .. } = record;
     for (index, name) in instruments.iter().enumerate() {
         if name.is_empty() || instruments[..index].contains(name) {
-            let mend = "each instrument has a name of its own";
-            return Err(Error::parameter(format!("instruments[{index}]"), format!("{name:?}"), mend));
+            let remedy = "each instrument has a name of its own";
+            return Err(Error::parameter(format!("instruments[{index}]"), format!("{name:?}"), remedy));
         }
     }
     for (index, one) in samples.iter().enumerate() {
@@ -117,8 +117,8 @@ pub(crate) fn samples(record: &Record) -> Result<()> {
         let hands = one.hands.len();
         if hands != instruments.len().max(1) {
             let named = if instruments.is_empty() { "no names".to_owned() } else { instruments.join(", ") };
-            let mend = format!("must be one for each of instruments, which has {named}");
-            return Err(Error::parameter(format!("{entry}.hands"), format!("{hands} hands"), mend));
+            let remedy = format!("must be one for each of instruments, which has {named}");
+            return Err(Error::parameter(format!("{entry}.hands"), format!("{hands} hands"), remedy));
         }
         sample(&entry, one)?;
         one.packing.iter().try_for_each(|packed| self::packed(&entry, packed))?;
@@ -204,11 +204,11 @@ pub(crate) fn in_scene(record: &Record, stack: &Stack) -> Result<()> {
     // Recordings of a single device need not name it.
     let unnamed = record.instruments.is_empty() && !stack.is_several();
     if record.instruments != names && !unnamed {
-        let mend = format!(
+        let remedy = format!(
             "the scene has [{}]: give the record of this scene (of a run, its folder with instruments.csv)",
             names.join(", ")
         );
-        return Err(Error::parameter("instruments", format!("[{}]", record.instruments.join(", ")), mend));
+        return Err(Error::parameter("instruments", format!("[{}]", record.instruments.join(", ")), remedy));
     }
     for (index, one) in record.injections.iter().enumerate() {
         if let Some(name) = one.outlet.as_ref().and_then(|outlet| outlet.instrument.as_ref()) {
@@ -220,8 +220,8 @@ pub(crate) fn in_scene(record: &Record, stack: &Stack) -> Result<()> {
             let length_mm = one.device.length_mm();
             if hand.inserted_mm > length_mm + SLACK_MM {
                 let name = format!("samples[{index}].hands[{number}].inserted_mm");
-                let mend = format!("{} is {length_mm} mm long: give the record of this scene", one.name);
-                return Err(Error::parameter(name, hand.inserted_mm, mend));
+                let remedy = format!("{} is {length_mm} mm long: give the record of this scene", one.name);
+                return Err(Error::parameter(name, hand.inserted_mm, remedy));
             }
         }
     }
@@ -231,8 +231,8 @@ pub(crate) fn in_scene(record: &Record, stack: &Stack) -> Result<()> {
 /// Checks a log of the beam. Without any state it says nothing about the beam, not that it was off.
 pub(crate) fn beam(beam: &[BeamState]) -> Result<()> {
     if beam.is_empty() {
-        let mend = "no state of the beam: give one for each change, or leave the log out if the beam was not recorded";
-        return Err(Error::parameter("beam", "empty", mend));
+        let remedy = "no state of the beam: give one for each change, or leave the log out if the beam was not recorded";
+        return Err(Error::parameter("beam", "empty", remedy));
     }
     for (index, state) in beam.iter().enumerate() {
         values(

@@ -138,8 +138,8 @@ impl Line {
         });
         let rises = rises(&only);
         let chance = (only.len() > 1).then(|| chance(&only, rises.unsigned_abs()));
-        let told = chance.is_some_and(|chance| chance <= CHANCE);
-        let trend = match (told, (rises > 0) == (better == Better::Higher)) {
+        let reported = chance.is_some_and(|chance| chance <= CHANCE);
+        let trend = match (reported, (rises > 0) == (better == Better::Higher)) {
             (false, _) => Trend::None,
             (true, true) => Trend::Better,
             (true, false) => Trend::Worse,

@@ -64,9 +64,9 @@ pub(crate) fn read(folder: &Path) -> Result<Record> {
 pub(crate) fn read_in_scene(folder: &Path) -> Result<SessionFile> {
     let named = summary(folder)?.and_then(|summary| Some((summary.scene_file?, summary.set)));
     let Some((scene_file, set)) = named else {
-        let mend =
+        let remedy =
             "says which scene the run is of, and is missing or names none; give the folder of a recorded run";
-        return Err(Error::content(&folder.join(SUMMARY), mend));
+        return Err(Error::content(&folder.join(SUMMARY), remedy));
     };
     Ok(SessionFile { scene_file, set, recorded_unix_s: None, record: read(folder)? })
 }
@@ -317,7 +317,7 @@ fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>> {
     let mut reader = csv::Reader::from_reader(text.as_slice());
     let columns = reader.headers().cloned().unwrap_or_default();
     let rows: std::result::Result<_, _> = reader.into_deserialize().collect();
-    rows.map_err(|error| Error::content(path, format!("{}; {}", wrong_row(&error, &columns), mend(path))))
+    rows.map_err(|error| Error::content(path, format!("{}; {}", wrong_row(&error, &columns), remedy(path))))
 }
 
 /// What is wrong with a row: its line, its column if that is known, and the reason.
@@ -330,7 +330,7 @@ fn wrong_row(error: &csv::Error, columns: &csv::StringRecord) -> String {
 }
 
 /// The remedy for a table with an invalid row.
-fn mend(path: &Path) -> &'static str {
+fn remedy(path: &Path) -> &'static str {
     if path.file_name().is_some_and(|name| name == BEAM) {
         return "a row of this log has time_s, on (true or false), frames_per_s, dose_ngy, field_mm2, primary_deg and secondary_deg";
     }

@@ -98,8 +98,8 @@ impl Goal {
         in_range("goal.inject_ml", asked, LARGEST)?;
         match contrast_ml {
             Some(most) if asked > most => {
-                let mend = format!("more than limits.contrast_ml = {most}: raise that, or ask for less");
-                Err(Error::parameter("goal.inject_ml", asked, mend))
+                let remedy = format!("more than limits.contrast_ml = {most}: raise that, or ask for less");
+                Err(Error::parameter("goal.inject_ml", asked, remedy))
             }
             _ => Ok(()),
         }

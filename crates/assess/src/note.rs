@@ -21,16 +21,16 @@ impl Record {
             |tip_mm: Option<Vec3>| displacement.as_ref().zip(tip_mm).map(|(now, tip)| now.material(&tip));
         // With a single device, its tip is already recorded as the foremost tip.
         let tip_of = |index: usize| (instruments.len() > 1).then(|| simulation.tip_of_mm(index)).flatten();
-        let hands = report.hands().into_iter().enumerate().map(|(index, told)| {
+        let hands = report.hands().into_iter().enumerate().map(|(index, reported)| {
             let moved = moves.iter().find(|one| one.instrument == index);
             let Command { advance_mm, rotate_rad } = moved.map(|one| one.command).unwrap_or_default();
             let tip_mm = tip_of(index);
             Hand {
                 advance_mm,
                 rotate_rad,
-                inserted_mm: told.inserted_mm,
-                push_force_n: told.push_force_n,
-                torque_nmm: told.torque_nmm,
+                inserted_mm: reported.inserted_mm,
+                push_force_n: reported.push_force_n,
+                torque_nmm: reported.torque_nmm,
                 tip_mm,
                 tip_at_rest_mm: at_rest(tip_mm),
             }

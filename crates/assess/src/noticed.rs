@@ -59,8 +59,8 @@ impl Noticed {
         Self { what, from_s: time_s, to_s: time_s, text }
     }
 
-    fn during(what: NoticedKind, (from_s, to_s): Stretch, told: &str) -> Self {
-        Self { what, from_s, to_s, text: format!("{told} for {:.1} s", to_s - from_s) }
+    fn during(what: NoticedKind, (from_s, to_s): Stretch, reported: &str) -> Self {
+        Self { what, from_s, to_s, text: format!("{reported} for {:.1} s", to_s - from_s) }
     }
 }
 
@@ -87,13 +87,13 @@ fn largest(record: &Record) -> impl Iterator<Item = Noticed> {
             .reduce(|a, b| if of(b) > of(a) { b } else { a })
             .map(|one| (one.time_s, of(one)))
     };
-    let told = [
+    let reported = [
         (NoticedKind::WallForce, "the largest sum of wall forces", most(|sample| sample.wall_force_n)),
         (NoticedKind::TipForce, "the largest wall force at the tip", most(|sample| sample.tip_force_n)),
     ];
-    told.into_iter().filter_map(|(what, told, most)| {
+    reported.into_iter().filter_map(|(what, reported, most)| {
         let (time_s, force_n) = most.filter(|(_, force_n)| *force_n > AGAINST_WALL_N)?;
-        Some(Noticed::at(what, time_s, format!("{told}: {force_n:.3} N")))
+        Some(Noticed::at(what, time_s, format!("{reported}: {force_n:.3} N")))
     })
 }
 
@@ -104,12 +104,13 @@ fn jumps(record: &Record) -> Vec<Noticed> {
         rest if rest > 0 && number + 1 == MOST => format!(", and {rest} more times later"),
         _ => String::new(),
     };
-    let told = at.iter().take(MOST).enumerate();
-    told.map(|(number, time_s)| {
-        let text = format!("the device snapped to another equilibrium{}", more(number));
-        Noticed::at(NoticedKind::Jumped, *time_s, text)
-    })
-    .collect()
+    let reported = at.iter().take(MOST).enumerate();
+    reported
+        .map(|(number, time_s)| {
+            let text = format!("the device snapped to another equilibrium{}", more(number));
+            Noticed::at(NoticedKind::Jumped, *time_s, text)
+        })
+        .collect()
 }
 
 /// The stretches of the samples that satisfy a condition.
@@ -125,16 +126,16 @@ fn wrong_branches(record: &Record, way: &Way) -> Vec<Noticed> {
     let wrong =
         |sample: &Sample| sample.on_centreline_mm().is_some_and(|tip| way.wrong_branch(&tip).is_some());
     let stretches = longest(joined(while_samples(record, wrong), 0.0), 0.0, MOST);
-    let told = |stretch| Noticed::during(NoticedKind::WrongBranch, stretch, "in a wrong branch");
-    stretches.into_iter().map(told).collect()
+    let reported = |stretch| Noticed::during(NoticedKind::WrongBranch, stretch, "in a wrong branch");
+    stretches.into_iter().map(reported).collect()
 }
 
 fn ahead(record: &Record) -> Vec<Noticed> {
     let stretches = longest(joined(while_samples(record, Sample::is_ahead), 0.0), UNSEEN_S, MOST);
-    let told = |stretch| {
+    let reported = |stretch| {
         Noticed::during(NoticedKind::CatheterAhead, stretch, "an instrument ahead of the one in it")
     };
-    stretches.into_iter().map(told).collect()
+    stretches.into_iter().map(reported).collect()
 }
 
 /// Stretches of beam without motion, and of motion without beam; none if the beam was not recorded.
@@ -147,23 +148,23 @@ fn beam(record: &Record) -> Vec<Noticed> {
     let off = joined([(0.0, dark)].into_iter().chain(of(false)), 0.0);
     let moves = joined(while_samples(record, |sample| !sample.rests()), APART_S);
     let rests = joined(while_samples(record, Sample::rests), 0.0);
-    let told = |what, told: &'static str, stretches: Vec<Stretch>| {
-        stretches.into_iter().map(move |stretch| Noticed::during(what, stretch, told))
+    let reported = |what, reported: &'static str, stretches: Vec<Stretch>| {
+        stretches.into_iter().map(move |stretch| Noticed::during(what, stretch, reported))
     };
     let idle = longest(common(&rests, &of(true)), IDLE_S, MOST);
     let unseen = longest(common(&moves, &off), UNSEEN_S, MOST);
-    told(NoticedKind::IdleBeam, "the beam on and no hand moving", idle)
-        .chain(told(NoticedKind::Unseen, "a hand moving and the beam off", unseen))
+    reported(NoticedKind::IdleBeam, "the beam on and no hand moving", idle)
+        .chain(reported(NoticedKind::Unseen, "a hand moving and the beam off", unseen))
         .collect()
 }
 
 fn against_wall(record: &Record) -> Vec<Noticed> {
     let held = record.injections.iter().filter(|one| record.is_against_wall(one) == Some(true)).take(MOST);
-    let told = held.map(|one| {
+    let reported = held.map(|one| {
         let text = format!("{} ml injected with the tip held by a wall", one.volume_ml);
         Noticed::at(NoticedKind::AgainstWall, one.time_s, text)
     });
-    told.collect()
+    reported.collect()
 }
 
 /// The longest pull-backs without a push in between.
@@ -188,10 +189,10 @@ fn pulls(record: &Record) -> Vec<Noticed> {
     all.retain(|(mm, ..)| *mm >= PULLED_MM);
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.truncate(MOST);
-    let told = |(mm, (from_s, to_s), hand): (f64, Stretch, usize)| {
+    let reported = |(mm, (from_s, to_s), hand): (f64, Stretch, usize)| {
         let of = record.instruments.get(hand).map_or_else(String::new, |name| format!(" of {name}"));
         let text = format!("{mm:.0} mm{of} pulled back in {:.1} s", to_s - from_s);
         Noticed { what: NoticedKind::PulledBack, from_s, to_s, text }
     };
-    all.into_iter().map(told).collect()
+    all.into_iter().map(reported).collect()
 }

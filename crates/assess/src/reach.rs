@@ -42,14 +42,14 @@ impl Reach {
     pub(crate) fn new(goal: &Goal, site: &Site<'_>) -> Result<Self> {
         let way = match goal {
             Goal::Place(PlaceGoal { inject_ml: Some(ml), .. }) if site.all_solid => {
-                let mend = "no instrument has a lumen through which medium can be injected there: give inner_radius_mm to one in the scene, or leave this out";
-                return Err(Error::parameter("goal.inject_ml", ml, mend));
+                let remedy = "no instrument has a lumen through which medium can be injected there: give inner_radius_mm to one in the scene, or leave this out";
+                return Err(Error::parameter("goal.inject_ml", ml, remedy));
             }
             Goal::Place(goal) => Some(way_to(goal, site)?),
             Goal::Packing(_) if site.has_sac => None,
             Goal::Packing(PackingGoal { packing_density }) => {
-                let mend = "there is no sac that coils fill: give [vessel.sac] in the scene";
-                return Err(Error::parameter("goal.packing_density", packing_density, mend));
+                let remedy = "there is no sac that coils fill: give [vessel.sac] in the scene";
+                return Err(Error::parameter("goal.packing_density", packing_density, remedy));
             }
         };
         Ok(Self { goal: goal.clone(), way, there_since_s: None, injected_there_ml: 0.0 })
@@ -59,20 +59,20 @@ impl Reach {
     pub(crate) fn check(&self, record: &Record) -> Result<()> {
         match &self.goal {
             Goal::Packing(goal) if record.samples.iter().all(|sample| sample.packing.is_none()) => {
-                let mend = "the record does not tell what coils fill: it is of another scene, or of an earlier version; record it again";
-                Err(Error::parameter("goal.packing_density", goal.packing_density, mend))
+                let remedy = "the record does not tell what coils fill: it is of another scene, or of an earlier version; record it again";
+                Err(Error::parameter("goal.packing_density", goal.packing_density, remedy))
             }
             Goal::Place(PlaceGoal { inject_ml: Some(ml), .. })
                 if record.injections.iter().any(|one| one.outlet.is_none()) =>
             {
-                let mend = "the record does not tell where medium was injected: it is of an earlier version; record it again";
-                Err(Error::parameter("goal.inject_ml", ml, mend))
+                let remedy = "the record does not tell where medium was injected: it is of an earlier version; record it again";
+                Err(Error::parameter("goal.inject_ml", ml, remedy))
             }
             Goal::Place(PlaceGoal { instrument: Some(name), .. }) => {
                 // A single device is its own foremost tip.
                 let Some(hand) = self.way.as_ref().and_then(|way| way.instrument) else { return Ok(()) };
                 let refuse =
-                    |mend: String| Err(Error::parameter("goal.instrument", format!("{name:?}"), mend));
+                    |remedy: String| Err(Error::parameter("goal.instrument", format!("{name:?}"), remedy));
                 if record.instruments.get(hand) != Some(name) {
                     let known = match record.instruments.as_slice() {
                         [] => "names no instruments".to_owned(),
@@ -141,7 +141,7 @@ impl Reach {
 
 /// The way to the goal's target, for the tip that the goal names.
 fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
-    let refuse = |value: String, mend: String| Error::parameter("goal.target", value, mend);
+    let refuse = |value: String, remedy: String| Error::parameter("goal.target", value, remedy);
     let target = format!("{:?}", goal.target);
     let Some(tree) = site.tree else {
         return Err(refuse(target, "is a point of a centre line: give that of the vessel".to_owned()));
@@ -149,14 +149,14 @@ fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
     let way = match Way::to_target(tree, &goal.target, goal.tip_within_mm) {
         Ok(Some(way)) => way,
         Ok(None) => {
-            let mend = "is where the centre line begins: name a point farther on".to_owned();
-            return Err(refuse(target, mend));
+            let remedy = "is where the centre line begins: name a point farther on".to_owned();
+            return Err(refuse(target, remedy));
         }
-        Err(Error::Parameter { value, mend, .. }) => return Err(refuse(value, mend)),
+        Err(Error::Parameter { value, remedy, .. }) => return Err(refuse(value, remedy)),
         Err(other) => return Err(other),
     };
     let Some(name) = &goal.instrument else { return Ok(way) };
-    let refuse = |mend: String| Error::parameter("goal.instrument", format!("{name:?}"), mend);
+    let refuse = |remedy: String| Error::parameter("goal.instrument", format!("{name:?}"), remedy);
     match site.instruments.iter().position(|one| one == name) {
         Some(hand) if site.instruments.len() > 1 => Ok(way.for_instrument(hand)),
         // Its tip is the foremost one.
@@ -166,12 +166,12 @@ fn way_to(goal: &PlaceGoal, site: &Site<'_>) -> Result<Way> {
         )),
         None => {
             let nearest = nearest_name(site.instruments.iter().map(String::as_str), name);
-            let mend = format!(
+            let remedy = format!(
                 "is no instrument of the scene: name one of {}{}",
                 site.instruments.join(", "),
                 nearest.map_or_else(String::new, |nearest| format!("; did you mean {nearest:?}?"))
             );
-            Err(refuse(mend))
+            Err(refuse(remedy))
         }
     }
 }

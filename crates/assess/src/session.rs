@@ -74,14 +74,14 @@ impl SessionFile {
             _ => self.scene_file.file_name() == scene.file_name(),
         };
         if !same || !counted(&self.set).eq(counted(set)) {
-            let told = |scene: &Path, set: &[String]| {
+            let reported = |scene: &Path, set: &[String]| {
                 let set: String = set.iter().map(|setting| format!(" --set '{setting}'")).collect();
                 format!("{}{set}", scene.display())
             };
             let refused = format!(
                 "was recorded in {}, and the subject is in {}: name the subject that it was recorded with",
-                told(&self.scene_file, &self.set),
-                told(scene, set)
+                reported(&self.scene_file, &self.set),
+                reported(scene, set)
             );
             return Err(Error::content(path, refused));
         }

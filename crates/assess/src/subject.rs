@@ -118,48 +118,48 @@ impl Threshold {
     fn check(&self, key: &str, metrics: &[Metric]) -> Result<()> {
         let Some(metric) = metrics.iter().find(|metric| metric.name == self.metric) else {
             let nearest = nearest_name(metrics.iter().map(|metric| metric.name), &self.metric);
-            let mend = format!(
+            let remedy = format!(
                 "is no measure; did you mean {:?}? `endowire assess` lists all of them",
                 nearest.unwrap_or_default()
             );
-            return Err(Error::parameter(format!("{key}.metric"), format!("{:?}", self.metric), mend));
+            return Err(Error::parameter(format!("{key}.metric"), format!("{:?}", self.metric), remedy));
         };
         let (right, wrong, limit, other) = match metric.better {
             Better::Lower => ("at_most", "at_least", self.at_most, self.at_least),
             Better::Higher => ("at_least", "at_most", self.at_least, self.at_most),
         };
         if let Some(other) = other {
-            let mend = format!("of {} {} is better: give {right}", metric.name, metric.better.words());
-            return Err(Error::parameter(format!("{key}.{wrong}"), other, mend));
+            let remedy = format!("of {} {} is better: give {right}", metric.name, metric.better.words());
+            return Err(Error::parameter(format!("{key}.{wrong}"), other, remedy));
         }
         if let Some((most, least)) =
             largest(metric.name).zip(self.at_least).filter(|(most, least)| least > most)
         {
-            let mend = format!(
+            let remedy = format!(
                 "{} is never above {most}, and no session would pass: give that or less",
                 metric.name
             );
-            return Err(Error::parameter(format!("{key}.at_least"), least, mend));
+            return Err(Error::parameter(format!("{key}.at_least"), least, remedy));
         }
         match limit {
             // What is better when lower counts or measures something, which is never below 0.
             Some(limit) if metric.better == Better::Lower && limit < 0.0 => {
-                let mend =
+                let remedy =
                     format!("{} is never below 0, and no session would pass: give 0 or more", metric.name);
-                return Err(Error::parameter(format!("{key}.{right}"), limit, mend));
+                return Err(Error::parameter(format!("{key}.{right}"), limit, remedy));
             }
             Some(limit) if limit.is_finite() => {}
             Some(limit) => {
                 return Err(Error::parameter(format!("{key}.{right}"), limit, "must be a finite number"));
             }
             None => {
-                let mend = format!("which value of {} is asked for? give {right}", metric.name);
-                return Err(Error::parameter(format!("{key}.{right}"), "none", mend));
+                let remedy = format!("which value of {} is asked for? give {right}", metric.name);
+                return Err(Error::parameter(format!("{key}.{right}"), "none", remedy));
             }
         }
         if !(0.0..=LARGEST).contains(&self.points) {
-            let mend = format!("must be a number from 0 to {LARGEST}; with 0 it is only reported");
-            return Err(Error::parameter(format!("{key}.points"), self.points, mend));
+            let remedy = format!("must be a number from 0 to {LARGEST}; with 0 it is only reported");
+            return Err(Error::parameter(format!("{key}.points"), self.points, remedy));
         }
         Ok(())
     }
@@ -177,8 +177,8 @@ impl Subject {
         let reference = subject.reference.iter().map(|file| ("reference", file));
         for (key, file) in std::iter::once(("scene", &subject.scene)).chain(reference) {
             if !subject.resolve(file).is_file() {
-                let mend = format!("there is no such file from {}: name one", subject.folder().display());
-                let error = Error::parameter(key, format!("{:?}", file.display().to_string()), mend);
+                let remedy = format!("there is no such file from {}: name one", subject.folder().display());
+                let error = Error::parameter(key, format!("{:?}", file.display().to_string()), remedy);
                 return Err(Error::content(path, error.to_string()));
             }
         }
@@ -216,8 +216,8 @@ impl Subject {
             }
         }
         if !LEVELS.contains(&self.level) {
-            let mend = format!("must be from {} to {}", LEVELS.start(), LEVELS.end());
-            return Err(Error::parameter("level", self.level, mend));
+            let remedy = format!("must be from {} to {}", LEVELS.start(), LEVELS.end());
+            return Err(Error::parameter("level", self.level, remedy));
         }
         let Self { goal, limits, .. } = self;
         goal.check(limits.contrast_ml)?;
@@ -233,16 +233,16 @@ impl Subject {
         for (index, threshold) in self.threshold.iter().enumerate() {
             threshold.check(&format!("threshold[{index}]"), &metrics)?;
             if self.threshold[..index].iter().any(|before| before.metric == threshold.metric) {
-                let mend = "has a threshold already: keep one of the two";
+                let remedy = "has a threshold already: keep one of the two";
                 let key = format!("threshold[{index}].metric");
-                return Err(Error::parameter(key, format!("{:?}", threshold.metric), mend));
+                return Err(Error::parameter(key, format!("{:?}", threshold.metric), remedy));
             }
             let limit = limits.of(&threshold.metric).zip(threshold.at_most);
             if let Some(((limit, ends_at), most)) = limit.filter(|((_, ends_at), most)| most > ends_at) {
-                let mend = format!(
+                let remedy = format!(
                     "is never missed, since {limit} = {ends_at} ends the subject before: give at most that, or raise the limit"
                 );
-                return Err(Error::parameter(format!("threshold[{index}].at_most"), most, mend));
+                return Err(Error::parameter(format!("threshold[{index}].at_most"), most, remedy));
             }
         }
         Ok(())
@@ -255,8 +255,8 @@ impl Subject {
         });
         match never.next() {
             None => Ok(()),
-            Some((index, metric, mend)) => {
-                Err(Error::parameter(format!("threshold[{index}].metric"), format!("{metric:?}"), mend))
+            Some((index, metric, remedy)) => {
+                Err(Error::parameter(format!("threshold[{index}].metric"), format!("{metric:?}"), remedy))
             }
         }
     }

@@ -103,8 +103,8 @@ fn each_measure_is_what_it_says() {
     assert!(value("spectral_arc_length").unwrap() < -1.0);
     assert_eq!(value("catheter_ahead_s"), None, "of one instrument");
     assert_eq!((value("packing_density"), value("coil_outside_mm")), (None, None), "without a sac");
-    let told: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
-    assert_eq!(told.len(), by_hand.len() + 4);
+    let reported: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
+    assert_eq!(reported.len(), by_hand.len() + 4);
     assert!(Group::ALL.iter().all(|group| metrics.iter().any(|metric| metric.group == *group)));
 }
 

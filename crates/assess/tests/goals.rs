@@ -78,10 +78,10 @@ fn the_tip_of_a_named_instrument_is_waited_for() {
 #[test]
 fn in_a_vessel_that_moves_the_place_at_rest_counts() {
     let mut moved = record();
-    let aside = Vec3::new(0.0, 12.0, 0.0);
+    let lateral = Vec3::new(0.0, 12.0, 0.0);
     for hand in moved.samples.iter_mut().flat_map(|sample| &mut sample.hands) {
         hand.tip_at_rest_mm = hand.tip_mm;
-        hand.tip_mm = hand.tip_mm.map(|tip| tip + aside);
+        hand.tip_mm = hand.tip_mm.map(|tip| tip + lateral);
     }
     let exam = exam(CATHETER, false).unwrap();
     assert_eq!(end(&exam.clone().score(&moved)), Some((EndedBy::Goal, 7.0)));
@@ -114,25 +114,25 @@ fn a_sac_is_packed_when_coils_fill_what_was_asked() {
 
 #[test]
 fn a_record_that_does_not_tell_is_refused() {
-    let told = |exam: &Exam, record: &Record| exam.check(record).unwrap_err().to_string();
+    let reported = |exam: &Exam, record: &Record| exam.check(record).unwrap_err().to_string();
     let catheter = exam(CATHETER, false).unwrap();
     assert!(catheter.check(&record()).is_ok());
     let mut old = record();
     old.samples.iter_mut().flat_map(|sample| &mut sample.hands).for_each(|hand| hand.tip_mm = None);
-    let error = told(&catheter, &old);
+    let error = reported(&catheter, &old);
     assert!(error.contains("goal.toml: goal.instrument = \"catheter\": the record does not tell"), "{error}");
     // The foremost tip does not stand in for the one that is named.
     let mut alone = record();
     alone.instruments.clear();
     alone.samples.iter_mut().for_each(|sample| sample.hands.truncate(1));
-    let error = told(&catheter, &alone);
+    let error = reported(&catheter, &alone);
     assert!(error.contains("goal.instrument = \"catheter\": the record names no instruments"), "{error}");
     assert_eq!(end(&catheter.clone().score(&alone)), None);
     let mut other = record();
     other.instruments[1] = "sheath".to_owned();
-    let error = told(&catheter, &other);
+    let error = reported(&catheter, &other);
     assert!(error.contains("goal.instrument = \"catheter\": the record is of wire, sheath"), "{error}");
-    let error = told(&exam("packing_density = 0.1", true).unwrap(), &record());
+    let error = reported(&exam("packing_density = 0.1", true).unwrap(), &record());
     assert!(error.contains("goal.packing_density = 0.1: the record does not tell"), "{error}");
     // What asks for the foremost tip is judged by any record.
     assert!(exam("target = \"end\"\ntip_within_mm = 5.0", false).unwrap().check(&old).is_ok());
@@ -140,7 +140,7 @@ fn a_record_that_does_not_tell_is_refused() {
 
 #[test]
 fn a_goal_that_does_not_fit_is_refused_by_key_and_value() {
-    for (goal, told) in [
+    for (goal, reported) in [
         (
             CATHETER.replace("catheter", "cathter"),
             "goal.instrument = \"cathter\": is no instrument of the scene: name one of wire, catheter; did you mean \"catheter\"?",
@@ -163,10 +163,10 @@ fn a_goal_that_does_not_fit_is_refused_by_key_and_value() {
         ("packing_densty = 0.1".to_owned(), "did you mean `packing_density`?"),
     ] {
         let error = exam(&goal, false).unwrap_err();
-        assert!(error.starts_with("subjects/goal.toml: ") && error.contains(told), "{error}\n{told}");
+        assert!(error.starts_with("subjects/goal.toml: ") && error.contains(reported), "{error}\n{reported}");
     }
     // Thresholds of measures that have no value there.
-    for (goal, metric, has_sac, told) in [
+    for (goal, metric, has_sac, reported) in [
         (CATHETER, "packing_density", false, Some("there is no sac that coils fill")),
         (CATHETER, "coil_outside_mm", false, Some("there is no sac that coils fill")),
         (CATHETER, "packing_density", true, None),
@@ -176,8 +176,9 @@ fn a_goal_that_does_not_fit_is_refused_by_key_and_value() {
         let limit = if metric == "packing_density" { "at_least = 0.1" } else { "at_most = 1.0" };
         let made = exam(&format!("{goal}\n[[threshold]]\nmetric = \"{metric}\"\n{limit}"), has_sac);
         let error = made.err();
-        assert_eq!(error.is_some(), told.is_some(), "{metric}: {error:?}");
-        let whole = format!("goal.toml: threshold[0].metric = \"{metric}\": {}", told.unwrap_or_default());
+        assert_eq!(error.is_some(), reported.is_some(), "{metric}: {error:?}");
+        let whole =
+            format!("goal.toml: threshold[0].metric = \"{metric}\": {}", reported.unwrap_or_default());
         assert!(error.is_none_or(|error| error.contains(&whole)), "{whole}");
     }
     let alone = Exam::new(subject(CATHETER).unwrap(), &Site { tree: Some(&tree()), ..Site::default() });

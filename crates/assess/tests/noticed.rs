@@ -73,9 +73,9 @@ fn record() -> Record {
 
 #[test]
 fn each_fault_is_noticed_once_with_its_time() {
-    let told = noticed(&record(), Some(&way()));
+    let reported = noticed(&record(), Some(&way()));
     let found: Vec<(NoticedKind, f64, f64)> =
-        told.iter().map(|one| (one.what, one.from_s, one.to_s)).collect();
+        reported.iter().map(|one| (one.what, one.from_s, one.to_s)).collect();
     assert_eq!(
         found,
         [
@@ -89,10 +89,10 @@ fn each_fault_is_noticed_once_with_its_time() {
             (NoticedKind::Jumped, 9.0, 9.0),
             (NoticedKind::CatheterAhead, 9.0, 10.0),
         ],
-        "{told:#?}"
+        "{reported:#?}"
     );
-    assert_eq!(told[5].text, "26 mm of wire pulled back in 2.0 s");
-    assert_eq!(told[4].text, "6 ml injected with the tip held by a wall");
+    assert_eq!(reported[5].text, "26 mm of wire pulled back in 2.0 s");
+    assert_eq!(reported[4].text, "6 ml injected with the tip held by a wall");
 }
 
 #[test]
@@ -102,16 +102,16 @@ fn what_was_done_well_or_not_recorded_is_not_noticed() {
     clean.injections.truncate(1);
     assert_eq!(noticed(&clean, Some(&way())), []);
     assert_eq!(noticed(&Record::default(), None), []);
-    // Without a beam and a way the rest is still told.
-    let told = noticed(&Record { beam: None, ..record() }, None);
-    assert!(told.iter().all(|one| {
+    // Without a beam and a way the rest is still reported.
+    let reported = noticed(&Record { beam: None, ..record() }, None);
+    assert!(reported.iter().all(|one| {
         !matches!(one.what, NoticedKind::WrongBranch | NoticedKind::IdleBeam | NoticedKind::Unseen)
     }));
-    assert_eq!(told.len(), 6);
+    assert_eq!(reported.len(), 6);
 }
 
 #[test]
-fn of_many_jumps_the_first_are_told_and_the_rest_counted() {
+fn of_many_jumps_the_first_are_reported_and_the_rest_counted() {
     let mut record = record();
     record.samples.iter_mut().for_each(|sample| sample.jumped = true);
     let jumps: Vec<_> =

@@ -188,8 +188,8 @@ fn a_session_of_two_instruments_is_measured_as_by_hand() {
     // Twenty samples a second from 1 s on.
     let speeds = [(20, 0.0), (40, 40.0), (20, 0.0), (20, 47.0)];
     let speeds: Vec<f64> = speeds.iter().flat_map(|(count, speed)| vec![*speed; *count]).collect();
-    let (told, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
-    assert!((told - expected).abs() < 1e-9, "{told}, by sums {expected}");
+    let (reported, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
+    assert!((reported - expected).abs() < 1e-9, "{reported}, by sums {expected}");
     // The catheter's tip ends 10 mm into the branch, 40 mm before the target.
     let metrics = assess(&record, Some(&way("right").for_instrument(1)));
     assert_eq!((value(&metrics, "arrived"), value(&metrics, "placement_error_mm")), (Some(0.0), Some(40.0)));
@@ -268,8 +268,8 @@ fn a_folder_of_a_run_is_measured_as_by_hand() {
     ];
     check(&metrics, &by_hand);
     let speeds: Vec<f64> = [vec![4.0; 20], vec![22.0; 40]].concat();
-    let (told, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
-    assert!((told - expected).abs() < 1e-9, "{told}, by sums {expected}");
+    let (reported, expected) = (value(&metrics, "spectral_arc_length").unwrap(), arc_length_by_sums(&speeds));
+    assert!((reported - expected).abs() < 1e-9, "{reported}, by sums {expected}");
 }
 
 #[test]
@@ -302,7 +302,7 @@ fn with_beam(beam: &str) -> Result<Record, String> {
 fn a_log_of_the_beam_that_cannot_be_is_refused_by_key_and_value() {
     assert_eq!(with_beam(BEAM).unwrap().beam.unwrap().len(), 2, "the twin");
     let header = BEAM.lines().next().unwrap();
-    for (log, told) in [
+    for (log, reported) in [
         (String::new(), "beam = empty: no state of the beam"),
         (format!("{header}\n"), "beam = empty: no state of the beam"),
         (BEAM.replace(",30,", ",-30,"), "beam[0].dose_ngy = -30: must be a finite number of 0 or more"),
@@ -318,7 +318,7 @@ fn a_log_of_the_beam_that_cannot_be_is_refused_by_key_and_value() {
         (BEAM.replace("dose_ngy", "dose"), "unknown field `dose`"),
     ] {
         let error = with_beam(&log).unwrap_err();
-        assert!(error.contains("beam.csv: ") && error.contains(told), "{error}\n{told}");
+        assert!(error.contains("beam.csv: ") && error.contains(reported), "{error}\n{reported}");
         assert!(!error.contains("give the folder of a recorded run"), "{error}");
     }
 }
@@ -328,7 +328,7 @@ fn a_session_that_cannot_be_is_refused_by_key_and_value() {
     let read = |text: &str| Record::from_session(text.as_bytes(), Path::new("a.session.json"));
     let whole: Value = serde_json::from_str(&session()).unwrap();
     assert!(read(&whole.to_string()).is_ok(), "the twin");
-    for (pointer, value, told) in [
+    for (pointer, value, reported) in [
         ("/record/start_mm", json!([1e9, 0.0, 0.0]), "record.start_mm = [1e9, 0, 0]: must be three"),
         ("/record/samples/2/time_s", json!(0.0), "record.samples[2].time_s = 0: comes after 2"),
         ("/record/samples/2/wall_force_n", json!(-5.0), "record.samples[2].wall_force_n = -5: must be"),
@@ -375,7 +375,7 @@ fn a_session_that_cannot_be_is_refused_by_key_and_value() {
             None => other.pointer_mut(parent).unwrap()[key] = value,
         }
         let error = read(&other.to_string()).unwrap_err().to_string();
-        assert!(error.starts_with("a.session.json: ") && error.contains(told), "{error}\n{told}");
+        assert!(error.starts_with("a.session.json: ") && error.contains(reported), "{error}\n{reported}");
     }
 }
 
@@ -426,7 +426,7 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
         ("instruments.csv", cut("instruments.csv", 5)),
     ];
     assert_eq!(ends_at(read(&half).unwrap()), 6.0);
-    for (name, text, told) in [
+    for (name, text, reported) in [
         ("steps.csv", cut("steps.csv", 5), "step = 2: is the last one, and summary.json counts 3 steps"),
         ("steps.csv", lines("steps.csv", 3), "step = 2: is the last one, and summary.json counts 3 steps"),
         ("steps.csv", lines("steps.csv", 1), "steps = []: it has no step"),
@@ -468,7 +468,7 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
     ] {
         let error = read(&[(name, text)]).unwrap_err();
         let file = if name == "summary.json" { "steps.csv" } else { name };
-        assert!(error.contains(&format!("{file}: ")) && error.contains(told), "{error}\n{told}");
+        assert!(error.contains(&format!("{file}: ")) && error.contains(reported), "{error}\n{reported}");
     }
 }
 
@@ -484,10 +484,10 @@ fn stack(names: &[&str]) -> Stack {
 #[test]
 fn a_record_of_other_instruments_than_the_scenes_is_refused() {
     let record = Record::from_session(session().as_bytes(), Path::new("a.session.json")).unwrap();
-    let told = |record: &Record, names: &[&str]| record.check_in(&stack(names)).unwrap_err().to_string();
+    let reported = |record: &Record, names: &[&str]| record.check_in(&stack(names)).unwrap_err().to_string();
     assert!(record.check_in(&stack(&["wire", "catheter"])).is_ok());
     for names in [&["wire"][..], &["wire", "sheath"], &["catheter", "wire"], &["wire", "micro", "catheter"]] {
-        let error = told(&record, names);
+        let error = reported(&record, names);
         assert!(
             error.starts_with(&format!(
                 "instruments = [wire, catheter]: the scene has [{}]",
@@ -498,7 +498,7 @@ fn a_record_of_other_instruments_than_the_scenes_is_refused() {
     }
     let mut long = record.clone();
     long.samples[2].hands[1].inserted_mm = 5000.0;
-    let error = told(&long, &["wire", "catheter"]);
+    let error = reported(&long, &["wire", "catheter"]);
     assert!(error.contains("samples[2].hands[1].inserted_mm = 5000: catheter is 200 mm long"), "{error}");
     // The folder of a run of several without their table is that of none of them.
     let folder = tempfile::tempdir().unwrap();
@@ -507,8 +507,10 @@ fn a_record_of_other_instruments_than_the_scenes_is_refused() {
     }
     let alone = Record::read(folder.path()).unwrap();
     assert!(alone.check_in(&stack(&["device"])).is_ok());
-    assert!(told(&alone, &["wire", "catheter"]).contains("instruments = []: the scene has [wire, catheter]"));
-    let error = told(&alone, &["wire"]);
+    assert!(
+        reported(&alone, &["wire", "catheter"]).contains("instruments = []: the scene has [wire, catheter]")
+    );
+    let error = reported(&alone, &["wire"]);
     assert!(error.contains("injections[0].outlet.instrument = \"device\": is no instrument"), "{error}");
 }
 

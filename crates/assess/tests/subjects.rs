@@ -120,14 +120,14 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert_eq!((rough.verdict.passed, rough.verdict.score), (false, 0.0));
     assert_eq!(end(&rough), Some((EndedBy::WallForce, 4.0)));
 
-    // What is told alone need not be kept, and what was not measured is not kept.
-    let told = subject(&[("at_least = -100.0", "at_least = -0.5")]).unwrap();
-    assert!(exam(told).score(&pushed(|_| 0.5)).verdict.passed);
+    // What is reported alone need not be kept, and what was not measured is not kept.
+    let reported = subject(&[("at_least = -100.0", "at_least = -0.5")]).unwrap();
+    assert!(exam(reported).score(&pushed(|_| 0.5)).verdict.passed);
     let of_beam = [("\"total_s\"", "\"beam_on_s\""), ("at_most = 20.0", "at_most = 12.0")];
     let of_beam = subject(&of_beam).unwrap();
     let unseen = exam(of_beam.clone()).score(&pushed(|_| 0.5));
     assert_eq!((unseen.verdict.passed, unseen.verdict.score), (false, 75.0));
-    // It is not missed either, and the reason is told: the limit of the beam has the same.
+    // It is not missed either, and the reason is reported: the limit of the beam has the same.
     let threshold = unseen.metrics.iter().find(|one| one.metric.name == "beam_on_s").unwrap();
     assert_eq!((threshold.passed, threshold.kept_words()), (None, "not judged"));
     let unjudged: Vec<&str> = unseen.unjudged.iter().map(|one| one.what.as_str()).collect();
@@ -289,10 +289,10 @@ fn it_ends_alike_tick_by_tick_and_whole() {
 #[test]
 fn a_vessel_that_moves_takes_its_target_along() {
     let mut record = pushed(|_| 0.5);
-    let aside = Vec3::new(0.0, 12.0, 0.0);
+    let lateral = Vec3::new(0.0, 12.0, 0.0);
     for sample in &mut record.samples {
         sample.tip_at_rest_mm = sample.tip_mm;
-        sample.tip_mm = sample.tip_mm.map(|tip| tip + aside);
+        sample.tip_mm = sample.tip_mm.map(|tip| tip + lateral);
     }
     assert!(score(&record).verdict.passed);
     record.samples.iter_mut().for_each(|sample| sample.tip_at_rest_mm = None);
@@ -302,7 +302,7 @@ fn a_vessel_that_moves_takes_its_target_along() {
 #[test]
 fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
     let file = "subjects/end.toml: ";
-    for (from, to, told) in [
+    for (from, to, reported) in [
         (
             "\"wall_force_n\"\n",
             "\"wall_force\"\n",
@@ -356,14 +356,14 @@ fn a_file_that_does_not_fit_is_refused_by_key_and_value() {
         ("points = 3", "weight = 3", "unknown field `weight`"),
     ] {
         let error = subject(&[(from, to)]).unwrap_err();
-        assert!(error.starts_with(file) && error.contains(told), "{error}\n{told}");
+        assert!(error.starts_with(file) && error.contains(reported), "{error}\n{reported}");
     }
-    for (target, told) in
+    for (target, reported) in
         [("ende", "goal.target = \"ende\": did you mean \"end\"?"), ("start", "where the centre line begins")]
     {
         let wrong = subject(&[("target = \"end\"", &format!("target = \"{target}\""))]).unwrap();
         let error = at_site(wrong).unwrap_err();
-        assert!(error.starts_with(file) && error.contains(told), "{error}");
+        assert!(error.starts_with(file) && error.contains(reported), "{error}");
     }
     assert!(
         Subject::is_meant(FILE)

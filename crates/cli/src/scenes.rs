@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_of_the_scene_and_of_its_view_are_told_apart() {
+    fn keys_of_the_scene_and_of_its_view_are_reported_apart() {
         let texts = [
             "c_arm.sid_mm=1000",
             "vessel.wall.friction=0.1",
@@ -224,9 +224,12 @@ mod tests {
     #[test]
     fn steps_without_an_equilibrium_fail_unless_they_are_allowed() {
         let tally = Tally { unconverged_steps: 2, first_unconverged_step: Some(7), ..Tally::default() };
-        let told = check_converged("a.toml", &tally, 9, false, "all are kept").unwrap_err().to_string();
-        assert!(told.starts_with("a.toml: 2 of 9 steps found no equilibrium, the first step 7: "), "{told}");
-        assert!(told.contains("--allow-unconverged"), "{told}");
+        let reported = check_converged("a.toml", &tally, 9, false, "all are kept").unwrap_err().to_string();
+        assert!(
+            reported.starts_with("a.toml: 2 of 9 steps found no equilibrium, the first step 7: "),
+            "{reported}"
+        );
+        assert!(reported.contains("--allow-unconverged"), "{reported}");
         assert!(check_converged("a.toml", &tally, 9, true, "").is_ok());
         assert!(check_converged("a.toml", &Tally::default(), 9, false, "").is_ok());
     }

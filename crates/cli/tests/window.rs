@@ -42,7 +42,7 @@ impl Drop for Display {
 }
 
 /// Runs a window on a display that nobody sees, gives it lines with pauses in ms, and has its pace; none where there is no Xvfb. After each
-/// line `also` is told the display and the line's number.
+/// line `also` is reported the display and the line's number.
 fn paced(scene: &str, record: &Path, lines: &[(Value, u64)], also: impl Fn(&str, usize)) -> Option<Value> {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(display) = Display::open() else {

@@ -89,8 +89,8 @@ fn main() -> Result<()> {
             report.contacts.len(),
             report.converged
         );
-        let aside_mm = (simulation.shape().tip_mm().expect("a tip") - tip_mm).dot(&across);
-        println!("    the tip is {aside_mm:.2} mm aside");
+        let lateral_mm = (simulation.shape().tip_mm().expect("a tip") - tip_mm).dot(&across);
+        println!("    the tip is {lateral_mm:.2} mm aside");
     }
     Ok(())
 }

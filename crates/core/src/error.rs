@@ -28,14 +28,14 @@ pub enum Error {
         reason: String,
     },
     /// A value is out of its range or contradicts another.
-    #[error("{name} = {value}: {mend}")]
+    #[error("{name} = {value}: {remedy}")]
     Parameter {
         /// The parameter, as the user writes it (`device.radius_mm`).
         name: String,
         /// The value given.
         value: String,
         /// What would be valid.
-        mend: String,
+        remedy: String,
     },
     /// A surface mesh is unsuitable as a vessel wall.
     #[error("mesh: {0}")]
@@ -100,12 +100,12 @@ impl Error {
     pub fn parameter(
         name: impl std::fmt::Display,
         value: impl std::fmt::Display,
-        mend: impl Into<String>,
+        remedy: impl Into<String>,
     ) -> Self {
         // Hundreds of digits would hide what is wrong with a number.
         let text = value.to_string();
         let value = if text.len() > SHORT { text.parse().map_or(text, number) } else { text };
-        Self::Parameter { name: name.to_string(), value, mend: mend.into() }
+        Self::Parameter { name: name.to_string(), value, remedy: remedy.into() }
     }
 
     /// A [`Error::File`] for `path`.

@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(lists.place_mm, Some([1.0, 2.0, 3.0]));
         assert_eq!(lists.pairs, [(1, [2, 3]), (4, [5, 6])]);
         assert!(lists.any.is_some_and(|any| any[1].is_datetime() && any[0][0].as_integer() == Some(1)));
-        for (text, told) in [
+        for (text, reported) in [
             ("place_mm = [1, 2, 3, 4]", "f.toml: line 1: place_mm: must be a list of 3, not of 4"),
             ("place_mm = [1, 2]", "f.toml: line 1: place_mm: must be a list of 3, not of 2"),
             ("\npairs = [[1, [2, 3, 4, 5]]]", "f.toml: line 2: pairs: must be a list of 2, not of 4"),
@@ -186,7 +186,7 @@ mod tests {
             ),
         ] {
             let message = read(text).unwrap_err();
-            assert!(message.contains(told), "{message}");
+            assert!(message.contains(reported), "{message}");
         }
     }
 }

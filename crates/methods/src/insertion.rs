@@ -325,9 +325,9 @@ impl Method for Insertion {
             || state.frames.len() != nodes
             || moved
         {
-            let mend =
+            let remedy =
                 format!("{nodes} nodes are in this vessel from this sheath: restore a state of this scene");
-            return Err(Error::parameter("state.nodes", state.positions_mm.len(), mend));
+            return Err(Error::parameter("state.nodes", state.positions_mm.len(), remedy));
         }
         let posture = Posture { positions_mm: state.positions_mm.clone(), frames: state.frames.clone() };
         self.progress.chain.turn_rad = state.turn_rad;

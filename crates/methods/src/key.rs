@@ -35,9 +35,9 @@ impl Key {
         match parts {
             Some(parts) => Ok(Self { text: text.to_owned(), parts: parts.concat() }),
             None => {
-                let mend =
+                let remedy =
                     "write a key of the scene as in vessel.wall.friction or device.section[0].radius_mm";
-                Err(Error::parameter("key", format!("{text:?}"), mend))
+                Err(Error::parameter("key", format!("{text:?}"), remedy))
             }
         }
     }
@@ -89,20 +89,20 @@ impl Key {
                 (Part::Index(index), Value::Array(list)) => {
                     let count = list.len();
                     list.get_mut(*index).ok_or_else(|| {
-                        let mend = format!("the scene has {count} in that list, and [0] is the first");
-                        Error::parameter(&self.text, &value, mend)
+                        let remedy = format!("the scene has {count} in that list, and [0] is the first");
+                        Error::parameter(&self.text, &value, remedy)
                     })?
                 }
                 (Part::Name(name), _) => {
-                    let mend = format!("what {name} should lie in is no table of the scene");
-                    return Err(Error::parameter(&self.text, &value, mend));
+                    let remedy = format!("what {name} should lie in is no table of the scene");
+                    return Err(Error::parameter(&self.text, &value, remedy));
                 }
                 (Part::Index(index), _) => {
-                    let mut mend = format!("the scene has no list where [{index}] is asked for");
+                    let mut remedy = format!("the scene has no list where [{index}] is asked for");
                     if let Some(name) = nearest_name(LISTS.into_iter(), last).filter(|name| *name != last) {
-                        mend += &format!(" – did you mean `{name}[{index}]`?");
+                        remedy += &format!(" – did you mean `{name}[{index}]`?");
                     }
-                    return Err(Error::parameter(&self.text, &value, mend));
+                    return Err(Error::parameter(&self.text, &value, remedy));
                 }
             };
             if let Part::Name(name) = part {
@@ -178,7 +178,7 @@ mod tests {
         for wrong in ["", "a..b", "a[", "a[x]", "a[1", "[0]", "a b", "a[0]b"] {
             assert!(Key::parse(wrong).unwrap_err().to_string().contains("vessel.wall.friction"), "{wrong}");
         }
-        for (key, told) in [
+        for (key, reported) in [
             ("script[2].advance_mm", "script[2].advance_mm = 1: the scene has 2"),
             ("seed.first", "seed.first = 1: what first should lie in is no table"),
             ("device.section[0]", "device.section[0] = 1: the scene has no list where [0] is asked for"),
@@ -188,7 +188,7 @@ mod tests {
             ),
         ] {
             let error = Key::parse(key).unwrap().set(&mut scene(), 1.into()).unwrap_err().to_string();
-            assert!(error.starts_with(told), "{error}");
+            assert!(error.starts_with(reported), "{error}");
         }
     }
 }

@@ -198,8 +198,8 @@ mod tests {
             assert_eq!(here, None);
         }
         let (core, here) = read("kirchoff");
-        for told in [core, here] {
-            assert!(told.is_some_and(|e| e.contains("did you mean `kirchhoff`?")));
+        for reported in [core, here] {
+            assert!(reported.is_some_and(|e| e.contains("did you mean `kirchhoff`?")));
         }
     }
 }

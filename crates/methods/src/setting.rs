@@ -28,8 +28,8 @@ impl FromStr for Setting {
 
     fn from_str(text: &str) -> Result<Self> {
         let Some((key, value)) = text.split_once('=') else {
-            let mend = "write KEY=VALUE, as in vessel.wall.friction=0.1";
-            return Err(Error::parameter("set", format!("{text:?}"), mend));
+            let remedy = "write KEY=VALUE, as in vessel.wall.friction=0.1";
+            return Err(Error::parameter("set", format!("{text:?}"), remedy));
         };
         let (key, value) = (Key::parse(key.trim())?, value.trim());
         // What is not a TOML value is text: names of methods and files.
@@ -244,8 +244,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_key_value_and_the_nearest_right_one() {
-        for (set, told) in [
+    fn what_is_wrong_is_reported_with_key_value_and_the_nearest_right_one() {
+        for (set, reported) in [
             ("vessel.wall.frction=0.1", "scene.toml: --set: vessel.wall.frction = 0.1: "),
             ("vessel.wall.frction=0.1", "did you mean `friction`?"),
             ("vesel.wall.friction=0.1", "did you mean `vessel`?"),
@@ -263,7 +263,7 @@ mod tests {
             ),
         ] {
             let error = with(&[set]).unwrap_err().to_string();
-            assert!(error.contains(told), "{set}: {error}");
+            assert!(error.contains(reported), "{set}: {error}");
         }
     }
 

@@ -39,7 +39,7 @@ fn in_the_open(name: &str, device: Device, direction: Vec3, towards: Option<Vec3
 }
 
 /// Where the tip is beside the sheath's axis, mm.
-fn aside(simulation: &Simulation) -> Vec3 {
+fn lateral(simulation: &Simulation) -> Vec3 {
     let (sheath, tip) = (simulation.sheath(), simulation.shape().tip_mm().unwrap());
     let from = tip - sheath.position_mm;
     from - sheath.direction * from.dot(&sheath.direction)
@@ -53,14 +53,14 @@ fn all_methods_bend_to_the_same_side_and_there_where_the_sheath_says() {
                 let mut simulation = in_the_open(name, hook([TIP.1, 0.0]), direction, towards);
                 simulation.step(Command::advance(10.0)).unwrap();
                 simulation.step(Command::advance(10.0)).unwrap();
-                let aside = aside(&simulation);
-                assert!((aside.norm() - (1.0 - 1.0f64.cos()) / TIP.1).abs() < 0.1, "{name}: {aside}");
+                let lateral = lateral(&simulation);
+                assert!((lateral.norm() - (1.0 - 1.0f64.cos()) / TIP.1).abs() < 0.1, "{name}: {lateral}");
                 if let Some(way) = towards {
                     let t = simulation.sheath().direction;
                     let across = (way - t * way.dot(&t)).normalize();
-                    assert!((aside.normalize() - across).norm() < 1e-3, "{name}: {aside} {across}");
+                    assert!((lateral.normalize() - across).norm() < 1e-3, "{name}: {lateral} {across}");
                 }
-                aside
+                lateral
             });
             for (side, name) in sides.iter().zip(SHAPED) {
                 assert!((side - sides[0]).norm() < 0.1, "{name}, {direction}: {side} for {}", sides[0]);
@@ -125,11 +125,11 @@ fn a_tip_that_has_turned_with_the_hand_says_so() {
     for name in SHAPED {
         let mut simulation = in_the_open(name, hook([TIP.1, 0.0]), Vec3::x(), None);
         simulation.step(Command::advance(20.0)).unwrap();
-        let was = aside(&simulation);
+        let was = lateral(&simulation);
         for _ in 0..9 {
             simulation.step(Command { advance_mm: 0.0, rotate_rad: FRAC_PI_2 / 9.0 }).unwrap();
         }
-        let (is, report) = (aside(&simulation), simulation.report());
+        let (is, report) = (lateral(&simulation), simulation.report());
         let went = was.cross(&is).x.atan2(was.dot(&is));
         assert!((went - FRAC_PI_2).abs() < 0.1, "{name}: {went}");
         assert!((report.tip_rotation_rad - went).abs() < 0.1, "{name}: {went} {report:?}");
@@ -148,8 +148,8 @@ fn a_state_is_not_that_of_a_sheath_that_says_another_side() {
         let state = simulation.state();
         start(Some(Vec3::y())).restore(&state).unwrap();
         for other in [None, Some(Vec3::x())] {
-            let told = start(other).restore(&state).unwrap_err().to_string();
-            assert!(told.starts_with("state."), "{name}: {told}");
+            let reported = start(other).restore(&state).unwrap_err().to_string();
+            assert!(reported.starts_with("state."), "{name}: {reported}");
         }
     }
 }

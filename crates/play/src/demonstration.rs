@@ -84,8 +84,8 @@ impl Demonstration {
 
     /// Injections of lines that have begun since the last call.
     pub(crate) fn injections(&mut self) -> Vec<Injection> {
-        let told = std::mem::replace(&mut self.injected, self.run.injections().len());
-        self.run.injections()[told..].to_vec()
+        let reported = std::mem::replace(&mut self.injected, self.run.injections().len());
+        self.run.injections()[reported..].to_vec()
     }
 }
 

@@ -238,8 +238,8 @@ impl Lab {
     pub(crate) fn pedal(&mut self, down: bool, mode: Option<Mode>) -> Result<()> {
         let mode = mode.unwrap_or(self.fluoro.xray.mode);
         if mode == Mode::Roadmap && self.fluoro.injection.is_empty() {
-            let mend = "a roadmap shows an angiogram: inject contrast medium first";
-            return Err(Error::parameter("mode", "roadmap", mend));
+            let remedy = "a roadmap shows an angiogram: inject contrast medium first";
+            return Err(Error::parameter("mode", "roadmap", remedy));
         }
         // Each DSA run takes a new mask.
         if self.fluoro.xray.mode != mode || (mode == Mode::Dsa && down && !self.down) {
@@ -300,10 +300,10 @@ impl Lab {
         let angles_deg = [pose.primary_deg(), pose.secondary_deg()];
         for (angle_deg, most_deg) in angles_deg.into_iter().zip([MOST_LAO_DEG, MOST_CRA_DEG]) {
             if angle_deg.abs() > most_deg {
-                let mend = format!(
+                let remedy = format!(
                     "is out of reach: give at most {MOST_LAO_DEG}° LAO or RAO, and {MOST_CRA_DEG}° CRA or CAU"
                 );
-                return Err(Error::parameter("pose", String::from(pose), mend));
+                return Err(Error::parameter("pose", String::from(pose), remedy));
             }
         }
         self.angles(angles_deg)
@@ -330,8 +330,8 @@ impl Lab {
         within(["right_mm", "down_mm"], [right_mm, down_mm], MOST_TABLE_MM)?;
         let plane = if second { self.second_deg() } else { Some(self.fluoro.c_arm.angles_deg()) };
         let Some(angles_deg) = plane else {
-            let mend = "there is one plane alone: leave it out, or give view.biplane_deg in the scene";
-            return Err(Error::parameter("second", true, mend));
+            let remedy = "there is one plane alone: leave it out, or give view.biplane_deg in the scene";
+            return Err(Error::parameter("second", true, remedy));
         };
         let [lao, cra] = angles_deg.map(f64::to_radians);
         let right = Vec3::new(lao.cos(), lao.sin(), 0.0);
@@ -358,8 +358,8 @@ impl Lab {
     pub(crate) fn collimate(&mut self, open: [f64; 2]) -> Result<()> {
         for (name, share) in [("width", open[0]), ("height", open[1])] {
             if !(LEAST_SHARE..=1.0).contains(&share) {
-                let mend = format!("must be a share of the field from {LEAST_SHARE} to 1");
-                return Err(Error::parameter(name, share, mend));
+                let remedy = format!("must be a share of the field from {LEAST_SHARE} to 1");
+                return Err(Error::parameter(name, share, remedy));
             }
         }
         self.change(|spec| collimate(spec, open))?;

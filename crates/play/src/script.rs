@@ -39,13 +39,13 @@ impl Lines<'_> {
     /// that gives the same bits.
     pub(crate) fn of<'a>(self, steps: &[Done], injected: impl Iterator<Item = &'a Injected>) -> String {
         let mut text = String::new();
-        let mut told = 0;
+        let mut reported = 0;
         for one in injected {
-            self.write(&mut text, &steps[told..one.after_step]);
-            told = one.after_step;
+            self.write(&mut text, &steps[reported..one.after_step]);
+            reported = one.after_step;
             inject(&mut text, one, self.stack);
         }
-        self.write(&mut text, &steps[told..]);
+        self.write(&mut text, &steps[reported..]);
         text
     }
 

@@ -249,12 +249,12 @@ impl Session {
         }
         let steps = self.history.steps();
         let Some(script) = self.script.clone().filter(|script| !script.is_empty()) else {
-            let mend = "there is none to show: give [[script]] in the scene";
-            return Err(Error::parameter("script", "none", mend));
+            let remedy = "there is none to show: give [[script]] in the scene";
+            return Err(Error::parameter("script", "none", remedy));
         };
         if steps > 0 {
-            let mend = "it begins where the scene does: go back to step 0 first";
-            return Err(Error::parameter("script", format!("step {steps}"), mend));
+            let remedy = "it begins where the scene does: go back to step 0 first";
+            return Err(Error::parameter("script", format!("step {steps}"), remedy));
         }
         self.stop();
         self.demonstration = Some(Demonstration::new(script));

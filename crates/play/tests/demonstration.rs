@@ -105,11 +105,11 @@ fn what_is_shown_takes_its_time_and_is_what_is_run() {
     assert!((flows[0].start_s - injected[0].time_s.unwrap()).abs() < 1e-9, "{flows:?}");
 
     // And what is recorded has the same bits, its times but for the rest too.
-    let (again, told) = run(&session.script());
+    let (again, reported) = run(&session.script());
     assert_eq!(again.shape(), session.simulation().shape());
     assert_eq!(again.report(), session.simulation().report());
-    assert_eq!((told.len(), told[0].after_step, told[0].instrument), (1, 12, 1));
-    assert!((told[0].time_s.unwrap() - 0.4).abs() < 1e-9, "{told:?}");
+    assert_eq!((reported.len(), reported[0].after_step, reported[0].instrument), (1, 12, 1));
+    assert!((reported[0].time_s.unwrap() - 0.4).abs() < 1e-9, "{reported:?}");
 }
 
 #[test]

@@ -201,8 +201,8 @@ fn any_earlier_moment_can_be_had_again() {
         session.apply(&Input::GoTo { step }).unwrap();
         assert_eq!((session.steps(), session.simulation().shape()), (step, &shapes[step]));
     }
-    let told = session.apply(&Input::GoTo { step: 1 }).unwrap_err().to_string();
-    assert_eq!(told, "step = 1: 0 steps were carried out");
+    let reported = session.apply(&Input::GoTo { step: 1 }).unwrap_err().to_string();
+    assert_eq!(reported, "step = 1: 0 steps were carried out");
     // Undo takes one motion back: what was done between two rests.
     for mm_per_s in [10.0, 0.0, 30.0, 0.0] {
         session.apply(&Input::Move { instrument: None, mm_per_s, deg_per_s: 0.0 }).unwrap();
@@ -311,9 +311,9 @@ fn what_hands_inject_is_a_line_of_the_script_at_its_step_and_time() {
 
     let (simulation, injections) = replayed_with_injections(scene, &session);
     assert_eq!(simulation.shape(), session.simulation().shape());
-    let told: Vec<_> =
+    let reported: Vec<_> =
         injections.iter().map(|one| (one.instrument, one.ml, one.ml_per_s, one.after_step)).collect();
-    assert_eq!(told, [(1, 3.0, 4.0, out + 30), (1, 4.5, 4.0, out + 36)]);
+    assert_eq!(reported, [(1, 3.0, 4.0, out + 30), (1, 4.5, 4.0, out + 36)]);
     // A step is a tick; rests are none.
     for one in injections {
         assert!((one.time_s.unwrap() - one.after_step as f64 / 60.0).abs() < 1e-9, "{one:?}");
@@ -442,7 +442,7 @@ fn the_room_refuses_what_it_cannot_do() {
     let (_, mut session) = session("curved_tube.toml");
     let mut refused = |input: Input| session.apply(&input).unwrap_err().to_string();
     let table = |right_mm: f64, second: bool| Input::Table { right_mm, down_mm: 0.0, second };
-    for (input, told) in [
+    for (input, reported) in [
         (
             Input::CArm { pose: "LAO 130".parse().unwrap() },
             "pose = LAO 130 CRA 0: is out of reach: give at most 120°",
@@ -452,7 +452,7 @@ fn the_room_refuses_what_it_cannot_do() {
         (table(1.0, true), "second = true: there is one plane alone"),
     ] {
         let error = refused(input);
-        assert!(error.contains(told), "{error}\n{told}");
+        assert!(error.contains(reported), "{error}\n{reported}");
     }
     // A key that is held goes as far as the C-arm does.
     (0..20).for_each(|_| session.apply(&Input::TurnCArm { lao_deg: 20.0, cra_deg: 0.0 }).unwrap());

@@ -247,8 +247,8 @@ pub(crate) fn natural_or<T: TryFrom<i64>>(
 }
 
 /// The error for an array of the wrong shape.
-pub(crate) fn misshapen(name: &str, shape: &[usize], mend: &str) -> PyErr {
-    refuse(name, format!("an array of shape {shape:?}"), mend)
+pub(crate) fn misshapen(name: &str, shape: &[usize], remedy: &str) -> PyErr {
+    refuse(name, format!("an array of shape {shape:?}"), remedy)
 }
 
 /// A count or an index, 0 or more. It is taken as any object, so that the error about one that is none names the
@@ -258,8 +258,8 @@ pub(crate) fn natural<T: TryFrom<i64>>(name: &str, object: &Bound<'_, PyAny>) ->
         // Python takes True for 1.
         Ok(number) if !object.is_instance_of::<PyBool>() => number,
         Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => {
-            let mend = if object.lt(0)? { "must be 0 or more" } else { "is too large a number" };
-            return Err(refuse(name, object.str()?, mend));
+            let remedy = if object.lt(0)? { "must be 0 or more" } else { "is too large a number" };
+            return Err(refuse(name, object.str()?, remedy));
         }
         _ => {
             let wanted = "must be a whole number of 0 or more";

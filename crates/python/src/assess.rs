@@ -27,8 +27,8 @@ impl Task {
     fn new(centreline: Option<PathBuf>, target: Option<String>, within_mm: f64) -> PyResult<Self> {
         check_within(within_mm)?;
         if let (None, Some(target)) = (&centreline, &target) {
-            let mend = "is a point of a centre line: give centreline too";
-            return Err(refuse("target", format!("{target:?}"), mend));
+            let remedy = "is a point of a centre line: give centreline too";
+            return Err(refuse("target", format!("{target:?}"), remedy));
         }
         Ok(Self { centreline, target, within_mm })
     }
@@ -103,11 +103,11 @@ fn check_distinct(paths: &[PathBuf]) -> PyResult<()> {
     let mut seen = HashMap::new();
     for (index, path) in paths.iter().enumerate() {
         if let Some(first) = seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone()), index) {
-            let mend = format!("is paths[{first}] again: give each attempt once");
+            let remedy = format!("is paths[{first}] again: give each attempt once");
             return Err(refuse(
                 &format!("paths[{index}]"),
                 format!("{:?}", path.display().to_string()),
-                &mend,
+                &remedy,
             ));
         }
     }

@@ -81,8 +81,8 @@ impl Batch {
     ) -> PyResult<Bound<'py, PyDict>> {
         let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
         let moves = crate::moves::moves(moves, Some(count), hands)?;
-        let told = self.work(py, |members| work(&mut members.batch, &moves))?.map_err(exception)?;
-        failures(py, told)
+        let reported = self.work(py, |members| work(&mut members.batch, &moves))?.map_err(exception)?;
+        failures(py, reported)
     }
 
     /// Runs long `work` on the members, which a signal ends. Threads are used only for several, since a program may have
@@ -154,16 +154,16 @@ impl Members {
         if self.starts.is_empty() || instruments == hands {
             return Ok(());
         }
-        let mend = format!("a batch has simulations of the same number of instruments, here {hands}");
-        Err(refuse("instruments", instruments, &mend))
+        let remedy = format!("a batch has simulations of the same number of instruments, here {hands}");
+        Err(refuse("instruments", instruments, &remedy))
     }
 }
 
 /// The failures of simulations as a dictionary from their indices to exceptions.
-fn failures(py: Python<'_>, told: Vec<endowire_core::Result<()>>) -> PyResult<Bound<'_, PyDict>> {
+fn failures(py: Python<'_>, reported: Vec<endowire_core::Result<()>>) -> PyResult<Bound<'_, PyDict>> {
     let failures = PyDict::new(py);
-    for (index, told) in told.into_iter().enumerate() {
-        match told {
+    for (index, reported) in reported.into_iter().enumerate() {
+        match reported {
             Ok(()) => {}
             // No simulation has failed: the caller wants to stop.
             Err(stopped @ Error::Stopped) => return Err(exception(stopped)),
@@ -232,8 +232,8 @@ impl Batch {
             one => natural("instruments", &one).map(Some),
         });
         let instruments = each.collect::<PyResult<Vec<Option<usize>>>>()?;
-        let told = self.work(py, |members| members.batch.detach(&instruments))?.map_err(exception)?;
-        failures(py, told)
+        let reported = self.work(py, |members| members.batch.detach(&instruments))?.map_err(exception)?;
+        failures(py, reported)
     }
 
     /// Adds the last step of each simulation to a record: `moves` as in `step`, and its end times `times_s`, shape

@@ -97,7 +97,7 @@ impl Controller {
         let hands = simulation.pushed().len();
         // A copy, so that the simulation is not locked meanwhile.
         let copy = simulation.with(py, |simulation| simulation.clone());
-        let told = self.with(py, move |hand| {
+        let reported = self.with(py, move |hand| {
             let action = hand.controller.next(&copy)?;
             hand.ended = match action {
                 Action::Arrived => Some("arrived"),
@@ -106,7 +106,7 @@ impl Controller {
             };
             Ok::<_, Error>(action)
         });
-        let Action::Move(moves) = told.map_err(exception)? else { return Ok(None) };
+        let Action::Move(moves) = reported.map_err(exception)? else { return Ok(None) };
         let mut numbers = vec![0.0; 2 * hands];
         for one in moves {
             numbers[2 * one.instrument] += one.command.advance_mm;
@@ -139,8 +139,8 @@ fn path(table: &Numbers<'_>) -> PyResult<CentrelinePath> {
     let finite = rows.as_flattened().iter().all(|number| number.is_finite());
     let points = rows.into_iter().map(|[x, y, z, radius_mm]| (Vec3::new(x, y, z), radius_mm)).collect();
     let made = if finite { CentrelinePath::new(points) } else { None };
-    let mend = "must have two rows or more of finite numbers, and no two that follow in one place";
-    made.ok_or_else(|| refuse("path_mm", format!("{count} rows"), mend))
+    let remedy = "must have two rows or more of finite numbers, and no two that follow in one place";
+    made.ok_or_else(|| refuse("path_mm", format!("{count} rows"), remedy))
 }
 
 /// Refuses a distance that is negative or not finite.

@@ -149,8 +149,8 @@ fn table_of(name: &str, table: &Bound<'_, PyMapping>, depth: usize) -> PyResult<
 /// Reads a value; dictionaries must not be given as lists, whose values serde takes in the order of a type's fields.
 fn typed<T: DeserializeOwned + Serialize>(name: &str, given: Value) -> PyResult<T> {
     let read: T = serde_json::from_value(given.clone()).map_err(|e| refused(name, &e))?;
-    let told = serde_json::to_value(&read).map_err(|e| refused(name, &e))?;
-    refuse_lists(name, &given, &told)?;
+    let reported = serde_json::to_value(&read).map_err(|e| refused(name, &e))?;
+    refuse_lists(name, &given, &reported)?;
     Ok(read)
 }
 
@@ -159,8 +159,8 @@ fn refuse_lists(name: &str, given: &Value, read: &Value) -> PyResult<()> {
     match (given, read) {
         (Value::Array(_), Value::Object(table)) => {
             let keys: Vec<&str> = table.keys().map(String::as_str).collect();
-            let mend = format!("must be a dictionary of keys and values: {}", keys.join(", "));
-            Err(refuse(name, given, &mend))
+            let remedy = format!("must be a dictionary of keys and values: {}", keys.join(", "));
+            Err(refuse(name, given, &remedy))
         }
         (Value::Array(given), Value::Array(read)) => {
             let mut each = given.iter().zip(read).enumerate();

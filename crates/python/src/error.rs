@@ -21,6 +21,6 @@ pub(crate) fn exception(error: Error) -> PyErr {
 }
 
 /// The error for a value out of range, in the format of the library.
-pub(crate) fn refuse(name: &str, value: impl std::fmt::Display, mend: &str) -> PyErr {
-    exception(Error::parameter(name, value, mend))
+pub(crate) fn refuse(name: &str, value: impl std::fmt::Display, remedy: &str) -> PyErr {
+    exception(Error::parameter(name, value, remedy))
 }

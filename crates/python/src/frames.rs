@@ -54,11 +54,11 @@ impl Renderer {
         let lumen = vessel.lumen.clone();
         let mut planes = spec.planes();
         if plane >= planes.len() {
-            let mend = match planes.len() {
+            let remedy = match planes.len() {
                 1 => "the view has one plane, 0; a second is that of view.biplane_deg",
                 _ => "the view has two planes, 0 and 1",
             };
-            return Err(refuse("plane", plane, mend));
+            return Err(refuse("plane", plane, remedy));
         }
         let spec = planes.swap_remove(plane);
         let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, lumen.wall(&NoStore)?))?;
@@ -167,7 +167,7 @@ impl Renderer {
         let contacts: Vec<Vec3> = simulation
             .with(py, |simulation| simulation.report().contacts.iter().map(|c| c.position_mm).collect());
         let labels = self.with(py, |renderer| renderer.labels(&views, &contacts))?;
-        let told = PyDict::new(py);
+        let reported = PyDict::new(py);
         let devices = PyList::empty(py);
         for device in labels.devices {
             let one = PyDict::new(py);
@@ -182,12 +182,13 @@ impl Renderer {
             one.set_item("tip_visible", device.tip_visible)?;
             devices.append(one)?;
         }
-        told.set_item("devices", devices)?;
-        told.set_item("contacts", document::write(py, &labels.contacts)?)?;
-        told.set_item("mask", pixels(py, labels.mask)?)?;
-        told.set_item("vessel", labels.vessel.map(|mask| pixels(py, mask.image())).transpose()?)?;
-        told.set_item("camera_matrix", array(py, labels.camera_matrix.as_flattened().to_vec(), [3, 4])?)?;
-        Ok(told)
+        reported.set_item("devices", devices)?;
+        reported.set_item("contacts", document::write(py, &labels.contacts)?)?;
+        reported.set_item("mask", pixels(py, labels.mask)?)?;
+        reported.set_item("vessel", labels.vessel.map(|mask| pixels(py, mask.image())).transpose()?)?;
+        reported
+            .set_item("camera_matrix", array(py, labels.camera_matrix.as_flattened().to_vec(), [3, 4])?)?;
+        Ok(reported)
     }
 }
 

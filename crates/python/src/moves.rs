@@ -21,10 +21,10 @@ pub(crate) fn moves(
     };
     if !fits {
         let first = count.map_or("n".to_owned(), |count| count.to_string());
-        let mend = format!(
+        let remedy = format!(
             "must have the shape ({first}, {instruments}, 2): advance_mm and rotate_rad of each instrument"
         );
-        return Err(misshapen("moves", view.shape(), &mend));
+        return Err(misshapen("moves", view.shape(), &remedy));
     }
     let list: Vec<f64> = view.iter().copied().collect();
     let hands = |row: &[f64]| {

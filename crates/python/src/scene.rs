@@ -74,8 +74,8 @@ impl Scene {
         let stack = self.scene.stack().map_err(exception)?;
         let steps = self.scene.steps(&stack, &NoStore).and_then(|script| script.moves());
         let steps = steps.map_err(|error| match error {
-            Error::Parameter { name, value, mend } => {
-                exception(Error::Parameter { name, value, mend: mend + " (Scene.run)" })
+            Error::Parameter { name, value, remedy } => {
+                exception(Error::Parameter { name, value, remedy: remedy + " (Scene.run)" })
             }
             other => exception(other),
         })?;

@@ -355,18 +355,18 @@ impl Simulation {
     ) -> PyResult<Bound<'py, PyDict>> {
         let (count, place) = (self.pushed().len(), natural::<usize>("instrument", instrument)?);
         if place >= count {
-            let mend = format!("there are {count}, the innermost is 0");
-            return Err(refuse("instrument", place, &mend));
+            let remedy = format!("there are {count}, the innermost is 0");
+            return Err(refuse("instrument", place, &remedy));
         }
         let forces = self.with(py, |simulation| simulation.lateral_forces(place));
-        let told = PyDict::new(py);
+        let reported = PyDict::new(py);
         let list = |of: fn(&LateralForce) -> f64| PyArray1::from_vec(py, forces.iter().map(of).collect());
-        told.set_item("force_n", points(py, forces.iter().map(|at| at.force_n))?)?;
-        told.set_item("tension_n", list(|at| at.tension_n))?;
-        told.set_item("friction_n", list(|at| at.friction_n))?;
-        told.set_item("friction_nmm", list(|at| at.friction_nmm))?;
-        told.set_item("length_mm", list(|at| at.length_mm))?;
-        Ok(told)
+        reported.set_item("force_n", points(py, forces.iter().map(|at| at.force_n))?)?;
+        reported.set_item("tension_n", list(|at| at.tension_n))?;
+        reported.set_item("friction_n", list(|at| at.friction_n))?;
+        reported.set_item("friction_nmm", list(|at| at.friction_nmm))?;
+        reported.set_item("length_mm", list(|at| at.length_mm))?;
+        Ok(reported)
     }
 
     /// Length of each instrument beyond the mouth of the sheath, mm, shape (n_instruments,).

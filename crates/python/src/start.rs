@@ -126,15 +126,15 @@ impl Arguments {
     /// Instruments as a stack of the library.
     fn stack(&self, instruments: &[Instrument]) -> PyResult<Stack> {
         let count = instruments.len();
-        let told = [
+        let reported = [
             ("names", self.names.as_ref().map(Vec::len)),
             ("friction", self.friction.as_ref().map(Vec::len)),
             ("may_lead", self.may_lead.as_ref().map(Vec::len)),
         ];
-        for (name, given) in told {
+        for (name, given) in reported {
             if let Some(given) = given.filter(|given| *given != count) {
-                let mend = format!("there are {count} instruments: give one for each");
-                return Err(refuse(name, given, &mend));
+                let remedy = format!("there are {count} instruments: give one for each");
+                return Err(refuse(name, given, &remedy));
             }
         }
         let names = self.names.clone();
@@ -151,7 +151,7 @@ impl Arguments {
             _ => Stack::new(each.collect()).map_err(exception)?,
         };
         match &self.friction {
-            Some(friction) => stack.rubbing(friction.clone()).map_err(exception),
+            Some(friction) => stack.with_friction(friction.clone()).map_err(exception),
             None => Ok(stack),
         }
     }

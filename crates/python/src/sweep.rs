@@ -34,15 +34,16 @@ pub(crate) fn sweep<'py>(
     shard: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
     let jobs = jobs.map(|jobs| natural("jobs", jobs)).transpose()?;
-    let shard: Shard = shard.parse().map_err(|mend: String| refuse("shard", format!("{shard:?}"), &mend))?;
+    let shard: Shard =
+        shard.parse().map_err(|remedy: String| refuse("shard", format!("{shard:?}"), &remedy))?;
     let sweep = Sweep::read(&path).map_err(exception)?;
     if sweep.recorded().is_some() {
-        let mend = "recordings are made by the program, endowire sweep: leave it out, or use that";
-        return Err(refuse("record", "given", mend));
+        let remedy = "recordings are made by the program, endowire sweep: leave it out, or use that";
+        return Err(refuse("record", "given", remedy));
     }
     let stop = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&stop);
-    let told = stoppable(py, &stop, move || {
+    let reported = stoppable(py, &stop, move || {
         sweep.carry_out(&Order {
             folder: &out,
             shard,
@@ -54,13 +55,13 @@ pub(crate) fn sweep<'py>(
             progress: &|_| (),
         })
     })?;
-    let told = told.map_err(exception)?;
+    let reported = reported.map_err(exception)?;
     let document = PyDict::new(py);
-    document.set_item("runs", told.progress.runs)?;
-    document.set_item("earlier", told.earlier)?;
-    document.set_item("failed", told.progress.failed)?;
-    document.set_item("unconverged", told.progress.unconverged)?;
-    document.set_item("table", told.table)?;
+    document.set_item("runs", reported.progress.runs)?;
+    document.set_item("earlier", reported.earlier)?;
+    document.set_item("failed", reported.progress.failed)?;
+    document.set_item("unconverged", reported.progress.unconverged)?;
+    document.set_item("table", reported.table)?;
     Ok(document)
 }
 

@@ -74,11 +74,11 @@ impl Goal {
 /// Replaces the core's names `from` and `to` in an error by the arguments of the method.
 fn as_argument(error: Error) -> Error {
     match error {
-        Error::Parameter { name, value, mend } if name == "from" => {
-            Error::Parameter { name: "start".into(), value, mend }
+        Error::Parameter { name, value, remedy } if name == "from" => {
+            Error::Parameter { name: "start".into(), value, remedy }
         }
-        Error::Parameter { name, value, mend } if name == "to" => {
-            Error::Parameter { name: "ends".into(), value, mend }
+        Error::Parameter { name, value, remedy } if name == "to" => {
+            Error::Parameter { name: "ends".into(), value, remedy }
         }
         other => other,
     }
@@ -128,14 +128,14 @@ impl Vessel {
     #[pyo3(signature = (path, unit_mm = 1.0, axes = None))]
     fn read(py: Python<'_>, path: PathBuf, unit_mm: f64, axes: Option<&str>) -> PyResult<Self> {
         let frame = frame(unit_mm, axes)?;
-        let told = path.display().to_string();
+        let reported = path.display().to_string();
         let made = interruptible(py, move || {
             let wall = Wall::from_surface(&SurfaceMesh::read(&path, frame)?)?;
             wall_hints(&wall, frame.unit_mm).map(|hints| (wall, hints))
         })?;
         let (wall, hints) = made.map_err(exception)?;
         for hint in hints {
-            warn(py, &format!("{told}: {hint}"))?;
+            warn(py, &format!("{reported}: {hint}"))?;
         }
         Ok(Self::of_wall(wall))
     }
@@ -471,8 +471,8 @@ impl Vessel {
         let from = inlet.map(CentrelineEnd::Opening);
         let found = interruptible(py, move || ExtractedCentreline::of(lumen.wall(&NoStore)?, from, &[]))?;
         let found = found.map_err(|error| {
-            let mend = format!("none is found in the vessel ({error}): take vessel.with_centreline(start, ends), of openings or places inside");
-            refuse("centreline", "None", &mend)
+            let remedy = format!("none is found in the vessel ({error}): take vessel.with_centreline(start, ends), of openings or places inside");
+            refuse("centreline", "None", &remedy)
         })?;
         Ok(self.found.get_or_init(|| Line { tree: found.tree, inlet }))
     }
@@ -556,8 +556,9 @@ fn unknown(path: &Path, error: Error) -> PyErr {
     };
     let known = anatomy::NAMES.map(|known| format!("`{known}`")).join(", ");
     let hint = nearest(&format!("unknown name `{name}`, expected one of {known}"));
-    let mend = format!("is no file, and no built-in anatomy: those are {}{hint}", anatomy::NAMES.join(", "));
-    refuse("tree", format!("{name:?}"), &mend)
+    let remedy =
+        format!("is no file, and no built-in anatomy: those are {}{hint}", anatomy::NAMES.join(", "));
+    refuse("tree", format!("{name:?}"), &remedy)
 }
 
 /// Warns as `warnings.warn` does, at the line of the caller.
@@ -587,7 +588,7 @@ pub(crate) fn check_vessel<'py>(
     let report =
         interruptible(py, move || check_with(&SurfaceMesh::read(&path, frame)?, unit_mm, septum_mm))?
             .map_err(exception)?;
-    let told = document::write(py, &report)?;
-    told.set_item("sound", report.is_sound())?;
-    Ok(told)
+    let reported = document::write(py, &report)?;
+    reported.set_item("sound", report.is_sound())?;
+    Ok(reported)
 }

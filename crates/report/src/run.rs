@@ -218,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_step_that_came_to_rest_in_balance_is_told_without_a_number() {
+    fn a_step_that_came_to_rest_in_balance_is_reported_without_a_number() {
         let row = |imbalance: Option<f64>| Row {
             step: 3,
             inserted_mm: 12.0,

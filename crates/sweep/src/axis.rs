@@ -93,8 +93,8 @@ impl Axis {
                 Values::Latin(*range, stream, stream.shuffled(samples))
             }
             _ => {
-                let mend = "give one of list, grid, random and latin";
-                return Err(Error::parameter(name, format!("{{key = {:?}}}", spec.key), mend));
+                let remedy = "give one of list, grid, random and latin";
+                return Err(Error::parameter(name, format!("{{key = {:?}}}", spec.key), remedy));
             }
         };
         if matches!(&values, Values::Listed(list) if list.is_empty()) {
@@ -135,8 +135,8 @@ impl Axis {
 /// Prefixes the key in an error with its table.
 fn inside(table: &str, error: Error) -> Error {
     match error {
-        Error::Parameter { name, value, mend } => {
-            Error::Parameter { name: format!("{table}.{name}"), value, mend }
+        Error::Parameter { name, value, remedy } => {
+            Error::Parameter { name: format!("{table}.{name}"), value, remedy }
         }
         other => other,
     }
@@ -159,8 +159,8 @@ fn check_ends(name: &str, from: f64, to: f64, log: bool) -> Result<()> {
             return Err(Error::parameter(format!("{name}.{end}"), value, "must be a finite number"));
         }
         if log && value <= 0.0 {
-            let mend = "must be above 0 where log = true";
-            return Err(Error::parameter(format!("{name}.{end}"), value, mend));
+            let remedy = "must be above 0 where log = true";
+            return Err(Error::parameter(format!("{name}.{end}"), value, remedy));
         }
     }
     Ok(())
@@ -170,8 +170,8 @@ impl Grid {
     fn values(&self, name: &str) -> Result<Vec<Value>> {
         check_ends(name, self.from, self.to, self.log)?;
         if !(2..=RUN_LIMIT).contains(&self.count) {
-            let mend = format!("must be 2 to {RUN_LIMIT}; for one value give list");
-            return Err(Error::parameter(format!("{name}.count"), self.count, mend));
+            let remedy = format!("must be 2 to {RUN_LIMIT}; for one value give list");
+            return Err(Error::parameter(format!("{name}.count"), self.count, remedy));
         }
         let last = (self.count - 1) as f64;
         let value = |k: usize| Value::Float(between(self.from, self.to, self.log, k as f64 / last));
@@ -186,13 +186,13 @@ impl Range {
     fn check(&self, name: &str) -> Result<()> {
         check_ends(name, self.from, self.to, self.log)?;
         if self.from >= self.to {
-            let mend = format!("must be above {name}.from, {}", self.from);
-            return Err(Error::parameter(format!("{name}.to"), self.to, mend));
+            let remedy = format!("must be above {name}.from, {}", self.from);
+            return Err(Error::parameter(format!("{name}.to"), self.to, remedy));
         }
         for (end, value) in [("from", self.from), ("to", self.to)] {
             if self.integer && (value.fract() != 0.0 || value.abs() > INTEGER_LIMIT) {
-                let mend = format!("must be a whole number up to {INTEGER_LIMIT:e} where integer = true");
-                return Err(Error::parameter(format!("{name}.{end}"), value, mend));
+                let remedy = format!("must be a whole number up to {INTEGER_LIMIT:e} where integer = true");
+                return Err(Error::parameter(format!("{name}.{end}"), value, remedy));
             }
         }
         Ok(())
@@ -253,8 +253,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_key_value_and_mend() {
-        for (text, told) in [
+    fn what_is_wrong_is_reported_with_key_value_and_remedy() {
+        for (text, reported) in [
             ("", "axis[2] = {key = \"a.b\"}: give one of list, grid, random and latin"),
             ("list = []", "axis[2].list = []: give at least one value"),
             ("list = [1]\ngrid = { from = 0, to = 1, count = 2 }", "give one of"),
@@ -265,7 +265,7 @@ mod tests {
             ("latin = { from = 0.5, to = 3, integer = true }", "axis[2].latin.from = 0.5: must be a whole"),
         ] {
             let error = axis(text, 4).unwrap_err().to_string();
-            assert!(error.contains(told), "{error}");
+            assert!(error.contains(reported), "{error}");
         }
     }
 }

@@ -215,12 +215,12 @@ fn samples(spec: &SweepSpec) -> Result<usize> {
             Err(Error::parameter("samples", samples, format!("must be 1 to {RUN_LIMIT}")))
         }
         (Some(samples), false) => {
-            let mend = "nothing is drawn: leave it out, or give an axis random or latin";
-            Err(Error::parameter("samples", samples, mend))
+            let remedy = "nothing is drawn: leave it out, or give an axis random or latin";
+            Err(Error::parameter("samples", samples, remedy))
         }
         (None, true) => {
-            let mend = "an axis is drawn: say how many runs each combination of lists and grids has";
-            Err(Error::parameter("samples", "none", mend))
+            let remedy = "an axis is drawn: say how many runs each combination of lists and grids has";
+            Err(Error::parameter("samples", "none", remedy))
         }
     }
 }
@@ -231,24 +231,24 @@ fn check_axes(axes: &[Axis], spec: &SweepSpec) -> Result<()> {
         let same = |other: &Key| other.holds(&axis.key) && axis.key.holds(other);
         let overlaps = |other: &&Axis| other.key.holds(&axis.key) || axis.key.holds(&other.key);
         if let Some(other) = axes[..index].iter().find(overlaps) {
-            let mend = match same(&other.key) {
+            let remedy = match same(&other.key) {
                 true => "is the key of another axis too: keep one of them".to_owned(),
                 false => format!("overlaps with that of another axis, {}: keep one of them", other.key),
             };
-            return Err(Error::parameter(name, &axis.key, mend));
+            return Err(Error::parameter(name, &axis.key, remedy));
         }
         for given in spec.set.keys() {
             let key = Key::parse(given)?;
             // An axis inside a table of `[set]` replaces only its own key, as inside a table of the scene.
             if axis.key.holds(&key) {
                 let what = if same(&key) { String::new() } else { format!("with {given} in it ") };
-                let mend = format!("{what}is given in [set] too: keep one of the two");
-                return Err(Error::parameter(name, &axis.key, mend));
+                let remedy = format!("{what}is given in [set] too: keep one of the two");
+                return Err(Error::parameter(name, &axis.key, remedy));
             }
         }
         if axis.key.begins() == "view" && spec.record != Some(Recorded::Frames) {
-            let mend = "a view changes no row: give record = \"frames\", or leave the axis out";
-            return Err(Error::parameter(name, &axis.key, mend));
+            let remedy = "a view changes no row: give record = \"frames\", or leave the axis out";
+            return Err(Error::parameter(name, &axis.key, remedy));
         }
     }
     let runs = axes.iter().try_fold(1usize, |runs, axis| runs.checked_mul(axis.crossed()));

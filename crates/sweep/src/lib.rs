@@ -46,4 +46,4 @@ pub use provenance::{Program, hash_inputs};
 pub use row::Row;
 pub use run::{Record, Recorder, Run};
 pub use shard::Shard;
-pub use work::{Order, Progress, Told};
+pub use work::{Order, Progress, SweepReport};

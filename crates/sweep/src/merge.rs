@@ -18,17 +18,17 @@ use crate::table;
 /// cannot be written.
 pub fn merge(folders: &[PathBuf], out: &Path) -> Result<usize> {
     let Some((header, rows)) = gathered(folders)? else {
-        let mend = "no rows in these folders: give those of endowire sweep --out";
-        return Err(Error::parameter("merge", listed(folders), mend));
+        let remedy = "no rows in these folders: give those of endowire sweep --out";
+        return Err(Error::parameter("merge", listed(folders), remedy));
     };
     let missing: Vec<usize> = (0..header.runs).filter(|run| !rows.contains_key(run)).collect();
     if let Some(run) = missing.first() {
-        let mend = format!(
+        let remedy = format!(
             "{} of {} runs are missing, run {run} the first: go on with the shards that have not ended, or give their folders too",
             missing.len(),
             header.runs
         );
-        return Err(Error::parameter("merge", listed(folders), mend));
+        return Err(Error::parameter("merge", listed(folders), remedy));
     }
     let rows: Vec<Row> = rows.into_values().collect();
     table::write(out, &header.columns, &rows)?;

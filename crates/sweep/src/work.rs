@@ -63,7 +63,7 @@ impl Progress {
 
 /// Result of carrying out a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Told {
+pub struct SweepReport {
     /// Progress.
     pub progress: Progress,
     /// Number of runs that had a row before.
@@ -79,7 +79,7 @@ impl Sweep {
     /// # Errors
     /// A folder that cannot be written or holds another sweep; a run that cannot be recorded. Failures within a run
     /// are reported in its row.
-    pub fn carry_out(&self, order: &Order<'_>) -> Result<Told> {
+    pub fn carry_out(&self, order: &Order<'_>) -> Result<SweepReport> {
         std::fs::create_dir_all(order.folder).map_err(|e| Error::file(order.folder, e))?;
         let header = Header::new(self.hash().to_owned(), self.len(), order.shard, self.columns().clone());
         let (journal, mut rows) = Journal::open(&order.folder.join(order.shard.file_name("jsonl")), &header)?;
@@ -95,13 +95,13 @@ impl Sweep {
         progress.add(&new);
         rows.extend(new);
         if progress.done < progress.runs {
-            return Ok(Told { progress, earlier, table: None });
+            return Ok(SweepReport { progress, earlier, table: None });
         }
         rows.sort_by_key(|row| row.run);
         let path = order.folder.join(order.shard.file_name("parquet"));
         // A computation error rather than bad input: the folder was writable at the start.
         table::write(&path, self.columns(), &rows).map_err(|error| Error::Computation(error.to_string()))?;
-        Ok(Told { progress, earlier, table: Some(path) })
+        Ok(SweepReport { progress, earlier, table: Some(path) })
     }
 
     /// Carries out these runs, started in this order; returns their rows.
@@ -127,7 +127,7 @@ impl Sweep {
             program: order.program,
         };
         let next = AtomicUsize::new(0);
-        let told = Mutex::new((Vec::new(), begun, None::<Error>));
+        let reported = Mutex::new((Vec::new(), begun, None::<Error>));
         let work = || {
             while !order.stop.load(Ordering::Relaxed) && !broken.load(Ordering::Relaxed) {
                 let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
@@ -138,16 +138,16 @@ impl Sweep {
                         Err(Error::Computation(format!("run {run} cannot be recorded: {what}")))
                     }
                 };
-                let mut told = told.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                let mut reported = reported.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                 match row {
                     Ok(row) => {
-                        told.1.add([&row]);
-                        told.0.push(row);
-                        (order.progress)(told.1);
+                        reported.1.add([&row]);
+                        reported.0.push(row);
+                        (order.progress)(reported.1);
                     }
                     Err(error) => {
                         broken.store(true, Ordering::Relaxed);
-                        told.2.get_or_insert(error);
+                        reported.2.get_or_insert(error);
                     }
                 }
             }
@@ -157,7 +157,7 @@ impl Sweep {
                 scope.spawn(work);
             }
         });
-        let (rows, _, error) = told.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let (rows, _, error) = reported.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
         error.map_or(Ok(rows), Err)
     }
 

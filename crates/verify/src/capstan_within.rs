@@ -34,7 +34,7 @@ fn bent_within(curvature_per_mm: f64, friction: f64, valve_n: f64) -> Result<Sim
     let stack = Stack::new(vec![one("wire", wire)?, one("catheter", catheter)?])?;
     let wall = free_space()?;
     let sheath = Sheath::at_opening(&wall.wall, wall.inlet, 1.0)?;
-    let stack = stack.rubbing(vec![friction, 0.0])?.sealed(vec![0.0, valve_n])?;
+    let stack = stack.with_friction(vec![friction, 0.0])?.sealed(vec![0.0, valve_n])?;
     let mut simulation = Simulation::builder(wall.wall, stack, sheath).build()?;
     for _ in 0..40 {
         push(&mut simulation, &[(WIRE, (LENGTH_MM + 3.0) / 40.0), (CATHETER, LENGTH_MM / 40.0)])?;

@@ -27,9 +27,9 @@ pub(super) fn with_regions(
     let (length, radius) = (setup.length, setup.radius);
     // So far away that the box's edges have no effect: each of three steps (the edge is moved in, vertices reach it,
     // points reach these vertices) extends over at most a diagonal and a half of a cell.
-    let aside = cell * (6.0 * (radius / cell).max(1.0)).ceil();
-    let low = Vec3::new(-aside, floor, -aside);
-    let high = Vec3::new(length + aside, ceiling, aside);
+    let lateral = cell * (6.0 * (radius / cell).max(1.0)).ceil();
+    let low = Vec3::new(-lateral, floor, -lateral);
+    let high = Vec3::new(length + lateral, ceiling, lateral);
     let wall = Wall::from_surface(&SurfaceMesh::cuboid(low, high, cell))?;
     // Planes need no other mesh, and the box's edges must not be rounded.
     let properties = WallProperties {

@@ -190,9 +190,9 @@ pub(super) fn curved_in_straight() -> Result<Vec<Row>> {
     ] {
         let inner = curved("inner", lengths[0], [a, 0.7, CURVATURE]);
         let solved = stack(32, vec![inner, straight("outer", lengths[1], b)]).solve()?.checked()?;
-        for (told, expected) in solved.instruments.iter().zip(forces) {
-            let force = told.push_force.unwrap_or(f64::NAN);
-            let quantity = format!("push force of the {}", told.name);
+        for (reported, expected) in solved.instruments.iter().zip(forces) {
+            let force = reported.push_force.unwrap_or(f64::NAN);
+            let quantity = format!("push force of the {}", reported.name);
             let error = (force - expected).abs() / overlap;
             rows.push(Row::with_error(name, &quantity, force, expected, error, 1e-4));
         }

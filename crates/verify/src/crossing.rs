@@ -33,7 +33,7 @@ const BESIDE_RADII: f64 = 2.0;
 /// Larger depths behind the triangles are reported as this, mm.
 const FARTHEST_MM: f64 = 20.0;
 
-/// Largest distance of the felt wall from the triangles, mm.
+/// Largest distance of the contact surface from the triangles, mm.
 const FELT_MM: f64 = 0.1;
 /// The same in edges: a smooth wall that turns by a radian along an edge is an eighth of it away from its middle.
 const FELT_EDGES: f64 = 0.125;
@@ -92,7 +92,7 @@ impl CrossingTest {
 
     /// By how much the penetration reported by the device is too small, mm, where it passes through a triangle and
     /// beyond; `None` if it passes through none. If the device was pressed in, this is at most the distance between
-    /// the felt wall and the triangles. `wall`, made of these triangles, distinguishes inside from outside.
+    /// the contact surface and the triangles. `wall`, made of these triangles, distinguishes inside from outside.
     pub fn missing_mm(&self, wall: &Wall, simulation: &Simulation) -> Option<f64> {
         let (shape, stack) = (simulation.shape(), simulation.stack());
         let inserted_mm = simulation.report().lengths_mm();
@@ -101,21 +101,21 @@ impl CrossingTest {
         // A tip leaves through an opening, and so does a bow whose tip is still inside.
         let is_out = |x: &Vec3| {
             wall.openings().iter().any(|opening| {
-                let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
-                beyond_mm > 0.0 && aside_mm < BESIDE_RADII * opening.radius_mm
+                let (beyond_mm, lateral_mm) = opening.beyond_and_off_axis_mm(x);
+                beyond_mm > 0.0 && lateral_mm < BESIDE_RADII * opening.radius_mm
             })
         };
         let missing = |x: &Vec3, behind_mm: f64, (piece, part): (usize, f64)| {
             // An instrument may end at the element's first node, so the radius is that at the position itself.
             let (e, within) = (piece / CHORDS, ((piece % CHORDS) as f64 + part) / CHORDS as f64);
             let (near, far) = (shape.from_tip_mm[e], shape.from_tip_mm[e + 1]);
-            let radius_mm = stack.felt_radius_mm(&inserted_mm, near + (far - near) * within);
+            let radius_mm = stack.outermost_radius_mm(&inserted_mm, near + (far - near) * within);
             let near = contacts.iter().map(|c| ((c.position_mm - x).norm(), c.penetration_mm));
             let next = near.min_by(|a, b| a.0.total_cmp(&b.0));
             // Next to a position without contact the device does not press at all.
-            let told =
+            let reported =
                 next.filter(|(away, _)| *away < APART_RADII * radius_mm).map(|(away, depth)| away + depth);
-            radius_mm + behind_mm - told.unwrap_or(0.0)
+            radius_mm + behind_mm - reported.unwrap_or(0.0)
         };
         let mut most: Option<f64> = None;
         let mut note = |mm: f64| most = Some(most.map_or(mm.max(0.0), |most| most.max(mm)));

@@ -259,10 +259,10 @@ pub fn run(seed: u64) -> Result<DeploymentRow> {
         let behind = axes.iter().skip(1).any(|(axis, _)| crossing.crosses(axis))
             || crossing.is_crossed_by(&simulation);
         wrong(&mut row.behind, behind, "an axis passes through the wall".to_owned());
-        for (axis, told_mm) in &axes {
+        for (axis, reported_mm) in &axes {
             let length_mm = chords_mm(axis);
-            let stretched = report.converged && (length_mm - told_mm).abs() > STRETCHED * told_mm;
-            wrong(&mut row.stretched, stretched, format!("{length_mm:.3} mm of {told_mm:.3}"));
+            let stretched = report.converged && (length_mm - reported_mm).abs() > STRETCHED * reported_mm;
+            wrong(&mut row.stretched, stretched, format!("{length_mm:.3} mm of {reported_mm:.3}"));
         }
     }
     row.pass = row.deep + row.crossed + row.behind + row.stretched == 0;

@@ -107,19 +107,19 @@ fn pushed_on(way: Way) -> Result<Vec<Row>> {
         let total = energy(&simulation);
         jump = jump.max(unaccounted(&mut simulation, STEP_MM, JUMP * total)? / total);
         for instrument in [WIRE, CATHETER].into_iter().filter(|_| k % COMPARED == 0) {
-            let (told, found) = (force(&simulation, instrument), slope(&simulation, instrument)?);
-            let error = ((told - found) / found).abs();
+            let (reported, found) = (force(&simulation, instrument), slope(&simulation, instrument)?);
+            let error = ((reported - found) / found).abs();
             if error > worst[instrument].2 || error.is_nan() {
-                worst[instrument] = (told, found, error);
+                worst[instrument] = (reported, found, error);
             }
         }
     }
     let name = format!("D6 {}, 400 steps of 0.1 mm", way.place);
     let quantity = "change of the energy that no force accounts for";
     let mut rows = vec![Row::with_error(&name, quantity, jump, 0.0, jump, JUMP)];
-    for (instrument, (told, found, error)) in ["wire", "catheter"].into_iter().zip(worst) {
+    for (instrument, (reported, found, error)) in ["wire", "catheter"].into_iter().zip(worst) {
         let quantity = format!("push force of the {instrument}");
-        rows.push(Row::with_error(&name, &quantity, told, found, error, 1e-3));
+        rows.push(Row::with_error(&name, &quantity, reported, found, error, 1e-3));
     }
     Ok(rows)
 }

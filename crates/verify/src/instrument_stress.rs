@@ -38,7 +38,7 @@ const VALVE_N: f64 = 0.2;
 /// Where friction acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Rubbing {
+pub enum FrictionAt {
     /// Nowhere.
     Nothing,
     /// Between instruments, and in the sheath.
@@ -57,7 +57,7 @@ pub struct InstrumentCase {
     /// Element length, mm.
     pub element_mm: f64,
     /// Where friction acts.
-    pub rubbing: Rubbing,
+    pub friction: FrictionAt,
     /// Initial inserted length of the catheter, mm.
     pub start_mm: f64,
 }
@@ -92,28 +92,28 @@ pub struct InstrumentRow {
 
 /// The cases: arches and curved vessels, with and without friction, finely and coarsely meshed.
 pub fn cases() -> Vec<InstrumentCase> {
-    let case = |vessel, edge_mm, element_mm, rubbing, start_mm| InstrumentCase {
+    let case = |vessel, edge_mm, element_mm, friction, start_mm| InstrumentCase {
         vessel,
         edge_mm,
         element_mm,
-        rubbing,
+        friction,
         start_mm,
     };
     vec![
-        case("aortic_arch", 2.25, 4.0, Rubbing::Nothing, 165.0),
-        case("aortic_arch", 2.25, 4.0, Rubbing::Within, 165.0),
-        case("aortic_arch", 2.25, 4.0, Rubbing::Everywhere, 165.0),
-        case("aortic_arch", 4.5, 4.0, Rubbing::Nothing, 165.0),
-        case("aortic_arch_iii", 2.4, 4.0, Rubbing::Within, 165.0),
-        case("curved_tube", 1.2, 2.0, Rubbing::Nothing, 90.0),
-        case("curved_tube", 1.2, 2.0, Rubbing::Everywhere, 90.0),
-        case("hepatic", 1.1, 2.0, Rubbing::Within, 60.0),
+        case("aortic_arch", 2.25, 4.0, FrictionAt::Nothing, 165.0),
+        case("aortic_arch", 2.25, 4.0, FrictionAt::Within, 165.0),
+        case("aortic_arch", 2.25, 4.0, FrictionAt::Everywhere, 165.0),
+        case("aortic_arch", 4.5, 4.0, FrictionAt::Nothing, 165.0),
+        case("aortic_arch_iii", 2.4, 4.0, FrictionAt::Within, 165.0),
+        case("curved_tube", 1.2, 2.0, FrictionAt::Nothing, 90.0),
+        case("curved_tube", 1.2, 2.0, FrictionAt::Everywhere, 90.0),
+        case("hepatic", 1.1, 2.0, FrictionAt::Within, 60.0),
     ]
 }
 
 /// A hooked wire, a stiff one for exchange, a straight microcatheter and a bent catheter. With friction on the wall
 /// every instrument is twisted, which limits their number to three: no stiff wire.
-fn stack(rubbing: Rubbing) -> Result<Stack> {
+fn stack(friction: FrictionAt) -> Result<Stack> {
     let one = |name: &str, sections: Vec<Section>| {
         Ok(Instrument { name: name.to_owned(), device: Device::new(sections)?, may_lead: true })
     };
@@ -129,17 +129,17 @@ fn stack(rubbing: Rubbing) -> Result<Stack> {
     let wire = Section::straight(500.0, 0.2, 6.0);
     let catheter = tube(300.0, 0.8, 0.5, 60.0);
     let mut instruments = vec![one("wire", vec![bent(wire, 12.0, 0.08), wire])?];
-    if rubbing != Rubbing::Everywhere {
+    if friction != FrictionAt::Everywhere {
         instruments.push(one("stiff wire", vec![Section::straight(512.0, 0.25, 40.0)])?);
     }
     instruments.push(one("microcatheter", vec![tube(400.0, 0.45, 0.3, 8.0)])?);
     instruments.push(one("catheter", vec![bent(catheter, 25.0, 0.025), catheter])?);
     let count = instruments.len();
     let stack = Stack::new(instruments)?;
-    if rubbing == Rubbing::Nothing {
+    if friction == FrictionAt::Nothing {
         return Ok(stack);
     }
-    stack.rubbing((0..count).map(|index| if index + 1 < count { FRICTION } else { 0.0 }).collect())
+    stack.with_friction((0..count).map(|index| if index + 1 < count { FRICTION } else { 0.0 }).collect())
 }
 
 /// Three instruments in a vessel, the thinner farther in.
@@ -162,12 +162,12 @@ impl InstrumentStress {
         let made = GeneratedWall::new(&tree, Resolution::EdgeMm(case.edge_mm))?;
         let crossing = CrossingTest::new(made.wall.mesh());
         let mut sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0)?;
-        if case.rubbing != Rubbing::Nothing {
-            sheath = sheath.rubbing(VALVE_N, FRICTION)?;
+        if case.friction != FrictionAt::Nothing {
+            sheath = sheath.with_friction(VALVE_N, FRICTION)?;
         }
-        let friction = if case.rubbing == Rubbing::Everywhere { FRICTION } else { 0.0 };
+        let friction = if case.friction == FrictionAt::Everywhere { FRICTION } else { 0.0 };
         let options = KirchhoffOptions { element_mm: case.element_mm, ..KirchhoffOptions::default() };
-        let mut start = Simulation::builder(made.wall, stack(case.rubbing)?, sheath)
+        let mut start = Simulation::builder(made.wall, stack(case.friction)?, sheath)
             .properties(WallProperties { friction, ..WallProperties::default() })
             .method(&options)
             .build()?;
@@ -207,10 +207,10 @@ impl InstrumentStress {
     fn course(&self, seed: u64, count: usize, row: &mut InstrumentRow) {
         let mut simulation = self.start.clone();
         let mut hands = RandomHands::new(seed);
-        let mut wrong = |what: &mut usize, number: usize, moves: &[Move], told: &str| {
+        let mut wrong = |what: &mut usize, number: usize, moves: &[Move], reported: &str| {
             *what += 1;
             if row.first.is_empty() {
-                row.first = format!("course {seed}, command {number}, {moves:?}: {told}");
+                row.first = format!("course {seed}, command {number}, {moves:?}: {reported}");
             }
         };
         let [mut unconverged, mut crossed, mut unexplained, mut changed] = [0; 4];

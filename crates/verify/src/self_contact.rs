@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_soft_surface_is_told_from_a_hard_one() {
+    fn a_soft_surface_is_reported_from_a_hard_one() {
         let exact = Plectoneme::under(TENSION);
         let soft = twisted(240, 0.0, 0.3).unwrap();
         assert!((soft.moment / exact.moment - 1.0).abs() > 0.01, "{} {}", soft.moment, exact.moment);

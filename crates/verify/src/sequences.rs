@@ -30,7 +30,7 @@ pub const APART_MM: [f64; 2] = [0.05, 0.5];
 /// Number of chords of an element whose lengths are summed: for one that turns by a radian they are 4·10⁻⁵ shorter.
 const CHORDS: usize = 32;
 /// Excess of the depth behind the triangles over the reported one, mm, above which a device has gone through them:
-/// more than the error of the felt wall.
+/// more than the error of the contact surface.
 const CROSSED_MM: f64 = 0.3;
 
 /// Result of a sequence.
@@ -279,8 +279,8 @@ pub fn run(seed: u64) -> Result<SequenceRow> {
         }
         let tips = one.shape().tip_mm().zip(many.shape().tip_mm());
         let apart_mm = tips.map_or(0.0, |(a, b)| (a - b).norm());
-        let told = by_one.jumped && by_many.jumped;
-        row.apart += usize::from(apart_mm > APART_MM[usize::from(scene.friction > 0.0)] && !told);
+        let reported = by_one.jumped && by_many.jumped;
+        row.apart += usize::from(apart_mm > APART_MM[usize::from(scene.friction > 0.0)] && !reported);
         simulation = many;
     }
     row.pass = row.stored_more + row.not_finite + row.stretched + row.crossed + row.failed == 0;

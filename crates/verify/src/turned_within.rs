@@ -37,7 +37,7 @@ fn bent(torsion_nmm2: f64, friction: f64) -> Result<Simulation> {
     let wall = free_space()?;
     let sheath = Sheath::at_opening(&wall.wall, wall.inlet, 1.0)?;
     let options = KirchhoffOptions { element_mm: ELEMENT_MM, ..KirchhoffOptions::default() };
-    let builder = Simulation::builder(wall.wall, stack.rubbing(vec![friction, 0.0])?, sheath);
+    let builder = Simulation::builder(wall.wall, stack.with_friction(vec![friction, 0.0])?, sheath);
     let mut simulation = builder.method(&options).build()?;
     push(&mut simulation, &[(WIRE, 2.0)])?;
     for _ in 0..30 {
@@ -70,16 +70,16 @@ pub(super) fn turned() -> Result<Vec<Row>> {
     let mut turning = bent(SOFT_NMM2, FRICTION)?;
     for quarter in 1..=8 {
         go(&mut turning, 0.0, 0.25 * lag_rad)?;
-        let told = turning.report().instruments[WIRE];
+        let reported = turning.report().instruments[WIRE];
         match quarter {
             2 => row(
                 "torque, half of the way that turns all",
-                told.torque_nmm,
+                reported.torque_nmm,
                 couple * LENGTH_MM * 0.5f64.sqrt(),
             ),
             8 => {
-                row("torque, all of it turns", told.torque_nmm, couple * LENGTH_MM);
-                row("lag of the tip, rad", told.rotation_rad - told.tip_rotation_rad, lag_rad);
+                row("torque, all of it turns", reported.torque_nmm, couple * LENGTH_MM);
+                row("lag of the tip, rad", reported.rotation_rad - reported.tip_rotation_rad, lag_rad);
             }
             _ => {}
         }

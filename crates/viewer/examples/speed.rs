@@ -50,8 +50,9 @@ fn cpu_ms(start: Instant) -> f64 {
     };
     // The file of the process tells of its first thread alone.
     let threads = std::fs::read_dir("/proc/self/task").ok();
-    let told = threads.map(|all| all.flatten().filter_map(|thread| nanoseconds(thread.path())).sum::<f64>());
-    told.filter(|ns| *ns > 0.0).map_or(start.elapsed().as_secs_f64() * 1e3, |ns| ns / 1e6)
+    let reported =
+        threads.map(|all| all.flatten().filter_map(|thread| nanoseconds(thread.path())).sum::<f64>());
+    reported.filter(|ns| *ns > 0.0).map_or(start.elapsed().as_secs_f64() * 1e3, |ns| ns / 1e6)
 }
 
 /// Mean CPU time of a job, ms: the system counts in steps of milliseconds, so many runs are counted together.

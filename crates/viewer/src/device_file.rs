@@ -81,8 +81,8 @@ impl Layers {
     fn of(part: &Part) -> Result<Self> {
         let material = |name: &str, key: &str| {
             name.parse::<Material>().map_err(|error| match error {
-                Error::Parameter { value, mend, .. } => {
-                    Error::parameter(format!("part \"{}\".{key}", part.name), value, mend)
+                Error::Parameter { value, remedy, .. } => {
+                    Error::parameter(format!("part \"{}\".{key}", part.name), value, remedy)
                 }
                 other => other,
             })

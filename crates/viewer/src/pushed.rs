@@ -61,9 +61,9 @@ impl Pushed {
         let pushed = Self { stack, parts, kinds, part_names, coils: Vec::new() };
         let through_tip = spec.injection.iter().position(|one| one.at_tip);
         if let Some(number) = through_tip.filter(|_| !(0..pushed.parts.len()).any(|i| pushed.has_lumen(i))) {
-            let mend =
+            let remedy =
                 "nothing that is pushed has a lumen: medium comes through a catheter, not along a wire";
-            return Err(Error::parameter(format!("view.injection[{number}].at_tip"), true, mend));
+            return Err(Error::parameter(format!("view.injection[{number}].at_tip"), true, remedy));
         }
         Ok(pushed)
     }
@@ -75,8 +75,8 @@ impl Pushed {
     pub fn leave(&mut self, coils: &[DetachedCoil]) -> Result<()> {
         let count = self.stack.instruments().len();
         if let Some(other) = coils.iter().find(|coil| coil.instrument >= count) {
-            let mend = format!("there are {count} instruments, the innermost is 0");
-            return Err(Error::parameter("coil.instrument", other.instrument, mend));
+            let remedy = format!("there are {count} instruments, the innermost is 0");
+            return Err(Error::parameter("coil.instrument", other.instrument, remedy));
         }
         self.coils = coils.to_vec();
         Ok(())

@@ -100,7 +100,7 @@ fn apart(a: &mut Renderer, b: &mut Renderer, devices: &[DeviceView]) -> Vec<u8> 
 }
 
 #[test]
-fn pictures_and_lengths_agree_at_every_pixel_and_those_of_a_wall_a_tenth_of_a_millimetre_aside_do_not() {
+fn pictures_and_lengths_agree_at_every_pixel_and_those_of_a_wall_a_tenth_of_a_millimetre_lateral_do_not() {
     let mut failed = vec![];
     for (name, vessel, spec, devices) in scenes() {
         let wall = wall(vessel);
@@ -134,8 +134,8 @@ fn pictures_and_lengths_agree_at_every_pixel_and_those_of_a_wall_a_tenth_of_a_mi
     // The twin.
     let (_, vessel, spec, devices) = scenes().swap_remove(6);
     let wall = wall(vessel);
-    let mut aside = wall.clone();
-    aside.vertices_mm.iter_mut().for_each(|v| v.x += 0.1);
-    let [mut here, mut there] = [wall, aside].map(|wall| Renderer::new(&spec, &wall).unwrap());
+    let mut lateral = wall.clone();
+    lateral.vertices_mm.iter_mut().for_each(|v| v.x += 0.1);
+    let [mut here, mut there] = [wall, lateral].map(|wall| Renderer::new(&spec, &wall).unwrap());
     assert!(apart(&mut here, &mut there, &devices).pop() > Some(LEVELS));
 }

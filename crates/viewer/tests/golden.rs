@@ -88,18 +88,18 @@ fn folder() -> PathBuf {
 }
 
 /// A guidewire so much aside.
-fn wire(aside_mm: f64) -> DeviceView {
-    device(20, 0.45, |w| Vec3::new(1.0 + aside_mm, 2.0, 5.0 + 170.0 * w))
+fn wire(lateral_mm: f64) -> DeviceView {
+    device(20, 0.45, |w| Vec3::new(1.0 + lateral_mm, 2.0, 5.0 + 170.0 * w))
 }
 
-fn moved(aside_mm: f64) -> DeviceView {
+fn moved(lateral_mm: f64) -> DeviceView {
     let mut moved = catheter();
-    moved.points.iter_mut().for_each(|p| p.position_mm.x += aside_mm);
+    moved.points.iter_mut().for_each(|p| p.position_mm.x += lateral_mm);
     moved
 }
 
 #[test]
-fn frames_are_the_stored_ones_and_a_wire_a_millimetre_aside_is_not() {
+fn frames_are_the_stored_ones_and_a_wire_a_millimetre_lateral_is_not() {
     let mut pictures = Vec::new();
     for (name, mode) in
         [("fluoro", Mode::Fluoro), ("cine", Mode::Cine), ("dsa", Mode::Dsa), ("roadmap", Mode::Roadmap)]
@@ -125,9 +125,9 @@ fn frames_are_the_stored_ones_and_a_wire_a_millimetre_aside_is_not() {
 fn of_sequences(twin: bool) -> Vec<(String, Image)> {
     let mut pictures = Vec::new();
     let mut add = |name: &str, image: Image| pictures.push((format!("{name}.png"), image));
-    let frame = |renderer: &mut Renderer, aside_mm: f64, frame: u64| {
+    let frame = |renderer: &mut Renderer, lateral_mm: f64, frame: u64| {
         let moment = FrameTime { frame, time_s: 1.6 };
-        renderer.render_at(&[wire(aside_mm)], moment).unwrap().fluoro.unwrap()
+        renderer.render_at(&[wire(lateral_mm)], moment).unwrap().fluoro.unwrap()
     };
 
     // Near, and without contrast medium: what moves is seen.
@@ -140,8 +140,8 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
     // A wire that goes 6 mm aside from frame to frame: where it was fades.
     let mut held = near();
     for k in 0..6 {
-        let aside_mm = if twin { 0.0 } else { 6.0 * (k as f64 - 5.0) };
-        frame(&mut held, aside_mm, k);
+        let lateral_mm = if twin { 0.0 } else { 6.0 * (k as f64 - 5.0) };
+        frame(&mut held, lateral_mm, k);
     }
     add("hold", held.last_image_hold().unwrap());
 
@@ -209,7 +209,7 @@ impl Tolerance {
 }
 
 #[test]
-fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_is_not() {
+fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_lateral_is_not() {
     let Some(renderer) = on_gpu(&view(Mode::Fluoro), &wall("aortic_arch")) else { return };
     assert!(!renderer.backend().contains("CPU reference"), "{}", renderer.backend());
     let name = renderer.backend().to_owned();
@@ -241,8 +241,8 @@ fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_i
     let [fluoro, three_d] = draw(renderer, moved(1.0));
     // A subtraction has the wire in its mask too, and shows nothing of it.
     let others = OTHERS.map(|mode| (mode != Mode::Dsa).then(|| of_mode(mode, moved(1.0))));
-    let aside = [Some(fluoro), Some(three_d)].into_iter().chain(others);
-    for ((image, reference), tolerance) in aside.zip(&references).zip(&tolerances) {
+    let lateral = [Some(fluoro), Some(three_d)].into_iter().chain(others);
+    for ((image, reference), tolerance) in lateral.zip(&references).zip(&tolerances) {
         let Some(image) = image else { continue };
         let (said, differ) = tolerance.compare(image.data(), reference);
         eprintln!("aside: {said}");

@@ -126,11 +126,11 @@ fn medium_from_a_tip_goes_where_the_tip_was_whichever_frames_were_drawn() {
         often.render_at(&[wire(time_s)], at(k, time_s)).unwrap();
     }
     let drawn = filled(&mut often);
-    let mut told = Renderer::new(&view, &wall).unwrap();
+    let mut reported = Renderer::new(&view, &wall).unwrap();
     for time_s in steps.clone() {
-        told.follow_tip(time_s, tip_mm(time_s)).unwrap();
+        reported.follow_tip(time_s, tip_mm(time_s)).unwrap();
     }
-    assert_eq!(filled(&mut told), drawn);
+    assert_eq!(filled(&mut reported), drawn);
     // Seen from another place and back.
     let place = endowire_viewer::CArmSpec { primary_deg: 20.0, ..view.c_arm.clone() };
     often.turn_c_arm(&place).unwrap();

@@ -29,8 +29,8 @@ fn wall() -> SurfaceMesh {
 }
 
 /// A steel wire across the picture, so much aside.
-fn wire(aside_mm: f64) -> DeviceView {
-    device(9, 0.9, |w| Vec3::new(aside_mm, 0.0, 40.0 * w - 20.0))
+fn wire(lateral_mm: f64) -> DeviceView {
+    device(9, 0.9, |w| Vec3::new(lateral_mm, 0.0, 40.0 * w - 20.0))
 }
 
 fn line_integrals(renderer: &mut Renderer, pulse: &[Vec<DeviceView>]) -> Vec<f64> {
@@ -45,7 +45,7 @@ fn a_pulse_is_the_mean_of_signals_and_not_that_of_line_integrals() {
     let mut renderer = Renderer::new(&view(), &wall()).unwrap();
     // Pixels of 0.4 mm at the detector are 0.27 mm at the wire: four of them in eight parts.
     let asides: Vec<f64> = (0..8).map(|k| 1.1 * (f64::from(k) + 0.5) / 8.0).collect();
-    let pulse: Vec<_> = asides.iter().map(|aside| vec![wire(*aside)]).collect();
+    let pulse: Vec<_> = asides.iter().map(|lateral| vec![wire(*lateral)]).collect();
     let swept = line_integrals(&mut renderer, &pulse);
     let instants: Vec<_> =
         pulse.iter().map(|i| line_integrals(&mut renderer, std::slice::from_ref(i))).collect();

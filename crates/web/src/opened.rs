@@ -132,11 +132,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_a_subject_is_told_with_its_file() {
+    fn what_is_wrong_in_a_subject_is_reported_with_its_file() {
         let path = Path::new("subjects/own.toml");
         let text = "name = \"a\"\nlevel = 9\ntext = \"b\"\nscene = \"c.toml\"\n[goal]\ntarget = \"d\"\ntip_within_mm = 1.0\n";
         let files = Arc::new(InMemory([(path.to_owned(), text.into())].into()));
-        let told = missing(&files, path).unwrap_err().to_string();
-        assert!(told.starts_with("subjects/own.toml: level = 9"), "{told}");
+        let reported = missing(&files, path).unwrap_err().to_string();
+        assert!(reported.starts_with("subjects/own.toml: level = 9"), "{reported}");
     }
 }

@@ -261,8 +261,8 @@ impl Played {
 /// Adapts the `[view]` table of a scene to a page, and reads the centre line along which contrast medium flows.
 fn view(mut view: ViewSpec, files: &dyn Files) -> Result<ViewSpec> {
     if let Some(ct) = &view.patient.ct {
-        let mend = "tomograms are read by the program alone: leave [view.patient.ct] out here";
-        return Err(Error::parameter("view.patient.ct.file", ct.file.display(), mend));
+        let remedy = "tomograms are read by the program alone: leave [view.patient.ct] out here";
+        return Err(Error::parameter("view.patient.ct.file", ct.file.display(), remedy));
     }
     // Graphics processors in a browser answer asynchronously.
     view.backend = Backend::Cpu;

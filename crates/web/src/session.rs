@@ -15,7 +15,7 @@ use wasm_bindgen::prelude::*;
 
 use crate::graphics::Graphics;
 use crate::played::{Played, rgba};
-use crate::subject::{Task, Told};
+use crate::subject::{Graded, Task};
 use crate::{files, object, pad, thrown, value};
 
 #[wasm_bindgen(typescript_custom_section)]
@@ -266,7 +266,7 @@ impl Session {
     #[wasm_bindgen(unchecked_return_type = "Score | null")]
     pub fn score(&self) -> Result<JsValue, JsError> {
         let score = self.played.session.score();
-        object(&score.as_deref().map(Told::of))
+        object(&score.as_deref().map(Graded::of))
     }
 
     /// A report of the session so far: one self-contained HTML page, as `endowire report` makes it of a recording,

@@ -47,7 +47,7 @@ fn counts<'a>(threshold: &'a Threshold, measures: &[Metric]) -> Counts<'a> {
 
 /// A score, as in `endowire assess --json`, and in words.
 #[derive(Debug, Serialize)]
-pub(crate) struct Told<'a> {
+pub(crate) struct Graded<'a> {
     #[serde(flatten)]
     score: &'a Score,
     words: String,
@@ -67,7 +67,7 @@ struct Row<'a> {
     kept: Option<&'static str>,
 }
 
-impl<'a> Told<'a> {
+impl<'a> Graded<'a> {
     pub(crate) fn of(score: &'a Score) -> Self {
         Self { score, words: score.verdict.words(), rows: score.metrics.iter().map(row).collect() }
     }

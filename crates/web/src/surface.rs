@@ -15,12 +15,12 @@ use crate::{object, thrown};
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Surface {
-    told: Told,
+    reported: Document,
     image: Image,
 }
 
 #[derive(Debug, Serialize)]
-struct Told {
+struct Document {
     triangles: usize,
     size_mm: [f64; 3],
     notes: Vec<String>,
@@ -55,7 +55,7 @@ impl Surface {
     /// None in a working browser.
     #[wasm_bindgen(unchecked_return_type = "SurfaceReport")]
     pub fn report(&self) -> std::result::Result<JsValue, JsError> {
-        object(&self.told)
+        object(&self.reported)
     }
 
     /// A 3D picture of the surface.
@@ -89,7 +89,7 @@ impl Surface {
             pixel: renderer.three_d_pixel(&one.centre_mm),
         };
         let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
-        let told = Told {
+        let reported = Document {
             triangles: wall.mesh().triangles.len(),
             size_mm: (high - low).into(),
             notes: wall.report().notes(),
@@ -97,7 +97,7 @@ impl Surface {
             inlet: wall.inlet().map(|one| one.index),
             openings: wall.openings().iter().map(hole).collect(),
         };
-        Ok(Self { told, image })
+        Ok(Self { reported, image })
     }
 }
 
@@ -106,19 +106,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn openings_are_seen_where_they_are_and_what_is_no_surface_is_told() {
+    fn openings_are_seen_where_they_are_and_what_is_no_surface_is_reported() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/vessels/curved_tube.stl");
         let bytes = std::fs::read(file).unwrap();
         let surface = Surface::of(Path::new("tube.stl"), &bytes, 1.0, 128).unwrap();
-        assert_eq!(surface.told.openings.len(), 2);
-        assert!(surface.told.inlet.is_some() && surface.told.hints.is_empty(), "{:?}", surface.told);
-        for hole in &surface.told.openings {
+        assert_eq!(surface.reported.openings.len(), 2);
+        assert!(
+            surface.reported.inlet.is_some() && surface.reported.hints.is_empty(),
+            "{:?}",
+            surface.reported
+        );
+        for hole in &surface.reported.openings {
             let [x, y] = hole.pixel.unwrap();
             assert!((0.0..128.0).contains(&x) && (0.0..128.0).contains(&y), "{hole:?}");
         }
         // With a wrong unit, the vessel is far too small.
-        assert!(!Surface::of(Path::new("tube.stl"), &bytes, 0.01, 128).unwrap().told.hints.is_empty());
-        let told = Surface::of(Path::new("tube.stl"), &bytes[..200], 1.0, 128).unwrap_err().to_string();
-        assert!(told.starts_with("tube.stl"), "{told}");
+        assert!(!Surface::of(Path::new("tube.stl"), &bytes, 0.01, 128).unwrap().reported.hints.is_empty());
+        let reported = Surface::of(Path::new("tube.stl"), &bytes[..200], 1.0, 128).unwrap_err().to_string();
+        assert!(reported.starts_with("tube.stl"), "{reported}");
     }
 }

@@ -21,7 +21,7 @@ pub use pushed::{Ended, Pushed};
 pub use question::Question;
 pub use vessels::Vessel;
 
-/// A tip stops where it was told if it is no farther from there than this and a radius of the lumen, mm: a command and a half.
+/// A tip stops where it was reported if it is no farther from there than this and a radius of the lumen, mm: a command and a half.
 const PLACE_MM: f64 = 3.0;
 /// What passes takes no more force than this, N: some times that which was taken for none, since a tip that is being bent takes more than the
 /// rest of the device.
@@ -46,7 +46,7 @@ pub struct Row {
     /// What was asked.
     pub question: Question,
     /// What was said.
-    pub told: Passable,
+    pub reported: Passable,
     /// What was done.
     pub pushed: Pushed,
     /// What is against both being the same; none where they are.
@@ -60,26 +60,26 @@ impl Row {
     /// A way that is not found, and what cannot be simulated.
     pub fn new(seed: u64) -> Result<Self> {
         let question = Question::new(seed)?;
-        let told = passable(&question.way, &question.device, NO_FORCE_N)?;
+        let reported = passable(&question.way, &question.device, NO_FORCE_N)?;
         let pushed = Pushed::of(&question)?;
-        let against = disagreement(&told, &question.device, &pushed);
-        Ok(Self { seed, question, told, pushed, against })
+        let against = disagreement(&reported, &question.device, &pushed);
+        Ok(Self { seed, question, reported, pushed, against })
     }
 }
 
 impl fmt::Display for Row {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (told, pushed) = (format!("{:?}", self.told.passage), &self.pushed);
+        let (reported, pushed) = (format!("{:?}", self.reported.passage), &self.pushed);
         let ended = match &pushed.ended {
             Ended::Failed(why) => why.clone(),
             other => format!("{other:?}"),
         };
         write!(
             f,
-            "{:>4}  {told:<8} {:>8.1} {:>8.1}  {ended:<8} {:>8.1} {:>8.1} {:>9.4} {:>9.5}  {}",
+            "{:>4}  {reported:<8} {:>8.1} {:>8.1}  {ended:<8} {:>8.1} {:>8.1} {:>9.4} {:>9.5}  {}",
             self.seed,
-            self.told.length_mm,
-            self.told.reaches_mm,
+            self.reported.length_mm,
+            self.reported.reaches_mm,
             pushed.reached_mm,
             pushed.inserted_mm,
             pushed.force_n,
@@ -101,50 +101,50 @@ pub const HEAD: &str =
 ///
 /// - What passes arrives, and takes little force.
 /// - What is tight arrives, or its tip stops where a section of it comes to a place that is said to be tight.
-/// - What is blocked is blocked, or its tip makes no way any more, where that was told.
-/// - What is too short is all in with its tip where that was told.
-pub fn disagreement(told: &Passable, device: &Device, pushed: &Pushed) -> Option<String> {
+/// - What is blocked is blocked, or its tip makes no way any more, where that was reported.
+/// - What is too short is all in with its tip where that was reported.
+pub fn disagreement(reported: &Passable, device: &Device, pushed: &Pushed) -> Option<String> {
     let Pushed { ended, reached_mm, force_n, deep_mm, .. } = pushed;
     let near_mm = |stop_mm: f64| {
-        let behind = told.way.partition_point(|point| point.arc_mm < stop_mm).min(told.way.len() - 1);
-        PLACE_MM + told.way[behind].lumen_radius_mm
+        let behind = reported.way.partition_point(|point| point.arc_mm < stop_mm).min(reported.way.len() - 1);
+        PLACE_MM + reported.way[behind].lumen_radius_mm
     };
     let stops_at = |stop_mm: f64| (reached_mm - stop_mm).abs() <= near_mm(stop_mm);
-    let agrees = match (told.passage, ended) {
+    let agrees = match (reported.passage, ended) {
         (_, Ended::Failed(_)) => false,
         (Passage::Passes, ended) => *ended == Ended::Arrived && *force_n <= LITTLE_FORCE_N,
         (Passage::Tight, Ended::Arrived) => true,
-        (Passage::Tight, _) => tight_stops_mm(told, device).into_iter().any(stops_at),
+        (Passage::Tight, _) => tight_stops_mm(reported, device).into_iter().any(stops_at),
         (Passage::Blocked, ended) => {
-            matches!(ended, Ended::Blocked | Ended::Stuck | Ended::AllIn) && stops_at(told.reaches_mm)
+            matches!(ended, Ended::Blocked | Ended::Stuck | Ended::AllIn) && stops_at(reported.reaches_mm)
         }
-        (Passage::Short, ended) => *ended == Ended::AllIn && stops_at(told.reaches_mm),
+        (Passage::Short, ended) => *ended == Ended::AllIn && stops_at(reported.reaches_mm),
     };
     (!agrees).then(|| {
-        let narrow = &told.narrowest;
+        let narrow = &reported.narrowest;
         format!(
             "said {:?} to {:.1} mm, least clearance {:.3} mm of {:.3} at {:.1} mm, least bend {:.1} mm where {:.1} takes no force; \
              {ended:?} at {reached_mm:.1} mm with {force_n:.3} N and {deep_mm:.4} mm deep",
-            told.passage,
-            told.reaches_mm,
+            reported.passage,
+            reported.reaches_mm,
             narrow.clearance_mm,
             narrow.lumen_radius_mm,
             narrow.arc_mm,
-            told.sharpest.cut_radius_mm,
-            told.sharpest.bears_radius_mm
+            reported.sharpest.cut_radius_mm,
+            reported.sharpest.bears_radius_mm
         )
     })
 }
 
 /// Where the tip is when a section of a device comes to a place that is tight for it, mm of way.
-fn tight_stops_mm(told: &Passable, device: &Device) -> Vec<f64> {
+fn tight_stops_mm(reported: &Passable, device: &Device) -> Vec<f64> {
     let begins = device.sections().iter().scan(0.0, |end_mm, section| {
         let begin_mm = *end_mm;
         *end_mm += section.length_mm;
         Some((begin_mm, section.radius_mm))
     });
     let begins: Vec<(f64, f64)> = begins.collect();
-    let stops = told.way.iter().flat_map(|point| {
+    let stops = reported.way.iter().flat_map(|point| {
         let narrow = begins.iter().filter(|(_, radius_mm)| *radius_mm > TIGHT * point.lumen_radius_mm);
         let bends = (point.cut_radius_mm < point.bears_radius_mm).then_some(point.arc_mm);
         narrow.map(|(begin_mm, _)| point.arc_mm + begin_mm).chain(bends)

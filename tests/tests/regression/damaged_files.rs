@@ -111,7 +111,7 @@ fn damaged_ply_files() {
     );
     mesh.vertices_mm.iter().for_each(|v| text += &format!("{} {} {}\n", v.x, v.y, v.z));
     mesh.triangles.iter().for_each(|[a, b, c]| text += &format!("3 {a} {b} {c}\n"));
-    // A fault between the rows of a binary file has no line; its cause and mend are told.
+    // A fault between the rows of a binary file has no line; its cause and remedy are reported.
     let places =
         ["line ", "vertex ", "face ", "no triangles", "is empty", "mm across", "declares ", "mend it"];
     reads_or_refuses(&[written("ply"), text.into_bytes()], &places, readers::ply);

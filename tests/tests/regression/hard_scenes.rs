@@ -24,7 +24,7 @@ fn every_hard_scene_has_a_script_for_its_instruments() {
         let text = std::fs::read_to_string(&path).unwrap();
         let script_of = |text: &str| script(text, &path).map(|script| script.len());
         assert!(script_of(&text).unwrap() > 0, "{}", path.display());
-        // One that pushes in less than nothing is told.
+        // One that pushes in less than nothing is reported.
         assert!(script_of(&text.replace("step_mm = ", "step_mm = -")).is_err(), "{}", path.display());
         scenes += 1;
     }

@@ -229,11 +229,11 @@ fn sharp_bends_are_passed_on_coarse_fine_noisy_and_dirty_meshes() {
 #[test]
 fn a_sheath_that_touches_the_wall_lets_the_device_in() {
     let (wall, _) = tube(&straight(60.0), |_| 4.0, Resolution::EdgeMm(1.0));
-    for aside_mm in [3.5, 3.54] {
-        let sheath = Sheath::new(Vec3::new(aside_mm, 0.0, 5.0), Vec3::new(0.1, 0.0, 1.0)).unwrap();
+    for lateral_mm in [3.5, 3.54] {
+        let sheath = Sheath::new(Vec3::new(lateral_mm, 0.0, 5.0), Vec3::new(0.1, 0.0, 1.0)).unwrap();
         let (mut simulation, crossing) = start(wall.clone(), sheath, wire());
         let tally = in_and_out(&mut simulation, &crossing, 50.0, 1.0);
-        println!("{aside_mm} mm aside: {tally}");
+        println!("{lateral_mm} mm aside: {tally}");
         assert!(tally.failures.is_empty(), "{tally}");
     }
 }

@@ -47,7 +47,7 @@ fn start_at(
     Simulation::builder(made.wall, device, sheath).properties(properties).method(method).build().unwrap()
 }
 
-fn rubbing() -> WallProperties {
+fn with_friction() -> WallProperties {
     WallProperties { friction: 0.15, ..WallProperties::default() }
 }
 
@@ -105,7 +105,7 @@ fn every_step_can_be_taken_again(mut simulation: Simulation, from_mm: f64, seed:
 
 #[test]
 fn steps_with_friction_and_a_shaped_tip_can_be_taken_again() {
-    every_step_can_be_taken_again(start("curved_tube", rubbing(), wire(0.03), &kirchhoff()), 120.0, 1);
+    every_step_can_be_taken_again(start("curved_tube", with_friction(), wire(0.03), &kirchhoff()), 120.0, 1);
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn steps_of_the_papers_method_can_be_taken_again() {
 
 #[test]
 fn what_a_state_holds_is_needed() {
-    let mut simulation = start("curved_tube", rubbing(), wire(0.03), &kirchhoff());
+    let mut simulation = start("curved_tube", with_friction(), wire(0.03), &kirchhoff());
     (0..60).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
     let text = serde_json::to_string(&simulation.state()).unwrap();
     let after = |text: &str| {
@@ -185,7 +185,7 @@ fn spoil(value: &mut serde_json::Value, key: &str) {
 
 #[test]
 fn a_device_that_is_pulled_out_whole_leaves_no_trace() {
-    let mut used = start("curved_tube", rubbing(), wire(0.03), &kirchhoff());
+    let mut used = start("curved_tube", with_friction(), wire(0.03), &kirchhoff());
     let mut fresh = used.clone();
     for mm in [2.0, 2.0, 1.0, -1.0, -2.0, -2.0] {
         used.step(Command::advance(mm)).unwrap();
@@ -256,7 +256,7 @@ fn a_command_that_fails_leaves_the_state_to_the_byte() {
 }
 
 #[test]
-fn where_a_way_is_blocked_is_told_whatever_was_tried_before() {
+fn where_a_way_is_blocked_is_reported_whatever_was_tried_before() {
     let mut simulation = tube(true, 500);
     let mut last = simulation.clone();
     let said = loop {
@@ -318,14 +318,17 @@ fn a_state_of_another_scene_is_refused_and_changes_nothing() {
     for (name, mut here) in [
         ("state.method", start("curved_tube", smooth(), wire(0.0), &banded)),
         ("state.elements", start("curved_tube", smooth(), wire(0.0), &finer)),
-        ("state.scene", start("curved_tube", rubbing(), wire(0.0), &kirchhoff())),
+        ("state.scene", start("curved_tube", with_friction(), wire(0.0), &kirchhoff())),
         ("state.scene", start("curved_tube", smooth(), short, &kirchhoff())),
         ("state.scene", start_at(3.0, "curved_tube", smooth(), wire(0.0), &kirchhoff())),
     ] {
         let before = bytes(&here);
         match here.restore(&saved) {
-            Err(Error::Parameter { name: told, mend, .. }) => {
-                assert!(told == name && mend.contains("restore a state of"), "{name}: {told}: {mend}");
+            Err(Error::Parameter { name: reported, remedy, .. }) => {
+                assert!(
+                    reported == name && remedy.contains("restore a state of"),
+                    "{name}: {reported}: {remedy}"
+                );
             }
             other => panic!("{name}: {other:?}"),
         }
@@ -336,7 +339,7 @@ fn a_state_of_another_scene_is_refused_and_changes_nothing() {
 
 #[test]
 fn a_state_with_numbers_out_of_place_is_refused() {
-    let mut simulation = start("curved_tube", rubbing(), wire(0.0), &kirchhoff());
+    let mut simulation = start("curved_tube", with_friction(), wire(0.0), &kirchhoff());
     (0..40).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
     let whole = serde_json::to_value(simulation.state()).unwrap();
     let spoilt = |change: &dyn Fn(&mut serde_json::Value)| {
@@ -350,7 +353,7 @@ fn a_state_with_numbers_out_of_place_is_refused() {
         "penetration_mm": 0.0, "triangle": 0,
     });
     let touch = serde_json::json!({"energy_mj": 0.0, "contact": contact, "friction_nmm": 0.0});
-    for (change, told) in [
+    for (change, reported) in [
         (rod(&|s| drop(s["rod"]["angles"].as_array_mut().unwrap().pop())), "state.rod"),
         (rod(&|s| s["known"]["points"][0]["piece"] = 4_000_000_000u32.into()), "state.known"),
         (rod(&|s| drop(s["forces"].as_array_mut().unwrap().pop())), "state.forces"),
@@ -366,13 +369,13 @@ fn a_state_with_numbers_out_of_place_is_refused() {
         (spoilt(&|both| both["report"]["inserted_mm"] = 1.0.into()), "state.report"),
     ] {
         let error = simulation.clone().restore(&change).unwrap_err();
-        assert!(error.is_input() && error.to_string().starts_with(told), "{told}: {error}");
+        assert!(error.is_input() && error.to_string().starts_with(reported), "{reported}: {error}");
     }
 }
 
 #[test]
 fn threads_on_one_vessel_have_the_bits_of_runs_one_after_another() {
-    let first = start("curved_tube", rubbing(), wire(0.03), &kirchhoff());
+    let first = start("curved_tube", with_friction(), wire(0.03), &kirchhoff());
     let run = |mut simulation: Simulation, seed: u64| {
         (0..50).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
         commands(seed, 40).into_iter().for_each(|command| drop(simulation.step(command).map(|_| ())));
@@ -396,7 +399,7 @@ fn large() -> Simulation {
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
     let method = KirchhoffOptions { element_mm: 1.0, ..KirchhoffOptions::default() };
     let mut simulation = Simulation::builder(made.wall, wire(0.03), sheath)
-        .properties(rubbing())
+        .properties(with_friction())
         .method(&method)
         .build()
         .unwrap();

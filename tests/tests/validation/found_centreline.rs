@@ -145,16 +145,16 @@ fn a_surface_without_a_way_through_says_how_to_give_a_line() {
         "[vessel]\nfile = {file:?}\nflow = {{ inflow_ml_per_s = 4.0 }}\n[device]\nsection = [{{ length_mm = 50, radius_mm = 0.3, \
          bending_stiffness_nmm2 = 4 }}]\n[sheath]\nposition_mm = [0, 0, 5]\ndirection = [0, 0, 1]\n"
     );
-    let told = Scene::from_toml(&text, Path::new("a.toml"))
+    let reported = Scene::from_toml(&text, Path::new("a.toml"))
         .unwrap()
         .simulation(&NoStore)
         .map(drop)
         .unwrap_err()
         .to_string();
     std::fs::remove_file(&file).unwrap();
-    assert!(told.starts_with("vessel.centreline = none: none is found in the surface"), "{told}");
+    assert!(reported.starts_with("vessel.centreline = none: none is found in the surface"), "{reported}");
     assert!(
-        told.contains("no opening") && told.contains("endowire vessel centreline SURFACE --from"),
-        "{told}"
+        reported.contains("no opening") && reported.contains("endowire vessel centreline SURFACE --from"),
+        "{reported}"
     );
 }

@@ -30,7 +30,7 @@ fn push(simulation: &mut Simulation, step_mm: f64, steps: usize) -> (Vec3, bool)
 
 #[test]
 fn large_steps_end_where_small_ones_do() {
-    // At 300° and 4.67 mm a step the tip ended 38 mm off once, and no jump was told.
+    // At 300° and 4.67 mm a step the tip ended 38 mm off once, and no jump was reported.
     for (friction, degrees, most_mm) in [(0.0, 300.0, 0.05), (0.0, 90.0, 0.05), (0.1, 300.0, 0.5)] {
         let begun = turned(friction, degrees);
         let (small, small_converged) = push(&mut begun.clone(), 0.5, 200);

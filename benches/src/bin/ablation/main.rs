@@ -44,35 +44,35 @@ struct Arguments {
 
 impl Arguments {
     fn read() -> Result<Self> {
-        let mut told = Self { repeats: 1, ..Self::default() };
+        let mut reported = Self { repeats: 1, ..Self::default() };
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
             let mut value = || {
-                let mend = "say which after it";
-                words.next().ok_or_else(|| Error::parameter(word.as_str(), "nothing", mend))
+                let remedy = "say which after it";
+                words.next().ok_or_else(|| Error::parameter(word.as_str(), "nothing", remedy))
             };
             match word.as_str() {
-                "--print" => told.prints = true,
-                "--measured" => told.is_measured = true,
-                "--rows" => told.lists = true,
-                "--scenes" => told.scenes = Some(value()?),
+                "--print" => reported.prints = true,
+                "--measured" => reported.is_measured = true,
+                "--rows" => reported.lists = true,
+                "--scenes" => reported.scenes = Some(value()?),
                 "--repeats" => {
                     let count = value()?;
-                    let mend = "say how many times, at least once";
-                    told.repeats = count
+                    let remedy = "say how many times, at least once";
+                    reported.repeats = count
                         .parse()
                         .ok()
                         .filter(|repeats| *repeats > 0)
-                        .ok_or_else(|| Error::parameter("--repeats", count.as_str(), mend))?;
+                        .ok_or_else(|| Error::parameter("--repeats", count.as_str(), remedy))?;
                 }
                 option if option.starts_with("--") => {
-                    let mend = "say --print, --measured, --rows, --scenes PATTERN or --repeats N";
-                    return Err(Error::parameter("option", option, mend));
+                    let remedy = "say --print, --measured, --rows, --scenes PATTERN or --repeats N";
+                    return Err(Error::parameter("option", option, remedy));
                 }
-                pattern => told.rows = Some(pattern.to_owned()),
+                pattern => reported.rows = Some(pattern.to_owned()),
             }
         }
-        Ok(told)
+        Ok(reported)
     }
 
     /// Whether the table is of all rows and all scenes, and is to be written.
@@ -118,17 +118,17 @@ const SLOWER: f64 = 20.0;
 const GRACE_S: f64 = 10.0;
 
 fn main() -> Result<()> {
-    let told = Arguments::read()?;
+    let reported = Arguments::read()?;
     let mut rows = rows::all()?;
-    rows.retain(|row| has(&row.name, told.rows.as_deref()));
-    if told.lists {
+    rows.retain(|row| has(&row.name, reported.rows.as_deref()));
+    if reported.lists {
         rows.iter().for_each(|row| println!("{}: {}", row.group, row.name));
         return Ok(());
     }
     let mut hard = scenes::all()?;
-    hard.retain(|scene| has(&scene.name, told.scenes.as_deref()));
-    let results = Results::of_this_commit(&root(), told.is_measured)?;
-    if !told.is_measured {
+    hard.retain(|scene| has(&scene.name, reported.scenes.as_deref()));
+    let results = Results::of_this_commit(&root(), reported.is_measured)?;
+    if !reported.is_measured {
         for (k, row) in rows.iter().enumerate() {
             let known = results.of(row)?;
             for scene in &mut hard {
@@ -137,13 +137,13 @@ fn main() -> Result<()> {
                 }
                 eprintln!("{}/{} {}: {}", k + 1, rows.len(), row.name, scene.name);
                 scene.prepare()?;
-                results.keep(row, &scene.name, &pair(scene, row, told.repeats)?)?;
+                results.keep(row, &scene.name, &pair(scene, row, reported.repeats)?)?;
             }
         }
     }
     let lines = rows.iter().map(|row| Ok((row, results.of(row)?))).collect::<Result<Vec<_>>>()?;
     let table = table::table(&lines, &hard);
-    if told.writes() {
+    if reported.writes() {
         table::write(&root().join("BENCHMARKS.md"), &results.commit, hard.len(), &table)?;
     } else {
         println!("{table}");

@@ -38,7 +38,7 @@ pub(crate) struct Hard {
     walls: Option<(Lumen, Felt)>,
 }
 
-/// The felt wall of a scene: no row changes its recipe, so it is made once.
+/// The contact surface of a scene: no row changes its recipe, so it is made once.
 #[derive(Default)]
 struct Felt {
     walls: RefCell<Vec<Wall>>,

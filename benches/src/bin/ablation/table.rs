@@ -123,7 +123,7 @@ pub(crate) fn table(rows: &[(&Row, BTreeMap<String, Measured>)], scenes: &[Hard]
 pub(crate) fn write(path: &Path, commit: &str, scenes: usize, table: &str) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::file(path, error))?;
     let before = text.split(HEADING).next().unwrap_or_default().trim_end();
-    let told = format!(
+    let reported = format!(
         "Written by `cargo run --release -p endowire-benches --bin ablation` from commit {commit}: {scenes} scenes of \
          `benches/hard` without a mechanism of the solver, or with another number (`benches/src/bin/ablation/rows.rs`), over \
          those with all as they are. Ratios of sums of Newton iterations, of factorisations and of time, each scene run in \
@@ -132,6 +132,6 @@ pub(crate) fn write(path: &Path, commit: &str, scenes: usize, table: &str) -> Re
          (these are in no ratio). Where nothing differs, no scene needs it.",
         APART_MM[0], APART_MM[1]
     );
-    std::fs::write(path, format!("{before}\n\n{HEADING}\n{told}\n{table}\n"))
+    std::fs::write(path, format!("{before}\n\n{HEADING}\n{reported}\n{table}\n"))
         .map_err(|error| Error::file(path, error))
 }

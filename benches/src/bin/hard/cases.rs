@@ -58,11 +58,11 @@ fn case(path: &Path) -> Result<bool> {
             left = Some(given.commands);
         }
     }
-    let told = given.jumps > 0 && small.jumps > 0;
+    let reported = given.jumps > 0 && small.jumps > 0;
     let ends = [&given, &small].map(|one| one.end.is_some());
     let kept = match (left, ends[0] == ends[1]) {
         (None, true) => "kept",
-        _ if told => "told",
+        _ if reported => "told",
         _ => "LEFT",
     };
     let name = path.file_stem().unwrap_or_default().to_string_lossy();

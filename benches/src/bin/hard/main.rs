@@ -49,14 +49,16 @@ fn seeded<R: std::fmt::Display>(
 
 fn main() -> Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mend = "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]`, `ticks [DEVICE]`, `sequences [SEEDS]` or `deployments [SEEDS]`";
+    let remedy = "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]`, `ticks [DEVICE]`, `sequences [SEEDS]` or `deployments [SEEDS]`";
     let second = arguments.get(1).map(String::as_str);
     let seeds = |all: u64| {
-        let Some(told) = second else { return Ok(0..all) };
-        let (first, end) = told.split_once("..").unwrap_or(("0", told));
+        let Some(reported) = second else { return Ok(0..all) };
+        let (first, end) = reported.split_once("..").unwrap_or(("0", reported));
         match (first.parse(), end.parse()) {
             (Ok(first), Ok(end)) => Ok(first..end),
-            _ => Err(Error::parameter("SEEDS", told, "say how many, or from which up to which: 100..200")),
+            _ => {
+                Err(Error::parameter("SEEDS", reported, "say how many, or from which up to which: 100..200"))
+            }
         }
     };
     let wrong = match arguments.first().map(String::as_str) {
@@ -75,7 +77,7 @@ fn main() -> Result<ExitCode> {
             let head = deployments::DeploymentRow::HEAD;
             seeded(seeds(deployments::DEPLOYMENTS)?, head, deployments::run, |row| row.pass)?
         }
-        other => return Err(Error::parameter("study", other.unwrap_or("none"), mend)),
+        other => return Err(Error::parameter("study", other.unwrap_or("none"), remedy)),
     };
     println!("{wrong} are wrong");
     Ok(ExitCode::from(u8::from(wrong > 0)))

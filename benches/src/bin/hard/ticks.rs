@@ -66,8 +66,9 @@ pub(crate) fn ticks(only: Option<&str>) -> Result<usize> {
                 && stepping.jumps == ticking.jumps
                 && stepping.end.is_some() == ticking.end.is_some();
             let apart_mm = [&stepping, &few].map(|course| course.apart_mm(&small));
-            let is_told = [&stepping, &few].map(|course| course.jumps > 0 || small.jumps > 0);
-            let stays = apart_mm.iter().zip(is_told).all(|(mm, is_told)| *mm <= APART_MM || is_told);
+            let is_reported = [&stepping, &few].map(|course| course.jumps > 0 || small.jumps > 0);
+            let stays =
+                apart_mm.iter().zip(is_reported).all(|(mm, is_reported)| *mm <= APART_MM || is_reported);
             wrong += usize::from(!(same && stays));
             println!(
                 "{device:18} {friction:8.1} {:>14} {:16.3} {:11.3} {:13} {:6} {:4} {:6}",

@@ -88,9 +88,9 @@ pub(crate) fn turned(only: Option<&str>) -> Result<usize> {
                     if apart_mm <= most_mm && course.end.is_some() == small.end.is_some() {
                         continue;
                     }
-                    let told = course.jumps > 0 && small.jumps > 0;
-                    silent += usize::from(!told);
-                    let how = if told { "both tell a jump" } else { "in silence" };
+                    let reported = course.jumps > 0 && small.jumps > 0;
+                    silent += usize::from(!reported);
+                    let how = if reported { "both tell a jump" } else { "in silence" };
                     let failed = course.end.or(small.end.clone()).unwrap_or_default();
                     println!(
                         "{name}, μ {friction}, {degrees}°, {step_mm} mm: {apart_mm:.3} mm apart, {how} {failed}"

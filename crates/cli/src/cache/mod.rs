@@ -27,15 +27,15 @@ const LEAST: Duration = Duration::from_millis(5);
 /// Walls and centre lines in a folder; without a folder, nothing is cached.
 pub(crate) struct Cache {
     folder: Option<PathBuf>,
-    /// Whether the user was told that the folder cannot be written.
-    told: AtomicBool,
+    /// Whether the user was reported that the folder cannot be written.
+    reported: AtomicBool,
 }
 
 impl Cache {
     /// The user's cache, unless the command line disables it.
     pub(crate) fn new(args: &CacheArgs) -> Self {
         let folder = if args.no_cache { None } else { place::folder() };
-        Self { folder, told: AtomicBool::new(false) }
+        Self { folder, reported: AtomicBool::new(false) }
     }
 
     /// Folder of the cache, if there is one.
@@ -61,7 +61,7 @@ impl Cache {
 
     fn keep(&self, folder: &Path, key: &Key, made: &impl Kept) {
         if let Err(error) = write(folder, key, made)
-            && !self.told.swap(true, Ordering::Relaxed)
+            && !self.reported.swap(true, Ordering::Relaxed)
         {
             tell(format_args!(
                 "endowire: the wall is not kept for the next run: {}: {error} (set ENDOWIRE_CACHE to a folder that can be \

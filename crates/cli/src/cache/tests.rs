@@ -14,7 +14,7 @@ fn recipe(tree: &CentrelineTree) -> WallRecipe<'_> {
 }
 
 fn cache(folder: &Path) -> Cache {
-    Cache { folder: Some(folder.to_path_buf()), told: AtomicBool::new(false) }
+    Cache { folder: Some(folder.to_path_buf()), reported: AtomicBool::new(false) }
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -86,17 +86,17 @@ fn a_place_that_cannot_be_written_is_no_failure() {
     let file = folder.path().join("file");
     std::fs::write(&file, "mine").unwrap();
     let (tree, cache) = (tube(), cache(&file.join("walls")));
-    assert!(cache.wall(&recipe(&tree)).is_ok() && cache.told.load(Ordering::Relaxed));
+    assert!(cache.wall(&recipe(&tree)).is_ok() && cache.reported.load(Ordering::Relaxed));
     assert_eq!(std::fs::read(&file).unwrap(), b"mine");
 }
 
 #[test]
-fn what_cannot_be_made_is_told_and_not_kept() {
+fn what_cannot_be_made_is_reported_and_not_kept() {
     let folder = tempfile::tempdir().unwrap();
     let (tree, cache) = (tube(), cache(folder.path()));
     let wrong = WallRecipe::Generated { tree: &tree, resolution: Resolution::EdgeMm(-1.0) };
-    let told = cache.wall(&wrong).unwrap_err().to_string();
-    assert_eq!(told, wrong.make().unwrap_err().to_string());
+    let reported = cache.wall(&wrong).unwrap_err().to_string();
+    assert_eq!(reported, wrong.make().unwrap_err().to_string());
     assert_eq!(files(folder.path()), [] as [PathBuf; 0]);
 }
 

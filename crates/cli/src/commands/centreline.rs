@@ -52,9 +52,9 @@ pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
 /// Replaces the core's names `from`, `to` and target in an error by the flags of the command line.
 pub(super) fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
-        Error::Parameter { name, value, mend } if ["from", "to", "target"].contains(&name.as_str()) => {
+        Error::Parameter { name, value, remedy } if ["from", "to", "target"].contains(&name.as_str()) => {
             let flag = if name == "from" { "--from" } else { "--to" };
-            Error::Parameter { name: flag.to_owned(), value, mend }
+            Error::Parameter { name: flag.to_owned(), value, remedy }
         }
         other => other,
     })
@@ -62,15 +62,16 @@ pub(super) fn as_flag(error: Error) -> Failure {
 
 /// Parses `--from` and `--to`: the number of an opening, or a place `x,y,z`.
 pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
-    let mend = "expected the number of an opening (endowire vessel check lists them) or a place x,y,z in mm";
+    let remedy =
+        "expected the number of an opening (endowire vessel check lists them) or a place x,y,z in mm";
     let numbers: Vec<&str> = text.split(',').map(str::trim).collect();
     match numbers.as_slice() {
-        [opening] => opening.parse().map(CentrelineEnd::Opening).map_err(|_| mend.to_owned()),
+        [opening] => opening.parse().map(CentrelineEnd::Opening).map_err(|_| remedy.to_owned()),
         [x, y, z] => match (x.parse(), y.parse(), z.parse()) {
             (Ok(x), Ok(y), Ok(z)) => Ok(CentrelineEnd::Place([x, y, z].into())),
-            _ => Err(mend.to_owned()),
+            _ => Err(remedy.to_owned()),
         },
-        _ => Err(mend.to_owned()),
+        _ => Err(remedy.to_owned()),
     }
 }
 

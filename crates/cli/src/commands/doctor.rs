@@ -79,8 +79,8 @@ fn renderer() -> Result<String, Failure> {
 #[cfg(all(unix, not(target_os = "macos")))]
 fn display() -> Option<String> {
     let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
-    let told = |name: &str| named(name).map(|value| format!("{name}={}", value.to_string_lossy()));
-    told("WAYLAND_DISPLAY").or_else(|| told("DISPLAY"))
+    let reported = |name: &str| named(name).map(|value| format!("{name}={}", value.to_string_lossy()));
+    reported("WAYLAND_DISPLAY").or_else(|| reported("DISPLAY"))
 }
 
 #[cfg(not(all(unix, not(target_os = "macos"))))]

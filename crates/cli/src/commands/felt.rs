@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use endowire_core::contact::{FeltMesh, WallProperties};
+use endowire_core::contact::{ContactMesh, WallProperties};
 use endowire_core::vessel::{Conditioned, Conditioning, NoStore, SurfaceMesh, Wall, WallQuery, condition};
 use endowire_core::{Error, Vec3};
 use serde::Serialize;
@@ -23,7 +23,7 @@ const MARGIN: f64 = 20.0;
 /// Search radius for the given surface, mm: a larger distance is drawn as this one.
 const REACH_MM: f64 = 10.0;
 
-/// Properties of the felt wall.
+/// Properties of the contact surface.
 #[derive(Serialize)]
 pub(crate) struct FeltReport {
     changed: bool,
@@ -52,15 +52,15 @@ impl FeltReport {
         options.deviation_mm = args.deviation_mm.unwrap_or(options.deviation_mm);
         let even = wall.with_even_rims()?;
         let felt = condition(even.mesh(), &options).map_err(|error| match error {
-            Error::Parameter { name, value, mend } if name == "deviation_mm" => {
-                Failure::from(Error::Parameter { name: "--deviation-mm".to_owned(), value, mend })
+            Error::Parameter { name, value, remedy } if name == "deviation_mm" => {
+                Failure::from(Error::Parameter { name: "--deviation-mm".to_owned(), value, remedy })
             }
             other => other.into(),
         })?;
         // No further deviation, because the mesh is already conditioned.
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let meshed = Wall::welded(&felt.mesh)?;
-        let smooth = FeltMesh::new(&meshed, RADIUS_MM, &properties, &NoStore)?;
+        let smooth = ContactMesh::new(&meshed, RADIUS_MM, &properties, &NoStore)?;
         let deviation = smooth.deviation(&wall)?;
         let mut written = Vec::new();
         if let Some(path) = &args.felt {
@@ -107,7 +107,7 @@ impl FeltReport {
     }
 }
 
-/// Draws the felt wall, seen along its shortest extent: grey where it agrees with the given surface, red where it is
+/// Draws the contact surface, seen along its shortest extent: grey where it agrees with the given surface, red where it is
 /// inside by the limit or more, blue where it is outside.
 fn draw(path: &Path, felt: &Conditioned<'_>, wall: &Wall, limit_mm: f64) -> Result<(), Failure> {
     let mesh = &felt.mesh;

@@ -67,13 +67,13 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let left = coils::read(&args.dir, &stack)?;
     let bar = progress::bar(frames, "frame");
     // Number of steps whose tips were passed on.
-    let mut told = 0;
+    let mut reported = 0;
     for k in 0..frames {
         let step = if one { steps[0] } else { steps[k] };
-        while studio.follows_tip() && told < step {
-            told += 1;
-            let (shape, time_s) = (recording.shape(told), ended_s(told));
-            let inserted_mm = &lengths.after(told, &shape)?;
+        while studio.follows_tip() && reported < step {
+            reported += 1;
+            let (shape, time_s) = (recording.shape(reported), ended_s(reported));
+            let inserted_mm = &lengths.after(reported, &shape)?;
             let displacement = motion.as_ref().map(|motion| motion.at(time_s));
             studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
         }

@@ -39,11 +39,11 @@ pub(crate) fn sac(args: &SacArgs) -> Result<(), Failure> {
 fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
         Error::Parameter { name, value, .. } if ["from", "to"].contains(&name.as_str()) => {
-            let mend = "no centre line is found between two openings, by which the artery would be known: give a place in the artery";
-            Error::parameter("--parent", value, mend)
+            let remedy = "no centre line is found between two openings, by which the artery would be known: give a place in the artery";
+            Error::parameter("--parent", value, remedy)
         }
-        Error::Parameter { name, value, mend } if ["dome", "parent"].contains(&name.as_str()) => {
-            Error::Parameter { name: format!("--{name}"), value, mend }
+        Error::Parameter { name, value, remedy } if ["dome", "parent"].contains(&name.as_str()) => {
+            Error::Parameter { name: format!("--{name}"), value, remedy }
         }
         other => other,
     })

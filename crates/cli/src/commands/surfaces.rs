@@ -59,8 +59,8 @@ struct Start {
 pub(crate) fn surfaces(args: &VerifyArgs, folder: &Path) -> Result<(), Failure> {
     let files = surfaces_in(folder)?;
     let none = |pattern: &str| {
-        let mend = "no cell has all of these words; --full has more cells";
-        Failure::Input(format!("--cells {pattern}: {mend}"))
+        let remedy = "no cell has all of these words; --full has more cells";
+        Failure::Input(format!("--cells {pattern}: {remedy}"))
     };
     // Reading the surfaces takes minutes.
     if let Some(pattern) = args.cells.as_deref()
@@ -249,9 +249,9 @@ fn row_text(row: &CellRow, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
     let crossed = match row.crossings {
         0 => "–".to_owned(),
         count => format!("{count}×{:.2}", row.missing_mm),
-    } + &match row.untold {
+    } + &match row.unreported {
         0 => String::new(),
-        untold => format!(" ({untold} untold)"),
+        unreported => format!(" ({unreported} untold)"),
     };
     line(format_args!(
         "  {:<8} {:<52} {:>7.1} {:>5} {:>7} {:>6} {:>7.0} {:>8.2} {:>9.1} {:>7.2} {:>7.3} {:>5} {:>6} {:>9}{}",

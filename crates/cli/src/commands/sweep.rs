@@ -68,14 +68,14 @@ fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure
         stop,
         progress: &|progress| show(&bar, progress),
     };
-    let told = sweep.carry_out(&order)?;
+    let reported = sweep.carry_out(&order)?;
     bar.finish_and_clear();
-    let Progress { runs, done, failed, unconverged } = told.progress;
+    let Progress { runs, done, failed, unconverged } = reported.progress;
     if args.json {
-        let (earlier, table) = (told.earlier, told.table.clone());
+        let (earlier, table) = (reported.earlier, reported.table.clone());
         print_json(&Document { runs, done, earlier, failed, unconverged, table })?;
     }
-    match told.table {
+    match reported.table {
         Some(table) => {
             let steps = match unconverged {
                 0 => String::new(),
@@ -100,8 +100,9 @@ fn show(bar: &ProgressBar, progress: Progress) {
         bar.reset_eta();
     }
     let counts = [(progress.failed, "failed"), (progress.unconverged, "without equilibria")];
-    let told = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
-    bar.set_message(told.collect::<Vec<_>>().join(", "));
+    let reported =
+        counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+    bar.set_message(reported.collect::<Vec<_>>().join(", "));
 }
 
 /// Recordings of all runs: each a folder as from `endowire run`, with its scene beside it.

@@ -63,8 +63,8 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
 /// Replaces the core's name of a parameter in an error by the flag of the command line.
 fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
-        Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
-            Error::Parameter { name: format!("--{}", name.replace('_', "-")), value, mend }
+        Error::Parameter { name, value, remedy } if name == "edge_mm" || name == "triangles" => {
+            Error::Parameter { name: format!("--{}", name.replace('_', "-")), value, remedy }
         }
         other => other,
     })
@@ -90,8 +90,8 @@ fn report_on(
 ) -> Result<(), Failure> {
     let surface = SurfaceMesh::read(file, frame)?;
     let report = check_with(&surface, frame.unit_mm, septum_mm).map_err(|error| match error {
-        Error::Parameter { name, value, mend } if name == "septum_mm" => {
-            Failure::from(Error::Parameter { name: "--septum-mm".to_owned(), value, mend })
+        Error::Parameter { name, value, remedy } if name == "septum_mm" => {
+            Failure::from(Error::Parameter { name: "--septum-mm".to_owned(), value, remedy })
         }
         other => Failure::from(other).at(file.display()),
     })?;

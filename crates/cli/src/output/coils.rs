@@ -50,13 +50,13 @@ pub(crate) struct CoilTable {
     /// `None` before the first coil.
     table: Option<StepTable>,
     /// The coils as in their last rows.
-    told: Vec<DetachedCoil>,
+    reported: Vec<DetachedCoil>,
 }
 
 impl CoilTable {
     /// The table of a new recording in `folder`.
     pub(crate) fn new(folder: &Path) -> Self {
-        Self { path: folder.join(COILS), table: None, told: Vec::new() }
+        Self { path: folder.join(COILS), table: None, reported: Vec::new() }
     }
 
     /// The table of a recording that resumes after step `steps`; rows of later steps are dropped.
@@ -65,16 +65,16 @@ impl CoilTable {
         if !new.path.exists() {
             return Ok(new);
         }
-        let told = after(&read(folder, stack)?, steps);
+        let reported = after(&read(folder, stack)?, steps);
         let table = StepTable::go_on(&new.path, steps).map_err(|e| Failure::write(&new.path, &e))?;
-        Ok(Self { table: Some(table), told, ..new })
+        Ok(Self { table: Some(table), reported, ..new })
     }
 
     /// Adds the rows of a step.
     pub(crate) fn push(&mut self, step: usize, simulation: &Simulation) -> io::Result<()> {
         let mut moved = false;
         for (number, coil) in simulation.coils().iter().enumerate() {
-            if self.told.get(number).is_some_and(|was| moved_mm(coil, was) <= MOVED_MM) {
+            if self.reported.get(number).is_some_and(|was| moved_mm(coil, was) <= MOVED_MM) {
                 continue;
             }
             let table = match &mut self.table {
@@ -83,9 +83,9 @@ impl CoilTable {
             };
             let instrument = &simulation.stack().instruments()[coil.instrument].name;
             rows_of(step, number, instrument, &coil.shape).try_for_each(|row| table.push(row))?;
-            match self.told.get_mut(number) {
-                Some(told) => told.clone_from(coil),
-                None => self.told.push(coil.clone()),
+            match self.reported.get_mut(number) {
+                Some(reported) => reported.clone_from(coil),
+                None => self.reported.push(coil.clone()),
             }
             moved = true;
         }
@@ -96,8 +96,8 @@ impl CoilTable {
     }
 
     /// The coils as in their last rows.
-    pub(crate) fn told(&self) -> &[DetachedCoil] {
-        &self.told
+    pub(crate) fn reported(&self) -> &[DetachedCoil] {
+        &self.reported
     }
 
     /// Syncs all rows to disk.

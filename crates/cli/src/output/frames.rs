@@ -95,11 +95,11 @@ impl FrameWriter {
         if self.planes.is_empty() || !shows || !self.spec.injection.is_empty() {
             return Ok(());
         }
-        let refused = |mend: String| Err(Error::parameter("view.xray.mode", "roadmap", mend));
+        let refused = |remedy: String| Err(Error::parameter("view.xray.mode", "roadmap", remedy));
         let injects = script.and_then(|script| Some((script.steps_before_injection()?, script.len())));
         let Some((before, all)) = injects else {
-            let mend = "a roadmap shows an angiogram: give a [[view.injection]], or in endowire run inject in a line of the script";
-            return refused(mend.to_owned());
+            let remedy = "a roadmap shows an angiogram: give a [[view.injection]], or in endowire run inject in a line of the script";
+            return refused(remedy.to_owned());
         };
         let first = (self.spec.every as usize).min(all);
         if before < first {
@@ -125,11 +125,11 @@ impl FrameWriter {
     /// Geometry of each plane of fluoroscopy, for the summary.
     pub(crate) fn planes(&self) -> Vec<PlaneTold> {
         let arms = self.planes.iter().filter_map(|plane| Some((plane.c_arm()?, plane.exposure())));
-        let told = arms.map(|(arm, exposure)| {
+        let reported = arms.map(|(arm, exposure)| {
             let [primary_deg, secondary_deg] = arm.angles_deg();
             PlaneTold { primary_deg, secondary_deg, camera_matrix: arm.matrix(), exposure }
         });
-        told.collect()
+        reported.collect()
     }
 
     /// Adds an injection, from the next frame on.

@@ -58,26 +58,26 @@ impl InstrumentTable {
     /// Adds the rows of a step.
     pub(crate) fn push(&mut self, step: usize, moves: &[Move], simulation: &Simulation) -> io::Result<()> {
         let (hands, stack) = (simulation.report().hands(), simulation.stack());
-        for (index, (instrument, told)) in stack.instruments().iter().zip(&hands).enumerate() {
+        for (index, (instrument, reported)) in stack.instruments().iter().zip(&hands).enumerate() {
             let moved = moves.iter().find(|one| one.instrument == index);
             let command = moved.map(|one| one.command).unwrap_or_default();
             let tip = simulation.tip_of_mm(index);
             let outside = hands[index + 1..].iter().map(|other| other.inserted_mm);
-            let felt_mm = (told.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
+            let felt_mm = (reported.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
             let lateral = simulation.lateral_forces(index).into_iter().map(|at| at.force_n.norm());
             self.table.push(Row {
                 step,
                 instrument: instrument.name.clone(),
                 advance_mm: command.advance_mm,
                 rotate_rad: command.rotate_rad,
-                inserted_mm: told.inserted_mm,
-                rotation_rad: told.rotation_rad,
-                tip_rotation_rad: told.tip_rotation_rad,
+                inserted_mm: reported.inserted_mm,
+                rotation_rad: reported.rotation_rad,
+                tip_rotation_rad: reported.tip_rotation_rad,
                 tip_x_mm: tip.map(|tip| tip.x),
                 tip_y_mm: tip.map(|tip| tip.y),
                 tip_z_mm: tip.map(|tip| tip.z),
-                push_force_n: told.push_force_n,
-                torque_nmm: told.torque_nmm,
+                push_force_n: reported.push_force_n,
+                torque_nmm: reported.torque_nmm,
                 felt_mm,
                 felt_radius_mm: instrument.device.max_radius_within(felt_mm),
                 lateral_n: lateral.fold(0.0, |sum, force_n| sum + force_n),

@@ -47,7 +47,7 @@ pub(crate) struct Packed {
 pub(crate) struct PackingTable {
     table: StepTable,
     sac: Sac,
-    told: Packed,
+    reported: Packed,
 }
 
 impl PackingTable {
@@ -61,14 +61,14 @@ impl PackingTable {
     ) -> Result<Self, Failure> {
         let path = folder.join(PACKING);
         let table = StepTable::go_on(&path, steps).map_err(|e| Failure::write(&path, &e))?;
-        let (mut told, rows) = (Packed::none(&sac), rows::read::<Row>(&path)?);
+        let (mut reported, rows) = (Packed::none(&sac), rows::read::<Row>(&path)?);
         // In a new folder earlier steps have no rows, and the state is all that is known of them.
         if steps > 0 && rows.is_empty() {
             let Packing { density, neck_coverage, outside_mm, .. } = Packing::of(simulation, &sac)?;
-            told = Packed { density, neck_coverage, outside_mm, ..told };
+            reported = Packed { density, neck_coverage, outside_mm, ..reported };
         }
-        rows.iter().for_each(|row| told.add(row));
-        Ok(Self { table, told, sac })
+        rows.iter().for_each(|row| reported.add(row));
+        Ok(Self { table, reported, sac })
     }
 
     /// Adds the row of a step.
@@ -83,14 +83,14 @@ impl PackingTable {
             herniated: packing.herniated,
             dome_force_n: packing.dome_force_n,
         };
-        self.told.add(&row);
+        self.reported.add(&row);
         self.table.push(row)?;
         self.table.flush()
     }
 
     /// The packing for the summary.
-    pub(crate) fn told(&self) -> Packed {
-        self.told
+    pub(crate) fn reported(&self) -> Packed {
+        self.reported
     }
 
     /// Syncs all rows to disk.

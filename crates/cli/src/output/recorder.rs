@@ -290,12 +290,12 @@ impl Recorder {
 
     /// Packing of the scene's sac, if it has one.
     pub(crate) fn packed(&self) -> Option<Packed> {
-        self.packing.as_ref().map(PackingTable::told)
+        self.packing.as_ref().map(PackingTable::reported)
     }
 
     /// Detached coils after the last step.
     pub(crate) fn coils(&self) -> &[DetachedCoil] {
-        self.coils.told()
+        self.coils.reported()
     }
 
     /// Writes the current summary at intervals, in case the run is killed.

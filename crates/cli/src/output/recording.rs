@@ -289,9 +289,9 @@ mod tests {
                     );
                 }
                 Err(error) => {
-                    let told = error.to_string();
-                    assert!(told.contains(folder.to_str().unwrap()), "round {round}: {told}");
-                    assert!(!told.contains('\n') && told.len() < 1_000, "round {round}: {told}");
+                    let reported = error.to_string();
+                    assert!(reported.contains(folder.to_str().unwrap()), "round {round}: {reported}");
+                    assert!(!reported.contains('\n') && reported.len() < 1_000, "round {round}: {reported}");
                     refused += 1;
                 }
             }
@@ -312,12 +312,12 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_summary_is_told_and_not_needed_beside_the_scene() {
+    fn a_damaged_summary_is_reported_and_not_needed_beside_the_scene() {
         let folder = tempfile::tempdir().unwrap();
         killed(folder.path());
         std::fs::write(folder.path().join(SUMMARY), "{\"scene").unwrap();
-        let told = Recording::read(folder.path(), None).unwrap_err().to_string();
-        assert!(told.contains(SUMMARY) && told.contains("recorded run"), "{told}");
+        let reported = Recording::read(folder.path(), None).unwrap_err().to_string();
+        assert!(reported.contains(SUMMARY) && reported.contains("recorded run"), "{reported}");
         assert_eq!(Recording::read(folder.path(), Some(Path::new("a.toml"))).unwrap().steps(), 3);
     }
 

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::common::{document, endowire, play, said, scene, text, told};
+use crate::common::{document, endowire, play, reported, said, scene, text};
 
 fn assessed(args: &[&str]) -> Value {
-    told(&endowire().arg("assess").args(args).arg("--json").output().unwrap())
+    reported(&endowire().arg("assess").args(args).arg("--json").output().unwrap())
 }
 
 fn value(document: &Value, name: &str) -> Option<f64> {
@@ -68,7 +68,7 @@ fn a_session_is_measured_with_its_rests_and_its_beam_and_its_script_without() {
     let out = folder.path().join("out");
     let script = folder.path().join("played.toml");
     let args = ["--script", text(&script), "--json", "--out", text(&out)];
-    told(&endowire().arg("run").arg(scene("arch_vertebral.toml")).args(args).output().unwrap());
+    reported(&endowire().arg("run").arg(scene("arch_vertebral.toml")).args(args).output().unwrap());
     let again = assessed(&[text(&out), "--target", "opening 4"]);
     assert!((value(&again, "tip_path_mm").unwrap() - of("tip_path_mm")).abs() < 1e-6);
     assert_eq!((value(&again, "beam_on_s"), value(&again, "arrived")), (None, Some(0.0)));
@@ -90,7 +90,7 @@ fn a_record_of_other_instruments_than_its_scene_is_refused() {
     let out = folder.path().join("out");
     let script = folder.path().join("played.toml");
     let args = ["--script", text(&script), "--json", "--out", text(&out)];
-    told(&endowire().arg("run").arg(scene("arch_vertebral.toml")).args(args).output().unwrap());
+    reported(&endowire().arg("run").arg(scene("arch_vertebral.toml")).args(args).output().unwrap());
     let goal = |instrument: &str| {
         let file = folder.path().join("goal.toml");
         let head =
@@ -118,9 +118,9 @@ fn a_record_of_other_instruments_than_its_scene_is_refused() {
     for (record, names) in [(&session, "wire, sheath"), (&out, "")] {
         for more in [&[][..], &with_subject] {
             let (code, said) = assess(record, more);
-            let told =
+            let reported =
                 format!("{}: instruments = [{names}]: the scene has [wire, catheter]", record.display());
-            assert!(code == Some(2) && said.contains(&told), "{said}");
+            assert!(code == Some(2) && said.contains(&reported), "{said}");
         }
     }
 }

@@ -363,7 +363,7 @@ fn a_vessel_in_the_wrong_unit_is_refused_by_its_size() {
 }
 
 #[test]
-fn a_broken_ply_is_told_in_one_line() {
+fn a_broken_ply_is_reported_in_one_line() {
     Scene::good()
         .file("broken.ply", b"ply\nformat ascii 9.0\nelement nonsense\n")
         .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"broken.ply\"")

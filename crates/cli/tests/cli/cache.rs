@@ -87,8 +87,8 @@ fn a_cache_that_is_damaged_or_cannot_be_written_costs_time_alone() {
     assert!(files(&cache.join("walls")) == kept, "written anew");
     let file = folder.path().join("file");
     std::fs::write(&file, "mine").unwrap();
-    let told = String::from_utf8(run(&scene, &file, &out("unwritable"), &[]).stderr).unwrap();
-    assert_eq!(told.matches("is not kept").count(), 1, "{told}");
+    let reported = String::from_utf8(run(&scene, &file, &out("unwritable"), &[]).stderr).unwrap();
+    assert_eq!(reported.matches("is not kept").count(), 1, "{reported}");
     assert_eq!(std::fs::read(&file).unwrap(), b"mine");
     let first = recording(&out("first"));
     assert!(first == recording(&out("damaged")) && first == recording(&out("unwritable")));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{assets, said, text, told};
+use crate::common::{assets, reported, said, text};
 use serde_json::Value;
 
 fn vessel(arguments: &[&str]) -> std::process::Output {
@@ -20,7 +20,7 @@ fn wire() -> String {
 /// The centre line of the tube, in a folder.
 fn found(folder: &Path) -> (String, Value) {
     let table = text(&folder.join("tree.csv")).to_owned();
-    let document = told(&vessel(&["centreline", &tube(), "--out", &table, "--json"]));
+    let document = reported(&vessel(&["centreline", &tube(), "--out", &table, "--json"]));
     (table, document)
 }
 
@@ -35,17 +35,17 @@ fn the_centre_line_of_a_surface_is_a_table_that_makes_the_surface_again() {
     assert_eq!((&branch["from"], &branch["to"]), (&0.into(), &document["targets"][0]["row"]));
     assert_eq!(document["rows"], branch["to"].as_u64().unwrap() + 1);
     let again = text(&folder.path().join("again.stl")).to_owned();
-    let report = told(&vessel(&["generate", &table, "--out", &again, "--edge-mm", "2", "--json"]));
+    let report = reported(&vessel(&["generate", &table, "--out", &again, "--edge-mm", "2", "--json"]));
     assert_eq!((&report["sound"], report["openings"].as_array().unwrap().len()), (&true.into(), 2));
     // It begins where devices come in: in an arch at its narrower end, from the groin.
     let arch = text(&assets().join("vessels/aortic_arch.stl")).to_owned();
     for (file, inlet) in [(tube(), 0), (arch, 1)] {
-        let report = told(&vessel(&["check", &file, "--json"]));
+        let report = reported(&vessel(&["check", &file, "--json"]));
         assert_eq!(report["inlet"], inlet, "{file}");
         assert!(report["openings"][inlet]["centre_mm"][2].as_f64().unwrap().abs() < 1.0, "{file}");
         let lines = String::from_utf8(vessel(&["check", &file]).stdout).unwrap();
-        let told = lines.lines().find(|line| line.contains("devices come in here")).unwrap();
-        assert!(told.contains(&format!("opening {inlet}")), "{told}");
+        let reported = lines.lines().find(|line| line.contains("devices come in here")).unwrap();
+        assert!(reported.contains(&format!("opening {inlet}")), "{reported}");
     }
     let lines = String::from_utf8(vessel(&["centreline", &tube()]).stdout).unwrap();
     assert!(lines.contains("opening 1") && lines.contains("least radius mm"), "{lines}");
@@ -64,7 +64,7 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
             .into_iter()
             .chain(more.iter().copied())
             .collect();
-        told(&vessel(&given))
+        reported(&vessel(&given))
     };
     let thin = passage(&wire(), &["--to", "1"]);
     assert!(["passes", "tight"].contains(&thin["passage"].as_str().unwrap()), "{thin}");

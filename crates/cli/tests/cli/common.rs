@@ -71,7 +71,7 @@ pub(crate) fn document(path: impl AsRef<Path>) -> Value {
 }
 
 /// The JSON that a call has written on stdout, which must have gone well.
-pub(crate) fn told(output: &Output) -> Value {
+pub(crate) fn reported(output: &Output) -> Value {
     assert!(output.status.success(), "{}", said(output));
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -100,13 +100,13 @@ pub(crate) struct Listening {
 impl Listening {
     /// What it says of itself.
     pub(crate) fn read(said: &mut BufReader<ChildStderr>) -> Self {
-        let mut told = |begins: &str| {
+        let mut reported = |begins: &str| {
             let mut line = String::new();
             said.read_line(&mut line).unwrap();
             line.trim().strip_prefix(begins).unwrap_or_else(|| panic!("{line}")).to_owned()
         };
-        let address = told("endowire: listens at ");
-        Self { address, token: told("endowire: the first line of a connection is ") }
+        let address = reported("endowire: listens at ");
+        Self { address, token: reported("endowire: the first line of a connection is ") }
     }
 
     /// A connection that has shown the token.

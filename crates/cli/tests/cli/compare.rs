@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{document, endowire, said, told};
+use crate::common::{document, endowire, reported, said};
 use serde_json::Value;
 
 fn compare(out: &Path, args: &[&str]) -> Output {
@@ -35,7 +35,7 @@ const SMALL: [&str; 7] = [
 fn rows_pictures_and_the_front_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
-    let found = told(&compare(out, &SMALL));
+    let found = reported(&compare(out, &SMALL));
     for key in ["version", "git_revision", "scene_hash", "seed"] {
         assert!(!found[key].is_null(), "{key}");
     }
@@ -85,14 +85,14 @@ fn rows_pictures_and_the_front_are_written() {
 fn what_is_there_is_not_run_again_and_what_is_not_is_added() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
-    let first = told(&compare(out, &SMALL));
-    let again = told(&compare(out, &SMALL));
+    let first = reported(&compare(out, &SMALL));
+    let again = reported(&compare(out, &SMALL));
     // Times are measured: rows that were run again would differ.
     assert_eq!(first["rows"], again["rows"]);
 
     let mut more = SMALL;
     more[3] = "kirchhoff,beam-fem-damped";
-    let more = told(&compare(out, &more));
+    let more = reported(&compare(out, &more));
     assert_eq!(rows(&more).len(), rows(&first).len() + 2);
     for row in rows(&first) {
         assert!(rows(&more).contains(row), "{row}");
@@ -117,7 +117,7 @@ fn an_interrupted_run_goes_on() {
     let count = saved.lines().count() - 1;
     assert!(count > 0);
 
-    let found = told(&compare(out, &args));
+    let found = reported(&compare(out, &args));
     assert_eq!(rows(&found).len(), 2 * 11 * 2);
     let table = std::fs::read_to_string(&table).unwrap();
     assert!(table.starts_with(&saved), "{count} rows must be kept as they were");
@@ -127,7 +127,7 @@ fn an_interrupted_run_goes_on() {
 fn a_method_that_cannot_says_so_in_its_row() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["--case", "cantilever-10", "--method", "beam-fem,kirchhoff", "--elements", "16", "--json"];
-    let found = told(&compare(folder.path(), &args));
+    let found = reported(&compare(folder.path(), &args));
     let row = rows(&found).iter().find(|row| row["method"] == "beam-fem").unwrap();
     assert!(row["error"].is_null() && row["time_s"].is_null());
     assert!(row["note"].as_str().unwrap().contains("beam-fem"), "{row}");
@@ -137,7 +137,7 @@ fn a_method_that_cannot_says_so_in_its_row() {
 fn an_insertion_is_compared_and_stops_at_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["--case", "soft-tube", "--method", "kirchhoff,rigid-links", "--elements", "10,20", "--json"];
-    let found = told(&compare(folder.path(), &[&args[..], &["--limit-s", "1e-6"]].concat()));
+    let found = reported(&compare(folder.path(), &[&args[..], &["--limit-s", "1e-6"]].concat()));
     for row in rows(&found) {
         assert!(row["error"].is_null() && row["note"].as_str().unwrap().contains("limit of"), "{row}");
     }
@@ -145,7 +145,7 @@ fn an_insertion_is_compared_and_stops_at_the_limit() {
     assert!(notes[0].starts_with("stopped") && notes[1].starts_with("not begun: 10 elements"), "{notes:?}");
 
     let other = tempfile::tempdir().unwrap();
-    let found = told(&compare(other.path(), &args));
+    let found = reported(&compare(other.path(), &args));
     let tip_error = rows(&found)[1]["error"].as_f64().unwrap();
     assert!(tip_error < 0.01, "case C5 on 20 elements: {tip_error} mm");
 }

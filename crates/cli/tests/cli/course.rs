@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
 
-use crate::common::{assets, document, endowire, play, said, text, told};
+use crate::common::{assets, document, endowire, play, reported, said, text};
 
 /// A session in the curved tube that takes so long, as `endowire play` writes it; recorded on this day if one is given.
 fn session(folder: &Path, name: &str, total_s: f64, day: Option<u64>) -> PathBuf {
@@ -33,7 +33,7 @@ fn session(folder: &Path, name: &str, total_s: f64, day: Option<u64>) -> PathBuf
 }
 
 fn assessed(args: &[&str]) -> Value {
-    told(&endowire().arg("assess").args(args).arg("--json").output().unwrap())
+    reported(&endowire().arg("assess").args(args).arg("--json").output().unwrap())
 }
 
 fn line<'a>(course: &'a Value, name: &str) -> &'a Value {
@@ -41,7 +41,7 @@ fn line<'a>(course: &'a Value, name: &str) -> &'a Value {
 }
 
 #[test]
-fn sessions_are_ordered_by_when_they_were_recorded_and_their_course_is_told() {
+fn sessions_are_ordered_by_when_they_were_recorded_and_their_course_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     // By their names they are in another order.
     for (name, total_s, day) in [("b", 40.0, 0), ("a", 30.0, 7), ("d", 24.0, 14), ("c", 20.0, 21)] {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{assets, bytes, document, said, scene_text, text, told};
+use crate::common::{assets, bytes, document, reported, said, scene_text, text};
 use serde_json::Value;
 
 fn endowire(args: &[&str], threads: &str) -> Output {
@@ -49,9 +49,9 @@ fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let spec = specification(folder.path(), "");
     let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
-    let first = told(&endowire(&["dataset", text(&spec), "--out", text(&one), "--json"], "1"));
+    let first = reported(&endowire(&["dataset", text(&spec), "--out", text(&one), "--json"], "1"));
     assert_eq!((first["pictures"].as_u64(), first["drawn"].as_u64()), (Some(24), Some(24)));
-    told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
+    reported(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
     let whole = files(&one);
     assert!(whole == files(&two));
     // One call at a time draws into a folder.
@@ -64,13 +64,13 @@ fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
     // What a call that was ended has left: a shot without its list, and a picture that is half there.
     std::fs::remove_file(two.join("parts/000001.json")).unwrap();
     std::fs::write(two.join("images/0000007.png"), "half").unwrap();
-    let again = told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
+    let again = reported(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
     assert_eq!(again["drawn"].as_u64(), Some(6));
     assert!(whole == files(&two));
     // A picture of a dataset that is whole, and the arrays of another, go missing.
     std::fs::remove_file(two.join("images/0000001.png")).unwrap();
     std::fs::remove_file(two.join("arrays/0000023.npz")).unwrap();
-    let again = told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
+    let again = reported(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
     assert_eq!(again["drawn"].as_u64(), Some(12));
     assert!(whole == files(&two));
     // The twin: another seed is another dataset, and is not mixed with this one.
@@ -79,7 +79,7 @@ fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(said(&refused).contains("another dataset"));
     let other = folder.path().join("other");
-    told(&endowire(&["dataset", text(&spec), "--out", text(&other), "--json"], "2"));
+    reported(&endowire(&["dataset", text(&spec), "--out", text(&other), "--json"], "2"));
     assert!(files(&other)["images/0000000.png"] != whole["images/0000000.png"]);
 }
 
@@ -92,7 +92,7 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
     let whole = std::fs::read_to_string(&spec).unwrap();
     std::fs::write(&spec, whole.replace("[view]\n", small)).unwrap();
     let out = folder.path().join("out");
-    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    reported(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
     let document = document(out.join("annotations.json"));
     let images = document["images"].as_array().unwrap();
     assert_eq!(images.len(), 24);
@@ -157,8 +157,8 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     for (more, named) in [("pose = 3", "poses"), ("biplane = 1", "biplane_deg"), ("seed = -1", "seed")] {
         let spec = specification(folder.path(), more);
         let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("out"))], "1");
-        let told = said(&output);
-        assert!(output.status.code() == Some(2) && told.contains(named), "{told}");
+        let reported = said(&output);
+        assert!(output.status.code() == Some(2) && reported.contains(named), "{reported}");
     }
     let spec = specification(folder.path(), "");
     let whole = std::fs::read_to_string(&spec).unwrap();
@@ -180,8 +180,8 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     ] {
         std::fs::write(&spec, whole.replace(from, to)).unwrap();
         let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("out"))], "1");
-        let told = said(&output);
-        assert!(output.status.code() == Some(2) && told.contains(named), "{to}: {told}");
+        let reported = said(&output);
+        assert!(output.status.code() == Some(2) && reported.contains(named), "{to}: {reported}");
     }
 }
 
@@ -200,7 +200,7 @@ fn a_table_of_a_scene_never_dresses_another_device() {
     );
     std::fs::write(&spec, &more).unwrap();
     let out = folder.path().join("out");
-    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    reported(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
     let document = document(out.join("annotations.json"));
     let annotations = document["annotations"].as_array().unwrap();
     let materials: BTreeSet<&str> = annotations.iter().filter_map(|row| row["material"].as_str()).collect();
@@ -247,7 +247,7 @@ fn what_a_script_injects_is_in_pictures_of_its_steps_and_later() {
         );
         std::fs::write(&spec, more).unwrap();
         let out = folder.path().join(name);
-        told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+        reported(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
         bytes(out.join("images/0000000.png"))
     };
     let medium = picture("medium", injects, 1.0, 0.0);
@@ -258,14 +258,15 @@ fn what_a_script_injects_is_in_pictures_of_its_steps_and_later() {
         ["step_time_s", "time_s"].map(|key| annotations["images"][0][key].as_f64().unwrap())
     };
     // 32 mm at 20 mm/s, whatever goes on to flow.
-    let near = |name: &str, told: [f64; 2]| times(name).iter().zip(told).all(|(a, b)| (a - b).abs() < 1e-9);
+    let near =
+        |name: &str, reported: [f64; 2]| times(name).iter().zip(reported).all(|(a, b)| (a - b).abs() < 1e-9);
     assert!(near("medium", [1.6, 1.6]) && near("dry", [1.6, 0.0]) && near("later", [1.6, 4.6]));
     // Before it is injected there is none: steps 1 to 5 are those before the line.
     assert!(picture("before", injects, 0.5, 0.0) == picture("before_dry", "", 0.5, 0.0));
     // That of `fluoro` at the end of the last step, 32 mm at 20 mm/s.
     std::fs::write(folder.path().join("scene.toml"), scene(injects)).unwrap();
     let (path, out) = (folder.path().join("scene.toml"), folder.path().join("fluoro"));
-    told(&endowire(&["fluoro", text(&path), "--time", "1.6", "--out", text(&out), "--json"], "2"));
+    reported(&endowire(&["fluoro", text(&path), "--time", "1.6", "--out", text(&out), "--json"], "2"));
     assert!(medium == bytes(out.join("frame_000000_fluoro.png")));
 }
 
@@ -288,7 +289,7 @@ fn a_dataset_leaves_the_files_of_others() {
     let out = folder.path().join("beside");
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("notes.txt"), "mine").unwrap();
-    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    reported(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
     assert_eq!(files(&out)["notes.txt"], b"mine");
 }
 
@@ -324,11 +325,11 @@ fn a_scene_of_subtractions_gives_the_same_live_pictures_as_one_without() {
         (bytes(out.join("images/0000000.png")), said(&output))
     };
     let (fluoro, quiet) = picture("fluoro");
-    let (dsa, told) = picture("dsa");
+    let (dsa, reported) = picture("dsa");
     assert!(dsa == fluoro);
     assert!(
-        told.contains("live fluoroscopy, whatever view.xray.mode") && !quiet.contains("whatever"),
-        "{told}"
+        reported.contains("live fluoroscopy, whatever view.xray.mode") && !quiet.contains("whatever"),
+        "{reported}"
     );
 }
 
@@ -364,7 +365,7 @@ fn coils_are_labelled_on_their_pushers_and_where_they_were_left() {
         "scenes = [\"scene.toml\"]\nposes = 1\nmoments = 2\n[vary]\nprogress = [1.0, 1.0]\n[view]\nsize_px = [256, 256]\nbackend = \"cpu\"\n",
     );
     let (spec, out) = (folder.path().join("spec.toml"), folder.path().join("out"));
-    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    reported(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
     let document = document(out.join("annotations.json"));
     // The one that is in comes first, and then what was left behind, without a pusher.
     assert_eq!(document["images"][0]["instruments"], serde_json::json!(["second", "first"]));

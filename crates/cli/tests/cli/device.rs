@@ -14,7 +14,7 @@ fn endowire(args: &[&str]) -> Output {
     crate::common::endowire().args(args).current_dir(workspace()).output().unwrap()
 }
 
-fn told(output: &Output) -> String {
+fn reported(output: &Output) -> String {
     assert!(output.status.success(), "{}", said(output));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
@@ -23,7 +23,7 @@ fn told(output: &Output) -> String {
 fn table_and_picture_of_the_guide_are_what_the_command_writes() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("devices.svg");
-    let table = told(&endowire(&["device", "list", "--out", picture.to_str().unwrap()]));
+    let table = reported(&endowire(&["device", "list", "--out", picture.to_str().unwrap()]));
     let guide = std::fs::read_to_string(workspace().join("docs/guide/2-device.md")).unwrap();
     assert!(guide.contains(&table), "the guide has another table than:\n{table}");
     let fresh = std::fs::read(picture).unwrap();
@@ -35,7 +35,7 @@ fn table_and_picture_of_the_guide_are_what_the_command_writes() {
 #[test]
 fn a_device_is_shown_part_by_part_with_sizes_in_every_unit() {
     let file = "assets/devices/catheter_5f_cobra_c2.toml";
-    let table = told(&endowire(&["device", "show", file]));
+    let table = reported(&endowire(&["device", "show", file]));
     for word in
         ["cobra curve", "0.042 (110°)", "0.017 (25° to 180°)", "1.667", "5.0", "0.0656", "1.168", "estimate"]
     {
@@ -43,7 +43,7 @@ fn a_device_is_shown_part_by_part_with_sizes_in_every_unit() {
     }
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("cobra.png");
-    let json = told(&endowire(&["device", "show", file, "--json", "--out", picture.to_str().unwrap()]));
+    let json = reported(&endowire(&["device", "show", file, "--json", "--out", picture.to_str().unwrap()]));
     let shown: Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&shown["kind"], &shown["length_mm"]), (&"catheter".into(), &800.0.into()));
     assert_eq!(shown["parts"][1]["part"], "tip curve");
@@ -54,7 +54,7 @@ fn a_device_is_shown_part_by_part_with_sizes_in_every_unit() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_told_in_one_line() {
+fn what_cannot_be_shown_is_reported_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let wire = "assets/devices/microwire_014.toml";
     let text = std::fs::read_to_string(workspace().join(wire)).unwrap();
@@ -102,7 +102,7 @@ fn fluoroscopy_draws_the_materials_of_the_catalogue() {
     // Arrays by the material in their names.
     let draw = |scene: &str| -> Vec<PathBuf> {
         let args = ["fluoro", scene, "--raw", "--json", "--out", out.to_str().unwrap()];
-        let written: Value = serde_json::from_str(&told(&endowire(&args))).unwrap();
+        let written: Value = serde_json::from_str(&reported(&endowire(&args))).unwrap();
         written["files"].as_array().unwrap().iter().map(|f| out.join(f.as_str().unwrap())).collect()
     };
     let of = |files: &[PathBuf], material: &str| {

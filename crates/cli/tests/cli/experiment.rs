@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{endowire, said, told};
+use crate::common::{endowire, reported, said};
 use serde_json::Value;
 
 fn experiment(args: &[&str]) -> Output {
@@ -28,7 +28,7 @@ fn timing_has_a_row_for_every_method_and_the_papers_column() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let args = ["timing", "--nodes", "20,50", "--repeats", "3", "--out", out, "--json"];
-    let found = told(&experiment(&args));
+    let found = reported(&experiment(&args));
     assert_written(folder.path(), "timing", &found);
     let methods: Vec<&str> = rows(&found).iter().map(|row| row["method"].as_str().unwrap()).collect();
     let three = ["li2011-dense", "li2011-banded", "kirchhoff"];
@@ -53,7 +53,7 @@ fn timing_has_a_row_for_every_method_and_the_papers_column() {
 #[test]
 fn timing_says_who_is_too_slow_and_does_not_begin_larger_ones() {
     let args = ["timing", "--method", "mass-spring", "--nodes", "40,80", "--limit-s", "0.001", "--json"];
-    let found = told(&experiment(&args));
+    let found = reported(&experiment(&args));
     let note = |k: usize| rows(&found)[k]["note"].as_str().unwrap();
     assert!(rows(&found).iter().all(|row| row["median_ms"].is_null()));
     assert!(note(0).starts_with("stopped at the limit of 0.001 s"), "{}", note(0));
@@ -64,7 +64,7 @@ fn timing_says_who_is_too_slow_and_does_not_begin_larger_ones() {
 fn a_target_is_reached_and_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let found = told(&experiment(&["navigation", "--target", "aorta", "--out", out, "--json"]));
+    let found = reported(&experiment(&["navigation", "--target", "aorta", "--out", out, "--json"]));
     assert_written(folder.path(), "navigation", &found);
     let [paper, exact, row] = rows(&found) else { panic!("one target was asked for, of two wires") };
     assert_eq!((&row["target"], &row["success"]), (&"aorta".into(), &true.into()));
@@ -88,7 +88,7 @@ fn a_target_is_reached_and_drawn() {
 #[test]
 fn the_loop_grows_with_the_advance() {
     let folder = tempfile::tempdir().unwrap();
-    let found = told(&experiment(&["loop", "--out", folder.path().to_str().unwrap(), "--json"]));
+    let found = reported(&experiment(&["loop", "--out", folder.path().to_str().unwrap(), "--json"]));
     assert_written(folder.path(), "loop", &found);
     // The paper's four pictures in two views by two methods, and the chart as SVG and PNG.
     let frames = found["frames"].as_array().unwrap();
@@ -120,7 +120,7 @@ fn measured_points_stand_in_for_the_computed_truth() {
     let out = folder.path().to_str().unwrap();
     let measured = ["--measured", points.to_str().unwrap()];
     let cell = ["deformation", "--l-mm", "3", "--l-over-h", "3", "--out", out, "--json"];
-    let found = told(&experiment(&[&cell[..], &measured[..]].concat()));
+    let found = reported(&experiment(&[&cell[..], &measured[..]].concat()));
     assert_written(folder.path(), "deformation", &found);
     assert!(found["ground_truth"].as_str().unwrap().starts_with("measured points of"), "{found}");
     assert!(found["convergence"].as_array().unwrap().is_empty());
@@ -176,7 +176,7 @@ fn coils_follow_each_other_into_a_sac_and_what_it_cannot_hold_is_refused() {
     let out = folder.path().to_str().unwrap();
     let small =
         ["coil", "--coils", "filling,finishing", "--length-mm", "8", "--step-mm", "1", "--element-mm", "1"];
-    let found = told(&experiment(&[&small[..], &["--out", out, "--json"]].concat()));
+    let found = reported(&experiment(&[&small[..], &["--out", out, "--json"]].concat()));
     assert_written(folder.path(), "coil", &found);
     let packing: Vec<f64> = rows(&found).iter().map(|row| row["packing"].as_f64().unwrap()).collect();
     assert!(packing.windows(2).all(|pair| pair[0] <= pair[1] + 1e-9), "{packing:?}");
@@ -204,7 +204,7 @@ fn coils_follow_each_other_into_a_sac_and_what_it_cannot_hold_is_refused() {
 fn coils_are_harder_to_push_if_they_are_stiff_and_if_the_catheter_is_near_the_dome() {
     let largest_n = |kind: &str, height: &str| {
         let coil = ["coil", "--coils", kind, "--volume-mm3", "30", "--length-mm", "12", "--step-mm", "1"];
-        let found = told(&experiment(&[&coil[..], &["--tip-height", height, "--json"]].concat()));
+        let found = reported(&experiment(&[&coil[..], &["--tip-height", height, "--json"]].concat()));
         let forces = rows(&found).iter().map(|row| row["push_force_n"].as_f64().unwrap());
         forces.fold(f64::MIN, f64::max)
     };

@@ -176,14 +176,14 @@ fn a_broken_command_fails() {
         ("endowire rod a.toml || true", "line 5: '|' is not understood"),
         ("endowire rod \\", "goes on beyond the block"),
     ] {
-        let told = follow(&chapter(command)).unwrap_err();
-        assert!(told.contains(expected), "{command}: {told}");
+        let reported = follow(&chapter(command)).unwrap_err();
+        assert!(reported.contains(expected), "{command}: {reported}");
     }
     assert!(actions("```sh\nendowire --version\n").unwrap_err().contains("not closed"));
     // A file is written as it stands, and a wrong key in it is found.
     let case = "```toml file=case.toml\n[rod]\nlengthy = 1.0\n```\n```sh\nendowire rod case.toml\n```\n";
-    let told = follow(case).unwrap_err();
-    assert!(told.contains("line 6") && told.contains("length"), "{told}");
+    let reported = follow(case).unwrap_err();
+    assert!(reported.contains("line 6") && reported.contains("length"), "{reported}");
     // Blocks that are only shown are not run.
     assert_eq!(actions("```text\nendowire nonsense\n```\n```console\n$ cargo test\n```\n"), Ok(vec![]));
 }

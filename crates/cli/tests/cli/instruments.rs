@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{endowire, said, scene_text, text, told};
+use crate::common::{endowire, reported, said, scene_text, text};
 use serde_json::Value;
 
 /// The wire in the vertebral catheter, with small pictures of the end alone; each change replaces a piece of the text.
@@ -38,10 +38,10 @@ fn a_wire_leads_a_catheter_into_the_arch_and_is_withdrawn() {
 
     let summary: Value = serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
     assert!(summary["converged"].as_bool().unwrap() && summary["steps"] == 155, "{summary}");
-    let told =
+    let reported =
         |k: usize| (summary["instruments"][k]["name"].as_str(), &summary["instruments"][k]["inserted_mm"]);
-    assert_eq!(told(0).0.zip(told(1).0), Some(("wire", "catheter")));
-    assert_eq!((told(0).1.as_f64(), told(1).1.as_f64().map(f64::round)), (Some(0.0), Some(200.0)));
+    assert_eq!(reported(0).0.zip(reported(1).0), Some(("wire", "catheter")));
+    assert_eq!((reported(0).1.as_f64(), reported(1).1.as_f64().map(f64::round)), (Some(0.0), Some(200.0)));
 
     let rows = rows(&out.join("instruments.csv"));
     assert_eq!(rows.len(), 2 * 155);
@@ -83,8 +83,8 @@ fn a_run_of_several_instruments_goes_on_as_if_it_had_been_one() {
         &state,
     ]);
     assert!(output.status.success(), "{}", said(&output));
-    let rubbing = scene(folder.path(), &[("inserted_mm = 60.0", "friction = 0.1\ninserted_mm = 60.0")]);
-    let output = run(&[&rubbing, "--out".as_ref(), &at("none"), "--resume".as_ref(), &state]);
+    let with_friction = scene(folder.path(), &[("inserted_mm = 60.0", "friction = 0.1\ninserted_mm = 60.0")]);
+    let output = run(&[&with_friction, "--out".as_ref(), &at("none"), "--resume".as_ref(), &state]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("the device is not the same"), "{}", said(&output));
     let scene = scene(folder.path(), &[]);
@@ -100,11 +100,11 @@ fn a_run_of_several_instruments_goes_on_as_if_it_had_been_one() {
 }
 
 #[test]
-fn what_instruments_cannot_do_is_told_before_anything_moves() {
+fn what_instruments_cannot_do_is_reported_before_anything_moves() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let name = "instrument = \"catheter\"\nadvance_mm = 40.0";
-    for (piece, other, told) in [
+    for (piece, other, reported) in [
         (
             name,
             "instrument = \"cathter\"\nadvance_mm = 40.0",
@@ -144,13 +144,13 @@ fn what_instruments_cannot_do_is_told_before_anything_moves() {
     ] {
         let output = run(&[&scene(folder.path(), &[(piece, other)]), "--out".as_ref(), &out]);
         assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-        assert!(said(&output).contains(told), "{told}: {}", said(&output));
-        assert!(!out.exists(), "{told}");
+        assert!(said(&output).contains(reported), "{reported}: {}", said(&output));
+        assert!(!out.exists(), "{reported}");
     }
 }
 
 #[test]
-fn what_a_coil_fills_of_a_sac_is_told_step_by_step_and_by_a_run_that_goes_on() {
+fn what_a_coil_fills_of_a_sac_is_reported_step_by_step_and_by_a_run_that_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let scene = |line: &str, sac: &str| {
         let text = scene_text(
@@ -172,7 +172,7 @@ fn what_a_coil_fills_of_a_sac_is_told_step_by_step_and_by_a_run_that_goes_on() {
     let run = |more: &[&str]| {
         let mut args = vec!["run", text(&file), "--out", text(&out), "--save-state", text(&state), "--json"];
         args.extend(more);
-        told(&endowire().args(&args).output().unwrap())
+        reported(&endowire().args(&args).output().unwrap())
     };
     let first = run(&[]);
     let table = || -> Vec<Vec<f64>> {
@@ -197,7 +197,7 @@ fn what_a_coil_fills_of_a_sac_is_told_step_by_step_and_by_a_run_that_goes_on() {
     // Nothing more of it, into a folder without the earlier rows.
     let other = folder.path().join("other");
     let args = ["run", text(&file), "--resume", text(&state), "--out", text(&other), "--json"];
-    let third = told(&endowire().args(args).output().unwrap());
+    let third = reported(&endowire().args(args).output().unwrap());
     assert_eq!(third["packing"]["density"], second["packing"]["density"]);
     // A place that is not in the vessel, by its key.
     scene("advance_mm = 6.0\nstep_mm = 0.5", "dome_mm = [90.0, 6.0, 36.0]");

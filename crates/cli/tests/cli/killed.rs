@@ -111,9 +111,12 @@ fn a_second_run_into_the_same_folder_stops_until_the_first_is_gone() {
     let first = start(&scene, &out);
     wait_until(|| rows(&out) >= 5);
     let second = start(&scene, &out).wait_with_output().unwrap();
-    let told = said(&second);
-    assert_eq!(second.status.code(), Some(2), "{told}");
-    assert!(told.contains("another run is recording") && told.trim_end().lines().count() == 1, "{told}");
+    let reported = said(&second);
+    assert_eq!(second.status.code(), Some(2), "{reported}");
+    assert!(
+        reported.contains("another run is recording") && reported.trim_end().lines().count() == 1,
+        "{reported}"
+    );
     // The first goes on, is drawn meanwhile, and its death frees the folder.
     let before = rows(&out);
     assert!(render(&out).status.success());
@@ -122,9 +125,12 @@ fn a_second_run_into_the_same_folder_stops_until_the_first_is_gone() {
     let text = std::fs::read_to_string(&scene).unwrap().replace("step_mm = 0.001", "step_mm = 5.0");
     std::fs::write(&scene, text).unwrap();
     let third = start(&scene, &out).wait_with_output().unwrap();
-    let told = said(&third);
-    assert_eq!(third.status.code(), Some(0), "{told}");
-    assert!(told.contains("replaces the earlier recording") && told.contains("shapes.part/"), "{told}");
+    let reported = said(&third);
+    assert_eq!(third.status.code(), Some(0), "{reported}");
+    assert!(
+        reported.contains("replaces the earlier recording") && reported.contains("shapes.part/"),
+        "{reported}"
+    );
     assert!(out.join("shapes.npz").exists() && !out.join("shapes.part").exists());
 }
 

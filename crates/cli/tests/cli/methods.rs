@@ -93,7 +93,7 @@ fn a_state_of_another_method_is_refused() {
 }
 
 #[test]
-fn wrong_names_keys_and_values_are_told_with_the_right_ones() {
+fn wrong_names_keys_and_values_are_reported_with_the_right_ones() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     for (method, words) in [

@@ -5,7 +5,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{SHORT, assets, bytes, document, said, scene_text, text, told};
+use crate::common::{SHORT, assets, bytes, document, reported, said, scene_text, text};
 
 fn endowire(args: &[&str]) -> Output {
     crate::common::endowire().args(args).output().unwrap()
@@ -60,7 +60,7 @@ fn a_run_in_two_planes_has_the_frames_and_the_matrix_of_each() {
     assert_eq!(angles[1] - angles[0], 90.0);
     // Frames afterwards are in the planes of the scene too, with labels of both: the tip is where each matrix has it.
     let out = folder.path().join("out");
-    let files = told(&endowire(&[&last_step(&run, &out)[..], &["--labels", "--raw"]].concat()));
+    let files = reported(&endowire(&[&last_step(&run, &out)[..], &["--labels", "--raw"]].concat()));
     let files: Vec<&str> = files["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     for rest in ["fluoro.png", "mask.png", "mask_vessel.png", "labels.json", "line_integral.npy"] {
         let (name, ending) = rest.split_once('.').unwrap();
@@ -71,10 +71,10 @@ fn a_run_in_two_planes_has_the_frames_and_the_matrix_of_each() {
         let labels = document(out.join(format!("step_000106_labels{ending}.json")));
         assert_eq!(labels["camera_matrix"], summary["planes"][plane]["camera_matrix"]);
         let device = &labels["devices"][0];
-        let (told, expected) =
+        let (reported, expected) =
             (numbers(&device["tip_px"]), seen(&labels["camera_matrix"], &numbers(&device["tip_mm"])));
-        assert!((0..2).all(|k| (told[k] - expected[k]).abs() < 1e-6), "{told:?} {expected:?}");
-        tips.push(told);
+        assert!((0..2).all(|k| (reported[k] - expected[k]).abs() < 1e-6), "{reported:?} {expected:?}");
+        tips.push(reported);
     }
     assert_ne!(tips[0], tips[1], "the twin: the planes see it elsewhere");
 }
@@ -88,7 +88,7 @@ fn two_planes_are_drawn_at_once_and_each_is_what_it_is_alone() {
         let mut all =
             vec!["render", text(&run), "--from", "106", "--to", "106", "--view", "fluoro", "--json"];
         all.extend(args);
-        told(&endowire(&all))
+        reported(&endowire(&all))
     };
     let pair = draw(&["--pose", "RAO 20", "--biplane", "90", "--dicom", text(&dicom), "--out", text(&both)]);
     draw(&["--pose", "LAO 70", "--out", text(&alone)]);
@@ -112,7 +112,7 @@ fn arch(folder: &Path, mode: &str, more: &[&str]) -> Vec<Vec<u8>> {
     let still =
         ["--set", "detector.noise=false", "--set", "detector.lag=0", "--size", "64", "--view", "fluoro"];
     let scene = ["fluoro", text(&scene), "--steps", "0", "--mode", mode, "--out", text(&out), "--json"];
-    let files = told(&endowire(&[&scene[..], &still, more].concat()));
+    let files = reported(&endowire(&[&scene[..], &still, more].concat()));
     let names = files["files"].as_array().unwrap().iter().filter_map(Value::as_str);
     names.filter(|name| name.ends_with(".png")).map(|name| bytes(out.join(name))).collect()
 }
@@ -131,8 +131,8 @@ fn frames_of_a_c_arm_that_turns_are_those_of_each_angle_in_every_mode() {
         let last_s = format!("{}", 0.8 + 2.0 / 15.0);
         let still = arch(folder.path(), mode, &["--time", &last_s, "--pose", "LAO 30"]);
         assert!(turned[2] == still[0], "{mode}");
-        let aside = arch(folder.path(), mode, &["--time", &last_s, "--pose", "LAO 29"]);
-        assert!(turned[2] != aside[0], "{mode}: the twin, a degree aside");
+        let lateral = arch(folder.path(), mode, &["--time", &last_s, "--pose", "LAO 29"]);
+        assert!(turned[2] != lateral[0], "{mode}: the twin, a degree aside");
     }
 }
 
@@ -142,7 +142,7 @@ fn a_state_of_a_run_is_drawn_all_around_in_two_planes() {
     let run = recorded(folder.path());
     let [out, dicom] = ["out", "turn.dcm"].map(|name| folder.path().join(name));
     let step = last_step(&run, &out);
-    let files = told(&endowire(
+    let files = reported(&endowire(
         &[&step[..], &["--turn", "180", "--count", "4", "--labels", "--dicom", text(&dicom)]].concat(),
     ));
     let files: Vec<&str> = files["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
@@ -193,7 +193,7 @@ fn a_pulse_shows_the_way_of_a_device_in_a_run_and_afterwards_alike() {
     let [long, short] = [run("long", "60.0"), run("short", "0.1")];
     let frame = |run: &Path| bytes(run.join("frames/step_000106_fluoro.png"));
     let render = ["render", text(&long), "--from", "105", "--view", "fluoro", "--json", "--labels"];
-    told(&endowire(&render));
+    reported(&endowire(&render));
     assert!(frame(&long) == bytes(long.join("render/step_000106_fluoro.png")));
     assert!(frame(&long) != frame(&short), "the twin: a pulse that is over at once");
     let exposure = &document(long.join("summary.json"))["planes"][0]["exposure"];

@@ -17,9 +17,9 @@ fn answers(mut child: Child, lines: &[Value]) -> (Vec<Value>, Option<i32>, Strin
     });
     let output = child.wait_with_output().unwrap();
     writing.join().unwrap();
-    let told = String::from_utf8(output.stdout).unwrap();
-    let told = told.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    (told, output.status.code(), String::from_utf8(output.stderr).unwrap())
+    let reported = String::from_utf8(output.stdout).unwrap();
+    let reported = reported.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    (reported, output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 
 #[test]
@@ -42,15 +42,15 @@ fn what_is_played_is_run_with_the_same_bits() {
         json!({"do": "quit"}),
     ];
     let child = play("arch_vertebral.toml", &record, &["--headless", "--size", "96"]).spawn().unwrap();
-    let (told, code, said) = answers(child, &lines);
-    assert_eq!((told.len(), code), (lines.len(), Some(0)), "{said}");
-    let ok: Vec<bool> = told.iter().map(|answer| answer["ok"].as_bool().unwrap()).collect();
+    let (reported, code, said) = answers(child, &lines);
+    assert_eq!((reported.len(), code), (lines.len(), Some(0)), "{said}");
+    let ok: Vec<bool> = reported.iter().map(|answer| answer["ok"].as_bool().unwrap()).collect();
     assert_eq!(ok, [true, true, true, true, true, true, true, true, true, false, false, true]);
     assert!(
-        told[9]["error"].as_str().unwrap().contains("nobody")
-            && told[10]["error"].as_str().unwrap().contains("jump")
+        reported[9]["error"].as_str().unwrap().contains("nobody")
+            && reported[10]["error"].as_str().unwrap().contains("jump")
     );
-    let end = &told[11]["readout"];
+    let end = &reported[11]["readout"];
     assert_eq!(
         (&end["step"], &end["lab"]["beam_s"], &end["lab"]["mode"]),
         (&json!(98), &json!(0.5), &json!("cine"))
@@ -89,10 +89,11 @@ fn a_session_begins_where_a_script_ends_or_watches_it() {
             json!({"do": "nudge", "mm": 1}),
             json!({"do": "wait", "ticks": 2}),
         ];
-        let (told, code, said) = answers(child, &lines);
+        let (reported, code, said) = answers(child, &lines);
         assert_eq!(code, Some(0), "{said}");
-        let seen =
-            |k: usize| (told[k]["readout"]["step"].clone(), told[k]["readout"]["demonstrates"].clone());
+        let seen = |k: usize| {
+            (reported[k]["readout"]["step"].clone(), reported[k]["readout"]["demonstrates"].clone())
+        };
         (seen(0), seen(2))
     };
     assert_eq!(read("--after-script", 0), ((json!(6), json!(false)), (json!(7), json!(false))));
@@ -193,10 +194,10 @@ fn what_a_killed_session_leaves_is_of_one_session_and_its_file_is_its_own() {
     wait_until(|| text(&session).contains("scene_file"));
     // Another session may record beside it, and not to the same file.
     let second = play("curved_tube.toml", &record, &["--headless"]).output().unwrap();
-    let told = said(&second);
+    let reported = said(&second);
     assert!(
-        second.status.code() == Some(2) && told.contains("another session is being recorded there"),
-        "{told}"
+        second.status.code() == Some(2) && reported.contains("another session is being recorded there"),
+        "{reported}"
     );
     let beside =
         play("curved_tube.toml", &folder.path().join("other.toml"), &["--headless"]).output().unwrap();
@@ -266,16 +267,19 @@ fn a_socket_asks_for_its_token_and_writes_into_its_folder_alone() {
         let begin = ["POST / HTTP/1.1\r\n", "GET / HTTP/1.1\r\n", "", "\n"][k % 4];
         // The connection may be hung up on before all of it is sent.
         let _ = stream.write_all(format!("{begin}{head}{command}").as_bytes());
-        let mut told = String::new();
-        let _ = BufReader::new(stream).read_line(&mut told);
-        assert!(told.is_empty() || told.contains("\"ok\":false") && told.contains("token"), "{told}");
+        let mut reported = String::new();
+        let _ = BufReader::new(stream).read_line(&mut reported);
+        assert!(
+            reported.is_empty() || reported.contains("\"ok\":false") && reported.contains("token"),
+            "{reported}"
+        );
     }
     let mut known = listening.connect();
     for line in random_lines(10_000) {
         known.get_mut().write_all(&[&line[..], b"\n"].concat()).unwrap();
-        let mut told = String::new();
-        known.read_line(&mut told).unwrap();
-        assert!(told.starts_with("{\"ok\":false"), "{told} to {}", String::from_utf8_lossy(&line));
+        let mut reported = String::new();
+        known.read_line(&mut reported).unwrap();
+        assert!(reported.starts_with("{\"ok\":false"), "{reported} to {}", String::from_utf8_lossy(&line));
     }
     let _ = TcpStream::connect(&listening.address).unwrap().write_all(&[b'x'; 100_000]);
     for place in [
@@ -285,8 +289,8 @@ fn a_socket_asks_for_its_token_and_writes_into_its_folder_alone() {
         "seen.toml",
         "played.toml",
     ] {
-        let told = ask(&mut known, &format!("{}\n", json!({"do": "picture", "file": place})));
-        assert_eq!(told["ok"], false, "{place}");
+        let reported = ask(&mut known, &format!("{}\n", json!({"do": "picture", "file": place})));
+        assert_eq!(reported["ok"], false, "{place}");
     }
     #[cfg(unix)]
     {
@@ -303,8 +307,8 @@ fn a_socket_asks_for_its_token_and_writes_into_its_folder_alone() {
     assert!(files(outer.path()).iter().all(own), "{:?}", files(outer.path()));
 
     // The twin: what is allowed is done, and the session has not moved before it.
-    let told = ask(&mut known, "{\"do\": \"picture\", \"file\": \"seen.png\"}\n");
-    assert_eq!((&told["ok"], &told["readout"]["step"]), (&json!(true), &json!(0)));
+    let reported = ask(&mut known, "{\"do\": \"picture\", \"file\": \"seen.png\"}\n");
+    assert_eq!((&reported["ok"], &reported["readout"]["step"]), (&json!(true), &json!(0)));
     assert!(outer.path().join("session/seen.png").exists());
     assert_eq!(ask(&mut known, "{\"do\": \"quit\"}\n")["ok"], true);
     assert_eq!(child.wait().unwrap().code(), Some(0));

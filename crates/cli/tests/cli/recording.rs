@@ -152,7 +152,7 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let scene = short_scene(folder.path());
     let out = folder.path().join("out");
-    let told = |more: &[&str]| {
+    let reported = |more: &[&str]| {
         let output = endowire()
             .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
             .args(more)
@@ -161,13 +161,13 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
         assert!(output.status.success());
         said(&output)
     };
-    assert!(!told(&[]).contains("replaces"));
+    assert!(!reported(&[]).contains("replaces"));
     let mine = ["notes.txt", "frames/step_by_step.png", "frames/step_000040_3d.png.bak", "frames/best.png"];
     for name in mine {
         std::fs::write(out.join(name), "mine").unwrap();
     }
     std::fs::write(out.join("frames/step_999999_3d.png"), "old").unwrap();
-    let said = told(&[]);
+    let said = reported(&[]);
     assert!(said.contains("replaces the earlier recording in ") && said.contains("out: "), "{said}");
     assert!(said.contains("summary.json, steps.csv, instruments.csv, shapes.npz, 7 frames"), "{said}");
     assert!(mine.iter().all(|name| out.join(name).exists()));
@@ -211,9 +211,9 @@ fn a_folder_with_other_files_is_refused_and_left_as_it_is() {
     std::fs::write(out.join("steps.csv"), "left,right\n1,2\n").unwrap();
     let output =
         endowire().args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()]).output().unwrap();
-    let told = said(&output);
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("no earlier recording") && told.contains("recording"), "{told}");
+    let reported = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{reported}");
+    assert!(reported.contains("no earlier recording") && reported.contains("recording"), "{reported}");
     assert_eq!(std::fs::read_to_string(out.join("summary.json")).unwrap(), "mine");
     assert!(std::fs::read_to_string(out.join("steps.csv")).unwrap().starts_with("left"));
 }
@@ -230,11 +230,11 @@ fn a_frame_that_cannot_be_written_ends_the_run_and_keeps_the_recording() {
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("frames"), "a file, not a folder").unwrap();
     std::fs::write(out.join("steps.csv"), "").unwrap();
-    let (code, told) = run(&scene, &out);
+    let (code, reported) = run(&scene, &out);
     assert_eq!(code, Some(1));
-    assert_eq!((told["failure"]["step"].as_u64(), told["steps"].as_u64()), (Some(40), Some(40)));
-    assert!(told["failure"]["reason"].as_str().unwrap().contains("frames"));
-    assert_eq!(summary(&out), told);
+    assert_eq!((reported["failure"]["step"].as_u64(), reported["steps"].as_u64()), (Some(40), Some(40)));
+    assert!(reported["failure"]["reason"].as_str().unwrap().contains("frames"));
+    assert_eq!(summary(&out), reported);
     let offsets = integers(&out.join("shapes.npz"), "offsets");
     assert_eq!(offsets.len(), 41);
     assert_eq!(floats(&out.join("shapes.npz"), "positions_mm").0, [offsets[40] as u64, 3]);
@@ -314,10 +314,10 @@ fn an_interrupt_ends_the_run_after_the_step_under_way_and_keeps_the_recording() 
     let text = said(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("interrupted"), "{text}");
-    let told = summary(&out);
-    let steps = told["steps"].as_u64().unwrap() as usize;
-    assert!(steps < told["steps_asked"].as_u64().unwrap() as usize);
-    assert_eq!((told["failure"]["step"].as_u64(), rows()), (Some(steps as u64 + 1), steps + 1));
+    let reported = summary(&out);
+    let steps = reported["steps"].as_u64().unwrap() as usize;
+    assert!(steps < reported["steps_asked"].as_u64().unwrap() as usize);
+    assert_eq!((reported["failure"]["step"].as_u64(), rows()), (Some(steps as u64 + 1), steps + 1));
     assert_eq!(integers(&out.join("shapes.npz"), "offsets").len(), steps + 1);
 }
 

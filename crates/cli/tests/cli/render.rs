@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{SHORT, document, said, scene_text, text, told};
+use crate::common::{SHORT, document, reported, said, scene_text, text};
 use npyz::NpyFile;
 
 fn endowire(args: &[&str]) -> Output {
@@ -57,7 +57,7 @@ fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
         text(&out),
         "--json",
     ]);
-    let written = told(&output);
+    let written = reported(&output);
     let files: Vec<&str> = written["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
     // Steps 40 and 80, and the last one.
     for step in ["step_000040", "step_000080", "step_000106"] {
@@ -117,7 +117,7 @@ fn a_scene_is_drawn_without_a_recording() {
     let draw = |more: &[&str]| {
         let mut args = vec!["fluoro", text(&scene), "--out", text(&out), "--json", "--size", "48x32"];
         args.extend(more);
-        told(&endowire(&args))
+        reported(&endowire(&args))
     };
     assert_eq!(draw(&["--steps", "0"])["files"].as_array().unwrap().len(), 1);
     let bare = std::fs::read(out.join("frame_000000_fluoro.png")).unwrap();
@@ -155,7 +155,7 @@ fn drawing_anew_replaces_what_was_drawn_before_and_nothing_else() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
+fn what_cannot_be_drawn_is_refused_by_key_value_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, run) = recorded(folder.path());
     let nothing = folder.path().join("nothing");
@@ -166,7 +166,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     let pose = std::fs::read_to_string(&scene).unwrap().replace("[view]", "[view]\nc_arm.primary_deg = nan");
     std::fs::write(&nan, pose).unwrap();
     let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
-    // Each message names key, value and mend.
+    // Each message names key, value and remedy.
     let cases: [(Vec<&str>, &[&str]); 22] = [
         (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
         (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
@@ -208,7 +208,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
             [&still(&["--labels", "--out"])[..], &[text(&labels)]].concat(),
             &["cannot write", "frame_000000_labels.json", "is there already"],
         ),
-        // Pixels, kernels and volumes of numbers that nobody means: told before anything is computed.
+        // Pixels, kernels and volumes of numbers that nobody means: reported before anything is computed.
         (
             still(&["--set", "c_arm.field_mm=1e-308"]),
             &["view.c_arm.field_mm = 1e-308: must be a number from 0.01 to 100000"],
@@ -360,11 +360,11 @@ fn places_of_injections_are_in_the_vessel() {
         ])
     };
     let refused = draw("[900, 0, 10]");
-    let told = said(&refused);
-    assert_eq!(refused.status.code(), Some(2), "{told}");
+    let reported = said(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{reported}");
     assert!(
-        told.contains("view.injection[0].at_mm = [900, 0, 10]: is ") && told.contains("mm from"),
-        "{told}"
+        reported.contains("view.injection[0].at_mm = [900, 0, 10]: is ") && reported.contains("mm from"),
+        "{reported}"
     );
     // The twins: in the ascending aorta, and a number that is not there.
     let drawn = draw("[-38, -54, 140]");
@@ -376,7 +376,7 @@ fn places_of_injections_are_in_the_vessel() {
 }
 
 #[test]
-fn a_single_subtraction_of_nothing_is_told() {
+fn a_single_subtraction_of_nothing_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, _) = recorded(folder.path());
     let draw = |more: &[&str]| {

@@ -14,8 +14,8 @@ fn page(folder: &Path) -> PathBuf {
     std::fs::write(&scene, text).unwrap();
     let done = endowire().arg("run").arg(&scene).arg("--quiet").arg("--out").arg(&run).output().unwrap();
     assert_eq!((done.status.code(), done.stderr.len()), (Some(0), 0), "{done:?}");
-    let told = endowire().arg("report").arg(&run).output().unwrap();
-    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    let reported = endowire().arg("report").arg(&run).output().unwrap();
+    assert_eq!(reported.status.code(), Some(0), "{reported:?}");
     run.join("report.html")
 }
 
@@ -58,8 +58,8 @@ fn a_page_in_another_scene_says_so() {
     };
     let other = folder.path().join("other.toml");
     std::fs::write(&other, scene_text("loop.toml", &[])).unwrap();
-    let (told, shown) = report(&other);
-    assert!(told.contains("other.toml: this is the scene \"loop\", and the run in"), "{told}");
+    let (reported, shown) = report(&other);
+    assert!(reported.contains("other.toml: this is the scene \"loop\", and the run in"), "{reported}");
     assert!(shown.as_str().unwrap().contains("recorded in \"curved_tube\""), "{shown}");
     // Changed, and not another.
     let short = std::fs::read_to_string(folder.path().join("short.toml")).unwrap();
@@ -67,8 +67,8 @@ fn a_page_in_another_scene_says_so() {
     assert!(report(&other).0.contains("is not as it was when the run in"));
     // The twin: the same scene elsewhere.
     std::fs::write(&other, short).unwrap();
-    let (told, shown) = report(&other);
-    assert!(!told.contains("other.toml") && shown.is_null(), "{told} {shown}");
+    let (reported, shown) = report(&other);
+    assert!(!reported.contains("other.toml") && shown.is_null(), "{reported} {shown}");
     // A run with the script of another file is in its scene too.
     let script = folder.path().join("script.toml");
     std::fs::write(&script, "[[script]]\nadvance_mm = 10.0\nstep_mm = 2.0\n").unwrap();
@@ -89,13 +89,13 @@ fn pages_fit_into_narrow_windows_and_tell_an_interrupted_run_as_one() {
     let folder = tempfile::tempdir().unwrap();
     let page = page(folder.path());
     let summary = folder.path().join("run/summary.json");
-    let mut told: serde_json::Value = serde_json::from_slice(&std::fs::read(&summary).unwrap()).unwrap();
-    let steps = told["steps"].as_u64().unwrap();
-    (told["ended_by"], told["converged"]) = ("interrupted".into(), false.into());
-    told["failure"] =
+    let mut reported: serde_json::Value = serde_json::from_slice(&std::fs::read(&summary).unwrap()).unwrap();
+    let steps = reported["steps"].as_u64().unwrap();
+    (reported["ended_by"], reported["converged"]) = ("interrupted".into(), false.into());
+    reported["failure"] =
         serde_json::json!({"step": steps + 1, "reason": "interrupted in it", "kind": "interrupted"});
-    told["renderer"] = "a_name_without_a_space_".repeat(12).into();
-    std::fs::write(&summary, told.to_string()).unwrap();
+    reported["renderer"] = "a_name_without_a_space_".repeat(12).into();
+    std::fs::write(&summary, reported.to_string()).unwrap();
     assert_eq!(
         endowire().arg("report").arg(folder.path().join("run")).output().unwrap().status.code(),
         Some(0)
@@ -142,8 +142,8 @@ fn sweep_page(folder: &Path) -> PathBuf {
     std::fs::write(folder.join("sweep.toml"), axis).unwrap();
     let out = folder.join("swept");
     endowire().arg("sweep").arg(folder.join("sweep.toml")).arg("--out").arg(&out).output().unwrap();
-    let told = endowire().arg("report").arg(&out).output().unwrap();
-    assert_eq!(told.status.code(), Some(0), "{}", said(&told));
+    let reported = endowire().arg("report").arg(&out).output().unwrap();
+    assert_eq!(reported.status.code(), Some(0), "{}", said(&reported));
     out.join("report.html")
 }
 
@@ -277,8 +277,8 @@ fn numbers_of_what_stood_out_are_in_the_picture_and_beside_the_tip() {
     });
     let (session, page) = (folder.path().join("one.session.json"), folder.path().join("page.html"));
     std::fs::write(&session, document.to_string()).unwrap();
-    let told = endowire().arg("assess").arg(&session).arg("--page").arg(&page).output().unwrap();
-    assert_eq!(told.status.code(), Some(0), "{}", said(&told));
+    let reported = endowire().arg("assess").arg(&session).arg("--page").arg(&page).output().unwrap();
+    assert_eq!(reported.status.code(), Some(0), "{}", said(&reported));
     let text = std::fs::read_to_string(&page).unwrap();
     let script = "<script>for (const id of [\"line\", \"roadmap\"]) document.documentElement.dataset[id] = document.getElementById(id).clientWidth</script>";
     std::fs::write(&page, text.replace("</body>", &format!("{script}</body>"))).unwrap();

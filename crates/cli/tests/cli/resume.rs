@@ -192,7 +192,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
         assert_eq!(said(&output).trim_end().lines().count(), 1, "{}", said(&output));
         said(&output)
     };
-    for (from, to, told) in [
+    for (from, to, reported) in [
         ("radius_mm = 0.445", "radius_mm = 0.4", "the device is not the same"),
         ("friction = 0.1", "friction = 0.2", "the properties of its wall (vessel.wall) is not"),
         ("position_mm = [0.0, 0.0, 1.0]", "position_mm = [0.0, 0.0, 1.5]", "the sheath is not"),
@@ -215,7 +215,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     ] {
         if text.contains(from) {
             let said = refused(&text.replacen(from, to, 1), &state, "none");
-            assert!(said.contains(told) && said.contains("scene that it was saved in"), "{from}: {said}");
+            assert!(said.contains(reported) && said.contains("scene that it was saved in"), "{from}: {said}");
         }
     }
     let two = text.replacen("radius_mm = 0.445", "radius_mm = 0.4", 1).replacen(
@@ -223,8 +223,8 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
         "friction = 0.2",
         1,
     );
-    let told = refused(&two, &state, "none");
-    assert!(told.contains("(vessel.wall), the device are not the same"), "{told}");
+    let reported = refused(&two, &state, "none");
+    assert!(reported.contains("(vessel.wall), the device are not the same"), "{reported}");
 
     // What is no state, and one that is damaged at any byte.
     let bytes = std::fs::read(&state).unwrap();
@@ -233,7 +233,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     let mut changed = bytes.clone();
     let middle = changed.len() / 2;
     changed[middle] ^= 1;
-    let told = [
+    let reported = [
         (text.clone().into_bytes(), "is no saved state"),
         (newer, "its format is \"endowire state 22\""),
         (changed, "is not whole or was changed"),
@@ -241,10 +241,10 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
         (bytes[..20].to_vec(), "is not whole"),
         (Vec::new(), "is no saved state"),
     ];
-    for (content, told) in told {
+    for (content, reported) in reported {
         std::fs::write(&damaged, content).unwrap();
         let said = refused(&text, &damaged, "none");
-        assert!(said.contains(told) && said.contains("--save-state"), "{told}: {said}");
+        assert!(said.contains(reported) && said.contains("--save-state"), "{reported}: {said}");
     }
     assert!(!at("none").exists());
 

@@ -30,7 +30,7 @@ fn has_provenance(document: &Value) {
 }
 
 #[test]
-fn every_example_is_solved_and_told() {
+fn every_example_is_solved_and_reported() {
     let mut count = 0;
     for entry in std::fs::read_dir(cases()).unwrap() {
         let path = entry.unwrap().path();
@@ -82,7 +82,7 @@ fn the_cantilever_is_that_of_the_literature() {
 }
 
 #[test]
-fn a_case_that_does_not_converge_is_told_with_exit_code_1() {
+fn a_case_that_does_not_converge_is_reported_with_exit_code_1() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("short.toml");
     let text = std::fs::read_to_string(cases().join("tip_force.toml")).unwrap();

@@ -1,9 +1,9 @@
-//! `--set KEY=VALUE`: a scene with other values than its file has, in every command that takes one, and where that is told.
+//! `--set KEY=VALUE`: a scene with other values than its file has, in every command that takes one, and where that is reported.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{bytes, document, endowire, said, text, told};
+use crate::common::{bytes, document, endowire, reported, said, text};
 use serde_json::{Value, json};
 
 const SCENE: &str = r#"
@@ -75,7 +75,7 @@ fn steps(out: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn what_is_set_is_as_if_the_file_had_it_and_is_told() {
+fn what_is_set_is_as_if_the_file_had_it_and_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let file = scene(folder.path());
     let at = |name: &str| folder.path().join(name);
@@ -123,7 +123,7 @@ fn a_wrong_key_or_value_is_refused_with_the_nearest_right_one() {
     let folder = tempfile::tempdir().unwrap();
     let file = scene(folder.path());
     let out = folder.path().join("out");
-    for (command, set, told) in [
+    for (command, set, reported) in [
         ("run", "vessel.wall.frction=0.1", "vessel.wall.frction = 0.1: "),
         ("run", "vessel.wall.frction=0.1", "did you mean `friction`?"),
         ("run", "vesel.wall.friction=0.1", "did you mean `vessel`?"),
@@ -164,10 +164,10 @@ fn a_wrong_key_or_value_is_refused_with_the_nearest_right_one() {
         let output = call(command, &file, &out, &["--set", set]);
         let said = said(&output);
         assert_eq!(output.status.code(), Some(2), "{command} {set}: {said}");
-        assert!(said.contains(told), "{command} {set}: {said}");
+        assert!(said.contains(reported), "{command} {set}: {said}");
         // What the parser of the command line refuses has a line on the usage too.
         assert!(
-            told.contains("KEY=VALUE") || said.trim_end().lines().count() == 1,
+            reported.contains("KEY=VALUE") || said.trim_end().lines().count() == 1,
             "{command} {set}: {said}"
         );
     }
@@ -239,7 +239,7 @@ fn parts_of_a_device_file_are_set_and_swept() {
         "{}",
         said(&other)
     );
-    // What no run can have is told before the first.
+    // What no run can have is reported before the first.
     std::fs::write(
         &sweep,
         axis.replace("bending_stiffness_nmm2", "radius_mm").replace("[5.0, 20]", "[0.3, 0.4]"),
@@ -308,7 +308,7 @@ fn frames_of_a_scene_and_of_a_dataset_are_of_what_is_set() {
     let spec_text = "scenes = [\"scene.toml\"]\nposes = 1\nmoments = 1\n[vary]\nprogress = [1.0, 1.0]\n[view]\nsize_px = [32, 32]\nbackend = \"cpu\"\n";
     std::fs::write(&spec, spec_text).unwrap();
     let step = |name: &str, set: &[&str]| {
-        let written = told(&call("dataset", &spec, &at(name), &[&["--json"], set].concat()));
+        let written = reported(&call("dataset", &spec, &at(name), &[&["--json"], set].concat()));
         let images = document(at(name).join("annotations.json"))["images"].clone();
         (images[0]["step"].as_u64(), written["set"].clone())
     };
@@ -337,8 +337,8 @@ fn a_session_is_carried_out_again_with_what_was_set() {
     let answers = String::from_utf8(output.stdout.clone()).unwrap();
     let last: Value = serde_json::from_str(answers.lines().nth(1).unwrap()).unwrap();
     let recorded = std::fs::read_to_string(at("played.toml")).unwrap();
-    let told = " --set 'vessel.wall.friction=0.3' --set 'name=\"other tube\"'";
-    assert!(recorded.lines().nth(1).unwrap().ends_with(told), "{recorded}");
+    let reported = " --set 'vessel.wall.friction=0.3' --set 'name=\"other tube\"'";
+    assert!(recorded.lines().nth(1).unwrap().ends_with(reported), "{recorded}");
     let script = ["--script", text(&at("played.toml"))].map(str::to_owned);
     let tip = |name: &str, set: &[&str]| {
         let output = endowire()
@@ -355,7 +355,7 @@ fn a_session_is_carried_out_again_with_what_was_set() {
 }
 
 #[test]
-fn a_seed_that_changes_nothing_is_told() {
+fn a_seed_that_changes_nothing_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     scene(folder.path());
     let sweep = folder.path().join("sweep.toml");
@@ -366,10 +366,10 @@ fn a_seed_that_changes_nothing_is_told() {
         assert!(output.status.success(), "{}", said(&output));
         said(&output)
     };
-    let told = said("seed");
+    let reported = said("seed");
     assert!(
-        told.lines().next().unwrap().contains("axis[0].key = seed: nothing in a scene is random"),
-        "{told}"
+        reported.lines().next().unwrap().contains("axis[0].key = seed: nothing in a scene is random"),
+        "{reported}"
     );
     assert!(!said("script[0].step_mm").contains("random"));
 }

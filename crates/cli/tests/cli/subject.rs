@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 
-use crate::common::{assets, document, endowire, said, scene, text, told, workspace};
+use crate::common::{assets, document, endowire, reported, said, scene, text, workspace};
 
 /// The program where it finds subjects by their names.
 fn in_workspace() -> Command {
@@ -22,8 +22,9 @@ fn subject_file(name: &str) -> PathBuf {
 /// Does a subject by its reference; its score and its session.
 fn done(name: &str, folder: &Path) -> (Value, PathBuf) {
     let out = folder.join(name);
-    let score =
-        told(&in_workspace().args(["subject", "run", name, "--json", "--out", text(&out)]).output().unwrap());
+    let score = reported(
+        &in_workspace().args(["subject", "run", name, "--json", "--out", text(&out)]).output().unwrap(),
+    );
     (score, out.join("played.session.json"))
 }
 
@@ -52,7 +53,7 @@ fn played(name: &str, folder: &Path, lines: &[Value]) -> (Vec<Value>, Value) {
 #[test]
 fn every_subject_can_be_done_by_its_reference() {
     let folder = tempfile::tempdir().unwrap();
-    let listed = told(&in_workspace().args(["subject", "list", "--json"]).output().unwrap());
+    let listed = reported(&in_workspace().args(["subject", "list", "--json"]).output().unwrap());
     let subjects = listed["subjects"].as_array().unwrap();
     assert!(subjects.len() >= 8);
     for level in 1..=4 {
@@ -65,7 +66,7 @@ fn every_subject_can_be_done_by_its_reference() {
         assert_eq!((&score["subject"], &score["ended"]["by"]), (&json!(name), &json!("goal")));
         // The session says the same to those who assess it later.
         let again = in_workspace().args(["assess", text(&session), "--subject", name, "--json"]).output();
-        let again = told(&again.unwrap());
+        let again = reported(&again.unwrap());
         for key in ["subject", "passed", "score", "ended", "metrics"] {
             assert_eq!(again[key], score[key], "{name}: {key}");
         }
@@ -86,7 +87,7 @@ fn what_a_reference_has_done_is_run_with_the_same_bits() {
         let out = folder.path().join("again");
         let mut command = endowire();
         command.arg("run").arg(scene("curved_tube_friction.toml")).arg("--script").arg(script);
-        told(&command.args(["--json", "--out", text(&out)]).output().unwrap())
+        reported(&command.args(["--json", "--out", text(&out)]).output().unwrap())
     };
     assert_eq!(run(&script)["tip_mm"], last["tip_mm"]);
     // A script that is another is seen.
@@ -99,7 +100,7 @@ fn what_a_reference_has_done_is_run_with_the_same_bits() {
 }
 
 #[test]
-fn a_hand_is_told_how_it_stands_and_is_scored_at_the_end() {
+fn a_hand_is_reported_how_it_stands_and_is_scored_at_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let (answers, score) = played(
         "straight_tube",
@@ -188,11 +189,11 @@ fn a_folder_of_a_run_says_what_of_a_subject_it_cannot_tell() {
     ]);
     // As the subject sets them.
     run.args(["--set", "vessel.file=../vessels/straight_tube.stl", "--set", "name=straight_tube"]);
-    told(&run.args(["--json", "--out", text(&out)]).output().unwrap());
+    reported(&run.args(["--json", "--out", text(&out)]).output().unwrap());
     let assess = |args: &[&str]| {
         in_workspace().args(["assess", text(&out), "--subject", "straight_tube"]).args(args).output().unwrap()
     };
-    let score = told(&assess(&["--json"]));
+    let score = reported(&assess(&["--json"]));
     assert_eq!((&score["ended"]["by"], &score["passed"]), (&json!("goal"), &json!(false)));
     // Time, force and the way are there, and judged; of the beam nothing is.
     for name in ["total_s", "reversals", "wall_force_n"] {
@@ -217,7 +218,7 @@ fn a_folder_of_a_run_says_what_of_a_subject_it_cannot_tell() {
     let log =
         "time_s,on,frames_per_s,dose_ngy,field_mm2,primary_deg,secondary_deg\n0,true,7.5,30,40000,0,0\n";
     std::fs::write(out.join("beam.csv"), log).unwrap();
-    let score = told(&assess(&["--json"]));
+    let score = reported(&assess(&["--json"]));
     assert_eq!((&score["passed"], &score["score"]), (&json!(true), &json!(100.0)));
     assert!(score.get("unjudged").is_none());
 }
@@ -284,7 +285,7 @@ fn what_does_not_fit_its_scene_is_refused_when_it_is_shown() {
     let carotid = "scene = \"SCENES/arch_carotid.toml\"\n";
     let goal = "[goal]\ntarget = \"left carotid\"\ntip_within_mm = 10.0\n";
     std::fs::write(folder.path().join("far.toml"), "[[script]]\nadvance_mm = 10000.0\n").unwrap();
-    for (content, told) in [
+    for (content, reported) in [
         (format!("{carotid}{}", goal.replace("left carotid", "left carotis")), "goal.target"),
         (format!("{carotid}{goal}instrument = \"catheter\"\n"), "goal.instrument"),
         (format!("{carotid}set = [\"vessel.wall.frictoin=0.1\"]\n{goal}"), "frictoin"),
@@ -308,10 +309,10 @@ fn what_does_not_fit_its_scene_is_refused_when_it_is_shown() {
     ] {
         let file = own_subject(folder.path(), &content);
         let output = endowire().args(["subject", "show", text(&file)]).output().unwrap();
-        let told = told.replace("SCENES", &assets().join("scenes").display().to_string());
+        let reported = reported.replace("SCENES", &assets().join("scenes").display().to_string());
         assert!(
-            output.status.code() == Some(2) && said(&output).contains(&told),
-            "{told}: {}",
+            output.status.code() == Some(2) && said(&output).contains(&reported),
+            "{reported}: {}",
             said(&output)
         );
     }
@@ -377,8 +378,8 @@ fn a_session_in_which_nothing_was_done_has_no_score() {
     command.args(["play", "vertebral_catheter", "--headless", "--size", "64", "--record", text(&record)]);
     let output = command.stdin(Stdio::null()).output().unwrap();
     let said = said(&output);
-    let told = "vertebral_catheter: nothing was done: there is no score";
-    assert!(output.status.success() && said.contains(told) && !said.contains("of 100"), "{said}");
+    let reported = "vertebral_catheter: nothing was done: there is no score";
+    assert!(output.status.success() && said.contains(reported) && !said.contains("of 100"), "{said}");
     assert!(folder.path().join("played.session.json").exists());
     assert!(!folder.path().join("played.score.json").exists());
 }

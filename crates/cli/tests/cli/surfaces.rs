@@ -51,28 +51,28 @@ fn axes_are_obeyed_and_can_be_said() {
         (&plain, &["--axes", "ras"], true),
         (&ras, &["--axes", "LPS"], false),
     ] {
-        let told = check(path, options);
-        assert_eq!(told["sound"], true, "{told}");
+        let reported = check(path, options);
+        assert_eq!(reported["sound"], true, "{reported}");
         // Text and bytes are rounded in their own ways.
         let high =
             |report: &Value| (0..3).map(|k| report["high_mm"][k].as_f64().unwrap()).collect::<Vec<_>>();
-        let off = high(&told).iter().zip(high(&right)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert_eq!(off < 1e-4, same, "{options:?} {told}");
+        let off = high(&reported).iter().zip(high(&right)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert_eq!(off < 1e-4, same, "{options:?} {reported}");
     }
     let refused = endowire().args(["vessel", "check", text(&plain), "--axes", "LAS"]).output().unwrap();
     assert!(refused.status.code() == Some(2) && said(&refused).contains("LPS"), "{}", said(&refused));
 }
 
 #[test]
-fn a_unit_that_may_be_another_is_told_and_never_taken() {
+fn a_unit_that_may_be_another_is_reported_and_never_taken() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cm.vtk");
     let small: Vec<[f32; 3]> = corners().into_iter().map(|corner| corner.map(|c| c / 10.0)).collect();
     vtk(&path, "centimetres", &small);
     let hint = "if the file is in centimetres";
-    let told = check(&path, &[]);
-    assert!(told["hints"][0].as_str().is_some_and(|said| said.contains(hint)), "{told}");
-    assert!(told["high_mm"][2].as_f64().is_some_and(|mm| mm < 20.0), "{told}");
+    let reported = check(&path, &[]);
+    assert!(reported["hints"][0].as_str().is_some_and(|said| said.contains(hint)), "{reported}");
+    assert!(reported["high_mm"][2].as_f64().is_some_and(|mm| mm < 20.0), "{reported}");
     assert_eq!(check(&path, &["--unit-mm", "10"])["hints"], serde_json::json!([]));
     let new = |name: &str, options: &[&str]| {
         let made = folder.path().join(name);
@@ -98,7 +98,7 @@ fn a_unit_that_may_be_another_is_told_and_never_taken() {
 }
 
 #[test]
-fn a_faulty_surface_is_told_why_it_is() {
+fn a_faulty_surface_is_reported_why_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("one.obj");
     for (text, verdict) in [
@@ -113,8 +113,8 @@ fn a_faulty_surface_is_told_why_it_is() {
     ] {
         std::fs::write(&file, text).unwrap();
         let output = endowire().args(["vessel", "check"]).arg(&file).output().unwrap();
-        let told = String::from_utf8(output.stdout).unwrap();
-        assert!(told.lines().next().is_some_and(|line| line.ends_with(verdict)), "{told}");
+        let reported = String::from_utf8(output.stdout).unwrap();
+        assert!(reported.lines().next().is_some_and(|line| line.ends_with(verdict)), "{reported}");
     }
 }
 
@@ -135,13 +135,13 @@ fn a_vessel_that_is_cut_through_is_never_sound() {
         .collect();
     assert!(apart.len() < all.len());
     vtk(&path, "cut", &apart);
-    let told = check(&path, &[]);
+    let reported = check(&path, &[]);
     assert_eq!(
-        (&told["sound"], told["facing_openings"].as_array().map(Vec::len)),
+        (&reported["sound"], reported["facing_openings"].as_array().map(Vec::len)),
         (&false.into(), Some(1)),
-        "{told}"
+        "{reported}"
     );
-    assert!(told["hints"].to_string().contains("face each other"), "{told}");
+    assert!(reported["hints"].to_string().contains("face each other"), "{reported}");
     let whole = check(&assets().join("vessels/curved_tube.stl"), &[]);
     assert_eq!((&whole["sound"], &whole["facing_openings"]), (&true.into(), &serde_json::json!([])));
 }

@@ -159,8 +159,11 @@ fn a_sweep_that_is_killed_again_and_again_gives_the_table_of_one_that_was_not() 
     assert_eq!(journal.lines().count(), 1 + 24, "nothing twice");
     // Once more: there is nothing to do.
     let again = sweep(&file, &out, &[]);
-    let told: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
-    assert_eq!((&told["done"], &told["earlier"], &told["failed"]), (&24.into(), &24.into(), &8.into()));
+    let reported: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(
+        (&reported["done"], &reported["earlier"], &reported["failed"]),
+        (&24.into(), &24.into(), &8.into())
+    );
 }
 
 #[test]
@@ -176,7 +179,7 @@ fn a_line_without_an_end_is_done_again() {
         std::fs::write(&journal, &text[..end]).unwrap();
         assert!(table(&file, &out, &[]) == whole, "cut at {end}");
     }
-    // What is damaged otherwise is told.
+    // What is damaged otherwise is reported.
     std::fs::write(&journal, [&text[..head + 1], b"{}\n"].concat()).unwrap();
     let output = sweep(&file, &out, &[]);
     let said = said(&output);
@@ -242,11 +245,11 @@ fn recordings_are_those_of_run() {
 }
 
 #[test]
-fn what_is_wrong_with_a_sweep_is_told_on_one_line() {
+fn what_is_wrong_with_a_sweep_is_reported_on_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let file = small(folder.path());
     let good = std::fs::read_to_string(&file).unwrap();
-    for (from, to, told) in [
+    for (from, to, reported) in [
         ("vessel.wall.friction", "vessel.wall.frction", "did you mean `friction`?"),
         ("vessel.wall.friction", "vessel.wall.frction", "sweep.toml: axis[1]: vessel.wall.frction = 0"),
         (
@@ -289,7 +292,7 @@ fn what_is_wrong_with_a_sweep_is_told_on_one_line() {
         let output = sweep(&file, &folder.path().join("out"), &[]);
         let said = said(&output);
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(told) && said.trim_end().lines().count() == 1, "{told}: {said}");
+        assert!(said.contains(reported) && said.trim_end().lines().count() == 1, "{reported}: {said}");
     }
     // Rows of another sweep are not mixed with.
     std::fs::write(&file, &good).unwrap();

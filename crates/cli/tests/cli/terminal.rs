@@ -6,7 +6,7 @@ use std::process::Output;
 use crate::common::{assets, endowire, said};
 use serde_json::Value;
 
-fn told(output: &Output) -> String {
+fn reported(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
@@ -29,7 +29,7 @@ fn a_new_scene_runs_at_once() {
             .arg("--json")
             .output()
             .unwrap();
-        let summary: Value = serde_json::from_str(&told(&run)).unwrap();
+        let summary: Value = serde_json::from_str(&reported(&run)).unwrap();
         assert_eq!((run.status.code(), &summary["scene"]), (Some(0), &name.into()), "{run:?}");
         assert_eq!(summary["inserted_mm"], 90.0);
         assert!(summary["frames"].as_array().is_some_and(|frames| frames.len() > 4));
@@ -86,7 +86,7 @@ fn a_new_scene_of_an_unusual_vessel_runs_or_it_is_said_why_there_is_none() {
         run.arg("run").arg(made.join("scene.toml")).arg("--out").arg(made.join("out"));
         let run = run.args(["--set", "view.views=[]", "--json"]).output().unwrap();
         assert_eq!(run.status.code(), Some(0), "{name}: {run:?}");
-        let summary: Value = serde_json::from_str(&told(&run)).unwrap();
+        let summary: Value = serde_json::from_str(&reported(&run)).unwrap();
         assert!(summary["failure"].is_null() && summary["inserted_mm"].as_f64() > Some(0.0), "{summary}");
     }
 }
@@ -98,7 +98,7 @@ fn the_doctor_tells_what_is_used() {
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env(variable, value);
         let output = command.args(["doctor", "--json"]).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{output:?}");
-        serde_json::from_str::<Value>(&told(&output)).unwrap()
+        serde_json::from_str::<Value>(&reported(&output)).unwrap()
     };
     let found = with("ENDOWIRE_CACHE", "/somewhere");
     assert!(found["renderer"].as_str().is_some_and(|name| !name.is_empty()));
@@ -114,12 +114,12 @@ fn the_doctor_tells_what_is_used() {
 fn completions_and_manuals_know_all_commands() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let output = endowire().args(["completions", shell]).output().unwrap();
-        let script = told(&output);
+        let script = reported(&output);
         assert!(script.contains("experiment") && script.contains("warn-nmm"), "{shell}");
     }
     let page = |arguments: &[&str]| endowire().arg("man").args(arguments).output().unwrap();
-    assert!(told(&page(&[])).contains("endowire\\-play"));
-    assert!(told(&page(&["run"])).contains("resume"));
+    assert!(reported(&page(&[])).contains("endowire\\-play"));
+    assert!(reported(&page(&["run"])).contains("resume"));
     assert_eq!(page(&["rum"]).status.code(), Some(2));
 }
 

@@ -12,10 +12,10 @@ fn robbed(command: &mut Command, out: &Path, begun: impl Fn() -> bool) -> String
     // A file may be added meanwhile.
     wait_until(|| std::fs::remove_dir_all(out).is_ok());
     let output = child.wait_with_output().unwrap();
-    let told = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains(text(out)), "{told}");
-    told
+    let reported = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{reported}");
+    assert!(reported.contains(text(out)), "{reported}");
+    reported
 }
 
 /// A scene in the curved tube, of so many steps.
@@ -45,12 +45,12 @@ fn a_sweep_whose_folder_vanishes_says_so() {
         std::fs::write(&sweep, record.to_owned() + axis).unwrap();
         let out = folder.path().join(name);
         let lines = || std::fs::read_to_string(out.join("runs.jsonl")).map_or(0, |text| text.lines().count());
-        let told = robbed(
+        let reported = robbed(
             endowire().args(["sweep", text(&sweep), "--jobs", "1", "--out", text(&out)]),
             &out,
             || lines() > 2,
         );
-        assert!(told.contains("went on") || told.contains("recorded"), "{told}");
+        assert!(reported.contains("went on") || reported.contains("recorded"), "{reported}");
         assert!(!out.join("runs.parquet").exists());
     }
 }
@@ -64,8 +64,8 @@ fn frames_whose_folder_vanishes_are_missed() {
     assert!(recorded.status.success(), "{}", said(&recorded));
     let out = folder.path().join("frames");
     let draw = ["render", text(&run), "--from", "1", "--view", "3d", "--size", "320x240"];
-    let told = robbed(endowire().args(draw).args(["--out", text(&out)]), &out, || count(&out) > 2);
-    assert!(told.contains("while frames were drawn"), "{told}");
+    let reported = robbed(endowire().args(draw).args(["--out", text(&out)]), &out, || count(&out) > 2);
+    assert!(reported.contains("while frames were drawn"), "{reported}");
     // The twin: left alone, it draws them all.
     let drawn = endowire().args(draw).args(["--every", "40", "--out", text(&out)]).output().unwrap();
     assert!(drawn.status.success() && count(&out) > 2, "{}", said(&drawn));
@@ -82,8 +82,8 @@ fn a_dataset_whose_folder_vanishes_says_so() {
     );
     std::fs::write(&spec, dataset).unwrap();
     let out = folder.path().join("dataset");
-    let told = robbed(endowire().args(["dataset", text(&spec), "--out", text(&out)]), &out, || {
+    let reported = robbed(endowire().args(["dataset", text(&spec), "--out", text(&out)]), &out, || {
         count(&out.join("parts")) > 1
     });
-    assert!(told.trim_end().lines().count() == 1, "{told}");
+    assert!(reported.trim_end().lines().count() == 1, "{reported}");
 }

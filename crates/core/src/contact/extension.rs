@@ -1,4 +1,4 @@
-//! The felt wall beyond the vessel's openings.
+//! The contact surface beyond the vessel's openings.
 //!
 //! A surface ends where the scan ended, and a wall that ceases to hold a tip from one point to the next has no
 //! equilibrium there. Every opening that a device can pass is extended straight along its direction, like flow
@@ -168,8 +168,8 @@ pub(crate) fn leave_mm(opening: &Opening) -> f64 {
 /// The opening beyond whose plane `x` lies, within its extension, and the distance beyond it, mm.
 pub fn left_through<'a>(openings: &'a [Opening], x: &Vec3) -> Option<(&'a Opening, f64)> {
     openings.iter().find_map(|o| {
-        let (beyond, aside) = o.beyond_and_aside_mm(x);
-        (beyond > 0.0 && beyond <= o.beyond_mm && aside < 1.5 * o.radius_mm).then_some((o, beyond))
+        let (beyond, lateral) = o.beyond_and_off_axis_mm(x);
+        (beyond > 0.0 && beyond <= o.beyond_mm && lateral < 1.5 * o.radius_mm).then_some((o, beyond))
     })
 }
 

@@ -1,4 +1,4 @@
-//! The felt wall of a vessel that moves.
+//! The contact surface of a vessel that moves.
 //!
 //! Queries are made in the reference configuration, where nothing has to be recomputed, and knowledge stays with the
 //! vessel's material points: for a point x the wall is queried at X, x = X + u(X) ([`Displacement::material`]). Only
@@ -41,7 +41,7 @@ use crate::products::outer;
 use crate::vessel::motion::{Displacement, Local};
 use nalgebra::Matrix3;
 
-/// The felt wall at one displacement of its vessel. Methods through [`Deref`] refer to the reference.
+/// The contact surface at one displacement of its vessel. Methods through [`Deref`] refer to the reference.
 #[derive(Debug, Clone, Copy)]
 pub struct MovedWall<'a> {
     surface: &'a ContactSurface,

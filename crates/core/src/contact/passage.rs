@@ -167,7 +167,7 @@ impl<'a> Grid<'a> {
         ((x - self.piece[0]) / self.spacing_mm).map(|c| c.round() as i32).into()
     }
 
-    /// Distance of a position from the felt wall, exact up to the reach of a device; not positive outside the lumen.
+    /// Distance of a position from the contact surface, exact up to the reach of a device; not positive outside the lumen.
     fn clearance_mm(&self, x: &Vec3) -> f64 {
         self.surface.clearance_mm(x, self.radius_mm)
     }
@@ -264,12 +264,12 @@ mod tests {
             let parent = usize::try_from(k - 1).ok();
             CentrelineNode { position_mm: Vec3::z() * z, radius_mm: radius_mm(z), parent }
         });
-        let aside = (1..30).map(|k| CentrelineNode {
+        let lateral = (1..30).map(|k| CentrelineNode {
             position_mm: Vec3::new(0.5 * f64::from(k), 0.0, 20.0),
             radius_mm: 1.0,
             parent: Some(if k == 1 { 40 } else { 79 + k as usize }),
         });
-        let nodes = along.chain(aside.take(if branch { 29 } else { 0 }));
+        let nodes = along.chain(lateral.take(if branch { 29 } else { 0 }));
         let tree = CentrelineTree::new(nodes.collect()).unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(0.2)).unwrap().wall;
         let surface = ContactSurface::new(&wall, (0.4, 0.4), &WallProperties::default(), &NoStore).unwrap();
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_aside_is_a_way_and_one_back_is_none() {
+    fn a_way_beside_it_is_a_way_and_one_back_is_none() {
         let narrow = |z: f64| 2.0 - 1.8 * (z - 19.0).clamp(0.0, 1.0);
         let found = ahead(&vessel(narrow, false), 20.0, 0.0).unwrap();
         assert!((found.radius_mm - 0.2).abs() < 0.09, "{found:?}");

@@ -16,7 +16,7 @@ const LARGEST_RADIUS_MM: f64 = 1e6;
 /// and a much narrower transition would fall between two of them.
 const TRANSITION_MM: f64 = 2.0;
 
-/// Default for the largest distance of the felt wall from the given one, mm: less than a scanner resolves.
+/// Default for the largest distance of the contact surface from the given one, mm: less than a scanner resolves.
 const DEVIATION_MM: f64 = 0.1;
 /// Largest such distance, mm.
 const LARGEST_DEVIATION_MM: f64 = 10.0;
@@ -30,7 +30,7 @@ pub struct WallProperties {
     /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
     pub friction: f64,
     /// How far smoothing may move the surface, mm; at most a twentieth of the lumen's local radius. The resulting
-    /// distance of the felt wall is measured by [`ContactSurface::deviation`](super::FeltMesh::deviation). 0 uses the
+    /// distance of the contact surface is measured by [`ContactSurface::deviation`](super::ContactMesh::deviation). 0 uses the
     /// given mesh, for surfaces whose meshes are known to be good.
     pub deviation_mm: f64,
     /// Regions with other properties; later ones override earlier ones.
@@ -147,8 +147,8 @@ impl WallProperties {
         in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
         check_friction("vessel.wall.friction", self.friction)?;
         if !(0.0..=LARGEST_DEVIATION_MM).contains(&self.deviation_mm) {
-            let mend = format!("must be from 0 (surface as it is meshed) to {LARGEST_DEVIATION_MM}");
-            return Err(Error::parameter("vessel.wall.deviation_mm", self.deviation_mm, mend));
+            let remedy = format!("must be from 0 (surface as it is meshed) to {LARGEST_DEVIATION_MM}");
+            return Err(Error::parameter("vessel.wall.deviation_mm", self.deviation_mm, remedy));
         }
         for (index, region) in self.region.iter().enumerate() {
             let name = format!("vessel.wall.region[{index}]");
@@ -165,8 +165,8 @@ impl WallProperties {
                 && !(0.0..=2.0 * region.radius_mm).contains(&transition_mm)
             {
                 let radius = number(region.radius_mm);
-                let mend = format!("must be from 0 to twice the region's radius of {radius} mm");
-                return Err(Error::parameter(key("transition_mm"), transition_mm, mend));
+                let remedy = format!("must be from 0 to twice the region's radius of {radius} mm");
+                return Err(Error::parameter(key("transition_mm"), transition_mm, remedy));
             }
             if let Some(modulus) = region.modulus_n_per_mm2 {
                 in_range(&key("modulus_n_per_mm2"), modulus, LARGEST_MODULUS)?;
@@ -203,8 +203,8 @@ pub(crate) fn check_valve(name: &str, force_n: f64) -> Result<()> {
     if (0.0..=LARGEST_VALVE_N).contains(&force_n) {
         return Ok(());
     }
-    let mend = format!("must be a force from 0 (none) to {LARGEST_VALVE_N} N");
-    Err(Error::parameter(name, force_n, mend))
+    let remedy = format!("must be a force from 0 (none) to {LARGEST_VALVE_N} N");
+    Err(Error::parameter(name, force_n, remedy))
 }
 
 /// Checks a Coulomb coefficient.

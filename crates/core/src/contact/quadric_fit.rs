@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbours_are_told_once_in_order_and_alone_there_are_none() {
+    fn neighbours_are_reported_once_in_order_and_alone_there_are_none() {
         let fan = [[4, 0, 1], [4, 1, 2], [4, 2, 0]];
         let neighbours = Neighbours::new(&fan, 6);
         let found: Vec<&[u32]> = (0..6).map(|v| neighbours.of(v)).collect();

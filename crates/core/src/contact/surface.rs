@@ -1,7 +1,7 @@
-//! The felt wall: of a surface, remeshed uniformly, extended beyond its openings, smoothed and ready for queries
-//! ([`FeltMesh`]), or of a centre line, which needs no such preparation (`vessel::swept`).
+//! The contact surface: of a surface, remeshed uniformly, extended beyond its openings, smoothed and ready for queries
+//! ([`ContactMesh`]), or of a centre line, which needs no such preparation (`vessel::swept`).
 //!
-//! A contact point remembers the *piece* of wall next to it: a triangle of the felt mesh, or a position on the centre
+//! A contact point remembers the *piece* of wall next to it: a triangle of the contact mesh, or a position on the centre
 //! line. It seeks the wall through space, near a piece ([`Hint::Near`]); once sunk in, it follows the wall from the
 //! piece into which it sank ([`Hint::Side`]).
 
@@ -16,7 +16,7 @@ use super::regions::{RegionMap, Stiffness};
 use crate::vessel::{ClosestFrom, Lumen, SweptField, Wall, WallStore};
 use crate::{Result, Vec3};
 pub use deviation::Deviation;
-pub use mesh::FeltMesh;
+pub use mesh::ContactMesh;
 
 /// Distance beyond the necessary reach up to which a point seeks the wall, mm: while it moves less, no new query is
 /// needed. For a point on the axis of a tube all triangles are at one distance, and a query that reaches them visits
@@ -32,7 +32,7 @@ fn reach_mm(thickest_mm: f64, inset_mm: f64) -> f64 {
 /// A wall prepared for the contact of devices.
 #[derive(Debug)]
 pub struct ContactSurface {
-    felt: Felt,
+    source: Source,
     /// Radius of the thinnest piece of the device, mm.
     pub(super) thinnest_mm: f64,
     /// Reach of the queries of the device's points, mm.
@@ -41,8 +41,8 @@ pub struct ContactSurface {
 
 /// The representation of the wall.
 #[derive(Debug)]
-enum Felt {
-    Mesh(Box<FeltMesh>),
+enum Source {
+    Mesh(Box<ContactMesh>),
     /// With the largest radius of the device, mm.
     Swept(SweptField, f64),
 }
@@ -80,15 +80,15 @@ impl ContactSurface {
     /// Prepares `wall` for devices with these smallest and largest radii, mm, with its uniform mesh from `store`.
     ///
     /// # Errors
-    /// As [`FeltMesh::new`].
+    /// As [`ContactMesh::new`].
     pub fn new(
         wall: &Wall,
         (thinnest_mm, thickest_mm): (f64, f64),
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let mesh = FeltMesh::new(wall, thickest_mm, properties, store)?;
-        Ok(Self { reach_mm: mesh.reach_mm, felt: Felt::Mesh(Box::new(mesh)), thinnest_mm })
+        let mesh = ContactMesh::new(wall, thickest_mm, properties, store)?;
+        Ok(Self { reach_mm: mesh.reach_mm, source: Source::Mesh(Box::new(mesh)), thinnest_mm })
     }
 
     /// Prepares the wall of `lumen`. One given by a centre line is used directly, unless the device is thicker than
@@ -109,38 +109,38 @@ impl ContactSurface {
         match lumen {
             Lumen::Swept(vessel) if properties.region.is_empty() && vessel.least_radius_mm() > radii_mm.1 => {
                 let reach_mm = reach_mm(radii_mm.1, 0.0);
-                let felt = Felt::Swept(vessel.field(reach_mm), radii_mm.1);
-                Ok(Self { felt, thinnest_mm: radii_mm.0, reach_mm })
+                let source = Source::Swept(vessel.field(reach_mm), radii_mm.1);
+                Ok(Self { source, thinnest_mm: radii_mm.0, reach_mm })
             }
             _ => Self::new(lumen.wall(store)?, radii_mm, properties, store),
         }
     }
 
     /// Its mesh; `None` for a centre line.
-    pub fn mesh(&self) -> Option<&FeltMesh> {
-        match &self.felt {
-            Felt::Mesh(mesh) => Some(mesh),
-            Felt::Swept(..) => None,
+    pub fn mesh(&self) -> Option<&ContactMesh> {
+        match &self.source {
+            Source::Mesh(mesh) => Some(mesh),
+            Source::Swept(..) => None,
         }
     }
 
     /// Number of its pieces.
     pub(crate) fn pieces(&self) -> usize {
-        match &self.felt {
-            Felt::Mesh(mesh) => mesh.query.triangles(),
-            Felt::Swept(field, _) => field.pieces(),
+        match &self.source {
+            Source::Mesh(mesh) => mesh.query.triangles(),
+            Source::Swept(field, _) => field.pieces(),
         }
     }
 
     /// The piece nearest to `x`; one at `limit_mm` or farther need not be found.
     pub(super) fn nearest(&self, x: &Vec3, limit_mm: f64) -> Option<NearPiece> {
-        match &self.felt {
-            Felt::Mesh(mesh) => {
+        match &self.source {
+            Source::Mesh(mesh) => {
                 let near = mesh.query.nearest(x, limit_mm)?;
                 let piece = (!near.rim).then_some(near.triangle);
                 Some(NearPiece { distance_mm: near.distance_mm, piece, bound: near.triangle })
             }
-            Felt::Swept(field, _) => {
+            Source::Swept(field, _) => {
                 let near = field.near(x);
                 let is_number = !near.clearance_mm.is_nan();
                 let (distance_mm, piece) = (near.clearance_mm, near.piece);
@@ -163,9 +163,9 @@ impl ContactSurface {
 
     /// Distance of `x`, whose nearest piece is this one or close to it. `None` where no wall is known there.
     pub fn distance(&self, x: &Vec3, piece: u32) -> Option<Distance> {
-        match &self.felt {
-            Felt::Mesh(mesh) => mesh.smooth.distance(x, piece),
-            Felt::Swept(..) => match self.nearness(x, Hint::Near(piece), f64::INFINITY) {
+        match &self.source {
+            Source::Mesh(mesh) => mesh.smooth.distance(x, piece),
+            Source::Swept(..) => match self.nearness(x, Hint::Near(piece), f64::INFINITY) {
                 Nearness::Within(distance) => Some(distance),
                 Nearness::Beyond(_) | Nearness::Clear(_) => None,
             },
@@ -174,9 +174,9 @@ impl ContactSurface {
 
     /// Distance of `x`; with derivatives below `limit_mm`.
     pub(crate) fn nearness(&self, x: &Vec3, hint: Hint, limit_mm: f64) -> Nearness {
-        let (field, thickest_mm) = match &self.felt {
-            Felt::Mesh(mesh) => return mesh.nearness(x, hint.piece(), limit_mm),
-            Felt::Swept(field, thickest_mm) => (field, *thickest_mm),
+        let (field, thickest_mm) = match &self.source {
+            Source::Mesh(mesh) => return mesh.nearness(x, hint.piece(), limit_mm),
+            Source::Swept(field, thickest_mm) => (field, *thickest_mm),
         };
         // Beyond the thickness of any device there is no contact, and the distance need not be exact.
         let closest = match field.closer_than(x, from(hint), limit_mm.max(thickest_mm)) {
@@ -194,9 +194,9 @@ impl ContactSurface {
 
     /// The piece next to `x`, following the wall from one into which it has sunk.
     pub(super) fn follow(&self, side: u32, x: &Vec3) -> u32 {
-        match &self.felt {
-            Felt::Mesh(mesh) => mesh.smooth.walk(side, x),
-            Felt::Swept(field, _) => {
+        match &self.source {
+            Source::Mesh(mesh) => mesh.smooth.walk(side, x),
+            Source::Swept(field, _) => {
                 field.closest(x, ClosestFrom::Side(side)).map_or(side, |found| found.piece())
             }
         }
@@ -204,22 +204,24 @@ impl ContactSurface {
 
     /// The piece into which a point at `x` has sunk, given the hint with which it found the wall.
     pub(super) fn side(&self, x: &Vec3, hint: Hint) -> u32 {
-        match &self.felt {
-            Felt::Mesh(_) => hint.piece(),
-            Felt::Swept(field, _) => field.closest(x, from(hint)).map_or(hint.piece(), |found| found.piece()),
+        match &self.source {
+            Source::Mesh(_) => hint.piece(),
+            Source::Swept(field, _) => {
+                field.closest(x, from(hint)).map_or(hint.piece(), |found| found.piece())
+            }
         }
     }
 
     /// Distance of `x` from the wall next to it, following from a piece, mm: negative behind it, even if another wall
     /// is nearer.
     pub(super) fn distance_from(&self, piece: u32, x: &Vec3) -> f64 {
-        match &self.felt {
-            Felt::Mesh(mesh) => mesh.distance_from(piece, x),
-            Felt::Swept(..) => self.nearness(x, Hint::Side(piece), f64::NEG_INFINITY).value_mm(),
+        match &self.source {
+            Source::Mesh(mesh) => mesh.distance_from(piece, x),
+            Source::Swept(..) => self.nearness(x, Hint::Side(piece), f64::NEG_INFINITY).value_mm(),
         }
     }
 
-    /// How far the felt wall lies inside the distance of [`ContactSurface::nearest`] for a piece, mm.
+    /// How far the contact surface lies inside the distance of [`ContactSurface::nearest`] for a piece, mm.
     pub(super) fn inset_mm(&self, piece: u32) -> f64 {
         self.mesh().map_or(0.0, |mesh| mesh.smooth.inset_mm(piece))
     }
@@ -231,9 +233,9 @@ impl ContactSurface {
 
     /// Where a straight path first meets the wall, as a fraction of it, up to `farthest` times its length.
     pub(super) fn crossing(&self, from: &Vec3, to: &Vec3, farthest: f64) -> Option<f64> {
-        match &self.felt {
-            Felt::Mesh(mesh) => mesh.query.crossing(from, to, farthest),
-            Felt::Swept(field, _) => field.crossing(from, to, farthest),
+        match &self.source {
+            Source::Mesh(mesh) => mesh.query.crossing(from, to, farthest),
+            Source::Swept(field, _) => field.crossing(from, to, farthest),
         }
     }
 
@@ -255,18 +257,18 @@ impl ContactSurface {
         })
     }
 
-    /// Distance of `x` from the felt wall, mm, exact up to the reach of a device; not positive outside the lumen, and
+    /// Distance of `x` from the contact surface, mm, exact up to the reach of a device; not positive outside the lumen, and
     /// any such number deeper outside than `radius_mm`.
     pub(super) fn clearance_mm(&self, x: &Vec3, radius_mm: f64) -> f64 {
-        match &self.felt {
-            Felt::Mesh(mesh) => match mesh.query.nearest(x, self.reach_mm) {
+        match &self.source {
+            Source::Mesh(mesh) => match mesh.query.nearest(x, self.reach_mm) {
                 Some(flat) if flat.distance_mm > -radius_mm => {
                     mesh.nearness(x, flat.triangle, f64::NEG_INFINITY).value_mm()
                 }
                 Some(flat) => flat.distance_mm,
                 None => self.reach_mm,
             },
-            Felt::Swept(field, _) => {
+            Source::Swept(field, _) => {
                 let near = field.near(x);
                 let found = field.closest(x, ClosestFrom::Space(near.piece));
                 found.map_or(near.clearance_mm, |found| found.distance_mm())
@@ -287,7 +289,7 @@ impl ContactSurface {
         self.regions(piece).map_or(1.0, |(mesh, regions, triangle)| regions.rough(&mesh.smooth, x, triangle))
     }
 
-    fn regions(&self, piece: Option<u32>) -> Option<(&FeltMesh, &RegionMap, u32)> {
+    fn regions(&self, piece: Option<u32>) -> Option<(&ContactMesh, &RegionMap, u32)> {
         let mesh = self.mesh()?;
         Some((mesh, mesh.regions.as_ref()?, piece?))
     }

@@ -139,8 +139,8 @@ impl Controller for SearchAhead {
         self.team.check(simulation)?;
         let count = simulation.stack().instruments().len();
         if let Some(absent) = self.turned.iter().find(|instrument| **instrument >= count) {
-            let mend = format!("there are {count}, the innermost is 0");
-            return Err(Error::parameter("turned", absent, mend));
+            let remedy = format!("there are {count}, the innermost is 0");
+            return Err(Error::parameter("turned", absent, remedy));
         }
         if self.team.has_arrived(simulation, &self.path, self.arrived_mm) {
             return Ok(Action::Arrived);

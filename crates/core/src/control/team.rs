@@ -31,8 +31,8 @@ impl Team {
         members.extend(self.followers.iter().map(|follower| follower.instrument));
         for (index, member) in members.iter().enumerate() {
             if *member >= count || members[..index].contains(member) {
-                let mend = format!("there are {count}, the innermost is 0, and each is in a team once");
-                return Err(Error::parameter("team, instrument", member, mend));
+                let remedy = format!("there are {count}, the innermost is 0, and each is in a team once");
+                return Err(Error::parameter("team, instrument", member, remedy));
             }
         }
         Ok(())

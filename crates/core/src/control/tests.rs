@@ -93,8 +93,8 @@ fn followers_go_to_their_places_by_no_more_than_the_one_that_leads() {
 fn a_team_of_instruments_that_are_not_there_is_refused() {
     let (simulation, path) = scene("curved_tube", 45);
     for team in [Team { lead: 2, ..Team::default() }, Team { lead: 1, ..wire_first() }] {
-        let told = FollowPath::new(path.clone(), team, 6.0).next(&simulation).unwrap_err().to_string();
-        assert!(told.contains("there are 2, the innermost is 0"), "{told}");
+        let reported = FollowPath::new(path.clone(), team, 6.0).next(&simulation).unwrap_err().to_string();
+        assert!(reported.contains("there are 2, the innermost is 0"), "{reported}");
     }
 }
 

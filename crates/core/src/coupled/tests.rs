@@ -78,7 +78,7 @@ fn solution_and_inertia_agree_with_faer() {
 }
 
 #[test]
-fn what_is_no_number_is_told() {
+fn what_is_no_number_is_reported() {
     let (mut band, couplings) = random::<12>(6, 3);
     let mut shift = Shift::default();
     shift.reset(36);

@@ -149,11 +149,11 @@ impl FileTable {
         };
         let differs = |length: &Quantity| (length.ends.at(0.0) - device.length_mm()).abs() > SAME_LENGTH_MM;
         if let Some(length) = length.filter(differs) {
-            let mend = format!(
+            let remedy = format!(
                 "the parts have {} mm together: they must agree, or one part leaves its length out and is what is left",
                 device.length_mm()
             );
-            return Err(Error::parameter(format!("device.{}", length.key), length.given, mend));
+            return Err(Error::parameter(format!("device.{}", length.key), length.given, remedy));
         }
         Ok(DeviceFile { name: self.name, kind: self.kind, source: self.source, parts, device })
     }
@@ -172,8 +172,8 @@ impl FileTable {
 
     fn of_parts(&self, length_mm: Option<f64>) -> Result<(Vec<Part>, Device)> {
         let Some(kind) = self.kind else {
-            let mend = "say what it is: guidewire, microwire, microcatheter, catheter, guiding_catheter, sheath or coil";
-            return Err(Error::parameter("kind", "absent", mend));
+            let remedy = "say what it is: guidewire, microwire, microcatheter, catheter, guiding_catheter, sheath or coil";
+            return Err(Error::parameter("kind", "absent", remedy));
         };
         let lengths = self.lengths(length_mm)?;
         let mut parts = Vec::with_capacity(self.part.len());
@@ -197,15 +197,15 @@ impl FileTable {
     /// Lengths of the parts: one may omit its own, and gets the remaining length.
     fn lengths(&self, length_mm: Option<f64>) -> Result<Vec<f64>> {
         let given: Vec<Option<f64>> = self.part.iter().map(PartTable::length_mm).collect::<Result<_>>()?;
-        let absent = |index: usize, mend: String| {
+        let absent = |index: usize, remedy: String| {
             let name = format!("part \"{}\".length_mm", self.part[index].name);
-            Err(Error::parameter(name, "absent", mend))
+            Err(Error::parameter(name, "absent", remedy))
         };
         let mut open = (0..given.len()).filter(|&index| given[index].is_none());
         let Some(first) = open.next() else { return Ok(given.into_iter().flatten().collect()) };
         if let Some(second) = open.next() {
-            let mend = format!("part \"{}\" leaves it out too, and only one may", self.part[first].name);
-            return absent(second, mend);
+            let remedy = format!("part \"{}\" leaves it out too, and only one may", self.part[first].name);
+            return absent(second, remedy);
         }
         let Some(length_mm) = length_mm else {
             return absent(first, "give it, or the device's own length_mm or length_cm".into());

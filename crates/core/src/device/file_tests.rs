@@ -166,7 +166,7 @@ fn a_file_of_sections_is_a_file_of_parts() {
 #[allow(clippy::too_many_lines, reason = "a table of faults and what is said of them")]
 fn what_is_wrong_is_named_by_file_part_key_and_value() {
     let out_of_range = "must be a number above 0 and at most";
-    for (from, to, told) in [
+    for (from, to, reported) in [
         // Values.
         (
             "french = 6.0",
@@ -288,9 +288,12 @@ fn what_is_wrong_is_named_by_file_part_key_and_value() {
         ),
     ] {
         assert!(GOOD.contains(from), "{from}");
-        let error = read(&GOOD.replacen(from, to, 1)).expect_err(told);
-        assert!(error.starts_with("d.toml: ") && error.contains(told), "wanted: {told}\ngot: {error}");
-        assert!(!told.ends_with("must be") || error.contains(out_of_range), "{error}");
+        let error = read(&GOOD.replacen(from, to, 1)).expect_err(reported);
+        assert!(
+            error.starts_with("d.toml: ") && error.contains(reported),
+            "wanted: {reported}\ngot: {error}"
+        );
+        assert!(!reported.ends_with("must be") || error.contains(out_of_range), "{error}");
     }
     let error = DeviceFile::read(Path::new("no/such.toml")).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: "), "{error}");

@@ -82,8 +82,8 @@ impl Section {
             crate::error::in_range(&format!("{name}.{field}"), value, limit)?;
         }
         if self.radius_mm < LEAST_RADIUS_MM {
-            let mend = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
-            return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, mend));
+            let remedy = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
+            return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, remedy));
         }
         let stiffness = [
             ("bending_stiffness_nmm2", Some(self.bending_stiffness_nmm2)),
@@ -91,18 +91,18 @@ impl Section {
         ];
         for (field, value) in stiffness {
             if let Some(value) = value.filter(|value| *value < LEAST_STIFFNESS_NMM2) {
-                let mend = format!(
+                let remedy = format!(
                     "must be at least {LEAST_STIFFNESS_NMM2} N·mm²: the softest devices, coils and tips of catheters that the flow carries, have about 0.001"
                 );
-                return Err(Error::parameter(format!("{name}.{field}"), value, mend));
+                return Err(Error::parameter(format!("{name}.{field}"), value, remedy));
             }
         }
         if let Some(inner) = self.inner_radius_mm.filter(|inner| !(*inner > 0.0 && *inner < self.radius_mm)) {
-            let mend = format!(
+            let remedy = format!(
                 "must be above 0 and less than the outer radius, {} mm; leave it out where the device is solid",
                 self.radius_mm
             );
-            return Err(Error::parameter(format!("{name}.inner_radius_mm"), inner, mend));
+            return Err(Error::parameter(format!("{name}.inner_radius_mm"), inner, remedy));
         }
         let curvature = self.rest_curvature_per_mm;
         let bend = libm::hypot(curvature[0], curvature[1]) * self.radius_mm;
@@ -155,8 +155,8 @@ impl Device {
         }
         if sections.len() > MOST_SECTIONS {
             let value = format!("{} sections", sections.len());
-            let mend = format!("at most {MOST_SECTIONS} are taken: join neighbours that are nearly alike");
-            return Err(Error::parameter("device.section", value, mend));
+            let remedy = format!("at most {MOST_SECTIONS} are taken: join neighbours that are nearly alike");
+            return Err(Error::parameter("device.section", value, remedy));
         }
         for (index, section) in sections.iter().enumerate() {
             section.check(&format!("device.section[{index}]"))?;
@@ -174,11 +174,11 @@ impl Device {
         if coil_mm > 0.0 && coil_mm < self.length_mm {
             return Ok(Self { coil_mm, ..self });
         }
-        let mend = format!(
+        let remedy = format!(
             "must be above 0 and less than the device, {} mm: what is left is the pusher",
             self.length_mm
         );
-        Err(Error::parameter("device.coil_mm", coil_mm, mend))
+        Err(Error::parameter("device.coil_mm", coil_mm, remedy))
     }
 
     /// Length from the tip that can be detached, mm; 0 for devices without a coil.
@@ -316,22 +316,22 @@ mod tests {
     #[test]
     fn radii_and_sections_beyond_any_device_are_refused_by_key() {
         let straight = |radius_mm| Section::straight(10.0, radius_mm, 1.0);
-        let told = |sections: Vec<Section>| Device::new(sections).unwrap_err().to_string();
+        let reported = |sections: Vec<Section>| Device::new(sections).unwrap_err().to_string();
         assert!(Device::new(vec![straight(1.0), straight(1e-6)]).is_ok());
         for radius_mm in [1e-7, 1e-300, 1e-323] {
-            let error = told(vec![straight(1.0), straight(radius_mm)]);
+            let error = reported(vec![straight(1.0), straight(radius_mm)]);
             assert!(error.starts_with("device.section[1].radius_mm = 1e-"), "{error}");
             assert!(error.contains("at least 0.000001 mm"), "{error}");
         }
         for stiffness in [1.9e-4, 5e-324] {
-            let error = told(vec![straight(1.0), Section::straight(10.0, 1.0, stiffness)]);
+            let error = reported(vec![straight(1.0), Section::straight(10.0, 1.0, stiffness)]);
             assert!(error.starts_with("device.section[1].bending_stiffness_nmm2 = "), "{error}");
             let limp = Section { torsional_stiffness_nmm2: Some(stiffness), ..straight(1.0) };
-            let error = told(vec![limp]);
+            let error = reported(vec![limp]);
             assert!(error.starts_with("device.section[0].torsional_stiffness_nmm2 = "), "{error}");
         }
         assert!(Device::uniform(10.0, 1.0, 2e-4).is_ok());
-        let error = told(vec![Section::straight(1.0, 1.0, 1.0); 1001]);
+        let error = reported(vec![Section::straight(1.0, 1.0, 1.0); 1001]);
         assert!(error.starts_with("device.section = 1001 sections: at most 1000"), "{error}");
     }
 }

@@ -226,20 +226,20 @@ impl PartTable {
         let length = one_of(&place, length_ways(self.length_mm, self.length_cm), LENGTH_LIMIT_MM)?;
         if let Some(own_mm) = self.secondary.as_ref().and_then(Secondary::length_mm) {
             let Some(length) = length else { return Ok(Some(own_mm)) };
-            let mend = format!("secondary.points_mm is a curve of {own_mm} mm: keep one of the two");
-            return Err(Error::parameter(format!("{place}.{}", length.key), length.given, mend));
+            let remedy = format!("secondary.points_mm is a curve of {own_mm} mm: keep one of the two");
+            return Err(Error::parameter(format!("{place}.{}", length.key), length.given, remedy));
         }
         let Some(bend) = self.bend else { return Ok(length.map(|length| length.ends.at(0.0))) };
         if let Some(length) = length {
-            let mend = "bend has the length radius_mm · angle: keep one of the two";
-            return Err(Error::parameter(format!("{place}.{}", length.key), length.given, mend));
+            let remedy = "bend has the length radius_mm · angle: keep one of the two";
+            return Err(Error::parameter(format!("{place}.{}", length.key), length.given, remedy));
         }
         let named = |key: &str| format!("{place}.bend.{key}");
         crate::error::in_range(&named("radius_mm"), bend.radius_mm, LENGTH_LIMIT_MM)?;
         crate::error::in_range(&named("angle_deg"), bend.angle_deg, MOST_ANGLE_DEG)?;
         if !(-360.0..=360.0).contains(&bend.direction_deg) {
-            let mend = "must be a number from -360 to 360";
-            return Err(Error::parameter(named("direction_deg"), bend.direction_deg, mend));
+            let remedy = "must be a number from -360 to 360";
+            return Err(Error::parameter(named("direction_deg"), bend.direction_deg, remedy));
         }
         Ok(Some(bend.radius_mm * bend.angle_deg.to_radians()))
     }
@@ -257,28 +257,29 @@ impl PartTable {
         source: Option<&str>,
     ) -> Result<Part> {
         let place = self.place();
-        let missing = |key: &str, mend: &str| Err(Error::parameter(format!("{place}.{key}"), "absent", mend));
+        let missing =
+            |key: &str, remedy: &str| Err(Error::parameter(format!("{place}.{key}"), "absent", remedy));
         let Some(outer) = self.outer(&place)? else {
-            let mend = "give outer_diameter_mm, outer_diameter_inch, outer_diameter_french or radius_mm";
-            return missing("outer_diameter_mm", mend);
+            let remedy = "give outer_diameter_mm, outer_diameter_inch, outer_diameter_french or radius_mm";
+            return missing("outer_diameter_mm", remedy);
         };
         let inner = self.inner(&place)?;
         if is_tube && inner.is_none() {
-            let mend = "the device is a tube by its kind: give inner_diameter_mm, inner_diameter_inch, \
+            let remedy = "the device is a tube by its kind: give inner_diameter_mm, inner_diameter_inch, \
                         inner_diameter_french or inner_radius_mm";
-            return missing("inner_diameter_mm", mend);
+            return missing("inner_diameter_mm", remedy);
         }
         self.check_layers(&place, outer, inner)?;
         let wound = self.winding.map(|winding| winding.resolve(&place, outer.ends)).transpose()?;
         let given = self.stiffness(&place)?;
         let wound_stiffness = wound.map(|wound| (Stiffness::Bending(wound.bending_nmm2), wound.bending_nmm2));
         if wound.is_some() && (given.is_some() || self.torsional_stiffness_nmm2.is_some()) {
-            let mend = "the stiffness is given too, in numbers: keep one of the two";
-            return Err(Error::parameter(format!("{place}.winding"), "a table", mend));
+            let remedy = "the stiffness is given too, in numbers: keep one of the two";
+            return Err(Error::parameter(format!("{place}.winding"), "a table", remedy));
         }
         let Some((stiffness, stiffness_ends)) = given.or(wound_stiffness) else {
-            let mend = "give bending_stiffness_nmm2, flexural_modulus_mpa, flexural_modulus_gpa or winding";
-            return missing("bending_stiffness_nmm2", mend);
+            let remedy = "give bending_stiffness_nmm2, flexural_modulus_mpa, flexural_modulus_gpa or winding";
+            return missing("bending_stiffness_nmm2", remedy);
         };
         let torsion_way =
             Way { key: "torsional_stiffness_nmm2", given: self.torsional_stiffness_nmm2, factor: 1.0 };
@@ -300,8 +301,8 @@ impl PartTable {
             cuts: self.cuts(&place, tapered.into_iter().flatten().any(Ends::is_taper))?,
         };
         if part.has_secondary_shape() && part.cuts > 1 {
-            let mend = "the part is tapered: a part with a secondary shape is the same everywhere";
-            return Err(Error::parameter(format!("{place}.secondary"), "a table", mend));
+            let remedy = "the part is tapered: a part with a secondary shape is the same everywhere";
+            return Err(Error::parameter(format!("{place}.secondary"), "a table", remedy));
         }
         // EI and GJ follow from other values, so their ranges can be checked only now.
         [0.0, 1.0].iter().try_for_each(|end| part.at(*end).check(&place))?;
@@ -339,8 +340,8 @@ impl PartTable {
         let bending = one_of(place, [bending], STIFFNESS_LIMIT_NMM2)?;
         match (bending, modulus) {
             (Some(bending), Some(modulus)) => {
-                let mend = format!("{} is given too: keep one of the two", bending.key);
-                Err(Error::parameter(format!("{place}.{}", modulus.key), modulus.given, mend))
+                let remedy = format!("{} is given too: keep one of the two", bending.key);
+                Err(Error::parameter(format!("{place}.{}", modulus.key), modulus.given, remedy))
             }
             (Some(bending), None) => Ok(Some((Stiffness::Bending(bending.ends), bending.ends))),
             (None, modulus) => Ok(modulus.map(|modulus| (Stiffness::Modulus(modulus.ends), modulus.ends))),
@@ -354,17 +355,18 @@ impl PartTable {
             let radius_mm = outer.ends.0[end];
             let inner_mm = inner.map_or(0.0, |inner| inner.ends.0[end]);
             if let Some(inner) = inner.filter(|_| inner_mm >= radius_mm) {
-                let mend = format!(
+                let remedy = format!(
                     "is a radius of {inner_mm:.4} mm: must be less than the outer one, {radius_mm:.4} mm"
                 );
-                return Err(Error::parameter(format!("{place}.{}", inner.key), inner.given, mend));
+                return Err(Error::parameter(format!("{place}.{}", inner.key), inner.given, remedy));
             }
             if let Some(coat) = &self.coat
                 && !(coat.thickness_mm > 0.0 && coat.thickness_mm < radius_mm - inner_mm)
             {
-                let mend = format!("must be above 0 and less than the wall, {:.4} mm", radius_mm - inner_mm);
+                let remedy =
+                    format!("must be above 0 and less than the wall, {:.4} mm", radius_mm - inner_mm);
                 let name = format!("{place}.coat.thickness_mm");
-                return Err(Error::parameter(name, coat.thickness_mm, mend));
+                return Err(Error::parameter(name, coat.thickness_mm, remedy));
             }
         }
         Ok(())
@@ -382,16 +384,16 @@ impl PartTable {
         if let (Some(first), Some(second)) = (given.next(), given.next()) {
             let value = self.rest_curvature_per_mm.filter(|_| second == "rest_curvature_per_mm");
             let value = value.map_or_else(|| "a table".to_owned(), |curvature| format!("{curvature:?}"));
-            let mend = format!("{first} is given too: keep one of the two");
-            return Err(Error::parameter(format!("{place}.{second}"), value, mend));
+            let remedy = format!("{first} is given too: keep one of the two");
+            return Err(Error::parameter(format!("{place}.{second}"), value, remedy));
         }
         if let Some(secondary) = &self.secondary {
             return secondary.arcs(place, length_mm, widest_mm);
         }
         let curvature_per_mm = match self.bend {
             Some(bend) if bend.radius_mm < widest_mm => {
-                let mend = format!("must be at least the part's own radius, {widest_mm:.4} mm");
-                return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, mend));
+                let remedy = format!("must be at least the part's own radius, {widest_mm:.4} mm");
+                return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, remedy));
             }
             Some(bend) => {
                 let (sin, cos) = libm::sincos(bend.direction_deg.to_radians());
@@ -405,7 +407,7 @@ impl PartTable {
     /// Number of sections.
     fn cuts(&self, place: &str, tapered: bool) -> Result<usize> {
         let refused =
-            |value: String, mend: String| Err(Error::parameter(format!("{place}.sections"), value, mend));
+            |value: String, remedy: String| Err(Error::parameter(format!("{place}.sections"), value, remedy));
         match (self.sections, tapered) {
             (None, false) => Ok(1),
             (None, true) => refused(

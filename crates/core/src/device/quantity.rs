@@ -95,8 +95,8 @@ pub(super) fn one_of<const N: usize>(place: &str, ways: [Way; N], limit: f64) ->
     for Way { key, given, factor } in ways {
         let Some(given) = given else { continue };
         if let Some(first) = found {
-            let mend = format!("{} is given too: keep one of the two", first.key);
-            return Err(Error::parameter(format!("{place}.{key}"), given, mend));
+            let remedy = format!("{} is given too: keep one of the two", first.key);
+            return Err(Error::parameter(format!("{place}.{key}"), given, remedy));
         }
         for value in given.0 {
             crate::error::in_range(&format!("{place}.{key}"), value, limit / factor)?;

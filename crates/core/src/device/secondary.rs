@@ -73,8 +73,8 @@ impl Secondary {
             Self::Helix { diameter_mm, pitch_mm } => {
                 let bend_mm = bend_radius_mm(&place, *diameter_mm, radius_mm)?;
                 if !(pitch_mm.is_finite() && (0.0..=LENGTH_LIMIT_MM).contains(pitch_mm)) {
-                    let mend = format!("must be a number from 0 to {LENGTH_LIMIT_MM}");
-                    return Err(Error::parameter(format!("{place}.pitch_mm"), pitch_mm, mend));
+                    let remedy = format!("must be a number from 0 to {LENGTH_LIMIT_MM}");
+                    return Err(Error::parameter(format!("{place}.pitch_mm"), pitch_mm, remedy));
                 }
                 let rise_mm = pitch_mm / std::f64::consts::TAU;
                 let square = bend_mm * bend_mm + rise_mm * rise_mm;
@@ -91,17 +91,17 @@ impl Secondary {
                 let ball_mm = bend_radius_mm(&place, *diameter_mm, radius_mm)?;
                 for (key, value, most) in [("tilt_deg", *tilt_deg, 90.0), ("turn_deg", *turn_deg, 180.0)] {
                     if !(0.0..=most).contains(&value) {
-                        let mend = format!("must be a number from 0 to {most}");
-                        return Err(Error::parameter(format!("{place}.{key}"), value, mend));
+                        let remedy = format!("must be a number from 0 to {most}");
+                        return Err(Error::parameter(format!("{place}.{key}"), value, remedy));
                     }
                 }
                 check_count(&place, length_mm / (ball_mm * CAGE_STEP))?;
                 let points_mm = cage(length_mm, ball_mm, tilt_deg.to_radians(), turn_deg / 360.0);
                 if points_mm.len() < 3 {
-                    let mend = format!(
+                    let remedy = format!(
                         "is too short for loops of {diameter_mm} mm: make the part longer or its shape narrower"
                     );
-                    return Err(Error::parameter(format!("{part}.length_mm"), length_mm, mend));
+                    return Err(Error::parameter(format!("{part}.length_mm"), length_mm, remedy));
                 }
                 curve(&place, &points_mm)?
             }
@@ -121,8 +121,8 @@ fn turned(length_mm: f64, curvature: f64, angle: f64) -> Arc {
 fn bend_radius_mm(place: &str, diameter_mm: f64, radius_mm: f64) -> Result<f64> {
     crate::error::in_range(&format!("{place}.diameter_mm"), diameter_mm, LENGTH_LIMIT_MM)?;
     if 0.5 * diameter_mm < radius_mm {
-        let mend = format!("must be at least the part's own diameter, {:.4} mm", 2.0 * radius_mm);
-        return Err(Error::parameter(format!("{place}.diameter_mm"), diameter_mm, mend));
+        let remedy = format!("must be at least the part's own diameter, {:.4} mm", 2.0 * radius_mm);
+        return Err(Error::parameter(format!("{place}.diameter_mm"), diameter_mm, remedy));
     }
     Ok(0.5 * diameter_mm)
 }
@@ -130,8 +130,8 @@ fn bend_radius_mm(place: &str, diameter_mm: f64, radius_mm: f64) -> Result<f64> 
 fn check_count(place: &str, count: f64) -> Result<()> {
     if count > MOST_ARCS as f64 {
         let value = format!("{count} arcs");
-        let mend = format!("at most {MOST_ARCS} are taken: make the part shorter or its shape wider");
-        return Err(Error::parameter(place, value, mend));
+        let remedy = format!("at most {MOST_ARCS} are taken: make the part shorter or its shape wider");
+        return Err(Error::parameter(place, value, remedy));
     }
     Ok(())
 }

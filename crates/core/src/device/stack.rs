@@ -74,26 +74,30 @@ impl Stack {
     /// rest shape.
     pub fn new(instruments: Vec<Instrument>) -> Result<Self> {
         if instruments.is_empty() || instruments.len() > MOST {
-            let mend = format!("give 1 to {MOST} instruments, the innermost first");
-            return Err(Error::parameter("instrument", instruments.len(), mend));
+            let remedy = format!("give 1 to {MOST} instruments, the innermost first");
+            return Err(Error::parameter("instrument", instruments.len(), remedy));
         }
         let (mut sets, mut angles) = (Vec::with_capacity(instruments.len()), Angles::default());
         for (index, instrument) in instruments.iter().enumerate() {
             let name = &instrument.name;
             if name.is_empty() || instruments[..index].iter().any(|other| other.name == *name) {
-                let mend = "every instrument has a name of its own: commands call it by that";
-                return Err(Error::parameter(format!("instrument[{index}].name"), format!("{name:?}"), mend));
+                let remedy = "every instrument has a name of its own: commands call it by that";
+                return Err(Error::parameter(
+                    format!("instrument[{index}].name"),
+                    format!("{name:?}"),
+                    remedy,
+                ));
             }
             sets.push(instrument.device.is_shaped().then(|| angles.of(&instrument.device)));
         }
         if angles.count > MAX_ANGLES {
-            let mend = format!(
+            let remedy = format!(
                 "at most {MAX_ANGLES} instruments on one line, coils counting as one, may have a shape of their own"
             );
             return Err(Error::parameter(
                 "instrument",
                 format!("{} with rest curvature", angles.count),
-                mend,
+                remedy,
             ));
         }
         let (frictions, valves_n) = (vec![0.0; instruments.len()], vec![0.0; instruments.len()]);
@@ -105,10 +109,10 @@ impl Stack {
     /// # Errors
     /// A number of coefficients other than that of instruments, one outside 0 to 2, or a nonzero one of the
     /// outermost.
-    pub fn rubbing(mut self, frictions: Vec<f64>) -> Result<Self> {
+    pub fn with_friction(mut self, frictions: Vec<f64>) -> Result<Self> {
         if frictions.len() != self.instruments.len() {
-            let mend = format!("there are {} instruments: give one for each", self.instruments.len());
-            return Err(Error::parameter("instrument.friction", frictions.len(), mend));
+            let remedy = format!("there are {} instruments: give one for each", self.instruments.len());
+            return Err(Error::parameter("instrument.friction", frictions.len(), remedy));
         }
         let name = |index: usize| format!("instrument[{index}].friction");
         for (index, friction) in frictions.iter().enumerate() {
@@ -116,8 +120,9 @@ impl Stack {
         }
         let last = frictions.len() - 1;
         if frictions[last] > 0.0 {
-            let mend = "the last instrument has none outside it: the wall's friction is vessel.wall.friction";
-            return Err(Error::parameter(name(last), frictions[last], mend));
+            let remedy =
+                "the last instrument has none outside it: the wall's friction is vessel.wall.friction";
+            return Err(Error::parameter(name(last), frictions[last], remedy));
         }
         self.frictions = frictions;
         Ok(self)
@@ -130,16 +135,16 @@ impl Stack {
     /// A number of forces other than that of instruments, one outside 0 to 100 N, or a nonzero one of the innermost.
     pub fn sealed(mut self, valves_n: Vec<f64>) -> Result<Self> {
         if valves_n.len() != self.instruments.len() {
-            let mend = format!("there are {} instruments: give one for each", self.instruments.len());
-            return Err(Error::parameter("instrument.valve_n", valves_n.len(), mend));
+            let remedy = format!("there are {} instruments: give one for each", self.instruments.len());
+            return Err(Error::parameter("instrument.valve_n", valves_n.len(), remedy));
         }
         let name = |index: usize| format!("instrument[{index}].valve_n");
         for (index, valve_n) in valves_n.iter().enumerate() {
             check_valve(&name(index), *valve_n)?;
         }
         if valves_n[0] > 0.0 {
-            let mend = "nothing lies in the first instrument: the valve of the introducer sheath is sheath.friction_n";
-            return Err(Error::parameter(name(0), valves_n[0], mend));
+            let remedy = "nothing lies in the first instrument: the valve of the introducer sheath is sheath.friction_n";
+            return Err(Error::parameter(name(0), valves_n[0], remedy));
         }
         self.valves_n = valves_n;
         Ok(self)
@@ -168,10 +173,10 @@ impl Stack {
         let mut angles = Angles::default();
         let sets = self.devices().map(|device| Some(angles.of(device))).collect();
         if angles.count > MAX_ANGLES {
-            let mend = format!(
+            let remedy = format!(
                 "friction twists every instrument, and at most {MAX_ANGLES} on one line may be twisted: leave some out, or set friction to 0"
             );
-            return Err(Error::parameter("instrument", angles.count, mend));
+            return Err(Error::parameter("instrument", angles.count, remedy));
         }
         self.sets = sets;
         Ok(self)
@@ -251,16 +256,16 @@ impl Stack {
 
     /// Outer radius of the outermost instrument at this distance from the tip of the line, mm, with these lengths
     /// inserted.
-    pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
+    pub fn outermost_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
         let line_mm = line_mm(inserted_mm.iter().copied());
-        self.felt_instrument(inserted_mm, from_tip_mm).map_or(0.0, |index| {
+        self.outermost_instrument(inserted_mm, from_tip_mm).map_or(0.0, |index| {
             let own_mm = from_tip_mm - (line_mm - inserted_mm[index]);
             self.instruments[index].device.section_at(own_mm).radius_mm
         })
     }
 
     /// The outermost instrument there; `None` if none reaches it.
-    pub(crate) fn felt_instrument(&self, inserted_mm: &[f64], from_tip_mm: f64) -> Option<usize> {
+    pub(crate) fn outermost_instrument(&self, inserted_mm: &[f64], from_tip_mm: f64) -> Option<usize> {
         let line_mm = line_mm(inserted_mm.iter().copied());
         inserted_mm.iter().rposition(|inserted| from_tip_mm - (line_mm - inserted) >= 0.0)
     }
@@ -296,7 +301,7 @@ fn check_tails((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instr
     if inner_mm <= most_mm + LENGTH_SLACK_MM {
         return Ok(());
     }
-    let mend = format!(
+    let remedy = format!(
         "{tail_mm:.3} mm of {:?} are outside, and the tail of {:?} would be in them: insert at most {:.3} mm, insert {:?} farther, or \
          use a longer instrument",
         outer.name,
@@ -304,7 +309,7 @@ fn check_tails((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instr
         most_mm.max(0.0),
         outer.name
     );
-    Err(Error::parameter(format!("{}.inserted_mm", inner.name), inner_mm, mend))
+    Err(Error::parameter(format!("{}.inserted_mm", inner.name), inner_mm, remedy))
 }
 
 /// Checks that an outer instrument that must not lead is behind the inner one.
@@ -312,11 +317,11 @@ fn check_lead((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instru
     if outer.may_lead || outer_mm <= inner_mm + LENGTH_SLACK_MM {
         return Ok(());
     }
-    let mend = format!(
+    let remedy = format!(
         "must not lead, and {:?} is {inner_mm:.3} mm in: advance that first, or allow it with may_lead",
         inner.name
     );
-    Err(Error::parameter(format!("{}.inserted_mm", outer.name), outer_mm, mend))
+    Err(Error::parameter(format!("{}.inserted_mm", outer.name), outer_mm, remedy))
 }
 
 /// Checks that one instrument fits into another.
@@ -327,19 +332,19 @@ fn check_pair(inner: &Instrument, outer: &Instrument) -> Result<()> {
     match narrowest {
         Some(room) if value <= room => Ok(()),
         Some(room) => {
-            let mend = format!(
+            let remedy = format!(
                 "the lumen of {:?} has radius {room} mm: use a thinner instrument, or withdraw one of the two first",
                 outer.name
             );
-            Err(Error::parameter(name, value, mend))
+            Err(Error::parameter(name, value, remedy))
         }
         None => {
-            let mend = format!(
+            let remedy = format!(
                 "{:?} has no lumen: give inner_radius_mm in all of its sections, order instruments from the innermost, or withdraw one \
                  of the two first",
                 outer.name
             );
-            Err(Error::parameter(name, value, mend))
+            Err(Error::parameter(name, value, remedy))
         }
     }
 }
@@ -359,9 +364,9 @@ mod tests {
         let catheter = instrument("catheter", 0.9, Some(0.5));
         let wires = [instrument("wire", 0.2, None), instrument("stiff wire", 0.5, None)];
         let stack = Stack::new(wires.into_iter().chain([catheter]).collect()).unwrap();
-        let told = |mm: [f64; 3]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
-        assert!(told([20.0, 0.0, 20.0]).is_ok() && told([0.0, 10.0, 20.0]).is_ok());
-        assert!(told([10.0, 10.0, 20.0]).unwrap_err().contains("\"stiff wire\" has no lumen"));
+        let reported = |mm: [f64; 3]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
+        assert!(reported([20.0, 0.0, 20.0]).is_ok() && reported([0.0, 10.0, 20.0]).is_ok());
+        assert!(reported([10.0, 10.0, 20.0]).unwrap_err().contains("\"stiff wire\" has no lumen"));
         assert_eq!(stack.find("catheter").unwrap(), 2);
         let error = stack.find("cathter").unwrap_err().to_string();
         assert!(error.contains("did you mean \"catheter\"?"), "{error}");
@@ -377,15 +382,17 @@ mod tests {
         let wire = Instrument { name: "wire".to_owned(), device: wire, may_lead: true };
         let catheter = Instrument { may_lead: false, ..instrument("catheter", 0.9, Some(0.5)) };
         let stack = Stack::new(vec![wire, catheter]).unwrap();
-        let told = |mm: [f64; 2]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
-        assert!(told([70.0, 20.0]).is_ok() && told([20.0, 20.0]).is_ok() && told([0.0, 20.0]).is_ok());
-        let error = told([70.1, 20.0]).unwrap_err();
+        let reported = |mm: [f64; 2]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
+        assert!(
+            reported([70.0, 20.0]).is_ok() && reported([20.0, 20.0]).is_ok() && reported([0.0, 20.0]).is_ok()
+        );
+        let error = reported([70.1, 20.0]).unwrap_err();
         assert!(
             error.starts_with("wire.inserted_mm = 70.1: 80.000 mm of \"catheter\" are outside"),
             "{error}"
         );
         assert!(error.contains("insert at most 70.000 mm"), "{error}");
-        let error = told([20.0, 20.1]).unwrap_err();
+        let error = reported([20.0, 20.1]).unwrap_err();
         assert!(error.starts_with("catheter.inserted_mm = 20.1: must not lead"), "{error}");
     }
 }

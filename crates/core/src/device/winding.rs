@@ -60,19 +60,19 @@ impl Winding {
         };
         let wire_mm = wire.ends.at(0.0);
         if wire_mm >= thinnest_mm {
-            let mend = format!("must be less than the outer radius of the winding, {thinnest_mm:.4} mm");
-            return Err(Error::parameter(format!("{place}.{}", wire.key), wire.given, mend));
+            let remedy = format!("must be less than the outer radius of the winding, {thinnest_mm:.4} mm");
+            return Err(Error::parameter(format!("{place}.{}", wire.key), wire.given, remedy));
         }
         crate::error::in_range(&format!("{place}.modulus_gpa"), self.modulus_gpa, MODULUS_LIMIT_MPA / 1e3)?;
         if !(0.0..=0.5).contains(&self.poisson_ratio) {
-            let mend = "must be a number from 0 to 0.5";
-            return Err(Error::parameter(format!("{place}.poisson_ratio"), self.poisson_ratio, mend));
+            let remedy = "must be a number from 0 to 0.5";
+            return Err(Error::parameter(format!("{place}.poisson_ratio"), self.poisson_ratio, remedy));
         }
         let pitch_mm = self.pitch_mm.unwrap_or(wire_mm);
         if !(pitch_mm.is_finite() && pitch_mm >= wire_mm) {
-            let mend =
+            let remedy =
                 format!("must be at least the wire's diameter, {wire_mm:.4} mm: turns lie beside each other");
-            return Err(Error::parameter(format!("{place}.pitch_mm"), pitch_mm, mend));
+            return Err(Error::parameter(format!("{place}.pitch_mm"), pitch_mm, remedy));
         }
         let stiffness_nmm2 = 1e3 * self.modulus_gpa * second_moment_mm4(0.5 * wire_mm, 0.0);
         let torsion =
@@ -81,10 +81,10 @@ impl Winding {
         let bending_nmm2 = Ends(torsion_nmm2.0.map(|gj| 2.0 * gj / (2.0 + self.poisson_ratio)));
         let range = LEAST_STIFFNESS_NMM2..=STIFFNESS_LIMIT_NMM2;
         if let Some(found) = bending_nmm2.0.iter().find(|found| !range.contains(found)) {
-            let mend = format!(
+            let remedy = format!(
                 "gives a bending stiffness of {found:.1e} N·mm², and must give one of {LEAST_STIFFNESS_NMM2} to {STIFFNESS_LIMIT_NMM2}: take another wire, modulus or pitch"
             );
-            return Err(Error::parameter(format!("{place}.{}", wire.key), wire.given, mend));
+            return Err(Error::parameter(format!("{place}.{}", wire.key), wire.given, remedy));
         }
         Ok(Wound { bending_nmm2, torsion_nmm2 })
     }

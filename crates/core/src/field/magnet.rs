@@ -36,8 +36,8 @@ impl Magnet {
         let Range { start, end } = from_tip_mm;
         in_range("magnet.end_mm", end, LENGTH_LIMIT_MM)?;
         if !(0.0..end).contains(&start) {
-            let mend = format!("must be a distance from the tip of 0 or more, less than end_mm = {end}");
-            return Err(Error::parameter("magnet.start_mm", start, mend));
+            let remedy = format!("must be a distance from the tip of 0 or more, less than end_mm = {end}");
+            return Err(Error::parameter("magnet.start_mm", start, remedy));
         }
         at_most("magnet.moment_am2", moment_am2.abs(), MOMENT_LIMIT_AM2)?;
         at_most("magnet.field_t", field_t.norm(), FIELD_LIMIT_T)?;

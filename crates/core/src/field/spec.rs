@@ -60,13 +60,13 @@ impl FieldSpec {
     pub fn check(&self, name: &str, stack: &Stack) -> Result<()> {
         let (Self::Magnet { instrument, .. } | Self::Weight { instrument, .. }) = *self;
         let Some(held) = stack.instruments().get(instrument) else {
-            let mend = format!("there are {}, the innermost is 0", stack.instruments().len());
-            return Err(Error::parameter(format!("{name}.instrument"), instrument, mend));
+            let remedy = format!("there are {}, the innermost is 0", stack.instruments().len());
+            return Err(Error::parameter(format!("{name}.instrument"), instrument, remedy));
         };
         match *self {
             Self::Magnet { end_mm, .. } if end_mm > held.device.length_mm() + LENGTH_SLACK_MM => {
-                let mend = format!("must be within the instrument, {} mm", held.device.length_mm());
-                Err(Error::parameter(format!("{name}.end_mm"), end_mm, mend))
+                let remedy = format!("must be within the instrument, {} mm", held.device.length_mm());
+                Err(Error::parameter(format!("{name}.end_mm"), end_mm, remedy))
             }
             _ => Ok(()),
         }

@@ -120,8 +120,8 @@ impl BloodFlow {
         in_range("vessel.flow.split_exponent", flow.split_exponent, MOST_EXPONENT)?;
         let inlet_mm = flow.inlet_mm.map(Vec3::from);
         if let Some(inlet) = inlet_mm.filter(|inlet| !inlet.iter().all(|c| c.is_finite())) {
-            let mend = "must be finite, in mm";
-            return Err(Error::parameter("vessel.flow.inlet_mm", error::vector(&inlet), mend));
+            let remedy = "must be finite, in mm";
+            return Err(Error::parameter("vessel.flow.inlet_mm", error::vector(&inlet), remedy));
         }
         let nodes = flow_nodes(tree, inlet_mm, flow.split_exponent, ["vessel.flow", "vessel.flow.inlet_mm"])?;
         let mut stretches = Vec::new();
@@ -154,13 +154,13 @@ impl BloodFlow {
         }
         let nowhere = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
         let (from, to) = points.fold(nowhere, |(low, high), x| (low.inf(&x), high.sup(&x)));
-        let mend = format!(
+        let remedy = format!(
             "no point of it is in the vessel, which lies in {} to {}: give the centre line of this surface, in its coordinates and in mm",
             error::vector(&low),
             error::vector(&high)
         );
         let value = format!("{} to {}", error::vector(&from), error::vector(&to));
-        Err(Error::parameter("vessel.centreline", value, mend))
+        Err(Error::parameter("vessel.centreline", value, remedy))
     }
 
     /// The flow at a position, from the nearest stretch of the centre line; `None` outside the vessel.
@@ -252,8 +252,8 @@ mod tests {
         }
         for (x_mm, z_mm) in [(500.0, [0.0, 50.0]), (0.0, [60.0, 110.0]), (4.5, [0.0, 50.0])] {
             let error = within(x_mm, z_mm).unwrap_err().to_string();
-            let told = format!("vessel.centreline = [{x_mm}, 0, {}] to", z_mm[0]);
-            assert!(error.starts_with(&told) && error.contains("[4, 4, 50]"), "{error}");
+            let reported = format!("vessel.centreline = [{x_mm}, 0, {}] to", z_mm[0]);
+            assert!(error.starts_with(&reported) && error.contains("[4, 4, 50]"), "{error}");
         }
     }
 }

@@ -59,11 +59,11 @@ pub fn flow_nodes(
         .filter_map(|i| parent(i).map(|before| pieces(&before, &points[i].position_mm)))
         .sum();
     if count > MOST_NODES {
-        let mend = format!(
+        let remedy = format!(
             "with a point each {SPACING_MM} mm it has {count:.0} points, at most {MOST_NODES} are followed: mend the unit (mm), or \
              leave out branches or points"
         );
-        return Err(Error::parameter(keys[0], format!("{} rows", points.len()), mend));
+        return Err(Error::parameter(keys[0], format!("{} rows", points.len()), remedy));
     }
     let mut neighbours: Vec<Vec<usize>> = vec![vec![]; points.len()];
     for (i, point) in points.iter().enumerate() {
@@ -88,13 +88,13 @@ pub fn flow_nodes(
     let (position_mm, radius_mm) = place(inlet);
     let away_mm = |near: &Vec3| (position_mm - near).norm();
     if let Some(near) = inlet_mm.filter(|near| away_mm(near) > INLET_RADII * radius_mm) {
-        let mend = format!(
+        let remedy = format!(
             "the nearest end of the centre line, at {}, is {:.3} mm away, and at most {INLET_RADII} of its radii may be: give a \
              place next to the end where blood comes in",
             error::vector(&position_mm),
             away_mm(&near)
         );
-        return Err(Error::parameter(keys[1], error::vector(&near), mend));
+        return Err(Error::parameter(keys[1], error::vector(&near), remedy));
     }
     let mut nodes = vec![FlowNode {
         position_mm,
@@ -161,12 +161,12 @@ pub fn check_place(tree: &CentrelineTree, place_mm: Vec3, key: &str) -> Result<(
     let nearest = points.iter().map(stretch).min_by(|a, b| in_radii(a).total_cmp(&in_radii(b)));
     match nearest {
         Some((away_mm, radius_mm, nearest_mm)) if away_mm > OUTSIDE_RADII * radius_mm => {
-            let mend = format!(
+            let remedy = format!(
                 "is {away_mm:.1} mm from the centre line at {}, where the vessel has a radius of {radius_mm:.1} mm: give a place in \
                  the vessel, in mm, at most {OUTSIDE_RADII} radii from its centre line",
                 error::vector(&nearest_mm)
             );
-            Err(Error::parameter(key, error::vector(&place_mm), mend))
+            Err(Error::parameter(key, error::vector(&place_mm), remedy))
         }
         _ => Ok(()),
     }

@@ -38,11 +38,11 @@ const CHOICES: [&str; 2] = ["enum ", "unit variant "];
 /// they were.
 pub fn plain(message: &str) -> String {
     // A reader of JSON says the place at the end.
-    let (told, place) = match message.rfind(" at line ") {
+    let (reported, place) = match message.rfind(" at line ") {
         Some(at) => message.split_at(at),
         None => (message, ""),
     };
-    let words = of_type(told).or_else(|| of_length(told)).or_else(|| of_key(told));
+    let words = of_type(reported).or_else(|| of_length(reported)).or_else(|| of_key(reported));
     words.map_or_else(|| message.to_owned(), |words| format!("{words}{place}"))
 }
 
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_message_of_serde_is_said_in_plain_words() {
-        for (serde, told) in [
+        for (serde, reported) in [
             ("invalid type: string \"x\", expected f64", "must be a number, not the text \"x\""),
             (
                 "invalid type: floating point `1.5`, expected usize",
@@ -152,7 +152,7 @@ mod tests {
             ("unknown field `x`, expected `a`", "unknown field `x`, expected `a`"),
             ("must be above 0", "must be above 0"),
         ] {
-            assert_eq!(plain(serde), told);
+            assert_eq!(plain(serde), reported);
         }
     }
 
@@ -194,11 +194,11 @@ mod tests {
         for (key, value) in keys.iter().flat_map(|key| values.map(|value| (key, value))) {
             let text = format!("{key} = {value}");
             if let Err(error) = super::super::parse_toml::<Every>(&text, std::path::Path::new("f.toml")) {
-                let told = error.to_string();
+                let reported = error.to_string();
                 let bad = [
                     "f64", "usize", "u64", "i64", "struct", "enum", "variant", "sequence", " map", "invalid",
                 ];
-                assert!(!bad.iter().any(|word| told.contains(word)), "{text}: {told}");
+                assert!(!bad.iter().any(|word| reported.contains(word)), "{text}: {reported}");
             }
         }
     }

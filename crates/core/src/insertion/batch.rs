@@ -79,8 +79,8 @@ impl Batch {
         work: impl Fn(&mut Simulation, &T) -> Result<()> + Sync,
     ) -> Result<Vec<Result<()>>> {
         if given.len() != self.simulations.len() {
-            let mend = format!("give one for each of the {} simulations", self.simulations.len());
-            return Err(Error::parameter(name, given.len(), mend));
+            let remedy = format!("give one for each of the {} simulations", self.simulations.len());
+            return Err(Error::parameter(name, given.len(), remedy));
         }
         // Threads are started only for several simulations, since a program may have to fork.
         if let ([simulation], [one]) = (&mut self.simulations[..], given) {
@@ -92,9 +92,9 @@ impl Batch {
         let mut all: Vec<_> = self.simulations.iter_mut().zip(given).enumerate().collect();
         all.sort_by_cached_key(|(_, (simulation, _))| Reverse(labour(simulation)));
         let step = |(index, (simulation, one))| (index, work(simulation, one));
-        let mut told: Vec<_> = all.into_iter().par_bridge().map(step).collect();
-        told.sort_by_key(|(index, _)| *index);
-        Ok(told.into_iter().map(|(_, told)| told).collect())
+        let mut reported: Vec<_> = all.into_iter().par_bridge().map(step).collect();
+        reported.sort_by_key(|(index, _)| *index);
+        Ok(reported.into_iter().map(|(_, reported)| reported).collect())
     }
 }
 
@@ -132,9 +132,9 @@ mod tests {
         let mut batch = Batch::new(alone.clone());
         for step in 0..40 {
             let commands: Vec<Command> = (0..5).map(|k| command(k, step)).collect();
-            let told = batch.step(&commands).unwrap();
-            for (k, (one, told)) in alone.iter_mut().zip(told).enumerate() {
-                assert_eq!(one.step(commands[k]).is_ok(), told.is_ok());
+            let reported = batch.step(&commands).unwrap();
+            for (k, (one, reported)) in alone.iter_mut().zip(reported).enumerate() {
+                assert_eq!(one.step(commands[k]).is_ok(), reported.is_ok());
                 assert_eq!(one.shape(), batch.simulations()[k].shape());
                 assert_eq!(one.report(), batch.simulations()[k].report());
             }
@@ -161,7 +161,7 @@ mod tests {
         let mut batch = Batch::new(alone.clone());
         for _ in 0..15 {
             let all: Vec<Vec<Move>> = (0..3).map(moves).collect();
-            batch.step_together(&all).unwrap().into_iter().for_each(|told| told.unwrap());
+            batch.step_together(&all).unwrap().into_iter().for_each(|reported| reported.unwrap());
             for (one, moves) in alone.iter_mut().zip(&all) {
                 one.step_together(moves).unwrap();
             }
@@ -181,7 +181,7 @@ mod tests {
         for step in 0..30 {
             let moves: Vec<Vec<Move>> =
                 (0..3).map(|k| vec![Move { instrument: 0, command: command(k, step) }]).collect();
-            batch.tick(&moves, 3).unwrap().into_iter().for_each(|told| told.unwrap());
+            batch.tick(&moves, 3).unwrap().into_iter().for_each(|reported| reported.unwrap());
             for (one, moves) in alone.iter_mut().zip(&moves) {
                 behind += usize::from(!one.tick(moves, 3, None).unwrap().behind.is_empty());
             }
@@ -191,7 +191,7 @@ mod tests {
             assert_eq!((one.shape(), one.report()), (other.shape(), other.report()));
         }
         let refused = batch.tick(&vec![Vec::new(); 3], 0).unwrap();
-        assert!(refused.into_iter().all(|told| told.unwrap_err().to_string().contains("solves = 0")));
+        assert!(refused.into_iter().all(|reported| reported.unwrap_err().to_string().contains("solves = 0")));
     }
 
     #[test]
@@ -199,8 +199,10 @@ mod tests {
         let one = simulation();
         let mut batch = Batch::new(vec![one; 2]);
         batch.step(&[Command::advance(5.0); 2]).unwrap();
-        let told = batch.detach(&[None, Some(0)]).unwrap();
-        assert!(told[0].is_ok() && told[1].as_ref().is_err_and(|e| e.to_string().contains("is no coil")));
+        let reported = batch.detach(&[None, Some(0)]).unwrap();
+        assert!(
+            reported[0].is_ok() && reported[1].as_ref().is_err_and(|e| e.to_string().contains("is no coil"))
+        );
         assert!(batch.detach(&[None]).unwrap_err().to_string().contains("instruments = 1"));
     }
 
@@ -210,9 +212,9 @@ mod tests {
         batch.step(&[Command::advance(5.0); 3]).unwrap();
         let before = batch.simulations()[1].shape().clone();
         let commands = [Command::advance(1.0), Command::advance(f64::NAN), Command::advance(2.0)];
-        let told = batch.step(&commands).unwrap();
-        assert!(told[0].is_ok() && told[2].is_ok());
-        assert!(told[1].as_ref().is_err_and(|e| e.to_string().contains("advance_mm = NaN")));
+        let reported = batch.step(&commands).unwrap();
+        assert!(reported[0].is_ok() && reported[2].is_ok());
+        assert!(reported[1].as_ref().is_err_and(|e| e.to_string().contains("advance_mm = NaN")));
         assert_eq!(batch.simulations()[1].shape(), &before);
         assert_eq!(batch.simulations()[2].report().inserted_mm, 7.0);
         let refused = batch.step(&commands[..2]).unwrap_err().to_string();

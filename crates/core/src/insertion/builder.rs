@@ -92,8 +92,8 @@ impl<'a> SimulationBuilder<'a> {
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {
-            let mend = "pushes one device and no more: leave one instrument, or choose kirchhoff";
-            return Err(Error::parameter("method.name", method.name(), mend));
+            let remedy = "pushes one device and no more: leave one instrument, or choose kirchhoff";
+            return Err(Error::parameter("method.name", method.name(), remedy));
         }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;
         let (fields, fields_before) = (Arc::new([]), Arc::new([]));
@@ -131,12 +131,12 @@ fn check_still(mouth_mm: f64, motion: &VesselMotion, stack: &Stack, sheath: &She
     if moved_mm <= room_mm {
         return Ok(());
     }
-    let mend = format!(
+    let remedy = format!(
         "so far may the vessel move at the sheath's mouth at {}, which stays where it is with {room_mm:.3} mm to spare: keep the vessel \
          still there (still)",
         vector(mouth)
     );
-    Err(Error::parameter("vessel.motion", format!("{moved_mm:.3} mm"), mend))
+    Err(Error::parameter("vessel.motion", format!("{moved_mm:.3} mm"), remedy))
 }
 
 /// Ratio of a device's thickness to the vessel's from which a mistake of units is assumed.

@@ -81,8 +81,8 @@ mod tests {
                 wire(10.0, 4.0, 0.1, !is_swept, 1.0),
             ];
             for mut other in others {
-                let told = other.restore(&state).unwrap_err().to_string();
-                assert!(told.starts_with("state.scene = "), "{told}");
+                let reported = other.restore(&state).unwrap_err().to_string();
+                assert!(reported.starts_with("state.scene = "), "{reported}");
                 assert_eq!(other.report().inserted_mm, 0.0);
             }
         }

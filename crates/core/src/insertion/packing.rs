@@ -54,8 +54,8 @@ impl Packing {
     /// A sac without a volume, and a wall that cannot be queried.
     pub fn of(simulation: &Simulation, sac: &Sac) -> Result<Self> {
         if !(sac.volume_mm3.is_finite() && sac.volume_mm3 > 0.0) {
-            let mend = "there is nothing to fill: measure the sac of this vessel";
-            return Err(Error::parameter("sac.volume_mm3", sac.volume_mm3, mend));
+            let remedy = "there is nothing to fill: measure the sac of this vessel";
+            return Err(Error::parameter("sac.volume_mm3", sac.volume_mm3, remedy));
         }
         let height_mm = |x: &Vec3| (x - sac.neck_mm).dot(&sac.normal);
         let pieces = pieces(simulation);

@@ -164,8 +164,8 @@ impl Simulation {
         if (self.time_s..=LATEST_S).contains(&time_s) {
             return Ok(time_s);
         }
-        let mend = format!("must be a time from that of the last step, {} s, to {LATEST_S}", self.time_s);
-        Err(Error::parameter("time_s", time_s, mend))
+        let remedy = format!("must be a time from that of the last step, {} s, to {LATEST_S}", self.time_s);
+        Err(Error::parameter("time_s", time_s, remedy))
     }
 
     /// Detaches the coil of an instrument, which comes to rest, and withdraws its pusher. After an error the state is
@@ -189,8 +189,8 @@ impl Simulation {
     pub fn check_detach(&self, instrument: usize) -> Result<()> {
         let instruments = self.scene.stack.instruments().len();
         if instrument >= instruments {
-            let mend = format!("there are {instruments}, the innermost is 0");
-            return Err(Error::parameter("detach", instrument, mend));
+            let remedy = format!("there are {instruments}, the innermost is 0");
+            return Err(Error::parameter("detach", instrument, remedy));
         }
         self.method.check_detach(&surroundings!(self, self.time_s), instrument)
     }
@@ -205,8 +205,8 @@ impl Simulation {
     pub fn set_fields(&mut self, fields: impl IntoIterator<Item = Arc<dyn Field>>) -> Result<()> {
         let fields: Fields = fields.into_iter().collect();
         if !fields.is_empty() && !self.method.takes_fields() {
-            let mend = "this method knows no fields: use kirchhoff";
-            return Err(Error::parameter("fields", fields.len(), mend));
+            let remedy = "this method knows no fields: use kirchhoff";
+            return Err(Error::parameter("fields", fields.len(), remedy));
         }
         fields.iter().enumerate().try_for_each(|(index, field)| self.check_field(index, &**field))?;
         self.fields = fields;
@@ -222,8 +222,8 @@ impl Simulation {
         if (0..instruments).any(|instrument| !field.acts_on(instrument).is_empty()) {
             return Ok(());
         }
-        let mend = format!("acts on none of the {instruments} instruments: the innermost is 0");
-        Err(Error::parameter(name, format!("{field:?}"), mend))
+        let remedy = format!("acts on none of the {instruments} instruments: the innermost is 0");
+        Err(Error::parameter(name, format!("{field:?}"), remedy))
     }
 
     /// The fields in which the device was when it last came to rest, and those to which the next step leads.
@@ -248,8 +248,8 @@ impl Simulation {
             return Ok(());
         }
         let name = &self.scene.stack.instruments()[instrument].name;
-        let mend = "its coil is detached: advance the next one";
-        Err(Error::parameter("advance_mm", format!("{} of {name:?}", command.advance_mm), mend))
+        let remedy = "its coil is detached: advance the next one";
+        Err(Error::parameter("advance_mm", format!("{} of {name:?}", command.advance_mm), remedy))
     }
 
     fn check_moves(&self, moves: &[Move]) -> Result<()> {
@@ -261,12 +261,12 @@ impl Simulation {
         };
         for (index, one) in moves.iter().enumerate() {
             let Some(instrument) = instruments.get(one.instrument) else {
-                let mend = format!("there are {}, the innermost is 0", instruments.len());
-                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
+                let remedy = format!("there are {}, the innermost is 0", instruments.len());
+                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, remedy));
             };
             if moves[..index].iter().any(|other| other.instrument == one.instrument) {
-                let mend = format!("{:?} is moved twice: add its motions up", instrument.name);
-                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
+                let remedy = format!("{:?} is moved twice: add its motions up", instrument.name);
+                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, remedy));
             }
             self.check_attached(one.command, one.instrument)?;
             let checked = check_command(one.command, inserted(one.instrument), instrument.device.length_mm());
@@ -292,12 +292,12 @@ impl Simulation {
     /// A state of another method, vessel, wall, device, sheath or element length ([`Error::Parameter`]).
     pub fn restore(&mut self, state: &State) -> Result<()> {
         if !(0.0..=LATEST_S).contains(&state.time_s()) {
-            let mend = format!("must be a time from 0 to {LATEST_S} s: restore a state of this scene");
-            return Err(Error::parameter("state.time_s", state.time_s(), mend));
+            let remedy = format!("must be a time from 0 to {LATEST_S} s: restore a state of this scene");
+            return Err(Error::parameter("state.time_s", state.time_s(), remedy));
         }
         if state.scene() != self.scene.mark() {
-            let mend = "it was taken in another scene: its vessel, wall, instruments or sheath are others; restore a state of this scene";
-            return Err(Error::parameter("state.scene", format!("{:016x}", state.scene()), mend));
+            let remedy = "it was taken in another scene: its vessel, wall, instruments or sheath are others; restore a state of this scene";
+            return Err(Error::parameter("state.scene", format!("{:016x}", state.scene()), remedy));
         }
         self.method.restore(&self.scene.surroundings([self.time_s; 2]), state)?;
         self.time_s = state.time_s();
@@ -400,8 +400,8 @@ const TURN_LIMIT_RAD: f64 = 1000.0 * std::f64::consts::TAU;
 /// The same error, with the name of the instrument.
 fn within(instrument: &str, error: Error) -> Error {
     match error {
-        Error::Parameter { name, value, mend } => {
-            Error::Parameter { name: format!("{instrument}.{name}"), value, mend }
+        Error::Parameter { name, value, remedy } => {
+            Error::Parameter { name: format!("{instrument}.{name}"), value, remedy }
         }
         other => other,
     }
@@ -449,11 +449,11 @@ mod tests {
 
     #[test]
     fn turns_without_meaning_are_refused() {
-        let told = |rad: f64| check_command(Command::rotate(rad), 0.0, 100.0).unwrap_err().to_string();
+        let reported = |rad: f64| check_command(Command::rotate(rad), 0.0, 100.0).unwrap_err().to_string();
         for rad in [1e308, -1e5, f64::MAX] {
-            assert!(told(rad).contains("more than 1000 turns"), "{}", told(rad));
+            assert!(reported(rad).contains("more than 1000 turns"), "{}", reported(rad));
         }
-        assert!(told(f64::NAN).contains("finite"));
+        assert!(reported(f64::NAN).contains("finite"));
         assert!(check_command(Command::rotate(-6000.0), 0.0, 100.0).is_ok());
     }
 }

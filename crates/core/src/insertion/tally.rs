@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_went_wrong_is_told_and_nothing_else() {
+    fn what_went_wrong_is_reported_and_nothing_else() {
         assert_eq!(Tally::default().remarks(60), None);
         let tally = Tally {
             unconverged_steps: 3,
@@ -92,8 +92,8 @@ mod tests {
             relaxations: 2,
             ..Tally::default()
         };
-        let told = "3 of 60 steps without an equilibrium, the first step 12; 1 jump; 2 last resorts";
-        assert_eq!(tally.remarks(60).unwrap(), told);
+        let reported = "3 of 60 steps without an equilibrium, the first step 12; 1 jump; 2 last resorts";
+        assert_eq!(tally.remarks(60).unwrap(), reported);
         let coarse = Tally { max_turn_deg: 75.0, ..Tally::default() }.remarks(9).unwrap();
         assert!(coarse.contains("bend by up to 75°") && coarse.contains("method.element_mm"), "{coarse}");
         assert_eq!(Tally { jumps: 2, max_turn_deg: 45.0, ..Tally::default() }.remarks(9).unwrap(), "2 jumps");

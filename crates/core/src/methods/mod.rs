@@ -97,8 +97,8 @@ impl<'a> Surroundings<'a> {
     pub fn refuse_motion(&self, method: &str) -> Result<()> {
         let given = [("motion", self.motion.is_some()), ("flow", self.flow.is_some())];
         let Some((key, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };
-        let mend = format!("{method} knows a vessel at rest: leave {key} out or use the method kirchhoff");
-        Err(Error::parameter(format!("vessel.{key}"), "given", mend))
+        let remedy = format!("{method} knows a vessel at rest: leave {key} out or use the method kirchhoff");
+        Err(Error::parameter(format!("vessel.{key}"), "given", remedy))
     }
 }
 

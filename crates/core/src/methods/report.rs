@@ -239,8 +239,8 @@ mod tests {
         let contacts = vec![at(2.0, 0.3, 0.4), at(9.6, 0.1, 0.0), at(10.0, 0.2, 0.0)];
         let report = StepReport { contacts, ..StepReport::default() };
         let close = |force: WallForce, expected: [f64; 3]| {
-            let told = [force.sum_n, force.largest_n, force.tip_n];
-            assert!(told.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{told:?}");
+            let reported = [force.sum_n, force.largest_n, force.tip_n];
+            assert!(reported.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{reported:?}");
         };
         close(report.wall_force(&shape, 0.5), [0.8, 0.5, 0.3]);
         // A thin tip includes the last contact alone, one as thick as the distance all of them.

@@ -41,7 +41,7 @@ impl Sheath {
     ///
     /// # Errors
     /// A force that is not from 0 to 100 N, a coefficient that is not from 0 to 2.
-    pub fn rubbing(self, friction_n: f64, friction: f64) -> Result<Self> {
+    pub fn with_friction(self, friction_n: f64, friction: f64) -> Result<Self> {
         check_valve("sheath.friction_n", friction_n)?;
         check_friction("sheath.friction", friction)?;
         Ok(Self { friction_n, friction, ..self })
@@ -53,8 +53,9 @@ impl Sheath {
     /// # Errors
     /// A direction that is zero, not finite, or along the sheath's.
     pub fn bending_towards(self, towards: Vec3) -> Result<Self> {
-        let refused =
-            |mend: &str| Err(Error::parameter("sheath.bends_towards", crate::error::vector(&towards), mend));
+        let refused = |remedy: &str| {
+            Err(Error::parameter("sheath.bends_towards", crate::error::vector(&towards), remedy))
+        };
         let Some(unit) = unit(&towards) else {
             return refused("must be a direction, not all zero");
         };
@@ -89,9 +90,9 @@ impl Sheath {
         } else {
             ("sheath.friction", self.friction)
         };
-        let mend =
+        let remedy =
             format!("{method} has no friction in the sheath: leave it out or use the method kirchhoff");
-        Err(Error::parameter(name, value, mend))
+        Err(Error::parameter(name, value, remedy))
     }
 
     /// A sheath at a point, pointing in a direction of any length.
@@ -126,14 +127,14 @@ impl Sheath {
     pub fn at_opening(vessel: &impl AsRef<[Opening]>, opening: usize, depth_mm: f64) -> Result<Self> {
         let openings = vessel.as_ref();
         let Some(place) = openings.get(opening) else {
-            let mend = if openings.is_empty() {
+            let remedy = if openings.is_empty() {
                 "the vessel is closed: give sheath.position_mm, a point inside, and sheath.direction instead (endowire vessel \
                  check FILE offers both)"
                     .to_owned()
             } else {
                 format!("the vessel has {} openings, numbered from 0", openings.len())
             };
-            return Err(Error::parameter("sheath.opening", opening, mend));
+            return Err(Error::parameter("sheath.opening", opening, remedy));
         };
         if !(depth_mm.is_finite() && depth_mm >= 0.0) {
             return Err(Error::parameter(
@@ -173,8 +174,11 @@ mod tests {
             Vec3::z() * -2.0,
             Vec3::new(1e-8, 0.0, 1.0),
         ] {
-            let told = sheath.bending_towards(towards).unwrap_err();
-            assert!(told.is_input() && told.to_string().starts_with("sheath.bends_towards = "), "{told}");
+            let reported = sheath.bending_towards(towards).unwrap_err();
+            assert!(
+                reported.is_input() && reported.to_string().starts_with("sheath.bends_towards = "),
+                "{reported}"
+            );
         }
     }
 

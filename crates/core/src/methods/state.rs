@@ -152,9 +152,9 @@ impl State {
 
     /// The error for a state that is not of `method`.
     pub fn of_another(&self, method: &str) -> Error {
-        let mend =
+        let remedy =
             format!("this simulation is one of {method}: restore a state of the same scene and method");
-        Error::parameter("state.method", &self.method, mend)
+        Error::parameter("state.method", &self.method, remedy)
     }
 }
 
@@ -166,6 +166,6 @@ pub fn check_inserted(inserted_mm: f64, device: &Device) -> Result<()> {
     if (0.0..=device.length_mm()).contains(&inserted_mm) {
         return Ok(());
     }
-    let mend = format!("the device is {} mm long here: restore a state of this scene", device.length_mm());
-    Err(Error::parameter("state.inserted_mm", inserted_mm, mend))
+    let remedy = format!("the device is {} mm long here: restore a state of this scene", device.length_mm());
+    Err(Error::parameter("state.inserted_mm", inserted_mm, remedy))
 }

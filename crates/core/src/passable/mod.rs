@@ -19,7 +19,7 @@ use crate::{Error, Result, Vec3};
 pub const NO_FORCE_N: f64 = 0.1;
 /// Clearance, as a fraction of the device's radius, below which a path is tight.
 const TIGHT: f64 = 0.1;
-/// Largest distance of the felt wall from the surface, as a fraction of the lumen's radius and in mm (as
+/// Largest distance of the contact surface from the surface, as a fraction of the lumen's radius and in mm (as
 /// [`WallProperties::deviation_mm`](crate::contact::WallProperties::deviation_mm)). A device too thick by at most
 /// this may pass.
 const WALL_OFF: f64 = 0.05;
@@ -40,7 +40,7 @@ pub enum Passage {
     /// takes without force.
     Tight,
     /// The lumen is narrower than the device by more than a twentieth of the lumen's radius or 0.1 mm, whichever is
-    /// less: the possible error of the felt wall.
+    /// less: the possible error of the contact surface.
     Blocked,
     /// The device is shorter than its path.
     Short,

@@ -56,8 +56,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             (Some(path), None) => Ok(Some(("vessel.tree", self.resolve(path)))),
             (None, Some(path)) => Ok(Some(("vessel.centreline", self.resolve(path)))),
             (Some(_), Some(path)) => {
-                let mend = "vessel.tree is given too, and is the centre line: keep one of the two";
-                Err(Error::parameter("vessel.centreline", path.display(), mend))
+                let remedy = "vessel.tree is given too, and is the centre line: keep one of the two";
+                Err(Error::parameter("vessel.centreline", path.display(), remedy))
             }
         }
     }
@@ -85,11 +85,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     fn find(&self, wall: &Wall, store: &dyn WallStore) -> Result<CentrelineTree> {
         let recipe = CentrelineRecipe { wall, from: self.begin(wall) };
         store.centreline(&recipe).map_err(|error| {
-            let mend = format!(
+            let remedy = format!(
                 "none is found in the surface ({error}): name a table of it, as `endowire vessel centreline SURFACE --from END --to END --out TABLE` \
                  writes it between openings or places inside"
             );
-            Error::parameter("vessel.centreline", "none", mend)
+            Error::parameter("vessel.centreline", "none", remedy)
         })
     }
 

@@ -46,7 +46,10 @@ fn a_file_that_was_not_given_is_named_with_its_key() {
         let mut files = files();
         files.remove(Path::new(path));
         let scene = Scene::read_of(Arc::new(InMemory(files)), Path::new("scenes/a.toml")).unwrap();
-        let told = tip_mm(&scene).unwrap_err().to_string();
-        assert!(told.contains(key) && told.contains(path) && told.contains("was not given"), "{told}");
+        let reported = tip_mm(&scene).unwrap_err().to_string();
+        assert!(
+            reported.contains(key) && reported.contains(path) && reported.contains("was not given"),
+            "{reported}"
+        );
     }
 }

@@ -31,8 +31,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             None => Sac::on_artery(wall, dome_mm, self.centreline(store)?),
         };
         sac.map(Some).map_err(|error| match error {
-            Error::Parameter { name, value, mend } if ["dome", "parent"].contains(&name.as_str()) => {
-                Error::Parameter { name: format!("vessel.sac.{name}_mm"), value, mend }
+            Error::Parameter { name, value, remedy } if ["dome", "parent"].contains(&name.as_str()) => {
+                Error::Parameter { name: format!("vessel.sac.{name}_mm"), value, remedy }
             }
             other => other,
         })
@@ -60,16 +60,16 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_measures_its_sac_once_a_place_in_it_is_told() {
+    fn a_scene_measures_its_sac_once_a_place_in_it_is_reported() {
         let sac = |text: &str| {
             let scene = scene(text);
             scene.sac(&scene.lumen(&NoStore).unwrap(), &NoStore)
         };
         assert_eq!(sac("").unwrap(), None);
-        let told =
+        let reported =
             sac(", sac = { dome_mm = [2.0, 6.0, 35.0], parent_mm = [2.0, 0.0, 36.0] }").unwrap().unwrap();
         let found = sac(", sac = { dome_mm = [2.0, 6.0, 35.0] }").unwrap().unwrap();
-        assert!((found.volume_mm3 / told.volume_mm3 - 1.0).abs() < 0.02, "{found:?} {told:?}");
+        assert!((found.volume_mm3 / reported.volume_mm3 - 1.0).abs() < 0.02, "{found:?} {reported:?}");
         let error = sac(", sac = { dome_mm = [90.0, 6.0, 35.0] }").unwrap_err().to_string();
         assert!(error.starts_with("vessel.sac.dome_mm = "), "{error}");
     }

@@ -89,12 +89,12 @@ const START_MM: f64 = 1.0;
 /// An error of a device given in a table of the scene.
 fn in_table(table: &str, error: Error) -> Error {
     match error {
-        Error::Parameter { name, value, mend } => {
+        Error::Parameter { name, value, remedy } => {
             let name = match ["device.", "magnet.", "weight."].iter().find_map(|own| name.strip_prefix(own)) {
                 Some(key) => format!("{table}.{key}"),
                 None => format!("{table}.{name}"),
             };
-            Error::Parameter { name, value, mend }
+            Error::Parameter { name, value, remedy }
         }
         other => other,
     }
@@ -112,11 +112,11 @@ pub(super) fn missing(key: &str, error: Error) -> Error {
 pub(super) fn missing_tree(path: &Path, error: Error) -> Error {
     let name = path.file_name().and_then(|name| name.to_str()).filter(|name| anatomy::NAMES.contains(name));
     match (missing("vessel.tree", error), name) {
-        (Error::Parameter { name: key, value, mend }, Some(name)) => {
-            let mend = format!(
-                "{mend}; a scene names a table: `endowire new DIR --vessel {name}` writes that of the built-in vessel"
+        (Error::Parameter { name: key, value, remedy }, Some(name)) => {
+            let remedy = format!(
+                "{remedy}; a scene names a table: `endowire new DIR --vessel {name}` writes that of the built-in vessel"
             );
-            Error::Parameter { name: key, value, mend }
+            Error::Parameter { name: key, value, remedy }
         }
         (error, _) => error,
     }
@@ -249,12 +249,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
-            let mend = "only with vessel.file: a tree is in millimetres, in the axes of the scene";
+            let remedy = "only with vessel.file: a tree is in millimetres, in the axes of the scene";
             if let Some(unit_mm) = spec.unit_mm {
-                return Err(Error::parameter("vessel.unit_mm", unit_mm, mend));
+                return Err(Error::parameter("vessel.unit_mm", unit_mm, remedy));
             }
             if let Some(axes) = spec.axes {
-                return Err(Error::parameter("vessel.axes", axes.name(), mend));
+                return Err(Error::parameter("vessel.axes", axes.name(), remedy));
             }
             self.centreline_path()?;
             let tree = CentrelineTree::read_of(&*self.files, &path).map_err(|e| missing_tree(&path, e))?;
@@ -272,8 +272,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
         let surface =
             SurfaceMesh::read_of(&*self.files, &path, spec.frame()).map_err(|error| match error {
-                Error::Parameter { name, value, mend } => {
-                    Error::Parameter { name: format!("vessel.{name}"), value, mend }
+                Error::Parameter { name, value, remedy } => {
+                    Error::Parameter { name: format!("vessel.{name}"), value, remedy }
                 }
                 other => missing("vessel.file", other),
             })?;
@@ -285,8 +285,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     fn of_tree(&self, error: Error) -> Error {
         let Some(path) = self.vessel.tree.as_ref().map(|path| self.resolve(path)) else { return error };
         match error {
-            Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
-                Error::parameter(format!("vessel.{name}"), value, format!("{}: {mend}", path.display()))
+            Error::Parameter { name, value, remedy } if name == "edge_mm" || name == "triangles" => {
+                Error::parameter(format!("vessel.{name}"), value, format!("{}: {remedy}", path.display()))
             }
             other => Error::content(&path, other.to_string()),
         }
@@ -299,9 +299,9 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     pub fn device(&self) -> Result<Device> {
         match self.stack()? {
             stack if stack.is_several() => {
-                let mend =
+                let remedy =
                     "the scene has several instruments, and one device is asked for: leave one [device]";
-                Err(Error::parameter("instrument", stack.instruments().len(), mend))
+                Err(Error::parameter("instrument", stack.instruments().len(), remedy))
             }
             stack => Ok(stack.first().clone()),
         }
@@ -310,7 +310,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// The single device, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, `may_lead` of the first, and as [`Stack::new`], [`Stack::rubbing`] and
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, `may_lead` of the first, and as [`Stack::new`], [`Stack::with_friction`] and
     /// [`Stack::sealed`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
@@ -319,8 +319,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             }
             (None, false) => {
                 if let Some(may_lead) = self.instrument.first().and_then(|first| first.may_lead) {
-                    let mend = "nothing lies in the first instrument, which it could lead: leave it out";
-                    return Err(Error::parameter("instrument[0].may_lead", may_lead, mend));
+                    let remedy = "nothing lies in the first instrument, which it could lead: leave it out";
+                    return Err(Error::parameter("instrument[0].may_lead", may_lead, remedy));
                 }
                 let each = self.instrument.iter().enumerate().map(|(index, spec)| {
                     let name = format!("instrument[{index}]");
@@ -333,15 +333,15 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 });
                 let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
                 let valves_n = self.instrument.iter().map(|spec| spec.valve_n).collect();
-                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)?.sealed(valves_n)
+                Stack::new(each.collect::<Result<_>>()?)?.with_friction(frictions)?.sealed(valves_n)
             }
             (None, true) => {
-                let mend = "give [device], or an [[instrument]] for each of several, the innermost first";
-                Err(Error::parameter("device", "{}", mend))
+                let remedy = "give [device], or an [[instrument]] for each of several, the innermost first";
+                Err(Error::parameter("device", "{}", remedy))
             }
             (Some(_), false) => {
-                let mend = "[device] is given too: keep one of the two";
-                Err(Error::parameter("instrument", self.instrument.len(), mend))
+                let remedy = "[device] is given too: keep one of the two";
+                Err(Error::parameter("instrument", self.instrument.len(), remedy))
             }
         }
     }
@@ -354,11 +354,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let mut lengths_mm = vec![0.0; stack.instruments().len()];
         for (index, (spec, device)) in self.instrument.iter().zip(stack.devices()).enumerate() {
             if !(0.0..=device.length_mm()).contains(&spec.inserted_mm) {
-                let mend = format!("must be 0 to its length, {} mm", device.length_mm());
+                let remedy = format!("must be 0 to its length, {} mm", device.length_mm());
                 return Err(Error::parameter(
                     format!("instrument[{index}].inserted_mm"),
                     spec.inserted_mm,
-                    mend,
+                    remedy,
                 ));
             }
             lengths_mm[index] = spec.inserted_mm;
@@ -409,8 +409,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         };
         let key = format!("{name}.file");
         if let Some(given) = given.or((!tables.section.is_empty()).then_some("section")) {
-            let mend = format!("{name}.{given} is given too: keep one of the two");
-            return Err(Error::parameter(key, file.display(), mend));
+            let remedy = format!("{name}.{given} is given too: keep one of the two");
+            return Err(Error::parameter(key, file.display(), remedy));
         }
         let path = self.resolve(file);
         match DeviceFile::read_of(&*self.files, &path) {
@@ -464,17 +464,17 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             // Sections in the scene may give the lumen for rendering only; a file describes a device completely.
             let solid = |device: &Device| device.sections().iter().all(|s| s.inner_radius_mm.is_none());
             if stack.devices().all(solid) {
-                let mend = "its device has no lumen: medium comes through a catheter, not along a wire";
-                return Err(Error::parameter("script.inject", "given", mend));
+                let remedy = "its device has no lumen: medium comes through a catheter, not along a wire";
+                return Err(Error::parameter("script.inject", "given", remedy));
             }
         }
         let moves = VesselMotion::new(&self.vessel.motion)?.is_some_and(|motion| motion.changes());
         if moves && !script.is_empty() && !script.is_timed() {
-            let mend = "no time goes by in the script: give its lines speeds (speed_mm_per_s, speed_deg_per_s), or wait_s";
+            let remedy = "no time goes by in the script: give its lines speeds (speed_mm_per_s, speed_deg_per_s), or wait_s";
             return Err(Error::parameter(
                 "vessel.motion",
                 format!("{} given", self.vessel.motion.len()),
-                mend,
+                remedy,
             ));
         }
         Ok(script)
@@ -489,8 +489,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let hints = |error| match &error {
             // An absurd size of the vessel is the likeliest cause of any error.
             Error::Parameter { .. } | Error::Content { .. } => {
-                let told = self.lumen(store).and_then(|lumen| self.hints(&lumen)).unwrap_or_default();
-                told.iter().fold(error, |error, hint| with_hint(error, hint))
+                let reported = self.lumen(store).and_then(|lumen| self.hints(&lumen)).unwrap_or_default();
+                reported.iter().fold(error, |error, hint| with_hint(error, hint))
             }
             _ => error,
         };
@@ -543,14 +543,14 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                     self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
                 }
                 // The position follows from an opening: what can be changed is the depth.
-                Error::Parameter { name, value, mend } if name == "sheath.position_mm" => {
+                Error::Parameter { name, value, remedy } if name == "sheath.position_mm" => {
                     match self.sheath.opening {
                         Some(_) => Error::parameter(
                             "sheath.depth_mm",
                             self.sheath.depth_mm.unwrap_or(DEPTH_MM),
-                            format!("the mouth at {value} {mend}"),
+                            format!("the mouth at {value} {remedy}"),
                         ),
-                        None => Error::Parameter { name, value, mend },
+                        None => Error::Parameter { name, value, remedy },
                     }
                 }
                 other => other,
@@ -561,8 +561,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 /// An error about input with a hint appended to its correction.
 fn with_hint(error: Error, hint: &str) -> Error {
     match error {
-        Error::Parameter { name, value, mend } => {
-            Error::Parameter { name, value, mend: format!("{mend}; {hint}") }
+        Error::Parameter { name, value, remedy } => {
+            Error::Parameter { name, value, remedy: format!("{remedy}; {hint}") }
         }
         Error::Content { path, reason } => Error::Content { path, reason: format!("{reason}; {hint}") },
         other => other,

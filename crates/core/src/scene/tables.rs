@@ -200,7 +200,7 @@ impl SheathSpec {
                 "give either opening (with depth_mm if wanted) or position_mm and direction",
             )),
         }?;
-        let sheath = sheath.rubbing(self.friction_n, self.friction)?;
+        let sheath = sheath.with_friction(self.friction_n, self.friction)?;
         self.bends_towards.map_or(Ok(sheath), |towards| sheath.bending_towards(Vec3::from(towards)))
     }
 }

@@ -115,7 +115,7 @@ fn a_force_that_is_not_a_number_is_named() {
 }
 
 #[test]
-fn an_element_that_would_fold_is_told_and_shorter_ones_bend() {
+fn an_element_that_would_fold_is_reported_and_shorter_ones_bend() {
     let back = || Tip(Vec3::new(-40.0, 1.0, 0.0));
     let is_folded = |state: &RodState| state.is_folded(&vec![ElementData::plain(1.0, 1.0); state.elements()]);
     let (state, r) = cantilever(1, &mut back());

@@ -273,8 +273,8 @@ impl Between<'_> {
             let mut frames = Vec::with_capacity(elements.len() + 1);
             for i in 0..=elements.len() {
                 let x = s / self.length();
-                let aside = amplitude * if doubly { twice(x) } else { once(x) };
-                frames.push(frame.transported(turn.0 * x + aside * cos, turn.1 * x + aside * sin));
+                let lateral = amplitude * if doubly { twice(x) } else { once(x) };
+                frames.push(frame.transported(turn.0 * x + lateral * cos, turn.1 * x + lateral * sin));
                 s += elements.get(i).map_or(0.0, |e| e.length);
             }
             RodState::from_frames(elements, self.start, frames)

@@ -8,7 +8,7 @@ use super::loads::Loads;
 use super::mesh::{self, ASSUMED_GJ_RATIO};
 use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
 use super::stack::Stack;
-use crate::contact::{SelfContact, Skin, Touching};
+use crate::contact::{Capsule, SelfContact, Touching};
 use crate::field::{Field, FieldLoad};
 use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
@@ -303,7 +303,7 @@ impl StaticProblem {
     fn instruments(&self, solved: &Solved) -> Vec<InstrumentSolution> {
         let Some(stack) = &self.stack else { return Vec::new() };
         let each = stack.instruments().zip(&solved.instruments).enumerate();
-        let told = each.map(|(index, ((instrument, set), (push_force, torque)))| {
+        let reported = each.map(|(index, ((instrument, set), (push_force, torque)))| {
             let tip = stack.tip_node(index);
             InstrumentSolution {
                 name: instrument.name.clone(),
@@ -314,7 +314,7 @@ impl StaticProblem {
                 torque: *torque,
             }
         });
-        told.collect()
+        reported.collect()
     }
 
     /// The solution of a solved state.
@@ -381,11 +381,11 @@ fn outside<'a>(
 /// Contact between loops of the rod of a case, if modelled.
 fn self_contact(case: &StaticCase, elements: &[ElementData]) -> Option<SelfContact> {
     let surface = case.self_contact.as_ref()?;
-    let skin = |element: &ElementData| {
-        let rigid = Skin::rigid(surface.radius, element.bending[1]);
-        Skin { modulus_n_per_mm2: surface.modulus.unwrap_or(rigid.modulus_n_per_mm2), ..rigid }
+    let capsule = |element: &ElementData| {
+        let rigid = Capsule::rigid(surface.radius, element.bending[1]);
+        Capsule { modulus_n_per_mm2: surface.modulus.unwrap_or(rigid.modulus_n_per_mm2), ..rigid }
     };
-    let touching = SelfContact::new(elements, elements.iter().map(skin).collect());
+    let touching = SelfContact::new(elements, elements.iter().map(capsule).collect());
     let closed = case.end.position == Some(case.start.position);
     Some(if closed { touching.closed() } else { touching })
 }

@@ -196,7 +196,7 @@ fn parts_that_turn_alike_are_the_whole() {
 }
 
 #[test]
-fn what_is_no_case_of_several_instruments_is_told_by_key_and_mend() {
+fn what_is_no_case_of_several_instruments_is_reported_by_key_and_remedy() {
     type Spoil = fn(&mut StaticCase);
     let cases: [(Spoil, &str); 11] = [
         (|c| c.rod.length = 1.0, "rod.length = given: instruments have lengths"),

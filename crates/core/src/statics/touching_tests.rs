@@ -20,8 +20,8 @@ fn surfaces_and_curves_that_cannot_be_are_refused_by_key() {
         ("[initial]\npoints = [[0.0, 0.0, 0.0]]", "initial.points"),
         ("[initial]\npoints = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]", "initial.points"),
     ] {
-        let told = case(rest).unwrap_err().to_string();
-        assert!(told.contains(key), "{told}");
+        let reported = case(rest).unwrap_err().to_string();
+        assert!(reported.contains(key), "{reported}");
     }
     assert!(case("[self_contact]\nradius = 0.01").is_ok());
 }
@@ -90,8 +90,8 @@ fn a_loop_that_must_cross_itself_begins_beside_itself() {
 }
 
 #[test]
-fn what_does_not_converge_is_told_what_sets_the_start() {
+fn what_does_not_converge_is_reported_what_sets_the_start() {
     let found =
         StaticSolution { converged: false, ..between_clamps([90.0, 0.0, 0.0], [1.0, 0.0, 0.0], 8, None) };
-    assert!(found.failure().is_some_and(|told| told.contains("[initial] points")));
+    assert!(found.failure().is_some_and(|reported| reported.contains("[initial] points")));
 }

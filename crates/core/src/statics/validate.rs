@@ -78,8 +78,8 @@ fn check_points(initial: &Initial) -> Result<()> {
         return Err(Error::parameter("initial.points", 1, "a curve has two points at least"));
     }
     if let Some(twice) = points.windows(2).find(|pair| pair[0] == pair[1]) {
-        let mend = "comes twice in a row; leave one out";
-        return Err(Error::parameter("initial.points", format!("{:?}", twice[0]), mend));
+        let remedy = "comes twice in a row; leave one out";
+        return Err(Error::parameter("initial.points", format!("{:?}", twice[0]), remedy));
     }
     Ok(())
 }
@@ -94,8 +94,8 @@ fn check_sections(list: &str, sections: &[Section]) -> Result<()> {
         let name = |key| Key { list, index: k, key };
         positive(name("until"), section.until)?;
         if section.until <= begin {
-            let mend = format!("sections come in order: more than {begin}");
-            return Err(Error::parameter(name("until"), section.until, mend));
+            let remedy = format!("sections come in order: more than {begin}");
+            return Err(Error::parameter(name("until"), section.until, remedy));
         }
         begin = section.until;
         let Section { ei, ei_end, gj, gj_end, ea, ea_end, .. } = section;
@@ -204,11 +204,11 @@ impl StaticCase {
         }
         let work = self.solver.load_steps.saturating_mul(self.rod.elements);
         if work > MAX_WORK {
-            let mend = format!(
+            let remedy = format!(
                 "with {} elements that is {work} elements to solve for, and at most {MAX_WORK} are begun: use fewer steps or elements",
                 self.rod.elements
             );
-            return Err(Error::parameter("solver.load_steps", self.solver.load_steps, mend));
+            return Err(Error::parameter("solver.load_steps", self.solver.load_steps, remedy));
         }
         let tolerance = self.solver.tolerance;
         if !TOLERANCES.contains(&tolerance) {
@@ -227,21 +227,21 @@ impl StaticCase {
         positive("self_contact.radius", surface.radius)?;
         let most = self.rod.line_length() / LEAST_SLENDERNESS;
         if surface.radius > most {
-            let mend = format!("must be less than {most}: a rod is many times as long as it is thick");
-            return Err(Error::parameter("self_contact.radius", surface.radius, mend));
+            let remedy = format!("must be less than {most}: a rod is many times as long as it is thick");
+            return Err(Error::parameter("self_contact.radius", surface.radius, remedy));
         }
         let sites = self.rod.line_length() / surface.radius;
         if sites > MAX_SITES {
-            let mend =
+            let remedy =
                 format!("makes {sites:.0e} places that may touch, and at most {MAX_SITES:.0e} are looked at");
-            return Err(Error::parameter("self_contact.radius", surface.radius, mend));
+            return Err(Error::parameter("self_contact.radius", surface.radius, remedy));
         }
         if let Some(modulus) = surface.modulus {
             positive("self_contact.modulus", modulus)?;
         }
         if !self.rod.instrument.is_empty() {
-            let mend = "it is for a single rod: leave it out, or give rod.section";
-            return Err(Error::parameter("self_contact", "given with instruments", mend));
+            let remedy = "it is for a single rod: leave it out, or give rod.section";
+            return Err(Error::parameter("self_contact", "given with instruments", remedy));
         }
         Ok(())
     }
@@ -273,19 +273,19 @@ impl StaticCase {
 
     /// Checks several coaxial instruments.
     fn check_instruments(&self) -> Result<()> {
-        let given = |key: &str, mend: &str| Err(Error::parameter(key, "given", mend));
+        let given = |key: &str, remedy: &str| Err(Error::parameter(key, "given", remedy));
         if self.rod.length != 0.0 || !self.rod.section.is_empty() {
             let key = if self.rod.length != 0.0 { "rod.length" } else { "rod.section" };
             return given(key, "instruments have lengths and sections of their own; leave it out");
         }
         if self.start.kind != StartKind::Clamped {
-            let mend = "instruments come out of a sheath that holds them; use clamped";
-            return Err(Error::parameter("start.type", "pinned", mend));
+            let remedy = "instruments come out of a sheath that holds them; use clamped";
+            return Err(Error::parameter("start.type", "pinned", remedy));
         }
         if !matches!(self.end.kind, EndKind::Free | EndKind::Pinned) {
             let kind = format!("{:?}", self.end.kind).to_lowercase();
-            let mend = "several instruments end where they end; use free or pinned";
-            return Err(Error::parameter("end.type", kind, mend));
+            let remedy = "several instruments end where they end; use free or pinned";
+            return Err(Error::parameter("end.type", kind, remedy));
         }
         if self.initial.is_some() {
             return given(
@@ -296,8 +296,8 @@ impl StaticCase {
         for (index, load) in self.load.iter().enumerate() {
             if !matches!(load.kind, LoadKind::Force | LoadKind::Distributed) {
                 let kind = format!("{:?}", load.kind).to_lowercase();
-                let mend = "of several instruments none is said to carry it; use force or distributed";
-                return Err(Error::parameter(Key { list: "load", index, key: "kind" }, kind, mend));
+                let remedy = "of several instruments none is said to carry it; use force or distributed";
+                return Err(Error::parameter(Key { list: "load", index, key: "kind" }, kind, remedy));
             }
         }
         for (index, instrument) in self.rod.instrument.iter().enumerate() {
@@ -308,9 +308,9 @@ impl StaticCase {
             check_sections(&list, &instrument.section)?;
             let length = instrument.section[instrument.section.len() - 1].until;
             if length < instrument.inserted {
-                let mend =
+                let remedy =
                     format!("the instrument is {length} long, as its last section says: insert no more");
-                return Err(Error::parameter(name("inserted"), instrument.inserted, mend));
+                return Err(Error::parameter(name("inserted"), instrument.inserted, remedy));
             }
             for (k, section) in instrument.section.iter().enumerate() {
                 let key = |key| Key { list: &list, index: k, key };
@@ -322,8 +322,8 @@ impl StaticCase {
                     ));
                 }
                 if instrument.is_shaped() && section.gj.is_none() {
-                    let mend = "an instrument with rest curvature or twist is twisted by the others: give the torsion stiffness";
-                    return Err(Error::parameter(key("GJ"), "missing", mend));
+                    let remedy = "an instrument with rest curvature or twist is twisted by the others: give the torsion stiffness";
+                    return Err(Error::parameter(key("GJ"), "missing", remedy));
                 }
             }
         }
@@ -332,11 +332,11 @@ impl StaticCase {
 
     fn check_end(&self) -> Result<()> {
         let end = &self.end;
-        let wrong = |key: &str, mend: &str| {
+        let wrong = |key: &str, remedy: &str| {
             Err(Error::parameter(
                 format!("end.{key}"),
                 format!("given with type {:?}", end.kind).to_lowercase(),
-                mend,
+                remedy,
             ))
         };
         if end.kind == EndKind::Free || end.kind == EndKind::Guided {
@@ -430,7 +430,7 @@ mod tests {
 
     #[test]
     fn work_that_never_ends_is_refused_by_key_and_number() {
-        let told = |elements: usize, solver: &str| {
+        let reported = |elements: usize, solver: &str| {
             let text = format!(
                 "[rod]\nlength = 1.0\nelements = {elements}\n[[rod.section]]\nuntil = 1.0\nEI = 1.0\n[start]\ntype = \"clamped\"\n\
                  [solver]\n{solver}\n"
@@ -439,7 +439,7 @@ mod tests {
                 .err()
                 .map_or_else(String::new, |e| e.to_string())
         };
-        assert_eq!(told(100, "load_steps = 10\nmax_iterations = 50"), "");
+        assert_eq!(reported(100, "load_steps = 10\nmax_iterations = 50"), "");
         for (elements, solver, words) in [
             (1_000_000, "", "rod.elements = 1000000: must be 1 to 200000"),
             (
@@ -451,7 +451,7 @@ mod tests {
             (10, "max_iterations = 0", "solver.max_iterations = 0: must be 1 to 100000"),
             (10, "max_iterations = 100001", "solver.max_iterations = 100001: must be 1 to 100000"),
         ] {
-            let error = told(elements, solver);
+            let error = reported(elements, solver);
             assert!(error.contains(words), "{words}: {error}");
         }
     }

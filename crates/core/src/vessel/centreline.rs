@@ -63,8 +63,8 @@ impl CentrelineTree {
     /// row, a point coincides with its parent or is farther than 2 m or 250 radii from it, or there is not exactly one root with at least one child.
     pub fn new(nodes: Vec<CentrelineNode>) -> Result<Self> {
         for row in 0..nodes.len() {
-            check_row(&nodes, row).map_err(|(column, value, mend)| {
-                Error::parameter(format!("centreline row {row}, {column}"), value, mend)
+            check_row(&nodes, row).map_err(|(column, value, remedy)| {
+                Error::parameter(format!("centreline row {row}, {column}"), value, remedy)
             })?;
         }
         if nodes.len() < 2 {
@@ -81,11 +81,11 @@ impl CentrelineTree {
     pub fn with_targets(mut self, targets: Vec<Target>) -> Result<Self> {
         for (index, target) in targets.iter().enumerate() {
             if target.row >= self.nodes.len() {
-                let mend = format!("the tree has {} rows, counted from 0", self.nodes.len());
-                return Err(Error::parameter(format!("target {:?}, row", target.name), target.row, mend));
+                let remedy = format!("the tree has {} rows, counted from 0", self.nodes.len());
+                return Err(Error::parameter(format!("target {:?}, row", target.name), target.row, remedy));
             }
             check_name(&target.name, &targets[..index])
-                .map_err(|mend| Error::parameter("target", format!("{:?}", target.name), mend))?;
+                .map_err(|remedy| Error::parameter("target", format!("{:?}", target.name), remedy))?;
         }
         self.targets = targets;
         Ok(self)
@@ -103,8 +103,8 @@ impl CentrelineTree {
         if let Some(row) =
             rows.iter().find(|row| **row == 0 || !children.get(**row).is_some_and(Vec::is_empty))
         {
-            let mend = "must be the last point of a branch: elsewhere the vessel goes on";
-            return Err(Error::parameter("closed end, row", row, mend));
+            let remedy = "must be the last point of a branch: elsewhere the vessel goes on";
+            return Err(Error::parameter("closed end, row", row, remedy));
         }
         self.closed = rows;
         Ok(self)
@@ -142,19 +142,19 @@ impl CentrelineTree {
             // One number is as near as another: a computed centre line has all openings but those.
             let known: Vec<&str> = self.targets.iter().map(|target| target.name.as_str()).collect();
             if is_opening(name) && known.iter().any(|name| is_opening(name)) {
-                let mend = format!(
+                let remedy = format!(
                     "the centre line begins at this opening, or does not lead to it; its targets are {}",
                     known.join(", ")
                 );
-                return Error::parameter("target", format!("{name:?}"), mend);
+                return Error::parameter("target", format!("{name:?}"), remedy);
             }
-            let mend = match nearest_name(self.targets.iter().map(|target| target.name.as_str()), name) {
+            let remedy = match nearest_name(self.targets.iter().map(|target| target.name.as_str()), name) {
                 Some(nearest) => format!("did you mean {nearest:?}?"),
                 None => {
                     "the vessel names no targets: write them behind the rows of its centre-line table".into()
                 }
             };
-            Error::parameter("target", format!("{name:?}"), mend)
+            Error::parameter("target", format!("{name:?}"), remedy)
         })
     }
 
@@ -260,13 +260,17 @@ impl CentrelineTree {
                 columns = None;
             }
             if let Some(columns) = columns {
-                let told = |reason| format!("line {}: {reason}", index + 1);
+                let reported = |reason| format!("line {}: {reason}", index + 1);
                 if words.len() != columns.count {
-                    return Err(told(format!("{} values; the header has {}", words.len(), columns.count)));
+                    return Err(reported(format!(
+                        "{} values; the header has {}",
+                        words.len(),
+                        columns.count
+                    )));
                 }
-                let node = columns.point(&words).map_err(told)?;
+                let node = columns.point(&words).map_err(reported)?;
                 check_numbers(&node)
-                    .map_err(|(column, value, mend)| told(format!("{column} = {value}: {mend}")))?;
+                    .map_err(|(column, value, remedy)| reported(format!("{column} = {value}: {remedy}")))?;
                 nodes.push(node);
                 continue;
             }
@@ -278,11 +282,12 @@ impl CentrelineTree {
             if !name.is_empty() {
                 let name = name.join(" ");
                 check_name(&name, &targets)
-                    .map_err(|mend| format!("line {}: target = {name:?}: {mend}", index + 1))?;
+                    .map_err(|remedy| format!("line {}: target = {name:?}: {remedy}", index + 1))?;
                 targets.push(Target { name, row: nodes.len() - 1 });
             }
-            check_row(&nodes, nodes.len() - 1)
-                .map_err(|(column, value, mend)| format!("line {}: {column} = {value}: {mend}", index + 1))?;
+            check_row(&nodes, nodes.len() - 1).map_err(|(column, value, remedy)| {
+                format!("line {}: {column} = {value}: {remedy}", index + 1)
+            })?;
         }
         if columns.is_some() {
             nodes = point_lists::tree(&nodes)?;
@@ -448,8 +453,8 @@ fn check_numbers(node: &CentrelineNode) -> std::result::Result<(), (&'static str
         }
     }
     if !(LEAST_RADIUS_MM..=LARGEST_MM).contains(&node.radius_mm) {
-        let mend = format!("must be {LEAST_RADIUS_MM} to {LARGEST_MM} mm");
-        return Err(("radius", crate::error::number(node.radius_mm), mend));
+        let remedy = format!("must be {LEAST_RADIUS_MM} to {LARGEST_MM} mm");
+        return Err(("radius", crate::error::number(node.radius_mm), remedy));
     }
     Ok(())
 }
@@ -545,9 +550,9 @@ mod tests {
     #[test]
     fn the_opening_where_a_computed_line_begins_is_no_target() {
         let table = "0,0,0,2,-1\n0,0,5,1.5,0,opening 0\n0 3 9 1 0 opening 2\n";
-        let told = CentrelineTree::parse(table).unwrap().target("opening 1").unwrap_err().to_string();
+        let reported = CentrelineTree::parse(table).unwrap().target("opening 1").unwrap_err().to_string();
         let expected = "the centre line begins at this opening, or does not lead to it; its targets are opening 0, opening 2";
-        assert!(told.ends_with(expected), "{told}");
+        assert!(reported.ends_with(expected), "{reported}");
     }
 
     #[test]
@@ -556,10 +561,13 @@ mod tests {
         let tree = CentrelineTree::parse(table).unwrap();
         assert_eq!(tree.target("tip of the vessel").unwrap().row, 2);
         assert_eq!(CentrelineTree::parse(&tree.table("")).unwrap(), tree);
-        let told = |tree: &CentrelineTree, name: &str| tree.target(name).unwrap_err().to_string();
-        assert_eq!(told(&tree, "left carotd"), "target = \"left carotd\": did you mean \"left carotid\"?");
+        let reported = |tree: &CentrelineTree, name: &str| tree.target(name).unwrap_err().to_string();
+        assert_eq!(
+            reported(&tree, "left carotd"),
+            "target = \"left carotd\": did you mean \"left carotid\"?"
+        );
         let nameless = CentrelineTree::new(tree.nodes().to_vec()).unwrap();
-        assert!(told(&nameless, "a").contains("names no targets"));
+        assert!(reported(&nameless, "a").contains("names no targets"));
         // Names are not part of a wall's recipe.
         let json = |tree: &CentrelineTree| serde_json::to_string(tree).unwrap();
         assert_eq!(json(&nameless), json(&tree));

@@ -115,13 +115,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_opening_with_the_vessel_right_in_front_is_told() {
+    fn an_opening_with_the_vessel_right_in_front_is_reported() {
         let x = crate::Vec3::x();
         let opening = |beyond_mm: f64| Opening { index: 3, beyond_mm, ..Opening::at_end(x, 3.0, x) };
-        let told: Vec<String> = tight_hints(&[opening(0.2), opening(1.0)]).collect();
+        let reported: Vec<String> = tight_hints(&[opening(0.2), opening(1.0)]).collect();
         assert!(
-            told.len() == 1 && told[0].contains("in front of opening 3, at [1.00, 0.00, 0.00]"),
-            "{told:?}"
+            reported.len() == 1 && reported[0].contains("in front of opening 3, at [1.00, 0.00, 0.00]"),
+            "{reported:?}"
         );
     }
 

@@ -46,9 +46,9 @@ impl<'a> Ends<'a> {
             let corners = self.mesh.corners(t);
             let middle = corners.iter().sum::<Vec3>() / 3.0;
             let size_mm = corners.iter().map(|x| (x - middle).norm()).fold(0.0, f64::max);
-            let (along, aside) = opening.beyond_and_aside_mm(&middle);
+            let (along, lateral) = opening.beyond_and_off_axis_mm(&middle);
             let within = -reach_mm - size_mm..=opening.beyond_mm + 2.0 * reach_mm + size_mm;
-            if aside > reach_mm + size_mm || !within.contains(&along) {
+            if lateral > reach_mm + size_mm || !within.contains(&along) {
                 continue;
             }
             let is_own = self.own[number].contains(&(t as u32));

@@ -77,7 +77,7 @@ impl Opening {
     }
 
     /// Distance of `x` beyond the opening's plane, and from its axis, mm.
-    pub fn beyond_and_aside_mm(&self, x: &Vec3) -> (f64, f64) {
+    pub fn beyond_and_off_axis_mm(&self, x: &Vec3) -> (f64, f64) {
         let offset = x - self.centre_mm;
         let beyond_mm = offset.dot(&self.direction);
         (beyond_mm, (offset - self.direction * beyond_mm).norm())
@@ -85,7 +85,7 @@ impl Opening {
 
     /// How far its rim, which may be oblique, reaches beyond its plane, mm.
     pub(super) fn rim_mm(&self, mesh: &SurfaceMesh) -> f64 {
-        let at = |v: &u32| self.beyond_and_aside_mm(&mesh.vertices_mm[*v as usize]).0;
+        let at = |v: &u32| self.beyond_and_off_axis_mm(&mesh.vertices_mm[*v as usize]).0;
         self.boundary.iter().map(at).fold(0.0, f64::max)
     }
 
@@ -95,8 +95,8 @@ impl Opening {
         let u = any_perpendicular(&other.direction);
         let v = other.direction.cross(&u);
         let is_inside = |x: &Vec3| {
-            let (along, aside) = self.beyond_and_aside_mm(x);
-            along > 0.0 && along < length_mm && aside < self.radius_mm
+            let (along, lateral) = self.beyond_and_off_axis_mm(x);
+            along > 0.0 && along < length_mm && lateral < self.radius_mm
         };
         let place = |n: usize| {
             let (disc, circle, k) = (n / (CIRCLES * AROUND), n / AROUND % CIRCLES, n % AROUND);
@@ -154,13 +154,13 @@ pub(super) fn keep_apart(
         let rim_mm = rims_mm[number];
         let free = FREE_RADII * opening.radius_mm;
         wall(number, opening, &mut |x, is_of_end| {
-            let (along, aside) = opening.beyond_and_aside_mm(&x);
-            if aside >= free {
+            let (along, lateral) = opening.beyond_and_off_axis_mm(&x);
+            if lateral >= free {
                 return;
             }
             let before = along - rim_mm;
             let is_behind = before <= if is_of_end { 0.0 } else { -FLAT * opening.radius_mm };
-            let from_rim = libm::hypot(aside - opening.radius_mm, before);
+            let from_rim = libm::hypot(lateral - opening.radius_mm, before);
             let is_own = is_behind || (is_of_end && from_rim <= OWN_RIM * opening.radius_mm);
             // Rims may be oblique.
             if along > free || !is_own {

@@ -128,11 +128,11 @@ mod tests {
 
     #[test]
     fn what_is_no_tree_of_lines_is_refused_with_its_line() {
-        let told = |text: &str| read(text).unwrap_err().to_string();
-        assert!(told("x y z radius\n0 0 0 1\n0 0 0.5 one\n").contains("line 3: radius = \"one\""));
-        assert!(told("x y z radius\n0 0 0 1\n0 0 0.5\n").contains("line 3: 3 values; the header has 4"));
-        assert!(told("x y z radius\n0 0 0 1\n0 0 nan 1\n").contains("line 3: z = NaN"));
-        let apart = told("x y z radius\n0 0 0 1\n0 0 0.5 1\n9 0 0 1\n9 0 0.5 1\n");
+        let reported = |text: &str| read(text).unwrap_err().to_string();
+        assert!(reported("x y z radius\n0 0 0 1\n0 0 0.5 one\n").contains("line 3: radius = \"one\""));
+        assert!(reported("x y z radius\n0 0 0 1\n0 0 0.5\n").contains("line 3: 3 values; the header has 4"));
+        assert!(reported("x y z radius\n0 0 0 1\n0 0 nan 1\n").contains("line 3: z = NaN"));
+        let apart = reported("x y z radius\n0 0 0 1\n0 0 0.5 1\n9 0 0 1\n9 0 0.5 1\n");
         assert!(apart.contains("line 2 of the list"), "{apart}");
     }
 

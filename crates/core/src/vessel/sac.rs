@@ -78,8 +78,8 @@ impl Sac {
         let query = WallQuery::new(wall)?;
         let ball = middle(&query, dome_mm)?;
         if !query.nearest(&parent_mm, f64::MAX).is_some_and(|near| near.rim || near.distance_mm > 0.0) {
-            let mend = "must be a place within the artery, in mm";
-            return Err(Error::parameter("parent", crate::error::vector(&parent_mm), mend));
+            let remedy = "must be a place within the artery, in mm";
+            return Err(Error::parameter("parent", crate::error::vector(&parent_mm), remedy));
         }
         Self::beyond_neck((wall, &query), ball, (dome_mm, parent_mm))
     }
@@ -95,8 +95,8 @@ impl Sac {
         let away_mm = |node: &&CentrelineNode| (node.position_mm - ball.0).norm();
         let outside = line.nodes().iter().filter(|node| away_mm(node) > ball.1 + node.radius_mm);
         let Some(nearest) = outside.min_by(|a, b| away_mm(a).total_cmp(&away_mm(b))) else {
-            let mend = "the centre line does not leave the sac: give a place in the artery";
-            return Err(Error::parameter("parent", "absent", mend));
+            let remedy = "the centre line does not leave the sac: give a place in the artery";
+            return Err(Error::parameter("parent", "absent", remedy));
         };
         Self::beyond_neck((wall, &query), ball, (dome_mm, nearest.position_mm))
     }
@@ -108,16 +108,17 @@ impl Sac {
         (dome_mm, parent_mm): (Vec3, Vec3),
     ) -> Result<Self> {
         if (parent_mm - middle_mm).norm() <= radius_mm {
-            let mend = "the artery begins within the sac: give a place in the artery, or another in the sac";
-            return Err(Error::parameter("parent", crate::error::vector(&parent_mm), mend));
+            let remedy =
+                "the artery begins within the sac: give a place in the artery, or another in the sac";
+            return Err(Error::parameter("parent", crate::error::vector(&parent_mm), remedy));
         }
         let slope = Slope::new((wall, query), (middle_mm, radius_mm), parent_mm);
         let neck =
             least(&slope).and_then(|(normal, level_mm)| Some((normal, slope.beyond(&normal, level_mm)?)));
         let Some((normal, beyond)) = neck else {
-            let mend =
+            let remedy =
                 "no plane between it and the artery cuts off a sac: it has no neck, or an opening of its own";
-            return Err(Error::parameter("dome", crate::error::vector(&dome_mm), mend));
+            return Err(Error::parameter("dome", crate::error::vector(&dome_mm), remedy));
         };
         let neck_diameter_mm = (4.0 * beyond.area_mm2 / std::f64::consts::PI).sqrt();
         Ok(Self {
@@ -139,8 +140,8 @@ fn middle(query: &WallQuery, dome_mm: Vec3) -> Result<(Vec3, f64)> {
     let clearance =
         |at: &Vec3| query.nearest(at, reach_mm).filter(|near| near.distance_mm > 0.0 && !near.rim);
     let Some(mut near) = clearance(&dome_mm) else {
-        let mend = "must be a place within the sac, in mm";
-        return Err(Error::parameter("dome", crate::error::vector(&dome_mm), mend));
+        let remedy = "must be a place within the sac, in mm";
+        return Err(Error::parameter("dome", crate::error::vector(&dome_mm), remedy));
     };
     // Where two walls are equally near, the ascent is between their normals: all directions are tried.
     let (mut at, mut step) = (dome_mm, CLIMB.1);

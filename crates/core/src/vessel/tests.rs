@@ -122,7 +122,7 @@ fn a_surface_that_is_inside_out_is_turned() {
 }
 
 #[test]
-fn a_speck_beside_the_vessel_is_dropped_and_told() {
+fn a_speck_beside_the_vessel_is_dropped_and_reported() {
     let mut mesh = tube().mesh().clone();
     let first = mesh.vertices_mm.len() as u32;
     let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
@@ -374,14 +374,19 @@ fn vertices_apart_by_more_than_any_crack_tear_the_surface() {
 }
 
 #[test]
-fn a_surface_whose_triangles_share_no_vertices_is_checked_in_a_moment_and_told() {
+fn a_surface_whose_triangles_share_no_vertices_is_checked_in_a_moment_and_reported() {
     // Farther apart than vertices that are merged, and nearer than cracks that are joined.
     let mut cracked = soup(tube().mesh());
     jitter(&mut cracked, 1e-3);
     let clock = std::time::Instant::now();
-    let told = check(&cracked).unwrap();
-    assert_eq!((told.openings.len(), told.repair.components), (2, 1), "{:?}", told.repair);
-    assert!(told.components > 1000 && told.open_edges > 3000, "{} {}", told.components, told.open_edges);
+    let reported = check(&cracked).unwrap();
+    assert_eq!((reported.openings.len(), reported.repair.components), (2, 1), "{:?}", reported.repair);
+    assert!(
+        reported.components > 1000 && reported.open_edges > 3000,
+        "{} {}",
+        reported.components,
+        reported.open_edges
+    );
     // And farther apart than those.
     let mut torn = soup(tube().mesh());
     jitter(&mut torn, 0.8);
@@ -400,13 +405,16 @@ fn more_openings_than_a_vessel_can_have_are_refused_with_what_to_do() {
             .collect(),
         triangles: (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
     };
-    let told = check(&apart(10_001)).unwrap_err().to_string();
-    assert!(told.contains("10001 openings in 10001 pieces") && told.contains("merge those"), "{told}");
+    let reported = check(&apart(10_001)).unwrap_err().to_string();
+    assert!(
+        reported.contains("10001 openings in 10001 pieces") && reported.contains("merge those"),
+        "{reported}"
+    );
     assert!(Wall::from_surface(&apart(10_001)).is_err());
 }
 
 #[test]
-fn a_closed_piece_inside_another_is_told() {
+fn a_closed_piece_inside_another_is_reported() {
     // Tetrahedra: too few triangles and too unlike for a wall of two skins.
     let corners = [[1., 1., 1.], [-1., -1., 1.], [-1., 1., -1.], [1., -1., -1.]].map(Vec3::from);
     let triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];

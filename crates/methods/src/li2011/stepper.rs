@@ -184,9 +184,9 @@ impl Method for Li2011 {
             || shape.tangents.first() != Some(&surroundings.sheath.direction);
         let planes = [0, nodes - 1].contains(&state.touched.len());
         if shape.from_tip_mm != *from_tip_mm || shape.tangents.len() != nodes || !planes || moved {
-            let mend =
+            let remedy =
                 format!("{nodes} nodes are in this vessel from this sheath: restore a state of this scene");
-            return Err(Error::parameter("state.nodes", shape.len(), mend));
+            return Err(Error::parameter("state.nodes", shape.len(), remedy));
         }
         self.state.clone_from(state);
         Ok(())

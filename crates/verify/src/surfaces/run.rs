@@ -85,17 +85,17 @@ pub struct CellRow {
     /// Sub-steps with relaxation as last resort.
     pub relaxations: u64,
     /// Steps after which the device's axis passed through a given triangle: where it has sunk into a soft wall by
-    /// more than its radius, or where the felt wall is behind the given one.
+    /// more than its radius, or where the contact surface is behind the given one.
     pub crossings: usize,
     /// Inserted length at the first of them, mm.
     pub first_crossing_mm: Option<f64>,
     /// Largest amount by which the reported penetration there was too small, mm.
     pub missing_mm: f64,
-    /// The same behind the triangles of the felt wall, mm.
+    /// The same behind the triangles of the contact surface, mm.
     pub missing_felt_mm: f64,
     /// Steps after which a device was behind the given triangles by more than reported plus their stated deviation,
-    /// or behind those of the felt wall by more than reported.
-    pub untold: usize,
+    /// or behind those of the contact surface by more than reported.
+    pub unreported: usize,
     /// Largest push force, N.
     pub most_push_force_n: f64,
     /// Time of the slowest command, including a failed one, ms.
@@ -177,7 +177,7 @@ impl CellRow {
             first_crossing_mm: None,
             missing_mm: 0.0,
             missing_felt_mm: 0.0,
-            untold: 0,
+            unreported: 0,
             most_push_force_n: 0.0,
             slowest_ms: 0.0,
             median_ms: 0.0,
@@ -207,7 +207,7 @@ impl CellRow {
         self.most_push_force_n = self.most_push_force_n.max(report.push_force_n);
     }
 
-    /// Whether the device passes through given triangles or those of the felt wall, and whether its reported
+    /// Whether the device passes through given triangles or those of the contact surface, and whether its reported
     /// penetration there is correct.
     fn check(&mut self, surface: &Surface, simulation: &Simulation) {
         let given = surface.given.missing_mm(&surface.wall, simulation);
@@ -220,12 +220,12 @@ impl CellRow {
         self.missing_mm = self.missing_mm.max(given_mm);
         self.missing_felt_mm = self.missing_felt_mm.max(felt_mm);
         let place = &surface.places[self.cell.wire];
-        self.untold +=
+        self.unreported +=
             usize::from(given_mm > place.stated_mm + MISSED_MM || felt_mm > place.smooth_mm + MISSED_MM);
     }
 }
 
-/// Runs a cell, with the felt wall for its wire from `store`. `clock` returns seconds since any fixed time; a cell
+/// Runs a cell, with the contact surface for its wire from `store`. `clock` returns seconds since any fixed time; a cell
 /// that takes more than `limit_s` fails.
 pub fn run(
     surface: &Surface,
@@ -347,7 +347,7 @@ mod tests {
         let whole = tube(start, false);
         let free = run(&whole, &cell, &NoStore, 1e9, &|| 0.0);
         assert_eq!((free.ending, free.crossings, free.missing_mm), (Ending::Arrived, 0, 0.0));
-        assert_eq!((free.missing_felt_mm, free.untold), (0.0, 0));
+        assert_eq!((free.missing_felt_mm, free.unreported), (0.0, 0));
         // A closed tube of 30 mm; the wire gets to 41 mm minus the length its tip bends back.
         let mut closed = whole.wall.closed_mesh();
         closed.vertices_mm.iter_mut().for_each(|v| v.z *= 0.3);
@@ -361,7 +361,7 @@ mod tests {
             simulation.step(Command::advance(advance_mm)).unwrap();
             let mut row = CellRow::new(&checked, &cell);
             row.check(&checked, &simulation);
-            assert_eq!((row.crossings, row.untold), (crossings, crossings));
+            assert_eq!((row.crossings, row.unreported), (crossings, crossings));
             assert_eq!((8.0..11.5).contains(&row.missing_mm), crossings > 0, "{}", row.missing_mm);
         }
     }

@@ -37,10 +37,10 @@ pub struct Summary {
     pub crossings: usize,
     /// Largest amount by which a reported penetration was too small there, mm.
     pub missing_mm: f64,
-    /// The same behind the triangles of the felt wall, mm.
+    /// The same behind the triangles of the contact surface, mm.
     pub missing_felt_mm: f64,
-    /// Commands after which that exceeded the stated deviation of the felt wall.
-    pub untold: usize,
+    /// Commands after which that exceeded the stated deviation of the contact surface.
+    pub unreported: usize,
     /// Sub-steps with relaxation as last resort.
     pub relaxations: u64,
     /// Jumps.
@@ -70,7 +70,7 @@ impl Summary {
             sum.crossings += row.crossings;
             sum.missing_mm = sum.missing_mm.max(row.missing_mm);
             sum.missing_felt_mm = sum.missing_felt_mm.max(row.missing_felt_mm);
-            sum.untold += row.untold;
+            sum.unreported += row.unreported;
             sum.relaxations += row.relaxations;
             sum.jumps += row.jumps;
             if row.slowest_ms > sum.slowest_ms {
@@ -100,7 +100,7 @@ impl std::fmt::Display for Summary {
             self.cells_crossing,
             self.missing_mm,
             self.missing_felt_mm,
-            self.untold
+            self.unreported
         )?;
         if self.slowest.is_empty() {
             return Ok(());

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::crossing::CrossingTest;
-use endowire_core::contact::{FeltMesh, WallProperties};
+use endowire_core::contact::{ContactMesh, WallProperties};
 use endowire_core::insertion::Sheath;
 use endowire_core::vessel::{
     Conditioning, NoStore, SurfaceFrame, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore,
@@ -27,7 +27,7 @@ pub struct Place {
     pub sheath: Sheath,
     /// How the entry was found.
     pub found: Found,
-    /// Stated distance of the wire's felt wall from the repaired surface, mm; at least the target.
+    /// Stated distance of the wire's contact surface from the repaired surface, mm; at least the target.
     pub stated_mm: f64,
     /// Distance of the smooth wall from the triangles that it is made of, mm.
     pub smooth_mm: f64,
@@ -46,7 +46,7 @@ pub struct Surface {
     pub wall: Wall,
     /// The triangles as they were given, before any repair.
     pub given: CrossingTest,
-    /// The triangles of the felt wall, as `endowire vessel check --felt` writes them.
+    /// The triangles of the contact surface, as `endowire vessel check --felt` writes them.
     pub felt: CrossingTest,
     /// These triangles as a wall.
     pub even: Wall,
@@ -109,7 +109,7 @@ impl Surface {
             };
             match start {
                 Some((sheath, found)) => {
-                    let felt = FeltMesh::new(&surface.even, radius_mm, &properties, &NoStore)?;
+                    let felt = ContactMesh::new(&surface.even, radius_mm, &properties, &NoStore)?;
                     let stated_mm = felt.deviation(&surface.wall)?.most_mm.max(aimed.deviation_mm);
                     let smooth_mm = felt.deviation(&surface.even)?.most_mm;
                     surface.places.push(Place { wire, sheath, found, stated_mm, smooth_mm });

@@ -52,7 +52,7 @@ impl CArm {
     fn fitting_pitch(&self, wall: &SurfaceMesh) -> Result<f64> {
         let squares = wall.vertices_mm.iter().map(|v| (v - self.isocentre_mm).norm_squared());
         let radius_mm = squares.fold(0.0, f64::max).sqrt();
-        let refuse = |mend: &str| Err(Error::parameter("view.c_arm.pixel_mm", "absent", mend));
+        let refuse = |remedy: &str| Err(Error::parameter("view.c_arm.pixel_mm", "absent", remedy));
         if radius_mm == 0.0 {
             return refuse("the vessel has no extent to fit; give a pitch");
         }
@@ -74,12 +74,12 @@ impl CArm {
             return Ok(());
         }
         let depth = self.sod_mm + beam.z;
-        let mend = format!(
+        let remedy = format!(
             "the vessel must lie between source and detector, but its point ({:.1}, {:.1}, {:.1}) mm is {depth:.1} mm from \
              the source along the beam while the detector is at {} mm; mend the isocentre or the distances",
             point_mm.x, point_mm.y, point_mm.z, self.sid_mm
         );
-        Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend))
+        Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, remedy))
     }
 }
 
@@ -94,10 +94,10 @@ fn check_pitch(spec: &CArmSpec, size_px: [u32; 2], pixel_mm: f64) -> Result<()> 
         (None, Some(field)) => ("field_mm", field.to_string()),
         (None, None) => ("pixel_mm", "absent".to_owned()),
     };
-    let mend = format!(
+    let remedy = format!(
         "with {} pixels and magnification {} a pixel is {pixel_mm:e} mm wide at the detector; it must be {low} to {high} mm",
         size_px[0].max(size_px[1]),
         spec.magnification
     );
-    Err(Error::parameter(format!("view.c_arm.{key}"), value, mend))
+    Err(Error::parameter(format!("view.c_arm.{key}"), value, remedy))
 }

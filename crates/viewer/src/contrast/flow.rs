@@ -96,8 +96,12 @@ impl Flow {
         }
         let given = spec.flow.tree.as_deref().map(read_tree).transpose()?;
         let Some(tree) = given.as_ref().or(spec.flow.centreline.as_deref()) else {
-            let mend = "contrast medium flows along a centre line; give view.flow.tree";
-            return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
+            let remedy = "contrast medium flows along a centre line; give view.flow.tree";
+            return Err(Error::parameter(
+                "view.injection",
+                format!("{} tables", spec.injection.len()),
+                remedy,
+            ));
         };
         Self::new(tree, filled, &spec.flow, &spec.injection).map(Some)
     }

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_told_twice_changes_nothing_and_another_run_begins_where_it_departs() {
+    fn what_is_reported_twice_changes_nothing_and_another_run_begins_where_it_departs() {
         let mut way = way();
         for k in 0..10 {
             way.follow(1.0 + 0.1 * f64::from(k), at(f64::from(k)));
@@ -113,19 +113,19 @@ mod tests {
     fn where_nothing_is_injected_the_way_is_of_no_account() {
         let mut way = way();
         let steps = 5000;
-        let told = |way: &mut TipWay| {
+        let reported = |way: &mut TipWay| {
             (0..steps).for_each(|k| {
                 way.follow(0.002 * f64::from(k), at(f64::from(k)));
             });
         };
-        told(&mut way);
+        reported(&mut way);
         // A tenth of them, and a few on either side.
         let kept = way.places.len();
         assert!((500..508).contains(&kept), "{kept}");
         let place = way.at(1.5).unwrap();
         assert!((place - at(750.0)).norm() < 1e-9, "{place}");
         // The same run once more, as for another plane.
-        told(&mut way);
+        reported(&mut way);
         assert_eq!(way.places.len(), kept);
         let mut never = TipWay::new(&[]);
         assert_eq!(never.follow(1.0, at(1.0)), f64::INFINITY);

@@ -53,8 +53,8 @@ fn arterioles(end_mm: Vec3, onwards: Vec3, radius_mm: f64, seed: u64) -> Vec<Vec
     for division in 0..DIVISIONS {
         let of_division = random::splitmix64(seed, u64::from(division));
         let branch = |(number, (at, along)): (u64, &(Vec3, Vec3))| {
-            let aside = |k: u64| 2.0 * random::unit(random::splitmix64(of_division, 3 * number + k)) - 1.0;
-            let turn = Vec3::new(aside(0), aside(1), aside(2)) * ASIDE;
+            let lateral = |k: u64| 2.0 * random::unit(random::splitmix64(of_division, 3 * number + k)) - 1.0;
+            let turn = Vec3::new(lateral(0), lateral(1), lateral(2)) * ASIDE;
             let ways = [1.0, -1.0].map(|side| (along + turn * side).try_normalize(0.0).unwrap_or(*along));
             ways.map(|way| (at + way * length_mm, way))
         };

@@ -75,25 +75,25 @@ pub struct DevicePart {
 impl DevicePart {
     /// Checks the part on its own; errors begin with `name`.
     pub(crate) fn validate(&self, name: &str) -> Result<()> {
-        let refuse = |key: &str, value: String, mend: &str| {
-            Err(Error::parameter(format!("{name}.{key}"), value, mend))
+        let refuse = |key: &str, value: String, remedy: &str| {
+            Err(Error::parameter(format!("{name}.{key}"), value, remedy))
         };
         if let Some([first, last]) = self.from_tip_mm
             && !(first >= 0.0 && first < last && last <= 1e5)
         {
-            let mend = "must be two lengths from the tip, 0 to 100000 mm, the first less than the second";
-            return refuse("from_tip_mm", format!("[{first}, {last}]"), mend);
+            let remedy = "must be two lengths from the tip, 0 to 100000 mm, the first less than the second";
+            return refuse("from_tip_mm", format!("[{first}, {last}]"), remedy);
         }
         let most = match self.outer_radius_mm {
             Some(outer) if !(1e-6..=LARGEST_RADIUS_MM).contains(&outer) => {
-                let mend = "must be a number from 0.000001 to 1000";
-                return refuse("outer_radius_mm", outer.to_string(), mend);
+                let remedy = "must be a number from 0.000001 to 1000";
+                return refuse("outer_radius_mm", outer.to_string(), remedy);
             }
             outer => outer.unwrap_or(LARGEST_RADIUS_MM),
         };
         if !(0.0..most).contains(&self.inner_radius_mm) {
-            let mend = "must be at least 0, and less than the outer radius and 1000";
-            return refuse("inner_radius_mm", self.inner_radius_mm.to_string(), mend);
+            let remedy = "must be at least 0, and less than the outer radius and 1000";
+            return refuse("inner_radius_mm", self.inner_radius_mm.to_string(), remedy);
         }
         Ok(())
     }
@@ -126,8 +126,8 @@ impl DeviceView {
             let finite =
                 p.position_mm.iter().chain(&p.tangent).all(|x| x.is_finite()) && p.radius_mm.is_finite();
             if !finite || p.radius_mm < 0.0 {
-                let mend = "positions, tangents and radii must be finite, radii not negative";
-                return Err(Error::parameter(format!("device.points[{i}]"), format!("{p:?}"), mend));
+                let remedy = "positions, tangents and radii must be finite, radii not negative";
+                return Err(Error::parameter(format!("device.points[{i}]"), format!("{p:?}"), remedy));
             }
         }
         let most = (MOST_PIECES_IN_ALL / self.points.len().max(1)).clamp(1, MOST_PIECES) as f64;
@@ -301,11 +301,11 @@ impl RefinedDevice {
 
 /// A part whose lumen leaves nothing of its device.
 pub(crate) fn bore_too_wide(name: &str, bore_mm: f64, outer_mm: f64) -> Error {
-    let mend = format!(
+    let remedy = format!(
         "the device is {outer_mm} mm thick there, and nothing is left of it: give a narrower bore, or leave out parts that were written for \
          another device"
     );
-    Error::parameter(format!("{name}.inner_radius_mm"), bore_mm, mend)
+    Error::parameter(format!("{name}.inner_radius_mm"), bore_mm, remedy)
 }
 
 impl RefinedDevice {

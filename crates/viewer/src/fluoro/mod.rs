@@ -395,8 +395,8 @@ impl Fluoroscope {
     /// a roadmap.
     pub(crate) fn opacified(&self, still: &Still) -> Result<Signal> {
         let contrast = self.contrast.as_ref().ok_or_else(|| {
-            let mend = "a roadmap shows an angiogram; give a [[view.injection]]";
-            Error::parameter("view.xray.mode", "roadmap", mend)
+            let remedy = "a roadmap shows an angiogram; give a [[view.injection]]";
+            Error::parameter("view.xray.mode", "roadmap", remedy)
         })?;
         Ok(self.draw(still, &[], &contrast.largest()))
     }

@@ -53,7 +53,7 @@ mod tests {
     use crate::spec::{View, ViewSpec};
 
     #[test]
-    fn a_field_larger_than_the_adapter_draws_is_refused_with_the_key_and_the_mend() {
+    fn a_field_larger_than_the_adapter_draws_is_refused_with_the_key_and_the_remedy() {
         let Some(mut gpu) = context::tests::opened() else { return };
         let wall = SurfaceMesh {
             vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],

@@ -88,8 +88,8 @@ impl Material {
                 Ok(ATTENUATION.at(column, energy_kev) / 10.0)
             }
             _ => {
-                let mend = format!("the table covers {low} to {high} keV");
-                Err(Error::parameter("view.xray.energy_kev", energy_kev, mend))
+                let remedy = format!("the table covers {low} to {high} keV");
+                Err(Error::parameter("view.xray.energy_kev", energy_kev, remedy))
             }
         }
     }
@@ -110,10 +110,10 @@ impl FromStr for Material {
         }
         let mut names = NAMES.map(|row| row.1);
         names.sort_by(|a, b| strsim::jaro_winkler(b, text).total_cmp(&strsim::jaro_winkler(a, text)));
-        let mend = format!("no such material; did you mean {} or {}? (known: {})", names[0], names[1], {
+        let remedy = format!("no such material; did you mean {} or {}? (known: {})", names[0], names[1], {
             NAMES.map(|row| row.1).join(", ")
         });
-        Err(Error::parameter("material", format!("\"{text}\""), mend))
+        Err(Error::parameter("material", format!("\"{text}\""), remedy))
     }
 }
 

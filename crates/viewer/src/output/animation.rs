@@ -100,8 +100,8 @@ impl Animation {
     pub fn push(&mut self, image: &Image) -> Result<()> {
         let shape = |i: &Image| (i.width(), i.height(), i.format());
         if shape(image) != shape(&self.like) {
-            let mend = format!("all frames of an animation are alike: {:?}", shape(&self.like));
-            return Err(Error::parameter("frame", format!("{:?}", shape(image)), mend));
+            let remedy = format!("all frames of an animation are alike: {:?}", shape(&self.like));
+            return Err(Error::parameter("frame", format!("{:?}", shape(image)), remedy));
         }
         let stays_s = self.pace.stays_s(self.pushed);
         self.pushed += 1;
@@ -215,17 +215,17 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_told_before_anything_is() {
+    fn what_cannot_be_written_is_reported_before_anything_is() {
         for name in ["a.mpg", "a", "a.avi"] {
-            let told = Animation::check_name(Path::new(name)).unwrap_err().to_string();
-            assert!(told.contains(name) && told.contains(".gif"), "{told}");
+            let reported = Animation::check_name(Path::new(name)).unwrap_err().to_string();
+            assert!(reported.contains(name) && reported.contains(".gif"), "{reported}");
         }
         assert!(Animation::check_name(Path::new("A.GIF")).is_ok());
         let film = Animation::check_name(Path::new("a.mp4")).map_err(|e| e.to_string());
         if cfg!(feature = "mp4") {
             assert_eq!(film, Ok(()));
         } else {
-            assert!(film.is_err_and(|told| told.contains("cargo build --release --features mp4")));
+            assert!(film.is_err_and(|reported| reported.contains("cargo build --release --features mp4")));
         }
     }
 

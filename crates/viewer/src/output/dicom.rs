@@ -95,12 +95,12 @@ impl Angiogram<'_> {
             .chain(self.pace.intervals_s().iter().copied())
             .flat_map(f64::to_le_bytes);
         let size = frames.first().map_or([0; 2], |f| [f.width(), f.height()]);
-        let told = numbers
+        let reported = numbers
             .chain(self.c_arm.fingerprint().to_le_bytes())
             .chain(size.into_iter().flat_map(u32::to_le_bytes))
             .chain([self.mode as u8, u8::from(self.contrast)])
             .chain(self.description.bytes());
-        fingerprint(frames.iter().flat_map(|f| f.data().iter().copied()).chain(told))
+        fingerprint(frames.iter().flat_map(|f| f.data().iter().copied()).chain(reported))
     }
 
     fn object(&self, frames: &[Image], first: &Image, plane: Plane) -> InMemDicomObject {

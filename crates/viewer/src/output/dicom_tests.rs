@@ -103,9 +103,9 @@ fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
     turn.exposure.pulse = Some(Pulse { current_ma: 123.4, pulse_ms: 7.5 });
     turn.write(&turning, &pixels).unwrap();
     let read = dicom_object::open_file(&turning).unwrap();
-    let told = read.element(tags::POSITIONER_PRIMARY_ANGLE_INCREMENT).unwrap().to_float64().unwrap();
+    let reported = read.element(tags::POSITIONER_PRIMARY_ANGLE_INCREMENT).unwrap().to_float64().unwrap();
     assert_eq!(
-        (told, read.element(tags::POSITIONER_MOTION).unwrap().to_str().unwrap().trim()),
+        (reported, read.element(tags::POSITIONER_MOTION).unwrap().to_str().unwrap().trim()),
         (1.5, "DYNAMIC")
     );
     let float = |tag| read.element(tag).unwrap().to_float64().unwrap();
@@ -117,8 +117,8 @@ fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
     let pace = Pace::of(&[1.0, 2.2, 5.2], 15.0);
     Angiogram { pace, ..angiogram(&arm_a, Mode::Fluoro) }.write(&uneven, &pixels).unwrap();
     let read = dicom_object::open_file(&uneven).unwrap();
-    let told = read.element(tags::FRAME_TIME_VECTOR).unwrap().to_multi_float64().unwrap();
-    assert_eq!(told, [0.0, 1200.0, 3000.0]);
+    let reported = read.element(tags::FRAME_TIME_VECTOR).unwrap().to_multi_float64().unwrap();
+    assert_eq!(reported, [0.0, 1200.0, 3000.0]);
     let pointer = read.element(tags::FRAME_INCREMENT_POINTER).unwrap();
     assert_eq!(pointer.value().to_tag().unwrap(), tags::FRAME_TIME_VECTOR);
     assert!([tags::FRAME_TIME, tags::CINE_RATE].iter().all(|tag| read.element(*tag).is_err()));

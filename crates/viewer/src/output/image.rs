@@ -169,8 +169,9 @@ const OTHER_KINDS: [&str; 9] = ["jpg", "jpeg", "gif", "bmp", "tif", "tiff", "web
 fn check_png_name(path: &Path) -> Result<()> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     if OTHER_KINDS.iter().any(|other| other.eq_ignore_ascii_case(ending)) {
-        let mend = format!("the picture is written as PNG: name it {}", path.with_extension("png").display());
-        return Err(Error::parameter("picture", path.display(), mend));
+        let remedy =
+            format!("the picture is written as PNG: name it {}", path.with_extension("png").display());
+        return Err(Error::parameter("picture", path.display(), remedy));
     }
     Ok(())
 }

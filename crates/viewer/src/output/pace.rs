@@ -55,8 +55,8 @@ mod tests {
         let uneven = Pace::of(&[0.0, 1.0, 3.0], 15.0);
         assert_eq!((uneven.mean_s(), uneven.intervals_s()), (1.5, &[1.0, 2.0][..]));
         assert_eq!([0, 1, 2].map(|frame| uneven.stays_s(frame)), [1.0, 2.0, 1.5]);
-        for told in [&[][..], &[3.0], &[3.0, 3.0]] {
-            assert_eq!(Pace::of(told, 4.0), Pace::even(4.0));
+        for reported in [&[][..], &[3.0], &[3.0, 3.0]] {
+            assert_eq!(Pace::of(reported, 4.0), Pace::even(4.0));
         }
     }
 }

@@ -80,8 +80,8 @@ impl PatientSpec {
                 finite_within("view.patient.torso.diaphragm_mm", z, COORDINATE_MM)?;
             }
             if let Some(ct) = &self.ct {
-                let mend = "view.patient.torso is given too: keep one of the two";
-                return Err(Error::parameter("view.patient.ct.file", ct.file.display(), mend));
+                let remedy = "view.patient.torso is given too: keep one of the two";
+                return Err(Error::parameter("view.patient.ct.file", ct.file.display(), remedy));
             }
         }
         for x in self.ct.iter().flat_map(|ct| ct.offset_mm) {

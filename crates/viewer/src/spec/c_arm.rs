@@ -102,9 +102,9 @@ impl FromStr for Pose {
 
     fn from_str(text: &str) -> Result<Self> {
         let bad = || {
-            let mend = "say angles as in \"LAO 40\", \"RAO 30 CAU 20\" or \"AP\", each direction once, 0 to 180 degrees \
+            let remedy = "say angles as in \"LAO 40\", \"RAO 30 CAU 20\" or \"AP\", each direction once, 0 to 180 degrees \
                         (CRA and CAU 0 to 90)";
-            Error::parameter("view.c_arm.pose", format!("{text:?}"), mend)
+            Error::parameter("view.c_arm.pose", format!("{text:?}"), remedy)
         };
         let words: Vec<String> = text
             .split(|c: char| c.is_whitespace() || matches!(c, ',' | '/' | '°'))
@@ -187,9 +187,9 @@ impl CArmSpec {
         finite_within("view.c_arm.sid_mm", self.sid_mm, [10.0, 1e5])?;
         finite_within("view.c_arm.sod_mm", self.sod_mm, [1.0, 1e5])?;
         if self.sod_mm >= self.sid_mm {
-            let mend =
+            let remedy =
                 format!("must be less than sid_mm = {}: the isocentre is before the detector", self.sid_mm);
-            return Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend));
+            return Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, remedy));
         }
         for (key, value, range) in
             [("pixel_mm", self.pixel_mm, PITCH_MM), ("field_mm", self.field_mm, FIELD_MM)]
@@ -199,8 +199,8 @@ impl CArmSpec {
             }
         }
         if let (Some(field), Some(_)) = (self.field_mm, self.pixel_mm) {
-            let mend = "view.c_arm.pixel_mm is given too: keep one of the two";
-            return Err(Error::parameter("view.c_arm.field_mm", field, mend));
+            let remedy = "view.c_arm.pixel_mm is given too: keep one of the two";
+            return Err(Error::parameter("view.c_arm.field_mm", field, remedy));
         }
         finite_within("view.c_arm.magnification", self.magnification, [0.1, 100.0])?;
         finite_within("view.c_arm.rotation_deg", self.rotation_deg, [-360.0, 360.0])?;

@@ -38,7 +38,8 @@ impl Default for ExposureSpec {
 
 impl ExposureSpec {
     pub(super) fn validate(&self) -> Result<()> {
-        let refuse = |value: String, mend: &str| Err(Error::parameter("view.exposure.curve", value, mend));
+        let refuse =
+            |value: String, remedy: &str| Err(Error::parameter("view.exposure.curve", value, remedy));
         if !(1..=MOST_POINTS).contains(&self.curve.len()) {
             return refuse(
                 format!("{} pairs", self.curve.len()),
@@ -50,16 +51,16 @@ impl ExposureSpec {
             finite_within("view.exposure.curve (kV)", *kvp, [50.0, 125.0])?;
         }
         if let Some(pair) = self.curve.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
-            let mend = "thicknesses must rise from pair to pair";
-            return refuse(format!("{:?}, {:?}", pair[0], pair[1]), mend);
+            let remedy = "thicknesses must rise from pair to pair";
+            return refuse(format!("{:?}, {:?}", pair[0], pair[1]), remedy);
         }
         let [least, most] = self.current_ma;
         for current in self.current_ma {
             finite_within("view.exposure.current_ma", current, [0.01, 5000.0])?;
         }
         if least > most {
-            let mend = "the least current must not be above the largest";
-            return Err(Error::parameter("view.exposure.current_ma", format!("[{least}, {most}]"), mend));
+            let remedy = "the least current must not be above the largest";
+            return Err(Error::parameter("view.exposure.current_ma", format!("[{least}, {most}]"), remedy));
         }
         Ok(())
     }

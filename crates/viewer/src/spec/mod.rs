@@ -208,8 +208,8 @@ impl ViewSpec {
     pub fn own_parts(&self, several: bool) -> Result<Option<&[DevicePart]>> {
         let own = Some(&self.device[..]).filter(|parts| !parts.is_empty());
         if several && own.is_some() {
-            let mend = "describes one device, and there are several instruments: leave it out, and give materials in their files";
-            return Err(Error::parameter("view.device", self.device.len(), mend));
+            let remedy = "describes one device, and there are several instruments: leave it out, and give materials in their files";
+            return Err(Error::parameter("view.device", self.device.len(), remedy));
         }
         Ok(own)
     }
@@ -221,8 +221,8 @@ impl ViewSpec {
     pub fn validate(&self) -> Result<()> {
         for side in self.size_px {
             if side == 0 || side > LARGEST_SIDE_PX {
-                let mend = format!("each side must be 1 to {LARGEST_SIDE_PX} pixels");
-                return Err(Error::parameter("view.size_px", format!("{:?}", self.size_px), mend));
+                let remedy = format!("each side must be 1 to {LARGEST_SIDE_PX} pixels");
+                return Err(Error::parameter("view.size_px", format!("{:?}", self.size_px), remedy));
             }
         }
         if self.every == 0 {
@@ -242,8 +242,8 @@ impl ViewSpec {
         self.flow.validate()?;
         for (key, tables) in [("injection", self.injection.len()), ("device", self.device.len())] {
             if tables > MOST_TABLES {
-                let mend = format!("at most {MOST_TABLES} are read");
-                return Err(Error::parameter(format!("view.{key}"), format!("{tables} tables"), mend));
+                let remedy = format!("at most {MOST_TABLES} are read");
+                return Err(Error::parameter(format!("view.{key}"), format!("{tables} tables"), remedy));
             }
         }
         self.injection.iter().enumerate().try_for_each(|(i, injection)| injection.validate(i))?;

@@ -81,8 +81,9 @@ impl ViewSpec {
     pub fn find_centreline(&mut self, wall: &Wall) -> Result<()> {
         if self.flow.tree.is_none() && self.flow.centreline.is_none() {
             let found = ExtractedCentreline::of(wall, None, &[]).map_err(|error| {
-                let mend = format!("none is found in the surface ({error}): name a table of its centre line");
-                Error::parameter("view.flow.tree", "none", mend)
+                let remedy =
+                    format!("none is found in the surface ({error}): name a table of its centre line");
+                Error::parameter("view.flow.tree", "none", remedy)
             })?;
             self.flow.centreline = Some(Arc::new(found.tree));
         }

@@ -116,8 +116,8 @@ impl XRaySpec {
             && !(white >= -100.0 && black <= 100.0 && black - white >= 1e-4)
         {
             let value = format!("[{white}, {black}]");
-            let mend = "must be two line integrals from -100 to 100, the white one less than the black one by 0.0001 at least";
-            return Err(Error::parameter("view.xray.window", value, mend));
+            let remedy = "must be two line integrals from -100 to 100, the white one less than the black one by 0.0001 at least";
+            return Err(Error::parameter("view.xray.window", value, remedy));
         }
         Ok(())
     }
@@ -184,12 +184,12 @@ impl DetectorSpec {
         if self.blur_mm <= MOST_BLUR_PX * pixel_mm {
             return Ok(());
         }
-        let mend = format!(
+        let remedy = format!(
             "is {:.0} pixels of {pixel_mm} mm, and at most {MOST_BLUR_PX} are spread over: give at most {} mm, or larger pixels \
              (view.c_arm)",
             self.blur_mm / pixel_mm,
             MOST_BLUR_PX * pixel_mm
         );
-        Err(Error::parameter("view.detector.blur_mm", self.blur_mm, mend))
+        Err(Error::parameter("view.detector.blur_mm", self.blur_mm, remedy))
     }
 }

@@ -136,12 +136,12 @@ pub(crate) fn check(spec: &ViewSpec) -> Result<()> {
         return Ok(());
     }
     if let Some(energy) = spec.xray.energy_kev {
-        let mend = "one energy has no voltage that [view.exposure] could choose: leave out one of them";
-        return Err(Error::parameter("view.xray.energy_kev", energy, mend));
+        let remedy = "one energy has no voltage that [view.exposure] could choose: leave out one of them";
+        return Err(Error::parameter("view.xray.energy_kev", energy, remedy));
     }
     if spec.xray.pulse_ms <= 0.0 {
-        let mend = "[view.exposure] needs the length of a pulse: give 3 to 20 ms for fluoroscopy and cine, up to 100 for subtraction";
-        return Err(Error::parameter("view.xray.pulse_ms", spec.xray.pulse_ms, mend));
+        let remedy = "[view.exposure] needs the length of a pulse: give 3 to 20 ms for fluoroscopy and cine, up to 100 for subtraction";
+        return Err(Error::parameter("view.xray.pulse_ms", spec.xray.pulse_ms, remedy));
     }
     Ok(())
 }
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_tube_can_do_is_refused_by_key_and_mend() {
+    fn what_no_tube_can_do_is_refused_by_key_and_remedy() {
         let mut cases = vec![];
         let mut case = |change: &dyn Fn(&mut ViewSpec), words: &'static str| {
             let mut view = view(Mode::Fluoro);

@@ -20,8 +20,8 @@ pub(crate) fn check_kvp(kvp: f64) -> Result<()> {
 /// Photons of the anode at each energy of the table.
 fn anode(kvp: f64) -> Result<&'static [f64]> {
     ANODE.column(&format!("{kvp}")).ok_or_else(|| {
-        let mend = format!("the table has {} kV", ANODE.names().join(", "));
-        Error::parameter("view.xray.kvp", kvp, mend)
+        let remedy = format!("the table has {} kV", ANODE.names().join(", "));
+        Error::parameter("view.xray.kvp", kvp, remedy)
     })
 }
 

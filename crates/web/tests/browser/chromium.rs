@@ -39,7 +39,7 @@ pub(crate) struct Browser {
     messages: Receiver<Value>,
     calls: u64,
     session: String,
-    /// Errors and warnings that the console was told, of the page and of its worker.
+    /// Errors and warnings that the console was reported, of the page and of its worker.
     pub(crate) console: Vec<String>,
     /// Where the page is served.
     pub(crate) address: String,
@@ -141,7 +141,7 @@ impl Browser {
         }
     }
 
-    /// Keeps what the console is told.
+    /// Keeps what the console is reported.
     fn hear(&mut self, message: &Value) {
         let params = &message["params"];
         match message["method"].as_str() {
@@ -174,9 +174,9 @@ impl Browser {
         let begun = Instant::now();
         while self.eval(expression) != true {
             if begun.elapsed() >= PATIENCE {
-                let told = self.eval("document.getElementById('told')?.textContent");
+                let reported = self.eval("document.getElementById('told')?.textContent");
                 panic!(
-                    "{expression}: not so after {PATIENCE:?}; the page tells {told}, the console {:?}",
+                    "{expression}: not so after {PATIENCE:?}; the page tells {reported}, the console {:?}",
                     self.console
                 );
             }

@@ -113,7 +113,7 @@ fn script_and_table_that_are_saved_tell_what_hands_did() {
 fn a_graphics_processor_that_is_lost_leaves_pictures_to_the_processor_which_is_said() {
     let _alone = alone();
     let Some(mut browser) = with_webgpu("curved_tube_exact.toml", 128) else { return };
-    let told = browser.eval(
+    let reported = browser.eval(
         "(async () => {
             const { Graphics } = await import('./pkg/endowire.js');
             const request = GPUAdapter.prototype.requestDevice;
@@ -142,11 +142,11 @@ fn a_graphics_processor_that_is_lost_leaves_pictures_to_the_processor_which_is_s
             return [...before, session.backend(), session.backend3D(), session.fluoroSoon()[0].data.some((one) => one > 100)];
         })()",
     );
-    assert_eq!([&told[0], &told[1]], ["WebGPU", "WebGPU"]);
-    for backend in [&told[2], &told[3]] {
-        assert!(backend.as_str().unwrap().starts_with("CPU reference (adapter failed: "), "{told}");
+    assert_eq!([&reported[0], &reported[1]], ["WebGPU", "WebGPU"]);
+    for backend in [&reported[2], &reported[3]] {
+        assert!(backend.as_str().unwrap().starts_with("CPU reference (adapter failed: "), "{reported}");
     }
-    assert_eq!(told[4], true);
+    assert_eq!(reported[4], true);
 }
 
 #[test]

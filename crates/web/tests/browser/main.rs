@@ -70,14 +70,14 @@ fn bits(browser: &mut Browser, positions: &str) -> Vec<u64> {
     let text = format!(
         "(async () => [...new BigUint64Array(Float64Array.from({positions}).buffer)].map(String).join(' '))()"
     );
-    let told = browser.eval(&text);
-    told.as_str().unwrap().split_whitespace().map(|word| word.parse().unwrap()).collect()
+    let reported = browser.eval(&text);
+    reported.as_str().unwrap().split_whitespace().map(|word| word.parse().unwrap()).collect()
 }
 
 /// What the page measures of itself.
 fn pace(browser: &mut Browser, what: &str) -> f64 {
-    let told = browser.eval(&format!("document.getElementById('pace').dataset.{what}"));
-    told.as_str().and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
+    let reported = browser.eval(&format!("document.getElementById('pace').dataset.{what}"));
+    reported.as_str().and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
 }
 
 #[test]
@@ -134,8 +134,9 @@ fn pictures_are_those_of_the_program() {
         native::rgb(&pictures.three_d(&snapshot).unwrap()),
     ];
     for (expression, expected) in ["session.fluoro()[0]", "session.threeD()"].into_iter().zip(native) {
-        let told = browser.eval(&format!("[...({expression}).data].filter((_, k) => k % 4 < 3).join(' ')"));
-        let seen: Vec<u8> = told.as_str().unwrap().split(' ').map(|word| word.parse().unwrap()).collect();
+        let reported =
+            browser.eval(&format!("[...({expression}).data].filter((_, k) => k % 4 < 3).join(' ')"));
+        let seen: Vec<u8> = reported.as_str().unwrap().split(' ').map(|word| word.parse().unwrap()).collect();
         assert_eq!(seen.len(), expected.len());
         let apart = seen.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(apart.unwrap() <= 2, "{expression}: {apart:?} of 255");
@@ -151,7 +152,7 @@ fn pictures_are_those_of_the_program() {
 fn pictures_by_webgpu_are_those_of_the_reference() {
     let _alone = alone();
     let Some(mut browser) = with_webgpu("arch_carotid.toml", 192) else { return };
-    let told = browser.eval(
+    let reported = browser.eval(
         "(async () => {
             const { Graphics } = await import('./pkg/endowire.js');
             const sharp = async (session, graphics) => {
@@ -179,11 +180,11 @@ fn pictures_by_webgpu_are_those_of_the_reference() {
             return [graphics.name, apart(second), range, apart(other)];
         })()",
     );
-    assert_eq!(told[0], "WebGPU");
-    let [most, range, other] = [1, 2, 3].map(|k| told[k].as_f64().unwrap());
+    assert_eq!(reported[0], "WebGPU");
+    let [most, range, other] = [1, 2, 3].map(|k| reported[k].as_f64().unwrap());
     eprintln!("fluoroscopy by WebGPU: at most {most} of 255 apart at any pixel");
-    assert!(most <= 2.0 && range > 100.0, "{told}");
-    assert!(other > 2.0, "another place must differ: {told}");
+    assert!(most <= 2.0 && range > 100.0, "{reported}");
+    assert!(other > 2.0, "another place must differ: {reported}");
     browser.eval("document.getElementById('lock').click()");
     // The page takes what is quicker for all of them, and says what that is: here software imitates a graphics processor.
     browser
@@ -267,7 +268,7 @@ fn five_thousand_random_inputs_break_nothing() {
     module(&mut browser, "curved_tube_friction.toml", 64);
     let mut dice = Dice(7);
     let inputs: Vec<Value> = (0..5000).map(|_| dice.wild()).collect();
-    let told = browser.eval(&format!(
+    let reported = browser.eval(&format!(
         "(() => {{
             let refused = 0;
             for (const [number, input] of {}.entries()) {{
@@ -282,8 +283,8 @@ fn five_thousand_random_inputs_break_nothing() {
         }})()",
         json!(inputs)
     ));
-    let refused = told[0].as_u64().unwrap();
-    assert!((500..4500).contains(&refused) && told[1].as_u64().unwrap() > 50, "{told}");
+    let refused = reported[0].as_u64().unwrap();
+    assert!((500..4500).contains(&refused) && reported[1].as_u64().unwrap() > 50, "{reported}");
     assert!(browser.console.is_empty(), "{:?}", browser.console);
 }
 
@@ -299,7 +300,7 @@ fn drop_file(browser: &mut Browser, name: &str, bytes: &str) {
 }
 
 #[test]
-fn a_surface_is_dropped_and_entered_and_what_is_none_is_told_in_the_cores_words() {
+fn a_surface_is_dropped_and_entered_and_what_is_none_is_reported_in_the_cores_words() {
     let _alone = alone();
     let Some(mut browser) = Browser::open("", PHONE) else { return };
     browser.wait(READY);

@@ -137,7 +137,7 @@ fn a_subject_is_read_done_by_hand_scored_and_saved() {
 }
 
 #[test]
-fn a_subject_is_shown_by_its_reference_and_one_that_does_not_fit_is_told() {
+fn a_subject_is_shown_by_its_reference_and_one_that_does_not_fit_is_reported() {
     let _alone = alone();
     let Some(mut browser) = Browser::open("#scene=subjects/straight_tube.toml", PHONE) else { return };
     browser.wait(&is_open("task-dialog"));
@@ -196,8 +196,8 @@ fn a_session_is_reported_as_one_page_that_needs_nothing_else() {
     std::fs::write(file.path(), page).unwrap();
     browser.call("Page.navigate", &json!({ "url": format!("file://{}", file.path().display()) }));
     browser.wait("Boolean(document.documentElement?.dataset.drawnMs)");
-    let told = browser.eval("document.getElementById('now').textContent");
-    assert!(told.as_str().unwrap().starts_with(&format!("step {steps}: ")), "{told}");
+    let reported = browser.eval("document.getElementById('now').textContent");
+    assert!(reported.as_str().unwrap().starts_with(&format!("step {steps}: ")), "{reported}");
     browser.wait(
         "[...document.images].length === 2 && [...document.images].every((one) => one.naturalWidth > 100)",
     );

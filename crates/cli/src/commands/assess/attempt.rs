@@ -86,7 +86,7 @@ impl<'a> Places<'a> {
 type Given<'a> = (&'a Path, SessionFile);
 
 /// The sessions that are assessed, with their files, and the files of those in which nothing was done. These are left
-/// out and told of, unless all are such.
+/// out and reported of, unless all are such.
 pub(super) fn read(files: &[PathBuf]) -> Result<(Vec<Given<'_>>, Vec<&Path>), Failure> {
     let (mut sessions, mut left_out) = (vec![], vec![]);
     for file in files {

@@ -26,13 +26,13 @@ struct Document<'a> {
     #[serde(flatten)]
     provenance: Provenance,
     #[serde(flatten)]
-    told: Told<'a>,
+    reported: Assessed<'a>,
 }
 
 /// One session, or several with their courses.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Told<'a> {
+enum Assessed<'a> {
     One(Box<Session<'a>>),
     Several {
         sessions: Vec<Session<'a>>,
@@ -82,10 +82,10 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     };
     course::order(&mut attempts);
     let courses = courses(&attempts, &places);
-    let told = match attempts.as_slice() {
-        [attempt] if left_out.is_empty() => Told::One(Box::new(told(attempt, &places))),
-        all => Told::Several {
-            sessions: all.iter().map(|attempt| told(attempt, &places)).collect(),
+    let reported = match attempts.as_slice() {
+        [attempt] if left_out.is_empty() => Assessed::One(Box::new(reported(attempt, &places))),
+        all => Assessed::Several {
+            sessions: all.iter().map(|attempt| reported(attempt, &places)).collect(),
             courses: &courses,
             left_out: &left_out,
         },
@@ -93,11 +93,11 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     if let Some(out) = &args.page {
         write_page(out, &page::of(&attempts, &courses, &places, &provenance)?)?;
     }
-    answer(&Document { provenance, told }, args.json, || text::of(&attempts, &courses, &left_out))
+    answer(&Document { provenance, reported }, args.json, || text::of(&attempts, &courses, &left_out))
 }
 
 /// The results of an attempt.
-fn told<'a>(attempt: &'a Attempt, places: &'a Places<'_>) -> Session<'a> {
+fn reported<'a>(attempt: &'a Attempt, places: &'a Places<'_>) -> Session<'a> {
     let by = match &attempt.score {
         Some(score) => By::Subject(score),
         None => By::Measures {

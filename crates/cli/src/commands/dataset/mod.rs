@@ -175,9 +175,9 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<Claim, Failure> {
     let claim = claim_dataset(folder)?;
     // Another call may have been faster.
     check(provenance, folder)?;
-    let (path, told) = (folder.join("dataset.json"), to_json(provenance)?);
+    let (path, reported) = (folder.join("dataset.json"), to_json(provenance)?);
     if !path.exists() {
-        whole::write_bytes(&path, told.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
+        whole::write_bytes(&path, reported.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
     }
     Ok(claim)
 }

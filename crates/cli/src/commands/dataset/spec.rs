@@ -159,7 +159,7 @@ impl Spec {
 
     /// Refuses keys of `[view]` that have no effect on the pictures of a dataset.
     fn check_view(&self) -> Result<(), Failure> {
-        for (keys, mend) in [
+        for (keys, remedy) in [
             (&["biplane_deg"][..], "a dataset has biplane_deg beside its seed"),
             (&["views"], "a dataset draws fluoroscopy alone: leave the key out"),
             (&["c_arm", "pose"], "poses are drawn: give vary.primary_deg and vary.secondary_deg"),
@@ -171,7 +171,7 @@ impl Spec {
             let (first, others) = keys.split_first().map_or(("", keys), |(first, others)| (*first, others));
             let value = others.iter().fold(self.view.get(first), |value, key| value?.get(key));
             if let Some(value) = value {
-                return Err(Failure::Input(format!("view.{} = {value}: {mend}", keys.join("."))));
+                return Err(Failure::Input(format!("view.{} = {value}: {remedy}", keys.join("."))));
             }
         }
         let mode = self.view.get("xray").and_then(|xray| xray.get("mode"));

@@ -95,11 +95,11 @@ pub(super) fn coil(args: &CoilArgs) -> Result<(), Failure> {
     let (mut rows, mut largest_void_mm, mut failure) = (Vec::new(), Vec::new(), None);
     let started = Instant::now();
     for number in 0..args.coils.len() {
-        let mut told = |row: Row| {
+        let mut reported = |row: Row| {
             rows.push(row);
             bar.inc(1);
         };
-        let done = push((args, number), &mut simulation, &sac, &started, &mut told);
+        let done = push((args, number), &mut simulation, &sac, &started, &mut reported);
         let void = done.and_then(|()| Packing::largest_void_mm(&simulation, &sac));
         match void {
             Ok(mm) => largest_void_mm.push(mm),
@@ -283,7 +283,7 @@ fn push(
     simulation: &mut Simulation,
     sac: &Sac,
     started: &Instant,
-    told: &mut impl FnMut(Row),
+    reported: &mut impl FnMut(Row),
 ) -> endowire_core::Result<()> {
     let catheter = args.coils.len();
     let tip = |simulation: &Simulation| simulation.tip_of_mm(catheter).unwrap_or_default();
@@ -305,7 +305,7 @@ fn push(
             let [a, b] = touch.positions_mm;
             (a - b).norm() < touch.penetration_mm
         };
-        told(Row {
+        reported(Row {
             coil: name.clone(),
             inserted_mm: report.lengths_mm()[number] - covered_mm,
             packing: packing.density,

@@ -54,8 +54,8 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
         }
     };
     let found = passable(&way, &device.device, args.force_n).map_err(|error| match error {
-        endowire_core::Error::Parameter { name, value, mend } if name == "force_n" => {
-            Failure::from(endowire_core::Error::Parameter { name: "--force-n".into(), value, mend })
+        endowire_core::Error::Parameter { name, value, remedy } if name == "force_n" => {
+            Failure::from(endowire_core::Error::Parameter { name: "--force-n".into(), value, remedy })
         }
         other => other.into(),
     })?;
@@ -107,9 +107,9 @@ fn name_of(path: &Path) -> String {
 /// The way extracted from the surface.
 fn way_in_surface(args: &PassableArgs, wall: &Wall) -> Result<CentrelinePath, Failure> {
     let opening = args.to.strip_prefix("opening ").unwrap_or(&args.to);
-    let to = parse_end(opening).map_err(|mend| {
+    let to = parse_end(opening).map_err(|remedy| {
         let more = "a name needs the table that has it: --centreline FILE";
-        Failure::Input(format!("--to = {:?}: {mend}; {more}", args.to))
+        Failure::Input(format!("--to = {:?}: {remedy}; {more}", args.to))
     })?;
     let found = ExtractedCentreline::of(wall, args.from, &[to])
         .map_err(|error| as_flag(error).at(args.file.display()))?;

@@ -119,7 +119,7 @@ impl Picture<'_> {
         let narrow = &found.narrowest;
         let bend = &found.sharpest;
         let grey = RGBColor(90, 90, 90);
-        let told: [(Mark<B>, String); 2] = [
+        let reported: [(Mark<B>, String); 2] = [
             (
                 mark_narrowest,
                 format!(
@@ -137,7 +137,7 @@ impl Picture<'_> {
                 ),
             ),
         ];
-        for (number, (mark, text)) in told.into_iter().enumerate() {
+        for (number, (mark, text)) in reported.into_iter().enumerate() {
             let y = 14 + 30 * number as i32;
             mark(legend, (36, y + 9))?;
             legend.draw(&Text::new(text, (60, y), chart::font(19)))?;

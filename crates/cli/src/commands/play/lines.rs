@@ -166,18 +166,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unknown_command_is_told_all_that_there_are() {
-        let told = parse("{\"do\": \"weit\"}").unwrap_err();
-        assert!(told.starts_with("weit: is no command: did you mean \"wait\"?"), "{told}");
+    fn an_unknown_command_is_reported_all_that_there_are() {
+        let reported = parse("{\"do\": \"weit\"}").unwrap_err();
+        assert!(reported.starts_with("weit: is no command: did you mean \"wait\"?"), "{reported}");
         for name in INPUTS.into_iter().chain(ORDERS) {
-            assert!(told.contains(name), "{name}");
+            assert!(reported.contains(name), "{name}");
             // Each is known, whatever keys it needs.
-            let told = parse(&format!("{{\"do\": \"{name}\"}}")).err().unwrap_or_default();
-            assert!(!told.contains("unknown variant") && !told.contains("no command"), "{told}");
+            let reported = parse(&format!("{{\"do\": \"{name}\"}}")).err().unwrap_or_default();
+            assert!(!reported.contains("unknown variant") && !reported.contains("no command"), "{reported}");
         }
         // Those of a session are all of them.
-        let told = serde_json::from_str::<Input>("{\"do\": \"x\"}").unwrap_err().to_string();
-        assert_eq!(told.matches('`').count() / 2, INPUTS.len() + 1, "{told}");
+        let reported = serde_json::from_str::<Input>("{\"do\": \"x\"}").unwrap_err().to_string();
+        assert_eq!(reported.matches('`').count() / 2, INPUTS.len() + 1, "{reported}");
     }
 
     #[test]

@@ -164,7 +164,7 @@ fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-/// Runs the session on this thread until it is told to end.
+/// Runs the session on this thread until it is asked to end.
 pub(crate) fn physics(
     mut session: Session,
     messages: &Receiver<Message>,

@@ -134,10 +134,10 @@ impl Record {
             (jumps, "with a jump"),
             (relaxations, "last resorts"),
         ];
-        let told =
+        let reported =
             counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
-        let told: String = told.collect();
-        tell(format_args!("{} steps are recorded in {}{told}", session.steps(), self.path.display()));
+        let reported: String = reported.collect();
+        tell(format_args!("{} steps are recorded in {}{reported}", session.steps(), self.path.display()));
         Ok(())
     }
 }

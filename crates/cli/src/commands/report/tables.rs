@@ -49,9 +49,9 @@ pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
     let mut source = Vec::new();
     let sweep = if folder.is_dir() { endowire_sweep::table_of(folder)? } else { None };
     if let Some(sweep) = sweep {
-        let (runs, told) = of_sweep(sweep);
+        let (runs, reported) = of_sweep(sweep);
         tables.insert(0, runs);
-        source = told;
+        source = reported;
     }
     if tables.is_empty() {
         return Ok(None);
@@ -67,10 +67,10 @@ pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
     }
     if source.is_empty() {
         let documents = files("json").into_iter().filter_map(|path| std::fs::read(path).ok());
-        let told = documents.filter_map(|bytes| serde_json::from_slice::<Value>(&bytes).ok()).next();
-        let told = told.unwrap_or(Value::Null);
-        let keys = SOURCE.iter().filter(|key| !told[**key].is_null());
-        source = keys.map(|key| ((*key).to_owned(), told[*key].clone())).collect();
+        let reported = documents.filter_map(|bytes| serde_json::from_slice::<Value>(&bytes).ok()).next();
+        let reported = reported.unwrap_or(Value::Null);
+        let keys = SOURCE.iter().filter(|key| !reported[**key].is_null());
+        source = keys.map(|key| ((*key).to_owned(), reported[*key].clone())).collect();
     }
     Ok(Some(Tables { name: stem(folder), tables, pictures, source }))
 }

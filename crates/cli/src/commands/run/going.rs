@@ -10,7 +10,7 @@ use endowire_methods::Scene;
 use endowire_sweep::{EndedBy, RunOutcome, StepFailure};
 use indicatif::ProgressBar;
 
-use super::told::live;
+use super::reported::live;
 use crate::failure::Failure;
 use crate::output::frames::FrameWriter;
 use crate::output::injections::{self, Injected};

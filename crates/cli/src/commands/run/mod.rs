@@ -1,7 +1,7 @@
 //! `endowire run`: a scripted insertion, recorded.
 
 mod going;
-mod told;
+mod reported;
 
 use std::path::Path;
 use std::sync::Once;
@@ -100,7 +100,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     going.begin()?;
     going.carry_out(next, interrupted, &bar);
     bar.finish_and_clear();
-    told::tell_end(args, &folder, going.end())
+    reported::tell_end(args, &folder, going.end())
 }
 
 /// Whether there is a state to resume from. If not, the run starts from the beginning, so that a job script can

@@ -75,8 +75,12 @@ pub(super) fn write_dicom(planes: &[Plane], path: &Path, turn_deg: f64, pace: &P
     match planes {
         [first, second] => {
             let other = beside(path);
-            let told = [first.angiogram(turn_deg, pace)?, second.angiogram(turn_deg, pace)?];
-            Angiogram::write_biplane([&told[0], &told[1]], [path, &other], [&first.series, &second.series])?;
+            let reported = [first.angiogram(turn_deg, pace)?, second.angiogram(turn_deg, pace)?];
+            Angiogram::write_biplane(
+                [&reported[0], &reported[1]],
+                [path, &other],
+                [&first.series, &second.series],
+            )?;
             Ok(vec![path.to_owned(), other])
         }
         [one, ..] => {

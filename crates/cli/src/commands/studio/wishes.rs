@@ -62,9 +62,9 @@ fn key_of_view(text: &str) -> &str {
 
 /// The option that set the key which a message is about; `None` if the value is the scene file's own.
 pub(super) fn at_fault(args: &FrameArgs, message: &str) -> Option<String> {
-    let told = message.strip_prefix("view.")?;
+    let reported = message.strip_prefix("view.")?;
     let is_about = |key: &str| {
-        let rest = told.strip_prefix(key).filter(|_| !key.is_empty());
+        let rest = reported.strip_prefix(key).filter(|_| !key.is_empty());
         rest.is_some_and(|rest| rest.starts_with([' ', '.', '[']))
     };
     let set = args.set.iter().rev().find(|text| is_about(key_of_view(text)));

@@ -25,11 +25,11 @@ impl SmoothWall {
         let list = self.list(triangle as usize);
         let front = self.reach_from(x, list, None);
         let derived = |reached: &Reached| self.derive(x, list, reached, |_| {});
-        let told = |value_mm: f64, distance: &dyn Fn() -> Distance| {
+        let reported = |value_mm: f64, distance: &dyn Fn() -> Distance| {
             if value_mm < limit_mm { Nearness::Within(distance()) } else { Nearness::Beyond(value_mm) }
         };
         if let Some(front) = front.as_ref().filter(|front| front.value_mm >= 0.0) {
-            return Some((told(front.value_mm, &|| derived(front)), front.coverage));
+            return Some((reported(front.value_mm, &|| derived(front)), front.coverage));
         }
         let behind = self.behind(list);
         // A point that no vertex reaches in front of the surface need not be behind it.
@@ -42,7 +42,7 @@ impl SmoothWall {
             (Some(front), Some(back)) => (front, back),
             (one, None) | (None, one) => {
                 let one = one?;
-                return Some((told(one.value_mm, &|| derived(&one)), one.coverage));
+                return Some((reported(one.value_mm, &|| derived(&one)), one.coverage));
             }
         };
         let [share, in_f, in_ff] = self.share(front.value_mm);
@@ -66,7 +66,7 @@ impl SmoothWall {
         // The triangles' share is as in front until the blending is complete.
         let [deep, ..] = self.share(front.value_mm + self.passing_mm);
         let coverage = front.coverage + deep * (back.coverage - front.coverage);
-        Some((told(value_mm, &passing), coverage))
+        Some((reported(value_mm, &passing), coverage))
     }
 
     /// As [`SmoothWall::distance`], with the coverage C and

@@ -82,7 +82,7 @@ fn behind_the_surface_the_distance_goes_on_as_in_front() {
 }
 
 #[test]
-fn a_point_beyond_the_limit_is_told_its_distance_alone() {
+fn a_point_beyond_the_limit_is_reported_its_distance_alone() {
     let wall = tube(1.0);
     for x in points() {
         let triangle = wall.1.nearest(&x, 10.0).unwrap().triangle;
@@ -127,8 +127,8 @@ fn the_value_does_not_depend_on_the_triangle_it_is_asked_from() {
     let (smooth, query) = tube(1.0);
     for x in points() {
         let here = smooth.distance(&x, query.nearest(&x, 10.0).unwrap().triangle).unwrap();
-        let aside = Vec3::new(-x.y, x.x, 1.2) * 0.06;
-        let there = smooth.distance(&x, query.nearest(&(x + aside), 10.0).unwrap().triangle).unwrap();
+        let lateral = Vec3::new(-x.y, x.x, 1.2) * 0.06;
+        let there = smooth.distance(&x, query.nearest(&(x + lateral), 10.0).unwrap().triangle).unwrap();
         assert_eq!(here.value_mm.to_bits() >> 8, there.value_mm.to_bits() >> 8);
     }
 }

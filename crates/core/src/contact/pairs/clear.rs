@@ -116,7 +116,7 @@ impl SelfContact {
         state: &RodState,
         advance_mm: f64,
     ) -> bool {
-        if advance_mm <= 0.0 || self.skins.is_empty() || self.is_alone_and_open(elements, state) {
+        if advance_mm <= 0.0 || self.capsules.is_empty() || self.is_alone_and_open(elements, state) {
             return false;
         }
         // The tip belongs to the first rod.
@@ -124,20 +124,20 @@ impl SelfContact {
             return false;
         };
         self.is_placed = false;
-        self.tree.place(&super::Curve { elements, state, skins: &self.skins, closed: false });
+        self.tree.place(&super::Curve { elements, state, capsules: &self.capsules, closed: false });
         let tip = state.positions[last + 1];
         let from = tip - state.frames[last + 1].t * advance_mm;
-        let reach_mm = |e: usize| 0.5 * (self.skins[e].radius_mm + self.skins[last].radius_mm);
+        let reach_mm = |e: usize| 0.5 * (self.capsules[e].radius_mm + self.capsules[last].radius_mm);
         self.tree.is_near_segment((&from, &tip), advance_mm + self.apart_mm(), reach_mm)
     }
 
     /// Whether the rod passes through itself between two states.
     pub(crate) fn crosses(&mut self, elements: &[ElementData], from: &RodState, to: &RodState) -> bool {
-        if self.skins.is_empty() || (self.is_alone_and_open(elements, from) && is_open(to)) {
+        if self.capsules.is_empty() || (self.is_alone_and_open(elements, from) && is_open(to)) {
             return false;
         }
         self.is_placed = false;
-        let curve = |state| super::Curve { elements, state, skins: &self.skins, closed: self.closed };
+        let curve = |state| super::Curve { elements, state, capsules: &self.capsules, closed: self.closed };
         self.tree.place(&curve(from));
         self.tree.move_to(&curve(to));
         self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0

@@ -65,7 +65,7 @@ impl Geometry for SelfContact {
 
     fn follow(&mut self, moved: &dyn Moved) {
         self.ways.clear();
-        self.ways.extend((0..self.skins.len()).map(|e| moved.element(e)));
+        self.ways.extend((0..self.capsules.len()).map(|e| moved.element(e)));
     }
 
     fn motion(&self, difference: &Difference, _moved: &dyn Moved) -> Motion {

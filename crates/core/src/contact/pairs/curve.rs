@@ -5,7 +5,7 @@
 //! rods are solved together there are gaps between them, which are not elements of either. Where the radius changes
 //! abruptly, as at the tip of a catheter, the surface has a shoulder: a stretch ends there, as at the end of a rod.
 
-use super::Skin;
+use super::Capsule;
 use crate::Vec3;
 use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
@@ -59,7 +59,7 @@ impl Piece {
 pub(super) struct Curve<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) state: &'a RodState,
-    pub(super) skins: &'a [Skin],
+    pub(super) capsules: &'a [Capsule],
     /// Whether the rod is a ring: its end is its start.
     pub(super) closed: bool,
 }
@@ -111,7 +111,7 @@ impl Curve<'_> {
 
     /// Whether the surface of an element continues in a neighbour, which is no gap.
     fn goes_on(&self, into: usize, from: usize) -> bool {
-        let [a, b] = [into, from].map(|e| self.skins[e].radius_mm);
+        let [a, b] = [into, from].map(|e| self.capsules[e].radius_mm);
         !self.is_break(into) && (a - b).abs() <= SHOULDER * a.max(b)
     }
 

@@ -46,7 +46,7 @@ pub(super) struct FrictionOfPairs {
 
 /// Parameters of friction in a part of a command.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rubs {
+pub(crate) struct FrictionLaw {
     /// Coefficient of friction μ.
     pub(crate) coefficient: f64,
     /// Slip below which points stick, and its lower bound while hands hold still, mm.
@@ -101,7 +101,7 @@ impl SelfContact {
         state: &RodState,
         places: impl Iterator<Item = Vec3>,
         advances_mm: impl Iterator<Item = f64>,
-        Rubs { coefficient, stick_mm, least_n }: Rubs,
+        FrictionLaw { coefficient, stick_mm, least_n }: FrictionLaw,
     ) {
         let friction = &mut self.friction;
         friction.law = Coulomb::new(coefficient);
@@ -133,8 +133,8 @@ impl SelfContact {
         }
         let FrictionOfPairs { law, least_n, begun, advances_mm } = &mut self.friction;
         let (now, was) = (
-            Curve { elements, state, skins: &self.skins, closed: self.closed },
-            Curve { elements, state: begun, skins: &self.skins, closed: self.closed },
+            Curve { elements, state, capsules: &self.capsules, closed: self.closed },
+            Curve { elements, state: begun, capsules: &self.capsules, closed: self.closed },
         );
         let all = self.pairs.iter_mut().map(|pair| {
             let size = pair.gap.direction().norm();

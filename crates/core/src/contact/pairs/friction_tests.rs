@@ -21,9 +21,10 @@ fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
     let all = [&elements[..], &[ElementData::BREAK], &stiff[..]].concat();
     let springs = (0..=N).map(|i| (N + 1 + i, below.positions[i])).collect();
     let mut held = Held { force: (N, Vec3::new(0.0, along, -down)), springs, stiffness: 2000.0 };
-    let skin = |data: &ElementData| if data.is_break() { Skin::NONE } else { Skin::rigid(RADIUS, 1.0) };
-    let mut loops = SelfContact::new(&all, all.iter().map(skin).collect());
-    let law = Rubs { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
+    let capsule =
+        |data: &ElementData| if data.is_break() { Capsule::NONE } else { Capsule::rigid(RADIUS, 1.0) };
+    let mut loops = SelfContact::new(&all, all.iter().map(capsule).collect());
+    let law = FrictionLaw { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
     loops.begin_friction(&rods, std::iter::empty(), all.iter().map(|_| 0.0), law);
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
     let options = NewtonOptions { tolerance: 1e-9, ..NewtonOptions::default() };
@@ -39,7 +40,7 @@ fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
 #[test]
 fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
     let (elements, state) = tests::along(|a| Vec3::new(0.5 * a.cos(), 0.5 * a.sin(), 0.03 * a), 13.0, 40);
-    let coil = || SelfContact::new(&elements, vec![Skin { radius_mm: 0.1, modulus_n_per_mm2: 40.0 }; 40]);
+    let coil = || SelfContact::new(&elements, vec![Capsule { radius_mm: 0.1, modulus_n_per_mm2: 40.0 }; 40]);
     let mut first = coil();
     first.look_at_base(&elements, &state);
     first.pairs.iter_mut().for_each(|pair| pair.force_n = 0.5);
@@ -51,7 +52,7 @@ fn held_friction_of_pairs_is_that_of_the_start_of_the_part() {
     };
     for (coefficient, share) in [(0.3, 1.0), (0.0, 0.0)] {
         let mut next = coil();
-        let law = Rubs { coefficient, stick_mm: [1e-3, 1e-5], least_n: 1e-9 };
+        let law = FrictionLaw { coefficient, stick_mm: [1e-3, 1e-5], least_n: 1e-9 };
         next.begin_friction(&state, std::iter::empty(), elements.iter().map(|_| 0.0), law);
         next.recall(&elements, &kept);
         next.hold_friction();

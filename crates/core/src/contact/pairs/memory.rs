@@ -103,7 +103,7 @@ impl SelfContact {
             let Pair { site, arc_mm, force_n, friction, .. } = pair;
             Remembered { site, arc_mm, force_n, friction }
         }));
-        let curve = Curve { elements, state, skins: &self.skins, closed: self.closed };
+        let curve = Curve { elements, state, capsules: &self.capsules, closed: self.closed };
         self.site_positions.clear();
         self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
         self.known = 0.0;
@@ -127,7 +127,7 @@ impl SelfContact {
     /// Finds the pairs at the base whose gap is between the distance known so far and another, in touching distances.
     fn seek(&mut self, elements: &[ElementData], base: &RodState, known: f64) {
         let (mut near, mut pairs) = (std::mem::take(&mut self.near), std::mem::take(&mut self.pairs));
-        let curve = Curve { elements, state: base, skins: &self.skins, closed: self.closed };
+        let curve = Curve { elements, state: base, capsules: &self.capsules, closed: self.closed };
         let reach_mm = |a: usize, b: usize| reach(known) * self.touch_mm(a, b);
         self.tree.near(2.0 * self.largest_radius_mm * reach(known), self.apart_mm(), reach_mm, &mut near);
         for (a, b) in &near {
@@ -151,7 +151,7 @@ impl SelfContact {
 
     /// Distance of the axes of two elements whose surfaces touch, mm.
     fn touch_mm(&self, a: usize, b: usize) -> f64 {
-        self.skins[a].radius_mm + self.skins[b].radius_mm
+        self.capsules[a].radius_mm + self.capsules[b].radius_mm
     }
 
     /// Finds the pairs of the sites of element `a` with element `b`: minima within `b` of the distance from a site.
@@ -191,7 +191,7 @@ impl SelfContact {
         if a.abs_diff(b) < 2 || self.tree.between(here_mm, arc_mm) < self.apart_mm() {
             return None;
         }
-        let [one, other] = [a, b].map(|e| self.skins[e]);
+        let [one, other] = [a, b].map(|e| self.capsules[e]);
         let softer = 2.0 / (1.0 / one.modulus_n_per_mm2 + 1.0 / other.modulus_n_per_mm2);
         // Both stretches have sites that feel the other.
         let weight_mm = 0.5 * self.sites[site].weight_mm;
@@ -225,7 +225,12 @@ impl SelfContact {
     /// Places the hierarchy at the base, if it is not there yet.
     pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
         if !std::mem::replace(&mut self.is_placed, true) {
-            self.tree.place(&Curve { elements, state: &self.base, skins: &self.skins, closed: self.closed });
+            self.tree.place(&Curve {
+                elements,
+                state: &self.base,
+                capsules: &self.capsules,
+                closed: self.closed,
+            });
         }
     }
 
@@ -236,7 +241,7 @@ impl SelfContact {
             return *part;
         }
         self.place_tree(elements);
-        self.tree.move_to(&Curve { elements, state: to, skins: &self.skins, closed: self.closed });
+        self.tree.move_to(&Curve { elements, state: to, capsules: &self.capsules, closed: self.closed });
         let part = self.tree.safe_part(self.apart_mm());
         self.checked.0.copy_from(to);
         self.checked.1 = part;

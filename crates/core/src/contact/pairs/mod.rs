@@ -41,7 +41,7 @@ use contacts::Difference;
 use curve::{Curve, Place};
 pub use forces::Touching;
 pub(crate) use forces::{Pressing, RodPlace};
-pub(crate) use friction::Rubs;
+pub(crate) use friction::FrictionLaw;
 use friction::{FrictionOfPairs, PairFriction};
 use gap::Gap;
 pub(crate) use memory::PairForce;
@@ -62,14 +62,14 @@ const BEYOND: f64 = 0.1;
 
 /// The surface of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Skin {
+pub struct Capsule {
     /// Radius of the rod, mm.
     pub radius_mm: f64,
     /// k: force per length and depth, N/mm².
     pub modulus_n_per_mm2: f64,
 }
 
-impl Skin {
+impl Capsule {
     /// Default contact modulus of a rod, over EI/r⁴. A solid round wire has E = 4/π EI/r⁴, and two of them in contact
     /// yield by about as much as their material does; ten times as hard they are practically rigid: a plectoneme
     /// under T r²/EI = 10⁻³ sinks in by 10⁻⁴ of its radius.
@@ -135,7 +135,7 @@ pub(crate) struct PairCounters {
 /// Contact energy of rods with themselves and each other, with knowledge kept between calls.
 #[derive(Debug, Clone, Default)]
 pub struct SelfContact {
-    skins: Vec<Skin>,
+    capsules: Vec<Capsule>,
     sites: Vec<Site>,
     /// First site of each element, and one past the last.
     first_sites: Vec<usize>,
@@ -171,22 +171,22 @@ pub struct SelfContact {
 
 impl SelfContact {
     /// For a rod with these elements and their surfaces.
-    pub fn new(elements: &[ElementData], skins: Vec<Skin>) -> Self {
+    pub fn new(elements: &[ElementData], capsules: Vec<Capsule>) -> Self {
         let mut contact = Self::default();
-        contact.renew(elements, skins);
+        contact.renew(elements, capsules);
         contact
     }
 
     /// Resets to another rod, about which nothing is known.
-    pub(crate) fn renew(&mut self, elements: &[ElementData], skins: impl IntoIterator<Item = Skin>) {
-        let Self { skins: known, sites, first_sites, .. } = self;
+    pub(crate) fn renew(&mut self, elements: &[ElementData], capsules: impl IntoIterator<Item = Capsule>) {
+        let Self { capsules: known, sites, first_sites, .. } = self;
         known.clear();
-        known.extend(skins);
+        known.extend(capsules);
         sites.clear();
         first_sites.clear();
         first_sites.push(0);
-        for (e, (element, skin)) in elements.iter().zip(&*known).enumerate() {
-            let spaces = (element.length / (SPACING_RADII * skin.radius_mm)).ceil().max(1.0);
+        for (e, (element, capsule)) in elements.iter().zip(&*known).enumerate() {
+            let spaces = (element.length / (SPACING_RADII * capsule.radius_mm)).ceil().max(1.0);
             let count = if element.is_break() { 0.0 } else { spaces };
             let site = |k: usize| Site {
                 place: Place { element: e, xi: (k as f64 + 0.5) / count },
@@ -195,7 +195,7 @@ impl SelfContact {
             sites.extend((0..count as usize).map(site));
             first_sites.push(sites.len());
         }
-        let radii_mm = || known.iter().map(|skin| skin.radius_mm);
+        let radii_mm = || known.iter().map(|capsule| capsule.radius_mm);
         self.largest_radius_mm = radii_mm().fold(0.0, f64::max);
         self.thinnest_radius_mm =
             radii_mm().filter(|radius_mm| *radius_mm > 0.0).fold(f64::INFINITY, f64::min);
@@ -213,7 +213,7 @@ impl SelfContact {
     }
 
     fn curve<'a>(&'a self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
-        Curve { elements, state, skins: &self.skins, closed: self.closed }
+        Curve { elements, state, capsules: &self.capsules, closed: self.closed }
     }
 
     /// Counts so far.

@@ -37,7 +37,7 @@ fn loop_over(high: f64) -> impl Fn(f64) -> Vec3 {
 }
 
 fn contact(elements: &[ElementData], radius_mm: f64) -> SelfContact {
-    SelfContact::new(elements, vec![Skin { radius_mm, modulus_n_per_mm2: 40.0 }; elements.len()])
+    SelfContact::new(elements, vec![Capsule { radius_mm, modulus_n_per_mm2: 40.0 }; elements.len()])
 }
 
 fn derivatives_are_those_of_the_energy<const C: usize>(
@@ -52,8 +52,8 @@ fn derivatives_are_those_of_the_energy<const C: usize>(
     for (i, x) in begun.positions.iter_mut().enumerate() {
         *x += Vec3::new((0.7 * i as f64).sin(), (1.1 * i as f64).cos(), 0.3) * 0.01;
     }
-    let rubs = Rubs { coefficient: friction, stick_mm: [0.02, 0.001], least_n: 0.0 };
-    touching.begin_friction(&begun, std::iter::empty(), elements.iter().map(|_| 0.005), rubs);
+    let law = FrictionLaw { coefficient: friction, stick_mm: [0.02, 0.001], least_n: 0.0 };
+    touching.begin_friction(&begun, std::iter::empty(), elements.iter().map(|_| 0.005), law);
     let mut assembly = Assembly::<C>::new(elements.len());
     touching.look_at_base(elements, state);
     // With the forces of the energy itself.
@@ -266,9 +266,9 @@ fn a_thick_part_is_not_felt_beyond_its_shoulder() {
         elements.extend(others);
         state.join(&other);
         let radius = |e: usize| if e < 10 { 0.3 } else { 0.1 };
-        let skin = |e: usize| Skin { radius_mm: radius(e), modulus_n_per_mm2: 40.0 };
-        let skins = (0..elements.len()).map(skin).collect();
-        let touching = SelfContact::new(&elements, skins).touching_at(&elements, &state);
+        let capsule = |e: usize| Capsule { radius_mm: radius(e), modulus_n_per_mm2: 40.0 };
+        let capsules = (0..elements.len()).map(capsule).collect();
+        let touching = SelfContact::new(&elements, capsules).touching_at(&elements, &state);
         (touching.iter().map(|t| t.force_n).sum::<f64>(), touching)
     };
     // A little above the thin part: free. Pressed in by a hundredth: that and no more, as far from the shoulder.
@@ -286,16 +286,16 @@ fn a_thick_part_is_not_felt_beyond_its_shoulder() {
 #[test]
 fn ends_that_meet_head_on_are_felt_as_near_as_they_are() {
     // Open rings with this gap whose ends face each other, or are offset.
-    for (apart, aside) in [(0.19, 0.0), (0.15, 0.5), (0.0, 0.9), (0.12, 0.7)] {
+    for (apart, lateral) in [(0.19, 0.0), (0.15, 0.5), (0.0, 0.9), (0.12, 0.7)] {
         let radius = 1.5;
         let turn = std::f64::consts::TAU - apart / radius;
-        let ring = move |a: f64| Vec3::new(radius * a.cos(), radius * a.sin(), 0.19 * aside * a / turn);
+        let ring = move |a: f64| Vec3::new(radius * a.cos(), radius * a.sin(), 0.19 * lateral * a / turn);
         let (elements, state) = along(ring, turn, 20);
         let mut touching = contact(&elements, 0.1);
         let ends = (state.positions[20] - state.positions[0]).norm();
         touching.look_at_base(&elements, &state);
         // The depths of the sites next to the ends.
         let deepest = touching.pairs.iter().map(Pair::depth_mm).fold(0.0, f64::max);
-        assert!((deepest - (0.2 - ends)).abs() < 5e-4, "{apart} {aside}: {deepest} of {}", 0.2 - ends);
+        assert!((deepest - (0.2 - ends)).abs() < 5e-4, "{apart} {lateral}: {deepest} of {}", 0.2 - ends);
     }
 }

@@ -1,4 +1,4 @@
-//! Deviation of the felt wall from the surface it is made from.
+//! Deviation of the contact surface from the surface it is made from.
 //!
 //! The wall that acts on a device is the smooth one, not the triangles it is made from: where these cut across a
 //! crest the smooth wall lies slightly outside them, and in tubes by the sag edge²/8R. So the deviation is measured
@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use super::FeltMesh;
+use super::ContactMesh;
 use crate::vessel::{SurfaceMesh, Wall, WallQuery};
 use crate::{Result, Vec3, parallel};
 
@@ -40,7 +40,7 @@ pub struct Deviation {
     pub worst_at_mm: Vec3,
 }
 
-impl FeltMesh {
+impl ContactMesh {
     /// The deviation of this wall from `given`, except its extensions beyond openings.
     ///
     /// # Errors
@@ -58,8 +58,8 @@ impl FeltMesh {
         };
         let extended = |x: &Vec3| {
             given.openings().iter().any(|opening| {
-                let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
-                beyond_mm > 0.0 && aside_mm < BESIDE_RADII * opening.radius_mm
+                let (beyond_mm, lateral_mm) = opening.beyond_and_off_axis_mm(x);
+                beyond_mm > 0.0 && lateral_mm < BESIDE_RADII * opening.radius_mm
             })
         };
         let from_felt = |x: &Vec3| {
@@ -156,7 +156,7 @@ mod tests {
     fn it_is_the_sag_of_triangles_and_the_distance_of_another_tube() {
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let given = tube(4.0);
-        let surface = FeltMesh::new(&given, 0.2, &properties, &NoStore).unwrap();
+        let surface = ContactMesh::new(&given, 0.2, &properties, &NoStore).unwrap();
         let own = surface.deviation(&given).unwrap();
         // The middle of a chord of 1 mm, and slightly more in the middle of a triangle.
         let sag_mm = 1.0 / 32.0;

@@ -1,4 +1,4 @@
-//! The felt wall of a surface: remeshed uniformly, extended beyond its openings, smoothed, and ready for queries.
+//! The contact surface of a surface: remeshed uniformly, extended beyond its openings, smoothed, and ready for queries.
 
 use std::borrow::Cow;
 
@@ -15,7 +15,7 @@ use crate::{Result, Vec3, parallel};
 
 /// A mesh prepared for the contact of devices.
 #[derive(Debug, Clone)]
-pub struct FeltMesh {
+pub struct ContactMesh {
     /// Its smooth distance.
     pub smooth: SmoothWall,
     /// Nearest triangles and clearances.
@@ -43,7 +43,7 @@ fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) 
     store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
 }
 
-impl FeltMesh {
+impl ContactMesh {
     /// Prepares `wall` for devices up to this radius, mm, with its uniform mesh from `store`.
     ///
     /// # Errors
@@ -141,7 +141,7 @@ mod tests {
         let tree = anatomy::tree("aortic_arch").unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(6.0)).unwrap().wall;
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-        let surface = FeltMesh::new(&wall, RADIUS_MM, &properties, &NoStore).unwrap();
+        let surface = ContactMesh::new(&wall, RADIUS_MM, &properties, &NoStore).unwrap();
         // With insets measured on the triangles alone.
         let on_them = SmoothWall::new(&Wall::welded(&extended(&wall, RADIUS_MM)).unwrap(), RADIUS_MM);
         let mut pressing = [0, 0];

@@ -6,7 +6,7 @@ use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 impl WallContact<'_> {
     /// Whether there is friction.
-    pub(crate) fn rubs(&self) -> bool {
+    pub(crate) fn has_friction(&self) -> bool {
         self.friction.acts()
     }
 

@@ -68,8 +68,8 @@ impl WallContact<'_> {
     /// The reading taken at `x` with that hint, if it is sufficient.
     pub(super) fn read_there(&self, index: usize, x: &Vec3, hint: Hint, limit_mm: f64) -> Option<Reading> {
         let TakenReading { at_mm, hint: taken, nearness } = self.cache.readings[index];
-        let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
-        (at_mm == *x && taken == hint && told).then(|| Reading::of(nearness, limit_mm))
+        let reported = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
+        (at_mm == *x && taken == hint && reported).then(|| Reading::of(nearness, limit_mm))
     }
 
     /// Reading of a point that has sunk into the wall: follows the surface from there.

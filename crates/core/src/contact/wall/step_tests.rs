@@ -123,7 +123,7 @@ fn rubbed(surface: &ContactSurface, predicting: bool) -> ([usize; 2], [f64; 2]) 
 }
 
 #[test]
-fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
+fn a_rod_with_friction_slips_and_sticks_in_few_steps() {
     let surface = straight();
     let ((few, with), (many, without)) = (rubbed(&surface, true), rubbed(&surface, false));
     // Equal to the accuracy of the held normal forces.

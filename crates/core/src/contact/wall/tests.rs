@@ -171,8 +171,8 @@ fn on_the_way(contact: &mut WallContact<'_>, from: Vec3, to: Vec3) -> [f64; 2] {
     (known.base_looked_at, known.base_piece) = (from, Some(triangle));
     (known.looked_at, known.piece) = (from, Some(triangle));
     contact.read_within(0, &from, radius_mm);
-    let told = contact.read_within(0, &to, radius_mm).distance_mm();
-    [told, contact.surface.nearness(&to, Hint::Near(triangle), radius_mm).value_mm()]
+    let reported = contact.read_within(0, &to, radius_mm).distance_mm();
+    [reported, contact.surface.nearness(&to, Hint::Near(triangle), radius_mm).value_mm()]
         .map(|mm| mm.min(radius_mm))
 }
 
@@ -187,8 +187,8 @@ fn what_a_point_reads_hangs_on_where_it_is_not_on_where_it_was() {
     for (k, from) in crate::contact::ridge_tests::points().enumerate() {
         let k = k as f64;
         let to = from + Vec3::new((1.7 * k).sin(), (2.3 * k).sin(), (3.1 * k).cos()) * 0.05;
-        let [told, fresh] = on_the_way(&mut contact, from, to);
-        assert!((told - fresh).abs() < 1e-12, "{from:?} {to:?}: {told} for {fresh}");
+        let [reported, fresh] = on_the_way(&mut contact, from, to);
+        assert!((reported - fresh).abs() < 1e-12, "{from:?} {to:?}: {reported} for {fresh}");
         presses += usize::from(fresh > 0.0 && fresh < 0.2);
         let (triangle, _) = surface.nearest_piece(&from, 5.0).unwrap();
         let lost_mm = surface.nearness(&from, Hint::Near(triangle), f64::INFINITY).value_mm() - 0.2;

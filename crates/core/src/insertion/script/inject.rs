@@ -59,14 +59,15 @@ impl Bolus {
     pub(super) fn new(name: String, inject: &Inject, own: usize, stack: &Stack) -> Result<Self> {
         for (key, value, [least, most]) in [("ml", inject.ml, ML), ("ml_per_s", inject.ml_per_s, ML_PER_S)] {
             if !(least..=most).contains(&value) {
-                let mend = format!("must be a number from {least} to {most}");
-                return Err(Error::parameter(format!("{name}.{key}"), value, mend));
+                let remedy = format!("must be a number from {least} to {most}");
+                return Err(Error::parameter(format!("{name}.{key}"), value, remedy));
             }
         }
         let duration_s = inject.ml / inject.ml_per_s;
         if duration_s > LONGEST_S {
-            let mend = format!("takes {duration_s} s with {} ml: at most {LONGEST_S} s are taken", inject.ml);
-            return Err(Error::parameter(format!("{name}.ml_per_s"), inject.ml_per_s, mend));
+            let remedy =
+                format!("takes {duration_s} s with {} ml: at most {LONGEST_S} s are taken", inject.ml);
+            return Err(Error::parameter(format!("{name}.ml_per_s"), inject.ml_per_s, remedy));
         }
         let through = format!("{name}.through");
         let instrument = match &inject.through {
@@ -76,8 +77,9 @@ impl Bolus {
         let one = &stack.instruments()[instrument];
         // A single device contains no other instrument, so its lumen may be given for rendering only.
         if stack.is_several() && one.device.sections().iter().any(|s| s.inner_radius_mm.is_none()) {
-            let mend = "has no lumen: inject through another, or give inner_radius_mm in all of its sections";
-            return Err(Error::parameter(through, format!("{:?}", one.name), mend));
+            let remedy =
+                "has no lumen: inject through another, or give inner_radius_mm in all of its sections";
+            return Err(Error::parameter(through, format!("{:?}", one.name), remedy));
         }
         Ok(Self { name, instrument, ml: inject.ml, ml_per_s: inject.ml_per_s })
     }
@@ -87,7 +89,7 @@ impl Bolus {
         if lengths.now_mm[self.instrument] > 0.0 {
             return Ok(());
         }
-        let mend = "the instrument is not in when the line begins: advance it before";
-        Err(Error::parameter(&self.name, format!("{} ml", self.ml), mend))
+        let remedy = "the instrument is not in when the line begins: advance it before";
+        Err(Error::parameter(&self.name, format!("{} ml", self.ml), remedy))
     }
 }

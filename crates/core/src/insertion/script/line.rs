@@ -88,7 +88,7 @@ impl ScriptLine {
         let solves = self.solves;
         let wait = self.wait(name)?;
         let of_solves =
-            |mend: &str| Err(Error::parameter(format!("{name}.solves"), solves.unwrap_or(0), mend));
+            |remedy: &str| Err(Error::parameter(format!("{name}.solves"), solves.unwrap_or(0), remedy));
         if solves == Some(0) {
             return of_solves(
                 "allow at least one in each step, or leave it out for steps that end in equilibrium",
@@ -110,8 +110,8 @@ impl ScriptLine {
             let part = line.part(name, stack)?;
             if parts.iter().any(|other| other.instrument == part.instrument) {
                 let value = format!("{:?}", stack.instruments()[part.instrument].name);
-                let mend = "moves in this line already: split the line in two";
-                return Err(Error::parameter(format!("{}.instrument", part.name), value, mend));
+                let remedy = "moves in this line already: split the line in two";
+                return Err(Error::parameter(format!("{}.instrument", part.name), value, remedy));
             }
             parts.push(part);
         }
@@ -127,8 +127,8 @@ impl ScriptLine {
         let key = format!("{name}.exchange");
         let instrument = find(stack, other, &key)?;
         if parts.len() > 1 || instrument == lead {
-            let mend = "one instrument takes the place of another: name that one, and leave with out";
-            return Err(Error::parameter(key, format!("{other:?}"), mend));
+            let remedy = "one instrument takes the place of another: name that one, and leave with out";
+            return Err(Error::parameter(key, format!("{other:?}"), remedy));
         }
         let into = match self.advance_mm {
             Some(mm) => Travel::By(mm),
@@ -150,17 +150,17 @@ impl ScriptLine {
     fn detachment(&self, name: &str, stack: &Stack) -> Result<Motion> {
         let alone = Self { instrument: self.instrument.clone(), detach: true, ..Self::default() };
         if *self != alone {
-            let mend = "stands alone with its instrument: leave all that moves, waits or injects to lines of their own";
-            return Err(Error::parameter(format!("{name}.detach"), true, mend));
+            let remedy = "stands alone with its instrument: leave all that moves, waits or injects to lines of their own";
+            return Err(Error::parameter(format!("{name}.detach"), true, remedy));
         }
         let instrument = self.number(name, stack)?;
         let one = &stack.instruments()[instrument];
         if one.device.coil_mm() == 0.0 {
-            let mend = format!(
+            let remedy = format!(
                 "{:?} is no coil: a device file of kind coil whose first part has a winding is one",
                 one.name
             );
-            return Err(Error::parameter(format!("{name}.detach"), true, mend));
+            return Err(Error::parameter(format!("{name}.detach"), true, remedy));
         }
         Ok(Motion { detach: Some(instrument), ..Motion::resting(name.to_owned()) })
     }
@@ -182,16 +182,16 @@ impl ScriptLine {
         let Some(wait_s) = self.wait_s else {
             return match self.step_s {
                 Some(step_s) => {
-                    let mend =
+                    let remedy =
                         "cuts the time that hands rest: give wait_s, or step_mm and step_deg of a motion";
-                    Err(Error::parameter(format!("{name}.step_s"), step_s, mend))
+                    Err(Error::parameter(format!("{name}.step_s"), step_s, remedy))
                 }
                 None => Ok(None),
             };
         };
         if !self.rests() {
-            let mend = "hands rest in it: leave all that moves to a line of its own";
-            return Err(Error::parameter(format!("{name}.wait_s"), wait_s, mend));
+            let remedy = "hands rest in it: leave all that moves to a line of its own";
+            return Err(Error::parameter(format!("{name}.wait_s"), wait_s, remedy));
         }
         in_range(&format!("{name}.wait_s"), wait_s, LONGEST_S)?;
         let step_s = self.step_s.unwrap_or(STEP_S);
@@ -203,9 +203,9 @@ impl ScriptLine {
     fn part(&self, name: String, stack: &Stack) -> Result<Part> {
         for (field, value) in [("advance_mm", self.advance_mm), ("retract_mm", self.retract_mm)] {
             if let Some(v) = value.filter(|v| !(v.is_finite() && *v >= 0.0)) {
-                let mend =
+                let remedy =
                     "must be a number of 0 or more; the direction is in the key (advance_mm, retract_mm)";
-                return Err(Error::parameter(format!("{name}.{field}"), v, mend));
+                return Err(Error::parameter(format!("{name}.{field}"), v, remedy));
             }
         }
         let steps = [("step_mm", self.step_mm.unwrap_or(1.0)), ("step_deg", self.step_deg.unwrap_or(5.0))];
@@ -249,29 +249,29 @@ impl ScriptLine {
             }
             _ => return Ok(()),
         };
-        let (key, speed, mend) = idle;
-        Err(Error::parameter(format!("{}.{key}", part.name), speed, mend))
+        let (key, speed, remedy) = idle;
+        Err(Error::parameter(format!("{}.{key}", part.name), speed, remedy))
     }
 
     /// Its motion along the device.
     fn travel(&self, name: &str) -> Result<Travel> {
         match (self.advance_mm, self.retract_mm, self.withdraw) {
             (Some(a), Some(_), _) => {
-                let mend = "a line either advances or retracts: split it in two";
-                Err(Error::parameter(format!("{name}.advance_mm"), a, mend))
+                let remedy = "a line either advances or retracts: split it in two";
+                Err(Error::parameter(format!("{name}.advance_mm"), a, remedy))
             }
             (a, r, true) if a.is_some() || r.is_some() => {
-                let mend = "pulls back all that is in: leave advance_mm and retract_mm out";
-                Err(Error::parameter(format!("{name}.withdraw"), true, mend))
+                let remedy = "pulls back all that is in: leave advance_mm and retract_mm out";
+                Err(Error::parameter(format!("{name}.withdraw"), true, remedy))
             }
             (_, Some(r), _) if self.exchange.is_some() => {
-                let mend = "exchange withdraws all of the instrument: leave retract_mm out";
-                Err(Error::parameter(format!("{name}.retract_mm"), r, mend))
+                let remedy = "exchange withdraws all of the instrument: leave retract_mm out";
+                Err(Error::parameter(format!("{name}.retract_mm"), r, remedy))
             }
             (None, None, false) if self.rotate_deg.is_none() && self.exchange.is_none() => {
-                let mend =
+                let remedy =
                     "give advance_mm, retract_mm, withdraw, rotate_deg, exchange, detach, wait_s or inject";
-                Err(Error::parameter(name, "{}", mend))
+                Err(Error::parameter(name, "{}", remedy))
             }
             (_, _, true) => Ok(Travel::Out),
             (a, r, false) => Ok(Travel::By(a.unwrap_or(0.0) - r.unwrap_or(0.0))),
@@ -284,8 +284,8 @@ impl ScriptLine {
             Some(instrument) => find(stack, instrument, &format!("{name}.instrument")),
             None if stack.is_several() => {
                 let names: Vec<&str> = stack.instruments().iter().map(|one| one.name.as_str()).collect();
-                let mend = format!("say which one moves: {}", names.join(", "));
-                Err(Error::parameter(format!("{name}.instrument"), "none", mend))
+                let remedy = format!("say which one moves: {}", names.join(", "));
+                Err(Error::parameter(format!("{name}.instrument"), "none", remedy))
             }
             None => Ok(0),
         }
@@ -297,8 +297,8 @@ impl ScriptLine {
         for (index, line) in self.with.iter().enumerate() {
             let name = format!("{name}.with[{index}]");
             if !line.with.is_empty() {
-                let mend = "is with another line already: list all of them there";
-                return Err(Error::parameter(format!("{name}.with"), line.with.len(), mend));
+                let remedy = "is with another line already: list all of them there";
+                return Err(Error::parameter(format!("{name}.with"), line.with.len(), remedy));
             }
             let waits = line.wait_s.is_some() || line.step_s.is_some();
             let keys = [
@@ -311,8 +311,8 @@ impl ScriptLine {
             ];
             for (key, given) in keys {
                 if given {
-                    let mend = "belongs to the line itself, not to those with it";
-                    return Err(Error::parameter(format!("{name}.{key}"), "given", mend));
+                    let remedy = "belongs to the line itself, not to those with it";
+                    return Err(Error::parameter(format!("{name}.{key}"), "given", remedy));
                 }
             }
             lines.push((name, line));
@@ -324,7 +324,7 @@ impl ScriptLine {
 /// Index of the instrument that a key names.
 pub(super) fn find(stack: &Stack, instrument: &str, key: &str) -> Result<usize> {
     stack.find(instrument).map_err(|error| match error {
-        Error::Parameter { value, mend, .. } => Error::Parameter { name: key.to_owned(), value, mend },
+        Error::Parameter { value, remedy, .. } => Error::Parameter { name: key.to_owned(), value, remedy },
         other => other,
     })
 }

@@ -66,8 +66,8 @@ impl Script {
             }
             script.most_steps += bounds.go(motion, stack)?;
             if script.most_steps as f64 > STEP_LIMIT {
-                let mend = format!("at most {STEP_LIMIT} steps in all");
-                return Err(Error::parameter("script", script.most_steps, mend));
+                let remedy = format!("at most {STEP_LIMIT} steps in all");
+                return Err(Error::parameter("script", script.most_steps, remedy));
             }
         }
         Ok(script)
@@ -100,18 +100,18 @@ impl Script {
     /// steps are ticks.
     pub fn moves(&self) -> Result<Vec<Vec<Move>>> {
         if let Some(line) = self.conditional() {
-            let mend = "where the line ends is not known beforehand: carry the script out step by step";
-            return Err(Error::parameter(format!("{line}.until"), "given", mend));
+            let remedy = "where the line ends is not known beforehand: carry the script out step by step";
+            return Err(Error::parameter(format!("{line}.until"), "given", remedy));
         }
         if let Some(motion) = self.motions.iter().find(|motion| motion.detach.is_some()) {
-            let mend = "moves alone do not tell it: carry the script out step by step";
-            return Err(Error::parameter(format!("{}.detach", motion.name), true, mend));
+            let remedy = "moves alone do not tell it: carry the script out step by step";
+            return Err(Error::parameter(format!("{}.detach", motion.name), true, remedy));
         }
         if let Some((name, solves)) =
             self.motions.iter().find_map(|motion| Some((&motion.name, motion.solves?)))
         {
-            let mend = "moves alone do not tell ticks: carry the script out step by step";
-            return Err(Error::parameter(format!("{name}.solves"), solves, mend));
+            let remedy = "moves alone do not tell ticks: carry the script out step by step";
+            return Err(Error::parameter(format!("{name}.solves"), solves, remedy));
         }
         let mut run = self.begin();
         let mut moves = Vec::with_capacity(self.len());
@@ -140,8 +140,8 @@ impl Script {
     fn check_speeds(&self) -> Result<()> {
         match self.motions.iter().find(|motion| !motion.parts.is_empty() && !motion.is_timed()) {
             Some(motion) if self.is_timed() => {
-                let mend = "another line has a speed or wait_s: give speed_mm_per_s or speed_deg_per_s in all of them, or no times at all";
-                Err(Error::parameter(&motion.name, "no speed", mend))
+                let remedy = "another line has a speed or wait_s: give speed_mm_per_s or speed_deg_per_s in all of them, or no times at all";
+                Err(Error::parameter(&motion.name, "no speed", remedy))
             }
             _ => Ok(()),
         }
@@ -165,8 +165,8 @@ impl Bounds {
     /// Detaches a coil: only once, and it cannot be inserted again.
     fn detach(&mut self, motion: &Motion, instrument: usize, stack: &Stack) -> Result<usize> {
         let one = &stack.instruments()[instrument];
-        let refused = |mend: String| {
-            Err(Error::parameter(format!("{}.detach", motion.name), format!("{:?}", one.name), mend))
+        let refused = |remedy: String| {
+            Err(Error::parameter(format!("{}.detach", motion.name), format!("{:?}", one.name), remedy))
         };
         if std::mem::replace(&mut self.detached[instrument], true) {
             return refused("is detached already: push the next coil".into());
@@ -186,8 +186,8 @@ impl Bounds {
     fn go(&mut self, motion: &Motion, stack: &Stack) -> Result<usize> {
         if let Some(part) = motion.parts.iter().find(|part| self.detached[part.instrument]) {
             let name = &stack.instruments()[part.instrument].name;
-            let mend = "its coil is detached: advance the next one";
-            return Err(Error::parameter(format!("{}.instrument", part.name), format!("{name:?}"), mend));
+            let remedy = "its coil is detached: advance the next one";
+            return Err(Error::parameter(format!("{}.instrument", part.name), format!("{name:?}"), remedy));
         }
         let steps = motion.steps(&self.high)?;
         if let Some(bolus) = &motion.inject {
@@ -246,14 +246,14 @@ fn check_ends(part: &Part, [low_mm, high_mm]: [f64; 2], device_mm: f64) -> Resul
     let Travel::By(mm) = part.travel else { return Ok(()) };
     if low_mm > device_mm + LENGTH_SLACK_MM {
         let least_mm = low_mm - mm;
-        let mend = format!(
+        let remedy = format!(
             "the device is {device_mm} mm long and at least {least_mm} mm are inserted: advance less"
         );
-        return Err(Error::parameter(format!("{}.advance_mm", part.name), mm, mend));
+        return Err(Error::parameter(format!("{}.advance_mm", part.name), mm, remedy));
     }
     if high_mm < -LENGTH_SLACK_MM {
-        let mend = format!("at most {} mm are inserted: retract less", high_mm - mm);
-        return Err(Error::parameter(format!("{}.retract_mm", part.name), -mm, mend));
+        let remedy = format!("at most {} mm are inserted: retract less", high_mm - mm);
+        return Err(Error::parameter(format!("{}.retract_mm", part.name), -mm, remedy));
     }
     Ok(())
 }
@@ -264,7 +264,7 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
         let device = &stack.instruments()[one.instrument].device;
         let inserted = &mut inserted_mm[one.instrument];
         check_command(one.command, *inserted, device.length_mm()).map_err(|error| match error {
-            Error::Parameter { name: key, mend, .. } => {
+            Error::Parameter { name: key, remedy, .. } => {
                 let (key, value) = match part.travel {
                     // Rounded, to hide the error of unit conversion.
                     _ if key == "rotate_rad" => {
@@ -273,15 +273,19 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
                     Travel::By(mm) => (key.as_str(), mm.abs()),
                     _ => (key.as_str(), (one.command.advance_mm * steps.count as f64).abs()),
                 };
-                Error::parameter(format!("{}.{key}", part.name), value, format!("in its step {step}, {mend}"))
+                Error::parameter(
+                    format!("{}.{key}", part.name),
+                    value,
+                    format!("in its step {step}, {remedy}"),
+                )
             }
             other => other,
         })?;
         *inserted += one.command.advance_mm;
     }
     stack.check_places(inserted_mm.iter().copied()).map_err(|error| match error {
-        Error::Parameter { name, value, mend } => {
-            Error::Parameter { name: format!("{}: in its step {step}, {name}", motion.name), value, mend }
+        Error::Parameter { name, value, remedy } => {
+            Error::Parameter { name: format!("{}: in its step {step}, {name}", motion.name), value, remedy }
         }
         other => other,
     })

@@ -78,9 +78,9 @@ impl Incoming {
         if now_mm <= LENGTH_SLACK_MM {
             return Ok(());
         }
-        let mend =
+        let remedy =
             format!("{now_mm:.3} mm of it are in already: withdraw it before, or name one that is out");
-        Err(Error::parameter(&self.key, format!("{:?}", self.name), mend))
+        Err(Error::parameter(&self.key, format!("{:?}", self.name), remedy))
     }
 }
 
@@ -108,8 +108,8 @@ fn increments(name: &str, steps: f64) -> Result<usize> {
     let count = (steps - 1e-9).ceil().max(1.0);
     if count > STEP_LIMIT {
         let steps = format!("{} steps", crate::error::number(count));
-        let mend = format!("at most {STEP_LIMIT} steps in a line: use larger increments");
-        return Err(Error::parameter(name, steps, mend));
+        let remedy = format!("at most {STEP_LIMIT} steps in a line: use larger increments");
+        return Err(Error::parameter(name, steps, remedy));
     }
     Ok(count as usize)
 }

@@ -100,12 +100,12 @@ impl Script {
         let mut run = self.begin();
         for (index, line) in course.motions.iter().enumerate() {
             let other = |what: String| {
-                let mend = "the steps are those of another script";
-                Error::parameter(format!("motion {} of the script", index + 1), what, mend)
+                let remedy = "the steps are those of another script";
+                Error::parameter(format!("motion {} of the script", index + 1), what, remedy)
             };
             for _ in 0..line.steps {
-                let told = run.next_where(|_| None)?.map(&mut seen).is_some();
-                if !told || run.course.motions.len() != index + 1 {
+                let reported = run.next_where(|_| None)?.map(&mut seen).is_some();
+                if !reported || run.course.motions.len() != index + 1 {
                     return Err(other(format!("{} steps", line.steps)));
                 }
                 run.carried_out();

@@ -94,19 +94,19 @@ fn instruments_move_together_and_a_wire_is_exchanged() {
     let script = Script::new(&script, &stack(), &[10.0, 0.0, 0.0], None).unwrap();
     let steps = steps(&script);
     assert_eq!((script.len(), steps.len()), (33, 33));
-    let told = |step: usize| -> Vec<(usize, f64)> {
+    let reported = |step: usize| -> Vec<(usize, f64)> {
         steps[step].iter().map(|one| (one.instrument, one.command.advance_mm)).collect()
     };
-    assert_eq!(told(0), [(0, 1.0), (2, 2.0)]);
-    assert_eq!((told(30), told(32)), (vec![(0, -20.0)], vec![(1, 70.0)]));
+    assert_eq!(reported(0), [(0, 1.0), (2, 2.0)]);
+    assert_eq!((reported(30), reported(32)), (vec![(0, -20.0)], vec![(1, 70.0)]));
 }
 
 #[test]
-fn a_script_says_which_instrument_moves_and_what_does_not_go_is_told_before_it_begins() {
+fn a_script_says_which_instrument_moves_and_what_does_not_go_is_reported_before_it_begins() {
     let advance = |name: &str, mm| ScriptLine { advance_mm: Some(mm), ..line(name) };
     let both = ScriptLine { with: vec![advance("wire", 1.0)], ..advance("wire", 1.0) };
     let deep = ScriptLine { with: vec![both.clone()], ..advance("catheter", 1.0) };
-    for (script, told) in [
+    for (script, reported) in [
         (vec![advance("cathter", 1.0)], "script[0].instrument = \"cathter\": did you mean \"catheter\"?"),
         (vec![self::advance(1.0, 1.0)], "script[0].instrument = none: say which one moves: wire, stiff wire"),
         (vec![both], "script[0].with[0].instrument = \"wire\": moves in this line already"),
@@ -130,7 +130,7 @@ fn a_script_says_which_instrument_moves_and_what_does_not_go_is_told_before_it_b
         ),
     ] {
         let error = Script::new(&script, &stack(), &[0.0; 3], None).unwrap_err().to_string();
-        assert!(error.starts_with(told), "{error}");
+        assert!(error.starts_with(reported), "{error}");
     }
 }
 
@@ -144,13 +144,13 @@ fn a_wire_is_exchanged_in_one_line_as_far_as_the_one_before() {
     };
     let script =
         |advance_mm| Script::new(&[exchange(advance_mm)], &stack(), &[30.0, 0.0, 40.0], None).unwrap();
-    let told = |advance_mm| -> Vec<(usize, f64)> {
+    let reported = |advance_mm| -> Vec<(usize, f64)> {
         let steps = steps(&script(advance_mm));
         steps.iter().map(|moves| (moves[0].instrument, moves[0].command.advance_mm)).collect()
     };
-    assert_eq!(told(None), [(0, -10.0), (0, -10.0), (0, -10.0), (1, 10.0), (1, 10.0), (1, 10.0)]);
-    assert_eq!(told(Some(10.0)), [(0, -10.0), (0, -10.0), (0, -10.0), (1, 10.0)]);
-    for (line, told) in [
+    assert_eq!(reported(None), [(0, -10.0), (0, -10.0), (0, -10.0), (1, 10.0), (1, 10.0), (1, 10.0)]);
+    assert_eq!(reported(Some(10.0)), [(0, -10.0), (0, -10.0), (0, -10.0), (1, 10.0)]);
+    for (line, reported) in [
         (
             ScriptLine { retract_mm: Some(1.0), ..exchange(None) },
             "script[0].retract_mm = 1: exchange withdraws",
@@ -165,16 +165,16 @@ fn a_wire_is_exchanged_in_one_line_as_far_as_the_one_before() {
         ),
     ] {
         let error = Script::new(&[line], &stack(), &[0.0; 3], None).unwrap_err().to_string();
-        assert!(error.starts_with(told), "{error}");
+        assert!(error.starts_with(reported), "{error}");
     }
 }
 
 #[test]
 fn a_wire_is_exchanged_for_one_that_is_out() {
     let exchange = ScriptLine { exchange: Some("catheter".to_owned()), ..line("wire") };
-    let told = "script[0].exchange = \"catheter\": 10.000 mm of it are in already: withdraw it before";
+    let reported = "script[0].exchange = \"catheter\": 10.000 mm of it are in already: withdraw it before";
     let error = Script::new(std::slice::from_ref(&exchange), &stack(), &[30.0, 0.0, 10.0], None).unwrap_err();
-    assert!(error.to_string().starts_with(told), "{error}");
+    assert!(error.to_string().starts_with(reported), "{error}");
     // Pulled back to the level of rounding.
     let back = ScriptLine { retract_mm: Some(0.3), step_mm: Some(0.1), ..line("catheter") };
     let lines = [back.clone(), back.clone(), back, exchange.clone()];
@@ -189,12 +189,12 @@ fn a_wire_is_exchanged_for_one_that_is_out() {
         run.carried_out();
     }
     let error = run.next_where(|_| None).unwrap_err().to_string();
-    assert!(error.starts_with(&told.replace("[0]", "[1]")), "{error}");
+    assert!(error.starts_with(&reported.replace("[0]", "[1]")), "{error}");
     assert!(script.begin().next_where(|_| Some(Met::PushForceN)).is_ok());
 }
 
 #[test]
-fn conditions_that_have_decided_are_told() {
+fn conditions_that_have_decided_are_reported() {
     let until = |force| Some(Until { push_force_n: Some(force), ..Until::default() });
     let lines = [1.0, 2.0].map(|force| ScriptLine { until: until(force), ..advance(2.0, 1.0) });
     let script = Script::new(&lines, &Stack::from(Device::uniform(9.0, 0.4, 1.0).unwrap()), &[0.0], None);
@@ -202,8 +202,8 @@ fn conditions_that_have_decided_are_told() {
     let mut run = script.begin();
     for decided in [vec![], vec![1.0], vec![1.0], vec![1.0, 2.0]] {
         run.next_where(|_| None).unwrap();
-        let told: Vec<f64> = run.decided().filter_map(|(_, condition)| condition.push_force_n).collect();
-        assert_eq!(told, decided);
+        let reported: Vec<f64> = run.decided().filter_map(|(_, condition)| condition.push_force_n).collect();
+        assert_eq!(reported, decided);
         run.carried_out();
     }
 }
@@ -221,9 +221,9 @@ fn a_script_with_speeds_has_times_and_all_of_its_lines_have_one() {
         run.carried_out();
     }
     assert_eq!(times, [2.5, 5.0, 5.5, 6.0, 6.5, 7.0]);
-    let told = |lines: &[ScriptLine]| Script::new(lines, &stack, &[0.0], None).unwrap_err().to_string();
-    assert!(told(&[timed(1.0, Some(2.0)), timed(1.0, None)]).starts_with("script[1] = no speed"));
-    assert!(told(&[timed(1.0, Some(0.0))]).starts_with("script[0].speed_mm_per_s = 0: must be"));
+    let reported = |lines: &[ScriptLine]| Script::new(lines, &stack, &[0.0], None).unwrap_err().to_string();
+    assert!(reported(&[timed(1.0, Some(2.0)), timed(1.0, None)]).starts_with("script[1] = no speed"));
+    assert!(reported(&[timed(1.0, Some(0.0))]).starts_with("script[0].speed_mm_per_s = 0: must be"));
 }
 
 #[test]
@@ -251,8 +251,8 @@ fn a_speed_of_a_motion_that_a_line_does_not_make_is_refused() {
             "script[0].speed_deg_per_s",
         ),
     ] {
-        let told = script(line).unwrap_err().to_string();
-        assert!(told.starts_with(words), "{told}");
+        let reported = script(line).unwrap_err().to_string();
+        assert!(reported.starts_with(words), "{reported}");
     }
     // One speed of two motions, both speeds of one, and a line that a sweep has set to no length are as before.
     for line in [
@@ -285,7 +285,7 @@ fn hands_that_rest_take_steps_of_time_and_move_nothing() {
     resting.go_on(run.course(), |step| seen.push(step.time_s)).unwrap();
     assert_eq!(seen.len(), 8);
     assert_eq!(script(&[wait(1.0, None)]).unwrap().len(), 10);
-    let told = |lines: &[ScriptLine]| script(lines).unwrap_err().to_string();
+    let reported = |lines: &[ScriptLine]| script(lines).unwrap_err().to_string();
     for (line, words) in [
         (wait(0.0, None), "script[0].wait_s = 0: must be"),
         (wait(f64::NAN, None), "script[0].wait_s = NaN: must be"),
@@ -298,11 +298,11 @@ fn hands_that_rest_take_steps_of_time_and_move_nothing() {
             "script[0].instrument",
         ),
     ] {
-        assert!(told(&[line]).starts_with(words), "{words}");
+        assert!(reported(&[line]).starts_with(words), "{words}");
     }
-    assert!(told(&[wait(1.0, None), advance(1.0, 1.0)]).starts_with("script[1] = no speed"));
+    assert!(reported(&[wait(1.0, None), advance(1.0, 1.0)]).starts_with("script[1] = no speed"));
     let with = ScriptLine { with: vec![wait(1.0, None)], ..go };
-    assert!(told(&[with]).starts_with("script[0].with[0].wait_s = given"));
+    assert!(reported(&[with]).starts_with("script[0].with[0].wait_s = given"));
 }
 
 #[test]
@@ -330,8 +330,8 @@ fn a_line_with_solves_has_ticks_for_steps() {
         (solves(6, inject), "script[0].solves = 6: a line that only injects"),
         (with, "script[0].with[0].solves = given"),
     ] {
-        let told = script(line).unwrap_err().to_string();
-        assert!(told.starts_with(words), "{told}");
+        let reported = script(line).unwrap_err().to_string();
+        assert!(reported.starts_with(words), "{reported}");
     }
 }
 
@@ -347,18 +347,21 @@ fn what_ends_a_line_is_checked_and_lengths_after_it_are_known_within_bounds() {
     let force = Until { push_force_n: Some(0.5), ..Until::default() };
     let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
     let script = |lines: &[ScriptLine]| Script::new(lines, &stack, &[0.0], Some(&tree));
-    let told = |lines: &[ScriptLine]| script(lines).unwrap_err().to_string();
-    let unknown = told(&[until(near("left carotd"), 5.0)]);
+    let reported = |lines: &[ScriptLine]| script(lines).unwrap_err().to_string();
+    let unknown = reported(&[until(near("left carotd"), 5.0)]);
     assert_eq!(unknown, "script[0].until.target = \"left carotd\": did you mean \"left carotid\"?");
-    assert!(told(&[until(Until::default(), 5.0)]).starts_with("script[0].until = {}: give"));
+    assert!(reported(&[until(Until::default(), 5.0)]).starts_with("script[0].until = {}: give"));
     let half = Until { target: None, ..near("left carotid") };
-    assert!(told(&[until(half, 5.0)]).starts_with("script[0].until.tip_within_mm = 2: of which target"));
+    assert!(reported(&[until(half, 5.0)]).starts_with("script[0].until.tip_within_mm = 2: of which target"));
     // After at most 40 mm, 60 may be too many and 101 are.
     assert!(script(&[until(force.clone(), 40.0), advance(70.0, 1.0)]).is_ok());
     assert!(
-        told(&[until(force.clone(), 40.0), advance(101.0, 1.0)]).starts_with("script[1].advance_mm = 101")
+        reported(&[until(force.clone(), 40.0), advance(101.0, 1.0)])
+            .starts_with("script[1].advance_mm = 101")
     );
-    assert!(told(&[until(force.clone(), 101.0)]).starts_with("script[0].advance_mm = 101: in its step 101"));
+    assert!(
+        reported(&[until(force.clone(), 101.0)]).starts_with("script[0].advance_mm = 101: in its step 101")
+    );
     let back = ScriptLine { withdraw: true, ..Default::default() };
     let lines = [until(force, 40.0), back, advance(100.0, 1.0)];
     assert_eq!(script(&lines).unwrap().len(), 40 + 40 + 100);
@@ -379,8 +382,9 @@ fn a_script_goes_on_from_its_course_in_the_middle_of_a_line_with_a_condition() {
             let step = (step.moves.to_vec(), step.time_s);
             let mut before = Vec::new();
             let mut again = script.go_on(run.course(), |step| before.push(step.moves.to_vec())).unwrap();
-            let told = again.next_where(|_| (k >= met_after).then_some(Met::PushForceN)).unwrap().unwrap();
-            assert_eq!((told.moves.to_vec(), told.time_s), step, "{met_after} {k}");
+            let reported =
+                again.next_where(|_| (k >= met_after).then_some(Met::PushForceN)).unwrap().unwrap();
+            assert_eq!((reported.moves.to_vec(), reported.time_s), step, "{met_after} {k}");
             assert!(!again.has_ended(), "{met_after} {k}");
             assert!(before.iter().eq(seen.iter()), "{met_after} {k}");
             run.carried_out();
@@ -388,10 +392,10 @@ fn a_script_goes_on_from_its_course_in_the_middle_of_a_line_with_a_condition() {
             k += 1;
         }
         assert!(run.has_ended());
-        let told: Vec<LineCourse> = run.conditions().map(|(_, line, _)| line).collect();
+        let reported: Vec<LineCourse> = run.conditions().map(|(_, line, _)| line).collect();
         assert!(run.conditions().all(|(_, _, after_step)| after_step == met_after));
         let met = (met_after <= 134).then_some(Met::PushForceN);
-        assert_eq!(told, [LineCourse { steps: met_after, met }]);
+        assert_eq!(reported, [LineCourse { steps: met_after, met }]);
         let wrong = ScriptCourse { motions: vec![LineCourse { steps: 1000, met: None }] };
         assert!(script.go_on(&wrong, |_| ()).is_err());
     }
@@ -430,8 +434,8 @@ fn injections_begin_with_their_lines_and_are_had_again_from_the_course_of_the_sc
         }
         run.carried_out();
     }
-    let told = |one: &Injection| (one.instrument, one.ml, one.after_step, one.time_s.unwrap());
-    let all: Vec<_> = run.injections().iter().map(told).collect();
+    let reported = |one: &Injection| (one.instrument, one.ml, one.after_step, one.time_s.unwrap());
+    let all: Vec<_> = run.injections().iter().map(reported).collect();
     assert_eq!(all, [(2, 2.0, 0, 0.0), (2, 8.0, 4, 10.0), (2, 5.0, 4, 10.0), (2, 1.0, 6, 15.0)]);
     assert_eq!(seen.iter().map(|(begun, _)| begun.len()).collect::<Vec<_>>(), [1, 1, 1, 1, 3, 3, 4]);
     for (begun, course) in seen {
@@ -440,7 +444,7 @@ fn injections_begin_with_their_lines_and_are_had_again_from_the_course_of_the_sc
 }
 
 #[test]
-fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_line_does() {
+fn an_injection_that_cannot_be_is_reported_before_the_script_begins_or_where_its_line_does() {
     let go = |inject| ScriptLine { inject, ..ScriptLine { advance_mm: Some(5.0), ..line("wire") } };
     let with = ScriptLine {
         with: vec![ScriptLine { inject: inject(1.0, 1.0, None), retract_mm: Some(1.0), ..line("catheter") }],
@@ -448,7 +452,7 @@ fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_lin
     };
     let unmoved =
         ScriptLine { until: Some(Until::default()), inject: inject(1.0, 1.0, None), ..line("catheter") };
-    for (line, told) in [
+    for (line, reported) in [
         (go(inject(0.0, 1.0, Some("catheter"))), "script[0].inject.ml = 0: must be a number from 0.1 to 100"),
         (go(inject(-1.0, 1.0, Some("catheter"))), "script[0].inject.ml = -1: must"),
         (go(inject(1.0, f64::NAN, Some("catheter"))), "script[0].inject.ml_per_s = NaN: must"),
@@ -465,7 +469,7 @@ fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_lin
         (unmoved, "script[0] = {}: give advance_mm"),
     ] {
         let error = Script::new(&[line], &stack(), &[9.0, 0.0, 9.0], None).unwrap_err().to_string();
-        assert!(error.starts_with(told), "{error}");
+        assert!(error.starts_with(reported), "{error}");
     }
     let lines = [go(inject(1.0, 1.0, Some("catheter")))];
     let out = Script::new(&lines, &stack(), &[9.0, 0.0, 0.0], None).unwrap_err().to_string();
@@ -511,7 +515,7 @@ fn a_coil_is_detached_by_a_line_of_its_own_and_the_next_one_follows() {
     }
     assert!(detached[26] == Some(0) && detached.iter().flatten().count() == 1);
     assert!(script.moves().unwrap_err().to_string().starts_with("script[1].detach"));
-    let told = |lines: &[ScriptLine]| made(lines).unwrap_err().to_string();
+    let reported = |lines: &[ScriptLine]| made(lines).unwrap_err().to_string();
     for (lines, expected) in [
         (&[by("framing", 26.0), detach("framing"), detach("framing")][..], "script[2].detach = \"framing\""),
         (&[by("framing", 26.0), detach("framing"), by("framing", 1.0)], "script[2].instrument = \"framing\""),
@@ -520,6 +524,6 @@ fn a_coil_is_detached_by_a_line_of_its_own_and_the_next_one_follows() {
         (&[by("framing", 26.0), by("filling", 1.0)], "has no lumen"),
         (&[ScriptLine { detach: true, ..by("framing", 26.0) }], "stands alone"),
     ] {
-        assert!(told(lines).contains(expected), "{}", told(lines));
+        assert!(reported(lines).contains(expected), "{}", reported(lines));
     }
 }

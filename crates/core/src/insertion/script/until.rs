@@ -58,12 +58,12 @@ impl Condition {
                 Some((place(&format!("{name}.target"), target, centreline)?, mm))
             }
             (Some(mm), None) => {
-                let mend = "of which target? give target, a name of the vessel's centre line";
-                return Err(Error::parameter(format!("{name}.tip_within_mm"), mm, mend));
+                let remedy = "of which target? give target, a name of the vessel's centre line";
+                return Err(Error::parameter(format!("{name}.tip_within_mm"), mm, remedy));
             }
             (None, Some(target)) => {
-                let mend = "how near to it? give tip_within_mm";
-                return Err(Error::parameter(format!("{name}.target"), format!("{target:?}"), mend));
+                let remedy = "how near to it? give tip_within_mm";
+                return Err(Error::parameter(format!("{name}.target"), format!("{target:?}"), remedy));
             }
             (None, None) => None,
         };
@@ -95,13 +95,13 @@ impl Condition {
 /// Position of a target.
 fn place(key: &str, target: &str, centreline: Option<&CentrelineTree>) -> Result<Vec3> {
     let Some(tree) = centreline else {
-        let mend = "is a name of the vessel's centre line, and none is given";
-        return Err(Error::parameter(key, format!("{target:?}"), mend));
+        let remedy = "is a name of the vessel's centre line, and none is given";
+        return Err(Error::parameter(key, format!("{target:?}"), remedy));
     };
     match tree.target(target) {
         Ok(target) => Ok(tree.nodes()[target.row].position_mm),
-        Err(Error::Parameter { value, mend, .. }) => {
-            Err(Error::Parameter { name: key.to_owned(), value, mend })
+        Err(Error::Parameter { value, remedy, .. }) => {
+            Err(Error::Parameter { name: key.to_owned(), value, remedy })
         }
         Err(other) => Err(other),
     }

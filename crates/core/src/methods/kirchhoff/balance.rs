@@ -26,7 +26,7 @@ pub(super) struct Balance {
     /// Increase of the stored energy.
     stored_mj: f64,
     /// Lower and upper bound of the dissipation by friction.
-    rubbed_mj: (f64, f64),
+    friction_mj: (f64, f64),
     /// Threshold of significance.
     notable_mj: f64,
 }
@@ -41,7 +41,7 @@ impl Balance {
         motions: &[HandMotion],
         (before, after): (&KirchhoffState, &KirchhoffState),
         by_wall: WallWork,
-        rubbed_mj: (f64, f64),
+        friction_mj: (f64, f64),
         notable: f64,
     ) -> Self {
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
@@ -72,7 +72,7 @@ impl Balance {
         let [elastic_was, elastic_is] = [was, is].map(|energy| energy.total() - energy.field);
         let sizes_mj = [elastic_was, elastic_is, (is.field - was.field).abs(), from_sheath_mj.abs()];
         let notable_mj = notable * sizes_mj.into_iter().fold(NOTABLE_FLOOR_MJ, f64::max);
-        Self { least_mj, mean_mj, most_mj, stored_mj, rubbed_mj, notable_mj }
+        Self { least_mj, mean_mj, most_mj, stored_mj, friction_mj, notable_mj }
     }
 
     /// The balance of this way and the next one together.
@@ -82,33 +82,33 @@ impl Balance {
             mean_mj: self.mean_mj + next.mean_mj,
             most_mj: self.most_mj + next.most_mj,
             stored_mj: self.stored_mj + next.stored_mj,
-            rubbed_mj: (self.rubbed_mj.0 + next.rubbed_mj.0, self.rubbed_mj.1 + next.rubbed_mj.1),
+            friction_mj: (self.friction_mj.0 + next.friction_mj.0, self.friction_mj.1 + next.friction_mj.1),
             notable_mj: self.notable_mj.max(next.notable_mj),
         }
     }
 
     /// Whether all its numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
-        let (least_mj, most_mj) = self.rubbed_mj;
+        let (least_mj, most_mj) = self.friction_mj;
         let work = [self.least_mj, self.mean_mj, self.most_mj];
         work.into_iter().chain([self.stored_mj, least_mj, most_mj, self.notable_mj]).all(f64::is_finite)
     }
 
     /// Whether energy that had been put in was released.
     pub(super) fn is_set_free(&self) -> bool {
-        self.least_mj - self.stored_mj - self.rubbed_mj.1 > self.notable_mj
+        self.least_mj - self.stored_mj - self.friction_mj.1 > self.notable_mj
     }
 
     /// Whether more is stored and dissipated than can have been put in.
     pub(super) fn lacks(&self) -> bool {
-        self.stored_mj + self.rubbed_mj.0 - self.most_mj > self.notable_mj
+        self.stored_mj + self.friction_mj.0 - self.most_mj > self.notable_mj
     }
 
     /// Energy dissipated by friction and energy released by a jump. Without a jump the loss is attributed to friction
     /// within its bounds. In a jump they are not separated: the normal forces on its way are not those at its ends.
     pub(super) fn lost_mj(&self, jumps: bool) -> (f64, f64) {
         let lost_mj = self.mean_mj - self.stored_mj;
-        let (least_mj, most_mj) = self.rubbed_mj;
+        let (least_mj, most_mj) = self.friction_mj;
         if jumps { (0.0, lost_mj.max(0.0)) } else { (lost_mj.clamp(least_mj, most_mj), 0.0) }
     }
 

@@ -68,7 +68,7 @@ fn narrow(
         return None;
     }
     let tip_mm = line_mm - inserted_mm;
-    let radius_mm = stack.felt_radius_mm(lengths_mm, tip_mm);
+    let radius_mm = stack.outermost_radius_mm(lengths_mm, tip_mm);
     let wall = environment.wall();
     let tuning = &environment.options.tuning.passage;
     let places = (0..tuning.front).map(|k| tip_mm + k as f64 * radius_mm).take_while(|mm| *mm < line_mm);

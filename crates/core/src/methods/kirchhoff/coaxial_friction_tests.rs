@@ -1,6 +1,6 @@
 //! Insertions of several instruments with friction on the wall.
 
-use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing, wire_in_catheter};
+use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing_along, wire_in_catheter};
 use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Move, Sheath, Simulation};
@@ -16,7 +16,7 @@ fn one(name: &str, section: Section) -> Instrument {
 
 /// The catheter inserted by 80 mm, the wire by 14 mm more.
 fn both_in() -> Simulation {
-    let mut simulation = rubbing(bend(), 4.0, wire_in_catheter(), FRICTION);
+    let mut simulation = rubbing_along(bend(), 4.0, wire_in_catheter(), FRICTION);
     push(&mut simulation, &[(WIRE, 14.0)]).unwrap();
     for _ in 0..40 {
         push(&mut simulation, &[(WIRE, 2.0), (CATHETER, 2.0)]).unwrap();
@@ -26,14 +26,14 @@ fn both_in() -> Simulation {
 
 /// Whether all friction is within Coulomb's cone, and the fraction that slips.
 fn slipping(simulation: &Simulation) -> f64 {
-    let (mut slips, mut all) = (0.0, 0.0);
+    let (mut rubbing_n, mut all_n) = (0.0, 0.0);
     for contact in &simulation.report().contacts {
         let most = FRICTION * contact.force_n;
         assert!(contact.friction_n.norm() <= 1.001 * most + 1e-6, "{contact:?}");
-        all += most;
-        slips += contact.friction_n.norm();
+        all_n += most;
+        rubbing_n += contact.friction_n.norm();
     }
-    slips / all
+    rubbing_n / all_n
 }
 
 /// With two instruments of one length that move together, friction acts on the outer one, and twists only that.
@@ -43,8 +43,8 @@ fn a_catheter_over_a_soft_wire_is_a_catheter() {
     let torsional_stiffness_nmm2 = Some(catheter.torsion_nmm2());
     let stack = vec![one("wire", Section::straight(150.0, 0.2, 0.06)), one("catheter", catheter)];
     let both = Section { bending_stiffness_nmm2: 60.06, torsional_stiffness_nmm2, ..catheter };
-    let mut single = rubbing(bend(), 4.0, Device::new(vec![both]).unwrap(), FRICTION);
-    let mut both = rubbing(bend(), 4.0, Stack::new(stack).unwrap(), FRICTION);
+    let mut single = rubbing_along(bend(), 4.0, Device::new(vec![both]).unwrap(), FRICTION);
+    let mut both = rubbing_along(bend(), 4.0, Stack::new(stack).unwrap(), FRICTION);
     let (mut apart_mm, mut torque_off_nmm, mut most_nmm) = (0.0f64, 0.0f64, 0.0f64);
     let (mut taken_mj, mut expected_mj) = (0.0, 0.0);
     for k in 0..120 {
@@ -52,15 +52,16 @@ fn a_catheter_over_a_soft_wire_is_a_catheter() {
         let moves = [WIRE, CATHETER].map(|instrument| Move { instrument, command });
         both.step_together(&moves).unwrap();
         single.step(command).unwrap();
-        let (told, alone) = (both.report(), single.report());
-        assert!(told.converged && alone.converged);
+        let (reported, alone) = (both.report(), single.report());
+        assert!(reported.converged && alone.converged);
         for (a, b) in both.shape().positions_mm.iter().zip(&single.shape().positions_mm) {
             apart_mm = apart_mm.max((a - b).norm());
         }
-        torque_off_nmm = torque_off_nmm.max((told.instruments[CATHETER].torque_nmm - alone.torque_nmm).abs());
+        torque_off_nmm =
+            torque_off_nmm.max((reported.instruments[CATHETER].torque_nmm - alone.torque_nmm).abs());
         most_nmm = most_nmm.max(alone.torque_nmm.abs());
-        assert!(told.instruments[WIRE].torque_nmm.abs() < 1e-9);
-        taken_mj += told.dissipated_mj;
+        assert!(reported.instruments[WIRE].torque_nmm.abs() < 1e-9);
+        taken_mj += reported.dissipated_mj;
         expected_mj += alone.dissipated_mj;
     }
     // With friction an equilibrium depends on the sub-steps, and rounding may subdivide one command and not the
@@ -80,8 +81,8 @@ fn hands_put_in_what_is_stored_and_rubbed_away_and_no_force_leaves_its_cone() {
     for moves in [&[(WIRE, -0.1)][..], &[(CATHETER, -0.1)], &[(WIRE, -0.1), (CATHETER, -0.05)]] {
         let (mut work, mut taken) = (0.0, 0.0);
         let surface = |simulation: &Simulation| {
-            let told = &simulation.report().instruments;
-            moves.iter().map(|(i, mm)| told[*i].push_force_n.unwrap() * mm).sum::<f64>()
+            let reported = &simulation.report().instruments;
+            moves.iter().map(|(i, mm)| reported[*i].push_force_n.unwrap() * mm).sum::<f64>()
         };
         // The first steps reverse friction.
         for _ in 0..10 {
@@ -138,9 +139,9 @@ fn arc(friction: f64) -> Simulation {
     let wire = Section { rest_curvature_per_mm: [ARC_REST, 0.0], ..Section::straight(165.0, 0.2, 20.0) };
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
     let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
-    let stack = stack.rubbing(vec![friction, 0.0]).unwrap();
+    let stack = stack.with_friction(vec![friction, 0.0]).unwrap();
     let axis = (0..16).map(|i| Vec3::z() * (20.0 * f64::from(i)));
-    let mut simulation = rubbing(axis, 120.0, stack, 0.0);
+    let mut simulation = rubbing_along(axis, 120.0, stack, 0.0);
     for _ in 0..40 {
         push(&mut simulation, &[(WIRE, 2.075), (CATHETER, 2.0)]).unwrap();
     }
@@ -180,13 +181,13 @@ fn a_wire_that_is_pulled_through_a_bend_obeys_the_capstan_law() {
 #[test]
 fn a_coefficient_that_is_none_is_refused() {
     let stack = wire_in_catheter();
-    for (frictions, told) in [
+    for (frictions, reported) in [
         (vec![0.1], "instrument.friction = 1: there are 2 instruments"),
         (vec![-0.1, 0.0], "instrument[0].friction = -0.1: must be a Coulomb coefficient"),
         (vec![0.1, 0.1], "instrument[1].friction = 0.1: the last instrument has none outside it"),
     ] {
-        let error = stack.clone().rubbing(frictions).unwrap_err().to_string();
-        assert!(error.starts_with(told), "{error}");
+        let error = stack.clone().with_friction(frictions).unwrap_err().to_string();
+        assert!(error.starts_with(reported), "{error}");
     }
 }
 
@@ -200,7 +201,7 @@ fn through(friction_n: f64, friction: f64) -> Vec<(f64, f64, f64)> {
     let made = GeneratedWall::new(&CentrelineTree::new(tree.collect()).unwrap(), Resolution::EdgeMm(1.6));
     let made = made.unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
-    let sheath = sheath.rubbing(friction_n, friction).unwrap();
+    let sheath = sheath.with_friction(friction_n, friction).unwrap();
     let device = Device::uniform(150.0, 0.8, 60.0).unwrap();
     let mut simulation = Simulation::builder(made.wall, device, sheath).build().unwrap();
     for _ in 0..30 {
@@ -210,8 +211,8 @@ fn through(friction_n: f64, friction: f64) -> Vec<(f64, f64, f64)> {
     commands
         .into_iter()
         .map(|command| {
-            let told = simulation.step(command).unwrap();
-            (told.push_force_n, told.torque_nmm, told.dissipated_mj)
+            let reported = simulation.step(command).unwrap();
+            (reported.push_force_n, reported.torque_nmm, reported.dissipated_mj)
         })
         .collect()
 }
@@ -228,10 +229,10 @@ fn a_valve_holds_against_the_hand_and_moves_nothing_inside() {
         near(tight[k].2 - smooth[k].2, taken);
     }
     assert!(rough[0].0 > smooth[0].0 && rough[1].0 < smooth[1].0);
-    let told = |error: crate::Error| error.to_string();
+    let reported = |error: crate::Error| error.to_string();
     let sheath = Sheath::new(Vec3::zeros(), Vec3::z()).unwrap();
-    assert!(told(sheath.rubbing(-1.0, 0.0).unwrap_err()).starts_with("sheath.friction_n = -1"));
-    assert!(told(sheath.rubbing(0.0, 3.0).unwrap_err()).starts_with("sheath.friction = 3"));
+    assert!(reported(sheath.with_friction(-1.0, 0.0).unwrap_err()).starts_with("sheath.friction_n = -1"));
+    assert!(reported(sheath.with_friction(0.0, 3.0).unwrap_err()).starts_with("sheath.friction = 3"));
 }
 
 /// What is rubbed off in a sheath and a valve while a wire comes out of its catheter and goes back into the sheath, in
@@ -249,7 +250,7 @@ fn out_and_back(step_mm: f64) -> (f64, usize) {
     });
     let tree = CentrelineTree::new(tree.collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(1.6)).unwrap();
-    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap().rubbing(0.05, 0.3).unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap().with_friction(0.05, 0.3).unwrap();
     let mut simulation = Simulation::builder(made.wall, stack, sheath).build().unwrap();
     let steps = (60.0 / step_mm) as usize;
     let (mut taken_mj, mut jumps) = (0.0, 0);
@@ -279,11 +280,11 @@ fn level_tips_on_a_rough_wall_are_pushed_as_one_device_is() {
     let catheter = Section { inner_radius_mm: Some(0.35), ..Section::straight(300.0, 0.6, 15.0) };
     let torsional_stiffness_nmm2 = Some(catheter.torsion_nmm2());
     let alone = Section { bending_stiffness_nmm2: 20.0, torsional_stiffness_nmm2, ..catheter };
-    let single = rubbing(bend(), 4.0, Device::new(vec![alone]).unwrap(), FRICTION);
+    let single = rubbing_along(bend(), 4.0, Device::new(vec![alone]).unwrap(), FRICTION);
     // Level, nearly level, and apart.
     for ahead_mm in [0.0, 1e-6, 0.01] {
         let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
-        let mut both = rubbing(bend(), 4.0, stack, FRICTION);
+        let mut both = rubbing_along(bend(), 4.0, stack, FRICTION);
         let mut one = single.clone();
         if ahead_mm > 0.0 {
             push(&mut both, &[(WIRE, ahead_mm)]).unwrap();

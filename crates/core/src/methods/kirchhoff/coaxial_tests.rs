@@ -38,11 +38,11 @@ fn in_tube(stack: impl Into<Stack>, radius_mm: f64) -> Simulation {
 
 /// Instruments at the mouth of a tube along these points.
 fn along(axis: impl Iterator<Item = Vec3>, radius_mm: f64, stack: impl Into<Stack>) -> Simulation {
-    rubbing(axis, radius_mm, stack, 0.0)
+    rubbing_along(axis, radius_mm, stack, 0.0)
 }
 
 /// As [`along`], for a wall with this coefficient of friction.
-pub(super) fn rubbing(
+pub(super) fn rubbing_along(
     axis: impl Iterator<Item = Vec3>,
     radius_mm: f64,
     stack: impl Into<Stack>,
@@ -135,8 +135,8 @@ fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
     let energies: Vec<f64> = (-2..=2)
         .map(|k| push(&mut simulation.clone(), &[(CATHETER, step_mm * f64::from(k))]).unwrap())
         .collect();
-    let told = simulation.report().instruments[CATHETER];
-    let (found, force) = (slope(&energies, step_mm), told.push_force_n.unwrap());
+    let reported = simulation.report().instruments[CATHETER];
+    let (found, force) = (slope(&energies, step_mm), reported.push_force_n.unwrap());
     assert!((found - force).abs() < 1e-3 * force.abs(), "{found} and {force}");
     let step_rad = 0.02;
     let turned = |k: i32| {
@@ -146,9 +146,9 @@ fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
     };
     let found = slope(&(-2..=2).map(turned).collect::<Vec<_>>(), step_rad);
     assert!(
-        (found - told.torque_nmm).abs() < 1e-3 * told.torque_nmm.abs(),
+        (found - reported.torque_nmm).abs() < 1e-3 * reported.torque_nmm.abs(),
         "{found} and {}",
-        told.torque_nmm
+        reported.torque_nmm
     );
 }
 
@@ -156,7 +156,7 @@ fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
 /// catheter's radius. A hook of 7 mm and a radius of 3 mm: energy released by the sheath is stored outside, so no
 /// push force is needed.
 #[test]
-fn a_hook_goes_out_and_in_freely_and_no_jump_is_told() {
+fn a_hook_goes_out_and_in_freely_and_no_jump_is_reported() {
     let wire = Section::straight(200.0, 0.4, 5.0);
     let hook = Section { length_mm: 7.0, rest_curvature_per_mm: [1.0 / 3.0, 0.0], ..wire };
     let device = Device::new(vec![hook, Section::straight(25.0, 0.4, 5.0), wire]).unwrap();
@@ -245,7 +245,7 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
     }
     let bytes = |simulation: &Simulation| serde_json::to_vec(&simulation.state()).unwrap();
     let before = bytes(&simulation);
-    for (moves, told) in [
+    for (moves, reported) in [
         (vec![(other, 1.0)], "other.radius_mm = 0.3: \"wire\" has no lumen"),
         (vec![(wire, 1.0), (wire, 1.0)], "moved twice"),
         (vec![(7, 1.0)], "move[0].instrument = 7"),
@@ -253,7 +253,7 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
         (vec![(catheter, -31.0)], "catheter.retract_mm = 31"),
     ] {
         let error = push(&mut simulation, &moves).unwrap_err().to_string();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(reported), "{error}");
         assert_eq!(bytes(&simulation), before);
     }
     for _ in 0..10 {
@@ -262,8 +262,8 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
     for _ in 0..9 {
         push(&mut simulation, &[(other, 4.0)]).unwrap();
     }
-    let told: Vec<f64> = simulation.report().instruments.iter().map(|i| i.inserted_mm.round()).collect();
-    assert_eq!(told, [36.0, 0.0, 30.0]);
+    let reported: Vec<f64> = simulation.report().instruments.iter().map(|i| i.inserted_mm.round()).collect();
+    assert_eq!(reported, [36.0, 0.0, 30.0]);
     push(&mut simulation, &[(other, -36.0), (catheter, -30.0)]).unwrap();
     assert_eq!(simulation.report().inserted_mm, 0.0);
     assert_eq!(simulation.shape().positions_mm.len(), 1);
@@ -304,8 +304,8 @@ fn feels_slopes(simulation: &mut Simulation, steps: usize) {
             let step_mm = 0.01;
             let at = |k: i32| push(&mut simulation.clone(), &[(instrument, step_mm * f64::from(k))]).unwrap();
             let found = slope(&(-2..=2).map(at).collect::<Vec<_>>(), step_mm);
-            let told = simulation.report().instruments[instrument].push_force_n.unwrap();
-            assert!((found - told).abs() < 1e-3 * told.abs(), "{found} and {told} N in step {k}");
+            let reported = simulation.report().instruments[instrument].push_force_n.unwrap();
+            assert!((found - reported).abs() < 1e-3 * reported.abs(), "{found} and {reported} N in step {k}");
         }
     }
 }
@@ -359,17 +359,18 @@ fn the_force_between_two_on_an_arc_is_that_of_the_rods() {
         let tension: f64 = potential + 0.5 * stiffness * (rest * rest - curvature * curvature);
         let pushed = simulation.report().instruments[WIRE].push_force_n.unwrap();
         assert!((pushed + potential + 0.5 * stiffness * rest * rest).abs() < 1e-6, "{pushed}");
-        let (told, shape) = (simulation.lateral_forces(WIRE), simulation.shape());
+        let (reported, shape) = (simulation.lateral_forces(WIRE), simulation.shape());
         let compared = |i: &usize| (4.0..76.0).contains(&(shape.from_tip_mm[0] - shape.from_tip_mm[*i]));
         for i in (0..shape.len()).filter(compared) {
             let inwards = (shape.tangents[i + 1] - shape.tangents[i - 1]).normalize();
-            let (found, expected) = (told[i].force_n / told[i].length_mm, inwards * (-tension * curvature));
+            let (found, expected) =
+                (reported[i].force_n / reported[i].length_mm, inwards * (-tension * curvature));
             assert!((found - expected).norm() < 1e-3 * expected.norm(), "{found} and {expected} at {i}");
         }
         assert!((0..shape.len()).filter(compared).count() > 30);
         let none = |force: &LateralForce| *force == LateralForce::default();
         assert!(simulation.lateral_forces(CATHETER).iter().all(none));
-        assert!(none(&told[0]) && none(&told[shape.len() - 1]) || lengths[0] < lengths[1]);
+        assert!(none(&reported[0]) && none(&reported[shape.len() - 1]) || lengths[0] < lengths[1]);
     }
 }
 
@@ -387,11 +388,11 @@ fn instruments_with_flush_tips_push_together_as_one_does() {
         push(&mut pair, &[(WIRE, 2.0), (CATHETER, 2.0)]).unwrap();
         one.step(Command::advance(2.0)).unwrap();
     }
-    let told = pair.report().clone();
-    assert!(told.instruments.iter().all(|each| each.push_force_n.is_none()));
+    let reported = pair.report().clone();
+    assert!(reported.instruments.iter().all(|each| each.push_force_n.is_none()));
     let alone_n = one.report().push_force_n;
     assert!(alone_n > 0.01, "{alone_n}");
-    assert!((told.push_force_n - alone_n).abs() < 1e-3 * alone_n, "{} {alone_n}", told.push_force_n);
+    assert!((reported.push_force_n - alone_n).abs() < 1e-3 * alone_n, "{} {alone_n}", reported.push_force_n);
     // Counter-check: with tips apart each hand feels its share.
     push(&mut pair, &[(WIRE, 0.3)]).unwrap();
     let apart = pair.report();
@@ -419,7 +420,7 @@ fn the_end_of_a_section_leaves_the_sheath_without_a_jump_of_the_push_force() {
     for beyond_mm in [-0.5, -1e-3, 0.0, 1e-7, 1e-5, 1e-4, 5e-4, 9.99e-4, 1e-3, 1.001e-3, 2e-3, 3e-3, 0.5] {
         let mut there = simulation.clone();
         push(&mut there, &[(WIRE, 1.0 + beyond_mm)]).unwrap();
-        let told = there.report().instruments[WIRE].push_force_n.unwrap();
-        assert!((told + 1.25e-4).abs() < 5e-6, "{told} N at {beyond_mm} mm");
+        let reported = there.report().instruments[WIRE].push_force_n.unwrap();
+        assert!((reported + 1.25e-4).abs() < 5e-6, "{reported} N at {beyond_mm} mm");
     }
 }

@@ -22,9 +22,9 @@ use crate::{Error, Result};
 /// Refuses a coil that cannot be detached; returns the length of one that can, mm.
 pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instrument: usize) -> Result<f64> {
     let stack = environment.surroundings.stack;
-    let refused = |mend: String| {
+    let refused = |remedy: String| {
         let name = stack.instruments().get(instrument).map_or_else(String::new, |one| one.name.clone());
-        Err(Error::parameter("detach", format!("{name:?}"), mend))
+        Err(Error::parameter("detach", format!("{name:?}"), remedy))
     };
     let coil_mm = stack.instruments().get(instrument).map_or(0.0, |one| one.device.coil_mm());
     if coil_mm == 0.0 {

@@ -200,21 +200,21 @@ fn what_cannot_be_detached_is_refused_and_nothing_is_lost() {
     let mut simulation = two_coils(0.0, true);
     advance(&mut simulation, &[0], 20.0).unwrap();
     let before = serde_json::to_string(&simulation.state()).unwrap();
-    let told = |simulation: &mut Simulation, instrument: usize| {
+    let reported = |simulation: &mut Simulation, instrument: usize| {
         simulation.detach(instrument).unwrap_err().to_string()
     };
-    assert!(told(&mut simulation, 0).contains("not out yet: advance it by 10.450 mm"));
-    assert!(told(&mut simulation, 1).contains("not out yet"));
-    assert!(told(&mut simulation, CATHETER).contains("is no coil"));
-    assert!(told(&mut simulation, 3).contains("there are 3"));
+    assert!(reported(&mut simulation, 0).contains("not out yet: advance it by 10.450 mm"));
+    assert!(reported(&mut simulation, 1).contains("not out yet"));
+    assert!(reported(&mut simulation, CATHETER).contains("is no coil"));
+    assert!(reported(&mut simulation, 3).contains("there are 3"));
     assert_eq!(serde_json::to_string(&simulation.state()).unwrap(), before);
     advance(&mut simulation, &[0], 10.5).unwrap();
     simulation.detach(0).unwrap();
-    assert!(told(&mut simulation, 0).contains("detached already"));
+    assert!(reported(&mut simulation, 0).contains("detached already"));
     let again = advance(&mut simulation, &[0], 0.5).unwrap_err().to_string();
     assert!(again.contains("its coil is detached"), "{again}");
     // Counter-check: without self-contact.
     let mut blind = two_coils(0.0, false);
     advance(&mut blind, &[0], OUT_MM).unwrap();
-    assert!(told(&mut blind, 0).contains("method.self_contact = false: what follows"));
+    assert!(reported(&mut blind, 0).contains("method.self_contact = false: what follows"));
 }

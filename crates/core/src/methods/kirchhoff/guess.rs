@@ -45,7 +45,7 @@ impl Guess {
     ) -> bool {
         self.slid.copy_from(state);
         let corrected = repeats && self.correct(contact, loops, (start, mesh, &mut *state));
-        if contact.rubs() {
+        if contact.has_friction() {
             if !self.before_motion.is_empty() {
                 state.measure_from(&self.before_motion);
             } else if corrected {

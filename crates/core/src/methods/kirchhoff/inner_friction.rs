@@ -133,14 +133,14 @@ impl<const C: usize> Search<'_, '_, C> {
             })
             .collect();
         let line = Line { stack, mesh, rod: state, pressing: &pressing, inner_friction };
-        let told: Vec<Vec<LateralForce>> = (0..mesh.inserted_mm.len())
+        let reported: Vec<Vec<LateralForce>> = (0..mesh.inserted_mm.len())
             .map(|inner| match stack.friction(inner) {
                 0.0 => Vec::new(),
                 _ => lateral_forces::<C>(&line, inner),
             })
             .collect();
         let force = |place: &Place| {
-            let at = &told[place.inner][place.node];
+            let at = &reported[place.inner][place.node];
             (at.force_n.norm(), at.length_mm)
         };
         self.contact.between().renew(state, force)

@@ -1,6 +1,6 @@
 //! Instruments with friction that rotate in one another.
 
-use super::coaxial_tests::{CATHETER, WIRE, push, rubbing};
+use super::coaxial_tests::{CATHETER, WIRE, push, rubbing_along};
 use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, InstrumentReport, Move, Simulation};
@@ -42,9 +42,9 @@ fn straight_in_arc(torsion_nmm2: f64, friction: f64, (first, others): (usize, us
     all.extend((0..others).map(|k| one(&format!("sheath {k}"), Section::straight(50.0, 2.0, 1.0))));
     let count = all.len();
     let frictions = std::iter::once(friction).chain(vec![0.0; count - 1]).collect();
-    let stack = Stack::new(all).unwrap().rubbing(frictions).unwrap();
+    let stack = Stack::new(all).unwrap().with_friction(frictions).unwrap();
     let axis = (0..16).map(|i| Vec3::z() * (20.0 * f64::from(i)));
-    let mut simulation = rubbing(axis, 120.0, stack, 0.0);
+    let mut simulation = rubbing_along(axis, 120.0, stack, 0.0);
     push(&mut simulation, &[(first, 2.0)]).unwrap();
     for _ in 0..30 {
         push(&mut simulation, &[(WIRE, LENGTH_MM / 30.0), (CATHETER, LENGTH_MM / 30.0)]).unwrap();
@@ -58,9 +58,9 @@ fn go(simulation: &mut Simulation, moves: &[(usize, f64, f64)]) -> [InstrumentRe
         instrument: *instrument,
         command: Command { advance_mm: *advance_mm, rotate_rad: *rotate_rad },
     });
-    let told = simulation.step_together(&each.collect::<Vec<_>>()).unwrap();
-    assert!(told.converged && told.relaxations == 0 && told.substeps == 1, "{told:?}");
-    [WIRE, CATHETER].map(|index| told.instruments[index])
+    let reported = simulation.step_together(&each.collect::<Vec<_>>()).unwrap();
+    assert!(reported.converged && reported.relaxations == 0 && reported.substeps == 1, "{reported:?}");
+    [WIRE, CATHETER].map(|index| reported.instruments[index])
 }
 
 /// The wire is straight at rest, and first slides freely along the line: N₁ + ½EI₁κ² = 0, and it presses with n =
@@ -117,8 +117,8 @@ fn a_wire_that_is_turned_is_pushed_more_easily() {
     let inner_friction = |turn_rad: f64| {
         let mut simulation = straight_in_arc(STIFF_NMM2, FRICTION, (WIRE, 0));
         let steps = (0..4).map(|_| go(&mut simulation, &[(WIRE, 0.1, turn_rad)])[WIRE]);
-        let told = steps.last().unwrap();
-        (told.push_force_n.unwrap() - loose, told.torque_nmm, simulation.report().dissipated_mj)
+        let reported = steps.last().unwrap();
+        (reported.push_force_n.unwrap() - loose, reported.torque_nmm, simulation.report().dissipated_mj)
     };
     let mut last_n = f64::INFINITY;
     for turn_rad in [0.0f64, 0.1, 0.25, 1.0] {
@@ -170,7 +170,7 @@ fn hands_put_in_what_is_stored_and_taken_while_a_twisted_wire_slides() {
 }
 
 #[test]
-fn a_wire_without_angles_turns_freely_and_rubs_along_the_line() {
+fn a_wire_without_angles_turns_freely_and_slips_along_the_line() {
     let (mut angles, mut none) =
         (straight_in_arc(STIFF_NMM2, FRICTION, (WIRE, 0)), straight_in_arc(STIFF_NMM2, FRICTION, (WIRE, 2)));
     let [with, without] = [&mut angles, &mut none].map(|simulation| {
@@ -190,14 +190,14 @@ fn a_step_that_turns_can_be_taken_again() {
     let couples = |simulation: &Simulation| -> f64 {
         simulation.lateral_forces(WIRE).iter().map(|at| at.friction_nmm).sum()
     };
-    let told = couples(&simulation);
-    near(-told, simulation.report().instruments[WIRE].torque_nmm, 1e-3);
+    let reported = couples(&simulation);
+    near(-reported, simulation.report().instruments[WIRE].torque_nmm, 1e-3);
     go(&mut simulation, &[(WIRE, 0.2, 0.1)]);
     let after = bytes(&simulation);
     let mut other = straight_in_arc(SOFT_NMM2, FRICTION, (WIRE, 0));
     go(&mut other, &[(CATHETER, -0.1, 0.3)]);
     other.restore(&serde_json::from_slice(&before).unwrap()).unwrap();
-    assert_eq!(couples(&other), told);
+    assert_eq!(couples(&other), reported);
     go(&mut other, &[(WIRE, 0.2, 0.1)]);
     assert_eq!(bytes(&other), after);
     // A state with more friction entries than nodes is rejected.

@@ -15,10 +15,10 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::coaxial::alone;
-use super::loops::skin;
+use super::loops::capsule;
 use super::mesh::{Fineness, Mesh};
 use super::state::KirchhoffState;
-use crate::contact::{ContactPoint, KnownPoints, NormalForce, Skin};
+use crate::contact::{Capsule, ContactPoint, KnownPoints, NormalForce};
 use crate::device::Stack;
 use crate::methods::DetachedCoil;
 use crate::rod::{ElementData, RodState, Stencils};
@@ -58,7 +58,7 @@ impl FreeCoil {
     }
 
     /// Its reported centre line.
-    pub(super) fn told(&self) -> DetachedCoil {
+    pub(super) fn reported(&self) -> DetachedCoil {
         DetachedCoil {
             instrument: self.instrument,
             shape: Shape {
@@ -109,8 +109,8 @@ impl FreeCoil {
             let fits = rod.fits(nodes - 1, sets) && rod.is_finite() && self.forces.len() == forces;
             (fits && self.known.fits(points, pieces)).then_some(())
         };
-        let mend = "is no coil of this scene's instruments: restore a state of this scene";
-        is_one().ok_or_else(|| Error::parameter("state.coils", self.instrument, mend))
+        let remedy = "is no coil of this scene's instruments: restore a state of this scene";
+        is_one().ok_or_else(|| Error::parameter("state.coils", self.instrument, remedy))
     }
 }
 
@@ -122,7 +122,7 @@ pub(super) struct Joined {
     /// For each coil a gap and its elements.
     elements: Vec<ElementData>,
     /// The surfaces of these elements.
-    skins: Vec<Skin>,
+    capsules: Vec<Capsule>,
     /// The contact points of all coils; their elements are counted from the first gap.
     points: Vec<ContactPoint>,
     /// Number of contact points of each coil.
@@ -149,13 +149,13 @@ impl Joined {
             self.instruments.push(coil.instrument);
             self.counts.push(mesh.points.len());
             self.elements.push(ElementData::BREAK);
-            self.skins.push(Skin::NONE);
+            self.capsules.push(Capsule::NONE);
             self.elements.extend_from_slice(&mesh.elements);
-            self.skins.extend(
+            self.capsules.extend(
                 mesh.elements
                     .iter()
                     .zip(mesh.from_tip_mm.windows(2))
-                    .map(|(data, ends)| skin(device, 0.5 * (ends[0] + ends[1]), data)),
+                    .map(|(data, ends)| capsule(device, 0.5 * (ends[0] + ends[1]), data)),
             );
             let moved = |point: ContactPoint| ContactPoint { element: first + point.element, ..point };
             self.points.extend(mesh.points.into_iter().map(moved));
@@ -168,8 +168,8 @@ impl Joined {
     }
 
     /// The surfaces of gaps and coils.
-    pub(super) fn skins(&self) -> impl Iterator<Item = Skin> + '_ {
-        self.skins.iter().copied()
+    pub(super) fn capsules(&self) -> impl Iterator<Item = Capsule> + '_ {
+        self.capsules.iter().copied()
     }
 
     /// Adds the coils to the mesh of a line.

@@ -90,13 +90,13 @@ pub(super) fn comes_out(mesh: &Mesh, instrument: usize) -> Option<usize> {
 /// Forces on an instrument and all inside it by those outside it, at every node of the line, sheath first.
 pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize) -> Vec<LateralForce> {
     let Line { stack, mesh, rod, .. } = *line;
-    let mut told = vec![LateralForce::default(); mesh.from_tip_mm.len()];
-    let Some((own, outside)) = mesh.inserted_mm.split_at_checked(instrument + 1) else { return told };
+    let mut reported = vec![LateralForce::default(); mesh.from_tip_mm.len()];
+    let Some((own, outside)) = mesh.inserted_mm.split_at_checked(instrument + 1) else { return reported };
     let [inside_mm, outside_mm, line_mm] =
         [own, outside, &mesh.inserted_mm].map(|all| line_mm(all.iter().copied()));
     let reach_mm = own[instrument].min(outside_mm);
     if reach_mm == 0.0 {
-        return told;
+        return reported;
     }
     let first = mesh.nearest_node(line_mm - inside_mm.min(outside_mm));
     let last = mesh.nearest_node(line_mm - reach_mm);
@@ -132,11 +132,11 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
             let after = mesh.elements.get(i).filter(|_| i < last).map_or(0.0, |data| data.length);
             let length_mm = 0.5 * (mesh.elements[i - 1].length + after);
             let [friction_n, friction_nmm] = [drag, couple_mm].map(|part| part * force_n.norm());
-            told[i] = LateralForce { force_n, length_mm, tension_n: tension, friction_n, friction_nmm };
+            reported[i] = LateralForce { force_n, length_mm, tension_n: tension, friction_n, friction_nmm };
         }
         beyond = near.plus(&near_pull, tension);
     }
-    told
+    reported
 }
 
 /// Forces of each of the first elements of an instrument and those inside it at its near and far node without axial

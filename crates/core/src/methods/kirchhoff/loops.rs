@@ -1,21 +1,21 @@
 //! Contact between loops of the device.
 
 use super::mesh::Mesh;
-use crate::contact::{HandMotion, Skin};
+use crate::contact::{Capsule, HandMotion};
 use crate::device::{Device, Stack};
 use crate::rod::ElementData;
 
 /// The surface of each element of the line: with the radius of its outermost instrument in the middle, practically
 /// rigid.
-pub(super) fn skins<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item = Skin> + 'a {
+pub(super) fn capsules<'a>(mesh: &'a Mesh, stack: &'a Stack) -> impl Iterator<Item = Capsule> + 'a {
     middles(mesh).zip(&mesh.elements).map(move |(middle_mm, element)| {
-        Skin::rigid(stack.felt_radius_mm(&mesh.inserted_mm, middle_mm), element.bending[1])
+        Capsule::rigid(stack.outermost_radius_mm(&mesh.inserted_mm, middle_mm), element.bending[1])
     })
 }
 
 /// The surface of an element of a single device whose middle is at this distance from the tip, mm.
-pub(super) fn skin(device: &Device, middle_mm: f64, element: &ElementData) -> Skin {
-    Skin::rigid(device.section_at(middle_mm).radius_mm, element.bending[1])
+pub(super) fn capsule(device: &Device, middle_mm: f64, element: &ElementData) -> Capsule {
+    Capsule::rigid(device.section_at(middle_mm).radius_mm, element.bending[1])
 }
 
 /// Advance of the outermost instrument in each element along the line, mm; 0 for coils, whose elements follow.
@@ -24,7 +24,7 @@ pub(super) fn advances_mm<'a>(
     stack: &'a Stack,
     motions: &'a [HandMotion],
 ) -> impl Iterator<Item = f64> + 'a {
-    let outermost = |middle_mm: f64| stack.felt_instrument(&mesh.inserted_mm, middle_mm).unwrap_or(0);
+    let outermost = |middle_mm: f64| stack.outermost_instrument(&mesh.inserted_mm, middle_mm).unwrap_or(0);
     let on_line = middles(mesh).map(move |middle_mm| motions[outermost(middle_mm)].advance_mm());
     on_line.chain(std::iter::repeat(0.0)).take(mesh.elements.len())
 }

@@ -129,8 +129,8 @@ impl MethodChoice for KirchhoffOptions {
         if self.self_contact {
             return Ok(());
         }
-        let mend = "what follows a detached coil would pass through it: set it to true";
-        Err(Error::parameter("method.self_contact", false, mend))
+        let remedy = "what follows a detached coil would pass through it: set it to true";
+        Err(Error::parameter("method.self_contact", false, remedy))
     }
 }
 
@@ -245,20 +245,20 @@ impl<const C: usize> Kirchhoff<C> {
         let points: usize =
             surroundings.stack.devices().map(|device| options.fineness().points(device)).sum();
         if points > POINT_LIMIT {
-            let mend = format!(
+            let remedy = format!(
                 "makes {points} contact points along the device, and more than {POINT_LIMIT} take gigabytes: allow them farther apart"
             );
-            return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, mend));
+            return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, remedy));
         }
         if options.self_contact && surroundings.motion.is_some() {
-            let mend =
+            let remedy =
                 "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
-            return Err(Error::parameter("method.self_contact", true, mend));
+            return Err(Error::parameter("method.self_contact", true, remedy));
         }
         crate::contact::check_friction("method.self_friction", options.self_friction)?;
         if options.self_friction > 0.0 && !options.self_contact {
-            let mend = "nothing touches itself that could rub: set method.self_contact = true as well";
-            return Err(Error::parameter("method.self_friction", options.self_friction, mend));
+            let remedy = "nothing touches itself that could rub: set method.self_contact = true as well";
+            return Err(Error::parameter("method.self_friction", options.self_friction, remedy));
         }
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
@@ -330,7 +330,7 @@ impl<const C: usize> Kirchhoff<C> {
             self.write_shape(&workspace.mesh.from_tip_mm);
         }
         self.workspace = Some(workspace);
-        done.map(|(_, told)| told)
+        done.map(|(_, reported)| reported)
     }
 
     /// Carries out moves as far as so many linear solves go, `usize::MAX` for all of it.
@@ -366,8 +366,9 @@ impl<const C: usize> Kirchhoff<C> {
         let hands = &state.hands;
         let devices = surroundings.stack.devices();
         if hands.len() != devices.len() {
-            let mend = format!("there are {} instruments here: restore a state of this scene", devices.len());
-            return Err(Error::parameter("state.instruments", hands.len(), mend));
+            let remedy =
+                format!("there are {} instruments here: restore a state of this scene", devices.len());
+            return Err(Error::parameter("state.instruments", hands.len(), remedy));
         }
         for (hand, device) in hands.iter().zip(devices) {
             crate::methods::check_inserted(hand.inserted_mm, device)?;
@@ -399,7 +400,7 @@ impl<const C: usize> Kirchhoff<C> {
         self.shape.from_tip_mm.clear();
         self.shape.from_tip_mm.extend_from_slice(from_tip_mm);
         self.coils.clear();
-        self.coils.extend(self.state.coils.iter().map(FreeCoil::told));
+        self.coils.extend(self.state.coils.iter().map(FreeCoil::reported));
     }
 }
 
@@ -499,8 +500,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         joined.add_to(&mut mesh);
         let mut rod = self.state.rod.clone();
         join(&mut rod, &self.state.coils);
-        let skins = loops::skins(&mesh, stack).chain(joined.skins()).collect();
-        SelfContact::new(&mesh.elements, skins).touching_at(&mesh.elements, &rod)
+        let capsules = loops::capsules(&mesh, stack).chain(joined.capsules()).collect();
+        SelfContact::new(&mesh.elements, capsules).touching_at(&mesh.elements, &rod)
     }
 
     fn state(&self) -> State {

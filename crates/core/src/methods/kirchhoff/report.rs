@@ -45,8 +45,8 @@ pub(super) fn check(report: &StepReport, state: &KirchhoffState) -> Result<()> {
         && hands.iter().zip(&state.hands).all(is_at)
         && report.inserted_mm == line_mm(lengths(&state.hands))
         && report.behind == state.behind;
-    let mend = "is of another state: restore one as it was saved";
-    if agrees { Ok(()) } else { Err(Error::parameter("state.report", report.inserted_mm, mend)) }
+    let remedy = "is of another state: restore one as it was saved";
+    if agrees { Ok(()) } else { Err(Error::parameter("state.report", report.inserted_mm, remedy)) }
 }
 
 /// Writes what is known of a state into a report.

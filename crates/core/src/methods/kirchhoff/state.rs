@@ -223,12 +223,12 @@ impl KirchhoffState {
         let r = &self.rod;
         let sets = belongs.sets.max(1);
         if !r.fits(n, sets) {
-            let mend = format!("its lists are not those of {n} elements");
-            return Err(other("rod", r.positions.len(), mend));
+            let remedy = format!("its lists are not those of {n} elements");
+            return Err(other("rod", r.positions.len(), remedy));
         }
         if self.has_angles != (belongs.sets > 0) {
-            let mend = "it has material angles where this simulation has none, or none where it has: another device or friction";
-            return Err(other("has_angles", self.has_angles, mend));
+            let remedy = "it has material angles where this simulation has none, or none where it has: another device or friction";
+            return Err(other("has_angles", self.has_angles, remedy));
         }
         let forces = if belongs.inner_friction { belongs.points } else { 0 };
         if self.forces.len() != forces {
@@ -239,16 +239,16 @@ impl KirchhoffState {
             ));
         }
         if !self.inner_friction.is_empty() && self.inner_friction.len() != belongs.inner * (n + 1) {
-            let mend = format!("at {} nodes {} instruments may rub in others here", n + 1, belongs.inner);
-            return Err(other("inner_friction", self.inner_friction.len(), mend));
+            let remedy = format!("at {} nodes {} instruments may rub in others here", n + 1, belongs.inner);
+            return Err(other("inner_friction", self.inner_friction.len(), remedy));
         }
         if !self.known.fits(belongs.points, belongs.surface.pieces()) {
-            let mend = format!(
+            let remedy = format!(
                 "{} contact points on {} pieces of wall are here: another vessel, device or wall",
                 belongs.points,
                 belongs.surface.pieces()
             );
-            return Err(other("known", self.known.len(), mend));
+            return Err(other("known", self.known.len(), remedy));
         }
         let felt = (belongs.fineness, belongs.surface.pieces());
         self.coils
@@ -285,11 +285,11 @@ impl KirchhoffState {
         let (position, frame, was) = (belongs.sheath.position_mm, belongs.sheath.frame(), &r.frames[0]);
         let turned = (frame.t - was.t).norm().max((frame.u - was.u).norm());
         if r.positions[0] != position || turned > SAME_DIRECTION {
-            let mend = format!(
+            let remedy = format!(
                 "the sheath's mouth is at {} here, and its direction and bends_towards must be the same",
                 show(&position)
             );
-            return Err(other("sheath", show(&r.positions[0]), mend));
+            return Err(other("sheath", show(&r.positions[0]), remedy));
         }
         let mut inner_friction =
             self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
@@ -355,6 +355,6 @@ fn show(v: &Vec3) -> String {
     crate::error::vector(v)
 }
 
-fn other(what: &str, value: impl Display, mend: impl Display) -> Error {
-    Error::parameter(format!("state.{what}"), value, format!("{mend}: restore a state of this scene"))
+fn other(what: &str, value: impl Display, remedy: impl Display) -> Error {
+    Error::parameter(format!("state.{what}"), value, format!("{remedy}: restore a state of this scene"))
 }

@@ -9,7 +9,7 @@ use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, line_advance_mm, longest_mm, set_motions};
 use super::joined::{Resistance, join};
-use super::loops::{advances_mm, skins};
+use super::loops::{advances_mm, capsules};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::{KirchhoffState, UnderWay};
@@ -17,7 +17,7 @@ use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::Vec3;
-use crate::contact::{ContactPoint, Rubs, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{ContactPoint, FrictionLaw, SETTLED, WallContact, least_force_n, stick_mm};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
 
@@ -217,12 +217,12 @@ impl<const C: usize> Tools<C> {
     ) -> bool {
         let (stack, motions) = (environment.surroundings.stack, &self.guess.motions);
         let radius_mm = mesh.points.first().map_or(0.0, |point| point.potential.radius_mm);
-        let friction = Rubs {
+        let friction = FrictionLaw {
             coefficient: environment.options.self_friction,
             stick_mm: stick_mm(motions, radius_mm),
             least_n: least_force_n(stack.softest_nmm2()),
         };
-        self.loops.renew(&mesh.elements, skins(mesh, stack).chain(self.joined.skins()));
+        self.loops.renew(&mesh.elements, capsules(mesh, stack).chain(self.joined.capsules()));
         let place = |from_tip_mm: &f64| {
             place_on_curve(start.mesh, &start.state.rod, mesh.from_tip_mm[0] - from_tip_mm).0
         };
@@ -260,16 +260,16 @@ impl<const C: usize> Tools<C> {
         &self,
         environment: &Environment<'_>,
         (was, is): (Start<'_>, Start<'_>),
-        (left, aside_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
-        rubbed_mj: (f64, f64),
+        (left, lateral_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
+        friction_mj: (f64, f64),
     ) -> Balance {
         let (states, motions) = ((was.state, is.state), &self.guess.motions);
-        let flow_mj = aside_mj + self.drag.size_n() * longest_mm(motions);
+        let flow_mj = lateral_mj + self.drag.size_n() * longest_mm(motions);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), states).with_flow(flow_mj);
         let by_fields = work_of_fields(environment, was, is);
         let by_wall = by_wall.with(by_fields);
         let notable = environment.options.tuning.steps.notable;
-        Balance::new(environment.surroundings.stack, motions, states, by_wall, rubbed_mj, notable)
+        Balance::new(environment.surroundings.stack, motions, states, by_wall, friction_mj, notable)
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
@@ -367,7 +367,7 @@ impl<const C: usize> Tools<C> {
                 contact.anchor_friction(&mesh.elements, rod);
             }
         }
-        let aside_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
+        let lateral_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
         self.counters.add(&contact.count());
         self.work.add(taken, mesh.elements.len());
         if let Some(wrong) = wrong {
@@ -376,7 +376,7 @@ impl<const C: usize> Tools<C> {
             }
             return Err(wrong);
         }
-        let rubbed_mj = self.dissipated_mj(mesh, rod);
+        let friction_mj = self.dissipated_mj(mesh, rod);
         let farthest_mm = self.newton.neighbourhood.farthest(rod);
         self.keep(start, mesh, after);
         let outside_mj = self.write_forces(environment, next);
@@ -384,7 +384,7 @@ impl<const C: usize> Tools<C> {
         if found.residual > tuning.steps.at_rest {
             next.parts().1.hand_forces.clone_from(&start.state.hand_forces);
         }
-        let balance = self.balance(environment, (start, next.start()), (left, aside_mj), rubbed_mj);
+        let balance = self.balance(environment, (start, next.start()), (left, lateral_mj), friction_mj);
         let after = next.parts().1;
         let lacks = balance.lacks();
         // Only a short part shows a jump: in a long one forces may go far beyond their values at its ends.

@@ -31,7 +31,7 @@ fn two(motion: &[MotionMode]) -> Simulation {
     let properties = WallProperties { friction: 0.1, deviation_mm: 0.0, ..WallProperties::default() };
     let options = KirchhoffOptions { element_mm: 4.0, tolerance: 1e-6, ..KirchhoffOptions::default() };
     let sheath = Sheath::new(crate::Vec3::z() * 6.0, crate::Vec3::z()).unwrap();
-    let mut two = Simulation::builder(tube(), stack.unwrap().rubbing(vec![0.1, 0.0]).unwrap(), sheath)
+    let mut two = Simulation::builder(tube(), stack.unwrap().with_friction(vec![0.1, 0.0]).unwrap(), sheath)
         .properties(properties)
         .motion(VesselMotion::new(motion).unwrap())
         .method(&options)
@@ -194,7 +194,7 @@ fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
     assert!((released_mj[1] / released_mj[0] - 1.0).abs() < 0.02, "{released_mj:?}");
     let [a, b] = [&ticking, &stepping].map(|each| each.shape().tip_mm().unwrap());
     assert!((a - b).norm() < 1e-3, "{a} {b}");
-    // On its way its axis stays in the lumen, up to the distance of the felt wall from its triangles.
+    // On its way its axis stays in the lumen, up to the distance of the contact surface from its triangles.
     assert!(deepest_mm < 0.4 + 0.01, "{deepest_mm}");
 }
 

@@ -47,7 +47,7 @@ fn go_on(simulation: &mut Simulation, to_mm: f64, step_mm: f64) -> StepReport {
     simulation.report().clone()
 }
 
-fn aside_mm(simulation: &Simulation) -> f64 {
+fn lateral_mm(simulation: &Simulation) -> f64 {
     let tip = simulation.shape().tip_mm().unwrap();
     (tip - Vec3::new(tip.x, 0.0, 75.0)).norm()
 }
@@ -62,11 +62,16 @@ fn a_tip_that_first_touches_in_a_long_step_sticks_as_in_short_ones() {
     // A column of 37.6 mm, clamped at one end and pinned at the other: 20.19 EI/L², and less the more it is bent.
     let euler_n = 20.19 * 0.2 / (37.6 * 37.6);
     assert!(forces[0] < euler_n && forces[0] > 0.7 * euler_n, "{forces:?} {euler_n}");
-    assert!(aside_mm(&long) < 3.0 && aside_mm(&short) < 3.0, "{} {}", aside_mm(&long), aside_mm(&short));
+    assert!(
+        lateral_mm(&long) < 3.0 && lateral_mm(&short) < 3.0,
+        "{} {}",
+        lateral_mm(&long),
+        lateral_mm(&short)
+    );
     // Counter-check: without friction it slides away.
     let mut free = upright(0.0);
     let slid = go_on(&mut free, 40.0, 1.0);
-    assert!(aside_mm(&free) > 8.0 && slid.push_force_n < 0.7 * forces[0]);
+    assert!(lateral_mm(&free) > 8.0 && slid.push_force_n < 0.7 * forces[0]);
 }
 
 #[test]
@@ -275,8 +280,8 @@ fn what_comes_in_at_a_narrow_mouth_stores_what_the_hand_gives() {
             before = report;
         }
         let stored_mj = before.energy.wall - first_mj;
-        let told = format!("{from_mm}, {element_mm}: {given_mj} {stored_mj} {most_mj}, {through_mj}");
-        assert!(most_mj > 1e-3 && (given_mj - stored_mj).abs() < 0.02 * most_mj, "{told}");
-        assert!((through_mj + was_mj - before.energy.wall).abs() < 0.01 * most_mj, "{told}");
+        let reported = format!("{from_mm}, {element_mm}: {given_mj} {stored_mj} {most_mj}, {through_mj}");
+        assert!(most_mj > 1e-3 && (given_mj - stored_mj).abs() < 0.02 * most_mj, "{reported}");
+        assert!((through_mj + was_mj - before.energy.wall).abs() < 0.01 * most_mj, "{reported}");
     }
 }

@@ -108,8 +108,8 @@ impl Bumps {
 
     /// Bumps at zero heights, mm, of the vertices that have any.
     pub(super) fn at_rest_mm(&self) -> impl Iterator<Item = (usize, f64)> {
-        let told = |(v, _): &(usize, f64)| !self.row(*v).is_empty();
-        self.at_rest_mm.iter().copied().enumerate().filter(told)
+        let reported = |(v, _): &(usize, f64)| !self.row(*v).is_empty();
+        self.at_rest_mm.iter().copied().enumerate().filter(reported)
     }
 
     /// An upper bound of the largest eigenvalue of the square of the operator.

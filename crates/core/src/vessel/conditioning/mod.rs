@@ -1,6 +1,6 @@
 //! Uniform remeshing of a surface.
 //!
-//! The felt wall blends quadrics fitted at the vertices of a mesh. That works where a mesh is uniform, and fails
+//! The contact surface blends quadrics fitted at the vertices of a mesh. That works where a mesh is uniform, and fails
 //! where it has slivers, fans, facets much longer than the vessel is wide, or noise; surfaces of real vessels have
 //! all of these. Here such a surface gets vertices that depend on its geometry and not on its triangulation:
 //!
@@ -72,8 +72,8 @@ impl Conditioning {
 
     fn check(&self) -> Result<()> {
         if !(self.deviation_mm > 0.0 && self.deviation_mm.is_finite()) {
-            let mend = "must be positive: how far the wall may be moved, in mm";
-            return Err(Error::parameter("deviation_mm", self.deviation_mm, mend));
+            let remedy = "must be positive: how far the wall may be moved, in mm";
+            return Err(Error::parameter("deviation_mm", self.deviation_mm, remedy));
         }
         if self.most_triangles == 0 {
             return Err(Error::parameter("most_triangles", 0, "must be positive"));
@@ -83,7 +83,7 @@ impl Conditioning {
 }
 
 /// A conditioned surface. The distance of the wall made of it from the given one is measured by
-/// [`ContactSurface::deviation`](crate::contact::FeltMesh::deviation).
+/// [`ContactSurface::deviation`](crate::contact::ContactMesh::deviation).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditioned<'a> {
     /// The mesh, counter-clockwise from outside like the given one; the given one itself if already uniform.

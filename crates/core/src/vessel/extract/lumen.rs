@@ -56,9 +56,9 @@ impl<'a> Lumen<'a> {
         let near = self.query.nearest(x, f64::INFINITY)?;
         let openings = self.wall.openings();
         let beyond = |vertex: &u32| {
-            self.opening_of
-                .get(vertex)
-                .is_some_and(|&k| openings[k].beyond_and_aside_mm(x).0 > PLANE_RADII * openings[k].radius_mm)
+            self.opening_of.get(vertex).is_some_and(|&k| {
+                openings[k].beyond_and_off_axis_mm(x).0 > PLANE_RADII * openings[k].radius_mm
+            })
         };
         match near.rim && self.wall.mesh().triangles[near.triangle as usize].iter().any(beyond) {
             true => Some(Nearest { distance_mm: -near.distance_mm.abs(), ..near }),
@@ -69,12 +69,12 @@ impl<'a> Lumen<'a> {
     /// Whether the straight way between two positions in the lumen leaves it through an opening.
     pub(super) fn leaves(&self, from: &Vec3, to: &Vec3) -> bool {
         self.wall.openings().iter().any(|opening| {
-            let [before, after] = [from, to].map(|x| opening.beyond_and_aside_mm(x).0);
+            let [before, after] = [from, to].map(|x| opening.beyond_and_off_axis_mm(x).0);
             if (before > 0.0) == (after > 0.0) {
                 return false;
             }
             let there = from + (to - from) * (before / (before - after));
-            opening.beyond_and_aside_mm(&there).1 < opening.radius_mm
+            opening.beyond_and_off_axis_mm(&there).1 < opening.radius_mm
         })
     }
 

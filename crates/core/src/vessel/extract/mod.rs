@@ -77,8 +77,8 @@ impl ExtractedCentreline {
             given => given.to_vec(),
         };
         if all.is_empty() {
-            let mend = "the surface has no other opening to lead to: give places inside";
-            return Err(Error::parameter("to", "none", mend));
+            let remedy = "the surface has no other opening to lead to: give places inside";
+            return Err(Error::parameter("to", "none", remedy));
         }
         if let Some(k) = all.iter().position(|to| *to == first) {
             return Err(Error::parameter("to", name(&first, k), "the way begins there: name another end"));
@@ -86,9 +86,9 @@ impl ExtractedCentreline {
         let ends = all.iter().map(|to| end(&lumen, to, "to")).collect::<Result<Vec<Sphere>>>()?;
         let ways = found_ways(&lumen, root, &ends);
         if let Some(missed) = (0..all.len()).find(|&k| ways[k].is_none() && !to.is_empty()) {
-            let mend =
+            let remedy =
                 "no way inside the vessel leads there: check that it is in the same piece of the surface";
-            return Err(Error::parameter("to", name(&all[missed], missed), mend));
+            return Err(Error::parameter("to", name(&all[missed], missed), remedy));
         }
         let is_missed = |(k, end): (usize, &CentrelineEnd)| match end {
             CentrelineEnd::Opening(opening) if ways[k].is_none() => Some(*opening),
@@ -105,8 +105,8 @@ impl ExtractedCentreline {
             targets.extend(row.map(|row| Target { name: name(&all[k], k), row }));
         }
         if growing.nodes.is_empty() {
-            let mend = "no way leads from there to any other opening: choose another with `from`";
-            return Err(Error::parameter("from", name(&first, 0), mend));
+            let remedy = "no way leads from there to any other opening: choose another with `from`";
+            return Err(Error::parameter("from", name(&first, 0), remedy));
         }
         Ok(Self { tree: CentrelineTree::new(growing.nodes)?.with_targets(targets)?, unreached })
     }
@@ -150,11 +150,11 @@ fn end(lumen: &Lumen<'_>, end: &CentrelineEnd, key: &str) -> Result<Sphere> {
     let centre_mm = match *end {
         CentrelineEnd::Opening(number) => {
             let opening = openings.get(number).ok_or_else(|| {
-                let mend = match openings.len() {
+                let remedy = match openings.len() {
                     0 => "the surface has no opening: give a place inside".to_owned(),
                     count => format!("the surface has {count} openings, counted from 0"),
                 };
-                Error::parameter(key, format!("opening {number}"), mend)
+                Error::parameter(key, format!("opening {number}"), remedy)
             })?;
             opening.centre_mm
         }

@@ -121,14 +121,14 @@ fn places_inside_are_ends_too_and_others_are_refused() {
         let tree = of(place(0.0, -3.8, 20.0), to).unwrap().tree;
         assert!((tree.branches()[0].length_mm - 40.0).abs() < 2.0, "{:?}", tree.branches());
     }
-    for (from, to, told) in [
+    for (from, to, reported) in [
         (place(0.0, 0.0, 20.0), place(8.0, 0.0, 60.0), "to = [8, 0, 60]: is not inside"),
         (place(0.0, 0.0, -5.0), place(0.0, 0.0, 60.0), "from = [0, 0, -5]: is not inside"),
         (place(f64::NAN, 0.0, 0.0), place(0.0, 0.0, 60.0), "from = [NaN, 0, 0]: is not inside"),
         (CentrelineEnd::Opening(2), place(0.0, 0.0, 60.0), "from = opening 2: the surface has 2 openings"),
     ] {
         let error = of(from, to).unwrap_err().to_string();
-        assert!(error.starts_with(told), "{error}");
+        assert!(error.starts_with(reported), "{error}");
     }
     let closed = Wall::welded(&made.wall.closed_mesh()).unwrap();
     let error = ExtractedCentreline::of(&closed, None, &[]).unwrap_err().to_string();
@@ -136,7 +136,7 @@ fn places_inside_are_ends_too_and_others_are_refused() {
 }
 
 #[test]
-fn openings_of_another_piece_are_told() {
+fn openings_of_another_piece_are_reported() {
     let made = wall_of("straight_tube");
     let mut mesh = made.wall.mesh().clone();
     let count = mesh.vertices_mm.len() as u32;
@@ -178,7 +178,7 @@ fn a_way_does_not_cross_the_gap_of_a_ring_that_is_cut_open() {
     let found = ExtractedCentreline::of(&wall, Some(CentrelineEnd::Opening(0)), &[]).unwrap();
     let [branch] = found.tree.branches()[..] else { panic!("{found:?}") };
     assert!((branch.length_mm - whole * ring_mm).abs() < 2.0, "{branch:?}");
-    // Nor do the felt extensions of its ends meet.
+    // Nor do the extensions of the contact surface of its ends meet.
     let reach: f64 = wall.openings().iter().map(|opening| opening.beyond_mm).sum();
     assert!(reach > 4.0 && reach < 4.7, "{reach}");
 }

@@ -26,8 +26,8 @@ fn is_read(name: &str, bytes: &[u8]) {
 }
 
 fn is_refused(name: &str, bytes: &[u8], why: &str) {
-    let told = read(name, bytes).unwrap_err().to_string();
-    assert!(told.contains(why), "{why}: {told}");
+    let reported = read(name, bytes).unwrap_err().to_string();
+    assert!(reported.contains(why), "{why}: {reported}");
 }
 
 const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0.5\nendloop\nendfacet\n\
@@ -158,8 +158,8 @@ fn plies_have_strips_unused_values_and_other_names() {
 #[test]
 fn axes_are_those_of_the_header_or_of_the_caller() {
     let stl = binary_stl();
-    let mut told = stl.clone();
-    told[26..48].copy_from_slice(b"3D Slicer. SPACE=RAS  ");
+    let mut reported = stl.clone();
+    reported[26..48].copy_from_slice(b"3D Slicer. SPACE=RAS  ");
     let field = |format: &str| {
         format!(
             "<PolyData><FieldData><Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" {format}</Array></FieldData>"
@@ -167,7 +167,7 @@ fn axes_are_those_of_the_header_or_of_the_caller() {
     };
     let letters = "format=\"ascii\">82 65 83 0";
     let said = [
-        ("a.stl", told),
+        ("a.stl", reported),
         ("a.stl", STL.replace("solid a", "solid a SPACE=RAS").into_bytes()),
         ("a.ply", PLY.replace("comment a", "comment SPACE=RAS a").into_bytes()),
         ("a.obj", OBJ.replace("# a", "# SPACE=RAS; a").into_bytes()),
@@ -198,7 +198,7 @@ fn axes_are_those_of_the_header_or_of_the_caller() {
 }
 
 #[test]
-fn a_file_under_a_wrong_name_is_told_what_it_seems_to_be() {
+fn a_file_under_a_wrong_name_is_reported_what_it_seems_to_be() {
     for (name, bytes, seems) in [
         ("a.stl", PLY.as_bytes(), "PLY files"),
         ("a.obj", VTP.as_bytes(), "VTK's XML files"),

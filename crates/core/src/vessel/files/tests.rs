@@ -165,7 +165,7 @@ fn errors_name_the_place_and_the_way_out() {
 }
 
 #[test]
-fn errors_of_ply_files_are_one_line_with_place_cause_and_mend() {
+fn errors_of_ply_files_are_one_line_with_place_cause_and_remedy() {
     let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                 element face 1\nproperty list uchar int vertex_indices\nend_header\n";
     let with = |rows: &str| format!("{head}{rows}");

@@ -184,12 +184,12 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
         found.push(fit(tree, &rows, leaves_parent, is_open)?);
         samples += found[found.len() - 1].samples.len();
         if found.len() > MOST_BRANCHES || samples > MOST_SAMPLES_IN_ALL {
-            let mend = format!(
+            let remedy = format!(
                 "the first {} branches need {samples} samples of their course, and at most {MOST_BRANCHES} branches and \
                  {MOST_SAMPLES_IN_ALL} samples are taken: leave out thin branches, or check the units",
                 found.len()
             );
-            return Err(Error::parameter("centreline rows", nodes.len(), mend));
+            return Err(Error::parameter("centreline rows", nodes.len(), remedy));
         }
     }
     Ok(found)

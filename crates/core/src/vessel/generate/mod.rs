@@ -204,8 +204,8 @@ fn edge_of_count(branches: &[curve::Branch], count: usize) -> f64 {
 /// Reformulates an error of an edge length as one of the requested count.
 fn of_count(error: Error, count: usize, edge: f64) -> Error {
     match error {
-        Error::Parameter { name, mend, .. } if name == "edge_mm" => {
-            Error::parameter("triangles", count, format!("means edges of {edge:.1e} mm: {mend}"))
+        Error::Parameter { name, remedy, .. } if name == "edge_mm" => {
+            Error::parameter("triangles", count, format!("means edges of {edge:.1e} mm: {remedy}"))
         }
         other => other,
     }
@@ -215,17 +215,17 @@ fn of_count(error: Error, count: usize, edge: f64) -> Error {
 fn checked_grid(branches: &[curve::Branch], edge_mm: f64) -> Result<f64> {
     let largest = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(0.0, f64::max);
     if edge_mm.is_nan() || edge_mm <= 0.0 || edge_mm > largest {
-        let mend = format!(
+        let remedy = format!(
             "must be positive and at most the largest radius, {largest:.3} mm, to resolve the vessel"
         );
-        return Err(Error::parameter("edge_mm", edge_mm, mend));
+        return Err(Error::parameter("edge_mm", edge_mm, remedy));
     }
     let grid = edge_mm.min(GRID_PER_RADIUS * smallest_radius(branches));
     let expected = branch_area(branches) * TRIANGLES_PER_FACE / (grid * grid);
     if expected > MOST_TRIANGLES {
-        let mend =
+        let remedy =
             format!("would need about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made");
-        return Err(Error::parameter("edge_mm", edge_mm, mend));
+        return Err(Error::parameter("edge_mm", edge_mm, remedy));
     }
     Ok(grid)
 }

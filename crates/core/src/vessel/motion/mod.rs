@@ -62,11 +62,11 @@ impl VesselMotion {
         let steepest = if is_rigid { 0.0 } else { modes.iter().map(Mode::steepest).sum::<f64>() };
         // NaN is rejected too.
         if steepest.is_nan() || steepest >= STEEPEST {
-            let mend = format!(
+            let remedy = format!(
                 "neighbouring points of the vessel would move apart by up to so much of their distance: it must stay below {STEEPEST}; \
                  move or turn less (a turn alone counts as 2 sin of half its angle), or fade over a longer way (fade_mm)"
             );
-            return Err(Error::parameter("vessel.motion", number(steepest), mend));
+            return Err(Error::parameter("vessel.motion", number(steepest), remedy));
         }
         Ok(Some(Self { modes, steepest }))
     }

@@ -97,36 +97,36 @@ impl MotionMode {
         let period_s = match (self.waveform, self.period_s) {
             (Waveform::Steady, None) => 1.0,
             (Waveform::Steady, Some(period_s)) => {
-                let mend = "what is steady has no period: leave it out, or choose another waveform";
-                return Err(Error::parameter(key("period_s"), period_s, mend));
+                let remedy = "what is steady has no period: leave it out, or choose another waveform";
+                return Err(Error::parameter(key("period_s"), period_s, remedy));
             }
             (_, Some(period_s)) => {
                 in_range(&key("period_s"), period_s, LONGEST_S)?;
                 period_s
             }
             (_, None) => {
-                let mend = "give it, in seconds: about 4 of breathing, about 0.8 of a heartbeat";
-                return Err(Error::parameter(key("period_s"), "none", mend));
+                let remedy = "give it, in seconds: about 4 of breathing, about 0.8 of a heartbeat";
+                return Err(Error::parameter(key("period_s"), "none", remedy));
             }
         };
         if !(0.0..=1.0).contains(&self.phase) {
-            let mend = "must be a part of the period, from 0 to 1";
-            return Err(Error::parameter(key("phase"), self.phase, mend));
+            let remedy = "must be a part of the period, from 0 to 1";
+            return Err(Error::parameter(key("phase"), self.phase, remedy));
         }
         let displacement = Vec3::from(self.displacement_mm);
         if !(0.0..=FARTHEST_MM).contains(&displacement.norm()) {
-            let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm");
-            return Err(Error::parameter(key("displacement_mm"), vector(&displacement), mend));
+            let remedy = format!("must be finite numbers, no farther than {FARTHEST_MM} mm");
+            return Err(Error::parameter(key("displacement_mm"), vector(&displacement), remedy));
         }
         let turn = self.turn.map(|turn| turn.check(&key("turn"))).transpose()?;
         if displacement == Vec3::zeros() && turn.is_none() {
-            let mend = "nothing moves in it: give displacement_mm, turn or both";
-            return Err(Error::parameter(name, "{}", mend));
+            let remedy = "nothing moves in it: give displacement_mm, turn or both";
+            return Err(Error::parameter(name, "{}", remedy));
         }
         let fade = match (self.still, self.within) {
             (Some(_), Some(_)) => {
-                let mend = "still is given too: keep one of the two";
-                return Err(Error::parameter(key("within"), "given", mend));
+                let remedy = "still is given too: keep one of the two";
+                return Err(Error::parameter(key("within"), "given", remedy));
             }
             (Some(around), None) => Some((around, true, "still")),
             (None, Some(around)) => Some((around, false, "within")),
@@ -145,17 +145,17 @@ impl Turn {
     fn check(&self, name: &str) -> Result<(Vec3, Unit<Vec3>, f64)> {
         let (centre, axis) = (Vec3::from(self.centre_mm), Vec3::from(self.axis));
         if !(0.0..=FARTHEST_MM).contains(&centre.norm()) {
-            let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
-            return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), mend));
+            let remedy = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
+            return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), remedy));
         }
         let Some(axis) = Unit::try_new(axis, f64::MIN_POSITIVE).filter(|a| a.iter().all(|c| c.is_finite()))
         else {
-            let mend = "must be a direction: finite numbers, not all of them 0";
-            return Err(Error::parameter(format!("{name}.axis"), vector(&axis), mend));
+            let remedy = "must be a direction: finite numbers, not all of them 0";
+            return Err(Error::parameter(format!("{name}.axis"), vector(&axis), remedy));
         };
         if self.angle_deg == 0.0 || !(-180.0..=180.0).contains(&self.angle_deg) {
-            let mend = "must be an angle from -180 to 180 degrees other than 0";
-            return Err(Error::parameter(format!("{name}.angle_deg"), self.angle_deg, mend));
+            let remedy = "must be an angle from -180 to 180 degrees other than 0";
+            return Err(Error::parameter(format!("{name}.angle_deg"), self.angle_deg, remedy));
         }
         Ok((centre, axis, self.angle_deg.to_radians()))
     }
@@ -165,12 +165,12 @@ impl Around {
     fn check(&self, name: &str) -> Result<()> {
         let centre = Vec3::from(self.centre_mm);
         if !(0.0..=FARTHEST_MM).contains(&centre.norm()) {
-            let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
-            return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), mend));
+            let remedy = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
+            return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), remedy));
         }
         if !(0.0..=FARTHEST_MM).contains(&self.radius_mm) {
-            let mend = format!("must be from 0 to {FARTHEST_MM}");
-            return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, mend));
+            let remedy = format!("must be from 0 to {FARTHEST_MM}");
+            return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, remedy));
         }
         in_range(&format!("{name}.fade_mm"), self.fade_mm, FARTHEST_MM)
     }

@@ -135,7 +135,7 @@ fn waveforms_begin_and_end_at_rest_and_reach_what_they_are_said_to() {
 
 #[test]
 fn what_makes_no_sense_is_refused_with_its_key() {
-    let told = |change: &dyn Fn(&mut MotionMode)| {
+    let reported = |change: &dyn Fn(&mut MotionMode)| {
         let mut one = mode(Waveform::Breathing);
         change(&mut one);
         VesselMotion::new(&[mode(Waveform::Steady), one]).unwrap_err().to_string()
@@ -155,9 +155,9 @@ fn what_makes_no_sense_is_refused_with_its_key() {
         (&|m| m.within = Some(around(1.0, 30.0)), "fade over a longer way"),
     ];
     for (change, words) in cases {
-        assert!(told(change).contains(words), "{words}: {}", told(change));
+        assert!(reported(change).contains(words), "{words}: {}", reported(change));
     }
-    let both = told(&|m| (m.still, m.within) = (Some(around(1.0, 90.0)), Some(around(1.0, 90.0))));
+    let both = reported(&|m| (m.still, m.within) = (Some(around(1.0, 90.0)), Some(around(1.0, 90.0))));
     assert!(both.contains("keep one of the two"), "{both}");
 }
 

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_with_other_vertices_are_sewn_and_the_seam_is_told() {
+    fn sides_with_other_vertices_are_sewn_and_the_seam_is_reported() {
         for (count, turn, gap) in [
             (48, 0.0, 0.0),
             (24, 0.5, 0.0),
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_that_is_no_seam_stays_and_is_told() {
+    fn a_gap_that_is_no_seam_stays_and_is_reported() {
         for gap in [1.0, 2.5] {
             let surface = seamed(48, 0.0, gap);
             let wall = Wall::from_surface(&surface).unwrap();

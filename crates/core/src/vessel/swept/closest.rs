@@ -262,11 +262,11 @@ impl SweptField {
             let bent = Matrix3::identity() + across * hessian * across * along;
             let wanted = across * (offset - hessian * n * (along * towards));
             // Beyond the centre of a bend the stationary point is where the distance is largest.
-            let aside = match bent.try_inverse().filter(|_| bent.determinant() > FOCUS) {
+            let lateral = match bent.try_inverse().filter(|_| bent.determinant() > FOCUS) {
                 Some(inverse) => inverse * wanted,
                 None => wanted,
             };
-            let change = (aside + n * towards).cap_magnitude(LONGEST * value.radius);
+            let change = (lateral + n * towards).cap_magnitude(LONGEST * value.radius);
             place += change;
             value = self.value(&mut feet, &place)?;
             let last = if value.is_joint && known.is_none() { LAST_IN_JOINT } else { LAST };

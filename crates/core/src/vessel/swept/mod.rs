@@ -102,10 +102,10 @@ impl SweptVessel {
     /// Whether a position is in the lumen.
     pub(crate) fn contains(&self, x: &Vec3) -> bool {
         let is_beyond = |opening: &Opening| {
-            let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
+            let (beyond_mm, lateral_mm) = opening.beyond_and_off_axis_mm(x);
             beyond_mm > 0.0
                 && beyond_mm <= opening.beyond_mm + opening.radius_mm
-                && aside_mm < 1.5 * opening.radius_mm
+                && lateral_mm < 1.5 * opening.radius_mm
         };
         self.field.contains(x) && !self.openings.iter().any(is_beyond)
     }

@@ -137,7 +137,7 @@ fn ways_leave_the_lumen_where_they_meet_the_mesh() {
         let number = |n: u64| unit(splitmix64(5, 4 * k as u64 + n)) - 0.5;
         let to = from + Vec3::new(number(0), number(1), number(2)) * 60.0;
         // Beyond an opening the field continues, and the mesh does not.
-        let out = |x: &Vec3| swept.openings().iter().any(|o| o.beyond_and_aside_mm(x).0 > -1.0);
+        let out = |x: &Vec3| swept.openings().iter().any(|o| o.beyond_and_off_axis_mm(x).0 > -1.0);
         match (field.crossing(&from, &to, 1.0), query.crossing(&from, &to, 1.0)) {
             (Some(one), Some(other)) => {
                 left += 1;
@@ -192,7 +192,7 @@ fn openings_are_where_and_what_those_of_the_mesh_are() {
 
 #[test]
 fn what_makes_no_vessel_is_refused() {
-    let told = |tree: CentrelineTree, edge_mm: f64| {
+    let reported = |tree: CentrelineTree, edge_mm: f64| {
         SweptVessel::new(tree, Resolution::EdgeMm(edge_mm)).unwrap_err().to_string()
     };
     // A tube that intersects itself.
@@ -201,7 +201,7 @@ fn what_makes_no_vessel_is_refused() {
         ([12.0 * cos, 12.0 * sin, 0.1 * k as f64, 2.0], k.checked_sub(1))
     };
     let ring = |count: usize| tree(&(0..count).map(ring).collect::<Vec<_>>());
-    assert!(told(ring(30), 1.0).contains("the wall cuts itself"));
+    assert!(reported(ring(30), 1.0).contains("the wall cuts itself"));
     assert!(SweptVessel::new(ring(22), Resolution::EdgeMm(1.0)).is_ok());
     // A branch that ends in its parent.
     let stump = |x: f64| {
@@ -210,9 +210,9 @@ fn what_makes_no_vessel_is_refused() {
         rows.push(([x, 0.0, 20.0, 2.0], Some(2)));
         tree(&rows)
     };
-    assert!(told(stump(4.0), 1.0).contains("lies in or touches another branch"));
+    assert!(reported(stump(4.0), 1.0).contains("lies in or touches another branch"));
     assert!(SweptVessel::new(stump(14.0), Resolution::EdgeMm(1.0)).is_ok());
-    assert!(told(cone(3.0), 4.0).contains("edge_mm = 4"));
+    assert!(reported(cone(3.0), 4.0).contains("edge_mm = 4"));
 }
 
 #[test]

@@ -95,10 +95,10 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-type Told<T> = std::result::Result<T, String>;
+type Parsed<T> = std::result::Result<T, String>;
 
 /// A slice; `None` for a DICOMDIR.
-fn slice(path: &Path) -> Told<Option<Slice>> {
+fn slice(path: &Path) -> Parsed<Option<Slice>> {
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let Some(object) = object(&bytes)? else { return Ok(None) };
     let class = text(&object, tags::SOP_CLASS_UID, "SOPClassUID").unwrap_or_default();
@@ -115,7 +115,7 @@ fn slice(path: &Path) -> Told<Option<Slice>> {
             "holds many frames, and one slice a file is read; export it as single slices, or as NIfTI".into(),
         );
     }
-    let whole = |tag, name: &str, [least, most]: [u16; 2]| -> Told<u16> {
+    let whole = |tag, name: &str, [least, most]: [u16; 2]| -> Parsed<u16> {
         let value = number(&object, tag).map_err(|why| format!("{name} {why}"))?;
         let fits = value.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&value);
         if fits { Ok(value as u16) } else { Err(format!("{name} = {value}: must be {least} to {most}")) }
@@ -176,7 +176,7 @@ fn slice(path: &Path) -> Told<Option<Slice>> {
 }
 
 /// The object in a file; `None` for a DICOMDIR.
-fn object(bytes: &[u8]) -> Told<Option<DefaultDicomObject>> {
+fn object(bytes: &[u8]) -> Parsed<Option<DefaultDicomObject>> {
     let explicit = TransferSyntaxRegistry.get(uids::EXPLICIT_VR_LITTLE_ENDIAN).ok_or("cannot be read")?;
     let mut rest = bytes.get(128..).unwrap_or_default();
     check_lengths(rest.get(4..).unwrap_or_default(), explicit, |tag| tag.0 == 2)?;
@@ -195,7 +195,7 @@ fn object(bytes: &[u8]) -> Told<Option<DefaultDicomObject>> {
 
 /// Rejects a file with an element longer than the file, in the elements up to the first that is not `wanted`: a
 /// reader allocates before it reads.
-fn check_lengths(bytes: &[u8], syntax: &TransferSyntax, wanted: impl Fn(Tag) -> bool) -> Told<()> {
+fn check_lengths(bytes: &[u8], syntax: &TransferSyntax, wanted: impl Fn(Tag) -> bool) -> Parsed<()> {
     let mut tokens =
         LazyDataSetReader::new_with_ts(Cursor::new(bytes), syntax).map_err(|e| unreadable(&e))?;
     while let Some(token) = tokens.advance() {
@@ -221,7 +221,7 @@ fn unreadable(error: &dyn std::error::Error) -> String {
 }
 
 /// The words of a slice's pixels.
-fn pixels(object: &DefaultDicomObject, count: usize) -> Told<Vec<u16>> {
+fn pixels(object: &DefaultDicomObject, count: usize) -> Parsed<Vec<u16>> {
     let element = element(object, tags::PIXEL_DATA).ok_or("has no PixelData")?;
     let words = match element.value() {
         Value::Primitive(PrimitiveValue::U16(words)) => words.to_vec(),
@@ -244,19 +244,19 @@ fn element(object: &DefaultDicomObject, tag: Tag) -> Option<&InMemElement> {
     object.element_opt(tag).ok().flatten()
 }
 
-fn text(object: &DefaultDicomObject, tag: Tag, name: &str) -> Told<String> {
+fn text(object: &DefaultDicomObject, tag: Tag, name: &str) -> Parsed<String> {
     let element = element(object, tag).ok_or_else(|| format!("has no {name}"))?;
     let text = element.to_str().map_err(|error| format!("{name}: {}", chain(&error)))?;
     Ok(text.trim_matches(|c: char| c.is_whitespace() || c == '\0').chars().take(100).collect())
 }
 
-fn number(object: &DefaultDicomObject, tag: Tag) -> Told<f64> {
+fn number(object: &DefaultDicomObject, tag: Tag) -> Parsed<f64> {
     let element = element(object, tag).ok_or("is absent")?;
     let number = element.to_float64().map_err(|error| format!("is no number: {}", chain(&error)))?;
     if number.is_finite() { Ok(number) } else { Err(format!("is {number}")) }
 }
 
-fn numbers<const N: usize>(object: &DefaultDicomObject, tag: Tag, name: &str) -> Told<[f64; N]> {
+fn numbers<const N: usize>(object: &DefaultDicomObject, tag: Tag, name: &str) -> Parsed<[f64; N]> {
     let element = element(object, tag).ok_or_else(|| format!("has no {name}"))?;
     let all = element.to_multi_float64().map_err(|error| format!("{name}: {}", chain(&error)))?;
     let all: [f64; N] =
@@ -266,13 +266,13 @@ fn numbers<const N: usize>(object: &DefaultDicomObject, tag: Tag, name: &str) ->
 
 /// An error with its causes, on one line.
 fn chain(error: &dyn std::error::Error) -> String {
-    let mut told = error.to_string();
+    let mut reported = error.to_string();
     let mut source = error.source();
     while let Some(error) = source {
-        told = format!("{told}: {error}");
+        reported = format!("{reported}: {error}");
         source = error.source();
     }
-    told.chars().map(|c| if c.is_control() { ' ' } else { c }).take(300).collect()
+    reported.chars().map(|c| if c.is_control() { ' ' } else { c }).take(300).collect()
 }
 
 /// Whether spacings are equal up to rounding.
@@ -298,7 +298,7 @@ fn missing(at: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// One volume of slices.
-fn joined(mut slices: Vec<Slice>) -> Told<Scan> {
+fn joined(mut slices: Vec<Slice>) -> Parsed<Scan> {
     let name = |slice: &Slice| {
         slice.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     };

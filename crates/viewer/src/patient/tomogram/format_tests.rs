@@ -35,7 +35,7 @@ fn read(file: &Path) -> std::result::Result<Volume, String> {
 }
 
 /// What two volumes must share, to the bit.
-fn told(volume: &Volume) -> ([usize; 3], Matrix3<f64>, Vec3, &[[f32; 2]]) {
+fn reported(volume: &Volume) -> ([usize; 3], Matrix3<f64>, Vec3, &[[f32; 2]]) {
     (volume.size, volume.into, volume.origin_mm, &volume.voxels)
 }
 
@@ -130,11 +130,11 @@ fn both_formats_of_nifti_are_one_volume_in_either_byte_order_bare_or_compressed(
         [("big.nii", false, true), ("second.nii", true, false), ("both.nii", true, true)]
     {
         let bytes = nifti(second, big, Placing::Affine);
-        assert_eq!(told(&read(&write(name, &bytes)).unwrap()), told(&first), "{name}");
+        assert_eq!(reported(&read(&write(name, &bytes)).unwrap()), reported(&first), "{name}");
         let mut packed = flate2::write::GzEncoder::new(vec![], flate2::Compression::fast());
         packed.write_all(&bytes).unwrap();
         let path = write(&format!("{name}.gz"), &packed.finish().unwrap());
-        assert_eq!(told(&read(&path).unwrap()), told(&first), "{name}.gz");
+        assert_eq!(reported(&read(&path).unwrap()), reported(&first), "{name}.gz");
     }
     let turned = Matrix3::new(0.0, 0.0, -1.25, -0.75, 0.0, 0.0, 0.0, 0.5, 0.0);
     for second in [false, true] {
@@ -145,7 +145,7 @@ fn both_formats_of_nifti_are_one_volume_in_either_byte_order_bare_or_compressed(
     // Counter-check: an affine map that is off by the last digit of the second format differs.
     let mut off = nifti(true, false, Placing::Affine);
     off[424] ^= 1;
-    assert_ne!(told(&read(&write("off.nii", &off)).unwrap()), told(&first));
+    assert_ne!(reported(&read(&write("off.nii", &off)).unwrap()), reported(&first));
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn a_series_of_slices_is_the_volume_that_a_nifti_file_is() {
     for syntax in [uids::EXPLICIT_VR_LITTLE_ENDIAN, uids::IMPLICIT_VR_LITTLE_ENDIAN, "1.2.840.10008.1.2.2"] {
         let folder = series(syntax, &|_, _| ());
         std::fs::write(folder.path().join("notes.txt"), "not a slice").unwrap();
-        assert_eq!(told(&read(folder.path()).unwrap()), told(&expected), "{syntax}");
+        assert_eq!(reported(&read(folder.path()).unwrap()), reported(&expected), "{syntax}");
     }
     // Signed numbers, with other bits above the stored ones.
     let signed = series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|k, object| {
@@ -267,14 +267,14 @@ fn a_series_of_slices_is_the_volume_that_a_nifti_file_is() {
         put_word(object, tags::PIXEL_REPRESENTATION, 1);
         put(object, tags::RESCALE_INTERCEPT, VR::DS, "0");
     });
-    assert_eq!(told(&read(signed.path()).unwrap()), told(&expected));
+    assert_eq!(reported(&read(signed.path()).unwrap()), reported(&expected));
     // Counter-checks: another intercept, and rows for columns.
     let other =
         series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|_, o| put(o, tags::RESCALE_INTERCEPT, VR::DS, "-1023"));
-    assert_ne!(told(&read(other.path()).unwrap()), told(&expected));
+    assert_ne!(reported(&read(other.path()).unwrap()), reported(&expected));
     let turned =
         series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|_, o| put(o, tags::PIXEL_SPACING, VR::DS, "0.75\\0.5"));
-    assert_ne!(told(&read(turned.path()).unwrap()), told(&expected));
+    assert_ne!(reported(&read(turned.path()).unwrap()), reported(&expected));
     // Padding becomes air, and a tilted gantry shears.
     let padded = series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &|k, object| {
         put_word(object, tags::PIXEL_PADDING_VALUE, ((hu()[59] + 1024) / 2) as u16);
@@ -292,7 +292,7 @@ fn a_series_of_slices_is_the_volume_that_a_nifti_file_is() {
 }
 
 #[test]
-fn what_is_not_one_even_series_of_tomograms_is_refused_with_its_file_and_the_mend() {
+fn what_is_not_one_even_series_of_tomograms_is_refused_with_its_file_and_the_remedy() {
     let place = |k: usize, y: f64| {
         move |of: usize, o: &mut InMemDicomObject| {
             if of == k {

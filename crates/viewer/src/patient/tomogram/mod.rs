@@ -110,10 +110,10 @@ impl Volume {
     /// that contains no part of the vessel.
     pub(crate) fn read(spec: &CtSpec, wall: &SurfaceMesh) -> Result<Self> {
         let path = &spec.file;
-        let told = std::fs::metadata(path)
+        let reported = std::fs::metadata(path)
             .map_err(|source| Error::parameter("view.patient.ct.file", path.display(), source.to_string()))?;
         let bad = |reason: String| Error::content(path, reason);
-        let scan = if told.is_dir() { dicom::read(path)? } else { nifti::read(path)? };
+        let scan = if reported.is_dir() { dicom::read(path)? } else { nifti::read(path)? };
         if scan.size.iter().any(|&n| n < 2) {
             let [nx, ny, nz] = scan.size;
             return Err(bad(format!("{nx} × {ny} × {nz} voxels are no volume")));
@@ -167,8 +167,8 @@ impl Volume {
         let spans = |points: &mut dyn Iterator<Item = Vec3>| {
             let [least, most] = points
                 .fold([Vec3::repeat(f64::MAX), Vec3::repeat(f64::MIN)], |[l, m], p| [l.inf(&p), m.sup(&p)]);
-            let told = |v: Vec3| format!("[{:.0}, {:.0}, {:.0}]", v.x, v.y, v.z);
-            format!("{} to {}", told(least), told(most))
+            let reported = |v: Vec3| format!("[{:.0}, {:.0}, {:.0}]", v.x, v.y, v.z);
+            format!("{} to {}", reported(least), reported(most))
         };
         Err(format!(
             "holds nothing of the vessel: in the scene's axes (left, posterior, superior, mm) it is from {}, the vessel from {}; move it with view.patient.ct.offset_mm",

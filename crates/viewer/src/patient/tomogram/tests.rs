@@ -184,7 +184,7 @@ fn a_slope_that_is_none_leaves_values_as_they_are_stored() {
 }
 
 #[test]
-fn how_much_of_the_vessel_is_in_the_volume_is_told() {
+fn how_much_of_the_vessel_is_in_the_volume_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.nii");
     let short: Vec<u8> = (0..8_i16).flat_map(|k| (400 + 25 * k).to_le_bytes()).collect();

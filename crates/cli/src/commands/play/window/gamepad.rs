@@ -6,7 +6,7 @@ use endowire_play::{Button, Pad};
 use gilrs::{Axis, Button as Key, Gamepad, Gilrs};
 use winit::event_loop::EventLoopProxy;
 
-use super::Told;
+use super::Event;
 
 use crate::output::tell;
 
@@ -14,18 +14,18 @@ use crate::output::tell;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Sends each change to the window until it is closed.
-pub(super) fn listen(window: EventLoopProxy<Told>) {
+pub(super) fn listen(window: EventLoopProxy<Event>) {
     std::thread::spawn(move || {
         let mut gilrs = match Gilrs::new() {
             Ok(gilrs) => gilrs,
             Err(error) => return tell(format_args!("endowire: gamepads cannot be read: {error}")),
         };
-        let mut told = None;
+        let mut reported = None;
         loop {
             let now = gilrs.gamepads().next().map(|(_, pad)| (pad.name().to_owned(), held(&pad)));
-            if now != told {
-                told.clone_from(&now);
-                if window.send_event(Told::Gamepad(now)).is_err() {
+            if now != reported {
+                reported.clone_from(&now);
+                if window.send_event(Event::Gamepad(now)).is_err() {
                     return;
                 }
             }

@@ -40,7 +40,7 @@ const DEG_PER_PX: f64 = 0.4;
 
 /// Messages from other threads.
 #[derive(Debug)]
-enum Told {
+enum Event {
     /// A new picture.
     Picture,
     /// State of the connected gamepad, with its name; `None` after it was disconnected.
@@ -104,7 +104,7 @@ pub(super) fn run(
             args.scene.display()
         ))
     };
-    let events = EventLoop::<Told>::with_user_event().build().map_err(|e| no_display(e.to_string()))?;
+    let events = EventLoop::<Event>::with_user_event().build().map_err(|e| no_display(e.to_string()))?;
     let writer = Writer::new().ok_or_else(|| no_display("the font cannot be read".to_owned()))?;
     let names = session.simulation().stack().instruments().iter().map(|one| one.name.clone()).collect();
     let shared = Arc::new(Shared::default());
@@ -134,7 +134,7 @@ pub(super) fn run(
             let done = live::physics(session, &messages, newest, record, false);
             live::end(newest);
             // Fails if the window is gone, which does not matter.
-            let _ = proxy.send_event(Told::Ended);
+            let _ = proxy.send_event(Event::Ended);
             done
         });
         let shown = events.run_app(&mut shell);
@@ -157,7 +157,7 @@ fn draw(
     newest: &Newest,
     shared: &Shared,
     mut writer: Writer,
-    proxy: &EventLoopProxy<Told>,
+    proxy: &EventLoopProxy<Event>,
 ) -> live::Frames {
     live::draw(pictures, newest, |shown| {
         let size = [0, 1].map(|side| shared.size[side].load(Ordering::Relaxed));
@@ -171,7 +171,7 @@ fn draw(
         let unseen = picture.take().and_then(|before| before.input_at);
         let field_mm = shown.moment.snapshot.readout.lab.field_mm;
         *picture = Some(Picture { canvas, input_at: unseen.or(shown.moment.input_at), field_mm });
-        let _ = proxy.send_event(Told::Picture);
+        let _ = proxy.send_event(Event::Picture);
     })
 }
 
@@ -299,7 +299,7 @@ impl Shell {
     }
 }
 
-impl ApplicationHandler<Told> for Shell {
+impl ApplicationHandler<Event> for Shell {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if self.surface.is_none()
             && let Err(reason) = self.open(events)
@@ -309,13 +309,13 @@ impl ApplicationHandler<Told> for Shell {
         }
     }
 
-    fn user_event(&mut self, events: &ActiveEventLoop, told: Told) {
-        match (told, &self.surface) {
-            (Told::Ended, _) => events.exit(),
-            (Told::Picture, Some(surface)) => surface.window().request_redraw(),
-            (Told::Picture, None) => {}
+    fn user_event(&mut self, events: &ActiveEventLoop, reported: Event) {
+        match (reported, &self.surface) {
+            (Event::Ended, _) => events.exit(),
+            (Event::Picture, Some(surface)) => surface.window().request_redraw(),
+            (Event::Picture, None) => {}
             #[cfg(feature = "gamepad")]
-            (Told::Gamepad(now), _) => self.held(now),
+            (Event::Gamepad(now), _) => self.held(now),
         }
     }
 

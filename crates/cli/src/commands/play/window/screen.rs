@@ -163,13 +163,13 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     ]
     .concat();
     writer.write(canvas, [12, y + 48], 15, FAINT, &times);
-    let told = shown.failure.map(str::to_owned).or_else(|| {
+    let reported = shown.failure.map(str::to_owned).or_else(|| {
         let shown = |event: &&endowire_play::Event| event.is_shown(readout.step, readout.time_s);
         readout.event.as_ref().filter(shown).map(|event| event.text.clone())
     });
-    let told =
-        told.or_else(|| readout.demonstrates.then(|| "the script is shown: move to take over".to_owned()));
-    if let Some(text) = told {
+    let reported = reported
+        .or_else(|| readout.demonstrates.then(|| "the script is shown: move to take over".to_owned()));
+    if let Some(text) = reported {
         writer.write(canvas, [12, y + 72], 15, WARN, &text);
     }
 }

@@ -59,22 +59,22 @@ fn asked(surface: &ContactSurface, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, V
         // Once more, as a base that has been evaluated.
         contact.linearise(&elements, &base, &mut assembly);
         let left_out = contact.cache.spans.iter().filter(|span| !span.at_base).count();
-        let told: Vec<[f64; 2]> = trials
+        let reported: Vec<[f64; 2]> = trials
             .iter()
             .map(|trial| [contact.safe_fraction(&elements, trial), contact.value(&elements, trial)])
             .collect();
-        (told, left_out)
+        (reported, left_out)
     };
-    let (told, left_out) = at_base(&mut knowing, &trials, more_mm);
+    let (reported, left_out) = at_base(&mut knowing, &trials, more_mm);
     let mut other = rod(surface, ELEMENTS, &proximity, 10.0);
     let (whole, all) = at_base(&mut other, &trials, f64::NEG_INFINITY);
     assert_eq!(all, 0);
-    (told, whole, left_out)
+    (reported, whole, left_out)
 }
 
-fn differ(told: &[[f64; 2]], whole: &[[f64; 2]]) -> usize {
+fn differ(reported: &[[f64; 2]], whole: &[[f64; 2]]) -> usize {
     let off = |a: f64, b: f64| (a - b).abs() > 1e-9 * (1.0 + b.abs());
-    told.iter().zip(whole).filter(|(a, b)| off(a[0], b[0]) || off(a[1], b[1])).count()
+    reported.iter().zip(whole).filter(|(a, b)| off(a[0], b[0]) || off(a[1], b[1])).count()
 }
 
 #[test]
@@ -82,14 +82,14 @@ fn what_is_left_out_touches_nothing() {
     let surface = tube();
     let (mut left_out, mut pressing, mut stopped, mut wrong) = (0, 0, 0, 0);
     for seed in 1..40 {
-        let (told, whole, out) = asked(&surface, seed, 0.0);
-        assert_eq!(differ(&told, &whole), 0, "{seed}: {told:?} {whole:?}");
+        let (reported, whole, out) = asked(&surface, seed, 0.0);
+        assert_eq!(differ(&reported, &whole), 0, "{seed}: {reported:?} {whole:?}");
         left_out += out;
         stopped += whole.iter().filter(|[safe, _]| *safe < 1.0).count();
         pressing += whole.iter().filter(|[_, value]| *value > 0.0).count();
         // Counter-check: with too large an assumed distance, elements go through the wall.
-        let (told, whole, _) = asked(&surface, seed, 2.0);
-        wrong += differ(&told, &whole);
+        let (reported, whole, _) = asked(&surface, seed, 2.0);
+        wrong += differ(&reported, &whole);
     }
     assert!(left_out > 200 && pressing > 100 && stopped > 10, "{left_out} {pressing} {stopped}");
     assert!(wrong > 20, "{wrong}");

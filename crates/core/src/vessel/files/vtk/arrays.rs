@@ -76,12 +76,13 @@ impl<'a> Encoding<'a> {
             || array.children().filter(Node::is_text).filter_map(|node| node.text()).collect::<String>();
         let bytes = match (array.attribute("format"), array.attribute("offset")) {
             (Some("appended"), offset) => {
-                let told = offset.unwrap_or_default();
+                let reported = offset.unwrap_or_default();
                 let (data, is_base64) =
                     self.appended.ok_or("its data are appended, but nothing is: the file is cut off")?;
-                let data = told.trim().parse().ok().and_then(|offset: usize| data.get(offset..));
-                let data = data
-                    .ok_or_else(|| format!("offset {:?} is not in the file: it is cut off", shown(told)))?;
+                let data = reported.trim().parse().ok().and_then(|offset: usize| data.get(offset..));
+                let data = data.ok_or_else(|| {
+                    format!("offset {:?} is not in the file: it is cut off", shown(reported))
+                })?;
                 if is_base64 {
                     self.unpacked(&base64(data))?.into_owned()
                 } else {

@@ -278,8 +278,8 @@ impl<'a> Input<'a> {
             1 => (Scalar::U32, 30),
             _ => (Scalar::U64, 62),
         };
-        let told = kind.read(self.rest, Order::Big).unwrap_or_default() as u64 & ((1 << bits) - 1);
-        let length = kind.size().saturating_add(told as usize);
+        let reported = kind.read(self.rest, Order::Big).unwrap_or_default() as u64 & ((1 << bits) - 1);
+        let length = kind.size().saturating_add(reported as usize);
         let bytes = self.rest.get(kind.size()..length).ok_or("a string is cut off")?;
         self.rest = &self.rest[length..];
         Ok(String::from_utf8_lossy(bytes).into_owned())

@@ -48,13 +48,13 @@ impl Cells {
         let mut cells = Self::default();
         let mut rest = numbers;
         for number in 0..count {
-            let told = rest.first().copied().unwrap_or(-1.0);
-            if !(told >= 0.0 && told.fract() == 0.0 && told < rest.len() as f64) {
+            let reported = rest.first().copied().unwrap_or(-1.0);
+            if !(reported >= 0.0 && reported.fract() == 0.0 && reported < rest.len() as f64) {
                 return Err(format!(
                     "cell {number} of {count} has no corners: the cells are damaged, or cut off"
                 ));
             }
-            let (corners, after) = rest[1..].split_at(told as usize);
+            let (corners, after) = rest[1..].split_at(reported as usize);
             cells.corners.extend(corners.iter().copied().map(index));
             cells.ends.push(cells.corners.len());
             rest = after;

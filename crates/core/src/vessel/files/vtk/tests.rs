@@ -185,7 +185,7 @@ fn damaged_xml_gives_reasons_and_never_panics() {
 }
 
 #[test]
-fn what_is_no_surface_is_told() {
+fn what_is_no_surface_is_reported() {
     let file = |kind: &str, content: &str| {
         format!(
             "<VTKFile type=\"{kind}\"><{kind}><Piece NumberOfLines=\"3\">{content}</Piece></{kind}></VTKFile>"

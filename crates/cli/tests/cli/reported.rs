@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{document, endowire, said, text, told};
+use crate::common::{document, endowire, reported, said, text};
 use serde_json::{Value, json};
 
 /// A wire pushed slantwise into a tube that it leaves in the end.
@@ -133,7 +133,7 @@ fn what_is_counted_goes_on_with_a_run_that_is_resumed() {
 }
 
 #[test]
-fn what_ended_a_script_is_told() {
+fn what_ended_a_script_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let ended = |name: &str, changes: &[(&str, &str)]| {
         let (file, out) = (scene(folder.path(), changes), folder.path().join(name));
@@ -191,7 +191,7 @@ fn what_ended_a_script_is_told() {
 fn forces_of_the_wall_are_those_of_the_contacts() {
     let folder = tempfile::tempdir().unwrap();
     let (file, out) = (scene(folder.path(), &[]), folder.path().join("out"));
-    let summary = told(&call("run", &file, &out, &["--json"]));
+    let summary = reported(&call("run", &file, &out, &["--json"]));
     let mut archive = zip::ZipArchive::new(std::fs::File::open(out.join("shapes.npz")).unwrap()).unwrap();
     let mut array = |name: &str| {
         npyz::NpyFile::new(archive.by_name(&format!("{name}.npy")).unwrap()).unwrap().into_vec::<f64>()
@@ -211,9 +211,10 @@ fn forces_of_the_wall_are_those_of_the_contacts() {
         let near: f64 = rows.clone().filter(tip).map(|k| norm(&forces[3 * k..3 * k + 3])).sum();
         beside |= near > 0.0 && near < sizes.iter().sum();
         let expected = [sizes.iter().sum(), sizes.iter().copied().fold(0.0, f64::max), near];
-        for (k, (told, expected)) in [sum[step], largest[step], at_tip[step]].iter().zip(expected).enumerate()
+        for (k, (reported, expected)) in
+            [sum[step], largest[step], at_tip[step]].iter().zip(expected).enumerate()
         {
-            assert!((told - expected).abs() < 1e-12, "step {step}, {k}: {told} {expected}");
+            assert!((reported - expected).abs() < 1e-12, "step {step}, {k}: {reported} {expected}");
             most[k] = most[k].max(expected);
         }
     }
@@ -236,7 +237,7 @@ fn a_sweep_counts_runs_with_such_steps_and_has_them_in_its_rows() {
     std::fs::write(&sweep, axis).unwrap();
     let out = folder.path().join("out");
     let output = call("sweep", &sweep, &out, &["--json"]);
-    let counted = told(&output);
+    let counted = reported(&output);
     assert_eq!((&counted["failed"], &counted["unconverged"]), (&json!(0), &json!(1)));
     assert!(
         said(&output).contains("0 of them failed, 1 have steps without an equilibrium"),
@@ -266,12 +267,12 @@ fn a_sweep_counts_runs_with_such_steps_and_has_them_in_its_rows() {
     std::fs::write(&sweep, axis.replace(", max_iterations = 20", "").replace("mass-spring", "kirchhoff"))
         .unwrap();
     let good = call("sweep", &sweep, &folder.path().join("good"), &["--json"]);
-    assert_eq!(told(&good)["unconverged"], 0);
+    assert_eq!(reported(&good)["unconverged"], 0);
     assert!(!said(&good).contains("without an equilibrium"), "{}", said(&good));
 }
 
 #[test]
-fn pictures_of_steps_without_an_equilibrium_are_told() {
+fn pictures_of_steps_without_an_equilibrium_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let file = scene(folder.path(), &[]);
     let out = folder.path().join("frames");
@@ -289,7 +290,7 @@ fn pictures_of_steps_without_an_equilibrium_are_told() {
     // The twins: without a device, and with one in equilibrium.
     assert!(call("fluoro", &file, &out, &[&more[..], &["--steps", "0"]].concat()).status.success());
     let good = call("fluoro", &file, &out, &[&more[..4], &["--json"]].concat());
-    assert_eq!(told(&good)["unconverged_steps"], 0);
+    assert_eq!(reported(&good)["unconverged_steps"], 0);
 
     let spec = folder.path().join("dataset.toml");
     let text = "scenes = [\"scene.toml\"]\nposes = 1\nmoments = 2\n[vary]\nprogress = [0.9, 1.0]\n[view]\nsize_px = [32, 32]\nbackend = \"cpu\"\n";
@@ -305,9 +306,9 @@ fn pictures_of_steps_without_an_equilibrium_are_told() {
     let images = document(data.join("annotations.json"))["images"].clone();
     assert_eq!((&images[0]["converged"], &images[1]["converged"]), (&json!(false), &json!(false)));
     // All is there: the call that allows it draws nothing.
-    let written = told(&call("dataset", &spec, &data, &[&HASTY[..], &["--allow-unconverged"]].concat()));
+    let written = reported(&call("dataset", &spec, &data, &[&HASTY[..], &["--allow-unconverged"]].concat()));
     assert_eq!((&written["drawn"], &written["unconverged"]), (&json!(0), &json!(2)));
-    let written = told(&call("dataset", &spec, &folder.path().join("good"), &["--json"]));
+    let written = reported(&call("dataset", &spec, &folder.path().join("good"), &["--json"]));
     assert_eq!((&written["drawn"], &written["unconverged"]), (&json!(2), &json!(0)));
 }
 
