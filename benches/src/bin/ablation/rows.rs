@@ -87,10 +87,8 @@ fn groups() -> [Group; 12] {
         (
             "Friction",
             vec![
-                without!("renewals of friction between instruments", steps.inner_renewals = 0),
-                other!(steps.inner_renewals = 5),
-                without!("renewals of the drag of the blood", steps.drag_renewals = 0),
-                other!(steps.drag_changed = 1e-2),
+                without!("renewals of drag and of forces between instruments", steps.lagged_renewals = 0),
+                other!(steps.lagged_renewals = 5),
             ],
         ),
         (

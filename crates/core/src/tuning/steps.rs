@@ -47,13 +47,8 @@ pub struct StepTuning {
     pub following: usize,
     /// Largest number of slides with the hand held still; two or three are typical.
     pub slides: u32,
-    /// Relative change of the drag up to which it is not renewed at an equilibrium.
-    pub drag_changed: f64,
-    /// Largest number of renewals of the drag.
-    pub drag_renewals: usize,
-    /// Largest number of renewals of the normal forces between instruments at an equilibrium: each needs few
-    /// iterations.
-    pub inner_renewals: usize,
+    /// Largest number of renewals of the lagged forces at an equilibrium: each needs few iterations.
+    pub lagged_renewals: usize,
     /// Whether the prediction repeats what the last step changed; otherwise it is the device slid along its own curve.
     pub repeats: bool,
     /// Whether a solution is tested for having passed through the wall.
@@ -87,9 +82,7 @@ impl StepTuning {
         longest: 2000,
         following: 20,
         slides: 400,
-        drag_changed: 1e-4,
-        drag_renewals: 5,
-        inner_renewals: 20,
+        lagged_renewals: 20,
         repeats: true,
         tests_passing: true,
         notable: 0.02,

@@ -1,19 +1,18 @@
 //! Friction between instruments in a sub-step: where it acts, and its normal forces.
 //!
 //! The force across the line follows from the equilibrium ([`super::lateral`]), and the couples of friction move the
-//! line; so both are lagged. A solution uses the forces of the previous one: first those of the last equilibrium at
-//! the same distance from the sheath, then its own, until the couples change by less than 10⁻⁴ of their bound.
+//! line; so both are lagged ([`Search::run`]). A solution uses the forces of the previous one: first those of the last
+//! equilibrium at the same distance from the sheath, then its own.
 //! Without rotation nothing has to be renewed: friction along the line is evaluated afterwards.
 
 use super::configuration::Start;
 use super::lateral::{Line, comes_out, lateral_forces};
 use super::mesh::Mesh;
 use super::search::Search;
-use crate::contact::{Between, HandMotion, InnerFriction, Place, SETTLED};
+use crate::contact::{Between, HandMotion, InnerFriction, Place};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::RodState;
-use crate::solve::NewtonReport;
 
 /// Smallest slip, mm; less is rounding of lengths.
 pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
@@ -94,35 +93,14 @@ fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usi
 }
 
 impl<const C: usize> Search<'_, '_, C> {
-    /// Iterates from an equilibrium with the normal forces of another to one with its own. Returns it with the
-    /// relative difference of the couples of friction from those used in its solution.
-    pub(super) fn rubbed(
-        &mut self,
-        mut found: NewtonReport,
-        stack: &Stack,
-        mesh: &Mesh,
-    ) -> (NewtonReport, f64) {
-        let mut change = 0.0;
-        if self.contact.between().places().is_empty() {
-            return (found, change);
-        }
-        let mut inner_friction = Vec::new();
-        let renewals = self.tuning.steps.inner_renewals;
-        for round in 0..=renewals {
-            change = self.press(stack, mesh, &mut inner_friction);
-            let there = change < SETTLED && found.is_within(self.tolerance);
-            if !found.converged || there || round == renewals {
-                break;
-            }
-            found = self.on();
-        }
-        (found, change)
-    }
-
     /// Renews the normal forces between instruments; returns the relative change of the couples.
-    fn press(&mut self, stack: &Stack, mesh: &Mesh, inner_friction: &mut Vec<InnerFriction>) -> f64 {
+    pub(super) fn press(&mut self, stack: &Stack, mesh: &Mesh) -> f64 {
+        if self.contact.between().places().is_empty() {
+            return 0.0;
+        }
         let state = &*self.state;
-        keep(self.contact.between(), state, mesh, inner_friction);
+        let mut inner_friction = Vec::new();
+        keep(self.contact.between(), state, mesh, &mut inner_friction);
         // The wall matters only where an instrument comes out of another.
         let ends: Vec<usize> = (0..mesh.inserted_mm.len()).filter_map(|k| comes_out(mesh, k)).collect();
         let beside = |e: usize| ends.iter().any(|node| e == *node || e + 1 == *node);
@@ -132,7 +110,7 @@ impl<const C: usize> Search<'_, '_, C> {
                 Some((index, self.contact.touch(&mesh.elements, state, index)?.contact.total_n()))
             })
             .collect();
-        let line = Line { stack, mesh, rod: state, pressing: &pressing, inner_friction };
+        let line = Line { stack, mesh, rod: state, pressing: &pressing, inner_friction: &inner_friction };
         let reported: Vec<Vec<LateralForce>> = (0..mesh.inserted_mm.len())
             .map(|inner| match stack.friction(inner) {
                 0.0 => Vec::new(),

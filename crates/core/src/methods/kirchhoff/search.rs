@@ -19,12 +19,22 @@
 //! friction comes to rest.
 
 use super::guess::Guess;
+use super::mesh::Mesh;
 use super::substep::Effort;
 use crate::contact::{SETTLED, SelfContact, WallContact};
+use crate::device::Stack;
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 use crate::tuning::Tuning;
+
+/// What the lagged forces follow from, besides the state.
+pub(super) struct Lagged<'a> {
+    /// The blood, if it flows.
+    pub(super) flow: Option<&'a BloodFlow>,
+    pub(super) stack: &'a Stack,
+    pub(super) mesh: &'a Mesh,
+}
 
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
@@ -61,34 +71,40 @@ pub(super) struct Search<'a, 'b, const C: usize> {
 }
 
 impl<const C: usize> Search<'_, '_, C> {
-    /// Searches, with the drag of the blood if that flows. The report is not converged if nothing was found; with
-    /// friction it may be unsettled.
-    pub(super) fn run(&mut self, flow: Option<&BloodFlow>) -> NewtonReport {
+    /// Searches. The report is not converged if nothing was found; with friction it may be unsettled. The number is the
+    /// relative change of the lagged forces from those used in its solution.
+    ///
+    /// The drag of the blood and the normal forces between instruments follow from an equilibrium and move the next
+    /// one. Those at the state are used in the next solution, until they no longer change.
+    pub(super) fn run(&mut self, lagged: &Lagged<'_>) -> (NewtonReport, f64) {
         if self.effort != Effort::Near {
             self.contact.hold_friction();
             self.with_loops(SelfContact::hold_friction);
         }
-        let found = self.on();
-        self.dragged(found, flow)
-    }
-
-    /// Iterates from an equilibrium with the drag at its start to one with its own, if blood flows.
-    fn dragged(&mut self, mut found: NewtonReport, flow: Option<&BloodFlow>) -> NewtonReport {
-        let Some(flow) = flow else { return found };
-        let steps = &self.tuning.steps;
-        for _ in 0..steps.drag_renewals {
-            if !found.converged
-                || self.contact.renew_drag(flow, self.elements, self.state) < steps.drag_changed
-            {
-                break;
+        let mut found = self.on();
+        if lagged.flow.is_none() && self.contact.between().places().is_empty() {
+            return (found, 0.0);
+        }
+        let mut renewals = 0;
+        loop {
+            let change = self.renew(lagged);
+            let is_settled = change < SETTLED && found.is_within(self.tolerance);
+            if !found.converged || is_settled || renewals == self.tuning.steps.lagged_renewals {
+                return (found, change);
             }
             found = self.on();
+            renewals += 1;
         }
-        found
+    }
+
+    /// Renews the lagged forces at the state; returns their largest relative change.
+    fn renew(&mut self, Lagged { flow, stack, mesh }: &Lagged<'_>) -> f64 {
+        let dragged = flow.map_or(0.0, |flow| self.contact.renew_drag(flow, self.elements, self.state));
+        dragged.max(self.press(stack, mesh))
     }
 
     /// From the state to the nearest equilibrium.
-    pub(super) fn on(&mut self) -> NewtonReport {
+    fn on(&mut self) -> NewtonReport {
         let was_resumed = self.resumed.is_some();
         let found = self.newton();
         if self.effort == Effort::Near || !found.converged || self.is_settled() {

@@ -11,7 +11,7 @@ use super::hands::{Hand, line_advance_mm, longest_mm, set_motions};
 use super::joined::{Resistance, join};
 use super::loops::{advances_mm, capsules};
 use super::mesh::Mesh;
-use super::search::Search;
+use super::search::{Lagged, Search};
 use super::state::{KirchhoffState, UnderWay};
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
@@ -342,8 +342,8 @@ impl<const C: usize> Tools<C> {
             solves: 0,
             slides: 0,
         };
-        let found = search.run(surroundings.flow);
-        let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
+        let lagged = Lagged { flow: surroundings.flow, stack: surroundings.stack, mesh };
+        let (found, lagging) = search.run(&lagged);
         let unsettled = search.unsettled().max(lagging);
         let (taken, slides) = ((search.iterations, search.solves), search.slides);
         let off = self.newton.neighbourhood.off(rod, &tuning.newton);
