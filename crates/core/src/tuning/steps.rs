@@ -6,7 +6,8 @@ pub struct StepTuning {
     /// Largest motion of the hands in a part with relaxation from a fold, mm: the accuracy of the fold's position.
     pub fold_mm: f64,
     /// Largest motion of the hands in a part that may end in a snap, in radii of the thinnest device: the place of the
-    /// snap on the way of the hands is known as well as that. Shorter parts mostly find the same equilibrium again.
+    /// snap on the way of the hands is known as well as that. Their solutions are not bounded: shorter parts mostly
+    /// find the same equilibrium again.
     /// At 0 no part may.
     pub snap_radii: f64,
     /// Largest part in which friction is held for the first time, mm: longer parts mostly fail for being too long.

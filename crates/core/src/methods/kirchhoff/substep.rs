@@ -311,7 +311,8 @@ impl<const C: usize> Tools<C> {
             contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
             self.newton.neighbourhood.begin(rod, &self.guess.room_mm, &tuning.newton);
         }
-        self.newton.neighbourhood.bounds = effort != Effort::Flight;
+        // What may end in a snap is solved once, wherever it leads.
+        self.newton.neighbourhood.bounds = effort != Effort::Flight && !may_snap;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let per_mm4 = tuning.steps.coil_resistance_per_mm4;
         let mut free =
