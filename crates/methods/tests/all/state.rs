@@ -1,7 +1,5 @@
 //! The state of an insertion by any method determines its next step.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};

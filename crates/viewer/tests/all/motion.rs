@@ -1,8 +1,6 @@
 //! A vessel that moves in front of a C-arm that stands.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;

@@ -1,8 +1,6 @@
 //! Path lengths at 512 × 512 against exact ones: the mean errors that the viewer promises.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,7 +1,5 @@
 //! Sessions of thousands of inputs: what is recorded has the same bits, nothing panics, nothing is lost.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 

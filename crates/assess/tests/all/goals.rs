@@ -1,7 +1,5 @@
 //! Goals other than the foremost tip: the tip of a named instrument, and a sac that coils fill.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::path::Path;
 
 use endowire_assess::{EndedBy, Exam, Goal, Hand, Packed, Record, Sample, Score, Site, Subject};

@@ -1,11 +1,9 @@
 //! Frames against stored ones: drawn by the plain Rust path, which needs no driver and is pinned nearly to the bit, and by wgpu,
 //! pinned as pictures: the stored ones are Mesa's software rasteriser's, whose last bits change with its version.
 //!
-//! `ENDOWIRE_BLESS=1 cargo test -p endowire-viewer --test golden` stores them anew; look at them before committing.
+//! `ENDOWIRE_BLESS=1 cargo test -p endowire-viewer --test all golden::` stores them anew; look at them before committing.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};

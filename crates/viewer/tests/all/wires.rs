@@ -1,8 +1,6 @@
 //! Wires thinner than a pixel: even along their length, of one piece, and the same in picture, arrays and mask.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;

@@ -1,8 +1,6 @@
 //! Trainees that are made up: one follows the way cleanly, others have a fault each. Every measure tells those apart that it should, and no
 //! others.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use endowire_assess::{BeamState, Hand, Injection, Metric, Record, Sample, Way, assess};
 use endowire_core::Vec3;
 use endowire_core::random::{splitmix64, unit};

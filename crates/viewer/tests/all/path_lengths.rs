@@ -1,6 +1,6 @@
 //! Path lengths against exact ones, on every engine.
 
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;

@@ -1,8 +1,6 @@
 //! Fluoroscopy, subtraction, roadmap and hold as sequences show them.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;

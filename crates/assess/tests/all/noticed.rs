@@ -1,9 +1,6 @@
 //! What stands out of a record whose faults are known.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-#[path = "common/beam.rs"]
-mod beam;
+use crate::beam;
 
 use beam::beam;
 use endowire_assess::{Hand, Injection, NoticedKind, Outlet, Record, Sample, Way, noticed};

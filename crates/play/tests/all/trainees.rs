@@ -1,7 +1,5 @@
 //! Trainees who work in the simulator itself: what the physics answers to their hands tells them apart.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::path::Path;
 
 use endowire_assess::{Exam, Score, Site, Subject};

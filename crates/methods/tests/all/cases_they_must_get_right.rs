@@ -1,7 +1,5 @@
 //! Every method on a case with an exact solution, and its order of convergence.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::f64::consts::FRAC_PI_2;
 
 use endowire_core::Vec3;

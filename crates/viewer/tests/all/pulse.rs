@@ -1,8 +1,6 @@
 //! A pulse of X-rays while a device moves, and its exposure.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;

@@ -1,8 +1,6 @@
 //! Labels against what they stand for, computed anew.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;

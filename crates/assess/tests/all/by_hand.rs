@@ -1,9 +1,6 @@
 //! Measures of a small record against values computed by hand.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-#[path = "common/fork.rs"]
-mod fork;
+use crate::fork;
 
 use endowire_assess::{BeamState, Group, Hand, Injection, Outlet, Record, Sample, Way, assess};
 use endowire_core::Vec3;

@@ -1,8 +1,6 @@
 //! The adapter's fluoroscopic pictures against the reference's at every pixel: vessels, modes, bodies, blades, devices, sizes.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod common;
+use crate::common;
 
 use std::f64::consts::TAU;
 

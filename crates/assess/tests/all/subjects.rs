@@ -1,9 +1,6 @@
 //! Subjects and exams by hand: a file is refused by its key, and a record is scored until its end.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-#[path = "common/beam.rs"]
-mod beam;
+use crate::beam;
 
 use std::path::Path;
 

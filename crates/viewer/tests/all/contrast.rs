@@ -1,7 +1,5 @@
 //! Contrast medium in the picture is that which was injected, and has no steps.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;

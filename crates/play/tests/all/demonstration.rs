@@ -1,7 +1,5 @@
 //! Scripts that are shown: what they do is what they do when run, a hand takes over at any time, and all of it is recorded.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::path::Path;
 
 use endowire_assess::{Group, Record, assess};

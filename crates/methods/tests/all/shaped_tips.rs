@@ -1,7 +1,5 @@
 //! Shaped tips: to which side they bend, and what they store, in every method that has them.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::f64::consts::FRAC_PI_2;
 
 use endowire_core::Vec3;

@@ -1,9 +1,6 @@
 //! Two recorded sessions, a file of `play` and a folder of `run`, against values worked out by hand. A third one is in `by_hand.rs`.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-#[path = "common/fork.rs"]
-mod fork;
+use crate::fork;
 
 use std::f64::consts::TAU;
 use std::path::Path;

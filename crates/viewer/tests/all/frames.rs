@@ -1,6 +1,6 @@
 //! What frames show, and what is refused.
 
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::vessel::SurfaceMesh;

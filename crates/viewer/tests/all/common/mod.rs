@@ -1,8 +1,5 @@
 //! Shapes with known path lengths, and comparisons.
 
-#![allow(dead_code, unreachable_pub, reason = "each test program uses its own part of this module")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +12,7 @@ use endowire_viewer::{
 
 /// A surface of revolution about z through the given (radius, height) profile from the bottom pole to the top
 /// pole.
-pub fn revolved(profile: &[(f64, f64)], sides: u32, centre: Vec3) -> SurfaceMesh {
+pub(crate) fn revolved(profile: &[(f64, f64)], sides: u32, centre: Vec3) -> SurfaceMesh {
     let mut mesh = SurfaceMesh::default();
     let inner = &profile[1..profile.len() - 1];
     for &(r, z) in inner {
@@ -42,7 +39,7 @@ pub fn revolved(profile: &[(f64, f64)], sides: u32, centre: Vec3) -> SurfaceMesh
     mesh
 }
 
-pub fn sphere(radius: f64, rings: u32, centre: Vec3) -> SurfaceMesh {
+pub(crate) fn sphere(radius: f64, rings: u32, centre: Vec3) -> SurfaceMesh {
     let profile: Vec<(f64, f64)> = (0..=rings)
         .map(|i| {
             let (s, c) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
@@ -53,13 +50,13 @@ pub fn sphere(radius: f64, rings: u32, centre: Vec3) -> SurfaceMesh {
 }
 
 /// A cylinder about z.
-pub fn cylinder(radius: f64, half_height: f64, sides: u32, centre: Vec3) -> SurfaceMesh {
+pub(crate) fn cylinder(radius: f64, half_height: f64, sides: u32, centre: Vec3) -> SurfaceMesh {
     let profile = [(0.0, -half_height), (radius, -half_height), (radius, half_height), (0.0, half_height)];
     revolved(&profile, sides, centre)
 }
 
 /// The two meshes as one.
-pub fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
+pub(crate) fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
     let offset = a.vertices_mm.len() as u32;
     let mut both = a.clone();
     both.vertices_mm.extend(&b.vertices_mm);
@@ -68,14 +65,14 @@ pub fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
 }
 
 /// The mesh with its inside out: a hole in what surrounds it.
-pub fn inverted(mesh: &SurfaceMesh) -> SurfaceMesh {
+pub(crate) fn inverted(mesh: &SurfaceMesh) -> SurfaceMesh {
     let mut mesh = mesh.clone();
     mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     mesh
 }
 
 /// A device along points with tangents by central differences of `at` over 0 to 1.
-pub fn device(points: usize, radius_mm: f64, at: impl Fn(f64) -> Vec3) -> DeviceView {
+pub(crate) fn device(points: usize, radius_mm: f64, at: impl Fn(f64) -> Vec3) -> DeviceView {
     let points = (0..points)
         .map(|i| {
             let w = i as f64 / (points - 1) as f64;
@@ -86,7 +83,7 @@ pub fn device(points: usize, radius_mm: f64, at: impl Fn(f64) -> Vec3) -> Device
 }
 
 /// A fluoroscopic view with the isocentre at the origin, at 60 keV on an ideal detector.
-pub fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
+pub(crate) fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
     ViewSpec {
         size_px: [size, size],
         views: vec![View::Fluoro],
@@ -100,7 +97,7 @@ pub fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
 
 /// A renderer on an adapter. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and
 /// a message.
-pub fn on_gpu(spec: &ViewSpec, wall: &SurfaceMesh) -> Option<Renderer> {
+pub(crate) fn on_gpu(spec: &ViewSpec, wall: &SurfaceMesh) -> Option<Renderer> {
     let spec = ViewSpec { backend: Backend::Gpu, ..spec.clone() };
     match Renderer::new(&spec, wall) {
         Ok(renderer) => Some(renderer),
@@ -114,7 +111,7 @@ pub fn on_gpu(spec: &ViewSpec, wall: &SurfaceMesh) -> Option<Renderer> {
 }
 
 /// The renderers to test: the CPU, and an adapter if there is one.
-pub fn engines(spec: &ViewSpec, wall: &SurfaceMesh) -> Vec<Renderer> {
+pub(crate) fn engines(spec: &ViewSpec, wall: &SurfaceMesh) -> Vec<Renderer> {
     let cpu = ViewSpec { backend: Backend::Cpu, ..spec.clone() };
     let mut all = vec![Renderer::new(&cpu, wall).expect("a valid scene")];
     all.extend(on_gpu(spec, wall));
@@ -122,43 +119,43 @@ pub fn engines(spec: &ViewSpec, wall: &SurfaceMesh) -> Vec<Renderer> {
 }
 
 /// Length of a line (unit direction) inside a sphere.
-pub fn sphere_chord(radius: f64, centre: Vec3, (origin, direction): (Vec3, Vec3)) -> f64 {
+pub(crate) fn sphere_chord(radius: f64, centre: Vec3, (origin, direction): (Vec3, Vec3)) -> f64 {
     let d2 = (centre - origin).cross(&direction).norm_squared();
     2.0 * (radius * radius - d2).max(0.0).sqrt()
 }
 
 /// Length of a line (unit direction) inside an infinite cylinder about z through the origin.
-pub fn cylinder_chord(radius: f64, (origin, direction): (Vec3, Vec3)) -> f64 {
+pub(crate) fn cylinder_chord(radius: f64, (origin, direction): (Vec3, Vec3)) -> f64 {
     let [o, d] = [origin, direction].map(|v| v.xy());
     let (a, b, c) = (d.norm_squared(), o.dot(&d), o.norm_squared() - radius * radius);
     2.0 * (b * b - a * c).max(0.0).sqrt() / a
 }
 
 /// Mean of the absolute differences.
-pub fn mean_difference(a: &[f32], b: &[f32]) -> f64 {
+pub(crate) fn mean_difference(a: &[f32], b: &[f32]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / a.len() as f64
 }
 
 /// The pixel centre of a row-by-row index.
-pub fn pixel_centre(index: usize, width: u32) -> [f64; 2] {
+pub(crate) fn pixel_centre(index: usize, width: u32) -> [f64; 2] {
     let width = width as usize;
     [(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]
 }
 
 /// The folder of the vessels that come with the project.
-pub fn assets() -> PathBuf {
+pub(crate) fn assets() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels")
 }
 
 /// The surface of one of them, closed.
-pub fn wall(vessel: &str) -> SurfaceMesh {
+pub(crate) fn wall(vessel: &str) -> SurfaceMesh {
     let surface = SurfaceMesh::read(&assets().join(format!("{vessel}.stl")), 1.0).unwrap();
     Wall::from_surface(&surface).unwrap().closed_mesh()
 }
 
 /// Contrast medium that comes in at an end of the vessel.
-pub fn with_injection(mut view: ViewSpec, vessel: &str, inlet_mm: [f64; 3], mode: Mode) -> ViewSpec {
+pub(crate) fn with_injection(mut view: ViewSpec, vessel: &str, inlet_mm: [f64; 3], mode: Mode) -> ViewSpec {
     view.xray.mode = mode;
     view.flow.tree = Some(assets().join(format!("{vessel}.csv")));
     view.flow.inlet_mm = Some(inlet_mm);

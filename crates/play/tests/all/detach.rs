@@ -1,7 +1,5 @@
 //! Coils that a hand leaves behind: recorded, taken back, done again and shown as a script with the same bits.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use endowire_core::insertion::Simulation;
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;

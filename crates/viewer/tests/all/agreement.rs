@@ -1,6 +1,6 @@
 //! The adapter against the CPU reference.
 
-mod common;
+use crate::common;
 
 use common::*;
 use endowire_core::Vec3;
