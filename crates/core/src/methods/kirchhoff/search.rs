@@ -20,7 +20,7 @@
 
 use super::guess::Guess;
 use super::substep::Effort;
-use crate::contact::{SETTLED, SelfContact, WallContact};
+use crate::contact::{SelfContact, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
@@ -161,7 +161,7 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Whether friction has the normal forces of the result.
     fn is_settled(&self) -> bool {
-        self.unsettled() < SETTLED
+        self.unsettled() < self.tuning.friction.settled
     }
 
     /// With the hand held still, relaxes an equilibrium with the normal forces of another state to where the device
