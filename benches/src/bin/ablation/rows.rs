@@ -36,7 +36,7 @@ const FAR: f64 = 1e30;
 type Group = (&'static str, Vec<(String, fn(&mut Tuning))>);
 
 #[allow(clippy::too_many_lines, reason = "a table")]
-fn groups() -> [Group; 12] {
+fn groups() -> [Group; 14] {
     [
         (
             "Parts of a command",
@@ -89,6 +89,27 @@ fn groups() -> [Group; 12] {
             vec![
                 without!("renewals of drag and of forces between instruments", steps.lagged_renewals = 0),
                 other!(steps.lagged_renewals = 5),
+                other!(friction.stick = 1e-4),
+                other!(friction.stick = 1e-2),
+                without!("slip that shrinks while the hand holds still", friction.stick_at_rest = 1.0),
+                other!(friction.stick_at_rest = 0.1),
+                other!(friction.least_at_rest = 1e-3),
+                other!(friction.least_at_rest = 0.1),
+                without!(
+                    "friction at the end of a step",
+                    friction.changed = f64::INFINITY,
+                    friction.renewed = f64::INFINITY
+                ),
+                without!("further rounds of a step for friction alone", friction.changed = f64::INFINITY),
+                other!(friction.changed = 0.01),
+                other!(friction.renewed = 0.05),
+                other!(friction.settled = 1e-5),
+                other!(friction.settled = 1e-3),
+                without!("own normal forces near the tip", friction.tip_radii = 0.0),
+                without!("normal forces that stay where the wall is", friction.tip_radii = FAR),
+                other!(friction.tip_radii = 30.0),
+                without!("iterations for friction between instruments", friction.lateral_rounds = 1),
+                other!(friction.lateral_rounds = 4),
             ],
         ),
         (
@@ -103,6 +124,33 @@ fn groups() -> [Group; 12] {
                 without!("cuts of trials before the wall", newton.safe_cuts = 0),
                 other!(newton.safe_cuts = 1),
                 without!("the test for a way through the wall", steps.tests_passing = false),
+                other!(contact.penalty = 0.01),
+                other!(contact.penalty = 1.0),
+                other!(contact.steepest = 1.0),
+                other!(contact.steepest = 4.0),
+                other!(contact.safe = 0.5),
+                other!(contact.safe = 0.99),
+                without!("the side of the wall of what has sunk in", contact.sunk = -FAR),
+                other!(contact.sunk = 0.1),
+                other!(contact.sunk = 0.6),
+                without!("the refusal of deeper predictions", contact.deeper = FAR),
+                other!(contact.deeper = 0.1),
+                other!(contact.gentlest_bend_mm = 30.0),
+                other!(contact.gentlest_bend_mm = 300.0),
+            ],
+        ),
+        (
+            "Distances from the wall",
+            vec![
+                other!(contact.follow = 0.25),
+                other!(contact.follow = 1.0),
+                without!("what was found nearby", contact.look_again = 0.0),
+                other!(contact.look_again = 0.25),
+                other!(contact.look_again = 1.0),
+                without!("a reach beyond what is needed", contact.look_mm = 0.0),
+                other!(contact.look_mm = 2.0),
+                without!("searches that grow", contact.farther = 0),
+                other!(contact.farther_by = 2.0),
             ],
         ),
         (
@@ -114,8 +162,40 @@ fn groups() -> [Group; 12] {
             ],
         ),
         (
+            "Contact between loops",
+            vec![
+                other!(pairs.spacing_radii = 0.25),
+                other!(pairs.spacing_radii = 1.0),
+                without!("ends of a stretch at shoulders", pairs.shoulder = FAR),
+                other!(pairs.near = 1.1),
+                other!(pairs.near = 2.0),
+                other!(pairs.known = 3.0),
+                without!("bases that need no search", pairs.free = -1.0),
+                other!(pairs.free = 1.5),
+                other!(pairs.clear = 4.0),
+                other!(pairs.clear = 16.0),
+                other!(pairs.beyond = 0.01),
+                other!(pairs.splits = 4),
+                other!(pairs.slide = 0.02),
+                other!(pairs.slide = 0.5),
+                other!(pairs.window = 1.0),
+                other!(pairs.window = 4.0),
+                other!(pairs.descents = 10),
+                other!(pairs.short = 1e-4),
+                other!(pairs.parabolic = 0.5),
+                without!("descents that end early", pairs.promised = f64::INFINITY),
+                other!(pairs.promised = 2.0),
+                other!(pairs.convex = 1e-2),
+                without!("forces of pairs from base to base", pairs.same = 0.0),
+                other!(pairs.same = 0.5),
+                other!(pairs.twice = 1e-2),
+            ],
+        ),
+        (
             "Newton's method",
             vec![
+                other!(newton.regularisation = 1e-10),
+                other!(newton.regularisation = 1e-6),
                 without!("the shift", newton.shifts = 0),
                 other!(newton.least_shift = 1e4),
                 other!(newton.least_shift = 1e6),
@@ -167,6 +247,8 @@ fn groups() -> [Group; 12] {
                 without!("the balance of energy", steps.notable = f64::INFINITY),
                 other!(steps.notable = 0.005),
                 other!(steps.notable = 0.1),
+                other!(steps.notable_floor_mj = 1e-8),
+                other!(steps.notable_floor_mj = 1e-4),
             ],
         ),
         (
@@ -197,8 +279,10 @@ fn groups() -> [Group; 12] {
             ],
         ),
         (
-            "Contact points",
+            "Elements and contact points",
             vec![
+                other!(mesh.largest_turn_rad = 0.4),
+                other!(mesh.largest_turn_rad = 1.5),
                 other!(mesh.tip_spacing_radii = 1.0),
                 other!(mesh.tip_spacing_radii = 1.0 / 16.0),
                 other!(mesh.fewest_intervals = 1.0),

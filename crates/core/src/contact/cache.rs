@@ -8,13 +8,13 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
-use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::ProximityCache;
 use super::set::ContactSet;
 use super::surface::Hint;
 use super::wall::{PointPlace, Span};
 use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
+use crate::tuning::ContactTuning;
 
 /// What a point knows of its surroundings. Positions are material points of the vessel, and clearances are distances
 /// between these.
@@ -100,6 +100,8 @@ pub struct ContactCache {
     pub(super) proximity: ProximityCache,
     /// Contacts in the step from a base.
     pub(super) set: ContactSet<PointPlace>,
+    /// The numbers of the surface.
+    pub(super) tuning: ContactTuning,
 }
 
 /// What the points of a device know of the wall at an equilibrium.
@@ -151,13 +153,13 @@ impl KnownPoints {
 impl ContactCache {
     /// An empty cache for `surface`.
     pub fn new(surface: &ContactSurface) -> Self {
-        let proximity = ProximityCache::new(LOOK_AGAIN * surface.thinnest_mm, surface.reach_mm);
         Self {
             points: Vec::new(),
             spans: Vec::new(),
             readings: Vec::new(),
-            proximity,
+            proximity: ProximityCache::of(surface),
             set: ContactSet::default(),
+            tuning: surface.tuning,
         }
     }
 
@@ -212,7 +214,7 @@ impl ContactCache {
             let slid = nearest.map(|(n, was)| {
                 // Where a thinner piece was free, a thicker one is free within a smaller distance.
                 let thicker_mm = (point.potential.radius_mm - was.potential.radius_mm).max(0.0);
-                let less_mm = (1.0 + FOLLOW) * thicker_mm;
+                let less_mm = (1.0 + self.tuning.follow) * thicker_mm;
                 KnownPoint {
                     from_tip_mm: n.from_tip_mm + advance_mm,
                     free_mm: n.free_mm - less_mm,

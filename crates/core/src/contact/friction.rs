@@ -34,7 +34,6 @@ mod slider;
 
 pub use between::{Between, InnerFriction, Place};
 pub(in crate::contact) use coulomb::{Coulomb, FrictionDerivatives};
-pub use follow::SETTLED;
 pub(in crate::contact) use follow::unsettled;
 pub use slider::NormalForce;
 pub(in crate::contact) use slider::Slider;
@@ -42,28 +41,12 @@ pub(in crate::contact) use slider::Slider;
 use super::ContactPoint;
 use crate::Vec3;
 use crate::rod::{ElementData, RodState};
+use crate::tuning::FrictionTuning;
 use crate::vessel::Displacement;
 use coulomb::sticking_mm;
 
-/// Slip below which a point sticks, as a fraction of the hand's motion, or of the device's radius if the hand rests:
-/// the error of the regularisation.
-const STICK: f64 = 1e-3;
-/// Factor by which it shrinks in every relaxation while the hand holds still.
-const STICK_AT_REST: f64 = 0.3;
-/// Smallest slip after shrinking, as a fraction of that of the step: a smaller one would make friction stiffer than
-/// any wall.
-const LEAST_AT_REST: f64 = 0.01;
 /// Smallest slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
-/// Friction at a point causes another round in a step where its force is wrong by more than this fraction of its
-/// bound.
-pub(in crate::contact) const CHANGED: f64 = 0.05;
-/// A round updates friction where it is wrong by more than this fraction: without the update, the error would make
-/// steps uphill.
-pub(in crate::contact) const RENEWED: f64 = 5e-3;
-/// Points nearer to the tip than this many radii (plus the advance) keep their own normal force; the others take the
-/// one felt before at their new position, since the wall does not move.
-const TIP_RADII: f64 = 10.0;
 
 /// Friction at all contact points of a device in one step.
 #[derive(Debug, Clone, Default)]
@@ -101,7 +84,12 @@ impl HandMotion {
 impl Friction {
     /// Friction of coefficient μ ≥ 0; 0 disables it.
     pub fn new(coefficient: f64) -> Self {
-        Self { law: Coulomb::new(coefficient), ..Self::default() }
+        Self::tuned(coefficient, &FrictionTuning::DEFAULT)
+    }
+
+    /// As [`Self::new`], with these numbers.
+    pub(crate) fn tuned(coefficient: f64, tuning: &FrictionTuning) -> Self {
+        Self { law: Coulomb::new(coefficient, tuning), sliders: Vec::new(), between: Between::new(tuning) }
     }
 
     /// Allocates for `points` points.
@@ -149,10 +137,10 @@ impl Friction {
         let line_mm = |length: fn(&HandMotion) -> f64| hands.iter().map(length).fold(0.0, f64::max);
         let advance = line_mm(|hand| hand.to_mm) - line_mm(|hand| hand.from_mm);
         let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
-        self.law.stick_within(stick_mm(hands, radius));
+        self.law.stick_within(stick_mm(hands, radius, &self.law.tuning));
         let (old_points, old) = before;
         let count = old_points.len().min(old.len());
-        let near_tip = TIP_RADII * radius + advance.abs();
+        let near_tip = self.law.tuning.tip_radii * radius + advance.abs();
         let mut k = 0;
         for (index, point) in points.iter().enumerate() {
             let advance_mm = hands[point.instrument].advance_mm();
@@ -194,7 +182,8 @@ impl Friction {
         }
         // With no hand on the rod, ε follows from its radius.
         if let ([], Some(first)) = (&self.sliders[..], points.first()) {
-            self.law.stick_within(sticking_mm(STICK * first.potential.radius_mm));
+            let tuning = self.law.tuning;
+            self.law.stick_within(sticking_mm(tuning.stick * first.potential.radius_mm, &tuning));
         }
         self.sliders.extend(points.iter().zip(forces).map(|(point, NormalForce { normal, force_n })| {
             let at = Slider::at(point.position_and_tangent(elements, state), point.turned(state), 0.0);
@@ -211,10 +200,11 @@ impl Friction {
         }
         // If the hands rest, the motion of the wall sets ε.
         let moves = hands.iter().any(|hand| hand.parts() != [0.0; 2]);
-        let stick_mm = STICK * farthest_mm;
+        let tuning = self.law.tuning;
+        let stick_mm = tuning.stick * farthest_mm;
         if farthest_mm > 0.0 {
             let stick_mm = if moves { self.law.stick_mm.max(stick_mm) } else { stick_mm };
-            self.law.stick_within(sticking_mm(stick_mm));
+            self.law.stick_within(sticking_mm(stick_mm, &tuning));
         }
     }
 
@@ -300,10 +290,10 @@ impl Friction {
 
 /// ε for a step with these hand motions and a device of that radius, and its lower bound while the hands hold still,
 /// mm. An instrument at rest gets the ε of those that move.
-pub(crate) fn stick_mm(hands: &[HandMotion], radius_mm: f64) -> [f64; 2] {
+pub(crate) fn stick_mm(hands: &[HandMotion], radius_mm: f64, tuning: &FrictionTuning) -> [f64; 2] {
     let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius_mm * hand.turn_rad.abs());
     let way_mm = ways.fold(0.0, f64::max);
-    sticking_mm(STICK * if way_mm > 0.0 { way_mm } else { radius_mm })
+    sticking_mm(tuning.stick * if way_mm > 0.0 { way_mm } else { radius_mm }, tuning)
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ pub use cache::{ContactCache, KnownPoints};
 pub use distance::{Distance, Nearness, SmoothWall};
 pub use drag::Drag;
 pub(crate) use friction::stick_mm;
-pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place, SETTLED};
+pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place};
 pub use moved::MovedWall;
 pub use pairs::{Capsule, SelfContact, Touching};
 pub(crate) use pairs::{FrictionLaw, PairForce, Pressing, RodPlace};
@@ -41,3 +41,6 @@ pub use regions::RegionMap;
 pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
 pub use wall::WallContact;
 pub(crate) use wall::least_force_n;
+
+/// Rounding error of a distance, in units of a coordinate's rounding.
+const ROUNDING: f64 = 4.0;

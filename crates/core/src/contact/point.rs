@@ -7,12 +7,6 @@ use crate::contact::{Distance, WallPotential};
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
 
-/// Distance from the wall, beyond its radius and as a fraction of it, within which a point is tracked.
-pub(in crate::contact) const FOLLOW: f64 = 0.5;
-/// Distance, as a fraction of a point's radius, over which a query's triangle is reused as the nearest or a close
-/// one.
-pub(super) const LOOK_AGAIN: f64 = 0.5;
-
 /// A point of the device at which contact with the wall is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPoint {

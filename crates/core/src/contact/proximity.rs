@@ -6,15 +6,12 @@
 
 use crate::Vec3;
 use crate::contact::ContactSurface;
+use crate::tuning::ContactTuning;
 
 /// Number of cells cached; a power of two. A device of a metre occupies some thousands.
 const CELLS: usize = 1 << 14;
 /// Largest magnitude of a cell's index.
 const FARTHEST: f64 = 1e9;
-/// Number of times the search radius is multiplied by `FARTHER_BY` before it becomes unlimited.
-const FARTHER: i32 = 6;
-/// See [`FARTHER`].
-const FARTHER_BY: f64 = 4.0;
 /// Margin of the search for a piece nearer than a known one, as a fraction of its distance and of the reach: against
 /// rounding.
 const CLOSE: f64 = 1e-9;
@@ -52,6 +49,8 @@ struct Cell {
 pub(super) struct ProximityCache {
     size_mm: f64,
     reach_mm: f64,
+    farther: i32,
+    farther_by: f64,
     cells: Vec<Cell>,
     /// The piece that was found last.
     last: u32,
@@ -61,10 +60,17 @@ pub(super) struct ProximityCache {
 
 impl ProximityCache {
     /// Cells with all points within `radius_mm` of their middle, from which walls are sought up to `reach_mm` away.
-    pub(super) fn new(radius_mm: f64, reach_mm: f64) -> Self {
+    fn new(radius_mm: f64, reach_mm: f64, tuning: &ContactTuning) -> Self {
         let unknown = Cell { key: [i32::MIN; 3], piece: NONE, clearance_mm: 0.0 };
         let size_mm = radius_mm * 2.0 / 3f64.sqrt();
-        Self { size_mm, reach_mm, cells: vec![unknown; CELLS], last: NONE, queries: 0 }
+        let ContactTuning { farther, farther_by, .. } = *tuning;
+        Self { size_mm, reach_mm, farther, farther_by, cells: vec![unknown; CELLS], last: NONE, queries: 0 }
+    }
+
+    /// For the queries of a surface.
+    pub(super) fn of(surface: &ContactSurface) -> Self {
+        let tuning = &surface.tuning;
+        Self::new(tuning.look_again * surface.thinnest_mm, surface.reach_mm, tuning)
     }
 
     /// The piece nearest to `x` itself.
@@ -80,9 +86,9 @@ impl ProximityCache {
                 far_mm.map_or(f64::MAX, |mm| mm * (1.0 + CLOSE) + self.reach_mm * CLOSE)
             }
         };
-        let reaches = (0..FARTHER).map(|k| self.reach_mm * FARTHER_BY.powi(k)).chain([f64::MAX]);
+        let reaches = (0..self.farther).map(|k| self.reach_mm * self.farther_by.powi(k)).chain([f64::MAX]);
         let mut limits =
-            reaches.map(|reach_mm| if found_mm < FARTHER_BY * reach_mm { found_mm } else { reach_mm });
+            reaches.map(|reach_mm| if found_mm < self.farther_by * reach_mm { found_mm } else { reach_mm });
         let nearest = limits.find_map(|limit_mm| surface.nearest(x, limit_mm));
         self.last = nearest.map_or(NONE, |n| n.bound);
         Proximity {
@@ -138,7 +144,7 @@ mod tests {
     #[test]
     fn a_cell_is_asked_once_and_answers_as_the_hierarchy_does() {
         let surface = tube(1.0);
-        let mut proximity = ProximityCache::new(0.2, 3.0);
+        let mut proximity = ProximityCache::new(0.2, 3.0, &ContactTuning::DEFAULT);
         let at = |i: i32| Vec3::new(2.5 * f64::from(i).sin(), 2.5 * f64::from(i).cos(), 0.02 * f64::from(i));
         for i in 0..3000 {
             let x = at(i);
@@ -156,14 +162,14 @@ mod tests {
     #[test]
     fn what_was_found_before_leads_to_the_same_answers() {
         let surface = tube(0.7);
-        let mut proximity = ProximityCache::new(0.2, 0.5);
+        let mut proximity = ProximityCache::new(0.2, 0.5, &ContactTuning::DEFAULT);
         // On a lattice about the axis many triangles are at equal distance.
         let at =
             |k: i32| Vec3::new(f64::from(k % 7 - 3), f64::from(k / 7 % 7 - 3), f64::from(k / 49 % 40)) * 0.9;
         for k in 0..2000 {
             let x = at(k * 611 % 2000);
             let place = proximity.ask(&surface, &x);
-            let fresh = ProximityCache::new(0.2, 0.5).ask(&surface, &x);
+            let fresh = ProximityCache::new(0.2, 0.5, &ContactTuning::DEFAULT).ask(&surface, &x);
             assert_eq!((place.piece, place.clearance_mm), (fresh.piece, fresh.clearance_mm), "{x}");
         }
     }
@@ -171,7 +177,7 @@ mod tests {
     #[test]
     fn no_number_is_no_place_and_a_far_wall_is_found() {
         let surface = tube(2.0);
-        let mut proximity = ProximityCache::new(0.2, 1.0);
+        let mut proximity = ProximityCache::new(0.2, 1.0, &ContactTuning::DEFAULT);
         let place = proximity.around(&surface, &Vec3::repeat(f64::NAN));
         assert!(place.piece.is_none() && place.clearance_mm == 1.0);
         let place = proximity.around(&surface, &Vec3::new(0.0, 0.0, 50.0));

@@ -1,6 +1,5 @@
 //! Distances of single points from a wall, for methods with contact at their nodes.
 
-use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::{Proximity, ProximityCache};
 use super::surface::Hint;
 use super::{ContactSurface, Nearness};
@@ -21,12 +20,8 @@ pub struct WallReader {
 impl WallReader {
     /// A reader for this `surface` only, and for points of the devices that it was made for.
     pub fn new(surface: &ContactSurface) -> Self {
-        let radius_mm = surface.thinnest_mm;
-        Self {
-            proximity: ProximityCache::new(LOOK_AGAIN * radius_mm, surface.reach_mm),
-            near_mm: FOLLOW * radius_mm,
-            wide: None,
-        }
+        let near_mm = surface.tuning.follow * surface.thinnest_mm;
+        Self { proximity: ProximityCache::of(surface), near_mm, wide: None }
     }
 
     /// Distance of `x` from the wall, with derivatives below `limit_mm`, and the piece of wall nearest to its

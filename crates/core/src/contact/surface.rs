@@ -10,23 +10,18 @@ mod mesh;
 
 use super::Distance;
 use super::distance::Nearness;
-use super::point::{FOLLOW, LOOK_AGAIN};
 use super::properties::WallProperties;
 use super::regions::{RegionMap, Stiffness};
+use crate::tuning::ContactTuning;
 use crate::vessel::{ClosestFrom, Lumen, SweptField, Wall, WallStore};
 use crate::{Result, Vec3};
 pub use deviation::Deviation;
 pub use mesh::ContactMesh;
 
-/// Distance beyond the necessary reach up to which a point seeks the wall, mm: while it moves less, no new query is
-/// needed. For a point on the axis of a tube all triangles are at one distance, and a query that reaches them visits
-/// all: a small extra reach is enough.
-const LOOK_MM: f64 = 0.5;
-
 /// Reach of the queries of a device's points, mm, given its largest radius and by how much the smooth wall may lie
 /// inside flat triangles.
-fn reach_mm(thickest_mm: f64, inset_mm: f64) -> f64 {
-    (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + inset_mm + LOOK_MM
+fn reach_mm(thickest_mm: f64, inset_mm: f64, tuning: &ContactTuning) -> f64 {
+    (1.0 + tuning.follow + tuning.look_again) * thickest_mm + inset_mm + tuning.look_mm
 }
 
 /// A wall prepared for the contact of devices.
@@ -37,6 +32,8 @@ pub struct ContactSurface {
     pub(super) thinnest_mm: f64,
     /// Reach of the queries of the device's points, mm.
     pub(super) reach_mm: f64,
+    /// The numbers with which devices touch it.
+    pub(super) tuning: ContactTuning,
 }
 
 /// The representation of the wall.
@@ -87,8 +84,8 @@ impl ContactSurface {
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let mesh = ContactMesh::new(wall, thickest_mm, properties, store)?;
-        Ok(Self { reach_mm: mesh.reach_mm, source: Source::Mesh(Box::new(mesh)), thinnest_mm })
+        let tuning = &ContactTuning::DEFAULT;
+        Self::of_wall(wall, (thinnest_mm, thickest_mm), properties, store, tuning)
     }
 
     /// Prepares the wall of `lumen`. One given by a centre line is used directly, unless the device is thicker than
@@ -106,14 +103,38 @@ impl ContactSurface {
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
+        Self::tuned(lumen, radii_mm, properties, store, &ContactTuning::DEFAULT)
+    }
+
+    /// As [`Self::of`], with these numbers.
+    pub(crate) fn tuned(
+        lumen: &Lumen,
+        radii_mm: (f64, f64),
+        properties: &WallProperties,
+        store: &dyn WallStore,
+        tuning: &ContactTuning,
+    ) -> Result<Self> {
         match lumen {
             Lumen::Swept(vessel) if properties.region.is_empty() && vessel.least_radius_mm() > radii_mm.1 => {
-                let reach_mm = reach_mm(radii_mm.1, 0.0);
+                let reach_mm = reach_mm(radii_mm.1, 0.0, tuning);
                 let source = Source::Swept(vessel.field(reach_mm), radii_mm.1);
-                Ok(Self { source, thinnest_mm: radii_mm.0, reach_mm })
+                Ok(Self { source, thinnest_mm: radii_mm.0, reach_mm, tuning: *tuning })
             }
-            _ => Self::new(lumen.wall(store)?, radii_mm, properties, store),
+            _ => Self::of_wall(lumen.wall(store)?, radii_mm, properties, store, tuning),
         }
+    }
+
+    /// As [`Self::new`], with these numbers.
+    fn of_wall(
+        wall: &Wall,
+        (thinnest_mm, thickest_mm): (f64, f64),
+        properties: &WallProperties,
+        store: &dyn WallStore,
+        tuning: &ContactTuning,
+    ) -> Result<Self> {
+        let mesh = ContactMesh::tuned(wall, thickest_mm, properties, store, tuning)?;
+        let (reach_mm, source) = (mesh.reach_mm, Source::Mesh(Box::new(mesh)));
+        Ok(Self { source, thinnest_mm, reach_mm, tuning: *tuning })
     }
 
     /// Its mesh; `None` for a centre line.

@@ -32,26 +32,16 @@ pub(super) use clear::Span;
 pub(super) use contacts::PointPlace;
 use reading::Reading;
 
-/// Radius of the gentlest relevant bend, mm.
-const LEAST_BEND_MM: f64 = 100.0;
-/// Fraction of its clearance by which a point may move in one Newton step.
-const SAFE: f64 = 0.9;
-/// A point whose axis is nearer to the wall than this fraction of its radius has sunk into it: the side of the wall
-/// follows from where it came from, and the nearest piece is sought along the wall, not through space.
-const SUNK: f64 = 0.3;
-/// Rounding error of a distance, in units of a coordinate's rounding.
-const ROUNDING: f64 = 4.0;
-
-/// Force scale of a device of this bending stiffness, N·mm², bent to a radius of 100 mm, N.
-pub(crate) fn least_force_n(bending_nmm2: f64) -> f64 {
-    bending_nmm2 / (LEAST_BEND_MM * LEAST_BEND_MM)
+/// Force scale of a device of this bending stiffness, N·mm², bent to this radius, mm, N.
+pub(crate) fn least_force_n(bending_nmm2: f64, bend_mm: f64) -> f64 {
+    bending_nmm2 / (bend_mm * bend_mm)
 }
 
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
     surface: MovedWall<'a>,
     points: &'a [ContactPoint],
-    /// Moment of the softest piece at a radius of 100 mm, N·mm.
+    /// Moment of the softest piece in the gentlest relevant bend, N·mm.
     least_moment_nmm: f64,
     /// Drag of flowing blood.
     drag: Option<&'a mut Drag>,
@@ -76,7 +66,7 @@ impl<'a> WallContact<'a> {
         Self {
             surface: surface.into(),
             points,
-            least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
+            least_moment_nmm: softest_nmm2 / cache.tuning.gentlest_bend_mm,
             drag: None,
             cache,
             friction,
@@ -88,6 +78,11 @@ impl<'a> WallContact<'a> {
     /// The material point of the vessel where point `index` is at a state; knowledge of the wall refers to these.
     fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
         self.surface.material(&self.points[index].position(elements, state))
+    }
+
+    /// Distance from the wall within which a point of this radius is tracked, mm.
+    fn followed_mm(&self, radius_mm: f64) -> f64 {
+        (1.0 + self.cache.tuning.follow) * radius_mm
     }
 
     /// Sets the drag of a flow at a state; none without flow. Returns its potential there, mJ.
@@ -136,27 +131,28 @@ impl<'a> WallContact<'a> {
     ) -> f64 {
         let x = self.material(index, elements, to);
         let known = &self.cache.points[index];
-        let safe_mm = SAFE * known.base_clearance_mm / self.surface.stretch();
+        let safe = self.cache.tuning.safe;
+        let safe_mm = safe * known.base_clearance_mm / self.surface.stretch();
         let way_mm = (x - known.base).norm();
         if known.side.is_some() || fraction * way_mm <= safe_mm {
             return fraction;
         }
         // Between two positions that are as far from the wall as from each other there is no wall.
         let to_mm = self.read(index, &x).distance_mm();
-        if way_mm <= safe_mm + SAFE * to_mm / self.surface.stretch() {
+        if way_mm <= safe_mm + safe * to_mm / self.surface.stretch() {
             return fraction;
         }
         self.counters.queries += 1;
         let known = &self.cache.points[index];
-        let Some(met) = self.surface.crossing(&known.base, &x, fraction / SAFE) else {
+        let Some(met) = self.surface.crossing(&known.base, &x, fraction / safe) else {
             return fraction;
         };
         // Near the wall flat triangles may stand into the smooth lumen, and the smooth distance decides.
         let from_mm = known.base_clearance_mm;
         match known.piece.map(|triangle| self.surface.distance_from(triangle, &x)) {
             Some(to_mm) if to_mm > 0.0 => fraction,
-            Some(to_mm) => fraction.min(SAFE * from_mm / (from_mm - to_mm)),
-            None => SAFE * met,
+            Some(to_mm) => fraction.min(safe * from_mm / (from_mm - to_mm)),
+            None => safe * met,
         }
     }
 

@@ -175,7 +175,7 @@ impl<const C: usize> Newton<C> {
     /// Factors the system under a shift and solves for the step. Returns whether the matrix has the inertia of a
     /// minimum.
     fn factors_minimum(&mut self, problem: &Problem<'_>, shift: f64) -> bool {
-        let found = self.factor_step(Self::regularisation(problem.elements) + shift);
+        let found = self.factor_step(self.regularisation(problem.elements) + shift);
         Self::restore_tensions(problem.elements, &mut self.step);
         found.is_ok_and(|inertia| inertia.negative == problem.multipliers())
     }

@@ -8,7 +8,6 @@
 use super::external::ContactMerit;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
-use super::shift::REGULARISATION;
 use crate::rod::{ElementData, Layout, RodState};
 use crate::tuning::NewtonTuning;
 
@@ -200,7 +199,7 @@ impl<const C: usize> Newton<C> {
         let l = Layout::<C>;
         let elements = problem.elements;
         let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-        turn.max(self.tuning.stiffening * pulled * REGULARISATION / Self::regularisation(elements))
+        turn.max(self.tuning.stiffening * pulled * self.tuning.regularisation / self.regularisation(elements))
     }
 
     /// Sets the trial to a fraction of the step, at most `part`, that crosses no surface; returns the fraction.

@@ -9,9 +9,6 @@ use super::report::StopReason;
 use crate::banded::{FactorError, Inertia};
 use crate::rod::{Assembly, ElementData, Supports};
 
-/// Regularisation that is always added: a uniform tension, as a fraction of EI/L².
-pub(super) const REGULARISATION: f64 = 1e-8;
-
 impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
     pub(crate) fn inertia(
@@ -26,7 +23,7 @@ impl<const C: usize> Newton<C> {
 
     /// Factors the assembled matrix with the regularisation, for the inverse.
     pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
-        self.inertia(elements, supports, Self::regularisation(elements))
+        self.inertia(elements, supports, self.regularisation(elements))
     }
 
     /// Replaces a right-hand side by the solution with the matrix factored last.
@@ -58,12 +55,12 @@ impl<const C: usize> Newton<C> {
     }
 
     /// The regularisation: the shift that is always added.
-    pub(crate) fn regularisation(elements: &[ElementData]) -> f64 {
+    pub(crate) fn regularisation(&self, elements: &[ElementData]) -> f64 {
         let rods = || elements.iter().filter(|data| !data.is_break());
         let length: f64 = rods().map(|e| e.length).sum();
         // EI averaged like springs in series: the effective stiffness of the whole rod.
         let soft: f64 = rods().map(|e| e.length / e.bending[1]).sum();
-        REGULARISATION / (length * soft)
+        self.tuning.regularisation / (length * soft)
     }
 
     /// Factors the matrix and solves for the step with the regularisation. If a minimum is sought and the inertia is
@@ -73,7 +70,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         problem: &Problem<'_>,
     ) -> Result<(f64, Option<Inertia>), StopReason> {
-        let regularisation = Self::regularisation(problem.elements);
+        let regularisation = self.regularisation(problem.elements);
         let wanted = problem.minimum.then(|| problem.multipliers());
         let right = |found: &Result<Inertia, FactorError>| {
             found.as_ref().is_ok_and(|inertia| wanted.is_none_or(|negative| inertia.negative == negative))
@@ -100,7 +97,7 @@ impl<const C: usize> Newton<C> {
     /// The first shift to try.
     pub(super) fn first_shift(&self, elements: &[ElementData]) -> f64 {
         let Self { tuning, last_shift, .. } = self;
-        (tuning.least_shift * Self::regularisation(elements)).max(tuning.shift_decay * last_shift)
+        (tuning.least_shift * self.regularisation(elements)).max(tuning.shift_decay * last_shift)
     }
 
     /// Factors the assembled matrix with a shift, and solves for the step.

@@ -68,7 +68,7 @@ impl<const C: usize> Path<C> {
                 report.reason
             )));
         }
-        let shift = Newton::<C>::regularisation(&problem.elements);
+        let shift = self.newton.regularisation(&problem.elements);
         let inertia = self
             .newton
             .inertia(&problem.elements, &self.supports, shift)

@@ -9,11 +9,14 @@ pub struct MeshTuning {
     /// Smallest number of intervals between contact points in an element: a wire that is thick relative to its
     /// elements needs points within them too.
     pub fewest_intervals: f64,
+    /// Largest angle by which the rest shape bends in an element, rad.
+    pub largest_turn_rad: f64,
 }
 
 impl MeshTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self { tip_spacing_radii: 1.0 / 256.0, fewest_intervals: 2.0 };
+    pub const DEFAULT: Self =
+        Self { tip_spacing_radii: 1.0 / 256.0, fewest_intervals: 2.0, largest_turn_rad: 0.75 };
 }
 
 impl Default for MeshTuning {

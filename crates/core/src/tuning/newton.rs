@@ -42,6 +42,8 @@ pub struct NewtonTuning {
     /// though steps still turn nodes by more than the tolerance.
     pub hidden: usize,
 
+    /// Regularisation that is always added: a uniform tension, as a fraction of EI/L² of the whole rod.
+    pub regularisation: f64,
     /// Smallest shift, as a multiple of the regularisation.
     pub least_shift: f64,
     /// Factor by which an insufficient shift grows.
@@ -101,6 +103,7 @@ impl NewtonTuning {
         quadratic: 10.0,
         chord: 10.0,
         hidden: 3,
+        regularisation: 1e-8,
         least_shift: 1e5,
         shift_growth: 4.0,
         shift_decay: 1.0 / 8.0,

@@ -57,6 +57,8 @@ pub struct StepTuning {
     /// Released or missing energy is significant above this fraction of the energy that is stored in the device and
     /// the wall, exchanged with fields, or released from the sheath. If infinite, energies are not compared.
     pub notable: f64,
+    /// Energy below which none is significant, mJ.
+    pub notable_floor_mj: f64,
     /// Resistance to motion of a detached coil, over its bending stiffness and length, 1/mm⁴: that to a motion of
     /// 1 mm of a coil of 60 mm is a thousandth of the force that bends it to a radius of 1 mm.
     pub coil_resistance_per_mm4: f64,
@@ -87,6 +89,7 @@ impl StepTuning {
         repeats: true,
         tests_passing: true,
         notable: 0.02,
+        notable_floor_mj: 1e-6,
         coil_resistance_per_mm4: 1e-5,
     };
 }

@@ -26,9 +26,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::LEAST_STICK_MM;
 use super::coulomb::{phi, rates};
-use super::{LEAST_STICK_MM, STICK, STICK_AT_REST};
 use crate::rod::{RodState, Stencils};
+use crate::tuning::FrictionTuning;
 
 /// Friction of one instrument on the next one outside it at a node, at the end of the last step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -130,9 +131,15 @@ impl Place {
 #[derive(Debug, Clone, Default)]
 pub struct Between {
     places: Vec<Place>,
+    tuning: FrictionTuning,
 }
 
 impl Between {
+    /// None yet.
+    pub(super) fn new(tuning: &FrictionTuning) -> Self {
+        Self { places: Vec::new(), tuning: *tuning }
+    }
+
     /// Removes all friction.
     pub(crate) fn clear(&mut self) {
         self.places.clear();
@@ -141,7 +148,8 @@ impl Between {
     /// Adds a node. `ways_mm` is the largest motion of a hand: ε is a fraction of that.
     pub(crate) fn push(&mut self, place: Place, ways_mm: f64) {
         let own_mm = place.advance_mm.abs() + place.radius_mm * place.turn_rad.abs();
-        let stick_mm = (STICK * own_mm.max(STICK_AT_REST * ways_mm)).max(LEAST_STICK_MM);
+        let FrictionTuning { stick, stick_at_rest, .. } = self.tuning;
+        let stick_mm = (stick * own_mm.max(stick_at_rest * ways_mm)).max(LEAST_STICK_MM);
         self.places.push(Place { stick_mm, ..place });
     }
 

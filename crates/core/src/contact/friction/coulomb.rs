@@ -4,10 +4,11 @@
 
 use nalgebra::Matrix3;
 
+use super::LEAST_STICK_MM;
 use super::follow::Renewal;
 use super::slider::Slider;
-use super::{LEAST_AT_REST, LEAST_STICK_MM, STICK_AT_REST};
 use crate::Vec3;
+use crate::tuning::FrictionTuning;
 
 /// Derivatives of the friction energy of a contact in its position and its angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,12 +37,14 @@ pub(in crate::contact) struct Coulomb {
     pub(super) renewal: Renewal,
     /// Energy dissipated before slip was reset, mJ.
     pub(super) taken_mj: f64,
+    /// Numbers that are choices.
+    pub(in crate::contact) tuning: FrictionTuning,
 }
 
 impl Coulomb {
     /// Friction of coefficient μ ≥ 0.
-    pub(in crate::contact) fn new(coefficient: f64) -> Self {
-        Self { coefficient, ..Self::default() }
+    pub(in crate::contact) fn new(coefficient: f64, tuning: &FrictionTuning) -> Self {
+        Self { coefficient, tuning: *tuning, ..Self::default() }
     }
 
     /// Whether there is friction.
@@ -137,7 +140,8 @@ impl Coulomb {
     /// before.
     pub(in crate::contact) fn anchor<'a>(&mut self, at: impl Iterator<Item = (&'a mut Slider, Vec3, f64)>) {
         self.hold();
-        let smaller = Self { stick_mm: (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm), ..*self };
+        let smaller =
+            Self { stick_mm: (self.stick_mm * self.tuning.stick_at_rest).max(self.least_stick_mm), ..*self };
         let (mut before_mj, mut after_mj) = (0.0, 0.0);
         for (slider, x, angle) in at {
             before_mj += self.largest_n(slider) * self.dissipating_mm(slider, &x, angle);
@@ -152,9 +156,9 @@ impl Coulomb {
     }
 }
 
-/// ε for a step in which something moves by `1/STICK` of this, and its lower bound while the hands hold still, mm.
-pub(super) fn sticking_mm(stick_mm: f64) -> [f64; 2] {
-    [stick_mm, LEAST_AT_REST * stick_mm].map(|mm| mm.max(LEAST_STICK_MM))
+/// ε for a step in which it is this fraction of what moves, and its lower bound while the hands hold still, mm.
+pub(super) fn sticking_mm(stick_mm: f64, tuning: &FrictionTuning) -> [f64; 2] {
+    [stick_mm, tuning.least_at_rest * stick_mm].map(|mm| mm.max(LEAST_STICK_MM))
 }
 
 /// Gradient of μ N φ in a slip in the wall's plane, N, and its derivative, N/mm.

@@ -8,10 +8,6 @@ use super::coulomb::Coulomb;
 use super::slider::Slider;
 use crate::Vec3;
 
-/// Normal forces are settled once their relative change, and their relative difference from the contact forces, is
-/// below this.
-pub const SETTLED: f64 = 1e-4;
-
 /// Whether normal forces are renewed at the next base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Renewal {
@@ -73,7 +69,8 @@ impl Coulomb {
                 off.add((slider.normal, slider.force_n), slider.seen);
             }
         }
-        let steady = change.change_n < SETTLED * change.sum_n && off.relative() < SETTLED;
+        let settled = self.tuning.settled;
+        let steady = change.change_n < settled * change.sum_n && off.relative() < settled;
         self.renewal = match self.renewal {
             Renewal::Begins => Renewal::Follows,
             Renewal::Follows if steady => Renewal::Settled,
@@ -84,7 +81,7 @@ impl Coulomb {
     /// Whether normal forces at an equilibrium match the contact forces, or are held; otherwise they are renewed
     /// again.
     pub(in crate::contact) fn settles(&mut self, unsettled: f64) -> bool {
-        if self.renewal == Renewal::Held || unsettled < SETTLED {
+        if self.renewal == Renewal::Held || unsettled < self.tuning.settled {
             return true;
         }
         self.renewal = Renewal::Follows;

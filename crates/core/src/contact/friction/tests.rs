@@ -18,7 +18,7 @@ fn friction(slip: Vec3) -> (Friction, Vec3) {
         ..Slider::default().with(normal, 2.0)
     };
     let at = slider.from_mm + (slip - normal * normal.dot(&slip));
-    let law = Coulomb { stick_mm: 0.01, ..Coulomb::new(0.25) };
+    let law = Coulomb { stick_mm: 0.01, ..Coulomb::new(0.25, &FrictionTuning::DEFAULT) };
     (Friction { law, sliders: vec![slider], ..Friction::default() }, at)
 }
 
@@ -111,7 +111,7 @@ const SLIPS: [Vec3; 3] =
 #[test]
 fn what_comes_to_rest_sticks_within_a_hundredth_and_no_less() {
     let mut point = slipped(SLIPS[0], 0.01);
-    point.friction.law.stick_within(sticking_mm(0.01));
+    point.friction.law.stick_within(sticking_mm(0.01, &FrictionTuning::DEFAULT));
     let mut within_mm = || {
         point.anchor();
         point.friction.law.stick_mm
@@ -142,7 +142,9 @@ fn what_is_anchored_anew_is_held_as_before_and_has_taken_as_much() {
 fn what_goes_back_the_way_it_came_is_held_by_less_only_once_anchored() {
     for slip in [SLIPS[0], SLIPS[1]] {
         let mut point = slipped(slip, 0.01);
-        let back = -0.5 * LEAST_STICK_MM.max(STICK_AT_REST * 0.01) * point.surface().gradient.normalize();
+        let back = -0.5
+            * LEAST_STICK_MM.max(FrictionTuning::DEFAULT.stick_at_rest * 0.01)
+            * point.surface().gradient.normalize();
         let mut anchored = slipped(slip, 0.01);
         anchored.anchor();
         point.shift(back);
@@ -174,6 +176,6 @@ fn a_hand_that_rests_sticks_within_a_part_of_the_radius() {
         friction.begin(elements, state, points, (&[], &[]), &[hand]);
         friction.law.stick_mm
     };
-    assert_eq!(sticks(10.0), STICK * RADIUS_MM);
-    assert_eq!(sticks(12.0), STICK * 2.0);
+    assert_eq!(sticks(10.0), FrictionTuning::DEFAULT.stick * RADIUS_MM);
+    assert_eq!(sticks(12.0), FrictionTuning::DEFAULT.stick * 2.0);
 }

@@ -8,15 +8,13 @@
 //! If no two pieces are nearer than 8 D, and no point has moved since by more than 3/4 D, none are nearer than 6½ D,
 //! and no step between such states brings two nearer by more than half of that.
 
-use super::{CLEAR, SelfContact, tree};
+use super::{SelfContact, tree};
 use crate::Vec3;
 use crate::rod::quadrature::largest_motion;
 use crate::rod::{ElementData, RodState};
 
 /// Total rotation of a rod's tangent, rad, up to which it cannot touch itself.
 const TURN: f64 = 2.0;
-/// Distance by which points may move since nothing was near, as a fraction of the touching distance.
-const FREE: f64 = 0.75;
 
 /// Positions and tangents of nodes at a state where nothing was near.
 #[derive(Debug, Clone, Default)]
@@ -75,7 +73,7 @@ impl SelfContact {
 
     /// Whether nothing is near, at the base and at a state, and no step between them passes anything.
     pub(super) fn stays_clear(&self, elements: &[ElementData], state: &RodState) -> bool {
-        let most_mm = FREE * 2.0 * self.largest_radius_mm;
+        let most_mm = self.tuning.free * 2.0 * self.largest_radius_mm;
         self.pairs.is_empty()
             && self.clear.as_ref().is_some_and(|clear| {
                 (clear.nodes.is_empty() && self.is_alone_and_open(elements, state))
@@ -92,7 +90,7 @@ impl SelfContact {
             self.clear = Some(Clear::default());
             return true;
         }
-        let most_mm = FREE * 2.0 * self.largest_radius_mm;
+        let most_mm = self.tuning.free * 2.0 * self.largest_radius_mm;
         let known = self.clear.as_ref().filter(|clear| !clear.nodes.is_empty());
         if known.is_some_and(|clear| clear.holds(elements, state, most_mm)) {
             return true;
@@ -100,7 +98,7 @@ impl SelfContact {
         self.clear = None;
         self.place_tree(elements);
         self.counters.searches += 1;
-        let reach_mm = CLEAR * 2.0 * self.largest_radius_mm;
+        let reach_mm = self.tuning.clear * 2.0 * self.largest_radius_mm;
         self.tree.near(reach_mm, self.apart_mm(), |_, _| reach_mm, &mut self.near);
         if self.near.is_empty() {
             self.clear = Some(Clear::of(state));
@@ -124,7 +122,8 @@ impl SelfContact {
             return false;
         };
         self.is_placed = false;
-        self.tree.place(&super::Curve { elements, state, capsules: &self.capsules, closed: false });
+        let Self { capsules, tuning, .. } = self;
+        self.tree.place(&super::Curve { elements, state, capsules, closed: false, tuning });
         let tip = state.positions[last + 1];
         let from = tip - state.frames[last + 1].t * advance_mm;
         let reach_mm = |e: usize| 0.5 * (self.capsules[e].radius_mm + self.capsules[last].radius_mm);
@@ -137,7 +136,8 @@ impl SelfContact {
             return false;
         }
         self.is_placed = false;
-        let curve = |state| super::Curve { elements, state, capsules: &self.capsules, closed: self.closed };
+        let Self { capsules, tuning, .. } = self;
+        let curve = |state| super::Curve { elements, state, capsules, closed: self.closed, tuning };
         self.tree.place(&curve(from));
         self.tree.move_to(&curve(to));
         self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0

@@ -3,7 +3,6 @@
 use super::{Pair, SelfContact};
 use crate::Vec3;
 use crate::contact::friction::Coulomb;
-use crate::contact::point::FOLLOW;
 use crate::contact::set::{
     ContactSet, Geometry, LinearContact, Motion, Slipping, Stencil, Stiffness, System, Wrench,
 };
@@ -40,7 +39,7 @@ impl SelfContact {
                 pair.force_n,
             );
             pair.contact = None;
-            if contact.at_base || -pair.depth_mm() < 0.5 * FOLLOW * pair.touch_mm {
+            if contact.at_base || -pair.depth_mm() < 0.5 * self.contacts.follow * pair.touch_mm {
                 pair.contact = Some(self.set.contacts.len());
                 self.set.contacts.push(contact);
             }

@@ -9,10 +9,7 @@ use super::Capsule;
 use crate::Vec3;
 use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
-
-/// Relative change of the radius between neighbouring elements above which the surface has a shoulder: elements of a
-/// taper differ by less.
-const SHOULDER: f64 = 0.1;
+use crate::tuning::PairTuning;
 
 /// A point on the centre line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +59,7 @@ pub(super) struct Curve<'a> {
     pub(super) capsules: &'a [Capsule],
     /// Whether the rod is a ring: its end is its start.
     pub(super) closed: bool,
+    pub(super) tuning: &'a PairTuning,
 }
 
 impl Curve<'_> {
@@ -112,7 +110,7 @@ impl Curve<'_> {
     /// Whether the surface of an element continues in a neighbour, which is no gap.
     fn goes_on(&self, into: usize, from: usize) -> bool {
         let [a, b] = [into, from].map(|e| self.capsules[e].radius_mm);
-        !self.is_break(into) && (a - b).abs() <= SHOULDER * a.max(b)
+        !self.is_break(into) && (a - b).abs() <= self.tuning.shoulder * a.max(b)
     }
 
     /// The point at a distance along the centre line from another, or the end of the stretch if that comes first; and

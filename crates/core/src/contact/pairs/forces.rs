@@ -5,11 +5,9 @@ use super::curve::{Curve, Place};
 use super::gap::Gap;
 use super::{Pair, SelfContact};
 use crate::Vec3;
+use crate::contact::ROUNDING;
 use crate::contact::set::merit;
 use crate::rod::{Couple, ElementData, RodState, Stencils};
-
-/// Rounding error of a distance, in units of a coordinate's rounding.
-const ROUNDING: f64 = 4.0;
 
 /// A contact of a rod with itself or with another one.
 #[derive(Debug, Clone, Copy, PartialEq)]

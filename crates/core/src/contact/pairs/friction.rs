@@ -104,7 +104,7 @@ impl SelfContact {
         FrictionLaw { coefficient, stick_mm, least_n }: FrictionLaw,
     ) {
         let friction = &mut self.friction;
-        friction.law = Coulomb::new(coefficient);
+        friction.law = Coulomb::new(coefficient, &friction.law.tuning);
         friction.law.stick_within(stick_mm);
         friction.least_n = least_n;
         if !friction.law.acts() {
@@ -132,9 +132,10 @@ impl SelfContact {
             return;
         }
         let FrictionOfPairs { law, least_n, begun, advances_mm } = &mut self.friction;
+        let (capsules, closed, tuning) = (&self.capsules, self.closed, &self.tuning);
         let (now, was) = (
-            Curve { elements, state, capsules: &self.capsules, closed: self.closed },
-            Curve { elements, state: begun, capsules: &self.capsules, closed: self.closed },
+            Curve { elements, state, capsules, closed, tuning },
+            Curve { elements, state: begun, capsules, closed, tuning },
         );
         let all = self.pairs.iter_mut().map(|pair| {
             let size = pair.gap.direction().norm();

@@ -29,28 +29,13 @@ use super::curve::{Curve, Jet, Place, slopes};
 use crate::Vec3;
 use crate::rod::couples::PLACES;
 use crate::rod::quadrature::hermite;
-
-/// ε. Sites at a crossing differ in depth by ε/4 of their distance squared over that of the axes; arcs bent away from
-/// each other by more than ε over that distance touch at their ends alone.
-const SLIDE: f64 = 0.1;
-/// Largest slide of a site, in touching distances.
-const WINDOW: f64 = 2.0;
-/// Largest number of steps to the minimum.
-const STEPS: usize = 40;
-/// Length of a step, in touching distances, after which the descent ends: the next would be its square.
-const SHORT: f64 = 1e-7;
-/// Length of a step, in touching distances, within which Φ is nearly the parabola of Newton's step: rods bend little on
-/// a tenth of their thickness.
-const PARABOLIC: f64 = 0.1;
-/// From there the descent ends where even this many times the decrease that the step promises leaves the gap too wide.
-const PROMISED: f64 = 4.0;
-/// Smallest Hessian of a minimum, as a fraction of the stiffness of straight lines.
-const CONVEX: f64 = 1e-3;
+use crate::tuning::PairTuning;
 
 /// Distance of a site from a stretch up to which its gap may be below `known`, both in touching distances. A slide
-/// s ≤ W brings it nearer by at most s, and counts as ε s².
-pub(super) fn reach(known: f64) -> f64 {
-    WINDOW + (known * known - SLIDE * WINDOW * WINDOW).max(0.0).sqrt()
+/// s ≤ W, the window, brings it nearer by at most s, and counts as ε s².
+pub(super) fn reach(known: f64, tuning: &PairTuning) -> f64 {
+    let PairTuning { slide, window, .. } = *tuning;
+    window + (known * known - slide * window * window).max(0.0).sqrt()
 }
 
 /// Second derivatives of Φ in s and t.
@@ -87,12 +72,12 @@ struct Value {
 }
 
 #[inline]
-fn value(a: &Jet, b: &Jet, slide: f64) -> Value {
+fn value(a: &Jet, b: &Jet, slide: f64, epsilon: f64) -> Value {
     let r = a.at - b.at;
-    let straight = [a.first.norm_squared() + SLIDE, -a.first.dot(&b.first), b.first.norm_squared()];
+    let straight = [a.first.norm_squared() + epsilon, -a.first.dot(&b.first), b.first.norm_squared()];
     Value {
-        phi: 0.5 * (r.norm_squared() + SLIDE * slide * slide),
-        slope: [r.dot(&a.first) + SLIDE * slide, -r.dot(&b.first)],
+        phi: 0.5 * (r.norm_squared() + epsilon * slide * slide),
+        slope: [r.dot(&a.first) + epsilon * slide, -r.dot(&b.first)],
         stiffness: [straight[0] + r.dot(&a.second), straight[1], straight[2] - r.dot(&b.second)],
         straight,
         between: r,
@@ -100,14 +85,15 @@ fn value(a: &Jet, b: &Jet, slide: f64) -> Value {
 }
 
 /// Inverse of the free part; `None` where that is not convex.
-fn inverse([ss, st, tt]: Stiffness, free: [bool; 2]) -> Option<Stiffness> {
+fn inverse([ss, st, tt]: Stiffness, free: [bool; 2], tuning: &PairTuning) -> Option<Stiffness> {
+    let PairTuning { slide, convex, .. } = *tuning;
     match free {
         [true, true] => {
             let det = ss * tt - st * st;
-            (ss > CONVEX && tt > CONVEX && det > CONVEX * SLIDE).then(|| [tt / det, -st / det, ss / det])
+            (ss > convex && tt > convex && det > convex * slide).then(|| [tt / det, -st / det, ss / det])
         }
-        [true, false] => (ss > CONVEX).then(|| [1.0 / ss, 0.0, 0.0]),
-        [false, true] => (tt > CONVEX).then(|| [0.0, 0.0, 1.0 / tt]),
+        [true, false] => (ss > convex).then(|| [1.0 / ss, 0.0, 0.0]),
+        [false, true] => (tt > convex).then(|| [0.0, 0.0, 1.0 / tt]),
         [false, false] => Some([0.0; 3]),
     }
 }
@@ -124,7 +110,8 @@ impl Gap {
         (touch, within): (f64, f64),
     ) -> Self {
         let enough = 0.5 * within * within;
-        let window = WINDOW * touch;
+        let tuning = curve.tuning;
+        let window = tuning.window * touch;
         let at = |slide: f64| curve.walk(site, slide.clamp(-window, window));
         let (first, mut slide) = at(slide);
         let mut places = [first, to];
@@ -137,22 +124,23 @@ impl Gap {
                     *piece = curve.piece(place.element);
                 }
             }
-            value(&pieces[0].jet(places[0].xi), &pieces[1].jet(places[1].xi), slide)
+            value(&pieces[0].jet(places[0].xi), &pieces[1].jet(places[1].xi), slide, tuning.slide)
         };
         let mut now = look(&places, slide);
-        for _ in 0..STEPS {
+        for _ in 0..tuning.descents {
             let held = |down: f64, place: Place| down != 0.0 && curve.ends(place, down.signum());
             let down = now.slope.map(|slope| -slope);
             free = [
                 !(held(down[0], places[0]) || (slide.abs() >= window && down[0] * slide > 0.0)),
                 !held(down[1], places[1]),
             ];
-            let convex = inverse(now.stiffness, free);
-            let Some([ss, st, tt]) = convex.or_else(|| inverse(now.straight, free)) else { break };
+            let convex = inverse(now.stiffness, free, tuning);
+            let Some([ss, st, tt]) = convex.or_else(|| inverse(now.straight, free, tuning)) else { break };
             let mut step = [ss * down[0] + st * down[1], st * down[0] + tt * down[1]];
             let size = step[0].abs().max(step[1].abs());
             let promised = 0.5 * (step[0] * down[0] + step[1] * down[1]);
-            if convex.is_some() && size < PARABOLIC * touch && now.phi - PROMISED * promised > enough {
+            let is_parabolic = convex.is_some() && size < tuning.parabolic * touch;
+            if is_parabolic && now.phi - tuning.promised * promised > enough {
                 break;
             }
             if size > 2.0 * touch {
@@ -163,13 +151,13 @@ impl Gap {
                 let (first, there) = at(slide + part * step[0]);
                 let next = [first, curve.walk(places[1], part * step[1]).0];
                 let then = look(&next, there);
-                if then.phi <= now.phi || part < 1e-3 || size <= SHORT * touch {
+                if then.phi <= now.phi || part < 1e-3 || size <= tuning.short * touch {
                     (slide, places, now) = (there, next, then);
                     break;
                 }
                 part *= 0.5;
             }
-            if size <= SHORT * touch {
+            if size <= tuning.short * touch {
                 break;
             }
         }
@@ -190,7 +178,8 @@ impl Gap {
     /// Derivatives of G.
     pub(super) fn derivatives(&self, curve: &Curve<'_>) -> Derivatives {
         let [a, b] = self.at.map(|place| curve.jet(place));
-        let now = value(&a, &b, self.slide);
+        let tuning = curve.tuning;
+        let now = value(&a, &b, self.slide, tuning.slide);
         let r = self.between;
         let c = self.weights();
         let [ca, cb] = self.at.map(|place| slopes(place.xi, curve.length_mm(place.element)));
@@ -205,8 +194,8 @@ impl Gap {
                 by_t[k] -= r * cb[k - 4];
             }
         }
-        let [ss, st, tt] = inverse(now.stiffness, self.free)
-            .or_else(|| inverse(now.straight, self.free))
+        let [ss, st, tt] = inverse(now.stiffness, self.free, tuning)
+            .or_else(|| inverse(now.straight, self.free, tuning))
             .unwrap_or_default();
         let m = self.direction();
         let gradient = c.map(|c| m * c);

@@ -8,15 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::curve::{Curve, Place};
 use super::friction::PairFriction;
 use super::gap::{Gap, reach};
-use super::{Difference, KNOWN, NEAR, Pair, SelfContact, Site, tree};
+use super::{Difference, Pair, SelfContact, Site, tree};
 use crate::contact::set::penalty_n_per_mm;
 use crate::rod::{ElementData, RodState};
-
-/// Two pairs of successive bases are the same if the nearest points of the stretch are within this distance, in
-/// touching distances.
-const SAME: f64 = 2.0;
-/// Two minima this close along the rod, in touching distances, are one.
-const TWICE: f64 = 1e-3;
 
 /// A pair of the base before.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +87,7 @@ impl SelfContact {
         if self.look_whether_clear(elements, state) {
             self.pairs.clear();
             self.before.clear();
-            self.known = KNOWN;
+            self.known = self.tuning.known;
             return;
         }
         self.place_tree(elements);
@@ -103,11 +97,12 @@ impl SelfContact {
             let Pair { site, arc_mm, force_n, friction, .. } = pair;
             Remembered { site, arc_mm, force_n, friction }
         }));
-        let curve = Curve { elements, state, capsules: &self.capsules, closed: self.closed };
-        self.site_positions.clear();
-        self.site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
+        let Self { capsules, tuning, site_positions, .. } = self;
+        let curve = Curve { elements, state, capsules, closed: self.closed, tuning };
+        site_positions.clear();
+        site_positions.extend(self.sites.iter().map(|site| curve.jet(site.place).at));
         self.known = 0.0;
-        self.seek(elements, state, NEAR);
+        self.seek(elements, state, self.tuning.near);
         self.remember();
         self.find_contacts();
         self.before.clear();
@@ -117,9 +112,10 @@ impl SelfContact {
     pub(super) fn know_pairs_within(&mut self, elements: &[ElementData], motion_mm: f64) {
         let touch_mm = 2.0 * self.thinnest_radius_mm;
         // Pairs not yet found are `known` touching distances apart, and come nearer by that motion.
-        if self.known < KNOWN && motion_mm > (self.known - 1.0) * touch_mm {
+        let known = self.tuning.known;
+        if self.known < known && motion_mm > (self.known - 1.0) * touch_mm {
             let base = std::mem::take(&mut self.base);
-            self.seek(elements, &base, KNOWN);
+            self.seek(elements, &base, known);
             self.base = base;
         }
     }
@@ -127,9 +123,10 @@ impl SelfContact {
     /// Finds the pairs at the base whose gap is between the distance known so far and another, in touching distances.
     fn seek(&mut self, elements: &[ElementData], base: &RodState, known: f64) {
         let (mut near, mut pairs) = (std::mem::take(&mut self.near), std::mem::take(&mut self.pairs));
-        let curve = Curve { elements, state: base, capsules: &self.capsules, closed: self.closed };
-        let reach_mm = |a: usize, b: usize| reach(known) * self.touch_mm(a, b);
-        self.tree.near(2.0 * self.largest_radius_mm * reach(known), self.apart_mm(), reach_mm, &mut near);
+        let curve = self.curve(elements, base);
+        let reach = reach(known, &self.tuning);
+        let reach_mm = |a: usize, b: usize| reach * self.touch_mm(a, b);
+        self.tree.near(2.0 * self.largest_radius_mm * reach, self.apart_mm(), reach_mm, &mut near);
         for (a, b) in &near {
             self.find_between(&curve, (*a, *b), known, &mut pairs);
             self.find_between(&curve, (*b, *a), known, &mut pairs);
@@ -137,7 +134,7 @@ impl SelfContact {
         // Pairs are large, so their places are sorted; arc lengths are not negative, so their bits have their order.
         pairs.sort_by_cached_key(|pair| (pair.site, pair.arc_mm.to_bits()));
         pairs.dedup_by(|q, p| {
-            let same = p.site == q.site && (q.arc_mm - p.arc_mm).abs() < TWICE * p.touch_mm;
+            let same = p.site == q.site && (q.arc_mm - p.arc_mm).abs() < self.tuning.twice * p.touch_mm;
             // At a shoulder the thicker side is felt.
             if same && q.depth_mm() > p.depth_mm() {
                 std::mem::swap(q, p);
@@ -201,7 +198,7 @@ impl SelfContact {
             gap,
             touch_mm,
             spring_n_per_mm: weight_mm * softer,
-            penalty_n_per_mm: penalty_n_per_mm(weight_mm, &curve.elements[a]),
+            penalty_n_per_mm: penalty_n_per_mm(weight_mm, &curve.elements[a], self.contacts.penalty),
             arc_mm,
             force_n: 0.0,
             contact: None,
@@ -216,7 +213,8 @@ impl SelfContact {
             let same = self.before[first..].iter().take_while(|old| old.site == pair.site);
             let nearest =
                 same.min_by(|p, q| (p.arc_mm - pair.arc_mm).abs().total_cmp(&(q.arc_mm - pair.arc_mm).abs()));
-            let kept = nearest.filter(|old| (old.arc_mm - pair.arc_mm).abs() < SAME * pair.touch_mm);
+            let kept =
+                nearest.filter(|old| (old.arc_mm - pair.arc_mm).abs() < self.tuning.same * pair.touch_mm);
             pair.force_n = kept.map_or(0.0, |old| old.force_n);
             pair.friction = kept.map_or_else(PairFriction::default, |old| old.friction);
         }
@@ -230,6 +228,7 @@ impl SelfContact {
                 state: &self.base,
                 capsules: &self.capsules,
                 closed: self.closed,
+                tuning: &self.tuning,
             });
         }
     }
@@ -241,7 +240,8 @@ impl SelfContact {
             return *part;
         }
         self.place_tree(elements);
-        self.tree.move_to(&Curve { elements, state: to, capsules: &self.capsules, closed: self.closed });
+        let Self { capsules, tuning, .. } = self;
+        self.tree.move_to(&Curve { elements, state: to, capsules, closed: self.closed, tuning });
         let part = self.tree.safe_part(self.apart_mm());
         self.checked.0.copy_from(to);
         self.checked.1 = part;

@@ -36,6 +36,7 @@ use crate::Vec3;
 use crate::contact::set::ContactSet;
 use crate::rod::{ElementData, RodState, Stencils};
 use crate::solve::{Contacts, External, Sizes};
+use crate::tuning::{ContactTuning, PairTuning, Tuning};
 
 use contacts::Difference;
 use curve::{Curve, Place};
@@ -47,18 +48,6 @@ use gap::Gap;
 pub(crate) use memory::PairForce;
 use memory::Remembered;
 use tree::Tree;
-
-/// Largest distance between sites, in radii.
-const SPACING_RADII: f64 = 0.5;
-/// Pairs at a base are sought up to this many touching distances, more than a step may close.
-const NEAR: f64 = 1.5;
-/// They are sought up to this many before a trial that moves points so far that others may touch: a step approaches by
-/// at most half.
-const KNOWN: f64 = 2.0;
-/// If nothing is nearer than this many touching distances, motions of up to `FREE` of one need no new search.
-const CLEAR: f64 = 8.0;
-/// Tolerance, for rounding, by which a trial may exceed the safe fraction.
-const BEYOND: f64 = 0.1;
 
 /// The surface of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,6 +156,9 @@ pub struct SelfContact {
     friction: FrictionOfPairs,
     rounding_n: f64,
     counters: PairCounters,
+    tuning: PairTuning,
+    /// Numbers shared with the wall.
+    contacts: ContactTuning,
 }
 
 impl SelfContact {
@@ -177,16 +169,23 @@ impl SelfContact {
         contact
     }
 
+    /// For no rod yet, with these numbers.
+    pub(crate) fn tuned(tuning: &Tuning) -> Self {
+        let mut contact = Self { tuning: tuning.pairs, contacts: tuning.contact, ..Self::default() };
+        contact.friction.law.tuning = tuning.friction;
+        contact
+    }
+
     /// Resets to another rod, about which nothing is known.
     pub(crate) fn renew(&mut self, elements: &[ElementData], capsules: impl IntoIterator<Item = Capsule>) {
-        let Self { capsules: known, sites, first_sites, .. } = self;
+        let Self { capsules: known, sites, first_sites, tuning, .. } = self;
         known.clear();
         known.extend(capsules);
         sites.clear();
         first_sites.clear();
         first_sites.push(0);
         for (e, (element, capsule)) in elements.iter().zip(&*known).enumerate() {
-            let spaces = (element.length / (SPACING_RADII * capsule.radius_mm)).ceil().max(1.0);
+            let spaces = (element.length / (tuning.spacing_radii * capsule.radius_mm)).ceil().max(1.0);
             let count = if element.is_break() { 0.0 } else { spaces };
             let site = |k: usize| Site {
                 place: Place { element: e, xi: (k as f64 + 0.5) / count },
@@ -213,7 +212,7 @@ impl SelfContact {
     }
 
     fn curve<'a>(&'a self, elements: &'a [ElementData], state: &'a RodState) -> Curve<'a> {
-        Curve { elements, state, capsules: &self.capsules, closed: self.closed }
+        Curve { elements, state, capsules: &self.capsules, closed: self.closed, tuning: &self.tuning }
     }
 
     /// Counts so far.
@@ -239,7 +238,7 @@ impl External for SelfContact {
         if self.stays_clear(elements, state) {
             return 0.0;
         }
-        if self.safe_part(elements, state) < 1.0 - BEYOND {
+        if self.safe_part(elements, state) < 1.0 - self.tuning.beyond {
             return f64::INFINITY;
         }
         self.stored_or_merit_mj(elements, state)

@@ -159,17 +159,18 @@ fn no_pair_is_missed_by_a_search_in_two_parts() {
         let mut touching = contact(elements, 0.1);
         touching.look_at_base(elements, state);
         let near = touching.pairs.len();
+        let PairTuning { near: sought, known, .. } = touching.tuning;
         // From twice as far as any site of a pair may be, without a limit at which a descent ends early.
-        let farthest_mm = 2.0 * gap::reach(KNOWN) * 0.2;
+        let farthest_mm = 2.0 * gap::reach(known, &touching.tuning) * 0.2;
         let (mut every, curve) = (Vec::new(), touching.curve(elements, state));
-        assert_eq!(touching.known, NEAR);
+        assert_eq!(touching.known, sought);
         let (from_nothing, mut far) = (SelfContact { known: 0.0, ..touching.clone() }, Vec::new());
         touching.tree.near(farthest_mm, touching.apart_mm(), |_, _| farthest_mm, &mut far);
         for (a, b) in far {
             from_nothing.find_between(&curve, (a, b), 1e3, &mut every);
             from_nothing.find_between(&curve, (b, a), 1e3, &mut every);
         }
-        every.retain(|pair| pair.gap.distance < KNOWN * pair.touch_mm);
+        every.retain(|pair| pair.gap.distance < known * pair.touch_mm);
         touching.know_pairs_within(elements, 1e3);
         let missed = |list: &[Pair], from: &[Pair]| {
             let same = |p: &Pair, q: &Pair| {

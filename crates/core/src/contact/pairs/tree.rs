@@ -55,6 +55,8 @@ pub(super) struct Tree {
     /// Whether it is not an element but a gap between two rods.
     breaks: Vec<bool>,
     closed: bool,
+    /// Largest number of halvings of an element before its bound is accepted.
+    splits: usize,
 }
 
 /// Arc length between the end of a rod and the start of the next, mm: more than any reach.
@@ -77,7 +79,7 @@ impl Tree {
     /// Places the hierarchy at the rods, without a motion.
     pub(super) fn place(&mut self, curve: &Curve<'_>) {
         let n = curve.elements.len();
-        self.closed = curve.closed;
+        (self.closed, self.splits) = (curve.closed, curve.tuning.splits);
         self.controls.clear();
         self.controls.extend((0..n).map(|e| curve.controls(e)));
         self.motions.clear();
@@ -178,7 +180,7 @@ impl Tree {
         let segment = [*from, from + (to - from) / 3.0, to - (to - from) / 3.0, *to];
         let mut others = (0..self.breaks.len())
             .filter(|e| !self.breaks[*e] && (*e > first || length - self.arcs[*e][1] >= behind));
-        others.any(|e| is_near(&self.controls[e], &segment, reach(e), SPLITS))
+        others.any(|e| is_near(&self.controls[e], &segment, reach(e), self.splits))
     }
 
     /// Fraction of the motion, at most 1, on which no two points of elements at least `apart` along the rod come
@@ -193,7 +195,7 @@ impl Tree {
             if self.may_touch(a, b, apart) {
                 let one = (self.controls[a], self.motions[a]);
                 let other = (self.controls[b], self.motions[b]);
-                part.set(safe_part(&one, &other, part.get(), SPLITS));
+                part.set(safe_part(&one, &other, part.get(), self.splits));
             }
         };
         self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
@@ -235,10 +237,6 @@ fn visit_between(
         halves(b).iter().for_each(|half| visit_between(a, half, is_near, leaf));
     }
 }
-
-/// Largest number of halvings of an element before its bound is accepted: its remaining bulge is below 10⁻⁴ of the
-/// original.
-const SPLITS: usize = 7;
 
 /// Fraction of a motion that brings no two points of two curves nearer by more than half their distance; at most
 /// `part`.

@@ -6,14 +6,10 @@ use crate::Vec3;
 use crate::rod::ElementData;
 use crate::solve::ContactMerit;
 
-/// c: penalty ρ over the stiffness of the element. With a larger one contacts activate and release at smaller depths,
-/// with a smaller one at smaller forces.
-const PENALTY: f64 = 0.1;
-
-/// ρ of a contact that represents this length of an element, N/mm.
+/// ρ of a contact that represents this length of an element, with the penalty c, N/mm.
 #[inline]
-pub(in crate::contact) fn penalty_n_per_mm(weight_mm: f64, element: &ElementData) -> f64 {
-    PENALTY * weight_mm * element.bending[1] / element.length.powi(4)
+pub(in crate::contact) fn penalty_n_per_mm(weight_mm: f64, element: &ElementData, c: f64) -> f64 {
+    c * weight_mm * element.bending[1] / element.length.powi(4)
 }
 
 /// Merit of a contact, mJ, its force, N, and derivative in ln κ, mJ.

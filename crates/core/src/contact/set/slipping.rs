@@ -14,7 +14,7 @@
 
 use super::{Motion, Stencil, Stiffness, System, Wrench};
 use crate::Vec3;
-use crate::contact::friction::{CHANGED, Coulomb, FrictionDerivatives, RENEWED, Slider};
+use crate::contact::friction::{Coulomb, FrictionDerivatives, Slider};
 
 /// A contact with friction in a step.
 #[derive(Debug, Clone, Copy)]
@@ -102,14 +102,14 @@ impl<S: Stencil> Slipping<S> {
         let Some(f) = law.derivatives(&self.slider, &x, angle) else { return false };
         let off = plus(&(f.gradient, f.turn), -1.0, &self.linear(&way));
         let (off_n, largest_n) = (off.0.norm(), law.largest_n(&self.slider));
-        if off_n > RENEWED * largest_n {
+        if off_n > law.tuning.renewed * largest_n {
             let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness(&f), &way));
             let more = plus(&at_rest, -1.0, &self.at_rest);
             let (hessian, mixed, turn2) = self.stiffness;
             self.stencil.add(system, &more, &(f.hessian - hessian, f.mixed - mixed, f.turn2 - turn2));
             (self.at_rest, self.stiffness) = (at_rest, stiffness(&f));
         }
-        off_n > CHANGED * largest_n
+        off_n > law.tuning.changed * largest_n
     }
 
     /// Computes its slip in a round to the end of another step.

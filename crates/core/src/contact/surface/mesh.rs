@@ -10,6 +10,7 @@ use crate::contact::extension::extended;
 use crate::contact::properties::WallProperties;
 use crate::contact::regions::RegionMap;
 use crate::contact::{Distance, SmoothWall};
+use crate::tuning::ContactTuning;
 use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3, parallel};
 
@@ -54,11 +55,22 @@ impl ContactMesh {
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
+        Self::tuned(wall, thickest_mm, properties, store, &ContactTuning::DEFAULT)
+    }
+
+    /// As [`Self::new`], with these numbers.
+    pub(super) fn tuned(
+        wall: &Wall,
+        thickest_mm: f64,
+        properties: &WallProperties,
+        store: &dyn WallStore,
+        tuning: &ContactTuning,
+    ) -> Result<Self> {
         let surface = extended(&*even(wall, properties, store)?, thickest_mm);
         let surface = Wall::welded(&surface)?;
         let smooth = SmoothWall::new(&surface, thickest_mm);
         let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };
-        let reach_mm = |smooth: &SmoothWall| reach_mm(thickest_mm, smooth.deepest_inset_mm());
+        let reach_mm = |smooth: &SmoothWall| reach_mm(thickest_mm, smooth.deepest_inset_mm(), tuning);
         let query = WallQuery::new(&surface)?;
         // Otherwise the first step would wait for it.
         query.prepare();
@@ -130,7 +142,6 @@ impl ContactMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::point::FOLLOW;
     use crate::random::{splitmix64, unit};
     use crate::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
 
@@ -155,8 +166,9 @@ mod tests {
                 let Some(flat) = surface.query.nearest(&x, surface.reach_mm) else { continue };
                 let felt_mm = surface.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
                 for (smooth, count) in [&surface.smooth, &on_them].into_iter().zip(&mut pressing) {
-                    let free_mm =
-                        flat.distance_mm - (1.0 + FOLLOW) * RADIUS_MM - smooth.inset_mm(flat.triangle);
+                    let free_mm = flat.distance_mm
+                        - (1.0 + ContactTuning::DEFAULT.follow) * RADIUS_MM
+                        - smooth.inset_mm(flat.triangle);
                     *count += u32::from(free_mm >= 0.0 && felt_mm < RADIUS_MM);
                 }
             }

@@ -11,9 +11,9 @@
 
 use std::ops::Range;
 
-use super::{Reading, SAFE, SUNK, WallContact};
+use super::{Reading, WallContact};
 use crate::Vec3;
-use crate::contact::point::{ContactPoint, FOLLOW};
+use crate::contact::point::ContactPoint;
 use crate::contact::surface::Hint;
 use crate::rod::quadrature::largest_motion;
 use crate::rod::{ElementData, RodState};
@@ -134,7 +134,7 @@ impl WallContact<'_> {
             let (to, length_mm) = (nodes(known.element, state), elements[known.element].length);
             let clearance_mm =
                 known.room.clearance_mm - self.motion_mm(&known.looked_at, &known.base, length_mm);
-            if part * self.motion_mm(&known.base, &to, length_mm) <= SAFE * clearance_mm {
+            if part * self.motion_mm(&known.base, &to, length_mm) <= self.cache.tuning.safe * clearance_mm {
                 return None;
             }
         }
@@ -229,7 +229,7 @@ impl WallContact<'_> {
     fn read_base(&mut self, index: usize, elements: &[ElementData], x: &Vec3) -> Reading {
         let radius_mm = self.points[index].potential.radius_mm;
         let force_n = self.cache.points[index].force_n;
-        let limit_mm = if force_n > 0.0 { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
+        let limit_mm = if force_n > 0.0 { self.followed_mm(radius_mm) } else { radius_mm };
         let reading = self.read_within(index, x, limit_mm);
         let presses = match &reading {
             Reading::Free(_) => false,
@@ -243,7 +243,7 @@ impl WallContact<'_> {
         (known.base_looked_at, known.base_piece) = (known.looked_at, known.piece);
         (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
         let hint = known.piece.map(if known.side.is_some() { Hint::Side } else { Hint::Near });
-        let sunk = hint.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
+        let sunk = hint.filter(|_| known.base_clearance_mm < self.cache.tuning.sunk * radius_mm);
         known.side = sunk.map(|hint| self.surface.side(x, hint));
         known.presses = presses;
         if !presses {

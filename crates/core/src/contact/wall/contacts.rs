@@ -4,10 +4,10 @@
 
 use nalgebra::Matrix3;
 
-use super::{LEAST_BEND_MM, ROUNDING, Reading, WallContact};
+use super::{Reading, WallContact};
 use crate::Vec3;
+use crate::contact::ROUNDING;
 use crate::contact::friction::{Coulomb, unsettled};
-use crate::contact::point::FOLLOW;
 use crate::contact::regions;
 use crate::contact::set::{
     ContactSet, Geometry, LinearContact, Motion, Nearby, Slipping, Stencil, Stiffness, System, Wrench, merit,
@@ -16,9 +16,6 @@ use crate::contact::set::{
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
-
-/// Assumed bound of the distance's gradient: the smooth wall of a mesh is steeper than 1 near crests.
-const STEEPEST: f64 = 2.0;
 
 /// Element, ξ and set of angles of a point.
 pub(in crate::contact) type PointPlace = (usize, f64, usize);
@@ -70,8 +67,8 @@ impl Geometry for WallContact<'_> {
             for index in self.near(span, elements, base).into_iter().flatten() {
                 let (known, point) = (&self.cache.points[index], &self.points[index]);
                 let radius_mm = point.potential.radius_mm;
-                if !known.presses && known.base_clearance_mm < (1.0 + FOLLOW) * radius_mm {
-                    let free_mm = (known.base_clearance_mm - radius_mm) / STEEPEST;
+                if !known.presses && known.base_clearance_mm < self.followed_mm(radius_mm) {
+                    let free_mm = (known.base_clearance_mm - radius_mm) / self.cache.tuning.steepest;
                     let penalty_n_per_mm = self.penalty_n_per_mm(index, elements);
                     self.cache.set.nearby.push(Nearby::new(
                         (index, point.place()),
@@ -85,7 +82,7 @@ impl Geometry for WallContact<'_> {
 
     fn linearised(&mut self, nearby: &Nearby<PointPlace>) -> Option<LinearContact<PointPlace>> {
         let index = nearby.key;
-        let near_mm = (1.0 + FOLLOW) * self.points[index].potential.radius_mm;
+        let near_mm = self.followed_mm(self.points[index].potential.radius_mm);
         let x = self.cache.points[index].base;
         let Reading::Pressed(d) = self.read_within(index, &x, near_mm) else { return None };
         Some(self.contact(index, (d.value_mm, d.gradient), nearby.penalty_n_per_mm))
@@ -111,7 +108,7 @@ impl Geometry for WallContact<'_> {
     }
 
     fn least_force_n(&self) -> f64 {
-        self.least_moment_nmm / LEAST_BEND_MM
+        self.least_moment_nmm / self.cache.tuning.gentlest_bend_mm
     }
 
     fn friction_off(&self) -> f64 {
@@ -123,7 +120,7 @@ impl WallContact<'_> {
     /// ρ of a point, N/mm.
     pub(super) fn penalty_n_per_mm(&self, index: usize, elements: &[ElementData]) -> f64 {
         let point = &self.points[index];
-        penalty_n_per_mm(point.weight_mm, &elements[point.element])
+        penalty_n_per_mm(point.weight_mm, &elements[point.element], self.cache.tuning.penalty)
     }
 
     /// The wall's modulus at the base position of a point.
@@ -202,7 +199,7 @@ impl WallContact<'_> {
         let contact = contacts.get(*next).filter(|contact| has_targets && contact.key == index);
         let force_n = contact.map_or(0.0, |contact| contact.target_n);
         // Where a force has a target, its distance off the wall counts as well.
-        let limit_mm = if force_n > 0.0 { (1.0 + FOLLOW) * radius_mm } else { self.asked_mm(radius_mm) };
+        let limit_mm = if force_n > 0.0 { self.followed_mm(radius_mm) } else { self.asked_mm(radius_mm) };
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
         if force_n == 0.0 && depth_mm <= 0.0 {
             return 0.0;

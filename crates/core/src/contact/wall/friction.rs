@@ -1,6 +1,7 @@
 //! Friction of the device on the wall: its normal forces, and its contribution at a point.
 
-use super::{ROUNDING, WallContact};
+use super::WallContact;
+use crate::contact::ROUNDING;
 use crate::contact::set::Geometry;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 

@@ -7,11 +7,10 @@
 //! Between bases a point's reading depends on its position alone, not on earlier trials: within half its radius of
 //! the query at the base, it uses the piece of wall found there.
 
-use super::{SUNK, WallContact};
+use super::WallContact;
 use crate::Vec3;
 use crate::contact::cache::TakenReading;
 use crate::contact::distance::{Distance, Nearness};
-use crate::contact::point::{FOLLOW, LOOK_AGAIN};
 use crate::contact::surface::Hint;
 
 /// The distance of a point from the wall.
@@ -51,7 +50,7 @@ impl WallContact<'_> {
         if let Some(side) = self.cache.points[index].side {
             let reading = self.read_from_side(index, x, side, limit_mm);
             // A point that has come back out has no side any more: the nearest wall may be the other one.
-            if reading.distance_mm() < SUNK * self.points[index].potential.radius_mm {
+            if reading.distance_mm() < self.cache.tuning.sunk * self.points[index].potential.radius_mm {
                 return reading;
             }
             return self.read_anew(index, x, limit_mm);
@@ -75,9 +74,10 @@ impl WallContact<'_> {
     /// Reading of a point that has sunk into the wall: follows the surface from there.
     pub(super) fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
         let point = &self.points[index];
+        let again_mm = self.cache.tuning.look_again * point.potential.radius_mm;
         let known = &mut self.cache.points[index];
         let piece = match known.base_piece {
-            Some(piece) if (x - known.base_looked_at).norm() < LOOK_AGAIN * point.potential.radius_mm => {
+            Some(piece) if (x - known.base_looked_at).norm() < again_mm => {
                 known.looked_at = known.base_looked_at;
                 piece
             }
@@ -103,7 +103,8 @@ impl WallContact<'_> {
     pub(super) fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
         let radius = self.points[index].potential.radius_mm;
         let stretch = self.surface.stretch();
-        let near = radius * (1.0 + FOLLOW) * stretch;
+        let near = self.followed_mm(radius) * stretch;
+        let again_mm = self.cache.tuning.look_again * radius;
         let known = &mut self.cache.points[index];
         let moved = (x - known.base_looked_at).norm();
         if moved < known.base_free_mm {
@@ -119,7 +120,7 @@ impl WallContact<'_> {
             known.free_mm = free_mm;
             return Some(Reading::Free((known.clearance_mm - moved) / stretch));
         }
-        if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_piece.is_some() {
+        if (x - known.base_looked_at).norm() < again_mm && known.base_piece.is_some() {
             (known.looked_at, known.piece) = (known.base_looked_at, known.base_piece);
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
         }
@@ -136,7 +137,7 @@ impl WallContact<'_> {
             self.counters.avoided += 1;
             return Some(reading);
         }
-        if (x - looked_at).norm() >= LOOK_AGAIN * radius {
+        if (x - looked_at).norm() >= again_mm {
             return None;
         }
         let nearness = self.surface.nearness(x, hint, limit_mm);
@@ -152,7 +153,7 @@ impl WallContact<'_> {
     pub(super) fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let radius = self.points[index].potential.radius_mm;
         let stretch = self.surface.stretch();
-        let near = radius * (1.0 + FOLLOW) * stretch;
+        let near = self.followed_mm(radius) * stretch;
         let known = &mut self.cache.points[index];
         let proximity = &mut self.cache.proximity;
         let asked = proximity.queries;
@@ -163,7 +164,7 @@ impl WallContact<'_> {
         let clearance = place.clearance(x) / stretch;
         let Some(piece) = place.piece else {
             // Past an opening there is no wall.
-            known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;
+            known.free_mm = (x - place.middle).norm() + self.cache.tuning.look_again * radius;
             return Reading::Free(clearance);
         };
         known.free_mm = place.clearance_mm - near - self.surface.inset_mm(piece);

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::*;
 use crate::contact::{ContactSurface, Hint, WallPotential, WallProperties};
 use crate::rod::Frame;
+use crate::tuning::ContactTuning;
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
 /// A closed outline swept along a line: `place` gives the k-th of `rings` its middle, the direction of the outline's
@@ -215,7 +216,12 @@ fn behind_a_coarse_facet_is_not_yet_through_the_wall() {
         |from_mm: f64, to_mm: f64| (side * from_mm + Vec3::z() * 16.0, side * to_mm + Vec3::z() * 20.9);
     let flat = |x: &Vec3| coarse.nearest_piece(x, 10.0).unwrap().1;
     let (start, end) = along(3.0, 3.6);
-    assert!(flat(&start) > 0.2 && flat(&end) < -SUNK * RADIUS_MM, "{} {}", flat(&start), flat(&end));
+    assert!(
+        flat(&start) > 0.2 && flat(&end) < -ContactTuning::DEFAULT.sunk * RADIUS_MM,
+        "{} {}",
+        flat(&start),
+        flat(&end)
+    );
     assert!(!has_passed(&coarse, start, end));
     // Through the wall into another vessel beside it.
     let (both, from) = (side_by_side(), Vec3::new(0.3, 0.0, 20.0));

@@ -10,9 +10,7 @@ use super::carried::WallWork;
 use super::state::KirchhoffState;
 use crate::contact::HandMotion;
 use crate::device::Stack;
-
-/// Energy below which none is significant, mJ.
-const NOTABLE_FLOOR_MJ: f64 = 1e-6;
+use crate::tuning::StepTuning;
 
 /// Energy between two states, mJ.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -34,7 +32,7 @@ pub(super) struct Balance {
 impl Balance {
     /// The balance of these motions between two states, given the work of wall and blood and the bounds of the
     /// dissipation. Friction outside the body is not part of it: what hands do against that is lost at once. Energy is
-    /// significant above the fraction `notable` of the energy that is stored in the device and the wall, exchanged with
+    /// significant above a fraction of the energy that is stored in the device and the wall, exchanged with
     /// fields, or released from the sheath.
     pub(super) fn new(
         stack: &Stack,
@@ -42,7 +40,7 @@ impl Balance {
         (before, after): (&KirchhoffState, &KirchhoffState),
         by_wall: WallWork,
         friction_mj: (f64, f64),
-        notable: f64,
+        tuning: &StepTuning,
     ) -> Self {
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
@@ -71,7 +69,7 @@ impl Balance {
         // The energy in a field has an arbitrary zero: its change counts.
         let [elastic_was, elastic_is] = [was, is].map(|energy| energy.total() - energy.field);
         let sizes_mj = [elastic_was, elastic_is, (is.field - was.field).abs(), from_sheath_mj.abs()];
-        let notable_mj = notable * sizes_mj.into_iter().fold(NOTABLE_FLOOR_MJ, f64::max);
+        let notable_mj = tuning.notable * sizes_mj.into_iter().fold(tuning.notable_floor_mj, f64::max);
         Self { least_mj, mean_mj, most_mj, stored_mj, friction_mj, notable_mj }
     }
 

@@ -7,8 +7,8 @@ use crate::contact::HandMotion;
 use crate::device::{Stack, line_mm};
 use crate::methods::{Command, Move};
 
-/// Retracting to within this distance of the sheath, mm, counts as retracting completely.
-const ZERO_LENGTH_MM: f64 = 1e-9;
+/// Lengths and slips up to this, mm, are rounding: within it of the sheath a device is retracted completely.
+pub(super) const ROUNDED_MM: f64 = 1e-9;
 
 /// Position of a hand relative to the start.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -118,7 +118,7 @@ impl Way {
         self.target.clear();
         for ((hand, command), device) in self.start.iter().zip(&self.commands).zip(stack.devices()) {
             let target = (hand.inserted_mm + command.advance_mm).min(device.length_mm());
-            let inserted_mm = if target < ZERO_LENGTH_MM { 0.0 } else { target };
+            let inserted_mm = if target < ROUNDED_MM { 0.0 } else { target };
             self.target.push(Hand { inserted_mm, turn_rad: hand.turn_rad + command.rotate_rad });
         }
     }

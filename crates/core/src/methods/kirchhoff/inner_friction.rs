@@ -6,6 +6,7 @@
 //! Without rotation nothing has to be renewed: friction along the line is evaluated afterwards.
 
 use super::configuration::Start;
+use super::hands::ROUNDED_MM;
 use super::lateral::{Line, comes_out, lateral_forces};
 use super::mesh::Mesh;
 use super::search::Search;
@@ -13,9 +14,6 @@ use crate::contact::{Between, HandMotion, InnerFriction, Place};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::RodState;
-
-/// Smallest slip, mm; less is rounding of lengths.
-pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
 
 /// The instrument with friction just behind a node, which is `instrument` or one inside it, and the one around it.
 pub(super) fn pair(mesh: &Mesh, (i, instrument): (usize, usize)) -> Option<(usize, usize)> {
@@ -59,7 +57,7 @@ pub(super) fn begin(
             let advance_mm = advance - outer_advance;
             let mut place = Place {
                 sets: stack.sets()[inner].zip(stack.sets()[outer]),
-                advance_mm: if advance_mm.abs() > LEAST_SLIP_MM { advance_mm } else { 0.0 },
+                advance_mm: if advance_mm.abs() > ROUNDED_MM { advance_mm } else { 0.0 },
                 turn_rad: turn - outer_turn,
                 ..Place::new((i, inner, outer), stack.friction(inner), radius_mm)
             };
@@ -110,7 +108,9 @@ impl<const C: usize> Search<'_, '_, C> {
                 Some((index, self.contact.touch(&mesh.elements, state, index)?.contact.total_n()))
             })
             .collect();
-        let line = Line { stack, mesh, rod: state, pressing: &pressing, inner_friction: &inner_friction };
+        let rounds = self.tuning.friction.lateral_rounds;
+        let line =
+            Line { stack, mesh, rod: state, pressing: &pressing, inner_friction: &inner_friction, rounds };
         let reported: Vec<Vec<LateralForce>> = (0..mesh.inserted_mm.len())
             .map(|inner| match stack.friction(inner) {
                 0.0 => Vec::new(),

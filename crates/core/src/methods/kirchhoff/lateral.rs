@@ -28,9 +28,6 @@ use crate::methods::LateralForce;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, Layout, Material, RodState, element_gradients};
 
-/// Number of iterations for the axial force behind a node and the friction there: each reduces the error by μ times
-/// half the angle of an element.
-const ROUNDS: usize = 12;
 /// A force at a node, and that in the rotation of its tangent.
 #[derive(Debug, Clone, Copy, Default)]
 struct NodeForce {
@@ -66,6 +63,8 @@ pub(super) struct Line<'a> {
     pub(super) pressing: &'a [(usize, Vec3)],
     /// Friction between instruments, node by node, the innermost first; empty without friction.
     pub(super) inner_friction: &'a [InnerFriction],
+    /// Largest number of iterations for the axial force behind a node and the friction there.
+    pub(super) rounds: usize,
 }
 
 impl Line<'_> {
@@ -120,7 +119,7 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
             force - t * t.dot(&force)
         };
         // The normal force depends on the axial force behind the node, through the angle of the line there.
-        for _ in 0..if drag == 0.0 { 0 } else { ROUNDS } {
+        for _ in 0..if drag == 0.0 { 0 } else { line.rounds } {
             let next = (drag * across(tension).norm() - along) / rate;
             if next == tension {
                 break;

@@ -1,5 +1,6 @@
 //! The rod's mesh on an inserted device: elements, their sections, and the contact points.
 
+use super::options::{Accuracy, KirchhoffOptions};
 use crate::contact::{ContactPoint, WallPotential};
 use crate::device::Device;
 use crate::rod::quadrature::GAUSS;
@@ -9,8 +10,6 @@ use crate::tuning::MeshTuning;
 /// Ends of sections closer than this fraction of an element share a node: in shorter elements, differences of unit
 /// vectors lose the digits that determine curvature.
 pub(super) const NEAR: f64 = 1e-3;
-/// Largest angle by which the rest shape bends in an element, rad.
-const LARGEST_TURN: f64 = 0.75;
 /// What is in by less than this fraction of an element is not yet in.
 const JUST_IN: f64 = 1e-9;
 /// Contact points are known up to the mark behind the sheath's mouth, which is nearer than this number of elements:
@@ -32,10 +31,6 @@ pub struct Fineness {
 }
 
 impl Fineness {
-    /// With this spacing a sharp crest between two contact points comes to within two thirds of a radius of the axis
-    /// before contact; with 2 radii it would reach the axis.
-    pub(crate) const CONTACT_SPACING_RADII: f64 = 1.5;
-
     /// Approximate number of contact points of a device.
     pub(super) fn points(&self, device: &Device) -> usize {
         let each = device.sections().iter().map(|section| section.length_mm / section.radius_mm);
@@ -44,7 +39,7 @@ impl Fineness {
 
     /// Elements of this length, with contact points dense enough for any crest.
     pub fn of_elements(element_mm: f64) -> Self {
-        let contact_spacing_radii = Self::CONTACT_SPACING_RADII;
+        let contact_spacing_radii = KirchhoffOptions::of(Accuracy::Fast).contact_spacing_radii;
         Self { element_mm, contact_spacing_radii, tuning: MeshTuning::DEFAULT }
     }
 }
@@ -102,20 +97,21 @@ pub(super) fn section_ends(device: &Device, element_mm: f64) -> impl Iterator<It
 /// Writes the arc lengths from the tip of the nodes of `inserted_mm` (above 0) of `device`, sheath first, tip (0) last.
 ///
 /// Nodes are marks on the device and enter with it: the ends of its sections, and between them equally spaced marks
-/// about one element apart; closer where the rest shape bends by more than [`LARGEST_TURN`] in an element. In an
+/// about one element apart; closer where the rest shape bends by more than `largest_turn_rad` in an element. In an
 /// element that contained the end of a section, stiffness and rest curvature would jump, and an element too long for
 /// its shape stores energy where the device stores none: both would depend on how far the element is out of the
 /// sheath, and would cause a spurious push force on a hook. The first element is at least half an element long where
 /// a mark enters, and may be as short as [`NEAR`] where the end of a section does.
-fn nodes_from_tip(device: &Device, inserted_mm: f64, element_mm: f64, from_tip_mm: &mut Vec<f64>) {
+fn nodes_from_tip(device: &Device, inserted_mm: f64, fineness: &Fineness, from_tip_mm: &mut Vec<f64>) {
+    let Fineness { element_mm, tuning: MeshTuning { largest_turn_rad, .. }, .. } = *fineness;
     from_tip_mm.clear();
     from_tip_mm.push(0.0);
     let mut from = 0.0;
     for Stretch { end_mm, curvature_per_mm } in stretches(device, element_mm) {
-        let longest_mm = element_mm.min(LARGEST_TURN / curvature_per_mm);
+        let longest_mm = element_mm.min(largest_turn_rad / curvature_per_mm);
         let is_last = end_mm >= device.length_mm();
         let length_mm = end_mm - from;
-        let bends = (length_mm * curvature_per_mm / LARGEST_TURN - 1e-9).ceil();
+        let bends = (length_mm * curvature_per_mm / largest_turn_rad - 1e-9).ceil();
         let pieces = (length_mm / element_mm).round().max(bends).max(1.0);
         // In the last stretch elements have the requested length.
         let piece_mm = if is_last { longest_mm } else { length_mm / pieces };
@@ -213,9 +209,9 @@ impl Mesh {
         modulus_n_per_mm2: f64,
     ) {
         let Fineness { element_mm, contact_spacing_radii, tuning } = fineness;
-        nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
+        nodes_from_tip(device, inserted_mm, &fineness, &mut self.from_tip_mm);
         let ahead_mm = (inserted_mm + BEHIND_MOUTH * element_mm).min(device.length_mm());
-        nodes_from_tip(device, ahead_mm.max(inserted_mm), element_mm, &mut self.ahead_mm);
+        nodes_from_tip(device, ahead_mm.max(inserted_mm), &fineness, &mut self.ahead_mm);
         self.points.clear();
         let most = 1.0 + fineness.points(device) as f64;
         // Half of the interval beyond the current point; beyond the tip this is its cap.
@@ -341,7 +337,7 @@ mod tests {
         for element_mm in [1.0, 2.0, 4.0] {
             for k in 1..=400 {
                 let inserted_mm = 0.1 * f64::from(k);
-                nodes_from_tip(&device, inserted_mm, element_mm, &mut nodes);
+                nodes_from_tip(&device, inserted_mm, &Fineness::of_elements(element_mm), &mut nodes);
                 assert_eq!((nodes[0], *nodes.last().unwrap()), (inserted_mm, 0.0));
                 for end in [7.0, 17.0] {
                     assert_eq!(
@@ -354,7 +350,10 @@ mod tests {
                     let length = ends[0] - ends[1];
                     assert!(length <= 1.5 * element_mm + 1e-9, "{inserted_mm}: {nodes:?}");
                     assert!(index == 0 || length >= 0.5 * element_mm.min(2.25), "{inserted_mm}: {nodes:?}");
-                    assert!(ends[0] > 7.0 || length / 3.0 <= 1.5 * LARGEST_TURN, "{inserted_mm}: {nodes:?}");
+                    assert!(
+                        ends[0] > 7.0 || length / 3.0 <= 1.5 * MeshTuning::DEFAULT.largest_turn_rad,
+                        "{inserted_mm}: {nodes:?}"
+                    );
                 }
             }
         }

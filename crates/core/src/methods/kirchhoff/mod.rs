@@ -275,7 +275,8 @@ impl<const C: usize> Kirchhoff<C> {
             ..StepReport::default()
         };
         let Surroundings { lumen, properties, stack, .. } = *surroundings;
-        let surface = ContactSurface::of(lumen, stack.radii_mm(), properties, store)?;
+        let surface =
+            ContactSurface::tuned(lumen, stack.radii_mm(), properties, store, &options.tuning.contact)?;
         let mut method = Self {
             options,
             surface: Arc::new(surface),
@@ -483,7 +484,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
         meshed(&environment, hands, &mut mesh);
         let on_line = touches.iter().take_while(|(point, _)| *point < mesh.points.len());
         let pressing: Vec<_> = on_line.map(|(point, touch)| (*point, touch.contact.total_n())).collect();
-        let line = Line { stack: surroundings.stack, mesh: &mesh, rod, pressing: &pressing, inner_friction };
+        let line = Line {
+            stack: surroundings.stack,
+            mesh: &mesh,
+            rod,
+            pressing: &pressing,
+            inner_friction,
+            rounds: self.options.tuning.friction.lateral_rounds,
+        };
         lateral::lateral_forces::<C>(&line, instrument)
     }
 
@@ -500,8 +508,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
         joined.add_to(&mut mesh);
         let mut rod = self.state.rod.clone();
         join(&mut rod, &self.state.coils);
-        let capsules = loops::capsules(&mesh, stack).chain(joined.capsules()).collect();
-        SelfContact::new(&mesh.elements, capsules).touching_at(&mesh.elements, &rod)
+        let mut loops = SelfContact::tuned(&self.options.tuning);
+        loops.renew(&mesh.elements, loops::capsules(&mesh, stack).chain(joined.capsules()));
+        loops.touching_at(&mesh.elements, &rod)
     }
 
     fn state(&self) -> State {

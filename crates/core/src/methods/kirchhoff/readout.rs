@@ -2,8 +2,7 @@
 
 use super::Environment;
 use super::configuration::Configuration;
-use super::hands::{HandForce, OutsideFriction};
-use super::inner_friction::LEAST_SLIP_MM;
+use super::hands::{HandForce, OutsideFriction, ROUNDED_MM};
 use super::slopes::{Acting, set_hand_forces};
 use super::workspace::Tools;
 use crate::Vec3;
@@ -155,7 +154,7 @@ fn is_in(motion: &HandMotion) -> bool {
 /// mJ.
 fn against(friction_n: f64, [advance_mm, turn_rad]: [f64; 2], radius_mm: f64) -> (OutsideFriction, f64) {
     let slip_mm = libm::hypot(advance_mm, radius_mm * turn_rad);
-    if slip_mm <= LEAST_SLIP_MM {
+    if slip_mm <= ROUNDED_MM {
         return (OutsideFriction::default(), 0.0);
     }
     let push_n = friction_n * advance_mm / slip_mm;

@@ -21,7 +21,7 @@
 use super::guess::Guess;
 use super::mesh::Mesh;
 use super::substep::Effort;
-use crate::contact::{SETTLED, SelfContact, WallContact};
+use crate::contact::{SelfContact, WallContact};
 use crate::device::Stack;
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
@@ -88,7 +88,7 @@ impl<const C: usize> Search<'_, '_, C> {
         let mut renewals = 0;
         loop {
             let change = self.renew(lagged);
-            let is_settled = change < SETTLED && found.is_within(self.tolerance);
+            let is_settled = change < self.tuning.friction.settled && found.is_within(self.tolerance);
             if !found.converged || is_settled || renewals == self.tuning.steps.lagged_renewals {
                 return (found, change);
             }
@@ -177,7 +177,7 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Whether friction has the normal forces of the result.
     fn is_settled(&self) -> bool {
-        self.unsettled() < SETTLED
+        self.unsettled() < self.tuning.friction.settled
     }
 
     /// With the hand held still, relaxes an equilibrium with the normal forces of another state to where the device

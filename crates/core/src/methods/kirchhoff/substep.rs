@@ -17,7 +17,7 @@ use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::Vec3;
-use crate::contact::{ContactPoint, FrictionLaw, SETTLED, WallContact, least_force_n, stick_mm};
+use crate::contact::{ContactPoint, FrictionLaw, WallContact, least_force_n, stick_mm};
 use crate::rod::{RodState, Supports};
 use crate::solve::{External, NewtonReport, StopReason};
 
@@ -217,10 +217,11 @@ impl<const C: usize> Tools<C> {
     ) -> bool {
         let (stack, motions) = (environment.surroundings.stack, &self.guess.motions);
         let radius_mm = mesh.points.first().map_or(0.0, |point| point.potential.radius_mm);
+        let tuning = &environment.options.tuning;
         let friction = FrictionLaw {
             coefficient: environment.options.self_friction,
-            stick_mm: stick_mm(motions, radius_mm),
-            least_n: least_force_n(stack.softest_nmm2()),
+            stick_mm: stick_mm(motions, radius_mm, &tuning.friction),
+            least_n: least_force_n(stack.softest_nmm2(), tuning.contact.gentlest_bend_mm),
         };
         self.loops.renew(&mesh.elements, capsules(mesh, stack).chain(self.joined.capsules()));
         let place = |from_tip_mm: &f64| {
@@ -268,8 +269,8 @@ impl<const C: usize> Tools<C> {
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), states).with_flow(flow_mj);
         let by_fields = work_of_fields(environment, was, is);
         let by_wall = by_wall.with(by_fields);
-        let notable = environment.options.tuning.steps.notable;
-        Balance::new(environment.surroundings.stack, motions, states, by_wall, friction_mj, notable)
+        let tuning = &environment.options.tuning.steps;
+        Balance::new(environment.surroundings.stack, motions, states, by_wall, friction_mj, tuning)
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
@@ -353,7 +354,8 @@ impl<const C: usize> Tools<C> {
         let is_interrupted = used_up && (effort == Effort::Flight || slides > 0);
         let near = effort != Effort::Flight && !is_interrupted;
         // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
-        let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
+        let settled = tuning.friction.settled;
+        let balanced = (found.converged || (!near && found.residual < settled)) && unsettled < settled;
         let goes_on =
             used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < tuning.steps.most_near;
         let wrong = Lost::of(&found, (near, goes_on), balanced, off > 1.0 && !may_snap).or_else(|| {

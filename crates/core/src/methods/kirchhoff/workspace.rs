@@ -83,13 +83,14 @@ impl<const C: usize> Workspace<C> {
         let surroundings = environment.surroundings;
         let (elements, points) = largest(surroundings.stack, environment.options.fineness());
         let nothing = Configuration::at(&surroundings, state.has_angles);
+        let tuning = &environment.options.tuning;
         let mut tools = Tools {
             newton: Newton::new(1),
             guess: Guess::default(),
-            friction: Friction::new(surroundings.properties.largest_friction()),
+            friction: Friction::tuned(surroundings.properties.largest_friction(), &tuning.friction),
             cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
-            loops: SelfContact::default(),
+            loops: SelfContact::tuned(tuning),
             joined: Joined::default(),
             work: Work::default(),
             counters: Counters::default(),
