@@ -199,8 +199,14 @@ fn groups() -> [Group; 12] {
             ],
         ),
         (
-            "Contact points",
+            "Elements and contact points",
             vec![
+                other!(mesh.largest_turn_rad = 0.25),
+                other!(mesh.largest_turn_rad = 0.75),
+                other!(mesh.alike = 0.05),
+                other!(mesh.alike = 1.0),
+                other!(mesh.alike_rad = 0.02),
+                other!(mesh.alike_rad = 0.5),
                 other!(mesh.tip_spacing_radii = 1.0),
                 other!(mesh.tip_spacing_radii = 1.0 / 16.0),
                 other!(mesh.fewest_intervals = 1.0),
