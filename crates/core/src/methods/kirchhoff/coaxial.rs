@@ -188,3 +188,45 @@ fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<Co
     end.potential.radius_mm = device.section_at(bare).radius_mm;
     points.push(end);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{Instrument, Section};
+
+    /// A tip of this length and radius of rest curvature on a straight shaft.
+    fn shaped(name: &str, shaft: Section, (length_mm, bend_mm): (f64, f64)) -> Instrument {
+        let tip = Section { length_mm, rest_curvature_per_mm: [1.0 / bend_mm, 0.0], ..shaft };
+        Instrument { name: name.to_owned(), device: Device::new(vec![tip, shaft]).unwrap(), may_lead: true }
+    }
+
+    #[test]
+    fn tight_bends_have_short_elements_in_and_out_of_each_other() {
+        let wire = shaped("wire", Section::straight(150.0, 0.2, 5.0), (9.0, 3.0));
+        let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+        let stack = Stack::new(vec![wire, shaped("catheter", catheter, (20.0, 6.0))]).unwrap();
+        let fineness = Fineness::of_elements(4.0);
+        let mut mesh = Mesh::default();
+        for k in 0..400 {
+            let inserted_mm = [45.0 + 0.1 * f64::from(k), 60.0];
+            let line = line_mm(inserted_mm);
+            Nodes::new(&stack, &inserted_mm, fineness).mesh(&stack, &inserted_mm, 1.0, &mut mesh);
+            for ends in mesh.from_tip_mm.windows(2) {
+                let length_mm = ends[0] - ends[1];
+                assert!(length_mm > fineness.near_mm() && length_mm < 8.0, "{inserted_mm:?}: {ends:?}");
+                for (inserted, (tip_mm, bend_mm)) in inserted_mm.iter().zip([(9.0, 3.0), (20.0, 6.0)]) {
+                    let [near, far] = [ends[0], ends[1]].map(|at| at - (line - inserted));
+                    let in_tip = far > -1e-9 && near < tip_mm + 1e-9;
+                    assert!(!in_tip || length_mm / bend_mm < 2.0 * 0.5, "{inserted_mm:?}: {ends:?}");
+                }
+            }
+        }
+        // Far from the other one the mesh of a bend is that of the wire alone.
+        let inserted_mm = [90.0, 60.0];
+        Nodes::new(&stack, &inserted_mm, fineness).mesh(&stack, &inserted_mm, 1.0, &mut mesh);
+        let mut alone = Mesh::default();
+        alone.build(stack.first(), 90.0, fineness, 1.0);
+        let tip = |mesh: &Mesh| mesh.from_tip_mm.iter().rev().take(7).copied().collect::<Vec<_>>();
+        assert_eq!(tip(&mesh), tip(&alone));
+    }
+}
