@@ -31,11 +31,7 @@ impl Shape {
 
     /// Largest angle between the directions at two neighbouring nodes, rad: by how much an element bends.
     pub fn largest_turn_rad(&self) -> f64 {
-        let pairs = self.tangents.windows(2);
-        // Exact for small angles too, where the cosine is not.
-        pairs
-            .map(|pair| libm::atan2(pair[0].cross(&pair[1]).norm(), pair[0].dot(&pair[1])))
-            .fold(0.0, f64::max)
+        largest_turn_rad(self.tangents.iter().copied())
     }
 
     /// Allocates for up to `nodes` nodes.
@@ -81,6 +77,17 @@ impl Shape {
     pub fn tip_mm(&self) -> Option<Vec3> {
         self.positions_mm.last().copied()
     }
+}
+
+/// Largest angle between unit vectors that follow each other, rad.
+pub(crate) fn largest_turn_rad(mut tangents: impl Iterator<Item = Vec3>) -> f64 {
+    let Some(mut last) = tangents.next() else { return 0.0 };
+    let turns = tangents.map(|next| {
+        let last = std::mem::replace(&mut last, next);
+        // Exact for small angles too, where the cosine is not.
+        libm::atan2(last.cross(&next).norm(), last.dot(&next))
+    });
+    turns.fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -289,6 +289,7 @@ impl Method for Insertion {
         self.write_report(surroundings);
         self.report.write_alone();
         self.write_shape();
+        self.report.largest_bend_rad = self.shape.largest_turn_rad();
         Ok(())
     }
 

@@ -103,6 +103,12 @@ impl StepReport {
         self.report.max_penetration_mm
     }
 
+    /// Largest angle by which an element bends from end to end, rad.
+    #[getter]
+    fn largest_bend_rad(&self) -> f64 {
+        self.report.largest_bend_rad
+    }
+
     /// Energy dissipated by friction in this step, mJ.
     #[getter]
     fn dissipated_mj(&self) -> f64 {

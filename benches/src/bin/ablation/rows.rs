@@ -281,8 +281,12 @@ fn groups() -> [Group; 14] {
         (
             "Elements and contact points",
             vec![
-                other!(mesh.largest_turn_rad = 0.4),
-                other!(mesh.largest_turn_rad = 1.5),
+                other!(mesh.largest_turn_rad = 0.25),
+                other!(mesh.largest_turn_rad = 0.75),
+                other!(mesh.alike = 0.05),
+                other!(mesh.alike = 1.0),
+                other!(mesh.alike_rad = 0.02),
+                other!(mesh.alike_rad = 0.5),
                 other!(mesh.tip_spacing_radii = 1.0),
                 other!(mesh.tip_spacing_radii = 1.0 / 16.0),
                 other!(mesh.fewest_intervals = 1.0),

@@ -26,7 +26,7 @@ pub struct Tally {
     pub max_penetration_mm: f64,
     /// The maximum of each of these forces.
     pub max_wall_force: WallForce,
-    /// Largest angle by which an element bends in any step, degrees ([`Shape::largest_turn_rad`](crate::shape::Shape::largest_turn_rad)).
+    /// Largest angle by which an element bends in any step, degrees ([`StepReport::largest_bend_rad`](super::StepReport::largest_bend_rad)).
     #[serde(default)]
     pub max_turn_deg: f64,
 }
@@ -50,7 +50,7 @@ impl Tally {
         most.sum_n = most.sum_n.max(force.sum_n);
         most.largest_n = most.largest_n.max(force.largest_n);
         most.tip_n = most.tip_n.max(force.tip_n);
-        self.max_turn_deg = self.max_turn_deg.max(simulation.shape().largest_turn_rad().to_degrees());
+        self.max_turn_deg = self.max_turn_deg.max(report.largest_bend_rad.to_degrees());
     }
 
     /// Irregularities in words: "3 of 60 steps without an equilibrium, the first step 12; 1 jump", and whether elements

@@ -178,6 +178,9 @@ pub struct StepReport {
     pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,
+    /// Largest angle by which an element bends from end to end, rad, those of detached coils included. Above 60° a force
+    /// may be off by a hundredth, and no element may bend by more than 120°.
+    pub largest_bend_rad: f64,
     /// Energy dissipated by friction in this step, mJ; in jumps it is not separated ([`Jump`]).
     pub dissipated_mj: f64,
     /// Contacts with the wall.

@@ -145,7 +145,8 @@ impl Method for Li2011 {
         let before = self.state.clone();
         match self.carry(surroundings, target_mm) {
             Ok((solves, inputs, converged)) => {
-                let report = &mut self.state.report;
+                let ChainState { report, shape, .. } = &mut self.state;
+                report.largest_bend_rad = shape.largest_turn_rad();
                 report.rotation_rad += command.rotate_rad;
                 // Without twist the tip rotates with the hand.
                 report.tip_rotation_rad = report.rotation_rad;

@@ -1,24 +1,18 @@
 //! The mesh on several coaxial instruments.
 //!
 //! The line is as long as the instrument inserted farthest, and its nodes are marks at whole element lengths from its
-//! tip. Where another instrument or a section ends, stiffness jumps, and a node moves with that end; a mark within
-//! half an element of it is removed, so that no sliver arises while an end slides by. Two ends closer than [`NEAR`]
-//! share a node, and material ending inside an element counts by its share of the element. An end that has no node
-//! because it is near another one counts as at that one: as a share of its own, a stiff section of a micrometre would be
-//! bent as much as the soft one beside it.
+//! tip. Where another instrument or a stretch of one ends, stiffness jumps, and a node moves with that end; where the
+//! rest shape of one needs shorter elements, nodes are marks on that. A mark within half an element of an end is
+//! removed, so that no sliver arises while an end slides by. Two ends closer than [`Fineness::near_mm`] share a node.
 //!
 //! The outermost instrument at a position touches the wall, at the contact points that it would have alone: they are
 //! marks on it, and their weights end where it becomes covered. So energies are continuous as ends pass nodes.
 
-use super::mesh::{Fineness, Mesh, NEAR, section_ends};
+use super::material::element;
+use super::mesh::{Fineness, Mesh};
+use super::stretches::{marks_in_bends, stretch_ends};
 use crate::contact::ContactPoint;
-use crate::device::{Device, Section, Stack, line_mm};
-use crate::rod::quadrature::GAUSS;
-use crate::rod::{ElementData, Material, shares};
-
-/// An end of a section as near to a node as this fraction of its element counts as at the node: above [`NEAR`] in all
-/// elements but slivers, since others are at least half as long as they should be.
-const FLUSH: f64 = 2.5 * NEAR;
+use crate::device::{Device, Stack, line_mm};
 
 /// What a node moves with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,24 +35,41 @@ pub(super) struct Nodes {
 impl Nodes {
     /// Nodes for these inserted lengths of the instruments, at least one above 0.
     pub(super) fn new(stack: &Stack, inserted_mm: &[f64], fineness: Fineness) -> Self {
-        let element_mm = fineness.element_mm;
+        let (element_mm, near_mm) = (fineness.element_mm, fineness.near_mm());
         let line = line_mm(inserted_mm.iter().copied());
-        let near = NEAR * element_mm;
+        let each = || stack.devices().zip(inserted_mm).enumerate();
+        let is_inner = |at: f64| at > near_mm && at < line - near_mm;
         let mut breaks: Vec<(f64, Anchor)> = Vec::new();
         // What is too near to another one goes; ends of coils, where they are detached, stay.
-        for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
+        for (index, (device, inserted)) in each() {
             let at = line - inserted + device.coil_mm();
-            if device.coil_mm() > 0.0 && at > near && at < line - near {
+            if device.coil_mm() > 0.0 && is_inner(at) {
                 breaks.push((at, Anchor::Break(index, device.coil_mm())));
             }
         }
-        for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
-            let begins = std::iter::once(0.0).chain(section_ends(device, element_mm));
+        for (index, (device, inserted)) in each() {
+            let begins = std::iter::once(0.0).chain(stretch_ends(device, fineness));
             for begin in begins.take_while(|begin| begin < inserted) {
                 let at = line - inserted + begin;
-                if at > near && at < line - near && breaks.iter().all(|(b, _)| (at - b).abs() > near) {
+                if is_inner(at) && breaks.iter().all(|(b, _)| (at - b).abs() > near_mm) {
                     breaks.push((at, Anchor::Break(index, begin)));
                 }
+            }
+        }
+        // Marks give way to ends, and those of gentle bends to those of tight ones.
+        let mut bends: Vec<(f64, f64, Anchor)> = Vec::new();
+        for (index, (device, inserted)) in each() {
+            let marks = marks_in_bends(device, fineness).take_while(|(mark, _)| mark < inserted);
+            bends.extend(
+                marks.map(|(mark, piece_mm)| (piece_mm, line - inserted + mark, Anchor::Break(index, mark))),
+            );
+        }
+        bends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (piece_mm, at, anchor) in bends {
+            let half_mm = 0.5 * piece_mm;
+            let is_free = breaks.iter().all(|(b, _)| (at - b).abs() >= half_mm);
+            if at >= half_mm && at <= line - half_mm && is_free {
+                breaks.push((at, anchor));
             }
         }
         let marks = (1..).map(|k| (k as f64 * element_mm, Anchor::Mark(k)));
@@ -77,8 +88,8 @@ impl Nodes {
         self.place(inserted_mm, mesh);
         mesh.elements.clear();
         let ends = mesh.from_tip_mm.windows(2);
-        mesh.elements
-            .extend(ends.map(|ends| element(stack, inserted_mm, inserted_mm.len(), (ends[0], ends[1]))));
+        let all = (inserted_mm, inserted_mm.len());
+        mesh.elements.extend(ends.map(|ends| element(stack, all, (ends[0], ends[1]), mesh.flush_mm)));
         self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
     }
 
@@ -103,7 +114,7 @@ impl Nodes {
             let [ends, were] = [&*mesh, known].map(|of| (of.from_tip_mm[e], of.from_tip_mm[e + 1]));
             let beside = |at: &f64| were.1 - within_mm <= *at && *at <= were.0 + within_mm;
             if ends != were || breaks.iter().any(beside) {
-                mesh.elements[e] = element(stack, inserted_mm, inserted_mm.len(), ends);
+                mesh.elements[e] = element(stack, (inserted_mm, inserted_mm.len()), ends, mesh.flush_mm);
                 others.push(e);
             }
         }
@@ -120,6 +131,7 @@ impl Nodes {
             Anchor::Mark(k) => k as f64 * self.fineness.element_mm,
             Anchor::Break(index, from_tip) => line - inserted_mm[index] + from_tip,
         }));
+        mesh.flush_mm = self.fineness.flush_mm();
         mesh.inserted_mm.clear();
         mesh.inserted_mm.extend_from_slice(inserted_mm);
     }
@@ -177,85 +189,44 @@ fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<Co
     points.push(end);
 }
 
-/// An element between two distances from the tip of the line, of those `inner` instruments whose tips are in it or
-/// beyond.
-pub(super) fn element(
-    stack: &Stack,
-    inserted_mm: &[f64],
-    inner: usize,
-    (near, far): (f64, f64),
-) -> ElementData {
-    let line = line_mm(inserted_mm.iter().copied());
-    let mut data = ElementData::of(near - far, Material::NONE);
-    for ((device, set), inserted) in stack.devices().zip(stack.sets()).zip(inserted_mm).take(inner) {
-        let behind = line - inserted;
-        if 0.5 * (near + far) <= behind {
-            continue;
-        }
-        let part = between(device, near - behind, far - behind);
-        for (sum, own) in data.bending.iter_mut().zip(part.bending) {
-            *sum += own;
-        }
-        if let Some(set) = set {
-            data.materials[*set] = part;
-        }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{Instrument, Section};
+
+    /// A tip of this length and radius of rest curvature on a straight shaft.
+    fn shaped(name: &str, shaft: Section, (length_mm, bend_mm): (f64, f64)) -> Instrument {
+        let tip = Section { length_mm, rest_curvature_per_mm: [1.0 / bend_mm, 0.0], ..shaft };
+        Instrument { name: name.to_owned(), device: Device::new(vec![tip, shaft]).unwrap(), may_lead: true }
     }
-    data
-}
 
-/// An element of a single instrument between two distances from its tip, with its set of angles, if any.
-pub(super) fn alone(device: &Device, set: Option<usize>, (near, far): (f64, f64)) -> ElementData {
-    let part = between(device, near, far);
-    let mut data = ElementData { length: near - far, bending: part.bending, ..ElementData::EMPTY };
-    if let Some(set) = set {
-        data.materials[set] = part;
-    }
-    data
-}
-
-/// The material between two distances from the tip of a device, with each section's share.
-fn between(device: &Device, near: f64, far: f64) -> Material {
-    let h = near - far;
-    let mut sum = Material::NONE;
-    for (section, begin, until) in flush_sections(device, near, far) {
-        if begin <= far && near <= until {
-            return material(section);
+    #[test]
+    fn tight_bends_have_short_elements_in_and_out_of_each_other() {
+        let wire = shaped("wire", Section::straight(150.0, 0.2, 5.0), (9.0, 3.0));
+        let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+        let stack = Stack::new(vec![wire, shaped("catheter", catheter, (20.0, 6.0))]).unwrap();
+        let fineness = Fineness::of_elements(4.0);
+        let mut mesh = Mesh::default();
+        for k in 0..400 {
+            let inserted_mm = [45.0 + 0.1 * f64::from(k), 60.0];
+            let line = line_mm(inserted_mm);
+            Nodes::new(&stack, &inserted_mm, fineness).mesh(&stack, &inserted_mm, 1.0, &mut mesh);
+            for ends in mesh.from_tip_mm.windows(2) {
+                let length_mm = ends[0] - ends[1];
+                assert!(length_mm > fineness.near_mm() && length_mm < 8.0, "{inserted_mm:?}: {ends:?}");
+                for (inserted, (tip_mm, bend_mm)) in inserted_mm.iter().zip([(9.0, 3.0), (20.0, 6.0)]) {
+                    let [near, far] = [ends[0], ends[1]].map(|at| at - (line - inserted));
+                    let in_tip = far > -1e-9 && near < tip_mm + 1e-9;
+                    assert!(!in_tip || length_mm / bend_mm < 2.0 * 0.5, "{inserted_mm:?}: {ends:?}");
+                }
+            }
         }
-        let (first, end) = (near.min(until), far.max(begin));
-        if end < first {
-            sum.add_share(&material(section), &shares((near - first) / h, (near - end) / h));
-        }
-    }
-    sum
-}
-
-/// The section that comes out of the sheath, of which an element has this distance from the tip at the mouth, and that
-/// at its other node.
-pub(super) fn at_mouth(device: &Device, near: f64, far: f64) -> &Section {
-    let mut each = flush_sections(device, near, far);
-    each.find(|(_, _, until)| near <= *until).map_or(device.section_at(near), |(section, ..)| section)
-}
-
-/// The sections of a device, and where they begin and end, from its tip. Those that end nearly at one of the nodes of
-/// an element end there.
-fn flush_sections(device: &Device, near: f64, far: f64) -> impl Iterator<Item = (&Section, f64, f64)> {
-    let last = device.sections().len() - 1;
-    let flush = move |end: f64| {
-        let node = if (end - near).abs() < (end - far).abs() { near } else { far };
-        if (end - node).abs() < FLUSH * (near - far) { node } else { end }
-    };
-    device.sections().iter().zip(begins(device)).enumerate().map(move |(k, (section, begin))| {
-        let until = if k == last { f64::INFINITY } else { flush(begin + section.length_mm) };
-        (section, flush(begin), until)
-    })
-}
-
-/// A section, at all Gauss points.
-fn material(section: &Section) -> Material {
-    Material {
-        bending: GAUSS.map(|_| section.bending_stiffness_nmm2),
-        torsion: GAUSS.map(|_| section.torsion_nmm2()),
-        rest_curvature: GAUSS.map(|_| section.rest_curvature_per_mm),
-        rest_twist: [0.0; 3],
+        // Far from the other one the mesh of a bend is that of the wire alone.
+        let inserted_mm = [90.0, 60.0];
+        Nodes::new(&stack, &inserted_mm, fineness).mesh(&stack, &inserted_mm, 1.0, &mut mesh);
+        let mut alone = Mesh::default();
+        alone.build(stack.first(), 90.0, fineness, 1.0);
+        let tip = |mesh: &Mesh| mesh.from_tip_mm.iter().rev().take(7).copied().collect::<Vec<_>>();
+        assert_eq!(tip(&mesh), tip(&alone));
     }
 }

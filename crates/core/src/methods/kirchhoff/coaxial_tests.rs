@@ -128,6 +128,15 @@ fn an_end_passes_through_the_mesh_without_a_jump_and_hands_feel_the_slope() {
 }
 
 #[test]
+fn the_largest_bend_of_an_element_is_told() {
+    let simulation = both_in(120.0);
+    let (reported_rad, seen_rad) =
+        (simulation.report().largest_bend_rad, simulation.shape().largest_turn_rad());
+    // The hook of the wire bends by 0.06/mm and is held by the catheter.
+    assert!(reported_rad == seen_rad && (0.03..0.13).contains(&reported_rad), "{reported_rad}");
+}
+
+#[test]
 fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
     let mut simulation = both_in(120.0);
     push(&mut simulation, &[(WIRE, 12.3)]).unwrap();

@@ -55,14 +55,14 @@ impl Configuration {
 
 /// Numbers of elements and contact points of fully inserted devices: the maximum in a step.
 pub(super) fn largest(stack: &Stack, fineness: Fineness) -> (usize, usize) {
-    let (mut elements, mut points) = (0, 0);
+    // All nodes of each: more than are ever on one line.
+    let (mut elements, mut points) = (1, 0);
     let mut mesh = Mesh::default();
     for device in stack.devices() {
         mesh.build(device, device.length_mm(), fineness, 1.0);
-        elements = elements.max(mesh.elements.len());
+        elements += mesh.elements.len() + 1;
         points += mesh.points.len();
     }
-    let others: usize = stack.devices().skip(1).map(|device| device.sections().len()).sum();
     // The first element may have more contact points than any other.
-    (elements + 1 + others, points + super::mesh::MOST_POINTS)
+    (elements, points + super::mesh::MOST_POINTS)
 }

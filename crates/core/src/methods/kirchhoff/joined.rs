@@ -14,8 +14,8 @@ use std::sync::Arc;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use super::coaxial::alone;
 use super::loops::capsule;
+use super::material::alone;
 use super::mesh::{Fineness, Mesh};
 use super::state::KirchhoffState;
 use crate::contact::{Capsule, ContactPoint, KnownPoints, NormalForce};
@@ -78,7 +78,7 @@ impl FreeCoil {
         mesh.build_points(device, device.length_mm(), fineness, modulus_n_per_mm2);
         mesh.points.retain(|point| point.from_tip_mm < self.from_tip_mm[0]);
         let ends = self.from_tip_mm.windows(2).map(|ends| (ends[0], ends[1]));
-        mesh.elements = ends.map(|ends| alone(device, set, ends)).collect();
+        mesh.elements = ends.map(|ends| alone(device, set, ends, fineness.flush_mm())).collect();
         mesh.from_tip_mm.clone_from(&self.from_tip_mm);
         let mut e = mesh.elements.len() - 1;
         let mut points = std::mem::take(&mut mesh.points);

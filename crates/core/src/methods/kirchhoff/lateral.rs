@@ -18,8 +18,8 @@
 //! feel it, and it changes the axial force: around a bend by e^{μφ}, the capstan equation, where everything slips.
 //! Normal forces at a node are found together with it, from the tip on.
 
-use super::coaxial::element;
 use super::inner_friction::{pair, radius_mm};
+use super::material::element;
 use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::InnerFriction;
@@ -162,7 +162,7 @@ fn inside(stack: &Stack, mesh: &Mesh, (e, instrument): (usize, usize)) -> Elemen
     let sets = &stack.sets()[..=instrument];
     if sets.contains(&None) {
         let ends = (mesh.from_tip_mm[e], mesh.from_tip_mm[e + 1]);
-        return element(stack, &mesh.inserted_mm, instrument + 1, ends);
+        return element(stack, (&mesh.inserted_mm, instrument + 1), ends, mesh.flush_mm);
     }
     let whole = &mesh.elements[e];
     let mut data = ElementData::of(whole.length, Material::NONE);

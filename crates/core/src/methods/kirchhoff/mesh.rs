@@ -1,15 +1,19 @@
 //! The rod's mesh on an inserted device: elements, their sections, and the contact points.
 
+use super::material::between;
 use super::options::{Accuracy, KirchhoffOptions};
+use super::stretches::nodes_from_tip;
 use crate::contact::{ContactPoint, WallPotential};
-use crate::device::Device;
-use crate::rod::quadrature::GAUSS;
-use crate::rod::{ElementData, Material};
+use crate::device::{Device, Section};
+use crate::rod::ElementData;
 use crate::tuning::MeshTuning;
 
 /// Ends of sections closer than this fraction of an element share a node: in shorter elements, differences of unit
 /// vectors lose the digits that determine curvature.
-pub(super) const NEAR: f64 = 1e-3;
+const NEAR: f64 = 1e-3;
+/// An end of a section counts as at a node that is nearer than this number of such distances: above 1, so that each
+/// end that has no node because it is near another one counts as at that.
+const FLUSH: f64 = 1.25;
 /// What is in by less than this fraction of an element is not yet in.
 const JUST_IN: f64 = 1e-9;
 /// Contact points are known up to the mark behind the sheath's mouth, which is nearer than this number of elements:
@@ -37,6 +41,16 @@ impl Fineness {
         (each.sum::<f64>() / self.contact_spacing_radii) as usize
     }
 
+    /// Ends of sections closer than this share a node, mm.
+    pub(super) fn near_mm(&self) -> f64 {
+        NEAR * self.element_mm
+    }
+
+    /// An end of a section counts as at a node that is nearer than this, mm.
+    pub(super) fn flush_mm(&self) -> f64 {
+        FLUSH * self.near_mm()
+    }
+
     /// Elements of this length, with contact points dense enough for any crest.
     pub fn of_elements(element_mm: f64) -> Self {
         let contact_spacing_radii = KirchhoffOptions::of(Accuracy::Fast).contact_spacing_radii;
@@ -55,78 +69,33 @@ pub struct Mesh {
     pub points: Vec<ContactPoint>,
     /// Inserted lengths of the instruments; empty where nothing is inserted.
     pub(super) inserted_mm: Vec<f64>,
+    /// Distance from a node within which an end of a section counts as at it, mm.
+    pub(super) flush_mm: f64,
     /// As `from_tip_mm`, for more than is inserted: between what contact points are.
     pub(super) ahead_mm: Vec<f64>,
 }
 
-/// A stretch of device between ends of sections.
-struct Stretch {
-    /// Its end, from the device's tip, mm.
+/// The sections of a device, asked for from its tip on.
+struct FromTip<'a> {
+    sections: &'a [Section],
+    /// Where the first of them ends, mm.
     end_mm: f64,
-    /// Largest rest curvature in it, 1/mm.
-    curvature_per_mm: f64,
 }
 
-/// The stretches of a device from its tip on, none shorter than half an element but the last and that at the end of a coil: tapers of many short sections
-/// need no node for each, and a coil is detached at a node.
-fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> {
-    let mut left = device.sections().iter();
-    let (mut begin, mut end) = (0.0, 0.0);
-    std::iter::from_fn(move || {
-        let mut curvature_per_mm: f64 = 0.0;
-        for section in left.by_ref() {
-            end += section.length_mm;
-            let [u, v] = section.rest_curvature_per_mm;
-            curvature_per_mm = curvature_per_mm.max(libm::hypot(u, v));
-            if end - begin >= 0.5 * element_mm || device.is_coil_end(end) {
-                break;
-            }
-        }
-        let is_one = end > begin;
-        begin = end;
-        is_one.then_some(Stretch { end_mm: end, curvature_per_mm })
-    })
-}
-
-/// Starts of the stretches of a device behind its tip, mm.
-pub(super) fn section_ends(device: &Device, element_mm: f64) -> impl Iterator<Item = f64> {
-    let ends = stretches(device, element_mm).map(|stretch| stretch.end_mm);
-    ends.take_while(|end| *end < device.length_mm())
-}
-
-/// Writes the arc lengths from the tip of the nodes of `inserted_mm` (above 0) of `device`, sheath first, tip (0) last.
-///
-/// Nodes are marks on the device and enter with it: the ends of its sections, and between them equally spaced marks
-/// about one element apart; closer where the rest shape bends by more than `largest_turn_rad` in an element. In an
-/// element that contained the end of a section, stiffness and rest curvature would jump, and an element too long for
-/// its shape stores energy where the device stores none: both would depend on how far the element is out of the
-/// sheath, and would cause a spurious push force on a hook. The first element is at least half an element long where
-/// a mark enters, and may be as short as [`NEAR`] where the end of a section does.
-fn nodes_from_tip(device: &Device, inserted_mm: f64, fineness: &Fineness, from_tip_mm: &mut Vec<f64>) {
-    let Fineness { element_mm, tuning: MeshTuning { largest_turn_rad, .. }, .. } = *fineness;
-    from_tip_mm.clear();
-    from_tip_mm.push(0.0);
-    let mut from = 0.0;
-    for Stretch { end_mm, curvature_per_mm } in stretches(device, element_mm) {
-        let longest_mm = element_mm.min(largest_turn_rad / curvature_per_mm);
-        let is_last = end_mm >= device.length_mm();
-        let length_mm = end_mm - from;
-        let bends = (length_mm * curvature_per_mm / largest_turn_rad - 1e-9).ceil();
-        let pieces = (length_mm / element_mm).round().max(bends).max(1.0);
-        // In the last stretch elements have the requested length.
-        let piece_mm = if is_last { longest_mm } else { length_mm / pieces };
-        let marks = (1..).map(|k| (k as f64, from + k as f64 * piece_mm));
-        let inner =
-            marks.take_while(|(k, at)| (is_last || *k < pieces) && *at <= inserted_mm - 0.5 * piece_mm);
-        from_tip_mm.extend(inner.map(|(_, at)| at));
-        if is_last || end_mm >= inserted_mm - NEAR * element_mm {
-            break;
-        }
-        from_tip_mm.push(end_mm);
-        from = end_mm;
+impl<'a> FromTip<'a> {
+    fn of(device: &'a Device) -> Self {
+        let sections = device.sections();
+        Self { sections, end_mm: sections[0].length_mm }
     }
-    from_tip_mm.push(inserted_mm);
-    from_tip_mm.reverse();
+
+    /// As [`Device::section_at`]; distances ascend.
+    fn at(&mut self, from_tip_mm: f64) -> &'a Section {
+        while from_tip_mm >= self.end_mm && self.sections.len() > 1 {
+            self.sections = &self.sections[1..];
+            self.end_mm += self.sections[0].length_mm;
+        }
+        &self.sections[0]
+    }
 }
 
 impl Mesh {
@@ -172,27 +141,18 @@ impl Mesh {
         self.points.reserve(points.saturating_sub(self.points.len()));
     }
 
-    /// Meshes `inserted_mm` (above 0) of `device`.
-    ///
-    /// Nodes are the ends of its sections, and equally spaced marks between them.
+    /// Meshes `inserted_mm` (above 0) of `device`; for its nodes see [`nodes_from_tip`].
     pub fn build(&mut self, device: &Device, inserted_mm: f64, fineness: Fineness, modulus_n_per_mm2: f64) {
         self.build_points(device, inserted_mm, fineness, modulus_n_per_mm2);
+        self.flush_mm = fineness.flush_mm();
         self.inserted_mm.clear();
         self.inserted_mm.push(inserted_mm);
         // Only fields for a single device are written: the rest of earlier elements is empty.
         self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
         for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {
-            let length = ends[0] - ends[1];
-            let section = |xi: f64| device.section_at(ends[0] - xi * length);
-            let sample = GAUSS.map(|g| section(g.xi));
-            let bending = sample.map(|s| s.bending_stiffness_nmm2);
-            (data.length, data.bending) = (length, bending);
-            data.materials[0] = Material {
-                bending,
-                torsion: sample.map(|s| s.torsion_nmm2()),
-                rest_curvature: sample.map(|s| s.rest_curvature_per_mm),
-                rest_twist: [0.0; 3],
-            };
+            let material = between(device, (ends[0], ends[1]), self.flush_mm);
+            (data.length, data.bending) = (ends[0] - ends[1], material.bending);
+            data.materials[0] = material;
         }
     }
 
@@ -209,22 +169,23 @@ impl Mesh {
         modulus_n_per_mm2: f64,
     ) {
         let Fineness { element_mm, contact_spacing_radii, tuning } = fineness;
-        nodes_from_tip(device, inserted_mm, &fineness, &mut self.from_tip_mm);
+        nodes_from_tip(device, inserted_mm, fineness, &mut self.from_tip_mm);
         let ahead_mm = (inserted_mm + BEHIND_MOUTH * element_mm).min(device.length_mm());
-        nodes_from_tip(device, ahead_mm.max(inserted_mm), &fineness, &mut self.ahead_mm);
+        nodes_from_tip(device, ahead_mm.max(inserted_mm), fineness, &mut self.ahead_mm);
         self.points.clear();
         let most = 1.0 + fineness.points(device) as f64;
         // Half of the interval beyond the current point; beyond the tip this is its cap.
         let mut half_beyond = device.section_at(0.0).radius_mm;
         let first = self.from_tip_mm.len() - 2;
+        let mut sections = FromTip::of(device);
         for (k, ends) in self.ahead_mm.windows(2).rev().enumerate().take_while(|(_, e)| e[1] < inserted_mm) {
             // Whole elements that are not all in are in the one at the mouth.
             let element = first.saturating_sub(k);
             let [near, far] = [self.from_tip_mm[element], self.from_tip_mm[element + 1]];
             let length = ends[0] - ends[1];
             let radius_mm = device.section_at(ends[1]).radius_mm;
-            // A thin tip too short for an element of its own determines the element's radius, without requiring more
-            // points than the device has in all.
+            // A thin tip too short for an element of its own determines the spacing in the element, without requiring
+            // more points than the device has in all.
             let intervals = (length / (contact_spacing_radii * radius_mm)).ceil();
             let intervals = intervals.min(most).max(tuning.fewest_intervals);
             let spacing = length / intervals;
@@ -249,7 +210,10 @@ impl Mesh {
                     set: 0,
                     from_tip_mm,
                     weight_mm: (half_beyond + 0.5 * step).min(behind_mm),
-                    potential: WallPotential { modulus_n_per_mm2, radius_mm },
+                    potential: WallPotential {
+                        modulus_n_per_mm2,
+                        radius_mm: sections.at(from_tip_mm).radius_mm,
+                    },
                 });
                 half_beyond = 0.5 * step;
                 at += step;
@@ -323,38 +287,6 @@ mod tests {
                     assert!((at - is.from_tip_mm).abs() < 1e-12 * inserted_mm.max(1.0), "{is:?}");
                 }
                 before.clone_from(&mesh.points);
-            }
-        }
-    }
-
-    #[test]
-    fn ends_of_sections_are_nodes_and_elements_turn_little_in_their_rest_shape() {
-        let wire = Section::straight(100.0, 0.4, 5.0);
-        let hook = Section { length_mm: 7.0, rest_curvature_per_mm: [1.0 / 3.0, 0.0], ..wire };
-        let short = Section { length_mm: 0.5, ..wire };
-        let device = Device::new(vec![hook, Section::straight(10.0, 0.4, 5.0), short, wire]).unwrap();
-        let mut nodes = Vec::new();
-        for element_mm in [1.0, 2.0, 4.0] {
-            for k in 1..=400 {
-                let inserted_mm = 0.1 * f64::from(k);
-                nodes_from_tip(&device, inserted_mm, &Fineness::of_elements(element_mm), &mut nodes);
-                assert_eq!((nodes[0], *nodes.last().unwrap()), (inserted_mm, 0.0));
-                for end in [7.0, 17.0] {
-                    assert_eq!(
-                        nodes[1..].contains(&end),
-                        inserted_mm > end + NEAR * element_mm,
-                        "{inserted_mm}: {nodes:?}"
-                    );
-                }
-                for (index, ends) in nodes.windows(2).enumerate() {
-                    let length = ends[0] - ends[1];
-                    assert!(length <= 1.5 * element_mm + 1e-9, "{inserted_mm}: {nodes:?}");
-                    assert!(index == 0 || length >= 0.5 * element_mm.min(2.25), "{inserted_mm}: {nodes:?}");
-                    assert!(
-                        ends[0] > 7.0 || length / 3.0 <= 1.5 * MeshTuning::DEFAULT.largest_turn_rad,
-                        "{inserted_mm}: {nodes:?}"
-                    );
-                }
             }
         }
     }

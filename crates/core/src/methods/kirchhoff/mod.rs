@@ -59,6 +59,7 @@ mod lateral;
 mod loops;
 #[cfg(test)]
 mod loops_tests;
+mod material;
 mod mesh;
 #[cfg(test)]
 mod motion_tests;
@@ -69,6 +70,7 @@ mod search;
 mod slopes;
 mod state;
 mod step_control;
+mod stretches;
 mod substep;
 mod sum;
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::Environment;
 use super::configuration::Configuration;
 use super::hands::{HandForce, OutsideFriction, ROUNDED_MM};
+use super::material::at_mouth;
 use super::slopes::{Acting, set_hand_forces};
 use super::workspace::Tools;
 use crate::Vec3;
@@ -57,14 +58,17 @@ impl<const C: usize> Tools<C> {
             return Some(clamp);
         }
         let frame = rod.material_frame(0);
-        let data = &mesh.elements[0].materials[0];
-        let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
+        let ends = (mesh.from_tip_mm[0], mesh.from_tip_mm[1]);
+        let section = at_mouth(surroundings.device, ends, mesh.flush_mm);
+        let [along_u, along_v] = section.rest_curvature_per_mm;
+        let rest = frame.u * along_u + frame.v * along_v;
         // What comes in where the wall presses stores energy in it.
         let coming_in = state.touches.iter().filter_map(|(index, touch)| {
             let point = mesh.points.get(*index).filter(|point| mesh.is_coming_in(point))?;
             Some(touch.energy_mj / point.weight_mm)
         });
-        let clamped_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
+        let (bending, torsion) = (section.bending_stiffness_nmm2, section.torsion_nmm2());
+        let clamped_n = clamp.push_force(&frame.t, bending, torsion, &rest);
         let push_n = clamped_n + coming_in.sum::<f64>() + self.newton.unbalanced_along_n(rod);
         state.hand_forces[0] = HandForce { push_n, torque_nmm: clamp.torque, ..HandForce::default() };
         Some(clamp)

@@ -9,6 +9,7 @@ use super::workspace::Work;
 use crate::contact::extension::left_through;
 use crate::device::{Stack, line_mm};
 use crate::methods::{InstrumentReport, StepReport};
+use crate::shape::largest_turn_rad;
 use crate::{Error, Result};
 
 /// What a step or a tick took.
@@ -56,6 +57,10 @@ fn write_state(environment: &Environment<'_>, to: Start<'_>, report: &mut StepRe
     report.inserted_mm = mesh.from_tip_mm[0];
     report.energy = state.energy;
     report.max_penetration_mm = state.deepest_mm();
+    let coils = state.coils.iter().map(|coil| &coil.rod);
+    let bends_rad =
+        coils.chain([&state.rod]).map(|rod| largest_turn_rad(rod.frames.iter().map(|frame| frame.t)));
+    report.largest_bend_rad = bends_rad.fold(0.0, f64::max);
     report.contacts.clear();
     report.contacts.extend(state.touches.iter().map(|(_, touch)| touch.contact));
     report.drag_n = state.drag_n;

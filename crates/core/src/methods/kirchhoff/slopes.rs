@@ -9,9 +9,10 @@
 //! ½EI|κ⁰|² per length, is part of it.
 
 use super::Environment;
-use super::coaxial::{Nodes, at_mouth};
+use super::coaxial::Nodes;
 use super::configuration::{Configuration, Start};
 use super::hands::{HandForce, lengths};
+use super::material::at_mouth;
 use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::{ContactPoint, Drag, Place, Pressing, RodPlace, Touch};
@@ -120,7 +121,7 @@ fn push_force<const C: usize>(
     let far = own - at.mesh.elements[0].length;
     let straightened_n = together.iter().map(|index| {
         let device = &stack.instruments()[*index].device;
-        at_mouth(device, inserted_mm[*index], far).straightening_n()
+        at_mouth(device, (inserted_mm[*index], far), at.mesh.flush_mm).straightening_n()
     });
     Some(stored + wall + loops + field + turned - dragged - straightened_n.sum::<f64>())
 }

@@ -152,7 +152,7 @@ fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
 }
 
 #[test]
-fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
+fn a_snap_is_one_jump_however_many_ticks_it_takes_and_ends_as_in_a_step() {
     // A bent wire in a bent tube whips when rotated.
     let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(60.0, 0.4, 10.0) };
     let wire = Device::new(vec![bent, Section::straight(190.0, 0.4, 10.0)]).unwrap();
@@ -165,16 +165,13 @@ fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
         stepping.step(Command::advance(5.0)).unwrap();
     }
     let mut ticking = stepping.clone();
-    let (mut jumps, mut moving, mut deepest_mm) = ([0, 0], 0, 0.0f64);
+    let (mut jumps, mut deepest_mm) = ([0, 0], 0.0f64);
     let mut released_mj = [0.0, 0.0];
     let mut add = |which: usize, report: &StepReport| {
         jumps[which] += usize::from(report.jumped);
         released_mj[which] += report.jump.map_or(0.0, |jump| jump.released_mj);
     };
-    let mut seen = |report: &StepReport| {
-        moving += usize::from(!report.converged);
-        deepest_mm = deepest_mm.max(report.max_penetration_mm);
-    };
+    let mut seen = |report: &StepReport| deepest_mm = deepest_mm.max(report.max_penetration_mm);
     for _ in 0..100 {
         let moves = [Move { instrument: 0, command: Command::rotate(0.05) }];
         add(0, stepping.step_together(&moves).unwrap());
@@ -189,8 +186,8 @@ fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
         seen(report);
         ticks += 1;
     }
-    // A snap is one jump, however many ticks it takes, with the same energy.
-    assert!(jumps == [1, 1] && moving > 5 && ticks < 400, "{jumps:?} {moving} {ticks}");
+    // With the same energy. It takes several ticks, in which the device waits.
+    assert!(jumps == [1, 1] && (5..400).contains(&ticks), "{jumps:?} {ticks}");
     assert!((released_mj[1] / released_mj[0] - 1.0).abs() < 0.02, "{released_mj:?}");
     let [a, b] = [&ticking, &stepping].map(|each| each.shape().tip_mm().unwrap());
     assert!((a - b).norm() < 1e-3, "{a} {b}");
