@@ -153,6 +153,7 @@ fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
 
 #[test]
 fn a_snap_is_one_jump_however_many_ticks_it_takes_and_ends_as_in_a_step() {
+    const TURN_RAD: f64 = 0.05;
     // A bent wire in a bent tube whips when rotated.
     let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(60.0, 0.4, 10.0) };
     let wire = Device::new(vec![bent, Section::straight(190.0, 0.4, 10.0)]).unwrap();
@@ -172,9 +173,16 @@ fn a_snap_is_one_jump_however_many_ticks_it_takes_and_ends_as_in_a_step() {
         released_mj[which] += report.jump.map_or(0.0, |jump| jump.released_mj);
     };
     let mut seen = |report: &StepReport| deepest_mm = deepest_mm.max(report.max_penetration_mm);
+    // Where in a part it snaps is not known, and so not with which of the hand's torques before and after.
+    let (mut torque_nmm, mut unknown_mj) = (0.0, 0.0);
     for _ in 0..100 {
-        let moves = [Move { instrument: 0, command: Command::rotate(0.05) }];
-        add(0, stepping.step_together(&moves).unwrap());
+        let moves = [Move { instrument: 0, command: Command::rotate(TURN_RAD) }];
+        let report = stepping.step_together(&moves).unwrap();
+        if report.jumped {
+            unknown_mj += TURN_RAD * (report.torque_nmm - torque_nmm).abs();
+        }
+        torque_nmm = report.torque_nmm;
+        add(0, report);
         let report = ticking.tick(&moves, 2, None).unwrap();
         add(1, report);
         seen(report);
@@ -186,9 +194,10 @@ fn a_snap_is_one_jump_however_many_ticks_it_takes_and_ends_as_in_a_step() {
         seen(report);
         ticks += 1;
     }
-    // With the same energy. It takes several ticks, in which the device waits.
+    // It takes several ticks, in which the device waits.
     assert!(jumps == [1, 1] && (5..400).contains(&ticks), "{jumps:?} {ticks}");
-    assert!((released_mj[1] / released_mj[0] - 1.0).abs() < 0.02, "{released_mj:?}");
+    assert!(unknown_mj < 0.1 * released_mj[0], "{unknown_mj} {released_mj:?}");
+    assert!((released_mj[1] - released_mj[0]).abs() < unknown_mj, "{unknown_mj} {released_mj:?}");
     let [a, b] = [&ticking, &stepping].map(|each| each.shape().tip_mm().unwrap());
     assert!((a - b).norm() < 1e-3, "{a} {b}");
     // On its way its axis stays in the lumen, up to the distance of the contact surface from its triangles.
