@@ -4,7 +4,7 @@
 //! ```sh
 //! cargo run --release -p endowire-benches --bin ablation                     # all rows in all scenes; writes the table
 //! cargo run --release -p endowire-benches --bin ablation -- PATTERN          # rows with this in their name; prints it
-//! cargo run --release -p endowire-benches --bin ablation -- --scenes PATTERN # scenes with this in their name; prints it
+//! cargo run --release -p endowire-benches --bin ablation -- --scenes A,B    # scenes with one of these in their name; prints it
 //! cargo run --release -p endowire-benches --bin ablation -- --print          # prints it in place of writing it
 //! cargo run --release -p endowire-benches --bin ablation -- --measured       # prints what is measured so far
 //! cargo run --release -p endowire-benches --bin ablation -- --repeats N      # times are the smallest of N runs
@@ -86,9 +86,9 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Whether a name has a pattern in it.
-fn has(name: &str, pattern: Option<&str>) -> bool {
-    pattern.is_none_or(|pattern| name.contains(pattern))
+/// Whether a name has a pattern in it, or one of several with commas between.
+fn has(name: &str, patterns: Option<&str>) -> bool {
+    patterns.is_none_or(|patterns| patterns.split(',').any(|pattern| name.contains(pattern)))
 }
 
 /// Runs a scene with all numbers as they are and with those of a row, in turn; of each the fastest run.
