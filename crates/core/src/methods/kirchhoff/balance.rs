@@ -6,11 +6,32 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::carried::WallWork;
-use super::state::KirchhoffState;
+use super::hands::HandForce;
 use crate::contact::HandMotion;
 use crate::device::Stack;
+use crate::methods::Energy;
 use crate::tuning::StepTuning;
+
+/// Work of the moving wall and blood on a device between two states, mJ.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct OuterWork {
+    /// The lower bound from the forces before and after.
+    pub(super) least_mj: f64,
+    /// The upper bound.
+    pub(super) most_mj: f64,
+}
+
+impl OuterWork {
+    /// The same, and something else that does between these.
+    pub(super) fn with(self, [one, other]: [f64; 2]) -> Self {
+        Self { least_mj: self.least_mj + one.min(other), most_mj: self.most_mj + one.max(other) }
+    }
+
+    /// The same, and blood that does so much at the most, or has it done against it.
+    pub(super) fn with_flow(self, most_mj: f64) -> Self {
+        self.with([-most_mj, most_mj])
+    }
+}
 
 /// Energy between two states, mJ.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -37,12 +58,13 @@ impl Balance {
     pub(super) fn new(
         stack: &Stack,
         motions: &[HandMotion],
-        (before, after): (&KirchhoffState, &KirchhoffState),
-        by_wall: WallWork,
+        (before, after): (&[HandForce], &[HandForce]),
+        (was, is): (Energy, Energy),
+        by_others: OuterWork,
         friction_mj: (f64, f64),
         tuning: &StepTuning,
     ) -> Self {
-        let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
+        let (mut least_mj, mut most_mj) = (by_others.least_mj, by_others.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
         // The part that has come out of the sheath was straight in it.
         let each = stack.devices().zip(motions).map(|(device, motion)| {
@@ -54,7 +76,7 @@ impl Balance {
             most_mj += (was * way).max(is * way);
             mean_mj += 0.5 * (was + is) * way;
         };
-        for ((was, is), motion) in before.hand_forces.iter().zip(&after.hand_forces).zip(motions) {
+        for ((was, is), motion) in before.iter().zip(after).zip(motions) {
             // Where the force jumps at one end, that at the other counts.
             let first_n = if was.jumps && !is.jumps { is.push_n } else { was.push_n };
             let last_n = if is.jumps && !was.jumps { was.push_n } else { is.push_n };
@@ -64,7 +86,6 @@ impl Balance {
             add(first_n, last_n, motion.advance_mm());
             add(was.torque_nmm, is.torque_nmm, motion.turn_rad);
         }
-        let (was, is) = (before.energy, after.energy);
         let stored_mj = is.total() - was.total() - from_sheath_mj;
         // The energy in a field has an arbitrary zero: its change counts.
         let [elastic_was, elastic_is] = [was, is].map(|energy| energy.total() - energy.field);

@@ -12,6 +12,7 @@
 //! proceeds as in a vessel at rest; slip is measured from the material points themselves
 //! ([`Friction::carry`](crate::contact::Friction::carry)).
 
+use super::balance::OuterWork;
 use super::configuration::Start;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
@@ -101,35 +102,13 @@ fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: &mut RodSta
     }
 }
 
-/// Work of the moving wall and blood on a device between two states, mJ.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct WallWork {
-    /// The lower bound from the forces before and after.
-    pub(super) least_mj: f64,
-    /// The upper bound.
-    pub(super) most_mj: f64,
-}
-
-impl WallWork {
-    /// Zero if the wall rests.
-    pub(super) fn new(passage: Option<Passage<'_>>, states: (&KirchhoffState, &KirchhoffState)) -> Self {
-        let Some((before, after)) = passage else { return Self::default() };
-        let there = |x: &Vec3| after.place(&before.material(x)) - x;
-        let back = |x: &Vec3| x - before.place(&after.material(x));
-        let was = done(&states.0.touches, there);
-        let is = done(&states.1.touches, back);
-        Self { least_mj: was.0.min(is.0), most_mj: was.1.max(is.1) }
-    }
-
-    /// The same, and something else that does between these.
-    pub(super) fn with(self, [one, other]: [f64; 2]) -> Self {
-        Self { least_mj: self.least_mj + one.min(other), most_mj: self.most_mj + one.max(other) }
-    }
-
-    /// The same, and blood that does so much at the most, or has it done against it.
-    pub(super) fn with_flow(self, most_mj: f64) -> Self {
-        self.with([-most_mj, most_mj])
-    }
+/// Work of the wall along a passage, given the contacts before and after it: zero if the wall rests.
+pub(super) fn work_of_wall(passage: Option<Passage<'_>>, [was, is]: [&[(usize, Touch)]; 2]) -> OuterWork {
+    let Some((before, after)) = passage else { return OuterWork::default() };
+    let there = |x: &Vec3| after.place(&before.material(x)) - x;
+    let back = |x: &Vec3| x - before.place(&after.material(x));
+    let (was, is) = (done(was, there), done(is, back));
+    OuterWork { least_mj: was.0.min(is.0), most_mj: was.1.max(is.1) }
 }
 
 /// Work of contact forces over the motion of the wall there, mJ: signed, and by magnitude.

@@ -17,9 +17,10 @@ use super::configuration::Start;
 use super::course::{Course, Next, Rest};
 use super::extrapolation::Correction;
 use super::hands::{lengths, line_advance_mm, set_motions};
+use super::part::Effort;
 use super::report::Took;
 use super::state::{KirchhoffState, UnderWay};
-use super::substep::{Attempt, Effort, Part};
+use super::substep::{Attempt, Part};
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
@@ -53,7 +54,7 @@ impl<const C: usize> Workspace<C> {
         tools.joined.renew(&from.coils, stack, fineness, properties.modulus_n_per_mm2);
         tools.work = Work::default();
         let surroundings = &environment.surroundings;
-        way.begin(surroundings.stack, from, moves);
+        way.begin(surroundings.stack, (&from.hands, &from.behind), moves);
         set_motions(&way.start, &way.target, &mut tools.guess.motions);
         let advance_mm = line_advance_mm(&tools.guess.motions);
         if advance_mm > 0.0 {

@@ -2,10 +2,11 @@
 
 use super::Environment;
 use super::hands::{Hand, Way, largest_mm};
+use super::part::{Effort, Found, Limits, Lost};
 use super::report::Took;
 use super::state::{Flight, KirchhoffState, UnderWay, Unfinished};
 use super::step_control::{StepControl, Stride};
-use super::substep::{Effort, Found, Limits, Lost, Part};
+use super::substep::Part;
 use super::sum::Sum;
 use super::workspace::Work;
 use crate::methods::{Command, Move};

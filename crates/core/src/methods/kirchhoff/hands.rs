@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::state::KirchhoffState;
 use crate::contact::HandMotion;
 use crate::device::{Stack, line_mm};
 use crate::methods::{Command, Move};
@@ -104,12 +103,12 @@ pub(super) struct Way {
 }
 
 impl Way {
-    /// Sets the motion from a state, with what ticks have left over.
-    pub(super) fn begin(&mut self, stack: &Stack, from: &KirchhoffState, moves: &[Move]) {
-        self.start.clone_from(&from.hands);
+    /// Sets the motion from these positions, with what ticks have left over for each hand.
+    pub(super) fn begin(&mut self, stack: &Stack, (hands, behind): (&[Hand], &[Command]), moves: &[Move]) {
+        self.go_on_from(hands);
         self.commands.clear();
         self.commands.resize(self.start.len(), Command::default());
-        self.commands.iter_mut().zip(&from.behind).for_each(|(command, behind)| *command = *behind);
+        self.commands.iter_mut().zip(behind).for_each(|(command, behind)| *command = *behind);
         for one in moves {
             let command = &mut self.commands[one.instrument];
             command.advance_mm += one.command.advance_mm;

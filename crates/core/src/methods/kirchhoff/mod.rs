@@ -64,6 +64,7 @@ mod mesh;
 #[cfg(test)]
 mod motion_tests;
 mod options;
+mod part;
 mod readout;
 mod report;
 mod search;

@@ -20,7 +20,7 @@
 
 use super::guess::Guess;
 use super::mesh::Mesh;
-use super::substep::Effort;
+use super::part::Effort;
 use crate::contact::{SelfContact, WallContact};
 use crate::device::Stack;
 use crate::flow::BloodFlow;

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::substep::{Effort, Found, Lost};
+use super::part::{Effort, Found, Lost};
 use crate::tuning::StepTuning;
 
 /// Step size passed from one command to the next.

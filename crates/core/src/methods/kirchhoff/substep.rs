@@ -2,35 +2,22 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::balance::Balance;
-use super::carried::{Passage, WallWork};
+use super::carried::{Passage, work_of_wall};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, line_advance_mm, longest_mm, set_motions};
 use super::joined::{Resistance, join};
 use super::loops::{advances_mm, capsules};
 use super::mesh::Mesh;
+use super::part::{Effort, Found, Limits, Lost};
 use super::search::{Lagged, Search};
 use super::state::{KirchhoffState, UnderWay};
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
-use crate::Vec3;
 use crate::contact::{ContactPoint, FrictionLaw, WallContact, least_force_n, stick_mm};
 use crate::rod::{RodState, Supports};
-use crate::solve::{External, NewtonReport, StopReason};
-
-/// How a part of a command is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Effort {
-    /// For the equilibrium near the prediction, with friction following the contact forces.
-    Near,
-    /// As `Near`, with friction held at the normal forces of the start of the part; then the device slides to rest.
-    Held,
-    /// By relaxation to where the device comes to rest, however far away.
-    Flight,
-}
+use crate::solve::{External, StopReason};
 
 /// A part of a command.
 #[derive(Debug, Clone, Copy)]
@@ -45,85 +32,6 @@ pub(super) struct Part<'a> {
     pub(super) holds_still: bool,
     /// Earlier ticks' progress in it.
     pub(super) resumed: Option<&'a UnderWay>,
-}
-
-/// Limits of the cost of a part.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Limits {
-    /// Largest number of Newton iterations.
-    pub(super) iterations: usize,
-    /// Largest number of linear solves, unlimited except in ticks.
-    pub(super) solves: usize,
-}
-
-/// Result of a part of a command.
-pub(super) struct Found {
-    /// Number of slides with the hand held still.
-    pub(super) slides: u32,
-    /// Energy dissipated by friction outside the body, mJ.
-    pub(super) outside_mj: f64,
-    /// Residual, relative to the force scale.
-    pub(super) residual: f64,
-    /// Relative difference of the normal forces of friction from the contact forces.
-    pub(super) unsettled: f64,
-    /// Whether it is an equilibrium.
-    pub(super) balanced: bool,
-    /// Whether a tick has ended on the way to where the device comes to rest.
-    pub(super) is_interrupted: bool,
-    /// Whether more energy is stored and dissipated than was put in: then the motion of this part cannot lead there.
-    pub(super) lacks: bool,
-    /// Distance from the prediction, as a fraction of the allowed one.
-    pub(super) off: f64,
-    /// The node that is farthest from its prediction, mm.
-    pub(super) farthest_mm: Vec3,
-    /// Energy balance of the part.
-    pub(super) balance: Balance,
-}
-
-/// Why a part failed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Lost {
-    /// The prediction is beyond the wall, or has passed through the device itself.
-    Beyond,
-    /// The solution is.
-    Passed,
-    /// Energy appeared from nowhere, or disappeared in a part that is too long to show a jump.
-    Unbalanced,
-    /// No equilibrium was found; with the residual relative to the force scale.
-    Unsolved(StopReason, f64),
-    /// The linear solves of a tick were used up.
-    UnderWay,
-}
-
-impl Lost {
-    /// The failure of a solution, if it is one. `near` is whether it must be an equilibrium, `used_up` whether its
-    /// linear solves are, and `left` whether it is farther from its prediction than allowed.
-    fn of(found: &NewtonReport, (near, used_up): (bool, bool), balanced: bool, left: bool) -> Option<Self> {
-        let folded = !found.residual.is_finite() || found.reason == StopReason::Folded;
-        let reason = match (near, found.converged) {
-            (true, false) if used_up => return Some(Self::UnderWay),
-            (true, false) => found.reason,
-            (true, true) if !balanced => StopReason::Unsettled,
-            (true, true) if left => StopReason::Left,
-            (false, _) if folded => found.reason,
-            _ => return None,
-        };
-        Some(Self::Unsolved(reason, found.residual))
-    }
-}
-
-impl std::fmt::Display for Lost {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Beyond => f.write_str("the device would be predicted beyond the wall or through itself"),
-            Self::Passed => f.write_str("the device would pass through the wall"),
-            Self::Unbalanced => {
-                f.write_str("what was put in, what is stored and what friction took do not agree")
-            }
-            Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
-            Self::UnderWay => f.write_str("the linear solves of the tick are used up"),
-        }
-    }
 }
 
 /// A part to be solved.
@@ -256,7 +164,8 @@ impl<const C: usize> Tools<C> {
         (on_wall.0 + on_loops.0 + between_mj, on_wall.1 + on_loops.1 + between_mj)
     }
 
-    /// The energy balance of a part in which the wall moved, the drag did `aside_mj`, and friction dissipated this at least and at most.
+    /// The energy balance of a part in which the wall moved, the drag did `lateral_mj`, and friction dissipated
+    /// this at least and at most.
     fn balance(
         &self,
         environment: &Environment<'_>,
@@ -264,13 +173,23 @@ impl<const C: usize> Tools<C> {
         (left, lateral_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
         friction_mj: (f64, f64),
     ) -> Balance {
-        let (states, motions) = ((was.state, is.state), &self.guess.motions);
+        let motions = &self.guess.motions;
         let flow_mj = lateral_mj + self.drag.size_n() * longest_mm(motions);
-        let by_wall = WallWork::new(left.map(|(_, passage)| passage), states).with_flow(flow_mj);
-        let by_fields = work_of_fields(environment, was, is);
-        let by_wall = by_wall.with(by_fields);
+        let touches = [was, is].map(|at| &at.state.touches[..]);
+        let by_wall = work_of_wall(left.map(|(_, passage)| passage), touches);
+        let by_others = by_wall.with_flow(flow_mj).with(work_of_fields(environment, was, is));
         let tuning = &environment.options.tuning.steps;
-        Balance::new(environment.surroundings.stack, motions, states, by_wall, friction_mj, tuning)
+        let forces = (&was.state.hand_forces[..], &is.state.hand_forces[..]);
+        let energies = (was.state.energy, is.state.energy);
+        Balance::new(
+            environment.surroundings.stack,
+            motions,
+            forces,
+            energies,
+            by_others,
+            friction_mj,
+            tuning,
+        )
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.

@@ -1,7 +1,7 @@
 //! What the parts of a command add up to in its report.
 
+use super::part::{Effort, Found};
 use super::state::Flight;
-use super::substep::{Effort, Found};
 use crate::methods::{Jump, StepReport};
 
 /// Accumulated results of the parts of a command.
