@@ -99,12 +99,12 @@ pub(super) struct Way {
     pub(super) start: Vec<Hand>,
     /// Positions at its end.
     pub(super) target: Vec<Hand>,
-    /// The whole motion of each hand, with what ticks had left over.
+    /// The whole motion of each hand, with what earlier commands had left over.
     pub(super) commands: Vec<Command>,
 }
 
 impl Way {
-    /// Sets the motion from a state, with what ticks have left over.
+    /// Sets the motion from a state, with what earlier commands have left over.
     pub(super) fn begin(&mut self, stack: &Stack, from: &KirchhoffState, moves: &[Move]) {
         self.start.clone_from(&from.hands);
         self.commands.clear();

@@ -43,7 +43,7 @@ pub(super) struct Part<'a> {
     pub(super) to: f64,
     /// Whether it only goes on from where the last part has left the device, with the hands held still.
     pub(super) holds_still: bool,
-    /// Earlier ticks' progress in it.
+    /// Earlier commands' progress in it.
     pub(super) resumed: Option<&'a UnderWay>,
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Part<'a> {
 pub(super) struct Limits {
     /// Largest number of Newton iterations.
     pub(super) iterations: usize,
-    /// Largest number of linear solves, unlimited except in ticks.
+    /// Largest number of linear solves.
     pub(super) solves: usize,
 }
 
@@ -68,7 +68,7 @@ pub(super) struct Found {
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
-    /// Whether a tick has ended on the way to where the device comes to rest.
+    /// Whether the solves were used up on the way to where the device comes to rest.
     pub(super) is_interrupted: bool,
     /// Whether more energy is stored and dissipated than was put in: then the motion of this part cannot lead there.
     pub(super) lacks: bool,
@@ -91,7 +91,7 @@ pub(super) enum Lost {
     Unbalanced,
     /// No equilibrium was found; with the residual relative to the force scale.
     Unsolved(StopReason, f64),
-    /// The linear solves of a tick were used up.
+    /// The linear solves of the command were used up.
     UnderWay,
 }
 
@@ -121,7 +121,7 @@ impl std::fmt::Display for Lost {
                 f.write_str("what was put in, what is stored and what friction took do not agree")
             }
             Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
-            Self::UnderWay => f.write_str("the linear solves of the tick are used up"),
+            Self::UnderWay => f.write_str("the linear solves of the command are used up"),
         }
     }
 }
@@ -366,7 +366,7 @@ impl<const C: usize> Tools<C> {
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut after.touches);
             if is_interrupted {
-                // The next tick continues from here, with these normal forces.
+                // The next command continues from here, with these normal forces.
                 contact.anchor_friction(&mesh.elements, rod);
             }
         }
