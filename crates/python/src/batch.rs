@@ -222,6 +222,26 @@ impl Batch {
         self.carry_out(py, &moves, |batch, moves| batch.tick(moves, solves))
     }
 
+    /// Drops the motion that ticks and steps have left over, as `Simulation.forget`, in the simulations with these
+    /// indices, or in all.
+    ///
+    /// Raises IndexError for an index that does not exist; then nothing is dropped.
+    #[pyo3(signature = (indices=None))]
+    fn forget(&self, py: Python<'_>, indices: Option<List<isize>>) -> PyResult<()> {
+        let Some(indices) = indices else {
+            self.with(py, |members| {
+                members.batch.simulations_mut().iter_mut().for_each(insertion::Simulation::forget);
+            });
+            return Ok(());
+        };
+        let places = indices.0.into_iter().map(|index| self.at(py, index, |_, place| Ok(place)));
+        let places = places.collect::<PyResult<Vec<usize>>>()?;
+        self.with(py, |members| {
+            places.into_iter().for_each(|place| members.batch.simulations_mut()[place].forget());
+        });
+        Ok(())
+    }
+
     /// Detaches the coil of an instrument in each simulation, as `Simulation.detach`: a number of an instrument for each,
     /// or None where nothing is detached.
     ///
@@ -272,8 +292,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Commanded motion in ticks that instruments have not yet followed: advance_mm and rotate_rad of each, shape (n,
-    /// n_instruments, 2); zeros if nothing remains.
+    /// Commanded motion that instruments have not yet followed, in ticks and in steps that used up their linear solves:
+    /// advance_mm and rotate_rad of each, shape (n, n_instruments, 2); zeros if nothing remains.
     #[getter]
     fn behind<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (rows, hands, list) = self.with(py, |members| {

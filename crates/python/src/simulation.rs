@@ -204,6 +204,9 @@ impl Simulation {
     /// entry per instrument, or as numbers for a single instrument. Meanwhile time, and a vessel that moves, advance
     /// to `time_s`, s; not at all if absent. Returns the StepReport.
     ///
+    /// A step ends after `most_solves` linear solves at the latest: what is then left of the motion is in
+    /// `StepReport.behind`, and the next step or tick goes on with it.
+    ///
     /// Raises InputError for an invalid command, EndOfWay where the way ends, and ComputationError if no equilibrium
     /// was found; then everything is unchanged.
     #[pyo3(signature = (advance_mm=None, rotate_rad=None, time_s=None))]
@@ -238,6 +241,26 @@ impl Simulation {
         let (moves, solves) = (self.moves(advance_mm, rotate_rad)?, natural("solves", solves)?);
         let ticked = self.with(py, |simulation| simulation.tick(&moves, solves, time_s).cloned());
         ticked.map(StepReport::new).map_err(exception)
+    }
+
+    /// The linear solves (`StepReport.solves`) after which `step` with this command ends, with what is behind from
+    /// commands before; one Newton iteration more may be counted. None for methods other than kirchhoff.
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None))]
+    fn most_solves(
+        &self,
+        py: Python<'_>,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Option<usize>> {
+        let moves = self.moves(advance_mm, rotate_rad)?;
+        Ok(self.with(py, |simulation| simulation.most_solves(&moves)))
+    }
+
+    /// Drops the motion that ticks and steps have left over (`StepReport.behind`): the hands are then where the
+    /// instruments are, at the lengths and rotations of the report. Instruments that are on their way to where they
+    /// rest still go there, in the next step or tick; until then `behind` is zeros.
+    fn forget(&self, py: Python<'_>) {
+        self.with(py, insertion::Simulation::forget);
     }
 
     /// Detaches the coil of an instrument, where it comes to rest, and withdraws its pusher. Returns the StepReport.

@@ -49,3 +49,19 @@ def test_members_are_restored_and_exchanged(simulation):
     assert len(batch) == 2 and (batch.inserted_mm == 0.0).all()
     with pytest.raises(IndexError):
         batch.state(2)
+
+
+def test_those_that_are_named_forget(simulation):
+    batch = endowire.Batch([simulation] * 3)
+    for _ in range(30):
+        batch.step(np.tile([[2.0, 0.05]], (3, 1, 1)))
+    batch.tick(np.tile([[1.0, 0.2]], (3, 1, 1)), solves=1)
+    assert (batch.behind[..., 0] > 0.0).all()
+    with pytest.raises(IndexError):
+        batch.forget([0, 3])
+    assert (batch.behind[..., 0] > 0.0).all()
+    batch.forget([0, -1])
+    assert (batch.behind[[0, 2]] == 0.0).all() and (batch.behind[1, :, 0] > 0.0).all()
+    batch.forget()
+    assert (batch.behind == 0.0).all()
+    assert batch.inserted_mm[:, 0] == pytest.approx([60.0] * 3)

@@ -44,6 +44,25 @@ def test_a_tick_has_a_fixed_cost_and_tells_what_it_leaves_over(simulation):
             simulation.tick(1.0, solves=wrong)
 
 
+def test_what_is_forgotten_has_no_effect(simulation):
+    simulation.run(np.tile([[2.0, 0.05]], (60, 1, 1)))
+    assert simulation.most_solves(5.0) > simulation.most_solves() > 100
+    assert simulation.most_solves(rotate_rad=0.5) == simulation.most_solves(5.0)
+    spared = copy.deepcopy(simulation)
+    simulation.tick(1.0, 0.2, solves=1)
+    assert simulation.report.behind is not None
+    # What is left counts, in costs and in refusals.
+    assert simulation.most_solves(5.0) > spared.most_solves(5.0)
+    with pytest.raises(endowire.InputError, match="1.000 mm and 0.200 rad .* are behind.*forget"):
+        simulation.step(179.5)
+    assert simulation.forget() is None
+    assert simulation.report.behind is None
+    assert simulation.report.inserted_mm.tolist() == spared.report.inserted_mm.tolist()
+    for one in (simulation, spared):
+        one.step(1.0, 0.2)
+    assert np.array_equal(simulation.positions_mm, spared.positions_mm)
+
+
 def test_copies_share_the_vessel_and_nothing_else(simulation):
     simulation.step(50.0)
     other = copy.deepcopy(simulation)

@@ -258,6 +258,8 @@ fn groups() -> [Group; 14] {
                 other!(steps.work = 140.0),
                 other!(steps.work = 560.0),
                 other!(steps.work_of_one = 2),
+                without!("the solves after which a command ends", steps.solves = usize::MAX),
+                other!(steps.solves = 2_000),
                 other!(steps.work_rad = 0.02),
                 without!("further relaxations at the end of a command", steps.again = 0),
                 other!(steps.again = 10),

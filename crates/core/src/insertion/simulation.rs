@@ -99,6 +99,12 @@ impl Simulation {
     /// Carries out one command; with several instruments, of the innermost. After an error the state is unchanged, to
     /// the bit.
     ///
+    /// What it costs is bounded: it ends after [`Simulation::most_solves`] linear solves, and the Newton iteration in
+    /// progress. All attempts count, and so does the way of a device that snaps. Hardly any command needs them all; one
+    /// that does ends as a tick does. What has been reached is the new state, what is left of the hands' motion is in
+    /// [`StepReport::behind`], and the next step or tick goes on with it, or [`Simulation::forget`] drops it. A device
+    /// that is seen on its way to where it rests has not converged.
+    ///
     /// # Errors
     /// A command that is not finite, rotates by more than a thousand turns, pushes in more than the device's length
     /// or pulls out more than is inserted (all [`Error::Parameter`]); a step without an equilibrium
@@ -121,23 +127,53 @@ impl Simulation {
     /// moves; without a time none passes.
     ///
     /// # Errors
-    /// As [`Simulation::step_together`], and a time before that of the last step or not finite.
+    /// As [`Simulation::step_together`], and a time before that of the last step or not finite. A vessel does not wait:
+    /// one that moves too far to be followed in [`Simulation::most_solves`] is an [`Error::Computation`] too.
     pub fn step_until(&mut self, moves: &[Move], time_s: Option<f64>) -> Result<&StepReport> {
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
         let surroundings = surroundings!(self, time_s);
-        self.method.step_together(&surroundings, moves)?;
-        self.time_s = time_s;
-        self.fields_before = Arc::clone(&self.fields);
+        let stepped = self.method.step_together(&surroundings, moves);
+        stepped.map_err(|error| self.telling_what_is_behind(error))?;
+        self.arrived(time_s);
         Ok(self.method.report())
     }
 
+    /// Time and fields after a command.
+    fn arrived(&mut self, time_s: f64) {
+        self.time_s = time_s;
+        if !self.method.report().is_under_way() {
+            self.fields_before = Arc::clone(&self.fields);
+        }
+    }
+
+    /// The linear solves ([`StepReport::solves`]) after which a command of these moves ends, done or not, with what
+    /// earlier ones have left over ([`StepReport::behind`]); a tick ends after its own, if those are fewer. The Newton
+    /// iteration in progress is finished. They follow from the motion alone
+    /// ([`StepTuning::most_solves`](crate::tuning::StepTuning::most_solves)). `None` for methods other than
+    /// `kirchhoff`, whose commands always go to their end.
+    pub fn most_solves(&self, moves: &[Move]) -> Option<usize> {
+        self.method.most_solves(moves)
+    }
+
+    /// Drops the motion that earlier ticks and steps have left over ([`StepReport::behind`]): the hands are then where
+    /// the device is, at the lengths and rotations of its report. Without such motion it does nothing.
+    ///
+    /// What was dropped has no effect on later steps but one: parts of commands may begin shorter, if that motion was
+    /// hard to follow. A device that is seen on its way to where it rests still goes there, in the next step or tick:
+    /// until then `behind` is zeros.
+    pub fn forget(&mut self) {
+        if self.report().is_under_way() {
+            self.method.forget();
+        }
+    }
+
     /// As [`Simulation::step_until`] in a tick of bounded cost: in about `solves` linear solves
-    /// ([`StepReport::solves`]), whether the device comes to rest in them or not. For haptics and displays that need
-    /// an answer in time.
+    /// ([`StepReport::solves`]), whether the device comes to rest in them or not, and never more than a step may take.
+    /// For haptics and displays that need an answer in time.
     ///
     /// Unfinished motion is reported ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step
-    /// continues it; with hands at rest ticks reach an equilibrium. No state is beyond a wall: hands whose way is
+    /// continues it, or [`Simulation::forget`] drops it; with hands at rest ticks reach an equilibrium. No state is beyond a wall: hands whose way is
     /// blocked in the tick wait. If the vessel moves and these solves do not suffice, the tick takes as many as a
     /// step. Methods other than `kirchhoff` take a step.
     ///
@@ -150,11 +186,9 @@ impl Simulation {
         self.check_moves(moves)?;
         let time_s = self.check_time(time_s)?;
         let surroundings = surroundings!(self, time_s);
-        self.method.tick(&surroundings, moves, solves)?;
-        self.time_s = time_s;
-        if !self.method.report().is_under_way() {
-            self.fields_before = Arc::clone(&self.fields);
-        }
+        let ticked = self.method.tick(&surroundings, moves, solves);
+        ticked.map_err(|error| self.telling_what_is_behind(error))?;
+        self.arrived(time_s);
         Ok(self.method.report())
     }
 
@@ -169,7 +203,8 @@ impl Simulation {
     }
 
     /// Detaches the coil of an instrument, which comes to rest, and withdraws its pusher. After an error the state is
-    /// unchanged, to the bit.
+    /// unchanged, to the bit. What is behind of other instruments goes on in it, as in [`Simulation::step`], which it
+    /// resembles in cost too.
     ///
     /// # Errors
     /// An instrument that does not exist, is not a coil, is already detached or is not yet fully out
@@ -177,8 +212,9 @@ impl Simulation {
     pub fn detach(&mut self, instrument: usize) -> Result<&StepReport> {
         self.check_detach(instrument)?;
         let surroundings = surroundings!(self, self.time_s);
-        self.method.detach(&surroundings, instrument)?;
-        self.fields_before = Arc::clone(&self.fields);
+        let detached = self.method.detach(&surroundings, instrument);
+        detached.map_err(|error| self.telling_what_is_behind(error))?;
+        self.arrived(self.time_s);
         Ok(self.method.report())
     }
 
@@ -255,10 +291,10 @@ impl Simulation {
     fn check_moves(&self, moves: &[Move]) -> Result<()> {
         let report = self.method.report();
         let instruments = self.scene.stack.instruments();
-        // Including motion left over by ticks.
-        let inserted = |index: usize| {
-            report.hand(index).inserted_mm + report.behind.get(index).map_or(0.0, |left| left.advance_mm)
-        };
+        // Including motion left over by earlier commands.
+        let reached = |index: usize| report.hand(index).inserted_mm;
+        let inserted =
+            |index: usize| reached(index) + report.behind.get(index).map_or(0.0, |left| left.advance_mm);
         for (index, one) in moves.iter().enumerate() {
             let Some(instrument) = instruments.get(one.instrument) else {
                 let remedy = format!("there are {}, the innermost is 0", instruments.len());
@@ -269,15 +305,52 @@ impl Simulation {
                 return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, remedy));
             }
             self.check_attached(one.command, one.instrument)?;
-            let checked = check_command(one.command, inserted(one.instrument), instrument.device.length_mm());
+            let device_mm = instrument.device.length_mm();
+            let checked = check_command(one.command, inserted(one.instrument), device_mm);
             // A single device has no name given by the user.
             let several = instruments.len() > 1;
-            checked.map_err(|error| if several { within(&instrument.name, error) } else { error })?;
+            let checked =
+                checked.map_err(|error| if several { within(&instrument.name, error) } else { error });
+            let would_do = || check_command(one.command, reached(one.instrument), device_mm).is_ok();
+            checked.map_err(|error| if would_do() { self.telling_what_is_behind(error) } else { error })?;
         }
         let by =
             |index: usize| moves.iter().find(|m| m.instrument == index).map_or(0.0, |m| m.command.advance_mm);
-        let after = (0..instruments.len()).map(|index| inserted(index) + by(index));
-        self.scene.stack.check_places(after)
+        let places = |from: &dyn Fn(usize) -> f64| {
+            self.scene.stack.check_places((0..instruments.len()).map(|index| from(index) + by(index)))
+        };
+        places(&inserted).map_err(|error| match places(&reached) {
+            Ok(()) => self.telling_what_is_behind(error),
+            Err(_) => error,
+        })
+    }
+
+    /// The same error of a refused or failed command; if motion of earlier ones is left, it tells of which hand how
+    /// much is, and what to do about it.
+    fn telling_what_is_behind(&self, error: Error) -> Error {
+        let hands = self.report().behind.iter().zip(self.scene.stack.instruments());
+        let each = hands.filter(|(left, _)| **left != Command::default()).map(|(left, instrument)| {
+            let Command { advance_mm, rotate_rad } = left;
+            format!("{advance_mm:.3} mm and {rotate_rad:.3} rad of {:?}", instrument.name)
+        });
+        let each: Vec<String> = each.collect();
+        if each.is_empty() {
+            return error;
+        }
+        let told = |text: String| {
+            format!(
+                "{text}; {} are behind, from commands before: finish them with ticks or steps without motion, or drop \
+                 them with forget",
+                each.join(", ")
+            )
+        };
+        match error {
+            Error::Parameter { name, value, remedy } => {
+                Error::Parameter { name, value, remedy: told(remedy) }
+            }
+            Error::Computation(reason) => Error::Computation(told(reason)),
+            other => other,
+        }
     }
 
     /// Everything the next step depends on, except the device's environment.

@@ -29,6 +29,9 @@ pub struct Tally {
     /// Largest angle by which an element bends in any step, degrees ([`StepReport::largest_bend_rad`](super::StepReport::largest_bend_rad)).
     #[serde(default)]
     pub max_turn_deg: f64,
+    /// Whether the last step has left motion to the next ([`StepReport::behind`](super::StepReport::behind)).
+    #[serde(default)]
+    pub ends_under_way: bool,
 }
 
 impl Tally {
@@ -39,6 +42,7 @@ impl Tally {
             self.unconverged_steps += 1;
             self.first_unconverged_step.get_or_insert(step);
         }
+        self.ends_under_way = report.is_under_way();
         self.jumps += usize::from(report.jumped);
         self.relaxations += u64::from(report.relaxations);
         // A tally is written as JSON, which has no infinite numbers.
@@ -74,6 +78,9 @@ impl Tally {
                 "elements bend by up to {turn_deg:.0}°: compare with shorter ones (method.element_mm)"
             ));
         }
+        if self.ends_under_way {
+            remarks.push("at its end the device is still behind its hands".to_owned());
+        }
         (!remarks.is_empty()).then(|| remarks.join("; "))
     }
 }
@@ -96,6 +103,8 @@ mod tests {
         assert_eq!(tally.remarks(60).unwrap(), reported);
         let coarse = Tally { max_turn_deg: 75.0, ..Tally::default() }.remarks(9).unwrap();
         assert!(coarse.contains("bend by up to 75°") && coarse.contains("method.element_mm"), "{coarse}");
+        let behind = Tally { ends_under_way: true, ..Tally::default() }.remarks(9).unwrap();
+        assert!(behind.contains("behind its hands"), "{behind}");
         assert_eq!(Tally { jumps: 2, max_turn_deg: 45.0, ..Tally::default() }.remarks(9).unwrap(), "2 jumps");
     }
 }

@@ -122,6 +122,15 @@ pub trait Method: Send {
         self.step(surroundings, moves.first().map_or_else(Command::default, |one| one.command))
     }
 
+    /// The linear solves after which a command of these moves ends, with what earlier ones have left over; `None` for
+    /// methods whose commands always go to their end.
+    fn most_solves(&self, _moves: &[Move]) -> Option<usize> {
+        None
+    }
+
+    /// Drops motion of the hands that earlier commands have left over ([`StepReport::behind`]).
+    fn forget(&mut self) {}
+
     /// Moves instruments within about `solves` linear solves, whether the device comes to rest in them or not: no
     /// state is beyond a wall, and remaining motion of the hands, or imbalance of forces, is left to the next tick or
     /// step ([`StepReport::behind`]). If the vessel moves, and moves the device, and these solves do not suffice, it

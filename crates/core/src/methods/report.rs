@@ -38,7 +38,8 @@ impl StepReport {
 }
 
 impl StepReport {
-    /// Whether the device is still moving after ticks: it has not caught up with its hands, or has not come to rest.
+    /// Whether the device is still moving: it has not caught up with its hands, or has not come to rest, after a tick
+    /// or after a step whose linear solves were used up.
     pub fn is_under_way(&self) -> bool {
         !self.behind.is_empty()
     }
@@ -215,8 +216,9 @@ pub struct StepReport {
     pub nodes_solved: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
-    /// Motion of each hand (of a single device one) in ticks ([`Method::tick`](crate::methods::Method::tick)) that
-    /// the device has not yet followed: the next tick or step continues with it. Empty if none remains.
+    /// Motion of each hand (of a single device one) that the device has not yet followed, in ticks and in steps whose
+    /// linear solves were used up ([`Simulation::most_solves`](crate::insertion::Simulation::most_solves)): the next
+    /// tick or step continues with it. Empty if nothing remains; zeros if the device is on its way to where it rests.
     pub behind: Vec<Command>,
 }
 

@@ -20,8 +20,15 @@ pub struct StepTuning {
     pub nearer: f64,
     /// Largest number of sub-steps of one command.
     pub substep_limit: usize,
+    /// Linear solves of a command, whatever its motion; see [`most_solves`](Self::most_solves), of which this is the
+    /// first term. If it is `usize::MAX`, a command is not bounded.
+    pub solves: usize,
+    /// Further ones per millimetre and per `work_rad` of its motion.
+    pub solves_per_mm: f64,
+    /// Motion beyond which a command gets no further solves, mm.
+    pub solves_up_to_mm: f64,
     /// Newton iterations allowed for a command per millimetre and per `work_rad`, including failed attempts, before it
-    /// is relaxed: this bounds its cost.
+    /// is relaxed. Relaxations go on after them, until the linear solves are used up.
     pub work: f64,
     /// Rotation that counts like a millimetre, rad.
     pub work_rad: f64,
@@ -34,8 +41,8 @@ pub struct StepTuning {
     pub rest_radii: f64,
     /// Residual, relative to the force scale, above which a device that does not move is not at rest.
     pub at_rest: f64,
-    /// Cost of a part of a tick beside its own linear solves, in linear solves: it builds a mesh and evaluates the
-    /// whole wall once.
+    /// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall
+    /// once.
     pub of_a_part: usize,
     /// Largest number of Newton iterations of a solution near its prediction: shortening the part takes fewer.
     pub most_near: usize,
@@ -73,6 +80,9 @@ impl StepTuning {
         least_mm: 1e-3,
         nearer: 0.2,
         substep_limit: 4096,
+        solves: 15_000,
+        solves_per_mm: 100.0,
+        solves_up_to_mm: 40.0,
         work: 280.0,
         work_rad: 0.1,
         work_of_one: 10,
@@ -92,6 +102,19 @@ impl StepTuning {
         notable_floor_mj: 1e-6,
         coil_resistance_per_mm4: 1e-5,
     };
+
+    /// The linear solves after which a command ends, for its largest motion of a hand, mm (a rotation of `work_rad`
+    /// counts as a millimetre), with what earlier commands have left over:
+    ///
+    /// ```text
+    /// solves + solves_per_mm · min(motion, solves_up_to_mm)
+    /// ```
+    ///
+    /// All parts count, whether they are accepted or thrown away, with those in which the device moves to where it
+    /// rests, and `of_a_part` for each. The Newton iteration in progress is finished.
+    pub fn most_solves(&self, motion_mm: f64) -> usize {
+        self.solves.saturating_add((self.solves_per_mm * motion_mm.min(self.solves_up_to_mm)) as usize)
+    }
 }
 
 impl Default for StepTuning {

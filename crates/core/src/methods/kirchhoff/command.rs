@@ -1,9 +1,10 @@
 //! The driver of the exact rod: one command, as a step or as ticks.
 //!
 //! A command is gone through in parts. Each part is proposed, solved, and then accepted or rejected
-//! ([`super::course`]): a step goes on until the command is done, a tick until so many linear solves are used up. What
-//! a tick leaves unfinished (a solution, a relaxation, motion of the hands) is kept with the state, and the next tick
-//! or step goes on with it. A tick with enough solves therefore is the step.
+//! ([`super::course`]), until the command is done or its linear solves are used up: those that follow from its motion
+//! ([`StepTuning::most_solves`](crate::tuning::StepTuning::most_solves)), in a tick at most those it is given. What is
+//! then unfinished (a solution, a relaxation, motion of the hands) is kept with the state, and the next tick or step
+//! goes on with it. A tick with enough solves therefore is the step.
 //!
 //! An error after an accepted part of a tick is postponed to the next tick, which repeats it. A step that fails leaves
 //! the state as it was.
@@ -32,14 +33,14 @@ use crate::{Error, Result, Vec3};
 pub(super) enum Driven {
     /// There is a new state; with what it took.
     Moved(Took),
-    /// The device has not moved yet; with what goes on in the next tick.
+    /// The device has not moved yet; with what goes on in the next command.
     Waits(Rest),
-    /// The solves of a tick do not suffice to follow what changes around the device.
-    Overtaken,
+    /// So many solves do not suffice to follow what changes around the device.
+    Overtaken(usize),
 }
 
 impl<const C: usize> Workspace<C> {
-    /// Begins with moves, and motion left over by ticks, from the state `from`.
+    /// Begins with moves, and motion left over by earlier commands, from the state `from`.
     ///
     /// # Errors
     /// [`PhysicalEnd`](crate::PhysicalEnd) if the tip has left the vessel and would be pushed on.
@@ -65,8 +66,9 @@ impl<const C: usize> Workspace<C> {
         Ok(())
     }
 
-    /// Carries out moves, and what ticks have left over, from the state `from`: all of it with `solves` =
-    /// `usize::MAX`, else as far as about that many linear solves go. A new state is in `now`.
+    /// Carries out moves, and what earlier commands have left over, from the state `from`: as a tick of about so many
+    /// linear solves, or as a step with `solves` = `usize::MAX`. Both end after those that a command may take
+    /// ([`most_solves`](crate::tuning::StepTuning::most_solves)). A new state is in `now`.
     ///
     /// # Errors
     /// As [`Method::step`](crate::methods::Method::step).
@@ -83,6 +85,8 @@ impl<const C: usize> Workspace<C> {
         let (start_mm, target_mm) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         let mut displaced = surroundings.displacement(0.0);
         let mut course = Course::new(environment, from, (way, moves));
+        let is_step = solves == usize::MAX;
+        let solves = solves.min(course.most_solves);
         let ends = loop {
             if course.is_over(way) || course.pauses(&tools.work, solves) {
                 break Ok(());
@@ -138,12 +142,12 @@ impl<const C: usize> Workspace<C> {
             };
             match course.reject(&part, lost) {
                 Next::Part => {}
-                Next::Tick => {
+                Next::Later => {
                     course.under_way = Some(tools.under_way(&part, &next.state, (from, before)));
                     break Ok(());
                 }
                 Next::Nothing => break Ok(()),
-                Next::Step => return Ok(Driven::Overtaken),
+                Next::Step => return Ok(Driven::Overtaken(solves)),
                 Next::Error => {
                     // If the vessel is too narrow to go on, the error says so.
                     let narrow = refuse_narrow(&at_start, was, &way.commands);
@@ -156,7 +160,7 @@ impl<const C: usize> Workspace<C> {
             }
         };
         // Of a tick, what has been reached so far is kept.
-        if solves == usize::MAX || !course.moved {
+        if is_step || !course.moved {
             ends?;
         }
         if course.has_failed(way) {

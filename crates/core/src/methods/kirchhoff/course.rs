@@ -33,8 +33,8 @@ impl Change {
 pub(super) enum Next {
     /// With another part.
     Part,
-    /// In the next tick, with the unfinished solution.
-    Tick,
+    /// In the next command, with the unfinished solution.
+    Later,
     /// Not at all: the device stays where it is.
     Nothing,
     /// Again from its start, with as many solves as it needs: what changes does not wait.
@@ -47,9 +47,9 @@ pub(super) enum Next {
 pub(super) struct Course<'a> {
     tuning: &'a StepTuning,
     control: StepControl,
-    /// The solution that the last tick has begun.
+    /// The solution that the last command has begun.
     begun: Option<&'a UnderWay>,
-    /// The solution that this tick leaves unfinished.
+    /// The solution that this one leaves unfinished.
     pub(super) under_way: Option<UnderWay>,
     /// The relaxation in progress.
     flight: Option<Flight>,
@@ -60,10 +60,12 @@ pub(super) struct Course<'a> {
     pub(super) moved: bool,
     /// Whether the device rests in equilibrium after it.
     balanced: bool,
+    /// Linear solves after which it ends, done or not.
+    pub(super) most_solves: usize,
 }
 
 impl<'a> Course<'a> {
-    /// Begins with the motion of a command, or goes on with that of the last tick.
+    /// Begins with the motion of a command, or goes on with that of the last one.
     pub(super) fn new(
         environment: &Environment<'a>,
         from: &'a KirchhoffState,
@@ -105,6 +107,7 @@ impl<'a> Course<'a> {
             sum: Sum::default(),
             moved: false,
             balanced: true,
+            most_solves: most_solves(&way.commands, tuning),
         }
     }
 
@@ -124,7 +127,7 @@ impl<'a> Course<'a> {
         self.is_there(way) && self.flight.is_none() && rests
     }
 
-    /// Whether a tick of so many solves ends here. A change that goes on is completed, by relaxation.
+    /// Whether a command of so many solves ends here. A change that goes on is completed, by relaxation.
     pub(super) fn pauses(&mut self, work: &Work, solves: usize) -> bool {
         let used = work.solves.saturating_add(self.tuning.of_a_part * self.sum.parts);
         if self.change.goes_on() {
@@ -134,13 +137,13 @@ impl<'a> Course<'a> {
         self.sum.parts > 0 && used >= solves
     }
 
-    /// The linear solves of a tick after which no part begins: with half of them a moving vessel does not wait any
+    /// The linear solves of a command after which no part begins: with half of them a moving vessel does not wait any
     /// longer.
     fn within(&self, solves: usize) -> usize {
         if self.change.vessel_moves && self.change.goes_on() { solves / 2 } else { solves }
     }
 
-    /// What a part may cost in a tick of so many solves, with this work before it.
+    /// What a part may cost in a command of so many solves, with this work before it.
     pub(super) fn limits(&self, part: &Part<'_>, before: &Work, solves: usize) -> Limits {
         let most = if self.change.overtakes { solves } else { self.within(solves) };
         let iterations = match part.effort {
@@ -226,7 +229,7 @@ impl<'a> Course<'a> {
     pub(super) fn reject(&mut self, part: &Part<'_>, lost: Lost) -> Next {
         if lost == Lost::UnderWay && (!self.change.goes_on() || (part.to == 1.0 && !self.change.vessel_moves))
         {
-            return Next::Tick;
+            return Next::Later;
         }
         if self.change.overtakes {
             return Next::Step;
@@ -259,7 +262,7 @@ impl<'a> Course<'a> {
         self.is_there(way) && !self.balanced && self.flight.is_none()
     }
 
-    /// Step size, remaining motion of the hands, and what the next tick goes on with; neither if the command is done.
+    /// Step size, remaining motion of the hands, and what the next command goes on with; neither if the command is done.
     pub(super) fn rest(self, way: &Way) -> Rest {
         let Self { control, under_way: part, flight, .. } = self;
         let stride = control.stride();
@@ -276,6 +279,11 @@ impl<'a> Course<'a> {
         self.rest(way).write(state);
         took
     }
+}
+
+/// The largest number of linear solves of a command with these motions, apart from those of the iteration in progress.
+pub(super) fn most_solves(motions: &[Command], tuning: &StepTuning) -> usize {
+    tuning.most_solves(largest_mm(motions.iter().copied(), tuning.work_rad))
 }
 
 /// What is left of a command.

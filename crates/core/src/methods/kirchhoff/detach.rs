@@ -16,7 +16,7 @@ use super::transport::transport_together;
 use super::workspace::Workspace;
 use super::{Environment, meshed};
 use crate::device::{LENGTH_SLACK_MM, line_mm};
-use crate::methods::MethodChoice;
+use crate::methods::{Command, MethodChoice};
 use crate::{Error, Result};
 
 /// Refuses a coil that cannot be detached; returns the length of one that can, mm.
@@ -39,7 +39,16 @@ pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instru
     let inserted_mm: Vec<f64> = lengths(&from.hands).collect();
     let left_mm = stack.out_mm(instrument, &inserted_mm) - inserted_mm[instrument];
     if left_mm > LENGTH_SLACK_MM {
-        return refused(format!("is not out yet: advance it by {left_mm:.3} mm"));
+        let behind_mm = from.behind.get(instrument).map_or(0.0, |left| left.advance_mm);
+        let also = if behind_mm == 0.0 {
+            String::new()
+        } else {
+            format!(
+                "; {behind_mm:.3} mm of its motion are behind: finish them with ticks or steps without motion, or drop \
+                 them with forget"
+            )
+        };
+        return refused(format!("is not out yet: advance it by {left_mm:.3} mm{also}"));
     }
     Ok(coil_mm)
 }
@@ -70,6 +79,8 @@ impl<const C: usize> Workspace<C> {
         state.pairs.clear();
         state.correction.clear();
         state.unfinished = None;
+        // Nothing is left of the motion of a coil that has no hand any more.
+        state.behind.iter_mut().skip(instrument).take(1).for_each(|own| *own = Command::default());
         state.hand_forces[instrument] = HandForce { jumps: stack.is_several(), ..HandForce::default() };
         if mesh.elements.is_empty() {
             state.withdraw(stack, &hands);

@@ -98,12 +98,12 @@ pub(super) struct Way {
     pub(super) start: Vec<Hand>,
     /// Positions at its end.
     pub(super) target: Vec<Hand>,
-    /// The whole motion of each hand, with what ticks had left over.
+    /// The whole motion of each hand, with what earlier commands had left over.
     pub(super) commands: Vec<Command>,
 }
 
 impl Way {
-    /// Sets the motion from these positions, with what ticks have left over for each hand.
+    /// Sets the motion from these positions, with what earlier commands have left over for each hand.
     pub(super) fn begin(&mut self, stack: &Stack, (hands, behind): (&[Hand], &[Command]), moves: &[Move]) {
         self.go_on_from(hands);
         self.commands.clear();

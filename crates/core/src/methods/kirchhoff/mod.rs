@@ -25,7 +25,7 @@
 //!         accept: the next part may be longer
 //!     otherwise
 //!         halve the part; if short, hold friction; if shorter still, relax
-//!     if the solves of a tick are used up: keep what is unfinished with the state
+//!     if the solves of the command are used up: keep what is unfinished with the state
 //! write the report                                                                   report.rs
 //! ```
 //!
@@ -337,7 +337,7 @@ impl<const C: usize> Kirchhoff<C> {
         done.map(|(_, reported)| reported)
     }
 
-    /// Carries out moves as far as so many linear solves go, `usize::MAX` for all of it.
+    /// Carries out moves as a tick of so many linear solves, or as a step with `usize::MAX`.
     fn drive(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
         if self.rests(surroundings, moves) {
             return Ok(());
@@ -350,7 +350,15 @@ impl<const C: usize> Kirchhoff<C> {
         })?;
         match waits {
             // Time proceeds, so the motion of the vessel cannot be postponed.
-            Some(Driven::Overtaken) => return self.drive(surroundings, moves, usize::MAX),
+            Some(Driven::Overtaken(_)) if solves < usize::MAX => {
+                return self.drive(surroundings, moves, usize::MAX);
+            }
+            Some(Driven::Overtaken(most)) => {
+                return Err(Error::Computation(format!(
+                    "kirchhoff: {most} linear solves do not suffice to follow what changes around the device: change \
+                     it, or the time, by less in a step"
+                )));
+            }
             Some(Driven::Waits(rest)) => {
                 let (state, report) = (Arc::make_mut(&mut self.state), Arc::make_mut(&mut self.report));
                 rest.write(state);
@@ -444,6 +452,24 @@ impl<const C: usize> Method for Kirchhoff<C> {
             report.converged = false;
         }
         done
+    }
+
+    fn most_solves(&self, moves: &[Move]) -> Option<usize> {
+        let mut motions = self.state.behind.clone();
+        motions.resize(self.state.hands.len(), Command::default());
+        for one in moves {
+            if let Some(motion) = motions.get_mut(one.instrument) {
+                motion.advance_mm += one.command.advance_mm;
+                motion.rotate_rad += one.command.rotate_rad;
+            }
+        }
+        Some(course::most_solves(&motions, &self.options.tuning.steps))
+    }
+
+    fn forget(&mut self) {
+        let (state, report) = (Arc::make_mut(&mut self.state), Arc::make_mut(&mut self.report));
+        state.forget();
+        report.behind.clone_from(&state.behind);
     }
 
     fn detach(&mut self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {

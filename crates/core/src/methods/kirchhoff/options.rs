@@ -62,7 +62,8 @@ pub struct KirchhoffOptions {
     /// Largest unbalanced force or moment at a node, relative to the largest in the device, its wall and its
     /// supports.
     pub tolerance: f64,
-    /// Largest number of Newton iterations of one solution; a command may take ten times as many.
+    /// Largest number of Newton iterations of one solution; after ten times as many in one command the device only
+    /// moves to where it rests.
     pub max_iterations: usize,
     /// Largest spacing of contact points, in radii of the device. At 1.5 a sharp crest between two of them comes to
     /// within two thirds of a radius of the axis before contact, above 2 it may be missed. On walls without sharp

@@ -22,7 +22,7 @@ pub(super) enum Effort {
 pub(super) struct Limits {
     /// Largest number of Newton iterations.
     pub(super) iterations: usize,
-    /// Largest number of linear solves, unlimited except in ticks.
+    /// Largest number of linear solves.
     pub(super) solves: usize,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Found {
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
-    /// Whether a tick has ended on the way to where the device comes to rest.
+    /// Whether the solves were used up on the way to where the device comes to rest.
     pub(super) is_interrupted: bool,
     /// Whether more energy is stored and dissipated than was put in: then the motion of this part cannot lead there.
     pub(super) lacks: bool,
@@ -61,7 +61,7 @@ pub(super) enum Lost {
     Unbalanced,
     /// No equilibrium was found; with the residual relative to the force scale.
     Unsolved(StopReason, f64),
-    /// The linear solves of a tick were used up.
+    /// The linear solves of the command were used up.
     UnderWay,
 }
 
@@ -96,7 +96,7 @@ impl std::fmt::Display for Lost {
                 f.write_str("what was put in, what is stored and what friction took do not agree")
             }
             Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
-            Self::UnderWay => f.write_str("the linear solves of the tick are used up"),
+            Self::UnderWay => f.write_str("the linear solves of the command are used up"),
         }
     }
 }

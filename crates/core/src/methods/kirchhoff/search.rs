@@ -60,7 +60,7 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) most: usize,
     /// Largest number of linear solves.
     pub(super) most_solves: usize,
-    /// Newton iterations and last shift of earlier ticks in the first solution.
+    /// Newton iterations and last shift of earlier commands in the first solution.
     pub(super) resumed: Option<(usize, f64)>,
     /// Newton iterations taken.
     pub(super) iterations: usize,

@@ -26,7 +26,7 @@ pub struct KirchhoffState {
     pub(super) hands: Vec<Hand>,
     /// Their forces.
     pub(super) hand_forces: Vec<HandForce>,
-    /// Motion of the hands that ticks have not yet carried out; empty if the device is at rest where they are.
+    /// Motion of the hands that commands have not yet carried out; empty if the device is at rest where they are.
     pub(super) behind: Vec<Command>,
     pub(super) rod: RodState,
     /// Whether it has material angles.
@@ -48,14 +48,14 @@ pub struct KirchhoffState {
     pub(super) correction: Correction,
     /// Step size of the next part of a command.
     pub(super) stride: Stride,
-    /// What ticks have left unfinished.
+    /// What commands have left unfinished.
     pub(super) unfinished: Option<Box<Unfinished>>,
     /// Detached coils.
     #[serde(with = "crate::methods::state::shared")]
     pub(super) coils: Coils,
 }
 
-/// A command that ticks have begun.
+/// A command that has begun and is not done.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Unfinished {
     /// Step size control.
@@ -106,7 +106,7 @@ impl Flight {
     }
 }
 
-/// A part of a command whose solution ticks have begun.
+/// A part of a command whose solution has begun.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct UnderWay {
     /// The largest motion of a hand in it, mm.
@@ -165,6 +165,19 @@ impl KirchhoffState {
             coils: Coils::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
             unfinished: None,
+        }
+    }
+
+    /// Drops motion of the hands that is left, and the solution that was begun for it. A relaxation in progress goes on:
+    /// where the device is seen on its way it is not at rest.
+    pub(super) fn forget(&mut self) {
+        if let Some(unfinished) = self.unfinished.as_deref_mut()
+            && unfinished.flight.is_some()
+        {
+            unfinished.part = None;
+            self.behind.fill(Command::default());
+        } else {
+            (self.unfinished, self.behind) = (None, Vec::new());
         }
     }
 

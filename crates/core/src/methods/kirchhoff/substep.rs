@@ -30,7 +30,7 @@ pub(super) struct Part<'a> {
     pub(super) to: f64,
     /// Whether it only goes on from where the last part has left the device, with the hands held still.
     pub(super) holds_still: bool,
-    /// Earlier ticks' progress in it.
+    /// Earlier commands' progress in it.
     pub(super) resumed: Option<&'a UnderWay>,
 }
 
@@ -285,7 +285,7 @@ impl<const C: usize> Tools<C> {
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut after.touches);
             if is_interrupted {
-                // The next tick continues from here, with these normal forces.
+                // The next command continues from here, with these normal forces.
                 contact.anchor_friction(&mesh.elements, rod);
             }
         }
