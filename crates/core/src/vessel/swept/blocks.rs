@@ -92,9 +92,24 @@ impl Blocks {
         self.near((first + knot / STEPS).min(end - 1))
     }
 
-    /// For every block a lower bound of the distance to its lumen, negative in its ball, mm.
-    pub(super) fn gaps<'a>(&'a self, x: &'a Vec3) -> impl Iterator<Item = (f64, Part)> + 'a {
-        self.blocks.iter().map(move |block| ((x - block.centre).norm() - block.reach, block.part))
+    /// The part whose ball is nearest to a position. `None` for none, or if the position is not finite.
+    pub(super) fn nearest_ball(&self, x: &Vec3) -> Option<Part> {
+        let gap = |block: &Block| (x - block.centre).norm() - block.reach;
+        let nearest = self.blocks.iter().map(|block| (gap(block), block.part));
+        nearest.filter(|(gap, _)| gap.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
+    }
+
+    /// The parts whose lumen may be nearer to a position than `lowest` mm, negative within it, at each time.
+    pub(super) fn nearer_than<'a>(
+        &'a self,
+        x: &'a Vec3,
+        lowest: impl Fn() -> f64 + 'a,
+    ) -> impl Iterator<Item = Part> + 'a {
+        let is_nearer = move |block: &&Block| {
+            let within = block.reach + lowest();
+            within > 0.0 && (x - block.centre).norm_squared() < within * within
+        };
+        self.blocks.iter().filter(is_nearer).map(|block| block.part)
     }
 
     fn near(&self, block: usize) -> &[Part] {

@@ -11,6 +11,8 @@
 //! For a point that has sunk into the wall the closest point on its own side of the wall is needed: the search starts
 //! on the tube into which it has sunk, and finds the nearest from there, whatever other lumen is behind.
 
+use std::cell::Cell;
+
 use nalgebra::Matrix3;
 
 use super::axis::NearKnot;
@@ -129,31 +131,30 @@ impl SweptField {
 
     /// Depth of a position in that branch. `None` if not finite.
     fn deepest(&self, x: &Vec3) -> Option<Depth> {
-        let mut best: Option<(Depth, usize)> = None;
-        let mut ask = |part: Part, lowest: &mut f64| {
+        // The one with the nearest ball comes first, which excludes most others.
+        self.deepest_from(x, self.blocks.nearest_ball(x)?).map(|(depth, _)| depth)
+    }
+
+    /// As [`Self::deepest`], with the part in which it is; fastest if that is asked first.
+    fn deepest_from(&self, x: &Vec3, first: Part) -> Option<(Depth, Part)> {
+        let lowest = Cell::new(f64::INFINITY);
+        let mut best: Option<(Depth, usize, Part)> = None;
+        let mut ask = |part: Part| {
             let axis = &self.axes[part.branch as usize];
             let NearKnot { knot, near, .. } = axis.nearest(x, part.from as usize, part.to as usize);
             // From neighbouring parts the search ends at the same foot.
-            if best.is_some_and(|(depth, known)| (depth.branch, known) == (part.branch, knot)) {
+            if best.is_some_and(|(depth, known, _)| (depth.branch, known) == (part.branch, knot)) {
                 return;
             }
             let depth = self.depth(part.branch as usize, x, near);
-            if depth.f < *lowest {
-                (*lowest, best) = (depth.f, Some((depth, knot)));
+            if depth.f < lowest.get() {
+                lowest.set(depth.f);
+                best = Some((depth, knot, part));
             }
         };
-        let mut lowest = f64::INFINITY;
-        // The one with the nearest ball comes first, which excludes most others.
-        let first = self.blocks.gaps(x).min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, part)) = first {
-            ask(part, &mut lowest);
-        }
-        for (gap, part) in self.blocks.gaps(x) {
-            if gap < lowest && first.is_some_and(|(_, done)| done != part) {
-                ask(part, &mut lowest);
-            }
-        }
-        best.map(|(depth, _)| depth)
+        ask(first);
+        self.blocks.nearer_than(x, || lowest.get()).filter(|part| *part != first).for_each(ask);
+        best.map(|(depth, _, part)| (depth, part))
     }
 
     /// Whether a point is in the lumen, including extensions of open ends.
@@ -177,9 +178,11 @@ impl SweptField {
     pub(crate) fn crossing(&self, from: &Vec3, to: &Vec3, farthest: f64) -> Option<f64> {
         let (way, length) = (to - from, (to - from).norm());
         let mut part = 0.0;
+        let mut first = self.blocks.nearest_ball(from)?;
         while part <= farthest && length > 0.0 {
             let x = from + way * part;
-            let depth = self.deepest(&x)?;
+            let (depth, there) = self.deepest_from(&x, first)?;
+            first = there;
             // A position in no branch may still be in a joint.
             if depth.f >= 0.0 && self.level(&depth, &x) >= 0.0 {
                 return Some(part);
@@ -224,19 +227,29 @@ impl SweptField {
         let (branch, knot) = self.blocks.knot(piece);
         let parts = self.blocks.about(branch, knot);
         let mut feet = self.feet(parts, x, 0.0);
-        let room = self.room(&mut feet, x);
+        let (room, only) = self.room(&mut feet, x);
         if room >= limit_mm {
             return Err(room);
         }
-        let Some(value) = self.value(&mut feet, x) else { return Ok(None) };
-        if value.is_distance {
-            let outside = value.f;
-            return Ok(Some(Closest { field: self, feet, place: *x, value, outside, is_distance: true }));
-        }
         // The wall is about as far as f; from near there on everything relevant is known.
-        let size = value.gradient.norm();
-        let start = x - value.gradient * (value.f / (size * size));
-        let mut feet = self.feet(parts, &start, NEARBY * value.radius);
+        let (start, radius) = match only.filter(|depth| !depth.is_distance) {
+            Some(depth) => (
+                x - depth.from_axis * (depth.f / (depth.f + depth.radius).max(f64::MIN_POSITIVE)),
+                depth.radius,
+            ),
+            None => {
+                let Some(value) = self.value(&mut feet, x) else { return Ok(None) };
+                if value.is_distance {
+                    let outside = value.f;
+                    let closest = Closest { field: self, feet, place: *x, value, outside, is_distance: true };
+                    return Ok(Some(closest));
+                }
+                (x - value.gradient * (value.f / value.gradient.norm_squared()), value.radius)
+            }
+        };
+        if (start - x).norm() + NEARBY * radius > feet.within_mm() {
+            feet = self.feet(parts, &start, NEARBY * radius);
+        }
         let Some(value) = self.value(&mut feet, &start) else { return Ok(None) };
         Ok(self.descend(x, feet, start, value))
     }

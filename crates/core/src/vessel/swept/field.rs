@@ -66,6 +66,15 @@ pub(crate) struct Value {
 pub(super) struct Feet {
     all: [(u32, f64); MOST_JOINED],
     count: usize,
+    /// Distance from the position up to which no other branch is relevant, mm.
+    within_mm: f64,
+}
+
+impl Feet {
+    /// Distance from the position up to which no other branch is relevant, mm.
+    pub(super) fn within_mm(&self) -> f64 {
+        self.within_mm
+    }
 }
 
 /// A tree as an implicit surface.
@@ -91,6 +100,10 @@ pub(super) struct Depth {
     pub(super) room: f64,
     /// Radius of the vessel, mm.
     pub(super) radius: f64,
+    /// The position, from the axis, mm.
+    pub(super) from_axis: Vec3,
+    /// Whether f is the distance: a branch without taper.
+    pub(super) is_distance: bool,
     /// The branch, and the arc length of the foot.
     pub(super) branch: u32,
     pub(super) foot: f64,
@@ -100,9 +113,12 @@ impl SweptField {
     /// Depth of a position in a single branch, whose foot is near an arc length.
     pub(super) fn depth(&self, branch: usize, x: &Vec3, near: f64) -> Depth {
         let (foot, place) = self.axes[branch].foot(x, near);
-        let [radius, ..] = place.radius;
-        let f = (x - place.position).norm() - radius;
-        Depth { f, room: -f / self.blocks.steepness(branch), radius, branch: branch as u32, foot }
+        let [radius, taper, flare] = place.radius;
+        let from_axis = x - place.position;
+        let f = from_axis.norm() - radius;
+        let is_distance = taper == 0.0 && flare == 0.0;
+        let room = -f / self.blocks.steepness(branch);
+        Depth { f, room, radius, from_axis, is_distance, branch: branch as u32, foot }
     }
 
     /// The field of a single branch, whose foot is near an arc length.
@@ -157,15 +173,17 @@ impl SweptField {
     }
 
     /// Lower bound of the distance to the wall of a position with these feet, mm: the lumen of each branch is part of
-    /// the whole.
-    pub(super) fn room(&self, feet: &mut Feet, x: &Vec3) -> f64 {
+    /// the whole. With the depth if there is one branch alone.
+    pub(super) fn room(&self, feet: &mut Feet, x: &Vec3) -> (f64, Option<Depth>) {
         let mut room = f64::NEG_INFINITY;
+        let mut last = None;
         for (branch, near) in &mut feet.all[..feet.count] {
             let depth = self.depth(*branch as usize, x, *near);
             *near = depth.foot;
             room = room.max(depth.room);
+            last = Some(depth);
         }
-        room
+        (room, last.filter(|_| feet.count == 1))
     }
 
     /// The parts of branches, of those given, in order, that may be relevant within `way` mm of a position.
@@ -184,7 +202,7 @@ impl SweptField {
                 *known = found;
             }
         }
-        let mut feet = Feet { all: [(0, 0.0); MOST_JOINED], count: 0 };
+        let mut feet = Feet { all: [(0, 0.0); MOST_JOINED], count: 0, within_mm: f64::INFINITY };
         for (index, part) in parts.iter().enumerate() {
             let axis = &self.axes[part.branch as usize];
             let NearKnot { away, knot, near } = known.get(index).copied().unwrap_or_else(|| nearest(part));
@@ -193,8 +211,10 @@ impl SweptField {
             // their slopes; on extensions excepted. A branch higher than another by the largest width of a joint has
             // no effect; a joint is at most between a thin branch and the mean of others.
             let approach = self.blocks.steepness(part.branch as usize) + low.2;
-            let least = away - radius - approach * (axis.step() + way);
-            if axis.is_inner(knot) && least > low.0 + BLEND * radius.min(WIDER * low.1) {
+            let within_mm =
+                (away - radius - low.0 - BLEND * radius.min(WIDER * low.1)) / approach - axis.step();
+            if axis.is_inner(knot) && within_mm > way {
+                feet.within_mm = feet.within_mm.min(within_mm);
                 continue;
             }
             if let Some(foot) = feet.all.get_mut(feet.count) {
