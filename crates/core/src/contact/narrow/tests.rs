@@ -49,18 +49,26 @@ fn a_tube_of_any_fineness_is_round_to_a_device_that_fills_it() {
         let wall = tube(edge * RADIUS_MM, |_| RADIUS_MM);
         for share in [0.75, 0.99] {
             let mesh = felt(&wall, share * RADIUS_MM);
-            let (mut off_mm, mut slope) = (0.0f64, 0.0f64);
+            let (mut off_mm, mut slope, mut worst) = (0.0f64, 0.0f64, 0.0);
             for k in 0..400 {
                 let [s, angle, part] = [0, 1, 2].map(|n| unit(splitmix64(7, 3 * k + n)));
                 let off = (1.0 - share) * RADIUS_MM * (0.5 + 0.7 * part);
                 // Where the bend begins there is no such axis: it is smooth.
                 let s = if s < 0.5 { -6.0 + 8.0 * s } else { 2.0 + 20.0 * (s - 0.5) };
                 let d = at(&mesh, &beside(s, off, std::f64::consts::TAU * angle));
+                let there = (d.value_mm - (RADIUS_MM - off)).abs();
+                if there > off_mm {
+                    worst = s;
+                }
                 off_mm = off_mm.max((d.value_mm - (RADIUS_MM - off)).abs());
                 slope = slope.max((d.gradient.norm() - 1.0).abs());
             }
             // The play is 0.16 and 0.0065 mm.
-            assert!(off_mm < 2e-5 && slope < 1e-4, "edges {edge}, filled {share}: {off_mm:.1e} {slope:.1e}");
+            let felt: Vec<_> = mesh.narrow().unwrap().tubes.iter().map(|tube| &tube.felt).collect();
+            assert!(
+                off_mm < 2e-5 && slope < 1e-4,
+                "edges {edge}, filled {share}: {off_mm:.1e} {slope:.1e} at {worst}, felt {felt:?}"
+            );
         }
     }
 }
@@ -72,7 +80,7 @@ fn derivatives_are_those_of_the_distance_where_a_tube_joins_the_mesh() {
     let mesh = felt(&wall, 0.8 * RADIUS_MM);
     let narrow = mesh.narrow().unwrap();
     let mut joined = 0;
-    for k in 0..300 {
+    for k in 0..600 {
         let [s, angle, part] = [0, 1, 2].map(|n| unit(splitmix64(8, 3 * k + n)));
         let x = beside(-6.0 + 22.0 * s, 0.1 + 0.3 * part, std::f64::consts::TAU * angle);
         let triangle = mesh.query.nearest(&x, 5.0).unwrap().triangle;

@@ -19,7 +19,7 @@ const AROUND: [f64; 2] = [0.4, 1.6];
 /// Least cosine between the inward normal of such a vertex and the direction to the axis.
 const FACING: f64 = 0.5;
 /// Passes of a fit from a vertex, and from the section before.
-const PASSES: [usize; 2] = [6, 1];
+const PASSES: [usize; 2] = [6, 2];
 /// Largest shift in the last pass, in radii.
 const SETTLED: f64 = 0.1;
 /// Largest product of the axis's curvature and the radius.
