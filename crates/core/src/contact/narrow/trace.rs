@@ -105,7 +105,8 @@ impl Tracing<'_> {
             };
             let Some(next) = self.settled(ahead, PASSES[1]) else { break };
             // Around a ring, back at the first.
-            let is_closed = (next.centre - first.centre).norm() < STEP * first.radius_mm;
+            let is_closed =
+                line.len() > LEAST && (next.centre - first.centre).norm() < STEP * first.radius_mm;
             let way = (next.centre - last.centre).dot(&last.along) * sense;
             if is_closed || way < 0.5 * STEP * last.radius_mm {
                 break;
