@@ -41,6 +41,7 @@ use std::ops::Range;
 
 use nalgebra::Matrix3;
 
+use super::narrow::Corner;
 use super::quadric::Quadric;
 use super::quadric_fit::{Neighbours, fit};
 use crate::products::{outer, product, times};
@@ -275,6 +276,21 @@ impl SmoothWall {
             }
             triangle = self.triangles[nearest as usize];
         }
+    }
+
+    /// All vertices, with the curvature of the wall there.
+    pub(super) fn corners(&self) -> impl Iterator<Item = Corner> + '_ {
+        self.quadrics.iter().map(|q| Corner {
+            position: q.position,
+            normal: q.normal,
+            along: q.axes[1],
+            curvature: if q.trust == 1.0 { q.curvature } else { [0.0; 2] },
+        })
+    }
+
+    /// The corners of all triangles.
+    pub(super) fn triangles(&self) -> &[[u32; 3]] {
+        &self.lists.triangles
     }
 
     /// All vertices.

@@ -6,6 +6,7 @@ mod drag;
 pub mod extension;
 pub mod friction;
 mod moved;
+mod narrow;
 pub mod pairs;
 pub(crate) mod passage;
 pub mod point;

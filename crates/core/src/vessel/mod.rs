@@ -51,5 +51,5 @@ pub use recipe::{CentrelineRecipe, NoStore, WallRecipe, WallStore};
 pub use sac::Sac;
 pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use swept::SweptVessel;
-pub(crate) use swept::{ClosestFrom, SweptField};
+pub(crate) use swept::{ClosestFrom, InTube, SweptField, Tube};
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};

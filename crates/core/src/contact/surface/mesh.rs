@@ -7,6 +7,7 @@ use nalgebra::Matrix3;
 use super::reach_mm;
 use crate::contact::distance::Nearness;
 use crate::contact::extension::extended;
+use crate::contact::narrow::Narrow;
 use crate::contact::properties::WallProperties;
 use crate::contact::regions::RegionMap;
 use crate::contact::{Distance, SmoothWall};
@@ -25,6 +26,8 @@ pub struct ContactMesh {
     pub regions: Option<RegionMap>,
     /// Reach of the queries of the device's points, mm.
     pub(in crate::contact) reach_mm: f64,
+    /// Where the lumen is narrow.
+    narrow: Option<Narrow>,
 }
 
 /// Inset, as a fraction of the thickest radius, above which points over the triangles are sampled too.
@@ -74,11 +77,22 @@ impl ContactMesh {
         let query = WallQuery::new(&surface)?;
         // Otherwise the first step would wait for it.
         query.prepare();
-        let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions };
+        let narrow = Narrow::of(&smooth, thickest_mm);
+        let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions, narrow };
+        if let Some(narrow) = &surface.narrow {
+            surface.smooth.deepen(narrow.insets_mm());
+            surface.reach_mm = reach_mm(&surface.smooth);
+        }
         let crests = surface.over_crests(thickest_mm);
         surface.smooth.deepen(crests.into_iter().flatten());
         surface.reach_mm = reach_mm(&surface.smooth);
         Ok(surface)
+    }
+
+    /// Where its lumen is narrow.
+    #[cfg(test)]
+    pub(in crate::contact) fn narrow(&self) -> Option<&Narrow> {
+        self.narrow.as_ref()
     }
 
     /// Insets of the smooth wall over triangles where they are large, mm: beside a crest the smooth wall lies farther
@@ -104,10 +118,25 @@ impl ContactMesh {
     }
 
     /// Distance of `x`, given a triangle at or near the nearest; with derivatives below `limit_mm`.
+    pub(in crate::contact) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
+        let Some(within) = self.narrow.as_ref().and_then(|narrow| narrow.at(x, triangle)) else {
+            return self.nearness_of_mesh(x, triangle, limit_mm);
+        };
+        let found = match within.is_whole() {
+            true => within.alone(),
+            false => match self.nearness_of_mesh(x, triangle, f64::INFINITY) {
+                Nearness::Within(mesh) => within.joined(&mesh),
+                Nearness::Beyond(_) | Nearness::Clear(_) => within.alone(),
+            },
+        };
+        if found.value_mm < limit_mm { Nearness::Within(found) } else { Nearness::Beyond(found.value_mm) }
+    }
+
+    /// As [`Self::nearness`], of the mesh alone.
     ///
     /// Where quadrics hardly reach, the flat triangles replace them gradually: with their coverage C, F = f + λ(C) (d
     /// − f) blends the smooth distance f into that of the triangles, d.
-    pub(in crate::contact) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
+    fn nearness_of_mesh(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
         if let Some((nearness, coverage)) = self.smooth.within(x, triangle, limit_mm)
             && coverage >= COVERED
         {

@@ -110,25 +110,32 @@ pub(super) struct Axis {
 impl Axis {
     pub(super) fn new(branch: &Branch, ends: [End; 2]) -> Self {
         let positions: Vec<Vec3> = branch.samples.iter().map(|sample| sample.position).collect();
-        let moments = natural_moments(&positions, &vec![branch.step; positions.len() - 1]);
+        let widths: Vec<(f64, f64)> =
+            branch.samples.iter().map(|sample| (sample.radius, sample.slope)).collect();
+        Self::through(&positions, &widths, branch.step, ends)
+    }
+
+    /// Through positions about `step` mm apart, with the radius there and its slope. At least two.
+    pub(super) fn through(positions: &[Vec3], widths: &[(f64, f64)], step: f64, ends: [End; 2]) -> Self {
+        let moments = natural_moments(positions, &vec![step; positions.len() - 1]);
         let last = positions.len() - 1;
         let tangent = |k: usize| {
             let (a, b) = (k.min(last - 1), k.min(last - 1) + 1);
-            let chord = (positions[b] - positions[a]) / branch.step;
+            let chord = (positions[b] - positions[a]) / step;
             let bend = if k == a { moments[a] * -2.0 - moments[b] } else { moments[a] + moments[b] * 2.0 };
-            chord + bend * (branch.step / 6.0)
+            chord + bend * (step / 6.0)
         };
-        let h = branch.step;
-        let knots = branch.samples.iter().enumerate().map(|(k, sample)| {
-            let next = &branch.samples[(k + 1).min(last)];
-            let (rise, sa, sb) = (next.radius - sample.radius, sample.slope * h, next.slope * h);
+        let h = step;
+        let knots = widths.iter().enumerate().map(|(k, &(radius, slope))| {
+            let (next_radius, next_slope) = widths[(k + 1).min(last)];
+            let (rise, sa, sb) = (next_radius - radius, slope * h, next_slope * h);
             Knot {
-                position: sample.position,
+                position: positions[k],
                 tangent: tangent(k),
                 moment: moments[k],
                 third: (moments[(k + 1).min(last)] - moments[k]) / h,
-                radius: sample.radius,
-                slope: sample.slope,
+                radius,
+                slope,
                 flare: [(3.0 * rise - 2.0 * sa - sb) / (h * h), (sa + sb - 2.0 * rise) / (h * h * h)],
             }
         });

@@ -10,6 +10,7 @@ mod closest;
 mod field;
 #[cfg(test)]
 mod tests;
+mod tube;
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
@@ -27,6 +28,7 @@ use blocks::Blocks;
 pub(crate) use closest::From as ClosestFrom;
 use closest::From;
 pub(crate) use field::SweptField;
+pub(crate) use tube::{InTube, Tube};
 
 /// Number of sample points on a cross-section, from which extensions of openings are kept apart.
 const AROUND: usize = 12;
