@@ -125,7 +125,8 @@ impl Tracing<'_> {
         for pass in 0..passes {
             let r = at.radius_mm;
             let directions = across(&at.along);
-            (around.clear(), spots.clear());
+            around.clear();
+            spots.clear();
             for v in self.vertices.within(&at.centre, r * (HEIGHT * HEIGHT + AROUND[1] * AROUND[1]).sqrt()) {
                 let corner = &self.vertices.all[v as usize];
                 let y = corner.position - at.centre;
@@ -260,7 +261,7 @@ fn even(line: &[Section]) -> Option<(Vec<Vec3>, Vec<f64>)> {
     let least_mm = line.iter().map(|section| section.radius_mm).fold(f64::INFINITY, f64::min);
     let (length_mm, last) = (way[way.len() - 1], line.len() - 1);
     let pieces = (length_mm / (STEP * least_mm)).ceil() as usize;
-    if pieces < LEAST || pieces > 2 * MOST {
+    if !(LEAST..=2 * MOST).contains(&pieces) {
         return None;
     }
     let (mut centres, mut radii, mut side) = (Vec::new(), Vec::new(), 0);
