@@ -141,7 +141,7 @@ impl Mesh {
         self.points.reserve(points.saturating_sub(self.points.len()));
     }
 
-    /// Meshes `inserted_mm` (above 0) of `device`; for its nodes see [`nodes_from_tip`].
+    /// Meshes `inserted_mm` (above 0) of `device`; for its nodes see `stretches.rs`.
     pub fn build(&mut self, device: &Device, inserted_mm: f64, fineness: Fineness, modulus_n_per_mm2: f64) {
         self.build_points(device, inserted_mm, fineness, modulus_n_per_mm2);
         self.flush_mm = fineness.flush_mm();
