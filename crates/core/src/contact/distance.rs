@@ -49,6 +49,7 @@ use crate::vessel::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Vec3, parallel};
 use over::Lists;
 use passing::PASSING;
+pub(in crate::contact) use passing::rise;
 
 /// Sum of weights below which no vertex reaches a point.
 const LEAST_WEIGHT: f64 = 1e-9;

@@ -52,7 +52,7 @@ pub struct FollowPath {
     within_mm: f64,
     failed_mm: f64,
     /// Angle between the path ahead and the target direction of the tip, rad.
-    lateral_rad: f64,
+    offset_rad: f64,
     /// Rotations since the last push.
     turns: usize,
     /// Initial position on the path of the tip of the whole line, mm: that of a wire over which the lead follows.
@@ -72,7 +72,7 @@ impl FollowPath {
             retries: 0,
             within_mm: 0.0,
             failed_mm: 0.0,
-            lateral_rad: 0.0,
+            offset_rad: 0.0,
             turns: 0,
             held_mm: None,
         }
@@ -122,7 +122,7 @@ impl FollowPath {
         if is_within {
             self.within_mm = self.within_mm.max(within.arc_mm);
             if within.arc_mm > self.failed_mm + PAST_MM {
-                self.lateral_rad = 0.0;
+                self.offset_rad = 0.0;
             }
         }
         let astray_mm = (ASTRAY * tip_mm).max(LEAST_ASTRAY_MM);
@@ -132,7 +132,7 @@ impl FollowPath {
             self.retries += 1;
             self.back_mm = BACK_MM;
             self.failed_mm = std::mem::take(&mut self.within_mm);
-            self.lateral_rad = (self.lateral_rad + GOLDEN_RAD) % TAU;
+            self.offset_rad = (self.offset_rad + GOLDEN_RAD) % TAU;
             return Command::rotate(0.0);
         }
         // The two differ at the mouths of branches. Which of them leads on is not known in advance: attempts
@@ -166,7 +166,7 @@ impl FollowPath {
         if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
             return 0.0;
         }
-        let angle = libm::atan2(axis.dot(&bend.cross(&wish)), bend.dot(&wish)) + self.lateral_rad;
+        let angle = libm::atan2(axis.dot(&bend.cross(&wish)), bend.dot(&wish)) + self.offset_rad;
         let nearest_way = (angle + PI).rem_euclid(TAU) - PI;
         nearest_way.clamp(-TURN_RAD, TURN_RAD)
     }

@@ -337,7 +337,7 @@ impl Simulation {
         if each.is_empty() {
             return error;
         }
-        let told = |text: String| {
+        let with_rest = |text: String| {
             format!(
                 "{text}; {} are behind, from commands before: finish them with ticks or steps without motion, or drop \
                  them with forget",
@@ -346,9 +346,9 @@ impl Simulation {
         };
         match error {
             Error::Parameter { name, value, remedy } => {
-                Error::Parameter { name, value, remedy: told(remedy) }
+                Error::Parameter { name, value, remedy: with_rest(remedy) }
             }
-            Error::Computation(reason) => Error::Computation(told(reason)),
+            Error::Computation(reason) => Error::Computation(with_rest(reason)),
             other => other,
         }
     }

@@ -38,6 +38,7 @@ pub use check::{CheckReport, OpeningReport, check, check_with};
 pub use conditioning::{Conditioned, Conditioning, condition};
 pub use extract::{CentrelineBranch, CentrelineEnd, ExtractedCentreline};
 pub use files::{PatientAxes, SurfaceFrame};
+pub(crate) use generate::any_perpendicular;
 pub use generate::{GeneratedWall, Resolution};
 pub use hints::wall_hints;
 pub use lumen::{Lumen, Meshed};

@@ -143,12 +143,12 @@ mod tests {
         }
         // Beside the mouth of the branch, in the trunk: nearer to the branch's line, and deeper in the trunk.
         let (fork_mm, in_branch_mm) = (path.at(201.0), path.at(224.0));
-        let lateral = fork_mm + (in_branch_mm - fork_mm) * 0.6;
-        let (near, deep) = (path.nearest(&lateral), path.deepest(&lateral));
+        let beside = fork_mm + (in_branch_mm - fork_mm) * 0.6;
+        let (near, deep) = (path.nearest(&beside), path.deepest(&beside));
         assert!(deep.distance_mm - deep.radius_mm <= near.distance_mm - path.place(near.arc_mm).1 + 1e-9);
         for arc_mm in (0..=3000).map(|k| path.length_mm() * k as f64 / 3000.0) {
             let (place, radius_mm) = path.place(arc_mm);
-            let deeper = (place - lateral).norm() - radius_mm;
+            let deeper = (place - beside).norm() - radius_mm;
             assert!(deeper >= deep.distance_mm - deep.radius_mm - 1e-6, "{arc_mm} {deeper} {deep:?}");
         }
         assert_eq!(path.at(1e9), path.end_mm());

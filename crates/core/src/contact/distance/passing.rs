@@ -110,8 +110,8 @@ impl SmoothWall {
     }
 }
 
-/// S and its derivatives.
-fn rise(x: f64) -> [f64; 3] {
+/// S and its derivatives: 10x³ − 15x⁴ + 6x⁵ between 0 and 1.
+pub(in crate::contact) fn rise(x: f64) -> [f64; 3] {
     if x <= 0.0 {
         return [0.0; 3];
     }

@@ -20,13 +20,15 @@ mod trace;
 mod vertices;
 
 use super::SmoothWall;
+use super::distance::rise;
 use crate::vessel::{InTube, Tube};
 use crate::{Vec3, products::outer};
 use nalgebra::Matrix3;
 pub(super) use vertices::Corner;
 use vertices::Vertices;
 
-/// v and w: radius of the lumen, over that of the device, up to which the tube is felt, and from which the mesh is.
+/// v and w: radius of the lumen, over that of the device, up to which the tube counts alone, and from which the mesh
+/// does.
 const NARROW: (f64, f64) = (1.5, 1.7);
 /// Radius over that of the device up to which the wall around a vertex of a coarse mesh may appear bent for the
 /// lumen to be looked at.
@@ -35,21 +37,21 @@ const LOOKED_AT: f64 = 2.0;
 const STRAIGHT: f64 = 0.5;
 /// How far the wall may be off a tube, over the play.
 const ROUND: f64 = 0.25;
-/// Part of a tube at its ends that is not felt, and length over which it is joined to the mesh, in its radii.
+/// Part of a tube at its ends that does not count, and length over which it is joined to the mesh, in its radii.
 const LEFT_OUT: f64 = 0.75;
 const JOINED: f64 = 1.0;
 
 /// No place.
 const NONE: u32 = u32::MAX;
 
-/// A tube, and where it is felt.
+/// A tube, and where it counts.
 #[derive(Debug, Clone)]
 struct Fitted {
     tube: Tube,
     /// Number of its first centre among those of all.
     first: u32,
-    /// Arc lengths between which it is felt, and over which it is joined to the mesh there, mm.
-    felt: Vec<([f64; 2], f64)>,
+    /// Arc lengths between which it counts, and over which it is joined to the mesh there, mm.
+    ranges: Vec<([f64; 2], f64)>,
 }
 
 /// The narrow stretches of a wall.
@@ -77,28 +79,28 @@ impl Narrow {
     /// The narrow stretches of a wall for devices up to this radius, mm; `None` if it has none.
     pub(super) fn of(smooth: &SmoothWall, thickest_mm: f64) -> Option<Self> {
         let least_per_mm = (LOOKED_AT * thickest_mm).recip();
-        let corners: Vec<Corner> = smooth.corners().collect();
         let is_seed = |corner: &Corner| {
             let [around, along] = corner.curvature;
             around > least_per_mm && along.abs() < STRAIGHT * around
         };
-        let seeds: Vec<u32> = (0..corners.len() as u32).filter(|v| is_seed(&corners[*v as usize])).collect();
+        let seeds = (0..).zip(smooth.corners()).filter(|(_, corner)| is_seed(corner)).map(|(v, _)| v);
+        let seeds: Vec<u32> = seeds.collect();
         if seeds.is_empty() {
             return None;
         }
         let widest_mm = NARROW.1 * thickest_mm;
-        let vertices = Vertices::new(corners, widest_mm);
+        let vertices = Vertices::new(smooth.corners().collect(), widest_mm);
         let mut all = Self { tubes: Vec::new(), places: Vec::new(), off_mm: Vec::new(), thickest_mm };
         let mut at = vec![NONE; vertices.all.len()];
         for traced in trace::traced(&vertices, &seeds, widest_mm) {
-            let felt = felt(&traced.tube, &traced.off_mm, thickest_mm);
-            if felt.is_empty() {
+            let ranges = ranges(&traced.tube, &traced.off_mm, thickest_mm);
+            if ranges.is_empty() {
                 continue;
             }
             let first = all.off_mm.len() as u32;
             traced.vertices.iter().for_each(|(v, centre)| at[*v as usize] = first + centre);
             all.off_mm.extend(&traced.off_mm);
-            all.tubes.push(Fitted { tube: traced.tube, first, felt });
+            all.tubes.push(Fitted { tube: traced.tube, first, ranges });
         }
         if all.tubes.is_empty() {
             return None;
@@ -108,7 +110,7 @@ impl Narrow {
         Some(all)
     }
 
-    /// How far the wall may lie inside its triangles where tubes are felt, mm.
+    /// How far the wall may lie inside its triangles where tubes count, mm.
     pub(super) fn insets_mm(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         let off_mm = |place: u32| self.off_mm[place as usize].min(self.thickest_mm);
         let known = self.places.iter().enumerate().filter(|(_, place)| **place != NONE);
@@ -122,14 +124,14 @@ impl Narrow {
             return None;
         }
         let index = self.tubes.partition_point(|fitted| fitted.first <= place) - 1;
-        let Fitted { tube, first, felt } = &self.tubes[index];
+        let Fitted { tube, first, ranges } = &self.tubes[index];
         let found = tube.at(x, tube.step_mm() * f64::from(place - first));
         let s = found.foot_mm;
-        let &([low, high], over_mm) = felt.iter().find(|([low, high], _)| *low < s && s < *high)?;
-        let (begun, ended) = (risen((s - low) / over_mm), risen((high - s) / over_mm));
+        let &([low, high], over_mm) = ranges.iter().find(|([low, high], _)| *low < s && s < *high)?;
+        let (begun, ended) = (rise((s - low) / over_mm), rise((high - s) / over_mm));
         let span_mm = (NARROW.1 - NARROW.0) * self.thickest_mm;
         let [r, r1, r2] = found.radius;
-        let tight = risen((NARROW.1 * self.thickest_mm - r) / span_mm);
+        let tight = rise((NARROW.1 * self.thickest_mm - r) / span_mm);
         // Each by arc length.
         let a = [begun[0], begun[1] / over_mm, begun[2] / (over_mm * over_mm)];
         let b = [ended[0], -ended[1] / over_mm, ended[2] / (over_mm * over_mm)];
@@ -150,7 +152,7 @@ impl Narrow {
 }
 
 impl Within {
-    /// Whether the mesh is not felt at all.
+    /// Whether the mesh does not count at all.
     pub(super) fn is_whole(&self) -> bool {
         self.share >= 1.0
     }
@@ -179,11 +181,11 @@ impl Within {
     }
 }
 
-/// Arc lengths between which a tube is felt, and the lengths over which it is joined to the mesh: where it is narrow
+/// Arc lengths between which a tube counts, and the lengths over which it is joined to the mesh: where it is narrow
 /// and round. Its ends, beyond which no triangle tells of it, are left out.
-fn felt(tube: &Tube, off_mm: &[f64], thickest_mm: f64) -> Vec<([f64; 2], f64)> {
+fn ranges(tube: &Tube, off_mm: &[f64], thickest_mm: f64) -> Vec<([f64; 2], f64)> {
     let step_mm = tube.step_mm();
-    let is_felt = |k: usize| {
+    let counts = |k: usize| {
         let (r, bend) = tube.radius_and_bend(step_mm * k as f64);
         let [from_start, from_end] = [k, off_mm.len() - 1 - k].map(|steps| step_mm * steps as f64);
         let is_inner = from_start.min(from_end) >= LEFT_OUT * r;
@@ -192,7 +194,7 @@ fn felt(tube: &Tube, off_mm: &[f64], thickest_mm: f64) -> Vec<([f64; 2], f64)> {
     let mut found = Vec::new();
     let mut from = None;
     for k in 0..=off_mm.len() {
-        if k < off_mm.len() && is_felt(k) {
+        if k < off_mm.len() && counts(k) {
             from = from.or(Some(k));
         } else if let Some(first) = from.take() {
             let ends = [step_mm * first as f64, step_mm * (k - 1) as f64];
@@ -208,16 +210,4 @@ fn felt(tube: &Tube, off_mm: &[f64], thickest_mm: f64) -> Vec<([f64; 2], f64)> {
 /// The product of two functions, with two derivatives.
 fn times(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]]
-}
-
-/// S with its derivatives: 10x³ − 15x⁴ + 6x⁵ between 0 and 1.
-fn risen(x: f64) -> [f64; 3] {
-    if x <= 0.0 {
-        return [0.0; 3];
-    }
-    if x >= 1.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    let y = 1.0 - x;
-    [x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * y * y, 60.0 * x * y * (y - x)]
 }

@@ -15,6 +15,7 @@ use std::f64::consts::FRAC_PI_4;
 use nalgebra::{SMatrix, SVector};
 
 use crate::Vec3;
+use crate::vessel::any_perpendicular;
 
 /// Number of coefficients.
 const TERMS: usize = 11;
@@ -83,8 +84,7 @@ pub(super) fn fitted(spots: impl Iterator<Item = Spot>, highest: f64) -> Option<
 
 /// Two directions across a third.
 pub(super) fn across(along: &Vec3) -> [Vec3; 2] {
-    let axis = Vec3::ith(along.iamin(), 1.0);
-    let e = (axis - along * along.dot(&axis)).normalize();
+    let e = any_perpendicular(along);
     [e, along.cross(&e)]
 }
 

@@ -64,10 +64,10 @@ fn a_tube_of_any_fineness_is_round_to_a_device_that_fills_it() {
                 slope = slope.max((d.gradient.norm() - 1.0).abs());
             }
             // The play is 0.16 and 0.0065 mm.
-            let felt: Vec<_> = mesh.narrow().unwrap().tubes.iter().map(|tube| &tube.felt).collect();
+            let ranges: Vec<_> = mesh.narrow().unwrap().tubes.iter().map(|tube| &tube.ranges).collect();
             assert!(
                 off_mm < 2e-5 && slope < 1e-4,
-                "edges {edge}, filled {share}: {off_mm:.1e} {slope:.1e} at {worst}, felt {felt:?}"
+                "edges {edge}, filled {share}: {off_mm:.1e} {slope:.1e} at {worst}, ranges {ranges:?}"
             );
         }
     }

@@ -169,27 +169,13 @@ impl Tracing<'_> {
         let members = self.members(&centres, &radii);
         let mut fits = vec![None; centres.len()];
         let mut tube = Tube::new(&centres, &radii);
-        for round in 0.. {
-            let mut spots = self.spots(&tube, &members);
-            spots.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for _ in 0..ROUNDS {
+            let spots = self.spots(&tube, &members);
             let step_mm = tube.step_mm();
-            let slice = |k: usize, reach_mm: f64| {
-                let s = step_mm * k as f64;
-                let from = spots.partition_point(|spot| spot.0 <= s - reach_mm);
-                &spots[from..spots.partition_point(|spot| spot.0 < s + reach_mm)]
-            };
-            if round == ROUNDS {
-                let off_mm = |k: usize| match fits[k] {
-                    Some(_) => slice(k, LOCAL * radii[k]).iter().map(|spot| spot.2.abs()).fold(0.0, f64::max),
-                    None => f64::INFINITY,
-                };
-                let off_mm = (0..centres.len()).map(off_mm).collect();
-                return Some(Traced { tube, off_mm, vertices: members });
-            }
             fits = parallel::map(centres.len(), |k| {
                 let (s, r) = (step_mm * k as f64, radii[k]);
                 let directions = across(&tube.tangent(s));
-                let seen = slice(k, HEIGHT * r).iter().map(|(at, towards, excess_mm)| Spot {
+                let seen = about(&spots, s, HEIGHT * r).iter().map(|(at, towards, excess_mm)| Spot {
                     height: (at - s) / r,
                     towards: directions.map(|d| d.dot(towards)),
                     excess: excess_mm / r,
@@ -205,7 +191,16 @@ impl Tracing<'_> {
             }
             tube = Tube::new(&centres, &radii);
         }
-        None
+        let spots = self.spots(&tube, &members);
+        let off_mm = |k: usize| match fits[k] {
+            Some(_) => {
+                let near = about(&spots, tube.step_mm() * k as f64, LOCAL * radii[k]);
+                near.iter().map(|(.., excess_mm)| excess_mm.abs()).fold(0.0, f64::max)
+            }
+            None => f64::INFINITY,
+        };
+        let off_mm = (0..centres.len()).map(off_mm).collect();
+        Some(Traced { tube, off_mm, vertices: members })
     }
 
     /// Vertices around centres, each with that next to it.
@@ -222,34 +217,40 @@ impl Tracing<'_> {
         found.into_iter().map(|(v, _, k)| (v, k)).collect()
     }
 
-    /// Arc length, direction and excess, mm, of those vertices that are the wall of a tube.
+    /// Arc length, direction and excess, mm, of those vertices that are the wall of a tube, along it.
     fn spots(&self, tube: &Tube, members: &[(u32, u32)]) -> Vec<(f64, Vec3, f64)> {
         let of = |&(v, k): &(u32, u32)| {
             let corner = &self.vertices.all[v as usize];
-            let (s, place, _, r) = tube.foot(&corner.position, tube.step_mm() * f64::from(k));
+            let (s, place, r) = tube.foot(&corner.position, tube.step_mm() * f64::from(k));
             let offset = corner.position - place;
             let off_mm = offset.norm();
-            let is_wall = off_mm > AROUND[0] * r
-                && off_mm < AROUND[1] * r
-                && corner.normal.dot(&offset) < -FACING * off_mm;
-            (is_wall && tube.holds(s)).then(|| (s, offset / off_mm, off_mm - r))
+            let is_spot = tube.holds(s) && is_wall(corner, &offset, r);
+            is_spot.then(|| (s, offset / off_mm, off_mm - r))
         };
-        members.iter().filter_map(of).collect()
+        let mut spots: Vec<_> = members.iter().filter_map(of).collect();
+        spots.sort_by(|a, b| a.0.total_cmp(&b.0));
+        spots
     }
+}
+
+/// Those of sorted spots whose arc length is within `reach_mm` of one.
+fn about(spots: &[(f64, Vec3, f64)], s: f64, reach_mm: f64) -> &[(f64, Vec3, f64)] {
+    let from = spots.partition_point(|spot| spot.0 <= s - reach_mm);
+    &spots[from..spots.partition_point(|spot| spot.0 < s + reach_mm)]
+}
+
+/// Whether a vertex at an offset from the axis of a section with radius r is its wall.
+fn is_wall(corner: &Corner, offset: &Vec3, r: f64) -> bool {
+    let off_mm = offset.norm();
+    off_mm > AROUND[0] * r && off_mm < AROUND[1] * r && corner.normal.dot(offset) < -FACING * off_mm
 }
 
 /// A vertex at a height, mm, and an offset from the axis of a section with radius r; `None` if it is not its wall.
 fn spot(corner: &Corner, offset: &Vec3, (z, r): (f64, f64), directions: &[Vec3; 2]) -> Option<Spot> {
     let off_mm = offset.norm();
-    if z.abs() >= HEIGHT * r
-        || off_mm < AROUND[0] * r
-        || off_mm > AROUND[1] * r
-        || corner.normal.dot(offset) > -FACING * off_mm
-    {
-        return None;
-    }
+    let is_spot = z.abs() < HEIGHT * r && is_wall(corner, offset, r);
     let towards = directions.map(|d| d.dot(offset) / off_mm);
-    Some(Spot { height: z / r, towards, excess: off_mm / r - 1.0 })
+    is_spot.then_some(Spot { height: z / r, towards, excess: off_mm / r - 1.0 })
 }
 
 /// Centres and radii at equal distances along sections.

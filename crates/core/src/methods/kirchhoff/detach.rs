@@ -39,16 +39,7 @@ pub(super) fn check(environment: &Environment<'_>, from: &KirchhoffState, instru
     let inserted_mm: Vec<f64> = lengths(&from.hands).collect();
     let left_mm = stack.out_mm(instrument, &inserted_mm) - inserted_mm[instrument];
     if left_mm > LENGTH_SLACK_MM {
-        let behind_mm = from.behind.get(instrument).map_or(0.0, |left| left.advance_mm);
-        let also = if behind_mm == 0.0 {
-            String::new()
-        } else {
-            format!(
-                "; {behind_mm:.3} mm of its motion are behind: finish them with ticks or steps without motion, or drop \
-                 them with forget"
-            )
-        };
-        return refused(format!("is not out yet: advance it by {left_mm:.3} mm{also}"));
+        return refused(format!("is not out yet: advance it by {left_mm:.3} mm"));
     }
     Ok(coil_mm)
 }

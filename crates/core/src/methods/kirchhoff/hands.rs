@@ -80,6 +80,20 @@ pub(super) fn longest_mm(motions: &[HandMotion]) -> f64 {
     motions.iter().fold(0.0, |most_mm, hand| hand.advance_mm().abs().max(most_mm))
 }
 
+/// Writes the motion of each of so many hands: what earlier commands have left over, and these moves.
+pub(super) fn add_moves(hands: usize, behind: &[Command], moves: &[Move], motions: &mut Vec<Command>) {
+    motions.clear();
+    motions.extend_from_slice(behind);
+    motions.resize(hands, Command::default());
+    for one in moves {
+        // Moves of instruments that do not exist are refused before they are carried out.
+        if let Some(motion) = motions.get_mut(one.instrument) {
+            motion.advance_mm += one.command.advance_mm;
+            motion.rotate_rad += one.command.rotate_rad;
+        }
+    }
+}
+
 /// Largest motion in commands, mm; a rotation of `turn_rad` counts as one.
 pub(super) fn largest_mm(commands: impl Iterator<Item = Command>, turn_rad: f64) -> f64 {
     let each = commands.map(|one| one.advance_mm.abs().max(one.rotate_rad.abs() / turn_rad));
@@ -106,14 +120,7 @@ impl Way {
     /// Sets the motion from these positions, with what earlier commands have left over for each hand.
     pub(super) fn begin(&mut self, stack: &Stack, (hands, behind): (&[Hand], &[Command]), moves: &[Move]) {
         self.go_on_from(hands);
-        self.commands.clear();
-        self.commands.resize(self.start.len(), Command::default());
-        self.commands.iter_mut().zip(behind).for_each(|(command, behind)| *command = *behind);
-        for one in moves {
-            let command = &mut self.commands[one.instrument];
-            command.advance_mm += one.command.advance_mm;
-            command.rotate_rad += one.command.rotate_rad;
-        }
+        add_moves(hands.len(), behind, moves, &mut self.commands);
         self.target.clear();
         for ((hand, command), device) in self.start.iter().zip(&self.commands).zip(stack.devices()) {
             let target = (hand.inserted_mm + command.advance_mm).min(device.length_mm());

@@ -100,7 +100,7 @@ fn flush_sections(
 }
 
 /// Whether both are of the same material.
-fn is_same(a: &Section, b: &Section) -> bool {
+pub(super) fn is_same(a: &Section, b: &Section) -> bool {
     a.bending_stiffness_nmm2 == b.bending_stiffness_nmm2
         && a.rest_curvature_per_mm == b.rest_curvature_per_mm
         && a.torsion_nmm2() == b.torsion_nmm2()

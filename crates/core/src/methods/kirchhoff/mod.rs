@@ -455,14 +455,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn most_solves(&self, moves: &[Move]) -> Option<usize> {
-        let mut motions = self.state.behind.clone();
-        motions.resize(self.state.hands.len(), Command::default());
-        for one in moves {
-            if let Some(motion) = motions.get_mut(one.instrument) {
-                motion.advance_mm += one.command.advance_mm;
-                motion.rotate_rad += one.command.rotate_rad;
-            }
-        }
+        let mut motions = Vec::new();
+        hands::add_moves(self.state.hands.len(), &self.state.behind, moves, &mut motions);
         Some(course::most_solves(&motions, &self.options.tuning.steps))
     }
 

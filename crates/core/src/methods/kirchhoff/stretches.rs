@@ -4,6 +4,7 @@
 //! section. A device whose sections are cut in pieces has the same stretches, and a taper of many short sections needs
 //! no node for each. Where stiffness, radius or rest curvature jumps a stretch ends, however short it is.
 
+use super::material::is_same;
 use super::mesh::Fineness;
 use crate::device::{Device, Section};
 
@@ -52,10 +53,7 @@ impl Stretch {
 
 /// What follows each other without a change.
 fn are_equal(a: &Section, b: &Section) -> bool {
-    let stiffness = |s: &Section| (s.bending_stiffness_nmm2, s.torsion_nmm2());
-    stiffness(a) == stiffness(b)
-        && a.radius_mm == b.radius_mm
-        && a.rest_curvature_per_mm == b.rest_curvature_per_mm
+    is_same(a, b) && a.radius_mm == b.radius_mm
 }
 
 /// Whether no node is needed where one follows the other.

@@ -164,17 +164,17 @@ impl<const C: usize> Tools<C> {
         (on_wall.0 + on_loops.0 + between_mj, on_wall.1 + on_loops.1 + between_mj)
     }
 
-    /// The energy balance of a part in which the wall moved, the drag did `lateral_mj`, and friction dissipated
+    /// The energy balance of a part in which the wall moved, the drag did `by_drag_mj`, and friction dissipated
     /// this at least and at most.
     fn balance(
         &self,
         environment: &Environment<'_>,
         (was, is): (Start<'_>, Start<'_>),
-        (left, lateral_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
+        (left, by_drag_mj): (Option<(Start<'_>, Passage<'_>)>, f64),
         friction_mj: (f64, f64),
     ) -> Balance {
         let motions = &self.guess.motions;
-        let flow_mj = lateral_mj + self.drag.size_n() * longest_mm(motions);
+        let flow_mj = by_drag_mj + self.drag.size_n() * longest_mm(motions);
         let touches = [was, is].map(|at| &at.state.touches[..]);
         let by_wall = work_of_wall(left.map(|(_, passage)| passage), touches);
         let by_others = by_wall.with_flow(flow_mj).with(work_of_fields(environment, was, is));
@@ -289,7 +289,7 @@ impl<const C: usize> Tools<C> {
                 contact.anchor_friction(&mesh.elements, rod);
             }
         }
-        let lateral_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
+        let by_drag_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
         self.counters.add(&contact.count());
         self.work.add(taken, mesh.elements.len());
         if let Some(wrong) = wrong {
@@ -306,7 +306,7 @@ impl<const C: usize> Tools<C> {
         if found.residual > tuning.steps.at_rest {
             next.parts().1.hand_forces.clone_from(&start.state.hand_forces);
         }
-        let balance = self.balance(environment, (start, next.start()), (left, lateral_mj), friction_mj);
+        let balance = self.balance(environment, (start, next.start()), (left, by_drag_mj), friction_mj);
         let after = next.parts().1;
         let lacks = balance.lacks();
         // Only a short part shows a jump: in a long one forces may go far beyond their values at its ends.

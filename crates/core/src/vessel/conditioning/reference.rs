@@ -254,7 +254,7 @@ pub(super) fn square_to(x: &Vec3, corners: &[Vec3; 3]) -> f64 {
 /// The nearest triangle that faces the same way, and the square of its distance; a needle's normal is meaningless.
 pub(super) fn nearest(mesh: &SurfaceMesh, tree: &Bvh, x: &Vec3, normal: &Vec3) -> Option<(u32, f64)> {
     let size = normal.norm();
-    let lateral = |node: &BvhNode, _: f64| {
+    let square_to_box = |node: &BvhNode, _: f64| {
         let (low, high) = (node.mins(), node.maxs());
         let gap = |x: f64, low: f64, high: f64| (low - x).max(x - high).max(0.0);
         gap(x.x, low.x, high.x).powi(2) + gap(x.y, low.y, high.y).powi(2) + gap(x.z, low.z, high.z).powi(2)
@@ -265,5 +265,5 @@ pub(super) fn nearest(mesh: &SurfaceMesh, tree: &Bvh, x: &Vec3, normal: &Vec3) -
         let other = (b - a).cross(&(c - a));
         (other.dot(normal) >= OTHER_SHEET * size * other.norm()).then(|| square_to(x, &corners))
     };
-    tree.find_best(f64::MAX, lateral, leaf)
+    tree.find_best(f64::MAX, square_to_box, leaf)
 }

@@ -22,7 +22,7 @@ use super::{CentrelineTree, SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3, parallel};
 use field::Field;
 pub(super) use field::{BLEND, BLEND_COSINES, HIDDEN};
-pub(super) use sweep::any_perpendicular;
+pub(crate) use sweep::any_perpendicular;
 use trim::End;
 pub(super) use trim::{End as TreeEnd, ends as open_ends};
 

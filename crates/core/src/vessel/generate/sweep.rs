@@ -67,7 +67,7 @@ fn frames(places: &[Place]) -> Vec<(Vec3, Vec3)> {
 }
 
 /// A unit vector perpendicular to `axis`, from the coordinate axis least aligned with it.
-pub(in crate::vessel) fn any_perpendicular(axis: &Vec3) -> Vec3 {
+pub(crate) fn any_perpendicular(axis: &Vec3) -> Vec3 {
     let least = Vec3::ith_axis(axis.iamin()).into_inner();
     (least - axis * axis.dot(&least)).normalize()
 }

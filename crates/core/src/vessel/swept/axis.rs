@@ -119,19 +119,13 @@ impl Axis {
     pub(super) fn through(positions: &[Vec3], widths: &[(f64, f64)], step: f64, ends: [End; 2]) -> Self {
         let moments = natural_moments(positions, &vec![step; positions.len() - 1]);
         let last = positions.len() - 1;
-        let tangent = |k: usize| {
-            let (a, b) = (k.min(last - 1), k.min(last - 1) + 1);
-            let chord = (positions[b] - positions[a]) / step;
-            let bend = if k == a { moments[a] * -2.0 - moments[b] } else { moments[a] + moments[b] * 2.0 };
-            chord + bend * (step / 6.0)
-        };
         let h = step;
         let knots = widths.iter().enumerate().map(|(k, &(radius, slope))| {
             let (next_radius, next_slope) = widths[(k + 1).min(last)];
             let (rise, sa, sb) = (next_radius - radius, slope * h, next_slope * h);
             Knot {
                 position: positions[k],
-                tangent: tangent(k),
+                tangent: spline_slope(positions, &moments, step, k),
                 moment: moments[k],
                 third: (moments[(k + 1).min(last)] - moments[k]) / h,
                 radius,
@@ -332,6 +326,15 @@ impl Axis {
             };
         }
     }
+}
+
+/// First derivative at a knot of the natural spline through points `step` apart with these second derivatives.
+pub(super) fn spline_slope(points: &[Vec3], moments: &[Vec3], step: f64, knot: usize) -> Vec3 {
+    let a = knot.min(points.len() - 2);
+    let b = a + 1;
+    let chord = (points[b] - points[a]) / step;
+    let bend = if knot == a { moments[a] * -2.0 - moments[b] } else { moments[a] + moments[b] * 2.0 };
+    chord + bend * (step / 6.0)
 }
 
 /// Half the second derivative of the squared distance from the axis; positive at a foot, since bends are wider than the vessel.

@@ -92,24 +92,28 @@ impl Blocks {
         self.near((first + knot / STEPS).min(end - 1))
     }
 
-    /// The part whose ball is nearest to a position. `None` for none, or if the position is not finite.
-    pub(super) fn nearest_ball(&self, x: &Vec3) -> Option<Part> {
-        let gap = |block: &Block| (x - block.centre).norm() - block.reach;
-        let nearest = self.blocks.iter().map(|block| (gap(block), block.part));
-        nearest.filter(|(gap, _)| gap.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
+    /// Number of blocks.
+    pub(super) fn len(&self) -> usize {
+        self.blocks.len()
     }
 
-    /// The parts whose lumen may be nearer to a position than `lowest` mm, negative within it, at each time.
-    pub(super) fn nearer_than<'a>(
-        &'a self,
-        x: &'a Vec3,
-        lowest: impl Fn() -> f64 + 'a,
-    ) -> impl Iterator<Item = Part> + 'a {
-        let is_nearer = move |block: &&Block| {
-            let within = block.reach + lowest();
-            within > 0.0 && (x - block.centre).norm_squared() < within * within
-        };
-        self.blocks.iter().filter(is_nearer).map(|block| block.part)
+    /// The part of a branch in a block.
+    pub(super) fn part(&self, block: usize) -> Part {
+        self.blocks[block].part
+    }
+
+    /// The block whose ball is nearest to a position. `None` for none, or if the position is not finite.
+    pub(super) fn nearest_ball(&self, x: &Vec3) -> Option<usize> {
+        let gap = |block: &Block| (x - block.centre).norm() - block.reach;
+        let gaps = self.blocks.iter().map(gap).enumerate().filter(|(_, gap)| gap.is_finite());
+        gaps.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(block, _)| block)
+    }
+
+    /// Whether the lumen in a block may be nearer to a position than this, mm, negative within it.
+    pub(super) fn may_be_nearer(&self, block: usize, x: &Vec3, mm: f64) -> bool {
+        let Block { centre, reach, .. } = &self.blocks[block];
+        let within = reach + mm;
+        within > 0.0 && (x - centre).norm_squared() < within * within
     }
 
     fn near(&self, block: usize) -> &[Part] {

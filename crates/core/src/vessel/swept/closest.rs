@@ -11,12 +11,9 @@
 //! For a point that has sunk into the wall the closest point on its own side of the wall is needed: the search starts
 //! on the tube into which it has sunk, and finds the nearest from there, whatever other lumen is behind.
 
-use std::cell::Cell;
-
 use nalgebra::Matrix3;
 
 use super::axis::NearKnot;
-use super::blocks::Part;
 use super::field::{Depth, Feet, SweptField, Value};
 use crate::Vec3;
 use crate::products::outer;
@@ -135,26 +132,28 @@ impl SweptField {
         self.deepest_from(x, self.blocks.nearest_ball(x)?).map(|(depth, _)| depth)
     }
 
-    /// As [`Self::deepest`], with the part in which it is; fastest if that is asked first.
-    fn deepest_from(&self, x: &Vec3, first: Part) -> Option<(Depth, Part)> {
-        let lowest = Cell::new(f64::INFINITY);
-        let mut best: Option<(Depth, usize, Part)> = None;
-        let mut ask = |part: Part| {
+    /// As [`Self::deepest`], with the block in which it is; fastest if that is asked first.
+    fn deepest_from(&self, x: &Vec3, first: usize) -> Option<(Depth, usize)> {
+        let mut best: Option<(Depth, usize, usize)> = None;
+        let others = (0..self.blocks.len()).filter(|block| *block != first);
+        for block in std::iter::once(first).chain(others) {
+            let lowest = best.map_or(f64::INFINITY, |(depth, ..)| depth.f);
+            if !self.blocks.may_be_nearer(block, x, lowest) {
+                continue;
+            }
+            let part = self.blocks.part(block);
             let axis = &self.axes[part.branch as usize];
             let NearKnot { knot, near, .. } = axis.nearest(x, part.from as usize, part.to as usize);
             // From neighbouring parts the search ends at the same foot.
             if best.is_some_and(|(depth, known, _)| (depth.branch, known) == (part.branch, knot)) {
-                return;
+                continue;
             }
             let depth = self.depth(part.branch as usize, x, near);
-            if depth.f < lowest.get() {
-                lowest.set(depth.f);
-                best = Some((depth, knot, part));
+            if depth.f < lowest {
+                best = Some((depth, knot, block));
             }
-        };
-        ask(first);
-        self.blocks.nearer_than(x, || lowest.get()).filter(|part| *part != first).for_each(ask);
-        best.map(|(depth, _, part)| (depth, part))
+        }
+        best.map(|(depth, _, block)| (depth, block))
     }
 
     /// Whether a point is in the lumen, including extensions of open ends.

@@ -121,57 +121,6 @@ impl SweptField {
         Depth { f, room, radius, from_axis, is_distance, branch: branch as u32, foot }
     }
 
-    /// The field of a single branch, whose foot is near an arc length.
-    pub(super) fn branch(&self, branch: usize, x: &Vec3, near: f64) -> Value {
-        let axis = &self.axes[branch];
-        let (s, place) = axis.foot(x, near);
-        let offset = x - place.position;
-        let distance = offset.norm().max(f64::MIN_POSITIVE);
-        let u = offset / distance;
-        let [radius, taper, flare] = place.radius;
-        let [low, high] = axis.range();
-        let is_free = s > low && s < high;
-        let sigma = if is_free { 1.0 / stretch(&place, &offset) } else { 0.0 };
-        let along = place.first * sigma;
-        let mut gradient = u;
-        let mut hessian = (Matrix3::identity() - outer(&u, &u) - outer(&place.first, &along)) / distance;
-        if taper != 0.0 || flare != 0.0 {
-            let mixed = outer(&place.first, &place.second) * (sigma * sigma);
-            let turn = sigma * (3.0 * place.first.dot(&place.second) - offset.dot(&place.third));
-            gradient -= along * taper;
-            hessian -= outer(&along, &along) * (flare - taper * turn) + (mixed + mixed.transpose()) * taper;
-        }
-        let (mut exposure, mut exposure_slope) = (1.0, Vec3::zeros());
-        let [from_low, from_high] = [s, axis.length() - s];
-        for (end, from_end, outwards) in [(axis.ends[0], from_low, 1.0), (axis.ends[1], from_high, -1.0)] {
-            if end != End::Round {
-                continue;
-            }
-            let part = from_end / (HIDDEN * radius);
-            let (share, rate) = smooth_step(part);
-            // Only the nearer end hides a branch.
-            if share < exposure {
-                exposure = share;
-                exposure_slope = along * (rate * (outwards / (HIDDEN * radius) - part * taper / radius));
-            }
-        }
-        let f = distance - radius;
-        Value {
-            f,
-            gradient,
-            towards: gradient,
-            turning: hessian,
-            radius,
-            radius_slope: along * taper,
-            exposure,
-            exposure_slope,
-            is_joint: false,
-            is_distance: taper == 0.0 && flare == 0.0,
-            branch: branch as u32,
-            foot: s,
-        }
-    }
-
     /// Lower bound of the distance to the wall of a position with these feet, mm: the lumen of each branch is part of
     /// the whole. With the depth if there is one branch alone.
     pub(super) fn room(&self, feet: &mut Feet, x: &Vec3) -> (f64, Option<Depth>) {
@@ -230,7 +179,7 @@ impl SweptField {
         let mut joined: Option<Value> = None;
         let mut last: Option<Value> = None;
         for (branch, near) in &mut feet.all[..feet.count] {
-            let value = self.branch(*branch as usize, x, *near);
+            let value = of_branch(&self.axes[*branch as usize], *branch, x, *near);
             *near = value.foot;
             match &mut last {
                 // A branch that returns counts where it is nearest.
@@ -290,6 +239,56 @@ impl SweptField {
             + outer(&u, &v) * across
             + outer(&n, &(u * along_u + v * along_v));
         sum + sum.transpose()
+    }
+}
+
+/// The field of a single branch, of this number, whose foot is near an arc length.
+pub(super) fn of_branch(axis: &Axis, branch: u32, x: &Vec3, near: f64) -> Value {
+    let (s, place) = axis.foot(x, near);
+    let offset = x - place.position;
+    let distance = offset.norm().max(f64::MIN_POSITIVE);
+    let u = offset / distance;
+    let [radius, taper, flare] = place.radius;
+    let [low, high] = axis.range();
+    let is_free = s > low && s < high;
+    let sigma = if is_free { 1.0 / stretch(&place, &offset) } else { 0.0 };
+    let along = place.first * sigma;
+    let mut gradient = u;
+    let mut hessian = (Matrix3::identity() - outer(&u, &u) - outer(&place.first, &along)) / distance;
+    if taper != 0.0 || flare != 0.0 {
+        let mixed = outer(&place.first, &place.second) * (sigma * sigma);
+        let turn = sigma * (3.0 * place.first.dot(&place.second) - offset.dot(&place.third));
+        gradient -= along * taper;
+        hessian -= outer(&along, &along) * (flare - taper * turn) + (mixed + mixed.transpose()) * taper;
+    }
+    let (mut exposure, mut exposure_slope) = (1.0, Vec3::zeros());
+    let [from_low, from_high] = [s, axis.length() - s];
+    for (end, from_end, outwards) in [(axis.ends[0], from_low, 1.0), (axis.ends[1], from_high, -1.0)] {
+        if end != End::Round {
+            continue;
+        }
+        let part = from_end / (HIDDEN * radius);
+        let (share, rate) = smooth_step(part);
+        // Only the nearer end hides a branch.
+        if share < exposure {
+            exposure = share;
+            exposure_slope = along * (rate * (outwards / (HIDDEN * radius) - part * taper / radius));
+        }
+    }
+    let f = distance - radius;
+    Value {
+        f,
+        gradient,
+        towards: gradient,
+        turning: hessian,
+        radius,
+        radius_slope: along * taper,
+        exposure,
+        exposure_slope,
+        is_joint: false,
+        is_distance: taper == 0.0 && flare == 0.0,
+        branch,
+        foot: s,
     }
 }
 

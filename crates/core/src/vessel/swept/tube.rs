@@ -1,12 +1,9 @@
 //! A round tube about a smooth axis that is given by points, not by a tree: where a surface is one.
 
-use std::sync::Arc;
-
 use nalgebra::Matrix3;
 
-use super::axis::{Axis, End, stretch};
-use super::blocks::Blocks;
-use super::field::SweptField;
+use super::axis::{Axis, End, spline_slope, stretch};
+use super::field::of_branch;
 use crate::Vec3;
 use crate::vessel::generate::any_perpendicular;
 use crate::vessel::generate::curve::natural_moments;
@@ -17,7 +14,7 @@ const ON_AXIS: f64 = 1e-9;
 /// A tube of slowly changing radius.
 #[derive(Debug, Clone)]
 pub(crate) struct Tube {
-    field: Arc<SweptField>,
+    axis: Axis,
 }
 
 /// A point in a tube.
@@ -43,57 +40,46 @@ impl Tube {
         let step_mm = chords / pieces as f64;
         let widths: Vec<Vec3> = radii_mm.iter().map(|radius| Vec3::new(*radius, 0.0, 0.0)).collect();
         let moments = natural_moments(&widths, &vec![step_mm; pieces]);
-        let slope = |k: usize| {
-            let a = k.min(pieces - 1);
-            let [m, n] = [moments[a].x, moments[a + 1].x];
-            let bend = if k == a { -2.0 * m - n } else { m + 2.0 * n };
-            (radii_mm[a + 1] - radii_mm[a]) / step_mm + bend * (step_mm / 6.0)
-        };
+        let slope = |k: usize| spline_slope(&widths, &moments, step_mm, k).x;
         let widths: Vec<(f64, f64)> =
             radii_mm.iter().enumerate().map(|(k, radius)| (*radius, slope(k))).collect();
-        let axes: Arc<[Axis]> = Arc::new([Axis::through(centres_mm, &widths, step_mm, [End::Round; 2])]);
-        let blocks = Blocks::new(&axes, 0.0);
-        Self { field: Arc::new(SweptField { axes, blocks }) }
-    }
-
-    fn axis(&self) -> &Axis {
-        &self.field.axes[0]
+        Self { axis: Axis::through(centres_mm, &widths, step_mm, [End::Round; 2]) }
     }
 
     /// Distance of its centres along the axis, mm.
     pub(crate) fn step_mm(&self) -> f64 {
-        self.axis().step()
+        self.axis.step()
     }
 
-    /// The point of the axis at the foot of `x`, near an arc length: the foot, the place and its tangent.
-    pub(crate) fn foot(&self, x: &Vec3, near_mm: f64) -> (f64, Vec3, Vec3, f64) {
-        let (s, place) = self.axis().foot(x, near_mm);
-        (s, place.position, place.first, place.radius[0])
+    /// The point of the axis at the foot of `x`, near an arc length: the foot, the place and the radius there.
+    pub(crate) fn foot(&self, x: &Vec3, near_mm: f64) -> (f64, Vec3, f64) {
+        let (s, place) = self.axis.foot(x, near_mm);
+        (s, place.position, place.radius[0])
     }
 
     /// Direction of the axis at an arc length.
     pub(crate) fn tangent(&self, s: f64) -> Vec3 {
-        self.axis().at(s).first.normalize()
+        self.axis.at(s).first.normalize()
     }
 
     /// Whether a foot is between the ends of the axis.
     pub(crate) fn holds(&self, s: f64) -> bool {
-        let [low, high] = self.axis().range();
+        let [low, high] = self.axis.range();
         s > low && s < high
     }
 
     /// Radius and curvature of the axis at an arc length.
     pub(crate) fn radius_and_bend(&self, s: f64) -> (f64, f64) {
-        let place = self.axis().at(s);
+        let place = self.axis.at(s);
         (place.radius[0], place.first.cross(&place.second).norm())
     }
 
     /// A point whose foot is near an arc length, mm.
     pub(crate) fn at(&self, x: &Vec3, near_mm: f64) -> InTube {
-        let value = self.field.branch(0, x, near_mm);
-        let place = self.axis().at(value.foot);
+        let value = of_branch(&self.axis, 0, x, near_mm);
+        let place = self.axis.at(value.foot);
         let offset = x - place.position;
-        let [low, high] = self.axis().range();
+        let [low, high] = self.axis.range();
         let is_free = value.foot > low && value.foot < high;
         let along = if is_free { place.first / stretch(&place, &offset) } else { Vec3::zeros() };
         let mut found = InTube {
