@@ -111,6 +111,7 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(then.as_ref()).with_fields_at(part.to);
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 set_motions(&was.state.hands, hands, &mut tools.guess.motions);
+                tools.tails.begin(&there, (was.state, hands));
                 now.withdraw(surroundings.stack, hands);
                 course.withdrawn(tools.write_forces(&there, now));
                 way.go_on_from(hands);
@@ -189,6 +190,8 @@ impl<const C: usize> Tools<C> {
         // Only its hands, configuration and knowledge of the wall matter.
         let state = KirchhoffState {
             hand_forces: from.hand_forces.clone(),
+            twists: from.twists.clone(),
+            across_n: from.across_n,
             behind: Vec::new(),
             energy: Energy::default(),
             touches: Vec::new(),
