@@ -79,8 +79,6 @@ mod sum;
 mod swept_tests;
 mod tail;
 #[cfg(test)]
-mod tail_tests;
-#[cfg(test)]
 mod tick_tests;
 #[cfg(test)]
 mod touch_tests;
