@@ -113,7 +113,8 @@ impl<const C: usize> Workspace<C> {
                 set_motions(&was.state.hands, hands, &mut tools.guess.motions);
                 tools.tails.begin(&there, (was.state, hands));
                 now.withdraw(surroundings.stack, hands);
-                course.withdrawn(tools.write_forces(&there, now));
+                let along_mj = tools.write_forces(&there, now);
+                course.withdrawn(along_mj + tools.around_mj[1]);
                 way.go_on_from(hands);
                 break Ok(());
             }

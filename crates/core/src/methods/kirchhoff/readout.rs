@@ -14,7 +14,7 @@ use crate::rod::Clamp;
 
 impl<const C: usize> Tools<C> {
     /// Writes energies and forces into the state of a configuration, that of the last sub-step, whose contacts are
-    /// known. Returns the energy dissipated by friction of valves and of the sheath, mJ.
+    /// known. Returns the energy dissipated by friction of valves and of the sheath along the line, mJ.
     pub(super) fn write_forces(&mut self, environment: &Environment<'_>, at: &mut Configuration) -> f64 {
         let clamp = self.write_inside(environment, at);
         let sheath = environment.surroundings.sheath;
@@ -26,7 +26,7 @@ impl<const C: usize> Tools<C> {
         energy.tail = self.tails.write(rod, twists, hand_forces);
         let rubbed = self.tails.rub(sheath, *across_n, rod, hand_forces);
         self.around_mj = rubbed.around_mj;
-        rubbed.along_mj + rubbed.around_mj
+        rubbed.along_mj
     }
 
     /// Writes them without friction outside the body. Returns the forces at the sheath's mouth, unless nothing is

@@ -181,7 +181,8 @@ impl<const C: usize> Tools<C> {
         let touches = [was, is].map(|at| &at.state.touches[..]);
         let by_wall = work_of_wall(left.map(|(_, passage)| passage), touches);
         let by_others = by_wall.with_flow(flow_mj).with(work_of_fields(environment, was, is));
-        let by_others = by_others.with([-self.around_mj; 2]);
+        let [least_mj, most_mj] = self.around_mj;
+        let friction_mj = (friction_mj.0 + least_mj, friction_mj.1 + most_mj);
         let tuning = &environment.options.tuning.steps;
         let forces = (&was.state.hand_forces[..], &is.state.hand_forces[..]);
         let energies = (was.state.energy, is.state.energy);

@@ -275,6 +275,18 @@ impl Tail {
         Turned { slip_rad, body_nmm, hand_nmm, stored_mj, stiffness_nmm }
     }
 
+    /// Energy dissipated at the grip by turning, at least and at most, mJ. Without advance friction is the same
+    /// throughout the slip; with it, its torque goes from that before to that after the part.
+    fn around_mj(&self, turned: &Turned) -> [f64; 2] {
+        let after = (turned.hand_nmm - turned.body_nmm) * turned.slip_rad;
+        let (twist, inserted_mm) = &self.before;
+        if self.advance_mm == 0.0 || *inserted_mm == 0.0 || twist.grip != self.grip {
+            return [after; 2];
+        }
+        let before = ((twist.hand_nmm - twist.body_nmm) * turned.slip_rad).max(0.0);
+        [before.min(after), before.max(after)]
+    }
+
     /// E at an angle of the mouth, mJ.
     fn energy_mj(&self, turned: &Turned) -> f64 {
         let slip_mm = libm::hypot(self.advance_mm, self.radius_mm * turned.slip_rad);
@@ -403,7 +415,7 @@ impl Tails {
     ) -> Rubbed {
         let mut rubbed = Rubbed::default();
         for (k, tail) in self.each.iter().enumerate() {
-            rubbed.around_mj += tail.let_go_mj;
+            rubbed.around_mj = rubbed.around_mj.map(|mj| mj + tail.let_go_mj);
             if !tail.is_in {
                 rubbed.along_mj += tail.friction_n * tail.advance_mm.abs();
                 continue;
@@ -423,7 +435,8 @@ impl Tails {
                 forces[outer].outside_n -= along_n;
             }
             rubbed.along_mj += along_n * tail.advance_mm;
-            rubbed.around_mj += (turned.hand_nmm - turned.body_nmm) * turned.slip_rad;
+            let around_mj = tail.around_mj(&turned);
+            rubbed.around_mj = [0, 1].map(|k| rubbed.around_mj[k] + around_mj[k]);
         }
         rubbed
     }
@@ -434,8 +447,8 @@ impl Tails {
 pub(super) struct Rubbed {
     /// Against advance: hands do it at once, beside what they do on the device.
     pub(super) along_mj: f64,
-    /// Against turning, of what hands do by their torque.
-    pub(super) around_mj: f64,
+    /// Against turning, of what hands do by their torque, at least and at most.
+    pub(super) around_mj: [f64; 2],
 }
 
 impl External for Tails {

@@ -36,8 +36,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) friction: Friction,
     pub(super) cache: ContactCache,
     pub(super) tails: Tails,
-    /// Energy dissipated outside the body by turning, in the sub-step, mJ.
-    pub(super) around_mj: f64,
+    /// Energy dissipated outside the body by turning, in the sub-step, at least and at most, mJ.
+    pub(super) around_mj: [f64; 2],
     /// Drag of the flow on the device.
     pub(super) drag: Drag,
     /// Self-contact; empty if loops do not touch.
@@ -94,7 +94,7 @@ impl<const C: usize> Workspace<C> {
             friction: Friction::tuned(surroundings.properties.largest_friction(), &tuning.friction),
             cache: ContactCache::new(environment.surface),
             tails: Tails::default(),
-            around_mj: 0.0,
+            around_mj: [0.0; 2],
             drag: Drag::default(),
             loops: SelfContact::tuned(tuning),
             joined: Joined::default(),
