@@ -240,7 +240,6 @@ impl StaticProblem {
             loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
             let mut outside = outside(&mut loads, &mut touching, field.as_mut());
             let report = newton.solve(&self.elements, &mut supports, &mut outside, &mut state, &self.options);
-            drop(outside);
             iterations += report.iterations;
             monotone &= !loads.is_conservative()
                 || newton.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);

@@ -78,6 +78,7 @@ mod sum;
 #[cfg(test)]
 mod swept_tests;
 mod tail;
+mod tails;
 #[cfg(test)]
 mod tick_tests;
 #[cfg(test)]

@@ -61,7 +61,10 @@ impl<const C: usize> Tools<C> {
         let stack = environment.surroundings.stack;
         self.tails.begin(environment, (start.state, hands));
         let tails = &self.tails;
-        let tail = |instrument: usize, from_tip_mm: f64| tails.angle_before(stack, instrument, from_tip_mm);
+        let tail = |instrument: usize, from_tip_mm: f64| match stack.sets()[instrument] {
+            Some(_) => tails.angle_before(stack, instrument, from_tip_mm),
+            None => 0.0,
+        };
         let transport_from = |start: Start<'_>, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
             if mesh.elements.is_empty() {
@@ -70,7 +73,7 @@ impl<const C: usize> Tools<C> {
             } else if stack.is_several() {
                 transport_together(from, mesh, (stack.sets(), tail), rod);
             } else {
-                transport(from, mesh, stack.sets()[0].map(|_| |from_tip_mm: f64| tail(0, from_tip_mm)), rod);
+                transport(from, mesh, |from_tip_mm| tail(0, from_tip_mm), rod);
             }
         };
         set_motions(&start.state.hands, hands, &mut self.guess.motions);

@@ -41,22 +41,19 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Environment;
-use super::hands::{Hand, HandForce, ROUNDED_MM};
+use super::hands::{Hand, ROUNDED_MM};
 use super::state::KirchhoffState;
-use crate::Vec3;
-use crate::device::{Device, Stack};
-use crate::methods::{Sheath, Surroundings};
-use crate::rod::{ElementData, MAX_ANGLES, RodState, Stencils};
-use crate::solve::External;
+use crate::device::Device;
+use crate::methods::Surroundings;
+use crate::rod::RodState;
 
 /// A tail, or a part of one, that is shorter than this fraction of an element counts as so long, or as none: angles over
 /// its compliance would lose their digits.
-const LEAST: f64 = 1e-4;
+pub(super) const LEAST: f64 = 1e-4;
 
 /// What holds a tail by friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-enum Grip {
+pub(super) enum Grip {
     #[default]
     Nothing,
     Sheath,
@@ -93,7 +90,7 @@ impl Twist {
     }
 
     /// Angle, rad, of the material at this distance from the tip, in a tail that is `inserted_mm` long in the body.
-    fn angle_rad(&self, device: &Device, inserted_mm: f64, from_tip_mm: f64) -> f64 {
+    pub(super) fn angle_rad(&self, device: &Device, inserted_mm: f64, from_tip_mm: f64) -> f64 {
         if from_tip_mm <= self.grip_mm {
             return self.mouth_rad + self.body_nmm * device.compliance_per_nmm(inserted_mm, from_tip_mm);
         }
@@ -103,51 +100,51 @@ impl Twist {
 
 /// A tail in a part of a command.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tail {
+pub(super) struct Tail {
     /// Set of material angles of its instrument, if it has one and is inserted.
-    set: Option<usize>,
-    is_in: bool,
+    pub(super) set: Option<usize>,
+    pub(super) is_in: bool,
     /// φ.
-    hand_rad: f64,
+    pub(super) hand_rad: f64,
     /// c₁ and c₂, rad/(N·mm).
     outer_per_nmm: f64,
     inner_per_nmm: f64,
     /// F.
-    friction_n: f64,
+    pub(super) friction_n: f64,
     /// r.
-    radius_mm: f64,
+    pub(super) radius_mm: f64,
     /// Δ.
-    advance_mm: f64,
+    pub(super) advance_mm: f64,
     /// ψₐ.
     from_rad: f64,
     /// Distance of the grip from the tip, mm.
     grip_mm: f64,
-    grip: Grip,
+    pub(super) grip: Grip,
     /// Twist and inserted length before the part; no length where it was out, and relaxed.
-    before: (Twist, f64),
+    pub(super) before: (Twist, f64),
     /// GJ at the mouth, N·mm².
-    torsion_nmm2: f64,
+    pub(super) torsion_nmm2: f64,
     /// Stored energy that is lost because the instrument is pulled out, mJ.
-    let_go_mj: f64,
+    pub(super) let_go_mj: f64,
 }
 
 /// A tail at an angle of the mouth.
 #[derive(Debug, Clone, Copy)]
-struct Turned {
+pub(super) struct Turned {
     /// α.
-    slip_rad: f64,
+    pub(super) slip_rad: f64,
     /// M and M₁.
-    body_nmm: f64,
-    hand_nmm: f64,
+    pub(super) body_nmm: f64,
+    pub(super) hand_nmm: f64,
     /// Energy stored in its twist, mJ.
-    stored_mj: f64,
+    pub(super) stored_mj: f64,
     /// d²E/dθ², N·mm.
-    stiffness_nmm: f64,
+    pub(super) stiffness_nmm: f64,
 }
 
 impl Tail {
     /// The tail of instrument `k` in a part from the state `start` to these hands.
-    fn new(place: &Place<'_>, k: usize) -> Self {
+    pub(super) fn new(place: &Place<'_>, k: usize) -> Self {
         let Place { surroundings, start, hands, .. } = *place;
         let stack = surroundings.stack;
         let device = &stack.instruments()[k].device;
@@ -249,7 +246,7 @@ impl Tail {
     }
 
     /// At an angle of the mouth; with `None` for one that turns freely.
-    fn at(&self, mouth_rad: Option<f64>) -> Turned {
+    pub(super) fn at(&self, mouth_rad: Option<f64>) -> Turned {
         let (outer, inner, hand) = (self.outer_per_nmm, self.inner_per_nmm, self.hand_rad - self.from_rad);
         let sum = match mouth_rad {
             Some(mouth_rad) => {
@@ -277,7 +274,7 @@ impl Tail {
 
     /// Energy dissipated at the grip by turning, at least and at most, mJ. A grip that lets go because the device now
     /// advances has had a larger torque before.
-    fn around_mj(&self, turned: &Turned) -> [f64; 2] {
+    pub(super) fn around_mj(&self, turned: &Turned) -> [f64; 2] {
         let after = (turned.hand_nmm - turned.body_nmm) * turned.slip_rad;
         let (twist, inserted_mm) = &self.before;
         if self.advance_mm == 0.0 || *inserted_mm == 0.0 || twist.grip != self.grip {
@@ -288,18 +285,18 @@ impl Tail {
     }
 
     /// E at an angle of the mouth, mJ.
-    fn energy_mj(&self, turned: &Turned) -> f64 {
+    pub(super) fn energy_mj(&self, turned: &Turned) -> f64 {
         let slip_mm = libm::hypot(self.advance_mm, self.radius_mm * turned.slip_rad);
         turned.stored_mj + self.friction_n * (slip_mm - self.advance_mm.abs())
     }
 
     /// At the mouth of a rod.
-    fn on(&self, rod: &RodState) -> Turned {
+    pub(super) fn on(&self, rod: &RodState) -> Turned {
         self.at(self.set.map(|set| rod.angle(0, set)))
     }
 
     /// Its twist at the mouth of a rod.
-    fn twist(&self, rod: &RodState, turned: &Turned) -> Twist {
+    pub(super) fn twist(&self, rod: &RodState, turned: &Turned) -> Twist {
         let grip_rad = self.from_rad + turned.slip_rad;
         Twist {
             mouth_rad: self.set.map_or(grip_rad, |set| rod.angle(0, set)),
@@ -324,146 +321,12 @@ fn twist_mj(twist: &Twist, device: &Device, hand: Hand) -> f64 {
 
 /// Where a part leads.
 #[derive(Clone, Copy)]
-struct Place<'a> {
-    surroundings: &'a Surroundings<'a>,
-    start: &'a KirchhoffState,
-    hands: &'a [Hand],
-    grip_radii: f64,
-    least_mm: f64,
-}
-
-/// The tails of all instruments in a part of a command.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Tails {
-    each: Vec<Tail>,
-}
-
-impl Tails {
-    /// Begins a part from the state `start` to these positions of the hands.
-    pub(super) fn begin(
-        &mut self,
-        environment: &Environment<'_>,
-        (start, hands): (&KirchhoffState, &[Hand]),
-    ) {
-        let (options, surroundings) = (environment.options, &environment.surroundings);
-        let grip_radii = options.tuning.friction.grip_radii;
-        let place = Place { surroundings, start, hands, grip_radii, least_mm: LEAST * options.element_mm };
-        self.each.clear();
-        self.each.extend((0..hands.len()).map(|k| Tail::new(&place, k)));
-    }
-
-    /// Angle, rad, that the material of an instrument at this distance from its tip had before the part, in its tail.
-    pub(super) fn angle_before(&self, stack: &Stack, instrument: usize, from_tip_mm: f64) -> f64 {
-        let tail = &self.each[instrument];
-        let (twist, inserted_mm) = &tail.before;
-        match *inserted_mm > 0.0 {
-            true => twist.angle_rad(&stack.instruments()[instrument].device, *inserted_mm, from_tip_mm),
-            false => tail.hand_rad,
-        }
-    }
-
-    /// Sets of angles that are held at the mouth: those of instruments that are not inserted.
-    pub(super) fn held(&self) -> [bool; MAX_ANGLES] {
-        let mut held = [true; MAX_ANGLES];
-        self.turning().for_each(|(set, _)| held[set] = false);
-        held
-    }
-
-    /// Whether any of them acts on the rod.
-    pub(super) fn act(&self) -> bool {
-        self.turning().next().is_some()
-    }
-
-    /// The tails that act on a set of angles.
-    fn turning(&self) -> impl Iterator<Item = (usize, &Tail)> {
-        self.each.iter().filter_map(|tail| Some((tail.set?, tail)))
-    }
-
-    /// Torque of all tails on the rod, N·mm.
-    pub(super) fn body_nmm(&self, rod: &RodState) -> f64 {
-        self.turning().map(|(_, tail)| tail.on(rod).body_nmm).sum()
-    }
-
-    /// Writes twists of the tails, and what they add to the forces of the hands: torques, and the twist that comes in. Returns the stored energy, mJ.
-    pub(super) fn write(&self, rod: &RodState, twists: &mut Vec<Twist>, forces: &mut [HandForce]) -> f64 {
-        twists.clear();
-        let mut stored_mj = 0.0;
-        for (k, tail) in self.each.iter().enumerate() {
-            if !tail.is_in {
-                twists.push(Twist::relaxed(tail.hand_rad));
-                continue;
-            }
-            let turned = tail.on(rod);
-            twists.push(tail.twist(rod, &turned));
-            stored_mj += turned.stored_mj;
-            forces[k].torque_nmm += turned.hand_nmm;
-            forces[k].push_n += 0.5 * turned.body_nmm * turned.body_nmm / tail.torsion_nmm2;
-            if let Grip::Valve(outer) = tail.grip {
-                forces[outer].torque_nmm -= turned.hand_nmm - turned.body_nmm;
-            }
-        }
-        stored_mj
-    }
-
-    /// Writes the friction at the grips along the line, with this force across it at the mouth, N.
-    pub(super) fn rub(
-        &self,
-        sheath: &Sheath,
-        across_n: f64,
-        rod: &RodState,
-        forces: &mut [HandForce],
-    ) -> Rubbed {
-        let mut rubbed = Rubbed::default();
-        for (k, tail) in self.each.iter().enumerate() {
-            rubbed.around_mj = rubbed.around_mj.map(|mj| mj + tail.let_go_mj);
-            if !tail.is_in {
-                rubbed.along_mj += tail.friction_n * tail.advance_mm.abs();
-                continue;
-            }
-            let turned = tail.on(rod);
-            let slip_mm = libm::hypot(tail.advance_mm, tail.radius_mm * turned.slip_rad);
-            if slip_mm <= ROUNDED_MM {
-                continue;
-            }
-            let friction_n = match tail.grip {
-                Grip::Sheath => sheath.friction_n + sheath.friction * across_n,
-                _ => tail.friction_n,
-            };
-            let along_n = friction_n * tail.advance_mm / slip_mm;
-            forces[k].outside_n += along_n;
-            if let Grip::Valve(outer) = tail.grip {
-                forces[outer].outside_n -= along_n;
-            }
-            rubbed.along_mj += along_n * tail.advance_mm;
-            let around_mj = tail.around_mj(&turned);
-            rubbed.around_mj = [0, 1].map(|k| rubbed.around_mj[k] + around_mj[k]);
-        }
-        rubbed
-    }
-}
-
-/// Energy dissipated by friction outside the body, mJ.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Rubbed {
-    /// Against advance: hands do it at once, beside what they do on the device.
-    pub(super) along_mj: f64,
-    /// Against turning, of what hands do by their torque, at least and at most.
-    pub(super) around_mj: [f64; 2],
-}
-
-impl External for Tails {
-    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        for (set, tail) in self.turning() {
-            let turned = tail.at(Some(state.angle(0, set)));
-            into.add_value(tail.energy_mj(&turned));
-            let spin = (-turned.body_nmm, turned.stiffness_nmm);
-            into.add_spin(state, &elements[0], (0, 0.0, set), &Vec3::zeros(), spin);
-        }
-    }
-
-    fn value(&mut self, _elements: &[ElementData], state: &RodState) -> f64 {
-        self.turning().map(|(set, tail)| tail.energy_mj(&tail.at(Some(state.angle(0, set))))).sum()
-    }
+pub(super) struct Place<'a> {
+    pub(super) surroundings: &'a Surroundings<'a>,
+    pub(super) start: &'a KirchhoffState,
+    pub(super) hands: &'a [Hand],
+    pub(super) grip_radii: f64,
+    pub(super) least_mm: f64,
 }
 
 #[cfg(test)]

@@ -81,11 +81,11 @@ pub(super) fn lay(
 /// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
 ///
 /// Material angles move with the device; material that enters from the sheath has the angle that it had in the `tail`, by
-/// its distance from the tip. `None` for a device that does not twist.
+/// its distance from the tip.
 pub(super) fn transport(
     (from, state): (&Mesh, &RodState),
     to: &Mesh,
-    tail: Option<impl Fn(f64) -> f64>,
+    tail: impl Fn(f64) -> f64,
     out: &mut RodState,
 ) {
     slide_curve(from, state, to, out);
@@ -102,7 +102,7 @@ pub(super) fn transport(
         out.bubbles.push(known.filter(|k| *k > 0).map_or(0.0, |k| state.bubbles[k]));
     }
     // Relative to triads carried along the rod without twist, like the new ones.
-    let angle = |i: usize| tail.as_ref().map_or(0.0, |tail| tail(to.from_tip_mm[i]));
+    let angle = |i: usize| tail(to.from_tip_mm[i]);
     out.angles.extend((0..n.saturating_sub(old)).map(angle));
     let known = state.angles.iter().zip(state.carried_twists()).map(|(angle, carried)| angle + carried);
     out.angles.extend(known.skip(old.saturating_sub(n)));

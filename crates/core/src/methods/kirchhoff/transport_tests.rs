@@ -34,7 +34,7 @@ fn bent(mesh: &Mesh, angle: impl Fn(f64) -> f64) -> RodState {
 
 fn slid(from: &Mesh, state: &RodState, to: &Mesh) -> RodState {
     let mut out = RodState::default();
-    transport((from, state), to, Some(|_| state.angles[0]), &mut out);
+    transport((from, state), to, |_| state.angles[0], &mut out);
     out
 }
 

@@ -6,7 +6,7 @@ use super::hands::{Hand, Way};
 use super::joined::Joined;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
-use super::tail::Tails;
+use super::tails::Tails;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact};
 use crate::methods::StepReport;
