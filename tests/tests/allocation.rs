@@ -87,7 +87,10 @@ fn nothing_is_allocated_in_a_step_of_an_insertion() {
             for k in 0..40 {
                 let rotate_rad = if k % 4 == 0 { 0.05 } else { 0.0 };
                 let advance_mm = if k % 5 == 4 { -0.7 } else { 0.6 };
-                iterations += simulation.step(Command { advance_mm, rotate_rad }).unwrap().iterations;
+                iterations += simulation
+                    .step(Command { advance_mm, rotate_rad, ..Command::default() })
+                    .unwrap()
+                    .iterations;
             }
         });
         assert!(iterations > 80, "{iterations}");

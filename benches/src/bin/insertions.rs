@@ -95,7 +95,7 @@ fn run(of: &Insertion) -> Result<()> {
         .properties(properties)
         .method(&method)
         .build()?;
-    let command = Command { advance_mm: of.increment_mm, rotate_rad: of.turn_rad };
+    let command = Command { advance_mm: of.increment_mm, rotate_rad: of.turn_rad, ..Command::default() };
     let (mut times, mut good, mut iterations, mut resorts) = (Vec::new(), 0, 0, 0);
     for _ in 0..(of.inserted_mm / of.increment_mm) as usize {
         let begun = Instant::now();

@@ -17,7 +17,7 @@
 //! let wall = WallProperties { friction: 0.05, ..WallProperties::default() };
 //! let mut simulation = Simulation::builder(vessel.wall, wire, sheath).properties(wall).build()?;
 //! for _ in 0..40 {
-//!     simulation.step(Command { advance_mm: 4.0, rotate_rad: 0.02 })?;
+//!     simulation.step(Command { advance_mm: 4.0, rotate_rad: 0.02, ..Command::default() })?;
 //! }
 //! let report = simulation.report();
 //! assert!(report.converged && report.push_force_n > 0.0 && !report.contacts.is_empty());

@@ -121,6 +121,10 @@ impl MethodChoice for AnyMethod {
         matches!(self, Self::Kirchhoff(options) if options.takes_several())
     }
 
+    fn takes_steering(&self) -> bool {
+        matches!(self, Self::Kirchhoff(options) if options.takes_steering())
+    }
+
     fn check_detach(&self) -> Result<()> {
         match self {
             Self::Kirchhoff(options) => options.check_detach(),

@@ -29,7 +29,11 @@ pub struct Motion {
 impl Motion {
     /// The same motion as a command, computed as a script does, so that it has the same bits.
     pub(crate) fn as_move(self) -> Move {
-        let command = Command { advance_mm: self.advance_mm, rotate_rad: self.rotate_deg.to_radians() };
+        let command = Command {
+            advance_mm: self.advance_mm,
+            rotate_rad: self.rotate_deg.to_radians(),
+            ..Command::default()
+        };
         Move { instrument: self.instrument, command }
     }
 }

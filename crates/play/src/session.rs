@@ -113,10 +113,14 @@ impl Session {
     /// fluoroscopic picture of `side_px` pixels.
     ///
     /// # Errors
-    /// Limits that are not above 0; as [`ViewSpec::validate`].
+    /// Limits that are not above 0; instruments that are steered; as [`ViewSpec::validate`].
     pub fn new(simulation: Simulation, view: ViewSpec, side_px: u32, limits: Limits) -> Result<Self> {
         for (name, limit) in [("warn_n", limits.push_n), ("warn_nmm", limits.torque_nmm)] {
             endowire_core::error::in_range(name, limit, 1e6)?;
+        }
+        if simulation.stack().is_steerable() {
+            let remedy = "no hand here steers: leave it out of the sections, or run the scene's script (endowire run) or Python";
+            return Err(Error::parameter("device.section.steer", "given", remedy));
         }
         let lab = Lab::new(view, side_px, simulation.lumen().wall(&NoStore)?.mesh())?;
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];

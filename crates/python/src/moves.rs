@@ -1,4 +1,4 @@
-//! Commands as arrays: advance, mm, and rotation, rad, of each instrument.
+//! Commands as arrays: advance, mm, rotation, rad, and, where there is any, change of the steering of each instrument.
 
 use endowire_core::insertion::{Command, Move};
 use pyo3::exceptions::PyTypeError;
@@ -8,7 +8,7 @@ use crate::arrays::{Numbers, misshapen, numbers, shown};
 use crate::error::refuse;
 
 /// The commands of all `instruments`, for each of `count` entries, or for any number of them: an array of shape
-/// (count, instruments, 2).
+/// (count, instruments, 2) or, with steering, (count, instruments, 3).
 pub(crate) fn moves(
     moves: &Numbers<'_>,
     count: Option<usize>,
@@ -16,22 +16,27 @@ pub(crate) fn moves(
 ) -> PyResult<Vec<Vec<Move>>> {
     let view = moves.as_array();
     let fits = match view.shape() {
-        [given, hands, 2] => *hands == instruments && count.is_none_or(|count| count == *given),
+        [given, hands, 2 | 3] => *hands == instruments && count.is_none_or(|count| count == *given),
         _ => false,
     };
     if !fits {
         let first = count.map_or("n".to_owned(), |count| count.to_string());
         let remedy = format!(
-            "must have the shape ({first}, {instruments}, 2): advance_mm and rotate_rad of each instrument"
+            "must have the shape ({first}, {instruments}, 2): advance_mm and rotate_rad of each instrument, or ({first}, \
+             {instruments}, 3) with the change of its steering"
         );
         return Err(misshapen("moves", view.shape(), &remedy));
     }
+    let columns = view.shape()[2];
     let list: Vec<f64> = view.iter().copied().collect();
     let hands = |row: &[f64]| {
-        let pairs = row.chunks_exact(2).map(|pair| Command { advance_mm: pair[0], rotate_rad: pair[1] });
-        together(pairs)
+        together(row.chunks_exact(columns).map(|own| Command {
+            advance_mm: own[0],
+            rotate_rad: own[1],
+            steer: own.get(2).copied().unwrap_or(0.0),
+        }))
     };
-    Ok(list.chunks_exact(2 * instruments).map(hands).collect())
+    Ok(list.chunks_exact(columns * instruments).map(hands).collect())
 }
 
 /// Simultaneous moves from the commands of the instruments in order.

@@ -59,7 +59,7 @@ impl Record {
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let moves = simulation.moves(advance_mm, rotate_rad)?;
+        let moves = simulation.moves(advance_mm, rotate_rad, None)?;
         self.check(time_s, &moves)?;
         simulation.with(py, |simulation| self.lock().note(time_s, &moves, simulation, None));
         Ok(())
@@ -134,8 +134,10 @@ impl Record {
 impl Record {
     /// Refuses a time before that of the last step, and moves that are no numbers.
     pub(crate) fn check(&self, time_s: f64, moves: &[Move]) -> PyResult<()> {
-        for Move { command: Command { advance_mm, rotate_rad }, .. } in moves {
-            for (name, number) in [("advance_mm", *advance_mm), ("rotate_rad", *rotate_rad)] {
+        for Move { command: Command { advance_mm, rotate_rad, steer }, .. } in moves {
+            for (name, number) in
+                [("advance_mm", *advance_mm), ("rotate_rad", *rotate_rad), ("steer", *steer)]
+            {
                 if !number.is_finite() {
                     return Err(refuse(name, number, "must be a finite number"));
                 }

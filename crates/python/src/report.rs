@@ -80,6 +80,18 @@ impl StepReport {
         self.of_hands(py, |hand| hand.torque_nmm)
     }
 
+    /// Value to which each instrument is steered, −1 to 1; 0 for those that are not.
+    #[getter]
+    fn steer<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_hands(py, |hand| hand.steer)
+    }
+
+    /// What steering takes: derivative of the energy of each inserted length in that value, mJ.
+    #[getter]
+    fn steer_mj<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_hands(py, |hand| hand.steer_mj)
+    }
+
     /// Bending energy, mJ.
     #[getter]
     fn bend_energy_mj(&self) -> f64 {
@@ -182,6 +194,14 @@ impl StepReport {
     fn behind<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let behind: Vec<_> = self.report.behind.iter().map(|c| vec![c.advance_mm, c.rotate_rad]).collect();
         if behind.is_empty() { Ok(None) } else { Ok(Some(PyArray2::from_vec2(py, &behind)?)) }
+    }
+
+    /// Change of the steering in `behind` that the instruments have not yet followed, shape (n_instruments,). None if
+    /// nothing remains.
+    #[getter]
+    fn behind_steer<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let behind: Vec<f64> = self.report.behind.iter().map(|left| left.steer).collect();
+        (!behind.is_empty()).then(|| PyArray1::from_vec(py, behind))
     }
 
     /// Number of parts into which the command was divided.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use endowire_core::insertion::Command;
 use endowire_core::vessel::NoStore;
 use endowire_core::{Error, insertion};
 use endowire_methods::Scene as SceneFile;
@@ -65,7 +66,8 @@ impl Scene {
         interruptible(py, move || Vessel::of_scene(&scene))?.map_err(exception)
     }
 
-    /// The moves of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
+    /// The moves of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad; with instruments that are
+    /// steered (steps, n_instruments, 3), the changes of their steering too.
     ///
     /// Raises InputError if a line has `until`, because the number of steps is then not known beforehand, and if one
     /// has `detach`, which is no move. `run` carries out such scripts.
@@ -80,14 +82,16 @@ impl Scene {
             other => exception(other),
         })?;
         let hands = stack.instruments().len();
-        let mut numbers = vec![0.0; steps.len() * hands * 2];
-        for (row, moves) in numbers.chunks_exact_mut(2 * hands).zip(&steps) {
+        let columns = if stack.is_steerable() { 3 } else { 2 };
+        let mut numbers = vec![0.0; steps.len() * hands * columns];
+        for (row, moves) in numbers.chunks_exact_mut(columns * hands).zip(&steps) {
             for one in moves {
-                let place = 2 * one.instrument;
-                (row[place], row[place + 1]) = (one.command.advance_mm, one.command.rotate_rad);
+                let Command { advance_mm, rotate_rad, steer } = one.command;
+                let own = &mut row[columns * one.instrument..][..columns];
+                own.copy_from_slice(&[advance_mm, rotate_rad, steer][..columns]);
             }
         }
-        array(py, numbers, [steps.len(), hands, 2])
+        array(py, numbers, [steps.len(), hands, columns])
     }
 
     /// Carries out its script, including lines with `until`, in a simulation of the scene at its start. Returns the

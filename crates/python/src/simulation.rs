@@ -82,12 +82,15 @@ impl Simulation {
         &self,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
+        steer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<insertion::Move>> {
         let hands = self.pushed().len();
         let lengths_mm = of_each("advance_mm", advance_mm, hands)?;
         let turns_rad = of_each("rotate_rad", rotate_rad, hands)?;
-        let commands = lengths_mm.into_iter().zip(turns_rad);
-        Ok(together(commands.map(|(advance_mm, rotate_rad)| Command { advance_mm, rotate_rad })))
+        let steered = of_each("steer", steer, hands)?;
+        let commands = lengths_mm.into_iter().zip(turns_rad).zip(steered);
+        let command = |((advance_mm, rotate_rad), steer)| Command { advance_mm, rotate_rad, steer };
+        Ok(together(commands.map(command)))
     }
 
     /// Locks the simulation. Never call it with the interpreter held: another thread may hold the lock for a long
@@ -209,15 +212,16 @@ impl Simulation {
     ///
     /// Raises InputError for an invalid command, EndOfWay where the way ends, and ComputationError if no equilibrium
     /// was found; then everything is unchanged.
-    #[pyo3(signature = (advance_mm=None, rotate_rad=None, time_s=None))]
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, time_s=None, *, steer=None))]
     fn step(
         &self,
         py: Python<'_>,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
         time_s: Option<f64>,
+        steer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<StepReport> {
-        let moves = self.moves(advance_mm, rotate_rad)?;
+        let moves = self.moves(advance_mm, rotate_rad, steer)?;
         let stepped = self.with(py, |simulation| simulation.step_until(&moves, time_s).cloned());
         stepped.map(StepReport::new).map_err(exception)
     }
@@ -229,7 +233,7 @@ impl Simulation {
     ///
     /// Raises what `step` raises, except if no equilibrium is found within the tick. The remaining motion is dropped
     /// when it raises.
-    #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, solves, time_s=None))]
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, solves, time_s=None, steer=None))]
     fn tick(
         &self,
         py: Python<'_>,
@@ -237,22 +241,24 @@ impl Simulation {
         rotate_rad: Option<&Bound<'_, PyAny>>,
         solves: &Bound<'_, PyAny>,
         time_s: Option<f64>,
+        steer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<StepReport> {
-        let (moves, solves) = (self.moves(advance_mm, rotate_rad)?, natural("solves", solves)?);
+        let (moves, solves) = (self.moves(advance_mm, rotate_rad, steer)?, natural("solves", solves)?);
         let ticked = self.with(py, |simulation| simulation.tick(&moves, solves, time_s).cloned());
         ticked.map(StepReport::new).map_err(exception)
     }
 
     /// The linear solves (`StepReport.solves`) after which `step` with this command ends, with what is behind from
     /// commands before; one Newton iteration more may be counted. None for methods other than kirchhoff.
-    #[pyo3(signature = (advance_mm=None, rotate_rad=None))]
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, steer=None))]
     fn most_solves(
         &self,
         py: Python<'_>,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
+        steer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Option<usize>> {
-        let moves = self.moves(advance_mm, rotate_rad)?;
+        let moves = self.moves(advance_mm, rotate_rad, steer)?;
         Ok(self.with(py, |simulation| simulation.most_solves(&moves)))
     }
 
@@ -296,7 +302,7 @@ impl Simulation {
     }
 
     /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and
-    /// rotate_rad. Returns the last StepReport. Ctrl-C ends it between two steps.
+    /// rotate_rad, or (steps, n_instruments, 3) with changes of the steering. Returns the last StepReport. Ctrl-C ends it between two steps.
     ///
     /// Raises what `step` raises; earlier steps are kept.
     fn run(&self, py: Python<'_>, moves: Numbers<'_>) -> PyResult<StepReport> {

@@ -68,7 +68,7 @@ mod tests {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/scenes/curved_tube_exact.toml");
         let scene = Scene::read(Path::new(file)).unwrap();
         let mut simulation = scene.simulation(&NoStore).unwrap();
-        simulation.step(Command { advance_mm: 40.0, rotate_rad: 0.0 }).unwrap();
+        simulation.step(Command { advance_mm: 40.0, rotate_rad: 0.0, ..Command::default() }).unwrap();
         let mut recorder = Recorder::default();
         let nodes = simulation.shape().len();
         let many = 2 * MOST_NODES / nodes;

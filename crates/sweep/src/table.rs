@@ -162,6 +162,7 @@ fn instrument(name: &str, index: usize, rows: &[Row]) -> Vec<Column> {
         number("rotation_rad", |one| Some(one.report.rotation_rad)),
         number("mouth_rotation_rad", |one| Some(one.report.mouth_rotation_rad)),
         number("tip_rotation_rad", |one| Some(one.report.tip_rotation_rad)),
+        number("steer", |one| Some(one.report.steer)),
         number("push_force_n", |one| one.report.push_force_n),
         number("torque_nmm", |one| Some(one.report.torque_nmm)),
     ]

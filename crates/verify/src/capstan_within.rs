@@ -82,7 +82,7 @@ pub(super) fn valve() -> Result<Vec<Row>> {
         let [mut plain, mut sealed] = starts.clone();
         let outside_mm = (165.0 - LENGTH_MM - 3.0 - advance_mm) - (150.0 - LENGTH_MM);
         let lag_rad = VALVE_N * torque * outside_mm / (WIRE_NMM2 / 1.3);
-        let command = Command { advance_mm, rotate_rad: turn_rad + lag_rad };
+        let command = Command { advance_mm, rotate_rad: turn_rad + lag_rad, ..Command::default() };
         for simulation in [&mut plain, &mut sealed] {
             simulation.step_together(&[Move { instrument: WIRE, command }])?;
         }

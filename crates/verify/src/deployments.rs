@@ -197,7 +197,8 @@ fn command(random: &mut Random, coil: usize) -> Move {
     match random.between(0.0, 1.0) {
         kind if kind < 0.1 => advance(coil, -2.0 * advance_mm),
         kind if kind < 0.2 => {
-            let command = Command { advance_mm: 0.0, rotate_rad: random.between(-1.0, 1.0) };
+            let command =
+                Command { advance_mm: 0.0, rotate_rad: random.between(-1.0, 1.0), ..Command::default() };
             Move { instrument: coil, command }
         }
         kind if kind < 0.25 => advance(CATHETER, random.between(-0.3, 0.3)),

@@ -341,7 +341,7 @@ impl RandomHands {
         let advance_mm = if rests { 0.0 } else { ADVANCES_MM[size] * (self.noise.next() + DRIFT) };
         let turns = self.noise.happens(0.4);
         let rotate_rad = if turns { TURNS_RAD[size] * self.noise.next() } else { 0.0 };
-        Command { advance_mm, rotate_rad }
+        Command { advance_mm, rotate_rad, ..Command::default() }
     }
 }
 

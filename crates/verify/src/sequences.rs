@@ -173,9 +173,10 @@ struct Done {
 
 /// One of this many equal parts of moves.
 pub fn part_of(moves: &[Move], parts: usize) -> Vec<Move> {
-    let share = |Command { advance_mm, rotate_rad }| Command {
+    let share = |Command { advance_mm, rotate_rad, steer }| Command {
         advance_mm: advance_mm / parts as f64,
         rotate_rad: rotate_rad / parts as f64,
+        steer: steer / parts as f64,
     };
     moves.iter().map(|one| Move { command: share(one.command), ..*one }).collect()
 }
@@ -232,7 +233,7 @@ pub fn run(seed: u64) -> Result<SequenceRow> {
             .map(|instrument| {
                 let advance_mm = random.one_of(&[0.0, 1.0, 1.0, 1.0, 1.0]) * random.between(-25.0, 40.0);
                 let rotate_rad = random.one_of(&[0.0, 1.0]) * random.between(-3.0, 3.0);
-                Move { instrument, command: Command { advance_mm, rotate_rad } }
+                Move { instrument, command: Command { advance_mm, rotate_rad, ..Command::default() } }
             })
             .collect();
         let millimetres =

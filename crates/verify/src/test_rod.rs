@@ -159,7 +159,7 @@ impl TestRod {
     /// friction and loads.
     pub(super) fn slide(&mut self, coefficient: f64, advance: f64) -> Result<()> {
         let length = self.setup.length;
-        let hands = [HandMotion { from_mm: length, to_mm: length + advance, turn_rad: 0.0 }];
+        let hands = [HandMotion { from_mm: length, to_mm: length + advance, turn_rad: 0.0, steer: 0.0 }];
         self.friction = Friction::new(coefficient);
         let nothing = (&[][..], &[][..]);
         self.friction.begin(&self.mesh.elements, &self.state, &self.mesh.points, nothing, &hands);

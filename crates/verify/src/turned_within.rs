@@ -49,7 +49,7 @@ fn bent(torsion_nmm2: f64, friction: f64) -> Result<Simulation> {
 }
 
 fn go(simulation: &mut Simulation, advance_mm: f64, rotate_rad: f64) -> Result<()> {
-    let command = Command { advance_mm, rotate_rad };
+    let command = Command { advance_mm, rotate_rad, ..Command::default() };
     simulation.step_together(&[Move { instrument: WIRE, command }]).map(|_| ())
 }
 

@@ -51,7 +51,7 @@ fn wander(count: usize) -> Tally {
         let mm = (5.0 * (noise.next() + drift)).clamp(-inserted, 500.0 - inserted);
         let command = match (noise.next() * 1.5).round() as i32 {
             -1 => Command::advance(mm),
-            0 => Command { advance_mm: mm, rotate_rad: 0.5 * noise.next() },
+            0 => Command { advance_mm: mm, rotate_rad: 0.5 * noise.next(), ..Command::default() },
             _ => Command::rotate(0.5 * noise.next()),
         };
         tally.step(&mut simulation, &crossing, command);

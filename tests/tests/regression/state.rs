@@ -73,7 +73,7 @@ fn commands(seed: u64, count: usize) -> Vec<Command> {
             }
             let advance_mm = if noise.happens(0.2) { 0.0 } else { 0.6 + 0.9 * noise.next() };
             let rotate_rad = if noise.happens(0.5) { 0.15 * noise.next() } else { 0.0 };
-            last = Command { advance_mm, rotate_rad };
+            last = Command { advance_mm, rotate_rad, ..Command::default() };
             last
         })
         .collect()
@@ -143,7 +143,7 @@ fn what_a_state_holds_is_needed() {
     let after = |text: &str| {
         let mut again = simulation.clone();
         again.restore(&serde_json::from_str(text).unwrap()).unwrap();
-        again.step(Command { advance_mm: 2.0, rotate_rad: 0.0 }).unwrap();
+        again.step(Command { advance_mm: 2.0, rotate_rad: 0.0, ..Command::default() }).unwrap();
         bytes(&again)
     };
     let whole = after(&text);
@@ -226,7 +226,11 @@ fn failures_change_nothing(mut simulation: Simulation, seed: u64, count: usize) 
     let mut noise = Noise::new(seed);
     let mut failures = [0; 3];
     for k in 0..count {
-        let mut command = Command { advance_mm: 0.4 + 1.2 * noise.next(), rotate_rad: 0.2 * noise.next() };
+        let mut command = Command {
+            advance_mm: 0.4 + 1.2 * noise.next(),
+            rotate_rad: 0.2 * noise.next(),
+            ..Command::default()
+        };
         match noise.below(12) {
             0 => command.advance_mm = 500.0,
             1 => command.rotate_rad = f64::NAN,

@@ -187,7 +187,8 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
         Simulation::builder(arch.wall, wire, sheath).method(&kirchhoff(4.0)).build().unwrap();
     let crossing = CrossingTest::new(simulation.lumen().wall(&NoStore).unwrap().mesh());
     for _ in 0..50 {
-        let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();
+        let report =
+            simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1, ..Command::default() }).unwrap();
         assert!(report.converged);
         assert!(!crossing.is_crossed_by(&simulation));
     }

@@ -8,5 +8,6 @@ mod insertion;
 mod path;
 mod rod;
 mod spoiled_surfaces;
+mod steered;
 mod tails;
 mod wall_regions;

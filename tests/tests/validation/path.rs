@@ -15,7 +15,9 @@ fn turned(friction: f64, degrees: f64) -> Simulation {
     let mut scene = Scene::read(&path).unwrap();
     scene.vessel.wall.friction = friction;
     let mut simulation = scene.simulation(&NoStore).unwrap();
-    simulation.step(Command { advance_mm: 0.0, rotate_rad: degrees.to_radians() }).unwrap();
+    simulation
+        .step(Command { advance_mm: 0.0, rotate_rad: degrees.to_radians(), ..Command::default() })
+        .unwrap();
     simulation
 }
 
@@ -53,9 +55,13 @@ fn one_command_stores_what_its_parts_do() {
     push(&mut simulation, 2.0, 20);
     for (advance_mm, rotate_rad) in [(38.0, 2.5), (-24.0, -3.0), (40.0, 0.0), (-30.0, 1.0), (35.0, -2.0)] {
         let (mut one, mut many) = (simulation.clone(), simulation.clone());
-        one.step(Command { advance_mm, rotate_rad }).unwrap();
+        one.step(Command { advance_mm, rotate_rad, ..Command::default() }).unwrap();
         for _ in 0..40 {
-            let part = Command { advance_mm: advance_mm / 40.0, rotate_rad: rotate_rad / 40.0 };
+            let part = Command {
+                advance_mm: advance_mm / 40.0,
+                rotate_rad: rotate_rad / 40.0,
+                ..Command::default()
+            };
             many.step(part).unwrap();
         }
         let [energy, of_parts] = [&one, &many].map(|s| s.report().energy.total());

@@ -95,7 +95,7 @@ fn work_of_the_hand_is_stored_in_wire_wall_and_tail() {
         let first = was.clone();
         let (mut put_in_mj, mut lost_mj, mut turned_mj) = (0.0, 0.0, 0.0f64);
         let steps = [Command::rotate(0.02); 60].into_iter().chain([Command::advance(0.1); 60]);
-        let steps = steps.chain([Command { advance_mm: -0.1, rotate_rad: 0.02 }; 60]);
+        let steps = steps.chain([Command { advance_mm: -0.1, rotate_rad: 0.02, ..Command::default() }; 60]);
         for (k, command) in steps.enumerate() {
             let is = simulation.step(command).unwrap().clone();
             assert!(is.converged && !is.jumped, "{k}");
@@ -185,7 +185,7 @@ fn two(valve_n: f64) -> Simulation {
 }
 
 fn moved(instrument: usize, advance_mm: f64, rotate_rad: f64) -> Move {
-    Move { instrument, command: Command { advance_mm, rotate_rad } }
+    Move { instrument, command: Command { advance_mm, rotate_rad, ..Command::default() } }
 }
 
 #[test]
@@ -228,7 +228,8 @@ fn tails_go_on_from_states_and_copies_and_ticks_are_steps() {
     restored.restore(&state).unwrap();
     assert_eq!(bits(&restored), bits(&first));
     let mut ticked = first.clone();
-    for command in [Command::rotate(-0.2), Command { advance_mm: 1.0, rotate_rad: 0.3 }] {
+    for command in [Command::rotate(-0.2), Command { advance_mm: 1.0, rotate_rad: 0.3, ..Command::default() }]
+    {
         for other in [&mut first, &mut copy, &mut restored] {
             other.step(command).unwrap();
         }

@@ -186,7 +186,7 @@ fn friction_in_a_region_acts_there_and_nowhere_else() {
 fn a_rough_region_holds_a_device_that_is_turned_on_it() {
     let rough = WallRegion { friction: Some(0.2), modulus_n_per_mm2: None, ..patch(1.0) };
     let mut simulation = in_curved_tube(WallProperties { region: vec![rough], ..wall(1.0) });
-    let turn = Command { advance_mm: 0.0, rotate_rad: FRAC_PI_2 };
+    let turn = Command { advance_mm: 0.0, rotate_rad: FRAC_PI_2, ..Command::default() };
     let mut torques = |length_mm: f64| {
         advance(&mut simulation, length_mm, 2.0);
         let report = simulation.step(turn).unwrap();

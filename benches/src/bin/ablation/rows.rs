@@ -263,6 +263,7 @@ fn groups() -> [Group; 14] {
                 without!("the solves after which a command ends", steps.solves = usize::MAX),
                 other!(steps.solves = 2_000),
                 other!(steps.work_rad = 0.02),
+                other!(steps.work_steer = 0.01),
                 without!("further relaxations at the end of a command", steps.again = 0),
                 other!(steps.again = 10),
                 other!(steps.rest_radii = 1e-2),

@@ -55,7 +55,7 @@ pub(crate) fn ticks(only: Option<&str>) -> Result<usize> {
                 [(); 4].map(|()| Course::new(start.clone()));
             for k in 0..COMMANDS {
                 let rotate_rad = if k % 7 == 0 { TURN_RAD } else { 0.0 };
-                let command = Command { advance_mm: ADVANCE_MM, rotate_rad };
+                let command = Command { advance_mm: ADVANCE_MM, rotate_rad, ..Command::default() };
                 let moves = [Move { instrument: 0, command }];
                 stepping.go(&moves, None, 1);
                 small.go(&moves, None, PARTS);

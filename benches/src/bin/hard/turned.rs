@@ -57,7 +57,7 @@ fn scene(name: &str, friction: f64) -> Result<Simulation> {
 fn insert(start: &Simulation, turn_rad: f64, total_mm: f64, step_mm: f64) -> Course {
     let mut course = Course::new(start.clone());
     let mut go = |advance_mm: f64, rotate_rad: f64, parts: usize| {
-        let command = Command { advance_mm, rotate_rad };
+        let command = Command { advance_mm, rotate_rad, ..Command::default() };
         course.go(&[Move { instrument: 0, command }], None, parts);
     };
     go(0.0, turn_rad, 1);

@@ -27,6 +27,9 @@ struct Row {
     #[serde(default)]
     mouth_rotation_rad: f64,
     tip_rotation_rad: f64,
+    /// Value to which it is steered.
+    #[serde(default)]
+    steer: f64,
     tip_x_mm: Option<f64>,
     tip_y_mm: Option<f64>,
     tip_z_mm: Option<f64>,
@@ -76,6 +79,7 @@ impl InstrumentTable {
                 rotation_rad: reported.rotation_rad,
                 mouth_rotation_rad: reported.mouth_rotation_rad,
                 tip_rotation_rad: reported.tip_rotation_rad,
+                steer: reported.steer,
                 tip_x_mm: tip.map(|tip| tip.x),
                 tip_y_mm: tip.map(|tip| tip.y),
                 tip_z_mm: tip.map(|tip| tip.z),

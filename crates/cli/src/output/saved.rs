@@ -121,8 +121,9 @@ fn replayed<'a>(
             if several {
                 numbers.extend((one.instrument as u64).to_le_bytes());
             }
-            let command = [one.command.advance_mm, one.command.rotate_rad];
-            numbers.extend(command.into_iter().flat_map(f64::to_le_bytes));
+            let steer = Some(one.command.steer).filter(|by| *by != 0.0);
+            let command = [one.command.advance_mm, one.command.rotate_rad].into_iter().chain(steer);
+            numbers.extend(command.flat_map(f64::to_le_bytes));
         }
         seen(step);
     })?;

@@ -67,6 +67,8 @@ pub struct HandMotion {
     pub to_mm: f64,
     /// Turn, rad.
     pub turn_rad: f64,
+    /// Change of the steering value.
+    pub steer: f64,
 }
 
 impl HandMotion {

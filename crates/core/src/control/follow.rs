@@ -113,7 +113,11 @@ impl FollowPath {
                 if self.back_mm <= 0.0 {
                     (self.best_mm, self.best_inserted_mm) = (0.0, inserted - STEP_MM);
                 }
-                return Command { advance_mm: -STEP_MM, rotate_rad: GOLDEN_RAD * STEP_MM / BACK_MM };
+                return Command {
+                    advance_mm: -STEP_MM,
+                    rotate_rad: GOLDEN_RAD * STEP_MM / BACK_MM,
+                    ..Command::default()
+                };
             }
         }
         if on.arc_mm > self.best_mm + FARTHER_MM {
@@ -145,7 +149,7 @@ impl FollowPath {
             return Command::rotate(turn);
         }
         self.turns = 0;
-        Command { advance_mm: STEP_MM, rotate_rad: turn }
+        Command { advance_mm: STEP_MM, rotate_rad: turn, ..Command::default() }
     }
 
     /// Rotation of the tail that turns the bend of the tip towards the path ahead, or away from it.

@@ -12,6 +12,7 @@ mod quantity;
 mod rest_shape;
 mod secondary;
 mod stack;
+mod steer;
 mod winding;
 
 pub(crate) use file::FileTable;
@@ -20,6 +21,8 @@ pub(crate) use part::PartTable;
 pub use part::{Coat, CutError, Part};
 pub(crate) use stack::LENGTH_SLACK_MM;
 pub use stack::{Instrument, Stack, line_mm};
+pub(crate) use steer::MOST_STEER;
+pub use steer::Steer;
 
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +47,9 @@ pub struct Section {
     /// Rest curvature along the first and second material direction, 1/mm: a shaped tip.
     #[serde(default)]
     pub rest_curvature_per_mm: [f64; 2],
+    /// How it bends when the device is steered; not at all if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steer: Option<Steer>,
 }
 
 impl Section {
@@ -56,12 +62,18 @@ impl Section {
             bending_stiffness_nmm2,
             torsional_stiffness_nmm2: None,
             rest_curvature_per_mm: [0.0; 2],
+            steer: None,
         }
     }
 
     /// GJ, N·mm².
     pub fn torsion_nmm2(&self) -> f64 {
         self.torsional_stiffness_nmm2.unwrap_or(self.bending_stiffness_nmm2 / 1.3)
+    }
+
+    /// Whether it has a rest shape, at some value of the steering.
+    fn is_shaped(&self) -> bool {
+        self.rest_curvature_per_mm != [0.0; 2] || self.steer.is_some()
     }
 
     /// Energy per length to straighten it, ½ EI |κ⁰|², mJ/mm = N: also the force with which it comes out of a
@@ -113,7 +125,7 @@ impl Section {
                 "must be finite, and its radius no smaller than the device's own",
             ));
         }
-        Ok(())
+        self.steer.iter().try_for_each(|steer| steer.check(name, self.radius_mm, curvature))
     }
 }
 
@@ -126,6 +138,8 @@ pub struct Device {
     length_mm: f64,
     /// Length from the tip that can be detached, mm; 0 if none.
     coil_mm: f64,
+    /// The value to which it is steered.
+    steered: f64,
 }
 
 /// Longest device accepted, mm. Ten metres: three times the longest exchange wire made; more is a unit mistake.
@@ -163,14 +177,17 @@ impl Device {
         }
         let length_mm = sections.iter().map(|s| s.length_mm).sum();
         crate::error::in_range("device length (sum of section lengths) in mm", length_mm, LENGTH_LIMIT_MM)?;
-        Ok(Self { sections, length_mm, coil_mm: 0.0 })
+        Ok(Self { sections, length_mm, coil_mm: 0.0, steered: 0.0 })
     }
 
     /// The same device as a coil on its pusher, with this length, from the tip on, that can be detached.
     ///
     /// # Errors
-    /// A length that is not positive and less than that of the device.
+    /// A length that is not positive and less than that of the device; a device that is steered.
     pub fn with_coil(self, coil_mm: f64) -> Result<Self> {
+        if self.is_steerable() {
+            return Err(Error::parameter("device.coil_mm", coil_mm, "a device that is steered is no coil"));
+        }
         if coil_mm > 0.0 && coil_mm < self.length_mm {
             return Ok(Self { coil_mm, ..self });
         }
@@ -179,6 +196,35 @@ impl Device {
             self.length_mm
         );
         Err(Error::parameter("device.coil_mm", coil_mm, remedy))
+    }
+
+    /// Whether any of its sections is steered.
+    pub fn is_steerable(&self) -> bool {
+        self.sections.iter().any(|section| section.steer.is_some())
+    }
+
+    /// The same device steered to a value from −1 to 1: with the rest curvature that its sections then have.
+    pub fn steered(&self, value: f64) -> Self {
+        let mut device = self.clone();
+        device.steered = value;
+        for section in &mut device.sections {
+            let Some(steer) = section.steer else { continue };
+            let by = steer.curvature_per_mm();
+            let rest = &mut section.rest_curvature_per_mm;
+            *rest = [0, 1].map(|axis| rest[axis] + (value - self.steered) * by[axis]);
+        }
+        device
+    }
+
+    /// The value to which it is steered.
+    pub(crate) fn steered_to(&self) -> f64 {
+        self.steered
+    }
+
+    /// Largest rest curvature of one of its sections, however it is steered, 1/mm.
+    pub(crate) fn most_bent_per_mm(&self, section: &Section) -> f64 {
+        let by = section.steer.map_or([0.0; 2], |steer| steer.curvature_per_mm());
+        steer::most_bent_per_mm(section.rest_curvature_per_mm, self.steered, by)
     }
 
     /// Length from the tip that can be detached, mm; 0 for devices without a coil.
@@ -236,7 +282,7 @@ impl Device {
 
     /// Whether the device has a rest shape, so that rotating its tail moves it.
     pub fn is_shaped(&self) -> bool {
-        self.sections.iter().any(|s| s.rest_curvature_per_mm != [0.0; 2])
+        self.sections.iter().any(Section::is_shaped)
     }
 
     /// Length from the tip within which the device has a rest shape, mm.
@@ -245,7 +291,7 @@ impl Device {
         let mut shaped_mm = 0.0;
         for section in &self.sections {
             end_mm += section.length_mm;
-            if section.rest_curvature_per_mm != [0.0; 2] {
+            if section.is_shaped() {
                 shaped_mm = end_mm;
             }
         }

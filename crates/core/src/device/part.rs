@@ -154,6 +154,7 @@ impl Part {
             },
             torsional_stiffness_nmm2: self.torsion_nmm2.map(|gj| gj.at(fraction)),
             rest_curvature_per_mm: self.arc(fraction).curvature_per_mm,
+            steer: None,
         }
     }
 

@@ -1,5 +1,7 @@
 //! Coaxial instruments: a wire in a microcatheter in a catheter.
 
+use std::borrow::Cow;
+
 use super::Device;
 use crate::contact::{check_friction, check_valve};
 use crate::error::nearest_name;
@@ -180,6 +182,26 @@ impl Stack {
         }
         self.sets = sets;
         Ok(self)
+    }
+
+    /// Whether any of the instruments is steered.
+    pub fn is_steerable(&self) -> bool {
+        self.devices().any(Device::is_steerable)
+    }
+
+    /// The same instruments steered to these values; those that are not steered have none.
+    pub(crate) fn steered(&self, values: impl Iterator<Item = f64> + Clone) -> Cow<'_, Self> {
+        let is_at = |(device, value): (&Device, f64)| device.steered_to() == value || !device.is_steerable();
+        if self.devices().zip(values.clone()).all(is_at) {
+            return Cow::Borrowed(self);
+        }
+        let mut steered = self.clone();
+        for (instrument, value) in steered.instruments.iter_mut().zip(values) {
+            if instrument.device.is_steerable() {
+                instrument.device = instrument.device.steered(value);
+            }
+        }
+        Cow::Owned(steered)
     }
 
     /// Number of sets of material angles on the line.

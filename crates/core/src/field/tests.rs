@@ -249,7 +249,7 @@ fn a_field_that_turns_while_the_hand_moves_is_followed_in_ticks_with_enough_solv
     let mut wire = simulation(Device::uniform(100.0, 0.3, STIFFNESS).unwrap(), 2.0);
     wire.step(Command::advance(40.0)).unwrap();
     let mut ticks = wire.clone();
-    let command = Command { advance_mm: 0.2, rotate_rad: 0.02 };
+    let command = Command { advance_mm: 0.2, rotate_rad: 0.02, ..Command::default() };
     for k in 0..20 {
         let angle = 0.9 * f64::from(k);
         let field_t = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0) * 0.01 * f64::from(k);

@@ -122,7 +122,11 @@ mod tests {
 
     /// The command of environment `k` in its `step`th step.
     fn command(k: usize, step: usize) -> Command {
-        Command { advance_mm: 1.0 + 0.25 * k as f64, rotate_rad: 0.1 * ((k + step) % 5) as f64 }
+        Command {
+            advance_mm: 1.0 + 0.25 * k as f64,
+            rotate_rad: 0.1 * ((k + step) % 5) as f64,
+            ..Command::default()
+        }
     }
 
     #[test]

@@ -95,6 +95,11 @@ impl<'a> SimulationBuilder<'a> {
             let remedy = "pushes one device and no more: leave one instrument, or choose kirchhoff";
             return Err(Error::parameter("method.name", method.name(), remedy));
         }
+        if scene.stack.is_steerable() && !method.takes_steering() {
+            let remedy =
+                "knows no devices that are steered: leave steer out of their sections, or choose kirchhoff";
+            return Err(Error::parameter("method.name", method.name(), remedy));
+        }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;
         let (fields, fields_before) = (Arc::new([]), Arc::new([]));
         Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before, stop: None })

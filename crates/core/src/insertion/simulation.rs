@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::contact::{Counters, Touching, WallProperties};
-use crate::device::{Device, LENGTH_SLACK_MM, Stack, line_mm};
+use crate::device::{Device, LENGTH_SLACK_MM, MOST_STEER, Stack, line_mm};
 use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::insertion::{SimulationBuilder, mark};
@@ -311,6 +311,9 @@ impl Simulation {
             let several = instruments.len() > 1;
             let checked =
                 checked.map_err(|error| if several { within(&instrument.name, error) } else { error });
+            let steered = |from: f64| check_steer(one.command, from, &instrument.device);
+            let left = report.behind.get(one.instrument).map_or(0.0, |left| left.steer);
+            let checked = checked.and_then(|()| steered(report.hand(one.instrument).steer + left));
             let would_do = || check_command(one.command, reached(one.instrument), device_mm).is_ok();
             checked.map_err(|error| if would_do() { self.telling_what_is_behind(error) } else { error })?;
         }
@@ -330,8 +333,9 @@ impl Simulation {
     fn telling_what_is_behind(&self, error: Error) -> Error {
         let hands = self.report().behind.iter().zip(self.scene.stack.instruments());
         let each = hands.filter(|(left, _)| **left != Command::default()).map(|(left, instrument)| {
-            let Command { advance_mm, rotate_rad } = left;
-            format!("{advance_mm:.3} mm and {rotate_rad:.3} rad of {:?}", instrument.name)
+            let Command { advance_mm, rotate_rad, steer } = left;
+            let steered = if *steer == 0.0 { String::new() } else { format!(" and {steer:.3} of steering") };
+            format!("{advance_mm:.3} mm and {rotate_rad:.3} rad{steered} of {:?}", instrument.name)
         });
         let each: Vec<String> = each.collect();
         if each.is_empty() {
@@ -463,6 +467,9 @@ impl Simulation {
     }
 }
 
+/// Slack of a steering value: the rounding of thousands of summed increments.
+const STEER_SLACK: f64 = 1e-9;
+
 /// Latest time of a step, s: beyond it too few digits are left to resolve a heartbeat.
 const LATEST_S: f64 = 1e9;
 
@@ -478,6 +485,22 @@ fn within(instrument: &str, error: Error) -> Error {
         }
         other => other,
     }
+}
+
+/// Checks the change of the steering in a command, from this value.
+pub(super) fn check_steer(command: Command, from: f64, device: &Device) -> Result<()> {
+    let to = from + command.steer;
+    if command.steer == 0.0 {
+        return Ok(());
+    }
+    let remedy = if !device.is_steerable() {
+        "it is not steered: give a section of it steer, or leave it out".to_owned()
+    } else if !to.is_finite() || to.abs() > MOST_STEER + STEER_SLACK {
+        format!("it is steered to {from}, and values are −1 to 1: steer it by less")
+    } else {
+        return Ok(());
+    };
+    Err(Error::parameter("steer", command.steer, remedy))
 }
 
 pub(super) fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {

@@ -9,12 +9,14 @@ pub struct Command {
     pub advance_mm: f64,
     /// Rotation of the tail about its axis, rad; positive is right-handed about the direction of insertion.
     pub rotate_rad: f64,
+    /// Change of the value to which a steered device is steered, which stays within −1 and 1.
+    pub steer: f64,
 }
 
 impl Command {
     /// Pushes in by `mm`.
     pub fn advance(mm: f64) -> Self {
-        Self { advance_mm: mm, rotate_rad: 0.0 }
+        Self { advance_mm: mm, ..Self::default() }
     }
 
     /// Pulls back by `mm`.
@@ -24,7 +26,12 @@ impl Command {
 
     /// Rotates the tail by `rad`.
     pub fn rotate(rad: f64) -> Self {
-        Self { advance_mm: 0.0, rotate_rad: rad }
+        Self { rotate_rad: rad, ..Self::default() }
+    }
+
+    /// Changes the steering value by so much.
+    pub fn steer(by: f64) -> Self {
+        Self { steer: by, ..Self::default() }
     }
 }
 

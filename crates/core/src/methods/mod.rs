@@ -219,6 +219,11 @@ pub trait MethodChoice: Debug {
         false
     }
 
+    /// Whether it supports devices that are steered.
+    fn takes_steering(&self) -> bool {
+        false
+    }
+
     /// Checks whether coils can be detached with this method and its options.
     ///
     /// # Errors
@@ -258,6 +263,11 @@ impl MethodChoice for OwnMethod {
     fn takes_several(&self) -> bool {
         let Self::Kirchhoff(options) = self;
         options.takes_several()
+    }
+
+    fn takes_steering(&self) -> bool {
+        let Self::Kirchhoff(options) = self;
+        options.takes_steering()
     }
 
     fn check_detach(&self) -> Result<()> {

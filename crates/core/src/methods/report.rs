@@ -68,6 +68,8 @@ impl StepReport {
             tip_rotation_rad: self.tip_rotation_rad,
             push_force_n: Some(self.push_force_n),
             torque_nmm: self.torque_nmm,
+            steer: 0.0,
+            steer_mj: 0.0,
         })
     }
 
@@ -121,6 +123,10 @@ pub struct InstrumentReport {
     pub push_force_n: Option<f64>,
     /// Holding torque of its hand, N·mm: derivative of the energy in its rotation.
     pub torque_nmm: f64,
+    /// Value to which it is steered, −1 to 1; 0 for those that are not.
+    pub steer: f64,
+    /// Derivative of the energy of the inserted length in that value, mJ: what steering takes.
+    pub steer_mj: f64,
 }
 
 /// Magnitudes of the wall's forces on a device, each contact's normal force and friction combined.

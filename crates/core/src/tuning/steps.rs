@@ -32,6 +32,8 @@ pub struct StepTuning {
     pub work: f64,
     /// Rotation that counts like a millimetre, rad.
     pub work_rad: f64,
+    /// Change of the steering value that counts like a millimetre.
+    pub work_steer: f64,
     /// Upper limit of these iterations, as a multiple of those of one solution.
     pub work_of_one: usize,
     /// Number of further relaxations, with the hands held still, of a device that rests at the end of its command but
@@ -85,6 +87,7 @@ impl StepTuning {
         solves_up_to_mm: 40.0,
         work: 280.0,
         work_rad: 0.1,
+        work_steer: 0.05,
         work_of_one: 10,
         again: 4,
         rest_radii: 1e-3,

@@ -125,7 +125,9 @@ fn a_tip_that_has_turned_with_the_hand_says_so() {
         simulation.step(Command::advance(20.0)).unwrap();
         let was = lateral(&simulation);
         for _ in 0..9 {
-            simulation.step(Command { advance_mm: 0.0, rotate_rad: FRAC_PI_2 / 9.0 }).unwrap();
+            simulation
+                .step(Command { advance_mm: 0.0, rotate_rad: FRAC_PI_2 / 9.0, ..Command::default() })
+                .unwrap();
         }
         let (is, report) = (lateral(&simulation), simulation.report());
         let went = was.cross(&is).x.atan2(was.dot(&is));

@@ -171,7 +171,7 @@ fn other_normal_forces_change_what_holds_and_not_what_was_taken() {
 fn a_hand_that_rests_sticks_within_a_part_of_the_radius() {
     let mut point = slipped(SLIPS[0], 0.01);
     let mut sticks = |to_mm: f64| {
-        let hand = HandMotion { from_mm: 10.0, to_mm, turn_rad: 0.0 };
+        let hand = HandMotion { from_mm: 10.0, to_mm, turn_rad: 0.0, steer: 0.0 };
         let Slipped { friction, elements, state, points } = &mut point;
         friction.begin(elements, state, points, (&[], &[]), &[hand]);
         friction.law.stick_mm

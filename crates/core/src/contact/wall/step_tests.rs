@@ -101,7 +101,7 @@ fn rubbed(surface: &ContactSurface, predicting: bool) -> ([usize; 2], [f64; 2]) 
     let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     rod.friction = Friction::new(0.3);
     let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
-    let hand = HandMotion { from_mm: 20.0, to_mm: 20.0, turn_rad: 0.0 };
+    let hand = HandMotion { from_mm: 20.0, to_mm: 20.0, turn_rad: 0.0, steer: 0.0 };
     rod.friction.begin(&elements, &state, &rod.points, (&[], &[]), &[hand]);
     let mut supports = Supports { start_tangent: true, ..Supports::default() };
     let mut newton = Newton::<PLAIN>::new(20);

@@ -5,13 +5,15 @@ use serde::{Deserialize, Serialize};
 use super::inject::{Bolus, Inject};
 use super::motion::{Incoming, Motion, Part, Travel, Wait};
 use super::until::{Condition, Until};
-use crate::device::Stack;
+use crate::device::{MOST_STEER, Stack};
 use crate::error::in_range;
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
 
 /// Time step while hands rest, s: ten images per second.
 const STEP_S: f64 = 0.1;
+/// Largest increment of a steering value unless given.
+const STEP_STEER: f64 = 0.05;
 /// Longest rest, s.
 const LONGEST_S: f64 = 1e6;
 
@@ -33,10 +35,14 @@ pub struct ScriptLine {
     pub withdraw: bool,
     /// Rotation of the tail, degrees, of either sign.
     pub rotate_deg: Option<f64>,
+    /// Value to which the instrument is steered, −1 to 1, in the course of the line.
+    pub steer: Option<f64>,
     /// Largest increment of length, mm; 1 if absent.
     pub step_mm: Option<f64>,
     /// Largest increment of rotation, degrees; 5 if absent.
     pub step_deg: Option<f64>,
+    /// Largest increment of the steering value; 0.05 if absent.
+    pub step_steer: Option<f64>,
     /// Name of the instrument that replaces this one, which is withdrawn first, over a catheter that stays. It is
     /// inserted by `advance_mm`, or as far as this one was.
     pub exchange: Option<String>,
@@ -44,6 +50,8 @@ pub struct ScriptLine {
     pub speed_mm_per_s: Option<f64>,
     /// Speed of rotation, degrees/s.
     pub speed_deg_per_s: Option<f64>,
+    /// Speed of steering, 1/s.
+    pub speed_steer_per_s: Option<f64>,
     /// Condition that ends the line early; its full motion is then the maximum.
     pub until: Option<Until>,
     /// Time for which the hands rest, s; other motion continues.
@@ -135,7 +143,7 @@ impl ScriptLine {
             None => Travel::AsFarAs(lead),
         };
         let mut withdrawn = parts[0].clone();
-        (withdrawn.travel, withdrawn.turn_rad) = (Travel::Out, 0.0);
+        (withdrawn.travel, withdrawn.turn_rad, withdrawn.steer) = (Travel::Out, 0.0, None);
         let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
         let until = until.map(|condition| Condition { instrument, ..condition });
         let incoming = Incoming { key, instrument, name: other.clone() };
@@ -173,7 +181,7 @@ impl ScriptLine {
     /// Whether it specifies no motion.
     fn rests(&self) -> bool {
         let lengths = self.advance_mm.is_some() || self.retract_mm.is_some() || self.withdraw;
-        let moves = lengths || self.rotate_deg.is_some() || self.exchange.is_some();
+        let moves = lengths || self.rotate_deg.is_some() || self.steer.is_some() || self.exchange.is_some();
         !moves && self.until.is_none() && self.with.is_empty()
     }
 
@@ -208,8 +216,16 @@ impl ScriptLine {
                 return Err(Error::parameter(format!("{name}.{field}"), v, remedy));
             }
         }
-        let steps = [("step_mm", self.step_mm.unwrap_or(1.0)), ("step_deg", self.step_deg.unwrap_or(5.0))];
-        let speeds = [("speed_mm_per_s", self.speed_mm_per_s), ("speed_deg_per_s", self.speed_deg_per_s)];
+        let steps = [
+            ("step_mm", self.step_mm.unwrap_or(1.0)),
+            ("step_deg", self.step_deg.unwrap_or(5.0)),
+            ("step_steer", self.step_steer.unwrap_or(STEP_STEER)),
+        ];
+        let speeds = [
+            ("speed_mm_per_s", self.speed_mm_per_s),
+            ("speed_deg_per_s", self.speed_deg_per_s),
+            ("speed_steer_per_s", self.speed_steer_per_s),
+        ];
         let given = speeds.iter().filter_map(|(field, speed)| speed.map(|speed| (*field, speed)));
         for (field, value) in steps.into_iter().chain(given) {
             if !(value.is_finite() && value > 0.0) {
@@ -220,14 +236,31 @@ impl ScriptLine {
         if !rotate.is_finite() {
             return Err(Error::parameter(format!("{name}.rotate_deg"), rotate, "must be a finite number"));
         }
+        let instrument = self.number(&name, stack)?;
+        if let Some(steer) = self.steer {
+            let device = &stack.instruments()[instrument].device;
+            let remedy = if !device.is_steerable() {
+                "the instrument is not steered: give a section of it steer, or leave it out"
+            } else if !(steer.is_finite() && steer.abs() <= MOST_STEER) {
+                "must be a value from −1 to 1"
+            } else {
+                ""
+            };
+            if !remedy.is_empty() {
+                return Err(Error::parameter(format!("{name}.steer"), steer, remedy));
+            }
+        }
         let part = Part {
-            instrument: self.number(&name, stack)?,
+            instrument,
             travel: self.travel(&name)?,
             turn_rad: rotate.to_radians(),
+            steer: self.steer,
             step_mm: steps[0].1,
             step_deg: steps[1].1,
+            step_steer: steps[2].1,
             speed_mm_per_s: self.speed_mm_per_s,
             speed_deg_per_s: self.speed_deg_per_s,
+            speed_steer_per_s: self.speed_steer_per_s,
             name,
         };
         self.check_speed(&part)?;
@@ -268,9 +301,10 @@ impl ScriptLine {
                 let remedy = "exchange withdraws all of the instrument: leave retract_mm out";
                 Err(Error::parameter(format!("{name}.retract_mm"), r, remedy))
             }
-            (None, None, false) if self.rotate_deg.is_none() && self.exchange.is_none() => {
-                let remedy =
-                    "give advance_mm, retract_mm, withdraw, rotate_deg, exchange, detach, wait_s or inject";
+            (None, None, false)
+                if self.rotate_deg.is_none() && self.steer.is_none() && self.exchange.is_none() =>
+            {
+                let remedy = "give advance_mm, retract_mm, withdraw, rotate_deg, steer, exchange, detach, wait_s or inject";
                 Err(Error::parameter(name, "{}", remedy))
             }
             (_, _, true) => Ok(Travel::Out),

@@ -19,7 +19,7 @@ pub use until::{Condition, Met, Until};
 
 use super::simulation::check_command;
 use super::{Command, Move};
-use crate::device::{Device, LENGTH_SLACK_MM, Stack};
+use crate::device::{Device, LENGTH_SLACK_MM, MOST_STEER, Stack};
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
 use motion::{Lengths, Motion, Part, STEP_LIMIT, Steps, Travel};
@@ -158,7 +158,7 @@ struct Bounds {
 
 impl Bounds {
     fn at(inserted_mm: &[f64]) -> Self {
-        let lengths = Lengths { now_mm: inserted_mm.to_vec(), before_mm: inserted_mm.to_vec() };
+        let lengths = Lengths::at(inserted_mm);
         Self { low: lengths.clone(), high: lengths, detached: vec![false; inserted_mm.len()] }
     }
 
@@ -177,7 +177,7 @@ impl Bounds {
         }
         for lengths in [&mut self.low, &mut self.high] {
             lengths.before_mm.clone_from(&lengths.now_mm);
-            lengths.now_mm[instrument] = 0.0;
+            (lengths.now_mm[instrument], lengths.steered[instrument]) = (0.0, 0.0);
         }
         Ok(1)
     }
@@ -203,13 +203,16 @@ impl Bounds {
         if low == high {
             self.high.before_mm.clone_from(&high.now_mm);
             for step in 1..=steps.count {
-                go(stack, &mut self.high.now_mm, motion, &steps, step)?;
+                go(stack, &mut self.high, motion, &steps, step)?;
             }
             self.low = self.high.clone();
             if motion.until.is_some() {
                 // It may end at once.
                 let ends = self.low.now_mm.iter_mut().zip(&mut self.high.now_mm);
-                ends.zip(&low.now_mm).for_each(|((a, b), start)| (*a, *b) = (a.min(*start), b.max(*start)));
+                let steered = self.low.steered.iter_mut().zip(&mut self.high.steered);
+                let starts = low.now_mm.iter().chain(&low.steered);
+                let ends = ends.chain(steered);
+                ends.zip(starts).for_each(|((a, b), start)| (*a, *b) = (a.min(*start), b.max(*start)));
             }
             return Ok(steps.count);
         }
@@ -225,6 +228,10 @@ impl Bounds {
             }
             self.low.now_mm[part.instrument] = a.clamp(0.0, device_mm);
             self.high.now_mm[part.instrument] = b.clamp(0.0, device_mm);
+            if let Some(to) = part.steer {
+                let (least, most) = if motion.until.is_none() { (to, to) } else { (-MOST_STEER, MOST_STEER) };
+                (self.low.steered[part.instrument], self.high.steered[part.instrument]) = (least, most);
+            }
         }
         Ok(steps.count)
     }
@@ -258,11 +265,11 @@ fn check_ends(part: &Part, [low_mm, high_mm]: [f64; 2], device_mm: f64) -> Resul
     Ok(())
 }
 
-/// Adds a step to the inserted lengths, if it can be carried out.
-fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, step: usize) -> Result<()> {
+/// Adds a step to the lengths, if it can be carried out.
+fn go(stack: &Stack, lengths: &mut Lengths, motion: &Motion, steps: &Steps, step: usize) -> Result<()> {
     for (one, part) in steps.moves.iter().zip(&motion.parts) {
         let device = &stack.instruments()[one.instrument].device;
-        let inserted = &mut inserted_mm[one.instrument];
+        let inserted = &mut lengths.now_mm[one.instrument];
         check_command(one.command, *inserted, device.length_mm()).map_err(|error| match error {
             Error::Parameter { name: key, remedy, .. } => {
                 let (key, value) = match part.travel {
@@ -282,8 +289,9 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
             other => other,
         })?;
         *inserted += one.command.advance_mm;
+        lengths.steered[one.instrument] += one.command.steer;
     }
-    stack.check_places(inserted_mm.iter().copied()).map_err(|error| match error {
+    stack.check_places(lengths.now_mm.iter().copied()).map_err(|error| match error {
         Error::Parameter { name, value, remedy } => {
             Error::Parameter { name: format!("{}: in its step {step}, {name}", motion.name), value, remedy }
         }

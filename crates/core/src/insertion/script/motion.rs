@@ -28,10 +28,14 @@ pub(super) struct Part {
     pub(super) instrument: usize,
     pub(super) travel: Travel,
     pub(super) turn_rad: f64,
+    /// The value to which it is steered, if it is.
+    pub(super) steer: Option<f64>,
     pub(super) step_mm: f64,
     pub(super) step_deg: f64,
+    pub(super) step_steer: f64,
     pub(super) speed_mm_per_s: Option<f64>,
     pub(super) speed_deg_per_s: Option<f64>,
+    pub(super) speed_steer_per_s: Option<f64>,
 }
 
 /// Time for which hands rest.
@@ -95,11 +99,21 @@ pub(super) struct Steps {
     pub(super) step_s: f64,
 }
 
-/// Inserted lengths of all instruments, mm: at the start of a motion, and of the one before.
+/// Inserted lengths of all instruments, mm: at the start of a motion, and of the one before; and the values to which they
+/// are steered.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Lengths {
     pub(super) now_mm: Vec<f64>,
     pub(super) before_mm: Vec<f64>,
+    pub(super) steered: Vec<f64>,
+}
+
+impl Lengths {
+    /// At the start of a script.
+    pub(super) fn at(inserted_mm: &[f64]) -> Self {
+        let steered = vec![0.0; inserted_mm.len()];
+        Self { now_mm: inserted_mm.to_vec(), before_mm: inserted_mm.to_vec(), steered }
+    }
 }
 
 /// Number of equal increments, rounded up from `steps`, for a line of this name.
@@ -124,36 +138,49 @@ impl Part {
         }
     }
 
-    /// Number of equal increments of a travel.
-    fn increments(&self, mm: f64) -> Result<usize> {
-        let mut count: f64 = 1.0;
-        for (step, travel) in [(self.step_mm, mm.abs()), (self.step_deg, self.turn_rad.to_degrees().abs())] {
-            count = count.max(travel / step);
-        }
-        increments(&self.name, count)
+    /// Change of the steering from there.
+    fn steers_by(&self, lengths: &Lengths) -> f64 {
+        self.steer.map_or(0.0, |to| to - lengths.steered[self.instrument])
     }
 
-    /// Whether it moves its instrument along and around itself.
-    pub(super) fn moves(&self) -> [bool; 2] {
+    /// Length, mm, turn, degrees, and change of the steering from there, without signs.
+    fn ways(&self, lengths: &Lengths) -> [f64; 3] {
+        [self.travel_mm(lengths), self.turn_rad.to_degrees(), self.steers_by(lengths)].map(f64::abs)
+    }
+
+    /// Number of equal increments from there.
+    fn increments(&self, lengths: &Lengths) -> Result<usize> {
+        let steps = [self.step_mm, self.step_deg, self.step_steer];
+        let each = self.ways(lengths).into_iter().zip(steps).map(|(way, step)| way / step);
+        increments(&self.name, each.fold(1.0, f64::max))
+    }
+
+    /// Whether it moves its instrument along and around itself, and steers it.
+    pub(super) fn moves(&self) -> [bool; 3] {
         let along = match self.travel {
             Travel::By(mm) => mm != 0.0,
             Travel::Out | Travel::AsFarAs(_) => true,
         };
-        [along, self.turn_rad != 0.0]
+        [along, self.turn_rad != 0.0, self.steer.is_some()]
     }
 
     /// Whether its duration is known: it has a speed of a motion that it makes, or any if it makes none.
     fn is_timed(&self) -> bool {
-        let speeds = [self.speed_mm_per_s, self.speed_deg_per_s];
         let moves = self.moves();
-        let counts = |k: usize| speeds[k].is_some() && (moves[k] || moves == [false; 2]);
-        counts(0) || counts(1)
+        let counts =
+            |(speed, moves_so): (Option<f64>, bool)| speed.is_some() && (moves_so || moves == [false; 3]);
+        self.speeds().into_iter().zip(moves).any(counts)
+    }
+
+    /// Speeds of pushing, turning and steering.
+    fn speeds(&self) -> [Option<f64>; 3] {
+        [self.speed_mm_per_s, self.speed_deg_per_s, self.speed_steer_per_s]
     }
 
     /// Its duration, s.
-    fn duration_s(&self, mm: f64) -> f64 {
-        let length_s = self.speed_mm_per_s.map_or(0.0, |speed| mm.abs() / speed);
-        length_s.max(self.speed_deg_per_s.map_or(0.0, |speed| self.turn_rad.to_degrees().abs() / speed))
+    fn duration_s(&self, lengths: &Lengths) -> f64 {
+        let each = self.ways(lengths).into_iter().zip(self.speeds());
+        each.map(|(way, speed)| speed.map_or(0.0, |speed| way / speed)).fold(0.0, f64::max)
     }
 }
 
@@ -174,7 +201,7 @@ impl Motion {
 
     /// Whether its duration is known: from a part that moves, if one does.
     pub(super) fn is_timed(&self) -> bool {
-        let moves = |part: &Part| part.moves() != [false; 2];
+        let moves = |part: &Part| part.moves() != [false; 3];
         let still = !self.parts.iter().any(moves);
         self.wait.is_some() || self.parts.iter().any(|part| part.is_timed() && (still || moves(part)))
     }
@@ -187,9 +214,8 @@ impl Motion {
         let (mut count, mut duration_s) =
             (usize::from(!self.parts.is_empty() || self.detach.is_some()), 0.0_f64);
         for part in &self.parts {
-            let mm = part.travel_mm(lengths);
-            count = count.max(part.increments(mm)?);
-            duration_s = duration_s.max(part.duration_s(mm));
+            count = count.max(part.increments(lengths)?);
+            duration_s = duration_s.max(part.duration_s(lengths));
         }
         if let Some(Wait { wait_s, step_s }) = self.wait {
             count = increments(&self.name, wait_s / step_s)?;
@@ -199,6 +225,7 @@ impl Motion {
         let command = |part: &Part| Command {
             advance_mm: part.travel_mm(lengths) * share,
             rotate_rad: part.turn_rad * share,
+            steer: part.steers_by(lengths) * share,
         };
         let moves =
             self.parts.iter().map(|part| Move { instrument: part.instrument, command: command(part) });

@@ -126,7 +126,7 @@ impl Script {
 
 impl<'a> ScriptRun<'a> {
     fn of(script: Cow<'a, Script>) -> Self {
-        let lengths = Lengths { now_mm: script.start_mm.clone(), before_mm: script.start_mm.clone() };
+        let lengths = Lengths::at(&script.start_mm);
         Self {
             script,
             course: ScriptCourse::default(),
@@ -180,9 +180,10 @@ impl<'a> ScriptRun<'a> {
         self.time_s += steps.step_s;
         for one in &steps.moves {
             self.lengths.now_mm[one.instrument] += one.command.advance_mm;
+            self.lengths.steered[one.instrument] += one.command.steer;
         }
         if let Some(instrument) = self.script.motions[self.course.motions.len() - 1].detach {
-            self.lengths.now_mm[instrument] = 0.0;
+            (self.lengths.now_mm[instrument], self.lengths.steered[instrument]) = (0.0, 0.0);
         }
     }
 

@@ -51,12 +51,12 @@ pub(super) struct Balance {
 }
 
 impl Balance {
-    /// The balance of these motions between two states, given the work of wall and blood and the bounds of the
+    /// The balance of these motions between two states, of the instruments as they are steered in each, given the work of wall and blood and the bounds of the
     /// dissipation. Friction outside the body is not part of it: what hands do against that is lost at once. Energy is
     /// significant above a fraction of the energy that is stored in the device and the wall, exchanged with
     /// fields, or released from the sheath.
     pub(super) fn new(
-        stack: &Stack,
+        stacks: [&Stack; 2],
         motions: &[HandMotion],
         (before, after): (&[HandForce], &[HandForce]),
         (was, is): (Energy, Energy),
@@ -66,11 +66,12 @@ impl Balance {
     ) -> Self {
         let (mut least_mj, mut most_mj) = (by_others.least_mj, by_others.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
-        // The part that has come out of the sheath was straight in it.
-        let each = stack.devices().zip(motions).map(|(device, motion)| {
+        // The part that has come out of the sheath was straight in it, steered as it was on the way.
+        let each = stacks.into_iter().flat_map(Stack::devices).zip(motions.iter().cycle());
+        let each = each.map(|(device, motion)| {
             device.straightening_mj(motion.to_mm) - device.straightening_mj(motion.from_mm)
         });
-        let from_sheath_mj: f64 = each.sum();
+        let from_sheath_mj = 0.5 * each.sum::<f64>();
         let mut add = |was: f64, is: f64, way: f64| {
             least_mj += (was * way).min(is * way);
             most_mj += (was * way).max(is * way);
@@ -85,6 +86,7 @@ impl Balance {
             let first_n = if comes_in { -from_sheath_mj.abs() / motion.to_mm } else { first_n };
             add(first_n, last_n, motion.advance_mm());
             add(was.torque_nmm, is.torque_nmm, motion.turn_rad);
+            add(was.steer_mj, is.steer_mj, motion.steer);
         }
         let stored_mj = is.total() - was.total() - from_sheath_mj;
         // The energy in a field has an arbitrary zero: its change counts.

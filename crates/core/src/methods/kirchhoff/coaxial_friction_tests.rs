@@ -48,7 +48,8 @@ fn a_catheter_over_a_soft_wire_is_a_catheter() {
     let (mut apart_mm, mut torque_off_nmm, mut most_nmm) = (0.0f64, 0.0f64, 0.0f64);
     let (mut taken_mj, mut expected_mj) = (0.0, 0.0);
     for k in 0..120 {
-        let command = Command { advance_mm: if k < 100 { 1.0 } else { -0.5 }, rotate_rad: 0.025 };
+        let command =
+            Command { advance_mm: if k < 100 { 1.0 } else { -0.5 }, rotate_rad: 0.025, ..Command::default() };
         let moves = [WIRE, CATHETER].map(|instrument| Move { instrument, command });
         both.step_together(&moves).unwrap();
         single.step(command).unwrap();

@@ -179,7 +179,8 @@ fn a_hook_goes_out_and_in_freely_and_no_jump_is_reported() {
         let mut simulation = builder.method(&options).build().unwrap();
         for k in 0..116 {
             let advance_mm = if k < 60 { 0.25 } else { -0.25 };
-            let report = simulation.step(Command { advance_mm, rotate_rad: 0.0 }).unwrap();
+            let report =
+                simulation.step(Command { advance_mm, rotate_rad: 0.0, ..Command::default() }).unwrap();
             let what = format!("{element_mm} mm elements, {} mm in: {report:?}", report.inserted_mm);
             assert!(report.converged && !report.jumped && report.relaxations == 0, "{what}");
             // Where the tip reaches the wall a step may be subdivided twice.

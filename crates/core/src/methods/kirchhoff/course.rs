@@ -76,12 +76,12 @@ impl<'a> Course<'a> {
         let tuning = &environment.options.tuning.steps;
         let most = tuning.work_of_one.saturating_mul(environment.options.max_iterations);
         let work = |travel_mm: f64| ((tuning.work * travel_mm) as usize).min(most);
-        let travel_mm = way.travel_mm(tuning.work_rad);
+        let travel_mm = way.travel_mm(tuning);
         let unfinished = from.unfinished.as_deref();
         let control = match unfinished {
             Some(unfinished) => {
                 let asked = moves.iter().map(|one| one.command);
-                unfinished.control.more(work(largest_mm(asked, tuning.work_rad)), most)
+                unfinished.control.more(work(largest_mm(asked, tuning)), most)
             }
             None => {
                 let control = StepControl::new(
@@ -173,7 +173,7 @@ impl<'a> Course<'a> {
         if self.is_there(way) {
             self.control.try_again();
         }
-        let travel_mm = way.travel_mm(self.tuning.work_rad);
+        let travel_mm = way.travel_mm(self.tuning);
         // A change without motion of the hands counts as a millimetre.
         let rest_mm = if travel_mm > 0.0 { travel_mm } else { 1.0 - self.change.done };
         let (effort, part_mm) = self.control.next(rest_mm);
@@ -283,7 +283,7 @@ impl<'a> Course<'a> {
 
 /// The largest number of linear solves of a command with these motions, apart from those of the iteration in progress.
 pub(super) fn most_solves(motions: &[Command], tuning: &StepTuning) -> usize {
-    tuning.most_solves(largest_mm(motions.iter().copied(), tuning.work_rad))
+    tuning.most_solves(largest_mm(motions.iter().copied(), tuning))
 }
 
 /// What is left of a command.

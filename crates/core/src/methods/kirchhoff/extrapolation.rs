@@ -39,8 +39,8 @@ struct Turn {
 /// Difference of the last equilibrium from the slid device.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Correction {
-    /// Advance, mm, and rotation, rad, of each hand in the step.
-    motions: Vec<[f64; 2]>,
+    /// Advance, mm, rotation, rad, and change of the steering value of each hand in the step.
+    motions: Vec<[f64; 3]>,
     /// In order from the tip.
     departures: Vec<Departure>,
     /// For every set of angles in each of these.
@@ -58,6 +58,10 @@ fn axes(f: &Frame) -> Matrix3<f64> {
 
 fn middle(state: &RodState, e: usize) -> Vec3 {
     mid_slope(state.frames[e].t, state.chords[e], state.frames[e + 1].t).normalize()
+}
+
+fn components(motion: &HandMotion) -> [f64; 3] {
+    [motion.advance_mm(), motion.turn_rad, motion.steer]
 }
 
 fn size(motions: impl Iterator<Item = f64>) -> f64 {
@@ -115,7 +119,7 @@ impl Correction {
     /// Stores the difference of the equilibrium found from the slid device; further rods may follow the slid one.
     pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
         self.clear();
-        self.motions.extend(motions.iter().map(HandMotion::parts));
+        self.motions.extend(motions.iter().map(components));
         let n = found.elements();
         self.mouth.extend((0..found.sets()).map(|set| found.angle(0, set) - slid.angle(0, set)));
         // Those of the slid device are measured from triads carried along the rod without twist; so are these.
@@ -137,7 +141,7 @@ impl Correction {
 
     /// The ratio of these motions to the hands' last ones; `None` if they are not proportional.
     pub(super) fn repeats(&self, motions: &[HandMotion]) -> Option<f64> {
-        let (now, last) = (motions.iter().flat_map(HandMotion::parts), self.motions.iter().flatten());
+        let (now, last) = (motions.iter().flat_map(components), self.motions.iter().flatten());
         let way = size(now.clone());
         let factor = way / size(last.clone().copied());
         let off = size(now.zip(last).map(|(now, last)| now - factor * last));
@@ -230,7 +234,7 @@ mod tests {
     }
 
     fn advance(mm: f64, turn_rad: f64) -> HandMotion {
-        HandMotion { from_mm: 20.0, to_mm: 20.0 + mm, turn_rad }
+        HandMotion { from_mm: 20.0, to_mm: 20.0 + mm, turn_rad, steer: 0.0 }
     }
 
     #[test]

@@ -1,10 +1,13 @@
 //! Positions of the hands: one for a single device, one for each of several instruments.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use crate::contact::HandMotion;
-use crate::device::{Stack, line_mm};
+use crate::device::{MOST_STEER, Stack, line_mm};
 use crate::methods::{Command, Move};
+use crate::tuning::StepTuning;
 
 /// Lengths and slips up to this, mm, are rounding: within it of the sheath a device is retracted completely.
 pub(super) const ROUNDED_MM: f64 = 1e-9;
@@ -16,6 +19,8 @@ pub(super) struct Hand {
     pub(super) inserted_mm: f64,
     /// Rotation, rad.
     pub(super) turn_rad: f64,
+    /// Value of the steering, −1 to 1.
+    pub(super) steer: f64,
 }
 
 impl Hand {
@@ -24,6 +29,7 @@ impl Hand {
         Command {
             advance_mm: target.inserted_mm - self.inserted_mm,
             rotate_rad: target.turn_rad - self.turn_rad,
+            steer: target.steer - self.steer,
         }
     }
 }
@@ -41,13 +47,15 @@ pub(super) struct HandForce {
     pub(super) torque_nmm: f64,
     /// Friction of the sheath and of valves on the push force, N.
     pub(super) outside_n: f64,
+    /// Work of steering the inserted length, per change of the value, mJ.
+    pub(super) steer_mj: f64,
 }
 
 impl HandForce {
     /// Whether all numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
-        let Self { push_n, torque_nmm, outside_n, .. } = self;
-        [push_n, torque_nmm, outside_n].into_iter().all(|part| part.is_finite())
+        let Self { push_n, torque_nmm, outside_n, steer_mj, .. } = self;
+        [push_n, torque_nmm, outside_n, steer_mj].into_iter().all(|part| part.is_finite())
     }
 }
 
@@ -58,6 +66,7 @@ pub(super) fn set_motions(before: &[Hand], after: &[Hand], motions: &mut Vec<Han
         from_mm: was.inserted_mm,
         to_mm: is.inserted_mm,
         turn_rad: is.turn_rad - was.turn_rad,
+        steer: is.steer - was.steer,
     }));
 }
 
@@ -81,14 +90,21 @@ pub(super) fn add_moves(hands: usize, behind: &[Command], moves: &[Move], motion
         if let Some(motion) = motions.get_mut(one.instrument) {
             motion.advance_mm += one.command.advance_mm;
             motion.rotate_rad += one.command.rotate_rad;
+            motion.steer += one.command.steer;
         }
     }
 }
 
-/// Largest motion in commands, mm; a rotation of `turn_rad` counts as one.
-pub(super) fn largest_mm(commands: impl Iterator<Item = Command>, turn_rad: f64) -> f64 {
-    let each = commands.map(|one| one.advance_mm.abs().max(one.rotate_rad.abs() / turn_rad));
-    each.fold(0.0, f64::max)
+/// Largest motion in commands, mm; a rotation of `work_rad`, and a change of the steering by `work_steer`, count as one.
+pub(super) fn largest_mm(commands: impl Iterator<Item = Command>, tuning: &StepTuning) -> f64 {
+    let around =
+        |one: Command| (one.rotate_rad.abs() / tuning.work_rad).max(one.steer.abs() / tuning.work_steer);
+    commands.map(|one| one.advance_mm.abs().max(around(one))).fold(0.0, f64::max)
+}
+
+/// The instruments as they are steered with the hands there.
+pub(super) fn steered<'a>(stack: &'a Stack, hands: &[Hand]) -> Cow<'a, Stack> {
+    stack.steered(hands.iter().map(|hand| hand.steer))
 }
 
 /// The lengths inserted, mm.
@@ -116,7 +132,9 @@ impl Way {
         for ((hand, command), device) in self.start.iter().zip(&self.commands).zip(stack.devices()) {
             let target = (hand.inserted_mm + command.advance_mm).min(device.length_mm());
             let inserted_mm = if target < ROUNDED_MM { 0.0 } else { target };
-            self.target.push(Hand { inserted_mm, turn_rad: hand.turn_rad + command.rotate_rad });
+            let turn_rad = hand.turn_rad + command.rotate_rad;
+            let steer = (hand.steer + command.steer).clamp(-MOST_STEER, MOST_STEER);
+            self.target.push(Hand { inserted_mm, turn_rad, steer });
         }
     }
 
@@ -130,6 +148,7 @@ impl Way {
         hands.extend(self.start.iter().zip(&self.target).map(|(start, target)| Hand {
             inserted_mm: start.inserted_mm + (target.inserted_mm - start.inserted_mm) * part,
             turn_rad: start.turn_rad + (target.turn_rad - start.turn_rad) * part,
+            steer: start.steer + (target.steer - start.steer) * part,
         }));
     }
 
@@ -149,8 +168,8 @@ impl Way {
         self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)).collect()
     }
 
-    /// Largest remaining motion of a hand, mm; a rotation of `turn_rad` counts as one.
-    pub(super) fn travel_mm(&self, turn_rad: f64) -> f64 {
-        largest_mm(self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)), turn_rad)
+    /// Largest remaining motion of a hand, mm, as [`largest_mm`] counts it.
+    pub(super) fn travel_mm(&self, tuning: &StepTuning) -> f64 {
+        largest_mm(self.start.iter().zip(&self.target).map(|(hand, target)| hand.to(target)), tuning)
     }
 }

@@ -56,7 +56,7 @@ fn straight_in_arc(torsion_nmm2: f64, friction: f64, (first, others): (usize, us
 fn go(simulation: &mut Simulation, moves: &[(usize, f64, f64)]) -> [InstrumentReport; 2] {
     let each = moves.iter().map(|(instrument, advance_mm, rotate_rad)| Move {
         instrument: *instrument,
-        command: Command { advance_mm: *advance_mm, rotate_rad: *rotate_rad },
+        command: Command { advance_mm: *advance_mm, rotate_rad: *rotate_rad, ..Command::default() },
     });
     let reported = simulation.step_together(&each.collect::<Vec<_>>()).unwrap();
     assert!(reported.converged && reported.relaxations == 0 && reported.substeps == 1, "{reported:?}");

@@ -191,7 +191,8 @@ fn at_random(seed: u64, self_contact: bool) -> (f64, usize, bool) {
     let from_sheath = |simulation: &Simulation| axis(simulation.shape());
     let mut before = Vec::new();
     for _ in 0..40 {
-        let command = Command { advance_mm: draw(-0.5, 2.0), rotate_rad: draw(-0.4, 0.4) };
+        let command =
+            Command { advance_mm: draw(-0.5, 2.0), rotate_rad: draw(-0.4, 0.4), ..Command::default() };
         if simulation.step(command).is_err() {
             continue;
         }

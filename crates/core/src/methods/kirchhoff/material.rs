@@ -104,6 +104,7 @@ pub(super) fn is_same(a: &Section, b: &Section) -> bool {
     a.bending_stiffness_nmm2 == b.bending_stiffness_nmm2
         && a.rest_curvature_per_mm == b.rest_curvature_per_mm
         && a.torsion_nmm2() == b.torsion_nmm2()
+        && a.steer == b.steer
 }
 
 /// A section, at all Gauss points.

@@ -95,7 +95,7 @@ pub use state::KirchhoffState;
 use std::sync::Arc;
 
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
-use crate::device::line_mm;
+use crate::device::{Stack, line_mm};
 use crate::field::FieldLoad;
 use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
@@ -106,7 +106,7 @@ use crate::{Error, Result};
 use coaxial::Nodes;
 use command::Driven;
 use configuration::Start;
-use hands::{Hand, lengths};
+use hands::{Hand, lengths, steered};
 use joined::{FreeCoil, Joined, join};
 use lateral::Line;
 use report::Took;
@@ -128,6 +128,10 @@ impl MethodChoice for KirchhoffOptions {
     }
 
     fn takes_several(&self) -> bool {
+        true
+    }
+
+    fn takes_steering(&self) -> bool {
         true
     }
 
@@ -192,6 +196,15 @@ impl<'a> Environment<'a> {
         'a: 'b,
     {
         Environment { displacement, ..*self }
+    }
+
+    /// The same with the instruments as they are steered.
+    fn steered<'b>(&self, stack: &'b Stack) -> Environment<'b>
+    where
+        'a: 'b,
+    {
+        let surroundings = Surroundings { device: stack.first(), stack, ..self.surroundings };
+        Environment { surroundings, ..*self }
     }
 
     /// The same after this part of the way into the fields after the step.
@@ -511,7 +524,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let on_line = touches.iter().take_while(|(point, _)| *point < mesh.points.len());
         let pressing: Vec<_> = on_line.map(|(point, touch)| (*point, touch.contact.total_n())).collect();
         let line = Line {
-            stack: surroundings.stack,
+            stack: &steered(surroundings.stack, hands),
             mesh: &mesh,
             rod,
             pressing: &pressing,
@@ -575,7 +588,9 @@ const NAME: &str = "kirchhoff";
 
 /// Meshes the inserted length.
 fn meshed(environment: &Environment<'_>, hands: &[Hand], mesh: &mut Mesh) {
-    let Surroundings { device, stack, properties, .. } = environment.surroundings;
+    let Surroundings { stack, properties, .. } = environment.surroundings;
+    let stack = &*steered(stack, hands);
+    let device = stack.first();
     let (fineness, modulus) = (environment.options.fineness(), properties.modulus_n_per_mm2);
     let line_mm = line_mm(lengths(hands));
     if line_mm == 0.0 {

@@ -130,7 +130,7 @@ fn in_a_vessel_that_is_displaced_the_rod_is_that_of_the_moved_scene() {
         let mut resting = wire(setting, &[]);
         for step in 0..80 {
             for simulation in [&mut moving, &mut moved, &mut resting] {
-                simulation.step(Command { advance_mm: 2.0, rotate_rad: 0.02 }).unwrap();
+                simulation.step(Command { advance_mm: 2.0, rotate_rad: 0.02, ..Command::default() }).unwrap();
             }
             let off_mm = apart_mm(&moving, &moved);
             assert!(off_mm < 1e-8, "{off_mm} mm in step {step}");

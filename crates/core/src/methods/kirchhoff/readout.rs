@@ -4,7 +4,7 @@ use super::Environment;
 use super::configuration::Configuration;
 use super::hands::HandForce;
 use super::material::at_mouth;
-use super::slopes::{Acting, set_hand_forces};
+use super::slopes::{Acting, set_hand_forces, steer_mj};
 use super::state::KirchhoffState;
 use super::workspace::Tools;
 use crate::Vec3;
@@ -18,6 +18,13 @@ impl<const C: usize> Tools<C> {
     pub(super) fn write_forces(&mut self, environment: &Environment<'_>, at: &mut Configuration) -> f64 {
         let clamp = self.write_inside(environment, at);
         let sheath = environment.surroundings.sheath;
+        let stack = environment.surroundings.stack;
+        if clamp.is_some() && stack.is_steerable() {
+            for k in 0..at.state.hands.len() {
+                let steer_mj = steer_mj::<C>(stack, at.start(), k);
+                at.parts().1.hand_forces[k].steer_mj = steer_mj;
+            }
+        }
         let state = at.parts().1;
         state.across_n = clamp.map_or(0.0, |clamp| {
             (clamp.force - sheath.direction * clamp.force.dot(&sheath.direction)).norm()

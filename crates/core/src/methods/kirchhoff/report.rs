@@ -40,7 +40,7 @@ impl Took {
 pub(super) fn check(report: &StepReport, state: &KirchhoffState) -> Result<()> {
     let hands = report.hands();
     let is_at = |(hand, own): (&InstrumentReport, &Hand)| {
-        hand.inserted_mm == own.inserted_mm && hand.rotation_rad == own.turn_rad
+        (hand.inserted_mm, hand.rotation_rad, hand.steer) == (own.inserted_mm, own.turn_rad, own.steer)
     };
     let turns = hands.iter().zip(&state.twists).all(|(hand, tail)| hand.mouth_rotation_rad == tail.mouth_rad);
     let agrees = hands.len() == state.hands.len()
@@ -96,6 +96,8 @@ pub(super) fn instruments<'a>(
         InstrumentReport {
             inserted_mm: hand.inserted_mm,
             rotation_rad: hand.turn_rad,
+            steer: hand.steer,
+            steer_mj: force.steer_mj,
             mouth_rotation_rad: tail.mouth_rad,
             tip_rotation_rad: tail.mouth_rad + twist,
             push_force_n: (!force.jumps).then_some(force.push_n + force.outside_n),

@@ -12,10 +12,11 @@ use super::Environment;
 use super::coaxial::Nodes;
 use super::configuration::{Configuration, Start};
 use super::hands::{HandForce, lengths};
-use super::material::at_mouth;
+use super::material::{at_mouth, element};
 use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::{ContactPoint, Drag, Place, Pressing, RodPlace, Touch};
+use crate::device::Stack;
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, RodState, element_energy};
 
@@ -117,6 +118,30 @@ fn push_force<const C: usize>(
         at_mouth(device, (inserted_mm[*index], far), at.mesh.flush_mm).straightening_n()
     });
     Some(stored + wall + loops + field + turned - dragged - straightened_n.sum::<f64>())
+}
+
+/// Work of steering an instrument, per change of its value, mJ: the slope of the energy of the rod at fixed unknowns,
+/// exact because that is quadratic in the value.
+pub(super) fn steer_mj<const C: usize>(stack: &Stack, at: Start<'_>, instrument: usize) -> f64 {
+    let Start { mesh, state } = at;
+    if !stack.instruments()[instrument].device.is_steerable() || state.hands[instrument].inserted_mm == 0.0 {
+        return 0.0;
+    }
+    let beside = |by: f64| {
+        let each = state.hands.iter().enumerate();
+        stack.steered(each.map(|(k, hand)| if k == instrument { hand.steer + by } else { hand.steer }))
+    };
+    let (less, more) = (beside(-0.5), beside(0.5));
+    let all = (&mesh.inserted_mm[..], mesh.inserted_mm.len());
+    let each = mesh.from_tip_mm.windows(2).enumerate().map(|(e, ends)| {
+        let [less, more] = [&less, &more].map(|stack| element(stack, all, (ends[0], ends[1]), mesh.flush_mm));
+        if less == more {
+            return 0.0;
+        }
+        let rod = state.rod.element::<C>(e);
+        element_energy::<C>(&more, &rod).total() - element_energy::<C>(&less, &rod).total()
+    });
+    each.sum()
 }
 
 /// Step of finite differences, mm.

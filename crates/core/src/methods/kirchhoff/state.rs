@@ -310,8 +310,8 @@ impl KirchhoffState {
         }
         let mut inner_friction =
             self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
-        let motions = self.behind.iter().flat_map(|left| [left.advance_mm, left.rotate_rad]);
-        let turns = self.hands.iter().flat_map(|hand| [hand.inserted_mm, hand.turn_rad]);
+        let motions = self.behind.iter().flat_map(|left| [left.advance_mm, left.rotate_rad, left.steer]);
+        let turns = self.hands.iter().flat_map(|hand| [hand.inserted_mm, hand.turn_rad, hand.steer]);
         let is_finite = r.is_finite()
             && motions
                 .chain(turns)

@@ -64,6 +64,7 @@ fn are_alike(a: &Section, b: &Section, Fineness { element_mm, tuning, .. }: Fine
         && alike(a.torsion_nmm2(), b.torsion_nmm2())
         && alike(a.radius_mm, b.radius_mm)
         && libm::hypot(u, v) * element_mm <= tuning.alike_rad
+        && a.steer == b.steer
 }
 
 /// The stretches of a device from its tip on.
@@ -79,8 +80,8 @@ fn stretches(device: &Device, fineness: Fineness) -> impl Iterator<Item = Stretc
         let mut curvature_per_mm: f64 = 0.0;
         while let Some(section) = left.next() {
             end_mm += section.length_mm;
-            let [u, v] = section.rest_curvature_per_mm;
-            curvature_per_mm = curvature_per_mm.max(libm::hypot(u, v));
+            // Nodes stay where they are while it is steered.
+            curvature_per_mm = curvature_per_mm.max(device.most_bent_per_mm(section));
             let first_one = *first.get_or_insert(section);
             let Some(next) = left.peek() else { break };
             if device.is_coil_end(end_mm) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::balance::Balance;
 use super::carried::{Passage, work_of_wall};
 use super::configuration::{Configuration, Start};
-use super::hands::{Hand, line_advance_mm, longest_mm, set_motions};
+use super::hands::{Hand, line_advance_mm, longest_mm, set_motions, steered};
 use super::joined::{Resistance, join};
 use super::loops::{advances_mm, capsules};
 use super::mesh::Mesh;
@@ -189,8 +189,9 @@ impl<const C: usize> Tools<C> {
         let tuning = &environment.options.tuning.steps;
         let forces = (&was.state.hand_forces[..], &is.state.hand_forces[..]);
         let energies = (was.state.energy, is.state.energy);
+        let stack = environment.surroundings.stack;
         Balance::new(
-            environment.surroundings.stack,
+            [&*steered(stack, &was.state.hands), stack],
             motions,
             forces,
             energies,
@@ -209,6 +210,8 @@ impl<const C: usize> Tools<C> {
         attempt: Attempt<'_>,
         next: &mut Configuration,
     ) -> std::result::Result<Found, Lost> {
+        let steered = steered(environment.surroundings.stack, attempt.hands);
+        let environment = &environment.steered(&steered);
         let (surroundings, options) = (&environment.surroundings, environment.options);
         let tuning = &options.tuning;
         let Attempt { part: Part { effort, part_mm, resumed, .. }, limits, left, .. } = attempt;

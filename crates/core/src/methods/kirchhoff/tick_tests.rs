@@ -54,7 +54,7 @@ fn pushed(wire: [f64; 2], catheter: [f64; 2]) -> [Move; 2] {
     let mut instrument = 0..;
     [wire, catheter].map(|[advance_mm, rotate_rad]| Move {
         instrument: instrument.next().unwrap(),
-        command: Command { advance_mm, rotate_rad },
+        command: Command { advance_mm, rotate_rad, ..Command::default() },
     })
 }
 
@@ -312,7 +312,8 @@ fn after_forgetting_the_hands_are_where_the_device_is_and_it_rests() {
         .map(|k| {
             let (to, from) = (reached.hand(k), from[k]);
             let advance_mm = to.inserted_mm - from.inserted_mm;
-            let command = Command { advance_mm, rotate_rad: to.rotation_rad - from.rotation_rad };
+            let command =
+                Command { advance_mm, rotate_rad: to.rotation_rad - from.rotation_rad, ..Command::default() };
             Move { instrument: k, command }
         })
         .collect();
