@@ -54,7 +54,11 @@ fn steps_keep_no_memory() {
     let mut simulation = in_the_arch();
     let mut there_and_back = |count: usize| {
         for k in 0..count {
-            let command = Command { advance_mm: if k % 2 == 0 { 0.7 } else { -0.7 }, rotate_rad: 0.01 };
+            let command = Command {
+                advance_mm: if k % 2 == 0 { 0.7 } else { -0.7 },
+                rotate_rad: 0.01,
+                ..Command::default()
+            };
             simulation.step_together(&[Move { instrument: [0, 2, 3][k / 2 % 3], command }]).unwrap();
         }
     };

@@ -25,6 +25,7 @@ fn every_method_goes_on_from_its_state_and_refuses_those_of_others() {
             let command = Command {
                 advance_mm: if k % 6 == 5 { -1.0 } else { 2.0 },
                 rotate_rad: 0.1 * f64::from(k % 3),
+                ..Command::default()
             };
             assert_eq!(simulation.step(command).is_ok(), again.step(command).is_ok(), "{name}");
             assert_eq!(again.shape(), simulation.shape(), "{name}, step {k}");
