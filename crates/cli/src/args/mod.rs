@@ -5,6 +5,7 @@
     reason = "doc comments here are help texts, in which script[0] is no link"
 )]
 
+mod bench;
 mod inputs;
 mod pictures;
 mod studies;
@@ -16,6 +17,9 @@ use clap::{Parser, Subcommand};
 use endowire_methods::Setting;
 use endowire_sweep::Shard;
 
+pub(crate) use bench::{
+    BenchCommand, BenchOutputArgs, BendArgs, PushArgs, TipLoadArgs, TorqueArgs, TrackArgs,
+};
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, SacArgs,
     VesselCommand,
@@ -71,6 +75,10 @@ pub(crate) enum Command {
     /// Show device files: parts, sizes in all units, stiffnesses, materials, sources, and the shape at rest
     #[command(subcommand)]
     Device(DeviceCommand),
+    /// Bench tests of devices: torque response, push along a tortuous path, tip load, three-point bending; several devices in one table and
+    /// one picture
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Run time against error, method by method: tables and a work–precision picture
     Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011

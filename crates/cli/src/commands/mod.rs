@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod assess;
+mod bench;
 mod centreline;
 mod compare;
 mod dataset;
@@ -57,6 +58,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Device(DeviceCommand::List { folder, out, json }) => {
             device::list(folder, out.as_deref(), *json)
         }
+        Command::Bench(command) => bench::bench(command),
         Command::Compare(args) => compare::compare(args),
         Command::Report(args) => report::report(args),
         Command::New(args) => new::new(args),

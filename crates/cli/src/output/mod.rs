@@ -3,6 +3,7 @@
 mod arrays;
 pub(crate) mod chart;
 pub(crate) mod coils;
+pub(crate) mod curves;
 pub(crate) mod film;
 pub(crate) mod folder;
 pub(crate) mod frames;

@@ -4,6 +4,7 @@
 
 mod assess;
 mod bad_input;
+mod bench;
 mod cache;
 mod centreline;
 mod common;
