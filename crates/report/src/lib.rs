@@ -12,7 +12,7 @@ mod vessel;
 
 pub use base64::base64;
 pub use recorder::Recorder;
-pub use run::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, events};
+pub use run::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, events, setup};
 use serde::Serialize;
 pub use vessel::Vessel;
 
@@ -32,7 +32,7 @@ const ASSESSED: &str = concat!(
 const STUDY: &str = concat!(include_str!("head.html"), include_str!("study.html"));
 const MARK: &str = "/*DATA*/null";
 
-/// The page of a run.
+/// The page of a run, and of others that it is compared with.
 ///
 /// # Errors
 /// A summary that cannot be written as JSON.

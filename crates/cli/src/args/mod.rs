@@ -56,8 +56,8 @@ pub(crate) enum Command {
     Subject(SubjectCommand),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
-    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
-    /// and pictures of an experiment
+    /// Write a recorded run, or several to compare, as one page for a browser: the shape to turn and to scrub through time, forces over
+    /// length, angle, time or steps, events, frames; or the tables and pictures of an experiment
     Report(ReportArgs),
     /// Write a recorded run for other programs: a series for ParaView and 3D Slicer (VTK)
     Export(ExportArgs),
@@ -162,9 +162,10 @@ pub(crate) struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct ReportArgs {
-    /// Folder of a recorded run, or of an experiment or comparison
-    pub(crate) dir: PathBuf,
-    /// File of the page; DIR/report.html if absent
+    /// Folder of a recorded run, or of an experiment or comparison; several runs are compared on one page, curve by curve
+    #[arg(required = true, value_name = "DIR")]
+    pub(crate) dirs: Vec<PathBuf>,
+    /// File of the page; report.html in the first DIR if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
     /// Scene file, if it is not the one named in summary.json

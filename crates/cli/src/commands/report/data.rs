@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use endowire_core::device::Stack;
+use endowire_core::insertion::WallProperties;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_report::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, Vessel, base64};
+use endowire_report::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, Vessel, base64, setup};
 use endowire_sweep::{EndedBy, UntilOutcome};
 use serde_json::Value;
 
@@ -16,12 +17,12 @@ use crate::output::recording::Recording;
 const MOST_FRAME_BYTES: usize = 2_000_000;
 const MOST_FRAMES: usize = 24;
 
-/// Gathers the data recorded in `folder`.
+/// Gathers the data recorded in `folder`, of a scene with this wall.
 pub(super) fn collect(
     folder: &Path,
     recording: &Recording,
     stack: &Stack,
-    vessel: &SurfaceMesh,
+    (vessel, wall): (&SurfaceMesh, &WallProperties),
 ) -> Result<Run, Failure> {
     let path = folder.join("summary.json");
     // Without a valid summary, the rest is still shown.
@@ -35,6 +36,8 @@ pub(super) fn collect(
         events: events(&rows, &summary),
         series: Series::of(&rows),
         frames: frames(folder),
+        setup: setup(stack, wall),
+        others: vec![],
         summary,
     })
 }
