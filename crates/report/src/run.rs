@@ -1,8 +1,11 @@
 //! Data of the page of a run.
 
-use endowire_core::Vec3;
-use endowire_core::device::{Instrument, Stack};
-use endowire_core::insertion::{Simulation, WallProperties};
+use endowire_core::device::{Device, Stack};
+use endowire_core::insertion::Simulation;
+use endowire_core::methods::MethodChoice;
+use endowire_core::scene::SceneOf;
+use endowire_core::{Result, Vec3};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -37,8 +40,19 @@ pub struct Run {
 }
 
 /// Devices and wall of a run in words: what a comparison of runs is about.
-pub fn setup(stack: &Stack, wall: &WallProperties) -> Vec<[String; 2]> {
-    let mut lines: Vec<[String; 2]> = stack.instruments().iter().map(device_words).collect();
+///
+/// # Errors
+/// A device file that cannot be read.
+pub fn setup<M: MethodChoice + DeserializeOwned + Default>(
+    scene: &SceneOf<M>,
+    stack: &Stack,
+) -> Result<Vec<[String; 2]>> {
+    let files = scene.device_files()?;
+    let name = |index: usize| files.get(index).and_then(Option::as_ref).map(|(_, file)| file.name.as_str());
+    let devices = stack.instruments().iter().enumerate();
+    let mut lines: Vec<[String; 2]> =
+        devices.map(|(index, one)| [one.name.clone(), device_words(name(index), &one.device)]).collect();
+    let wall = &scene.vessel.wall;
     let regions = match wall.region.len() {
         0 => String::new(),
         1 => ", another in a region".to_owned(),
@@ -46,12 +60,11 @@ pub fn setup(stack: &Stack, wall: &WallProperties) -> Vec<[String; 2]> {
     };
     lines.push(["friction coefficient".to_owned(), format!("{}{regions}", wall.friction)]);
     lines.push(["wall modulus".to_owned(), format!("{} N/mm²{regions}", wall.modulus_n_per_mm2)]);
-    lines
+    Ok(lines)
 }
 
 /// A device by its name and its extreme sizes.
-fn device_words(instrument: &Instrument) -> [String; 2] {
-    let device = &instrument.device;
+fn device_words(name: Option<&str>, device: &Device) -> String {
     let stiffnesses = device.sections().iter().map(|section| section.bending_stiffness_nmm2);
     let (low, high) = stiffnesses.fold((f64::MAX, 0.0f64), |(low, high), ei| (low.min(ei), high.max(ei)));
     let range = |low: f64, high: f64, digits: usize| match high - low > 0.005 * high {
@@ -60,12 +73,12 @@ fn device_words(instrument: &Instrument) -> [String; 2] {
     };
     let diameters = range(2.0 * device.min_radius_mm(), 2.0 * device.max_radius_mm(), 2);
     let digits = if high < 10.0 { 3 } else { 0 };
-    let text = format!(
-        "{diameters} mm thick, EI {} N·mm², {:.0} mm long",
+    let name = name.filter(|name| !name.is_empty()).map_or_else(String::new, |name| format!("{name}: "));
+    format!(
+        "{name}{diameters} mm thick, EI {} N·mm², {:.0} mm long",
         range(low, high, digits),
         device.length_mm()
-    );
-    [instrument.name.clone(), text]
+    )
 }
 
 /// The shape at a step.

@@ -65,7 +65,7 @@ impl Played {
             simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let all_solid = !lumens(simulation.stack(), &view).contains(&true);
         let wall = simulation.lumen().wall(&NoStore)?.clone();
-        let setup = setup(simulation.stack(), &scene.vessel.wall);
+        let setup = setup(&scene, simulation.stack())?;
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
         let session = Session::new(simulation, view, side_px, Limits::default())?;
         let mut session = session.with_ticks(TICK_SOLVES)?.with_sac(sac);

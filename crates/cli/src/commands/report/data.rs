@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use endowire_core::device::Stack;
-use endowire_core::insertion::WallProperties;
 use endowire_core::vessel::SurfaceMesh;
+use endowire_methods::Scene;
 use endowire_report::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, Vessel, base64, setup};
 use endowire_sweep::{EndedBy, UntilOutcome};
 use serde_json::Value;
@@ -17,12 +17,13 @@ use crate::output::recording::Recording;
 const MOST_FRAME_BYTES: usize = 2_000_000;
 const MOST_FRAMES: usize = 24;
 
-/// Gathers the data recorded in `folder`, of a scene with this wall.
+/// Gathers the data recorded in `folder`, of a run in this scene.
 pub(super) fn collect(
     folder: &Path,
     recording: &Recording,
+    scene: &Scene,
     stack: &Stack,
-    (vessel, wall): (&SurfaceMesh, &WallProperties),
+    vessel: &SurfaceMesh,
 ) -> Result<Run, Failure> {
     let path = folder.join("summary.json");
     // Without a valid summary, the rest is still shown.
@@ -36,7 +37,7 @@ pub(super) fn collect(
         events: events(&rows, &summary),
         series: Series::of(&rows),
         frames: frames(folder),
-        setup: setup(stack, wall),
+        setup: setup(scene, stack)?,
         others: vec![],
         summary,
     })

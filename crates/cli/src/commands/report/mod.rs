@@ -57,7 +57,7 @@ fn run(args: &ReportArgs, dir: &Path) -> Result<Run, Failure> {
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let stack = scene.stack().map_err(in_scene)?;
     let vessel = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;
-    let mut run = data::collect(dir, &recording, &stack, (vessel.mesh(), &scene.vessel.wall))?;
+    let mut run = data::collect(dir, &recording, &scene, &stack, vessel.mesh())?;
     if let (Some(summary), Some(other)) = (run.summary.as_object_mut(), other) {
         summary.insert(OTHER_SCENE.to_owned(), other.into());
     }
