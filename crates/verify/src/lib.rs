@@ -16,6 +16,7 @@ pub mod crossing;
 mod cylinder;
 pub mod deployments;
 mod ends;
+pub mod evidence;
 mod flow_drag;
 mod insertion;
 pub mod insertion_stress;

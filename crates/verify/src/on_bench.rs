@@ -198,7 +198,7 @@ pub(super) fn push() -> Result<Vec<Row>> {
 
 /// What a force against the tip adds to the push force behind a bend with friction, against the capstan's ratio for
 /// `expected` friction.
-fn capstan_row(friction: f64, expected: f64) -> Result<Row> {
+pub(crate) fn capstan_row(friction: f64, expected: f64) -> Result<Row> {
     let added_n = last_n(&pushed(FRAC_PI_2, friction, true, AGAINST_TIP_N)?)
         - last_n(&pushed(FRAC_PI_2, friction, true, 0.0)?);
     let name = format!("G3 behind a bend of 90°, μ={friction}");

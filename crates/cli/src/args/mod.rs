@@ -6,6 +6,7 @@
 )]
 
 mod bench;
+mod evidence;
 mod inputs;
 mod pictures;
 mod studies;
@@ -20,6 +21,7 @@ use endowire_sweep::Shard;
 pub(crate) use bench::{
     BenchCommand, BenchOutputArgs, BendArgs, PushArgs, TipLoadArgs, TorqueArgs, TrackArgs,
 };
+pub(crate) use evidence::EvidenceArgs;
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, SacArgs,
     VesselCommand,
@@ -79,6 +81,8 @@ pub(crate) enum Command {
     /// one picture
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Studies that compare the model with measurements and exact laws: question, data, figure, error, and what they do not show
+    Evidence(EvidenceArgs),
     /// Run time against error, method by method: tables and a work–precision picture
     Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011

@@ -7,6 +7,7 @@ mod compare;
 mod dataset;
 mod device;
 mod doctor;
+mod evidence;
 mod experiment;
 mod export;
 mod felt;
@@ -58,6 +59,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Device(DeviceCommand::List { folder, out, json }) => {
             device::list(folder, out.as_deref(), *json)
         }
+        Command::Evidence(args) => evidence::evidence(args),
         Command::Bench(command) => bench::bench(command),
         Command::Compare(args) => compare::compare(args),
         Command::Report(args) => report::report(args),

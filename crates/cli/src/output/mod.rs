@@ -20,6 +20,7 @@ mod rows;
 pub(crate) mod saved;
 pub(crate) mod session;
 mod step_table;
+pub(crate) mod study;
 pub(crate) mod vtk;
 
 use std::fmt::Display;

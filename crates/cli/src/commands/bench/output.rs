@@ -1,8 +1,5 @@
 //! What a bench test prints, draws and writes.
 
-use std::path::Path;
-
-use endowire_report::study_page;
 use serde::Serialize;
 
 use crate::args::BenchOutputArgs;
@@ -11,14 +8,8 @@ use crate::devices::NamedDevice;
 use crate::failure::Failure;
 use crate::output::curves::{Curves, Entry, Stroke, colour};
 use crate::output::provenance::Provenance;
-use crate::output::{chart, print, print_json, printable, tell, whole};
-
-/// A table of words.
-#[derive(Debug, Serialize)]
-pub(super) struct Table {
-    pub(super) columns: Vec<&'static str>,
-    pub(super) rows: Vec<Vec<String>>,
-}
+pub(super) use crate::output::study::Table;
+use crate::output::{chart, print, print_json, printable, study, tell};
 
 /// A test of several devices, ready to be shown.
 pub(super) struct Shown {
@@ -54,17 +45,6 @@ pub(super) struct Tested<R: Serialize> {
     pub(super) result: R,
 }
 
-/// The page of a test.
-#[derive(Serialize)]
-struct Page<'a> {
-    title: &'a str,
-    about: &'a [String],
-    /// Pictures as SVG.
-    pictures: [String; 1],
-    tables: [&'a Table; 1],
-    source: String,
-}
-
 /// Prints and writes what was asked for; then fails if a test did not come to its end.
 pub(super) fn give<S: Serialize, R: Serialize>(
     args: &BenchOutputArgs,
@@ -76,7 +56,9 @@ pub(super) fn give<S: Serialize, R: Serialize>(
         tell(format_args!("wrote {}", out.display()));
     }
     if let Some(page) = &args.page {
-        write_page(page, &document.provenance, shown)?;
+        let Shown { title, about, table, curves, .. } = shown;
+        let source = document.provenance.words();
+        study::write(page, study::Page { title, about, curves, table, source })?;
         tell(format_args!("wrote {}", page.display()));
     }
     if args.json {
@@ -91,25 +73,6 @@ pub(super) fn give<S: Serialize, R: Serialize>(
         [] => Ok(()),
         troubles => Err(Failure::Computation(troubles.join("; "))),
     }
-}
-
-fn write_page(path: &Path, provenance: &Provenance, shown: &Shown) -> Result<(), Failure> {
-    if path.extension().is_none_or(|extension| extension != "html") {
-        return Err(Failure::Input(format!(
-            "--page {}: name a file .html, and devices before the flag",
-            path.display()
-        )));
-    }
-    let page = Page {
-        title: &shown.title,
-        about: &shown.about,
-        pictures: [chart::svg(shown.curves.size(), &shown.curves)?],
-        tables: [&shown.table],
-        source: provenance.words(),
-    };
-    let unwritable = |e| Failure::Computation(format!("the page cannot be written as JSON: {e}"));
-    let text = study_page(&page).map_err(unwritable)?;
-    whole::write_bytes(path, text.as_bytes()).map_err(|e| Failure::write(path, &e))
 }
 
 fn csv_text(table: &Table) -> Result<String, Failure> {
