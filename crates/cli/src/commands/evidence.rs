@@ -5,7 +5,7 @@ use std::path::Path;
 use endowire_core::Vec3;
 use endowire_verify::Row;
 use endowire_verify::evidence::three_tubes::{self, ThreeTubes};
-use endowire_verify::evidence::{Compared, STUDIES, Study, bending, capstan, whip};
+use endowire_verify::evidence::{Compared, STUDIES, Study, bending, capstan, reversal, whip};
 use serde::Serialize;
 
 use super::device::table::{columns, digits};
@@ -58,6 +58,7 @@ pub(crate) fn evidence(args: &EvidenceArgs) -> Result<(), Failure> {
         return Err(Failure::Input(format!("{}: {name} takes no file: leave it out", file.display())));
     }
     let (compared, provenance) = match study.name {
+        "reversal" => (reversal::study()?, Provenance::of_program("evidence reversal")),
         "whip" => (whip::study()?, Provenance::of_program("evidence whip")),
         "capstan" => (capstan::study()?, Provenance::of_program("evidence capstan")),
         _ => bent()?,
@@ -112,7 +113,7 @@ fn compare(
             title: String::new(),
             across,
             up,
-            scale: if study.name == bending::STUDY.name { Scale::Logarithmic } else { Scale::Linear },
+            scale: if compared.is_logarithmic { Scale::Logarithmic } else { Scale::Linear },
             curves: lines()
                 .map(|(k, line)| Curve {
                     colour: colour(k),
@@ -173,7 +174,8 @@ fn distances(found: &ThreeTubes, file: &Path) -> (Table, Curves) {
     let share = |all: &Vec<f64>| -> Vec<[f64; 2]> {
         let at = |k: usize| (k * all.len().saturating_sub(1)) / SHARES;
         let part = |k: usize| 100.0 * (at(k) + 1) as f64 / all.len().max(1) as f64;
-        (0..=SHARES).filter_map(|k| Some([*all.get(at(k))?, part(k)])).collect()
+        let rest = (0..=SHARES).filter_map(|k| Some([*all.get(at(k))?, part(k)]));
+        std::iter::once([0.0, 0.0]).chain(rest).collect()
     };
     let curves = Curves {
         title: "Measured and computed tips of three nested tubes".to_owned(),

@@ -12,6 +12,7 @@ mod compare;
 mod course;
 mod dataset;
 mod device;
+mod evidence;
 mod experiment;
 mod export;
 mod guide;

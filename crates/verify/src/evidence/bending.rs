@@ -49,7 +49,12 @@ pub fn study(wires: &[(String, Device)]) -> Result<Compared> {
             .map(|at_mm| test.rigidity(device, at_mm).map(|found| [found.from_tip_mm, found.rigidity_nmm2]));
         lines.push(Line { name: name.clone(), is_reference: false, points: along.collect::<Result<_>>()? });
     }
-    Ok(Compared { rows, lines, axes: ["distance from the tip, mm", "rigidity F L³/(48 δ), N·mm²"] })
+    Ok(Compared {
+        rows,
+        lines,
+        axes: ["distance from the tip, mm", "rigidity F L³/(48 δ), N·mm²"],
+        is_logarithmic: true,
+    })
 }
 
 #[cfg(test)]

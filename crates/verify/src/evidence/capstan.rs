@@ -5,14 +5,14 @@ use std::f64::consts::FRAC_PI_2;
 use endowire_core::Result;
 
 use super::{Compared, Line, Study};
-use crate::on_bench;
+use crate::{Row, on_bench};
 
 /// The study in words.
 pub const STUDY: Study = Study {
     name: "capstan",
     title: "Friction in a bend",
     question: "How much more does the hand push than what arrives at the tip behind a bend of 90°?",
-    data: "The law of the capstan, e^(µθ) (Euler 1769, Eytelwein 1808), which holds for a flexible wire.",
+    data: "The law of the capstan, e^(µθ) (Euler 1769, Eytelwein), which holds for a flexible wire.",
     computed: "A wire of EI 10 N·mm² is pushed through a tube of radius 50 mm with 0.1 mm of play, and 1 N set against its tip behind the bend: the increase \
                of the push force over the force at the tip.",
     not_shown: "Whether Coulomb's law with one coefficient describes a coated wire in an artery. Where bending counts, as in the first millimetres after a bend \
@@ -25,8 +25,11 @@ pub const STUDY: Study = Study {
 /// A step that could not be carried out.
 pub fn study() -> Result<Compared> {
     let frictions = [0.05, 0.1, 0.15, 0.2, 0.25, 0.3];
-    let rows = frictions.iter().map(|friction| on_bench::capstan_row(*friction, *friction));
-    let rows = rows.collect::<Result<Vec<_>>>()?;
+    let row = |friction: &f64| {
+        let row = on_bench::capstan_row(*friction, *friction)?;
+        Ok(Row { name: format!("µ = {friction}"), ..row })
+    };
+    let rows = frictions.iter().map(row).collect::<Result<Vec<_>>>()?;
     let computed = frictions.iter().zip(&rows).map(|(friction, row)| [*friction, row.computed]).collect();
     let exact = (0..=30).map(|k| 0.01 * f64::from(k)).map(|mu| [mu, libm::exp(mu * FRAC_PI_2)]).collect();
     Ok(Compared {
@@ -36,6 +39,7 @@ pub fn study() -> Result<Compared> {
             Line { name: "capstan, e^(µθ)".to_owned(), is_reference: true, points: exact },
         ],
         axes: ["coefficient of friction", "force of the hand over force at the tip"],
+        is_logarithmic: false,
     })
 }
 

@@ -2,6 +2,7 @@
 
 pub mod bending;
 pub mod capstan;
+pub mod reversal;
 pub mod three_tubes;
 pub mod whip;
 
@@ -25,7 +26,8 @@ pub struct Study {
 }
 
 /// All studies, those with measurements first.
-pub const STUDIES: [Study; 4] = [three_tubes::STUDY, whip::STUDY, capstan::STUDY, bending::STUDY];
+pub const STUDIES: [Study; 5] =
+    [three_tubes::STUDY, reversal::STUDY, whip::STUDY, capstan::STUDY, bending::STUDY];
 
 /// A curve of a figure.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,4 +49,6 @@ pub struct Compared {
     pub lines: Vec<Line>,
     /// Names of the figure's axes, with units.
     pub axes: [&'static str; 2],
+    /// Whether the vertical axis is logarithmic.
+    pub is_logarithmic: bool,
 }

@@ -17,8 +17,8 @@ pub const STUDY: Study = Study {
     name: "three-tubes",
     title: "Three nested pre-curved tubes",
     question: "Where does the tip of pre-curved instruments end that are turned and pushed inside one another?",
-    data: "1,307 measured tips of a robot of three concentric tubes, in the public repository hjhdog1/ConcentricTubes on GitHub, which states no licence: get the table \
-           of measured tips there and give its path. A row has an index, three turns in rad, three positions of the tubes' bases in mm (negative behind the \
+    data: "1,307 measured tips of a robot of three concentric tubes, in the public repository hjhdog1/ConcentricTubes on GitHub, which states no licence: get the file \
+           jointTipTrajectory_measured_short.txt there (commit 2add607) and give its path. A row has an index, three turns in rad, three positions of the tubes' bases in mm (negative behind the \
            plate), the tip x y z in mm, and three axes of the tip.",
     computed: "The static equilibrium of every row, without friction and play, the bases of the tubes behind a plate, so that their straight ends twist. First with the \
                published numbers; then with 17 numbers (curvatures, stiffness ratios, lengths, zeros of the turns, pose of the plate) fitted to every eighth row, and \

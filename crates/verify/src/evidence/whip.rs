@@ -14,7 +14,7 @@ pub const STUDY: Study = Study {
     name: "whip",
     title: "Whip of a core wire",
     question: "Does a wire that is not quite straight lag and snap when it is turned in a bend, and from which straightness on?",
-    data: "In words alone: a whip test of 0.34 mm wire over 1,080° (Fort Wayne Metals, Advanced Materials & Processes, October 2019, page 49), in which \
+    data: "In words alone: a whip test of 0.34 mm wire over 1,080° (Fort Wayne Metals, Advanced Materials & Processes, October 2019), in which \
            straight wire lags by a few degrees and poorly straightened wire by tens, with snaps. The dimensions of the fixture are not given. The exact \
            criterion is that of a close-fitting bend: a wire snaps if λ = L √(EI κ₀ κ/GJ) exceeds π/2, with its rest curvature κ₀ and that of the bend, κ, \
            over the length L.",
@@ -51,7 +51,12 @@ pub fn study() -> Result<Compared> {
         let points = response.points.iter().map(|point| [point.hand_deg, point.hand_deg - point.tip_deg]);
         lines.push(Line { name: format!("λ = {lambda}"), is_reference: false, points: points.collect() });
     }
-    Ok(Compared { rows, lines, axes: ["angle of the hand, degrees", "tip behind hand, degrees"] })
+    Ok(Compared {
+        rows,
+        lines,
+        axes: ["angle of the hand, degrees", "tip behind hand, degrees"],
+        is_logarithmic: false,
+    })
 }
 
 #[cfg(test)]
