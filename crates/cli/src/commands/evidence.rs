@@ -5,7 +5,7 @@ use std::path::Path;
 use endowire_core::Vec3;
 use endowire_verify::Row;
 use endowire_verify::evidence::three_tubes::{self, ThreeTubes};
-use endowire_verify::evidence::{Compared, STUDIES, Study, bending, capstan, reversal, whip};
+use endowire_verify::evidence::{Compared, Kind, STUDIES, Study, bending, capstan, reversal, whip};
 use serde::Serialize;
 
 use super::device::table::{columns, digits};
@@ -104,7 +104,11 @@ fn compare(
         columns: vec!["case", "quantity", "computed", "reference", "error", "bound"],
         rows: cells.collect(),
     };
-    let stroke = |is_reference: bool| if is_reference { Stroke::Dashed } else { Stroke::Solid };
+    let stroke = |kind: Kind| match kind {
+        Kind::Computed => Stroke::Solid,
+        Kind::Law => Stroke::Dashed,
+        Kind::Values => Stroke::Dots,
+    };
     let lines = || compared.lines.iter().enumerate();
     let [across, up] = compared.axes.map(str::to_owned);
     let curves = Curves {
@@ -117,18 +121,14 @@ fn compare(
             curves: lines()
                 .map(|(k, line)| Curve {
                     colour: colour(k),
-                    stroke: stroke(line.is_reference),
+                    stroke: stroke(line.kind),
                     points: line.points.clone(),
                 })
                 .collect(),
             bands: vec![],
         }],
         legend: lines()
-            .map(|(k, line)| Entry {
-                name: line.name.clone(),
-                colour: colour(k),
-                stroke: stroke(line.is_reference),
-            })
+            .map(|(k, line)| Entry { name: line.name.clone(), colour: colour(k), stroke: stroke(line.kind) })
             .collect(),
         notes: vec![],
     };

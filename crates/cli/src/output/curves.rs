@@ -38,6 +38,8 @@ pub(crate) fn colour(index: usize) -> RGBColor {
 pub(crate) enum Stroke {
     Solid,
     Dashed,
+    /// Points alone.
+    Dots,
 }
 
 /// A curve.
@@ -143,6 +145,7 @@ fn draw_stroke<B: DrawingBackend>(area: &DrawingArea<B, Shift>, entry: &Entry, y
     let style = entry.colour.stroke_width(4);
     match entry.stroke {
         Stroke::Solid => area.draw(&PathElement::new(ends, style)),
+        Stroke::Dots => area.draw(&Circle::new((MARGIN_PX + 33, y), 6, entry.colour.filled())),
         Stroke::Dashed => area.draw(&DashedPathElement::new(ends, 10, 7, style)),
     }
 }
@@ -229,6 +232,10 @@ where
             curve.points.iter().map(|&[x, y]| (x, y)).filter(|(x, y)| x.is_finite() && y.is_finite());
         let style = curve.colour.stroke_width(3);
         match curve.stroke {
+            Stroke::Dots => {
+                let dot = |point| Circle::new(point, 6, curve.colour.filled());
+                plot.draw_series(points.map(dot)).map(drop)?;
+            }
             Stroke::Solid => plot.draw_series(LineSeries::new(points, style)).map(drop)?,
             Stroke::Dashed => plot.draw_series(DashedLineSeries::new(points, 9, 6, style)).map(drop)?,
         }

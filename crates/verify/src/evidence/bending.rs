@@ -3,7 +3,7 @@
 use endowire_core::Result;
 use endowire_core::device::Device;
 
-use super::{Compared, Line, Study};
+use super::{Compared, Kind, Line, Study};
 use crate::Row;
 use crate::bench::bend::BendTest;
 
@@ -47,7 +47,7 @@ pub fn study(wires: &[(String, Device)]) -> Result<Compared> {
         let along = places
             .filter(|at_mm| test.reaches(device, *at_mm))
             .map(|at_mm| test.rigidity(device, at_mm).map(|found| [found.from_tip_mm, found.rigidity_nmm2]));
-        lines.push(Line { name: name.clone(), is_reference: false, points: along.collect::<Result<_>>()? });
+        lines.push(Line { name: name.clone(), kind: Kind::Computed, points: along.collect::<Result<_>>()? });
     }
     Ok(Compared {
         rows,

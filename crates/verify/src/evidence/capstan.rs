@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use endowire_core::Result;
 
-use super::{Compared, Line, Study};
+use super::{Compared, Kind, Line, Study};
 use crate::{Row, on_bench};
 
 /// The study in words.
@@ -35,8 +35,8 @@ pub fn study() -> Result<Compared> {
     Ok(Compared {
         rows,
         lines: vec![
-            Line { name: "computed".to_owned(), is_reference: false, points: computed },
-            Line { name: "capstan, e^(µθ)".to_owned(), is_reference: true, points: exact },
+            Line { name: "computed".to_owned(), kind: Kind::Computed, points: computed },
+            Line { name: "capstan, e^(µθ)".to_owned(), kind: Kind::Law, points: exact },
         ],
         axes: ["coefficient of friction", "force of the hand over force at the tip"],
         is_logarithmic: false,

@@ -29,13 +29,24 @@ pub struct Study {
 pub const STUDIES: [Study; 5] =
     [three_tubes::STUDY, reversal::STUDY, whip::STUDY, capstan::STUDY, bending::STUDY];
 
+/// What a curve is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A result of this program.
+    Computed,
+    /// A law that it is compared with.
+    Law,
+    /// Single values that it is compared with.
+    Values,
+}
+
 /// A curve of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     /// What it is.
     pub name: String,
-    /// Whether it is a reference, not a result.
-    pub is_reference: bool,
+    /// Whether it is a result or a reference.
+    pub kind: Kind,
     /// Its points.
     pub points: Vec<[f64; 2]>,
 }

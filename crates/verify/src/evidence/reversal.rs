@@ -3,7 +3,7 @@
 use endowire_core::Result;
 use endowire_core::statics::{End, EndKind, StaticCase};
 
-use super::{Compared, Line, Study};
+use super::{Compared, Kind, Line, Study};
 use crate::{Row, unit_rod};
 
 /// The study in words.
@@ -60,10 +60,10 @@ pub fn study() -> Result<Compared> {
     Ok(Compared {
         rows,
         lines: vec![
-            Line { name: "computed".to_owned(), is_reference: false, points: computed },
+            Line { name: "computed".to_owned(), kind: Kind::Computed, points: computed },
             Line {
                 name: "independent values".to_owned(),
-                is_reference: true,
+                kind: Kind::Values,
                 points: FORCES.map(|(length, force)| [length, force]).to_vec(),
             },
         ],

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use endowire_core::Result;
 
-use super::{Compared, Line, Study};
+use super::{Compared, Kind, Line, Study};
 use crate::Row;
 use crate::bench::torque::TorqueTest;
 use crate::whip::in_tube;
@@ -49,7 +49,7 @@ pub fn study() -> Result<Compared> {
         let off = (snaps - expected).abs();
         rows.push(Row::with_error(&name, "snaps (1) or not (0)", snaps, expected, off, 0.0));
         let points = response.points.iter().map(|point| [point.hand_deg, point.hand_deg - point.tip_deg]);
-        lines.push(Line { name: format!("λ = {lambda}"), is_reference: false, points: points.collect() });
+        lines.push(Line { name: format!("λ = {lambda}"), kind: Kind::Computed, points: points.collect() });
     }
     Ok(Compared {
         rows,
