@@ -77,7 +77,7 @@ impl TorqueTest {
             Ok(()) => self.turn(&mut simulation),
             Err(reason) => {
                 let inserted_mm = simulation.report().inserted_mm;
-                Ok(TorqueResponse { ended: Some(reason), ..TorqueResponse::of(vec![], vec![], inserted_mm) })
+                Ok(TorqueResponse { ended: Some(reason), ..TorqueResponse::of(vec![], &[], inserted_mm) })
             }
         }
     }
@@ -123,7 +123,7 @@ impl TorqueTest {
             points.push(now);
         }
         let inserted_mm = simulation.report().inserted_mm;
-        Ok(TorqueResponse { unconverged, ended, ..TorqueResponse::of(points, whips, inserted_mm) })
+        Ok(TorqueResponse { unconverged, ended, ..TorqueResponse::of(points, &whips, inserted_mm) })
     }
 }
 
@@ -134,7 +134,7 @@ fn angles_rad(simulation: &Simulation) -> [f64; 2] {
 }
 
 impl TorqueResponse {
-    fn of(points: Vec<TorquePoint>, whips: Vec<(f64, f64)>, inserted_mm: f64) -> Self {
+    fn of(points: Vec<TorquePoint>, whips: &[(f64, f64)], inserted_mm: f64) -> Self {
         let lags = |from_deg: f64| {
             points.iter().filter(move |p| p.hand_deg >= from_deg).map(|p| p.hand_deg - p.tip_deg)
         };

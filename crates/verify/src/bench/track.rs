@@ -123,7 +123,7 @@ pub struct Bend {
     pub from_mm: f64,
     /// Where it ends, mm.
     pub to_mm: f64,
-    /// Its mean radius, mm.
+    /// Its least radius, mm.
     pub radius_mm: f64,
     /// Its angle, degrees.
     pub angle_deg: f64,
@@ -190,34 +190,36 @@ impl Track {
     /// Its bends: stretches along which the centre line is curved throughout, and turns by 20° or more.
     pub fn bends(&self) -> Vec<Bend> {
         let length_mm = self.path.length_mm();
-        let count = (length_mm / SAMPLE_MM).ceil().clamp(4.0, 10_000.0);
-        let step_mm = length_mm / count;
-        let way = |k: f64| self.path.at((k + 1.0) * step_mm) - self.path.at(k * step_mm);
-        let turn = |k: f64| libm::atan2(way(k - 1.0).cross(&way(k)).norm(), way(k - 1.0).dot(&way(k)));
+        // A centre line of points is a polygon: its curvature is that over a few of its sides.
+        let side_mm = length_mm / (self.path.points().len() - 1).max(1) as f64;
+        let around_mm = side_mm.max(self.path.least_radius_mm());
+        let per_mm = |at_mm: f64| {
+            let [a, b, c] = [-around_mm, 0.0, around_mm].map(|off_mm| self.path.at(at_mm + off_mm));
+            libm::atan2((b - a).cross(&(c - b)).norm(), (b - a).dot(&(c - b))) / around_mm
+        };
+        let count = ((length_mm - 2.0 * around_mm) / SAMPLE_MM).floor().clamp(0.0, 100_000.0);
         let mut bends: Vec<Bend> = Vec::new();
         let mut open = false;
-        for k in 1..count as usize {
-            let (at_mm, angle_rad) = (k as f64 * step_mm, turn(k as f64));
-            let is_bent = angle_rad > step_mm / STRAIGHT_MM;
-            match bends.last_mut().filter(|_| open && is_bent) {
-                Some(bend) => {
-                    bend.to_mm = at_mm + 0.5 * step_mm;
-                    bend.angle_deg += angle_rad.to_degrees();
-                }
-                None if is_bent => bends.push(Bend {
-                    from_mm: at_mm - 0.5 * step_mm,
-                    to_mm: at_mm + 0.5 * step_mm,
-                    radius_mm: 0.0,
-                    angle_deg: angle_rad.to_degrees(),
-                }),
-                None => {}
+        for k in 0..=count as usize {
+            let at_mm = around_mm + SAMPLE_MM * k as f64;
+            let curvature_per_mm = per_mm(at_mm);
+            let is_bent = curvature_per_mm > 1.0 / STRAIGHT_MM;
+            if is_bent && !open {
+                bends.push(Bend { from_mm: at_mm, to_mm: at_mm, radius_mm: STRAIGHT_MM, angle_deg: 0.0 });
+            }
+            if let Some(bend) = bends.last_mut().filter(|_| is_bent) {
+                bend.to_mm = at_mm;
+                bend.radius_mm = bend.radius_mm.min(1.0 / curvature_per_mm);
+                bend.angle_deg += (curvature_per_mm * SAMPLE_MM).to_degrees();
             }
             open = is_bent;
         }
         bends.retain(|bend| bend.angle_deg >= LEAST_BEND_DEG);
         for bend in &mut bends {
-            // The spline of the centre line bends a little beyond both ends of an arc: one step less is its length.
-            bend.radius_mm = (bend.to_mm - bend.from_mm - step_mm) / bend.angle_deg.to_radians();
+            // Curvature is taken over a stretch that reaches into a bend from before its beginning; where half of it
+            // does, the bend begins.
+            bend.from_mm += 0.5 * around_mm;
+            bend.to_mm = (bend.to_mm - 0.5 * around_mm).max(bend.from_mm);
         }
         bends
     }
@@ -249,4 +251,25 @@ fn longest_path(tree: &CentrelineTree) -> Result<CentrelinePath> {
     paths
         .max_by(|a, b| a.length_mm().total_cmp(&b.length_mm()))
         .ok_or_else(|| Error::parameter("track", "a single point", "must have a centre line of some length"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_standard_track_has_its_three_bends_and_another_tube_its_own() {
+        let track = Track::standard().unwrap();
+        let bends = track.bends();
+        assert_eq!(bends.len(), 3, "{bends:?}");
+        for (bend, (radius_mm, angle_deg)) in bends.iter().zip([(40.0, 90.0), (25.0, 180.0), (15.0, 90.0)]) {
+            assert!((bend.radius_mm / radius_mm - 1.0).abs() < 0.02, "{bend:?}");
+            assert!((bend.angle_deg - angle_deg).abs() < 4.0, "{bend:?}");
+        }
+        assert!((track.size().turns_deg - 360.0).abs() < 1.0);
+        let tube = endowire_core::vessel::anatomy::tree("curved_tube").unwrap();
+        assert_eq!(Track::of_tree(tube).unwrap().bends().len(), 1);
+        let straight = endowire_core::vessel::anatomy::tree("straight_tube").unwrap();
+        assert!(Track::of_tree(straight).unwrap().bends().is_empty());
+    }
 }
