@@ -59,8 +59,7 @@ pub(super) fn bend(args: &BendArgs) -> Result<(), Failure> {
     let devices = devices::read_all(&args.devices)?;
     let test = BendTest { span_mm: args.span_mm, deflection_mm: args.deflection_mm };
     test.check().map_err(as_flag)?;
-    let shown_mm =
-        devices.iter().map(|device| graded_mm(device)).fold(0.0, f64::max) + SHAFT_SPANS * test.span_mm;
+    let shown_mm = devices.iter().map(graded_mm).fold(0.0, f64::max) + SHAFT_SPANS * test.span_mm;
     let bar = progress::bar(devices.len(), "device");
     let bent = in_parallel(devices.len(), None, |index| {
         let bent = measured(&test, &devices[index], shown_mm, args.at_mm);
