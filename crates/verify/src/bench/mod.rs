@@ -1,4 +1,4 @@
-//! Bench tests of a device, as its engineers carry them out: [torque response](torque), [push](push) along a tortuous
+//! Bench tests of a device, as its engineers carry them out: [torque response](torque), [push] along a tortuous
 //! [track], [tip load](tip_load) and [three-point bending](bend).
 //!
 //! Every test is a sequence of equilibria of the exact rod: no speed, no damping, no time.
