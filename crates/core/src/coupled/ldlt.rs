@@ -11,8 +11,8 @@
 //! and which depends on none that has changed, is kept: where a few contacts open or close, that is most of them. The
 //! bits are those of a factorisation from the beginning.
 //!
-//! Blocks have 6 to 12 rows, a compile-time number, as in the band. faer's factorisation by supernodes takes four
-//! times as long for matrices of some hundred rows, and is not faster with thousands: see the decision.
+//! Blocks have 6 to 12 rows, a compile-time number, as in the band: the supernodes of coils are hardly larger, and a
+//! general sparse factorisation of such small ones takes four times as long (decision 18).
 
 use pulp::{Arch, Simd, WithSimd};
 
