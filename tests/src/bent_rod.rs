@@ -30,7 +30,7 @@ pub fn bent(n: usize, twisted: bool) -> (Vec<ElementData>, RodState) {
 
 /// The start is clamped.
 pub fn clamp() -> Supports {
-    Supports { start_tangent: true, start_angle: true, ..Supports::default() }
+    Supports { start_tangent: true, start_angles: [true; 3], ..Supports::default() }
 }
 
 /// PL²/EI = 10 across the end.

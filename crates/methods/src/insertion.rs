@@ -177,6 +177,7 @@ impl Insertion {
         let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
         let Strain { bend_mj, twist_mj, twist_rad } = self.model.strain(chain, posture);
         report.energy = Energy { bend: bend_mj, twist: twist_mj, wall, ..Energy::default() };
+        report.mouth_rotation_rad = report.rotation_rad;
         report.tip_rotation_rad = report.rotation_rad + twist_rad;
         report.max_penetration_mm = report.contacts.iter().map(|c| c.penetration_mm).fold(0.0, f64::max);
         report.push_force_n = 0.0;

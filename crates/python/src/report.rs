@@ -48,10 +48,17 @@ impl StepReport {
         self.of_hands(py, |hand| hand.inserted_mm)
     }
 
-    /// Rotation of each tail since the start, rad.
+    /// Rotation of each hand since the start, rad.
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.rotation_rad)
+    }
+
+    /// Rotation of each instrument at the sheath's mouth since the start, rad: the hand's, less the twist of the tail
+    /// between.
+    #[getter]
+    fn mouth_rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_hands(py, |hand| hand.mouth_rotation_rad)
     }
 
     /// Rotation of each tip since the start, relative to a frame carried along the axis without twist, rad.
@@ -95,6 +102,12 @@ impl StepReport {
     #[getter]
     fn field_energy_mj(&self) -> f64 {
         self.report.energy.field
+    }
+
+    /// Energy in the twist of the tails outside the body, mJ.
+    #[getter]
+    fn tail_energy_mj(&self) -> f64 {
+        self.report.energy.tail
     }
 
     /// Deepest penetration of the wall, mm; 0 without contact.

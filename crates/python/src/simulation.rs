@@ -398,7 +398,7 @@ impl Simulation {
         self.of_hands(py, |hand| hand.inserted_mm)
     }
 
-    /// Rotation of each tail since the start, rad, shape (n_instruments,).
+    /// Rotation of each hand since the start, rad, shape (n_instruments,).
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of_hands(py, |hand| hand.rotation_rad)

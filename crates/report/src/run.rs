@@ -137,13 +137,14 @@ pub struct Row {
     twist_mj: f64,
     wall_mj: f64,
     field_mj: Option<f64>,
+    tail_mj: Option<f64>,
     max_penetration_mm: f64,
     jumped: bool,
     left_through: Option<usize>,
     converged: bool,
     #[serde(default)]
     relaxations: u32,
-    // `None` in recordings of older versions, which lack these columns, as `field_mj`.
+    // `None` in recordings of older versions, which lack these columns, as `field_mj` and `tail_mj`.
     imbalance: Option<f64>,
     wall_force_sum_n: Option<f64>,
     wall_force_largest_n: Option<f64>,
@@ -166,6 +167,7 @@ impl Row {
             twist_mj: report.energy.twist,
             wall_mj: report.energy.wall,
             field_mj: Some(report.energy.field),
+            tail_mj: Some(report.energy.tail),
             max_penetration_mm: report.max_penetration_mm,
             jumped: report.jumped,
             left_through: report.left_through,
@@ -182,7 +184,8 @@ impl Row {
 
 impl Row {
     fn energy_mj(&self) -> f64 {
-        self.bend_mj + self.twist_mj + self.wall_mj + self.field_mj.unwrap_or_default()
+        let others = [self.field_mj, self.tail_mj].into_iter().flatten();
+        self.bend_mj + self.twist_mj + self.wall_mj + others.sum::<f64>()
     }
 }
 
@@ -297,6 +300,7 @@ mod tests {
             twist_mj: 0.0,
             wall_mj: 0.0,
             field_mj: None,
+            tail_mj: None,
             max_penetration_mm: 0.0,
             jumped: false,
             left_through: None,

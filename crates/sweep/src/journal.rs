@@ -30,7 +30,7 @@ pub(crate) struct Header {
 }
 
 /// The current format.
-const FORMAT: &str = "endowire sweep 2";
+const FORMAT: &str = "endowire sweep 3";
 
 /// Interval between syncs to disk: a power failure loses at most the rows written within it.
 const SYNC: Duration = Duration::from_secs(1);

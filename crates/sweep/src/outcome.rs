@@ -19,8 +19,12 @@ pub struct RunOutcome {
     pub failure: Option<StepFailure>,
     /// Inserted length at the end, mm.
     pub inserted_mm: f64,
-    /// Rotation of the tail at the end, rad.
+    /// Rotation of the hand at the end, rad.
     pub rotation_rad: f64,
+    /// Rotation of the device at the sheath's mouth at the end, rad.
+    pub mouth_rotation_rad: f64,
+    /// Rotation of the tip at the end, rad.
+    pub tip_rotation_rad: f64,
     /// Tip position at the end, mm.
     pub tip_mm: Option<[f64; 3]>,
     /// Push force at the end, N.
@@ -160,6 +164,8 @@ impl RunOutcome {
             failure,
             inserted_mm: report.inserted_mm,
             rotation_rad: report.rotation_rad,
+            mouth_rotation_rad: report.mouth_rotation_rad,
+            tip_rotation_rad: report.tip_rotation_rad,
             tip_mm: simulation.shape().tip_mm().map(Into::into),
             push_force_n: report.push_force_n,
             torque_nmm: report.torque_nmm,

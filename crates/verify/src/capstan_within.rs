@@ -67,7 +67,7 @@ const VALVE_N: f64 = 0.3;
 
 /// On a straight wire in a straight catheter only the valve acts: with F₀ against its motion, and in a combined
 /// motion with the components of F₀ along and around the wire. The catheter's hand feels the reaction, and neither
-/// hand feels anything if both move together.
+/// hand feels anything if both move together. Between valve and hand the wire twists by what its hand turns more.
 pub(super) fn valve() -> Result<Vec<Row>> {
     const NAME: &str = "D7 valve of 0.3 N, straight wire";
     let starts = [bent(0.0, 0.0)?, bent_within(0.0, 0.0, VALVE_N)?];
@@ -80,7 +80,9 @@ pub(super) fn valve() -> Result<Vec<Row>> {
         ("pushed and turned", 0.2, 2.0, [along, around]),
     ] {
         let [mut plain, mut sealed] = starts.clone();
-        let command = Command { advance_mm, rotate_rad: turn_rad };
+        let outside_mm = (165.0 - LENGTH_MM - 3.0 - advance_mm) - (150.0 - LENGTH_MM);
+        let lag_rad = VALVE_N * torque * outside_mm / (WIRE_NMM2 / 1.3);
+        let command = Command { advance_mm, rotate_rad: turn_rad + lag_rad };
         for simulation in [&mut plain, &mut sealed] {
             simulation.step_together(&[Move { instrument: WIRE, command }])?;
         }

@@ -121,7 +121,7 @@ impl TestRod {
             plates: 0.0,
             tolerance: NewtonOptions::default().tolerance,
             loads: Loads::default(),
-            supports: Supports { start_tangent: true, start_angle: true, ..Supports::default() },
+            supports: Supports { start_tangent: true, start_angles: [true; 3], ..Supports::default() },
             state: RodState::from_frames(&mesh.elements, start, frames),
             mesh,
         })

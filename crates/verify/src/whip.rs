@@ -15,7 +15,7 @@ const STIFFNESS: f64 = 10.0;
 /// Radius of the wire's section, mm.
 const WIRE_RADIUS: f64 = 0.1;
 
-/// A wire as long as the tube's bend of `lambda` radians, with a clearance `play_mm`.
+/// A wire as long as the tube's bend of `lambda` radians, with a clearance `play_mm`: no tail twists outside.
 pub(crate) fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     let length_mm = lambda * BEND;
     let radius_mm = WIRE_RADIUS + play_mm;
@@ -25,7 +25,7 @@ pub(crate) fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     let wire = Device::new(vec![Section {
         torsional_stiffness_nmm2: Some(STIFFNESS),
         rest_curvature_per_mm: [1.0 / BEND, 0.0],
-        ..Section::straight(length_mm + 1.0, WIRE_RADIUS, STIFFNESS)
+        ..Section::straight(length_mm, WIRE_RADIUS, STIFFNESS)
     }])?;
     let sheath = Sheath::new(Vec3::zeros(), Vec3::x())?;
     let element_mm = length_mm / 40.0;

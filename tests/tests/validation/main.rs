@@ -8,4 +8,5 @@ mod insertion;
 mod path;
 mod rod;
 mod spoiled_surfaces;
+mod tails;
 mod wall_regions;

@@ -110,6 +110,8 @@ fn groups() -> [Group; 14] {
                 other!(friction.tip_radii = 30.0),
                 without!("iterations for friction between instruments", friction.lateral_rounds = 1),
                 other!(friction.lateral_rounds = 4),
+                other!(friction.grip_radii = 0.1),
+                other!(friction.grip_radii = 10.0),
             ],
         ),
         (

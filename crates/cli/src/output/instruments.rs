@@ -24,6 +24,8 @@ struct Row {
     rotate_rad: f64,
     inserted_mm: f64,
     rotation_rad: f64,
+    #[serde(default)]
+    mouth_rotation_rad: f64,
     tip_rotation_rad: f64,
     tip_x_mm: Option<f64>,
     tip_y_mm: Option<f64>,
@@ -72,6 +74,7 @@ impl InstrumentTable {
                 rotate_rad: command.rotate_rad,
                 inserted_mm: reported.inserted_mm,
                 rotation_rad: reported.rotation_rad,
+                mouth_rotation_rad: reported.mouth_rotation_rad,
                 tip_rotation_rad: reported.tip_rotation_rad,
                 tip_x_mm: tip.map(|tip| tip.x),
                 tip_y_mm: tip.map(|tip| tip.y),

@@ -264,6 +264,20 @@ impl Device {
         each.sum()
     }
 
+    /// Rotation per torque of the stretch between two distances from the tip, ∫ ds/GJ, rad/(N·mm); negative towards the
+    /// tip. Beyond its end the device counts as going on.
+    pub(crate) fn compliance_per_nmm(&self, from_mm: f64, to_mm: f64) -> f64 {
+        let (first, second) = (from_mm.min(to_mm), from_mm.max(to_mm));
+        let (mut begin, mut sum) = (0.0, 0.0);
+        for (index, section) in self.sections.iter().enumerate() {
+            let is_last = index + 1 == self.sections.len();
+            let end = if is_last { f64::INFINITY } else { begin + section.length_mm };
+            sum += (second.min(end) - first.max(begin)).max(0.0) / section.torsion_nmm2();
+            begin = end;
+        }
+        if from_mm <= to_mm { sum } else { -sum }
+    }
+
     /// Smallest outer radius, mm.
     pub fn min_radius_mm(&self) -> f64 {
         self.sections.iter().map(|s| s.radius_mm).fold(f64::MAX, f64::min)

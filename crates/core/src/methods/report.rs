@@ -19,12 +19,15 @@ pub struct Energy {
     /// In a [`Field`](crate::field::Field); 0 without one.
     #[serde(default)]
     pub field: f64,
+    /// Twist of the tails, between the hands and the sheath's mouth; 0 for methods without it.
+    #[serde(default)]
+    pub tail: f64,
 }
 
 impl Energy {
     /// Sum of all terms, mJ.
     pub fn total(&self) -> f64 {
-        self.bend + self.twist + self.wall + self.field
+        self.bend + self.twist + self.wall + self.field + self.tail
     }
 }
 
@@ -61,6 +64,7 @@ impl StepReport {
         self.instruments.get(index).copied().unwrap_or(InstrumentReport {
             inserted_mm: self.inserted_mm,
             rotation_rad: self.rotation_rad,
+            mouth_rotation_rad: self.mouth_rotation_rad,
             tip_rotation_rad: self.tip_rotation_rad,
             push_force_n: Some(self.push_force_n),
             torque_nmm: self.torque_nmm,
@@ -108,6 +112,8 @@ pub struct InstrumentReport {
     pub inserted_mm: f64,
     /// Rotation of its hand since the start, rad.
     pub rotation_rad: f64,
+    /// Rotation of it at the sheath's mouth, rad: that of the hand less the twist of the tail between.
+    pub mouth_rotation_rad: f64,
     /// Rotation of its tip, transported along the axis without twist, rad.
     pub tip_rotation_rad: f64,
     /// Push force of its hand, N: derivative of the energy in its inserted length. `None` where it jumps: its tip is
@@ -159,9 +165,11 @@ pub struct Jump {
 pub struct StepReport {
     /// Length inside the sheath's mouth, mm; with several instruments, of the one inserted farthest.
     pub inserted_mm: f64,
-    /// Rotation of the tail since the start, rad; with several instruments this and the next are those of the
+    /// Rotation of the hand since the start, rad; with several instruments this and the next two are those of the
     /// innermost.
     pub rotation_rad: f64,
+    /// Rotation of the device at the sheath's mouth since the start, rad: the hand's, less the twist of the tail between.
+    pub mouth_rotation_rad: f64,
     /// Rotation of the tip about the device's axis since the start, transported along the axis without twist, rad:
     /// the hand's rotation reduced by lag or increased by whip.
     pub tip_rotation_rad: f64,

@@ -12,7 +12,8 @@ use crate::{Error, Result, Vec3};
 /// |f| = F₀ + μ |n⊥|
 /// ```
 ///
-/// with the force n⊥ between mouth and device across the axis. Only the hand feels it; nothing inside moves.
+/// with the force n⊥ between mouth and device across the axis. Along the axis only the hand feels it; around it, it holds
+/// the device just outside the mouth, against the twist of what lies between there and the hand.
 ///
 /// At rotation zero the first material direction of a device, towards which a positive first rest curvature bends it,
 /// lies in the plane of `direction` and `bends_towards`, on the side of the latter; the second is `direction` × the

@@ -22,8 +22,8 @@ pub struct Supports {
     pub start_free: bool,
     /// The first node's tangent is held.
     pub start_tangent: bool,
-    /// The first node's angles are held.
-    pub start_angle: bool,
+    /// Whether the first node's angle of each set is held.
+    pub start_angles: [bool; MAX_ANGLES],
     /// Directions (orthonormal) in which the last node's position is held; none to three.
     pub end_directions: Vec<Vec3>,
     /// The position at which it is held.
@@ -167,10 +167,8 @@ impl Supports {
             held[3] = Some(l.tangent(0));
             held[4] = Some(l.tangent(0) + 1);
         }
-        if self.start_angle {
-            for set in 0..Layout::<C>::ANGLES {
-                held[5 + set] = Some(l.angle(0, set));
-            }
+        for set in (0..Layout::<C>::ANGLES).filter(|set| self.start_angles[*set]) {
+            held[5 + set] = Some(l.angle(0, set));
         }
         held
     }

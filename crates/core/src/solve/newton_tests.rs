@@ -59,7 +59,7 @@ fn cantilever(n: usize, outside: &mut dyn External) -> (RodState, Solution) {
     let data = ElementData::plain(1.0 / n as f64, 1.0);
     let elements = vec![data; n];
     let mut state = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
-    let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+    let mut supports = Supports { start_tangent: true, start_angles: [true; 3], ..Supports::default() };
     let mut newton = Newton::<PLAIN>::new(n);
     let report = newton.solve(&elements, &mut supports, outside, &mut state, &NewtonOptions::default());
     (state, Solution { report, steps: newton.steps })
@@ -168,7 +168,7 @@ fn rods_behind_a_gap_are_solved_for_together_and_do_not_feel_each_other() {
     let solve =
         |elements: &[ElementData], mut state: RodState, outside: &mut dyn External, start_free: bool| {
             let mut supports =
-                Supports { start_free, start_tangent: true, start_angle: true, ..Supports::default() };
+                Supports { start_free, start_tangent: true, start_angles: [true; 3], ..Supports::default() };
             let mut newton = Newton::<PLAIN>::new(elements.len());
             let options = NewtonOptions { tolerance: 1e-11, ..NewtonOptions::default() };
             let report = newton.solve(elements, &mut supports, outside, &mut state, &options);
@@ -193,7 +193,7 @@ fn rods_behind_a_gap_are_solved_for_together_and_do_not_feel_each_other() {
         Held { force: bent, springs: Vec::new(), stiffness: 1.0 },
         Held { force: (first + sinks.0, sinks.1), springs: springs(first), stiffness: 1.0 },
     );
-    let mut outside = super::Together(vec![&mut on_one, &mut on_other]);
+    let mut outside = super::Together([Some(&mut on_one), Some(&mut on_other)]);
     let both = solve(&all, both, &mut outside, false);
     for (nodes, alone) in [(0..first, one), (first..2 * first, other)] {
         assert!(both.part(nodes).farthest_mm(&alone) < 1e-9);

@@ -217,7 +217,7 @@ impl StaticProblem {
         let mut newton = Newton::<C>::new(self.elements.len());
         let mut state = self.initial.clone();
         let mut supports = self.supports.clone();
-        if let (Some(end), true) = (supports.end_angle, supports.start_angle) {
+        if let (Some(end), true) = (supports.end_angle, supports.start_angles[0]) {
             // Distribute the rotation along the rod: a straight rod is then twisted without a single step.
             supports.begin(&state);
             let target = supports.end_angle.map_or(end.target, |e| e.target);
@@ -372,10 +372,10 @@ fn outside<'a>(
     loads: &'a mut Loads,
     touching: &'a mut Option<SelfContact>,
     field: Option<&'a mut FieldLoad<'_>>,
-) -> Together<'a> {
+) -> Together<'a, 3> {
     let touching = touching.as_mut().map(|touching| touching as &mut dyn External);
     let field = field.map(|field| field as &mut dyn External);
-    Together(std::iter::once(loads as &mut dyn External).chain(touching).chain(field).collect())
+    Together([Some(loads as &mut dyn External), touching, field])
 }
 
 /// Contact between loops of the rod of a case, if modelled.
@@ -423,7 +423,7 @@ fn loads(case: &StaticCase, nodes: &[f64]) -> Loads {
 /// Supports of the ends of a case whose start has this triad.
 fn supports(case: &StaticCase, frame: &Frame, twisted: bool) -> Supports {
     let clamped = case.start.kind == StartKind::Clamped;
-    let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
+    let mut supports = Supports { start_tangent: clamped, start_angles: [clamped; 3], ..Supports::default() };
     if let Some(p) = case.end.position {
         supports.end_position = Vec3::from(p);
         supports.end_directions = match case.end.slide {

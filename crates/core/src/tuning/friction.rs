@@ -29,6 +29,9 @@ pub struct FrictionTuning {
     /// Largest number of iterations for the axial force of an instrument in others behind a node and the friction
     /// there: each reduces the error by the coefficient times half the angle of an element.
     pub lateral_rounds: usize,
+    /// Distance behind the sheath's mouth, or behind a hub, at which friction holds an instrument, in its radii: the
+    /// mouth turns by the twist of that length while it sticks.
+    pub grip_radii: f64,
 }
 
 impl FrictionTuning {
@@ -42,6 +45,7 @@ impl FrictionTuning {
         settled: 1e-4,
         tip_radii: 10.0,
         lateral_rounds: 12,
+        grip_radii: 1.0,
     };
 }
 

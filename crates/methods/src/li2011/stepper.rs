@@ -149,7 +149,8 @@ impl Method for Li2011 {
                 report.largest_bend_rad = shape.largest_turn_rad();
                 report.rotation_rad += command.rotate_rad;
                 // Without twist the tip rotates with the hand.
-                report.tip_rotation_rad = report.rotation_rad;
+                (report.mouth_rotation_rad, report.tip_rotation_rad) =
+                    (report.rotation_rad, report.rotation_rad);
                 (report.iterations, report.substeps, report.converged) = (solves, inputs, converged);
                 report.write_alone();
                 Ok(())

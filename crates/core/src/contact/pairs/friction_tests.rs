@@ -26,9 +26,9 @@ fn pressed_across(coefficient: f64, down: f64, along: f64) -> (f64, f64) {
     let mut loops = SelfContact::new(&all, all.iter().map(capsule).collect());
     let law = FrictionLaw { coefficient, stick_mm: [1e-5, 1e-7], least_n: 1e-9 };
     loops.begin_friction(&rods, std::iter::empty(), all.iter().map(|_| 0.0), law);
-    let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+    let mut supports = Supports { start_tangent: true, start_angles: [true; 3], ..Supports::default() };
     let options = NewtonOptions { tolerance: 1e-9, ..NewtonOptions::default() };
-    let mut outside = Together(vec![&mut loops, &mut held]);
+    let mut outside = Together([Some(&mut loops), Some(&mut held)]);
     let report =
         Newton::<PLAIN>::new(all.len()).solve(&all, &mut supports, &mut outside, &mut rods, &options);
     assert!(report.converged && report.stable, "{coefficient}, {along}: {}", report.reason);

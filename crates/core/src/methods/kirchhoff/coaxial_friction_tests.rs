@@ -221,8 +221,10 @@ fn through(friction_n: f64, friction: f64) -> Vec<(f64, f64, f64)> {
 fn a_valve_holds_against_the_hand_and_moves_nothing_inside() {
     let (smooth, tight, rough) = (through(0.0, 0.0), through(0.3, 0.0), through(0.0, 0.2));
     let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    // The grip slips by what the tail, less its own radius, does not take up.
+    let lag_rad = 0.24 * (150.0 - 60.0 - 0.8) / (60.0 / 1.3);
     for (k, (push, torque, taken)) in
-        [(0.3, 0.0, 0.3), (-0.3, 0.0, 0.3), (0.0, 0.24, 0.12)].into_iter().enumerate()
+        [(0.3, 0.0, 0.3), (-0.3, 0.0, 0.3), (0.0, 0.24, 0.24 * (0.5 - lag_rad))].into_iter().enumerate()
     {
         near(tight[k].0 - smooth[k].0, push);
         near(tight[k].1 - smooth[k].1, torque);

@@ -111,8 +111,10 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(then.as_ref()).with_fields_at(part.to);
             if line_mm(lengths(hands)) == 0.0 && tools.joined.is_empty() {
                 set_motions(&was.state.hands, hands, &mut tools.guess.motions);
+                tools.tails.begin(&there, (was.state, hands));
                 now.withdraw(surroundings.stack, hands);
-                course.withdrawn(tools.write_forces(&there, now));
+                let along_mj = tools.write_forces(&there, now);
+                course.withdrawn(along_mj + tools.around_mj[1]);
                 way.go_on_from(hands);
                 break Ok(());
             }
@@ -189,6 +191,8 @@ impl<const C: usize> Tools<C> {
         // Only its hands, configuration and knowledge of the wall matter.
         let state = KirchhoffState {
             hand_forces: from.hand_forces.clone(),
+            twists: from.twists.clone(),
+            across_n: from.across_n,
             behind: Vec::new(),
             energy: Energy::default(),
             touches: Vec::new(),

@@ -12,6 +12,7 @@ use super::joined::FreeCoil;
 use super::mesh::Mesh;
 use super::report::Took;
 use super::state::KirchhoffState;
+use super::tail::Twist;
 use super::transport::transport_together;
 use super::workspace::Workspace;
 use super::{Environment, meshed};
@@ -72,12 +73,14 @@ impl<const C: usize> Workspace<C> {
         state.unfinished = None;
         // Nothing is left of the motion of a coil that has no hand any more.
         state.behind.iter_mut().skip(instrument).take(1).for_each(|own| *own = Command::default());
+        state.twists[instrument] = Twist::default();
         state.hand_forces[instrument] = HandForce { jumps: stack.is_several(), ..HandForce::default() };
         if mesh.elements.is_empty() {
             state.withdraw(stack, &hands);
         } else {
-            transport_together((&self.mesh, &from.rod), mesh, stack.sets(), &mut state.rod);
-            state.move_hands(stack, &hands);
+            let tail = |instrument: usize, _: f64| state.twists[instrument].mouth_rad;
+            transport_together((&self.mesh, &from.rod), mesh, (stack.sets(), tail), &mut state.rod);
+            state.move_hands(&hands);
             // The axial force of the coil is gone: in a straight catheter its energy is too small for descent to find
             // that.
             state.rod.tensions.fill(0.0);

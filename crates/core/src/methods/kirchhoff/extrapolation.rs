@@ -16,7 +16,7 @@ use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::HandMotion;
 use crate::rod::element::mid_slope;
-use crate::rod::{ElementData, Frame, RodState};
+use crate::rod::{ElementData, Frame, MAX_ANGLES, RodState};
 
 /// Difference of an equilibrium from the slid device in an element and its second node.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -45,6 +45,8 @@ pub(super) struct Correction {
     departures: Vec<Departure>,
     /// For every set of angles in each of these.
     turns: Vec<Turn>,
+    /// Change of the angle of every set at the sheath's mouth, rad.
+    mouth: Vec<f64>,
 }
 
 /// Relative difference of the components up to which motions are the same, except for a factor.
@@ -88,6 +90,7 @@ impl Correction {
         self.motions.reserve(1);
         self.departures.reserve(elements);
         self.turns.reserve(elements);
+        self.mouth.reserve(MAX_ANGLES);
     }
 
     /// Clears everything. Keeps the memory.
@@ -95,6 +98,7 @@ impl Correction {
         self.motions.clear();
         self.departures.clear();
         self.turns.clear();
+        self.mouth.clear();
     }
 
     /// Number of elements with a correction.
@@ -105,7 +109,7 @@ impl Correction {
     /// Whether there is a correction for `elements` elements with this number of sets of angles, or none.
     pub(super) fn fits(&self, elements: usize, sets: usize) -> bool {
         let n = self.len();
-        (n == 0 || n == elements) && self.turns.len() == n * sets
+        (n == 0 || n == elements) && self.turns.len() == n * sets && self.mouth.len() == sets * n.min(1)
     }
 
     /// Stores the difference of the equilibrium found from the slid device; further rods may follow the slid one.
@@ -113,6 +117,7 @@ impl Correction {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = found.elements();
+        self.mouth.extend((0..found.sets()).map(|set| found.angle(0, set) - slid.angle(0, set)));
         // Those of the slid device are measured from triads carried along the rod without twist; so are these.
         let mut twist = found.reference_twists.iter().sum::<f64>();
         for e in (0..n).rev() {
@@ -146,6 +151,7 @@ impl Correction {
         out.clear();
         let n = self.departures.len();
         let sets = self.turns.len() / n;
+        out.mouth.extend_from_slice(&self.mouth);
         let node = |k: usize| from.from_tip_mm[n - k];
         let middle = |k: usize| if k == n { node(n) } else { 0.5 * (node(k) + node(k + 1)) };
         let departure =
@@ -170,6 +176,7 @@ impl Correction {
     pub(super) fn apply(&self, factor: f64, elements: &[ElementData], state: &mut RodState) {
         let n = elements.len();
         let first = n - n.min(self.departures.len());
+        state.angles.iter_mut().zip(&self.mouth).for_each(|(angle, by)| *angle += factor * by);
         // Each middle before the tangents on either side change.
         let mut t = state.frames[first].t;
         for e in first..n {

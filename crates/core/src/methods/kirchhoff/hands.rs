@@ -28,8 +28,8 @@ impl Hand {
     }
 }
 
-/// Force and torque of a hand at an equilibrium. The energy balance of the device leaves out what acts outside the
-/// body, which moves nothing inside.
+/// Force and torque of a hand at an equilibrium. The energy balance of the device leaves out friction along the line
+/// outside the body, which moves nothing inside.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct HandForce {
     /// Push force inside the body, N; where it jumps the hand's share of that of all instruments with level tips.
@@ -37,26 +37,17 @@ pub(super) struct HandForce {
     /// Whether the push force of this hand alone jumps: its instrument's tip is at that of another, or it is not
     /// inserted.
     pub(super) jumps: bool,
-    /// Torque inside the body, N·mm.
+    /// Torque, with that of friction at the sheath and at valves, N·mm.
     pub(super) torque_nmm: f64,
-    /// Friction of the sheath's mouth and of valves.
-    pub(super) outside: OutsideFriction,
-}
-
-/// Friction outside the body on a hand.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct OutsideFriction {
-    /// On its push force, N.
-    pub(super) push_n: f64,
-    /// On its torque, N·mm.
-    pub(super) torque_nmm: f64,
+    /// Friction of the sheath and of valves on the push force, N.
+    pub(super) outside_n: f64,
 }
 
 impl HandForce {
     /// Whether all numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
-        let Self { push_n, torque_nmm, outside, .. } = self;
-        [push_n, torque_nmm, &outside.push_n, &outside.torque_nmm].into_iter().all(|part| part.is_finite())
+        let Self { push_n, torque_nmm, outside_n, .. } = self;
+        [push_n, torque_nmm, outside_n].into_iter().all(|part| part.is_finite())
     }
 }
 

@@ -1,17 +1,18 @@
 //! This crate's method: the exact rod in equilibrium with the wall, after every command.
 //!
 //! The inserted length is a Kirchhoff rod ([`crate::rod`]) clamped in the sheath's mouth and free at its tip, in the
-//! energy of the wall ([`crate::contact`]). A command changes the inserted length and rotates the tail; the rod
+//! energy of the wall ([`crate::contact`]). Outside lies its tail, which twists between hand and mouth (`tail.rs`). A command
+//! changes the inserted length and rotates the end of the tail; the rod
 //! slides along its own curve and Newton's method takes it from there to the nearest minimum of the potential energy.
 //! The hand's force and torque follow from the equilibrium: with n and m the internal force and moment in the
-//! sheath's mouth,
+//! sheath's mouth, and without friction outside the body,
 //!
 //! ```text
-//! F = −n·t − ½ EI |κ|² − ½ GJ τ²,    M = m·t
+//! F = −n·t − ½ EI |κ|²,    M = m·t
 //! ```
 //!
-//! of which the terms after the first are configurational: the energy that the next piece stores as it leaves the
-//! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with
+//! of which the second term is configurational: the energy that the next piece stores as it leaves the
+//! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). Its twist it had before. F is the derivative of the stored energy with
 //! respect to the inserted length.
 //!
 //! # The algorithm of a step
@@ -76,6 +77,7 @@ mod substep;
 mod sum;
 #[cfg(test)]
 mod swept_tests;
+mod tail;
 #[cfg(test)]
 mod tick_tests;
 #[cfg(test)]

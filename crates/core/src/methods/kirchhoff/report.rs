@@ -42,8 +42,10 @@ pub(super) fn check(report: &StepReport, state: &KirchhoffState) -> Result<()> {
     let is_at = |(hand, own): (&InstrumentReport, &Hand)| {
         hand.inserted_mm == own.inserted_mm && hand.rotation_rad == own.turn_rad
     };
+    let turns = hands.iter().zip(&state.twists).all(|(hand, tail)| hand.mouth_rotation_rad == tail.mouth_rad);
     let agrees = hands.len() == state.hands.len()
         && hands.iter().zip(&state.hands).all(is_at)
+        && turns
         && report.inserted_mm == line_mm(lengths(&state.hands))
         && report.behind == state.behind;
     let remedy = "is of another state: restore one as it was saved";
@@ -73,10 +75,11 @@ fn write_state(environment: &Environment<'_>, to: Start<'_>, report: &mut StepRe
     report.instruments.clear();
     report.instruments.extend(instruments(to, stack));
     let inner = report.hand(0);
-    (report.rotation_rad, report.tip_rotation_rad) = (inner.rotation_rad, inner.tip_rotation_rad);
+    (report.rotation_rad, report.mouth_rotation_rad, report.tip_rotation_rad) =
+        (inner.rotation_rad, inner.mouth_rotation_rad, inner.tip_rotation_rad);
     let forces = || state.hand_forces.iter();
-    report.push_force_n = forces().map(|force| force.push_n).sum::<f64>()
-        + forces().map(|force| force.outside.push_n).sum::<f64>();
+    report.push_force_n =
+        forces().map(|force| force.push_n).sum::<f64>() + forces().map(|force| force.outside_n).sum::<f64>();
     report.torque_nmm = report.instruments.iter().map(|hand| hand.torque_nmm).sum();
 }
 
@@ -85,16 +88,18 @@ pub(super) fn instruments<'a>(
     Start { mesh, state }: Start<'a>,
     stack: &'a Stack,
 ) -> impl Iterator<Item = InstrumentReport> + 'a {
-    state.hands.iter().zip(&state.hand_forces).zip(stack.sets()).map(move |((hand, force), set)| {
+    let hands = state.hands.iter().zip(&state.hand_forces).zip(&state.twists);
+    hands.zip(stack.sets()).map(move |(((hand, force), tail), set)| {
         let twist = set.filter(|_| hand.inserted_mm > 0.0).map_or(0.0, |set| {
             state.rod.twist_to(mesh.nearest_node(mesh.from_tip_mm[0] - hand.inserted_mm), set)
         });
         InstrumentReport {
             inserted_mm: hand.inserted_mm,
             rotation_rad: hand.turn_rad,
-            tip_rotation_rad: hand.turn_rad + twist,
-            push_force_n: (!force.jumps).then_some(force.push_n + force.outside.push_n),
-            torque_nmm: force.torque_nmm + force.outside.torque_nmm,
+            mouth_rotation_rad: tail.mouth_rad,
+            tip_rotation_rad: tail.mouth_rad + twist,
+            push_force_n: (!force.jumps).then_some(force.push_n + force.outside_n),
+            torque_nmm: force.torque_nmm,
         }
     })
 }

@@ -44,7 +44,7 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     /// Contacts of loops and coils, if modelled.
     pub(super) loops: Option<&'a mut SelfContact>,
     /// What acts beside them.
-    pub(super) beside: Vec<&'a mut dyn External>,
+    pub(super) beside: [Option<&'a mut dyn External>; 3],
     pub(super) supports: &'a mut Supports,
     pub(super) elements: &'a [ElementData],
     /// The prediction, then the result.
@@ -149,13 +149,15 @@ impl<const C: usize> Search<'_, '_, C> {
             ..NewtonOptions::default()
         };
         let (elements, supports) = (self.elements, &mut *self.supports);
-        let found = if self.loops.is_none() && self.beside.is_empty() {
+        let found = if self.loops.is_none() && self.beside.iter().all(Option::is_none) {
             self.newton.solve(elements, supports, self.contact, self.state, &options)
         } else {
-            let mut outside: Vec<&mut dyn External> = vec![&mut *self.contact];
-            outside.extend(self.loops.as_deref_mut().map(|loops| loops as &mut dyn External));
-            outside.extend(self.beside.iter_mut().map(|beside| &mut **beside as &mut dyn External));
-            self.newton.solve(elements, supports, &mut Together(outside), self.state, &options)
+            let loops = self.loops.as_deref_mut().map(|loops| loops as &mut dyn External);
+            let [one, two, three] = &mut self.beside;
+            let [one, two, three] =
+                [one, two, three].map(|beside| beside.as_mut().map(|it| &mut **it as &mut dyn External));
+            let mut outside = Together([Some(&mut *self.contact), loops, one, two, three]);
+            self.newton.solve(elements, supports, &mut outside, self.state, &options)
         };
         self.iterations += found.iterations;
         self.solves += found.solves;

@@ -17,7 +17,7 @@ use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::{ContactPoint, Drag, Place, Pressing, RodPlace, Touch};
 use crate::rod::quadrature::hermite;
-use crate::rod::{Clamp, ElementData, RodState, element_energy};
+use crate::rod::{ElementData, RodState, element_energy};
 
 /// Step of finite differences, as a fraction of the shortest element.
 const STEP: f64 = 1e-5;
@@ -37,7 +37,6 @@ pub(super) struct Acting<'a> {
 /// Sets the forces of the hands of several instruments.
 pub(super) fn set_hand_forces<const C: usize>(
     environment: &Environment<'_>,
-    clamp: &Clamp,
     acting: Acting<'_>,
     at: &mut Configuration,
 ) {
@@ -48,15 +47,9 @@ pub(super) fn set_hand_forces<const C: usize>(
     let push_force = |together: &[usize]| {
         push_force::<C>(environment, &nodes, (together, &inserted), (acting, &turning), at.start())
     };
-    let each = stack.sets().iter().zip(&inserted).enumerate().map(|(index, (set, inserted_mm))| {
+    let each = (0..inserted.len()).map(|index| {
         let push_n = push_force(&[index]);
-        let set = set.filter(|_| *inserted_mm > 0.0);
-        HandForce {
-            push_n: push_n.unwrap_or(0.0),
-            jumps: push_n.is_none(),
-            torque_nmm: set.map_or(0.0, |set| clamp.torques[set]),
-            ..HandForce::default()
-        }
+        HandForce { push_n: push_n.unwrap_or(0.0), jumps: push_n.is_none(), ..HandForce::default() }
     });
     let mut forces: Vec<HandForce> = each.collect();
     // Where ends are flush the force of a single hand jumps; that of all flush instruments together has a value.

@@ -11,6 +11,7 @@ use super::joined::Coils;
 use super::mesh::Fineness;
 use super::part::{Effort, Found};
 use super::step_control::{StepControl, Stride};
+use super::tail::Twist;
 use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce, Touch};
 use crate::device::Stack;
 use crate::methods::{Command, Energy, Sheath, Surroundings};
@@ -26,6 +27,10 @@ pub struct KirchhoffState {
     pub(super) hands: Vec<Hand>,
     /// Their forces.
     pub(super) hand_forces: Vec<HandForce>,
+    /// The twist of their tails.
+    pub(super) twists: Vec<Twist>,
+    /// Force between device and sheath across the axis, N.
+    pub(super) across_n: f64,
     /// Motion of the hands that commands have not yet carried out; empty if the device is at rest where they are.
     pub(super) behind: Vec<Command>,
     pub(super) rod: RodState,
@@ -151,6 +156,8 @@ impl KirchhoffState {
         Self {
             hands: vec![Hand::default(); hands],
             hand_forces: vec![HandForce { jumps: stack.is_several(), ..HandForce::default() }; hands],
+            twists: vec![Twist::default(); hands],
+            across_n: 0.0,
             behind: Vec::new(),
             rod,
             has_angles,
@@ -200,10 +207,15 @@ impl KirchhoffState {
         self.touches.reserve((points / TOUCHING).saturating_sub(self.touches.len()));
     }
 
-    /// Resets to nothing inserted: only the angles of the tails remain.
+    /// Resets to nothing inserted: only the angles of the hands remain.
     pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
         self.rod.truncate(1);
-        self.move_hands(stack, hands);
+        self.move_hands(hands);
+        for (set, hand) in stack.sets().iter().zip(hands) {
+            if let Some(set) = *set {
+                self.rod.angles[set] = hand.turn_rad;
+            }
+        }
         self.touches.clear();
         self.forces.clear();
         self.inner_friction.clear();
@@ -212,18 +224,10 @@ impl KirchhoffState {
         self.correction.clear();
     }
 
-    /// Sets the positions of the hands, and the angles of the tails to theirs.
-    pub(super) fn move_hands(&mut self, stack: &Stack, hands: &[Hand]) {
+    /// Sets the positions of the hands.
+    pub(super) fn move_hands(&mut self, hands: &[Hand]) {
         self.hands.clear();
         self.hands.extend_from_slice(hands);
-        // Where coils share a set of angles, it is that of the inserted one.
-        for is_in in [false, true] {
-            for (set, hand) in stack.sets().iter().zip(hands) {
-                if let Some(set) = set.filter(|_| is_in == (hand.inserted_mm > 0.0)) {
-                    self.rod.angles[set] = hand.turn_rad;
-                }
-            }
-        }
     }
 
     /// Checks that this is a state of a simulation with such a mesh: a file may contain anything.
@@ -268,8 +272,8 @@ impl KirchhoffState {
             .iter()
             .try_for_each(|coil| coil.check(belongs.stack, felt, (sets, belongs.inner_friction)))?;
         let hands = belongs.stack.instruments().len();
-        let counts = [self.hands.len(), self.hand_forces.len(), self.behind.len()];
-        if counts != [hands, hands, if self.behind.is_empty() { 0 } else { hands }] {
+        let counts = [self.hands.len(), self.hand_forces.len(), self.twists.len(), self.behind.len()];
+        if counts != [hands, hands, hands, if self.behind.is_empty() { 0 } else { hands }] {
             return Err(other("hands", format!("{counts:?}"), format!("there are {hands} instruments here")));
         }
         let points = belongs.points + self.coils.iter().map(|coil| coil.known.len()).sum::<usize>();
@@ -311,10 +315,11 @@ impl KirchhoffState {
         let is_finite = r.is_finite()
             && motions
                 .chain(turns)
-                .chain([self.energy.total()])
+                .chain([self.energy.total(), self.across_n])
                 .chain(self.drag_n.iter().copied())
                 .all(f64::is_finite)
             && self.hand_forces.iter().all(HandForce::is_finite)
+            && self.twists.iter().all(Twist::is_finite)
             && self.touches.iter().all(|(_, touch)| touch.is_finite())
             && self.pairs.iter().all(PairForce::is_finite);
         if !(is_finite && inner_friction.all(|part| part.is_finite())) {

@@ -59,15 +59,18 @@ impl<const C: usize> Tools<C> {
         let (mesh, after) = next.parts();
         meshed(environment, hands, mesh);
         let stack = environment.surroundings.stack;
+        self.tails.begin(environment, (start.state, hands));
+        let tails = &self.tails;
+        let tail = |instrument: usize, from_tip_mm: f64| tails.angle_before(stack, instrument, from_tip_mm);
         let transport_from = |start: Start<'_>, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
             if mesh.elements.is_empty() {
                 rod.copy_from(from.1);
                 rod.truncate(1);
             } else if stack.is_several() {
-                transport_together(from, mesh, stack.sets(), rod);
+                transport_together(from, mesh, (stack.sets(), tail), rod);
             } else {
-                transport(from, mesh, rod);
+                transport(from, mesh, stack.sets()[0].map(|_| |from_tip_mm: f64| tail(0, from_tip_mm)), rod);
             }
         };
         set_motions(&start.state.hands, hands, &mut self.guess.motions);
@@ -92,7 +95,7 @@ impl<const C: usize> Tools<C> {
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
         let pressed = resumed.map_or(start, |resumed| Start { mesh, state: &resumed.state });
         inner_friction::begin(stack, pressed, (mesh, &after.rod), moves, places);
-        after.move_hands(stack, hands);
+        after.move_hands(hands);
         let on_line = mesh.points.len();
         self.joined.add_to(mesh);
         join(&mut after.rod, &start.state.coils);
@@ -178,6 +181,8 @@ impl<const C: usize> Tools<C> {
         let touches = [was, is].map(|at| &at.state.touches[..]);
         let by_wall = work_of_wall(left.map(|(_, passage)| passage), touches);
         let by_others = by_wall.with_flow(flow_mj).with(work_of_fields(environment, was, is));
+        let [least_mj, most_mj] = self.around_mj;
+        let friction_mj = (friction_mj.0 + least_mj, friction_mj.1 + most_mj);
         let tuning = &environment.options.tuning.steps;
         let forces = (&was.state.hand_forces[..], &is.state.hand_forces[..]);
         let energies = (was.state.energy, is.state.energy);
@@ -233,19 +238,21 @@ impl<const C: usize> Tools<C> {
         }
         // What may end in a snap is solved once, wherever it leads.
         self.newton.neighbourhood.bounds = effort != Effort::Flight && !may_snap;
-        let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+        let start_angles = self.tails.held();
+        let mut supports = Supports { start_tangent: true, start_angles, ..Supports::default() };
         let per_mm4 = tuning.steps.coil_resistance_per_mm4;
         let mut free =
             (!self.joined.is_empty()).then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1, per_mm4));
         let mut fields = environment.field_load(&*mesh);
         let free = free.as_mut().map(|free| free as &mut dyn External);
         let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
+        let tails = self.tails.act().then_some(&mut self.tails as &mut dyn External);
         let mut search = Search {
             newton: &mut self.newton,
             guess: &mut self.guess,
             contact: &mut contact,
             loops,
-            beside: free.into_iter().chain(fields).collect(),
+            beside: [free, fields, tails],
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,

@@ -175,7 +175,7 @@ fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
 /// A bent wire before a bent tube, in which it whips when rotated.
 fn whipping(tuning: Tuning) -> Simulation {
     let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(60.0, 0.4, 10.0) };
-    let wire = Device::new(vec![bent, Section::straight(190.0, 0.4, 10.0)]).unwrap();
+    let wire = Device::new(vec![bent, Section::straight(103.0, 0.4, 10.0)]).unwrap();
     let sheath = Sheath::new(crate::Vec3::z() * 6.0, crate::Vec3::z()).unwrap();
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
     let options = KirchhoffOptions { element_mm: 4.0, tuning, ..KirchhoffOptions::default() };

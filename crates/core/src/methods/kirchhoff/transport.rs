@@ -80,8 +80,14 @@ pub(super) fn lay(
 
 /// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
 ///
-/// Material angles move with the device; material that enters from the sheath has the angle that the tail had.
-pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut RodState) {
+/// Material angles move with the device; material that enters from the sheath has the angle that it had in the `tail`, by
+/// its distance from the tip. `None` for a device that does not twist.
+pub(super) fn transport(
+    (from, state): (&Mesh, &RodState),
+    to: &Mesh,
+    tail: Option<impl Fn(f64) -> f64>,
+    out: &mut RodState,
+) {
     slide_curve(from, state, to, out);
     let n = to.elements.len();
     // Axial forces, angles and bubbles of the same piece of device, by its distance from the tip.
@@ -96,19 +102,19 @@ pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut 
         out.bubbles.push(known.filter(|k| *k > 0).map_or(0.0, |k| state.bubbles[k]));
     }
     // Relative to triads carried along the rod without twist, like the new ones.
-    let tail = state.angles[0];
-    out.angles.resize(n.saturating_sub(old), tail);
+    let angle = |i: usize| tail.as_ref().map_or(0.0, |tail| tail(to.from_tip_mm[i]));
+    out.angles.extend((0..n.saturating_sub(old)).map(angle));
     let known = state.angles.iter().zip(state.carried_twists()).map(|(angle, carried)| angle + carried);
     out.angles.extend(known.skip(old.saturating_sub(n)));
-    out.angles[0] = tail;
+    out.angles[0] = angle(0);
 }
 
-/// As [`transport`], for several instruments, each with its set of angles, if any: the nodes are different marks, so
-/// angles are interpolated.
+/// As [`transport`], for several instruments, each with its set of angles, if any, and its tail: the nodes are different
+/// marks, so angles are interpolated.
 pub(super) fn transport_together(
     (from, state): (&Mesh, &RodState),
     to: &Mesh,
-    sets: &[Option<usize>],
+    (sets, tail): (&[Option<usize>], impl Fn(usize, f64) -> f64),
     out: &mut RodState,
 ) {
     slide_curve(from, state, to, out);
@@ -142,7 +148,7 @@ pub(super) fn transport_together(
             let from_tip = (from_line_tip - (to.from_tip_mm[0] - to.inserted_mm[index])).max(0.0);
             let place = from.from_tip_mm[0] - (inserted - from_tip);
             if inserted <= from_tip {
-                return state.angle(0, set);
+                return tail(index, from_tip);
             }
             let e = holding(place).min(old - 1);
             let xi = ((from.from_tip_mm[e] - place) / from.elements[e].length).clamp(0.0, 1.0);

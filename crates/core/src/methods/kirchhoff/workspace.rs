@@ -6,6 +6,7 @@ use super::hands::{Hand, Way};
 use super::joined::Joined;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
+use super::tail::Tails;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact};
 use crate::methods::StepReport;
@@ -34,6 +35,9 @@ pub(super) struct Tools<const C: usize> {
     pub(super) guess: Guess,
     pub(super) friction: Friction,
     pub(super) cache: ContactCache,
+    pub(super) tails: Tails,
+    /// Energy dissipated outside the body by turning, in the sub-step, at least and at most, mJ.
+    pub(super) around_mj: [f64; 2],
     /// Drag of the flow on the device.
     pub(super) drag: Drag,
     /// Self-contact; empty if loops do not touch.
@@ -89,6 +93,8 @@ impl<const C: usize> Workspace<C> {
             guess: Guess::default(),
             friction: Friction::tuned(surroundings.properties.largest_friction(), &tuning.friction),
             cache: ContactCache::new(environment.surface),
+            tails: Tails::default(),
+            around_mj: [0.0; 2],
             drag: Drag::default(),
             loops: SelfContact::tuned(tuning),
             joined: Joined::default(),
