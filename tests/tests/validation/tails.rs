@@ -194,15 +194,15 @@ fn hands_of_several_put_in_what_tails_store_and_valves_take() {
         let mut simulation = two(valve_n);
         let first = simulation.report().clone();
         let (mut was, mut put_in_mj, mut lost_mj) = (first.clone(), 0.0, 0.0);
-        for k in 0..120 {
-            let moves = match k / 40 {
-                0 => [moved(0, 0.0, 0.02), moved(1, 0.0, -0.01)],
-                1 => [moved(0, 0.0, -0.03), moved(1, -0.05, 0.0)],
-                _ => [moved(0, 0.05, 0.0), moved(1, 0.0, 0.02)],
+        for k in 0..240 {
+            let moves = match k / 80 {
+                0 => [moved(0, 0.0, 0.01), moved(1, 0.0, -0.005)],
+                1 => [moved(0, 0.0, -0.015), moved(1, -0.025, 0.0)],
+                _ => [moved(0, 0.025, 0.0), moved(1, 0.0, 0.01)],
             };
             let is = simulation.step_together(&moves).unwrap().clone();
             assert!(is.converged && !is.jumped, "{is:?}");
-            put_in_mj += work_mj(&was, &is, k % 40 == 0);
+            put_in_mj += work_mj(&was, &is, k % 80 == 0);
             lost_mj += is.dissipated_mj;
             was = is;
         }

@@ -275,8 +275,8 @@ impl Tail {
         Turned { slip_rad, body_nmm, hand_nmm, stored_mj, stiffness_nmm }
     }
 
-    /// Energy dissipated at the grip by turning, at least and at most, mJ. Without advance friction is the same
-    /// throughout the slip; with it, its torque goes from that before to that after the part.
+    /// Energy dissipated at the grip by turning, at least and at most, mJ. A grip that lets go because the device now
+    /// advances has had a larger torque before.
     fn around_mj(&self, turned: &Turned) -> [f64; 2] {
         let after = (turned.hand_nmm - turned.body_nmm) * turned.slip_rad;
         let (twist, inserted_mm) = &self.before;
@@ -284,7 +284,7 @@ impl Tail {
             return [after; 2];
         }
         let before = ((twist.hand_nmm - twist.body_nmm) * turned.slip_rad).max(0.0);
-        [before.min(after), before.max(after)]
+        [after, before.max(after)]
     }
 
     /// E at an angle of the mouth, mJ.
