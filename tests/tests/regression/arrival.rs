@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
-use endowire_core::device::{Device, DeviceFile, Instrument, Stack};
+use endowire_core::device::{Device, DeviceFile, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Simulation};
 use endowire_core::scene::Scene;
 use endowire_core::vessel::{NoStore, Wall};
@@ -122,9 +122,11 @@ fn run_in_a_catheter(
     step_mm: f64,
 ) -> (Simulation, Tally) {
     let commands = commands(scene, step_mm);
-    // Of exchange length: its tail must not slip into the catheter's.
+    // Of exchange length: its tail must not slip into the catheter's. What is added does not twist, so that the turns of the scene
+    // arrive as with its own wire.
     let mut sections = scene.device().unwrap().sections().to_vec();
-    sections.last_mut().unwrap().length_mm += 1500.0;
+    let last = *sections.last().unwrap();
+    sections.push(Section { length_mm: 1500.0, torsional_stiffness_nmm2: Some(1e8), ..last });
     let wire = Device::new(sections).unwrap();
     let catheter = DeviceFile::read(&asset("devices/catheter_4f_vertebral.toml")).unwrap().device;
     let one = |name: &str, device| Instrument { name: name.to_owned(), device, may_lead: true };
