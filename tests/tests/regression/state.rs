@@ -167,7 +167,8 @@ fn spoil(value: &mut serde_json::Value, key: &str) {
                         *inner = (0.5 * number.as_f64().unwrap() - 0.1).into();
                     }
                     serde_json::Value::Array(list)
-                        if key == "departures" && ["departures", "turns", "mouth"].contains(&name.as_str()) =>
+                        if key == "departures"
+                            && ["departures", "turns", "mouth"].contains(&name.as_str()) =>
                     {
                         list.clear();
                     }
