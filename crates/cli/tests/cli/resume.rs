@@ -449,7 +449,7 @@ fn what_a_script_injects_is_recorded_drawn_and_goes_on_as_if_nothing_had_been_be
     assert_eq!((rows[2][0], rows[2][3], rows[2][4], rows.len()), ("26", "2.0", "8.0", 3));
     let steps = std::fs::read_to_string(at("whole/steps.csv")).unwrap();
     assert_eq!(rows[1][..6], ["10", &end_s(&steps, 10), "device", "6.0", "4.0", "40.0"]);
-    let tips = |step: usize| steps.lines().nth(step).unwrap().split(',').skip(7).take(3).collect::<Vec<_>>();
+    let tips = |step: usize| steps.lines().nth(step).unwrap().split(',').skip(8).take(3).collect::<Vec<_>>();
     assert_eq!(
         (&rows[1][6..9], &rows[2][6..9]),
         (&tips(10)[..], &tips(26)[..]),
