@@ -3,6 +3,7 @@
 mod args;
 mod cache;
 mod commands;
+mod devices;
 mod environment;
 mod failure;
 mod output;

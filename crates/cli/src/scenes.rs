@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use endowire_core::error::nearest_name;
 use endowire_core::insertion::Tally;
 use endowire_methods::{Scene, Setting, scene_with};
 use endowire_viewer::ViewSpec;
@@ -184,6 +185,27 @@ pub(crate) fn check_converged(
         ))),
         _ => Ok(()),
     }
+}
+
+/// The file that `which` means: itself, or the file of that name in `folder`, which holds files of the kind `what`.
+pub(crate) fn named(which: &Path, folder: &str, what: &str) -> Result<PathBuf, Failure> {
+    if which.is_file() {
+        return Ok(which.to_path_buf());
+    }
+    let file = file_of(which, folder);
+    if file.is_file() {
+        return Ok(file);
+    }
+    let known = files(Path::new(folder)).unwrap_or_default();
+    let stems = known.iter().filter_map(|path| path.file_stem()?.to_str());
+    let nearest = nearest_name(stems, &which.display().to_string())
+        .map_or_else(String::new, |name| format!("; did you mean {name}?"));
+    Err(Failure::Input(format!("{}: is no file and no {what} of {folder}{nearest}", which.display())))
+}
+
+/// The file of a name in a folder.
+pub(crate) fn file_of(name: &Path, folder: &str) -> PathBuf {
+    Path::new(folder).join(format!("{}.toml", name.display()))
 }
 
 /// TOML files of a folder, sorted by name.

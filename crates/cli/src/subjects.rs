@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use endowire_assess::{Exam, Score, Scored, Site, Subject, Threshold};
-use endowire_core::error::nearest_name;
 use endowire_core::insertion::Simulation;
 use endowire_methods::{Scene, Setting};
 use endowire_play::{Limits, lumens};
@@ -34,25 +33,9 @@ pub(crate) struct ScoreDocument<'a> {
     pub(crate) score: &'a Score,
 }
 
-/// The file of a subject given by name.
-fn named(which: &Path) -> PathBuf {
-    Path::new(FOLDER).join(format!("{}.toml", which.display()))
-}
-
 /// Reads a subject, given by file or name.
 pub(crate) fn read(which: &Path) -> Result<Subject, Failure> {
-    if which.is_file() {
-        return Ok(Subject::read(which)?);
-    }
-    let file = named(which);
-    if file.is_file() {
-        return Ok(Subject::read(&file)?);
-    }
-    let known = scenes::files(Path::new(FOLDER)).unwrap_or_default();
-    let stems = known.iter().filter_map(|path| path.file_stem()?.to_str());
-    let nearest = nearest_name(stems, &which.display().to_string())
-        .map_or_else(String::new, |name| format!("; did you mean {name}?"));
-    Err(Failure::Input(format!("{}: is no file and no subject of {FOLDER}{nearest}", which.display())))
+    Ok(Subject::read(&scenes::named(which, FOLDER, "subject")?)?)
 }
 
 /// The same for what may be a scene instead; then `None`.
@@ -63,7 +46,7 @@ pub(crate) fn if_meant(which: &Path) -> Result<Option<Subject>, Failure> {
         std::str::from_utf8(&bytes).is_ok_and(Subject::is_meant)
     } else {
         // A name without an extension is more likely a subject than a scene.
-        named(which).is_file() || which.extension().is_none()
+        scenes::file_of(which, FOLDER).is_file() || which.extension().is_none()
     };
     meant.then(|| read(which)).transpose()
 }

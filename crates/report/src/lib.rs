@@ -2,7 +2,8 @@
 //!
 //! A [`Run`] holds the data of a run's page: the vessel, shapes step by step, numbers, events and frames. It is made
 //! from a recording on disk, or from a [`Recorder`] that follows a simulation. [`run_page`] and [`tables_page`] each
-//! make one HTML file that contains all scripts and data; [`assessed_page`] does so for the assessments of trainees.
+//! make one HTML file that contains all scripts and data; [`study_page`] does so for bench tests and studies,
+//! [`assessed_page`] for the assessments of trainees.
 
 mod base64;
 mod recorder;
@@ -11,7 +12,7 @@ mod vessel;
 
 pub use base64::base64;
 pub use recorder::Recorder;
-pub use run::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, events};
+pub use run::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, events, setup};
 use serde::Serialize;
 pub use vessel::Vessel;
 
@@ -28,9 +29,10 @@ const ASSESSED: &str = concat!(
     include_str!("assess/page.js"),
     "</script>\n</body>\n</html>\n"
 );
+const STUDY: &str = concat!(include_str!("head.html"), include_str!("study.html"));
 const MARK: &str = "/*DATA*/null";
 
-/// The page of a run.
+/// The page of a run, and of others that it is compared with.
 ///
 /// # Errors
 /// A summary that cannot be written as JSON.
@@ -44,6 +46,14 @@ pub fn run_page(run: &Run) -> serde_json::Result<String> {
 /// Data that cannot be written as JSON.
 pub fn tables_page(tables: &impl Serialize) -> serde_json::Result<String> {
     page(TABLES, tables)
+}
+
+/// The page of a study: pictures, tables and text; the document is read by the script in `study.html`.
+///
+/// # Errors
+/// Data that cannot be written as JSON.
+pub fn study_page(study: &impl Serialize) -> serde_json::Result<String> {
+    page(STUDY, study)
 }
 
 /// The page of assessments; the document is read by the scripts in `assess`.

@@ -1,7 +1,11 @@
 //! Data of the page of a run.
 
-use endowire_core::Vec3;
+use endowire_core::device::{Device, Stack};
 use endowire_core::insertion::Simulation;
+use endowire_core::methods::MethodChoice;
+use endowire_core::scene::SceneOf;
+use endowire_core::{Result, Vec3};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -28,6 +32,53 @@ pub struct Run {
     pub events: Vec<Event>,
     /// Pictures.
     pub frames: Vec<Frame>,
+    /// Devices, friction and wall: names and values for people.
+    pub setup: Vec<[String; 2]>,
+    /// Other runs to compare it with.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Run>,
+}
+
+/// Devices and wall of a run in words: what a comparison of runs is about.
+///
+/// # Errors
+/// A device file that cannot be read.
+pub fn setup<M: MethodChoice + DeserializeOwned + Default>(
+    scene: &SceneOf<M>,
+    stack: &Stack,
+) -> Result<Vec<[String; 2]>> {
+    let files = scene.device_files()?;
+    let name = |index: usize| files.get(index).and_then(Option::as_ref).map(|(_, file)| file.name.as_str());
+    let devices = stack.instruments().iter().enumerate();
+    let mut lines: Vec<[String; 2]> =
+        devices.map(|(index, one)| [one.name.clone(), device_words(name(index), &one.device)]).collect();
+    let wall = &scene.vessel.wall;
+    let regions = match wall.region.len() {
+        0 => String::new(),
+        1 => ", another in a region".to_owned(),
+        count => format!(", others in {count} regions"),
+    };
+    lines.push(["friction coefficient".to_owned(), format!("{}{regions}", wall.friction)]);
+    lines.push(["wall modulus".to_owned(), format!("{} N/mm²{regions}", wall.modulus_n_per_mm2)]);
+    Ok(lines)
+}
+
+/// A device by its name and its extreme sizes.
+fn device_words(name: Option<&str>, device: &Device) -> String {
+    let stiffnesses = device.sections().iter().map(|section| section.bending_stiffness_nmm2);
+    let (low, high) = stiffnesses.fold((f64::MAX, 0.0f64), |(low, high), ei| (low.min(ei), high.max(ei)));
+    let range = |low: f64, high: f64, digits: usize| match high - low > 0.005 * high {
+        true => format!("{low:.digits$}–{high:.digits$}"),
+        false => format!("{high:.digits$}"),
+    };
+    let diameters = range(2.0 * device.min_radius_mm(), 2.0 * device.max_radius_mm(), 2);
+    let digits = if high < 10.0 { 3 } else { 0 };
+    let name = name.filter(|name| !name.is_empty()).map_or_else(String::new, |name| format!("{name}: "));
+    format!(
+        "{name}{diameters} mm thick, EI {} N·mm², {:.0} mm long",
+        range(low, high, digits),
+        device.length_mm()
+    )
 }
 
 /// The shape at a step.
@@ -78,6 +129,8 @@ pub(crate) fn scaled(point_mm: &Vec3, per_mm: f64) -> [i32; 3] {
 pub struct Row {
     pub(crate) step: usize,
     inserted_mm: f64,
+    rotation_rad: f64,
+    tip_rotation_rad: f64,
     push_force_n: f64,
     torque_nmm: f64,
     bend_mj: f64,
@@ -96,6 +149,7 @@ pub struct Row {
     wall_force_sum_n: Option<f64>,
     wall_force_largest_n: Option<f64>,
     wall_force_tip_n: Option<f64>,
+    time_s: Option<f64>,
 }
 
 impl Row {
@@ -105,6 +159,8 @@ impl Row {
         Self {
             step,
             inserted_mm: report.inserted_mm,
+            rotation_rad: report.rotation_rad,
+            tip_rotation_rad: report.tip_rotation_rad,
             push_force_n: report.push_force_n,
             torque_nmm: report.torque_nmm,
             bend_mj: report.energy.bend,
@@ -121,6 +177,7 @@ impl Row {
             wall_force_sum_n: Some(force.sum_n),
             wall_force_largest_n: Some(force.largest_n),
             wall_force_tip_n: Some(force.tip_n),
+            time_s: Some(simulation.time_s()),
         }
     }
 }
@@ -136,7 +193,11 @@ impl Row {
 #[derive(Debug, Serialize)]
 pub struct Series {
     step: Vec<usize>,
+    time_s: Vec<Option<f64>>,
     inserted_mm: Vec<f64>,
+    rotation_deg: Vec<f64>,
+    /// Angle by which the tip is behind the hand.
+    tip_lag_deg: Vec<f64>,
     push_force_n: Vec<f64>,
     torque_nmm: Vec<f64>,
     energy_mj: Vec<f64>,
@@ -153,7 +214,13 @@ impl Series {
     pub fn of(rows: &[Row]) -> Self {
         Self {
             step: rows.iter().map(|row| row.step).collect(),
+            time_s: rows.iter().map(|row| row.time_s).collect(),
             inserted_mm: rows.iter().map(|row| row.inserted_mm).collect(),
+            rotation_deg: rows.iter().map(|row| row.rotation_rad.to_degrees()).collect(),
+            tip_lag_deg: rows
+                .iter()
+                .map(|row| (row.rotation_rad - row.tip_rotation_rad).to_degrees())
+                .collect(),
             push_force_n: rows.iter().map(|row| row.push_force_n).collect(),
             torque_nmm: rows.iter().map(|row| row.torque_nmm).collect(),
             energy_mj: rows.iter().map(Row::energy_mj).collect(),
@@ -225,6 +292,8 @@ mod tests {
         let row = |imbalance: Option<f64>| Row {
             step: 3,
             inserted_mm: 12.0,
+            rotation_rad: 0.0,
+            tip_rotation_rad: 0.0,
             push_force_n: 0.0,
             torque_nmm: 0.0,
             bend_mj: 0.0,
@@ -241,6 +310,7 @@ mod tests {
             wall_force_sum_n: None,
             wall_force_largest_n: None,
             wall_force_tip_n: None,
+            time_s: None,
         };
         for imbalance in [None, Some(0.0)] {
             assert_eq!(events(&[row(imbalance)])[0].text, "at 12.0 mm: left to come to rest");

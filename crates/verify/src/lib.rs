@@ -5,6 +5,7 @@
 //! of any size ([`sequences`]), random deployments of coils ([`deployments`]), insertions into the [`surfaces`] of a
 //! folder, and the exact test for a device that [crosses](crossing) its wall.
 
+pub mod bench;
 mod capstan;
 mod capstan_within;
 mod channel;
@@ -15,11 +16,13 @@ pub mod crossing;
 mod cylinder;
 pub mod deployments;
 mod ends;
+pub mod evidence;
 mod flow_drag;
 mod insertion;
 pub mod insertion_stress;
 pub mod instrument_stress;
 pub mod noise;
+mod on_bench;
 mod planar;
 mod quadratic;
 mod regions;
@@ -264,6 +267,18 @@ pub const FAMILIES: &[Family] = &[
         run: self_contact::trefoil,
     },
     Family { id: "E6", title: "Two cantilevers that cross", run: self_contact::crossing },
+    Family {
+        id: "G1",
+        title: "Three-point bending of uniform and tapered wires",
+        run: on_bench::three_point,
+    },
+    Family {
+        id: "G2",
+        title: "Torque response: straight wire, whip of a pre-curved one (B5)",
+        run: on_bench::torque,
+    },
+    Family { id: "G3", title: "Push: straight tube, bend, capstan behind a bend", run: on_bench::push },
+    Family { id: "G4", title: "Tip load: columns that slide or are held", run: on_bench::tip_load },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.

@@ -16,7 +16,7 @@ const STIFFNESS: f64 = 10.0;
 const WIRE_RADIUS: f64 = 0.1;
 
 /// A wire as long as the tube's bend of `lambda` radians, with a clearance `play_mm`: no tail twists outside.
-fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
+pub(crate) fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     let length_mm = lambda * BEND;
     let radius_mm = WIRE_RADIUS + play_mm;
     let tube =

@@ -14,7 +14,7 @@ use endowire_methods::Setting;
 use endowire_play::{
     Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot, TICK_SOLVES, lumens, script_head,
 };
-use endowire_report::{Frame, Recorder, Run, Series, Vessel, events};
+use endowire_report::{Frame, Recorder, Run, Series, Vessel, events, setup};
 use endowire_viewer::{Backend, Graphics, Image, PixelFormat, ViewSpec};
 use serde_json::{Value, json};
 
@@ -33,6 +33,7 @@ pub(crate) struct Played {
     script: Script,
     /// Provenance of a report of the session, and its data of the steps.
     provenance: Value,
+    setup: Vec<[String; 2]>,
     recorder: Recorder,
     /// Number of steps in the recorder.
     noted: usize,
@@ -64,6 +65,7 @@ impl Played {
             simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let all_solid = !lumens(simulation.stack(), &view).contains(&true);
         let wall = simulation.lumen().wall(&NoStore)?.clone();
+        let setup = setup(&scene, simulation.stack())?;
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
         let session = Session::new(simulation, view, side_px, Limits::default())?;
         let mut session = session.with_ticks(TICK_SOLVES)?.with_sac(sac);
@@ -89,6 +91,7 @@ impl Played {
             settings,
             script,
             provenance,
+            setup,
             recorder: Recorder::default(),
             noted: 0,
             pictures,
@@ -182,6 +185,8 @@ impl Played {
             series: Series::of(rows),
             events: events(rows),
             frames,
+            setup: self.setup.clone(),
+            others: vec![],
         })
     }
 

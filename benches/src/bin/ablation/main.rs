@@ -4,7 +4,7 @@
 //! ```sh
 //! cargo run --release -p endowire-benches --bin ablation                     # all rows in all scenes; writes the table
 //! cargo run --release -p endowire-benches --bin ablation -- PATTERN          # rows with this in their name; prints it
-//! cargo run --release -p endowire-benches --bin ablation -- --scenes A,B    # scenes with one of these in their name; prints it
+//! cargo run --release -p endowire-benches --bin ablation -- --scenes A,B    # scenes with one of these in their name; writes it
 //! cargo run --release -p endowire-benches --bin ablation -- --print          # prints it in place of writing it
 //! cargo run --release -p endowire-benches --bin ablation -- --measured       # prints what is measured so far
 //! cargo run --release -p endowire-benches --bin ablation -- --repeats N      # times are the smallest of N runs
@@ -75,9 +75,9 @@ impl Arguments {
         Ok(reported)
     }
 
-    /// Whether the table is of all rows and all scenes, and is to be written.
+    /// Whether the table is of all rows, and is to be written.
     fn writes(&self) -> bool {
-        self.rows.is_none() && self.scenes.is_none() && !self.prints && !self.is_measured
+        self.rows.is_none() && !self.prints && !self.is_measured
     }
 }
 
@@ -126,6 +126,7 @@ fn main() -> Result<()> {
         return Ok(());
     }
     let mut hard = scenes::all()?;
+    let all = hard.len();
     hard.retain(|scene| has(&scene.name, reported.scenes.as_deref()));
     let results = Results::of_this_commit(&root(), reported.is_measured)?;
     if !reported.is_measured {
@@ -144,7 +145,7 @@ fn main() -> Result<()> {
     let lines = rows.iter().map(|row| Ok((row, results.of(row)?))).collect::<Result<Vec<_>>>()?;
     let table = table::table(&lines, &hard);
     if reported.writes() {
-        table::write(&root().join("BENCHMARKS.md"), &results.commit, hard.len(), &table)?;
+        table::write(&root().join("BENCHMARKS.md"), &results.commit, (hard.len(), all), &table)?;
     } else {
         println!("{table}");
     }

@@ -119,13 +119,13 @@ pub(crate) fn table(rows: &[(&Row, BTreeMap<String, Measured>)], scenes: &[Hard]
     lines.join("\n")
 }
 
-/// Writes the table at the end of the document, in place of the one that is there.
-pub(crate) fn write(path: &Path, commit: &str, scenes: usize, table: &str) -> Result<()> {
+/// Writes the table of so many of all scenes at the end of the document, in place of the one that is there.
+pub(crate) fn write(path: &Path, commit: &str, (scenes, all): (usize, usize), table: &str) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::file(path, error))?;
     let before = text.split(HEADING).next().unwrap_or_default().trim_end();
     let reported = format!(
-        "Written by `cargo run --release -p endowire-benches --bin ablation` from commit {commit}: {scenes} scenes of \
-         `benches/hard` without a mechanism of the solver, or with another number (`benches/src/bin/ablation/rows.rs`), over \
+        "Written by `cargo run --release -p endowire-benches --bin ablation` from commit {commit}: {scenes} of the {all} scenes \
+         of `benches/hard` without a mechanism of the solver, or with another number (`benches/src/bin/ablation/rows.rs`), over \
          those with all as they are. Ratios of sums of Newton iterations, of factorisations and of time, each scene run in \
          turn with and without; the scene with the largest ratio of iterations; scenes whose tip ends more than {} mm \
          elsewhere ({} mm with friction), in which more commands end without an equilibrium, and which end in an error \

@@ -5,6 +5,8 @@
     reason = "doc comments here are help texts, in which script[0] is no link"
 )]
 
+mod bench;
+mod evidence;
 mod inputs;
 mod pictures;
 mod studies;
@@ -16,6 +18,10 @@ use clap::{Parser, Subcommand};
 use endowire_methods::Setting;
 use endowire_sweep::Shard;
 
+pub(crate) use bench::{
+    BenchCommand, BenchOutputArgs, BendArgs, PushArgs, TipLoadArgs, TorqueArgs, TrackArgs,
+};
+pub(crate) use evidence::EvidenceArgs;
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, SacArgs,
     VesselCommand,
@@ -52,8 +58,8 @@ pub(crate) enum Command {
     Subject(SubjectCommand),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
-    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
-    /// and pictures of an experiment
+    /// Write a recorded run, or several to compare, as one page for a browser: the shape to turn and to scrub through time, forces over
+    /// length, angle, time or steps, events, frames; or the tables and pictures of an experiment
     Report(ReportArgs),
     /// Write a recorded run for other programs: a series for ParaView and 3D Slicer (VTK)
     Export(ExportArgs),
@@ -71,6 +77,12 @@ pub(crate) enum Command {
     /// Show device files: parts, sizes in all units, stiffnesses, materials, sources, and the shape at rest
     #[command(subcommand)]
     Device(DeviceCommand),
+    /// Bench tests of devices: torque response, push along a tortuous path, tip load, three-point bending; several devices in one table and
+    /// one picture
+    #[command(subcommand)]
+    Bench(BenchCommand),
+    /// Studies that compare the model with measurements and exact laws: question, data, figure, error, and what they do not show
+    Evidence(EvidenceArgs),
     /// Run time against error, method by method: tables and a work–precision picture
     Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011
@@ -154,9 +166,10 @@ pub(crate) struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct ReportArgs {
-    /// Folder of a recorded run, or of an experiment or comparison
-    pub(crate) dir: PathBuf,
-    /// File of the page; DIR/report.html if absent
+    /// Folder of a recorded run, or of an experiment or comparison; several runs are compared on one page, curve by curve
+    #[arg(required = true, value_name = "DIR")]
+    pub(crate) dirs: Vec<PathBuf>,
+    /// File of the page; report.html in the first DIR if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
     /// Scene file, if it is not the one named in summary.json

@@ -1,11 +1,13 @@
 //! The commands, one file each.
 
 mod assess;
+mod bench;
 mod centreline;
 mod compare;
 mod dataset;
 mod device;
 mod doctor;
+mod evidence;
 mod experiment;
 mod export;
 mod felt;
@@ -57,6 +59,8 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Device(DeviceCommand::List { folder, out, json }) => {
             device::list(folder, out.as_deref(), *json)
         }
+        Command::Evidence(args) => evidence::evidence(args),
+        Command::Bench(command) => bench::bench(command),
         Command::Compare(args) => compare::compare(args),
         Command::Report(args) => report::report(args),
         Command::New(args) => new::new(args),

@@ -64,20 +64,12 @@ pub(crate) fn write(
 
 /// Draws a chart to a file, SVG or PNG by its extension.
 pub(crate) fn write_file(path: &Path, size: (u32, u32), chart: &impl Chart) -> Result<(), Failure> {
-    static FONT: Once = Once::new();
-    FONT.call_once(|| {
-        // Fails only for an invalid font, and this one is part of the program.
-        let _ = register_font(FAMILY, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
-    });
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("svg") => {
-            let mut text = String::new();
-            draw(SVGBackend::with_string(&mut text, size), path, chart)?;
-            std::fs::write(path, text)
-        }
+        Some("svg") => std::fs::write(path, svg(size, chart)?),
         Some("png") => {
+            register();
             let mut pixels = vec![0; 3 * (size.0 * size.1) as usize];
-            draw(BitMapBackend::with_buffer(&mut pixels, size), path, chart)?;
+            draw(BitMapBackend::with_buffer(&mut pixels, size), chart)?;
             write_png(path, size, &pixels)
         }
         _ => return Err(Failure::Input(format!("--out {}: name a file .svg or .png", path.display()))),
@@ -85,13 +77,30 @@ pub(crate) fn write_file(path: &Path, size: (u32, u32), chart: &impl Chart) -> R
     .map_err(|e| Failure::write(path, &e))
 }
 
+/// The chart as the text of an SVG file.
+pub(crate) fn svg(size: (u32, u32), chart: &impl Chart) -> Result<String, Failure> {
+    register();
+    let mut text = String::new();
+    draw(SVGBackend::with_string(&mut text, size), chart)?;
+    Ok(text)
+}
+
+/// Makes the font known to the drawing library.
+fn register() {
+    static FONT: Once = Once::new();
+    FONT.call_once(|| {
+        // Fails only for an invalid font, and this one is part of the program.
+        let _ = register_font(FAMILY, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
+    });
+}
+
 /// Draws on a backend and completes its output.
-fn draw<B: DrawingBackend>(backend: B, path: &Path, chart: &impl Chart) -> Result<(), Failure> {
+fn draw<B: DrawingBackend>(backend: B, chart: &impl Chart) -> Result<(), Failure> {
     let root = backend.into_drawing_area();
     root.fill(&WHITE)
         .and_then(|()| chart.draw(&root))
         .and_then(|()| root.present())
-        .map_err(|e| Failure::Computation(format!("the chart {} cannot be drawn: {e}", path.display())))
+        .map_err(|e| Failure::Computation(format!("the chart cannot be drawn: {e}")))
 }
 
 /// Writes an RGB picture of three bytes per pixel.

@@ -3,6 +3,7 @@
 mod arrays;
 pub(crate) mod chart;
 pub(crate) mod coils;
+pub(crate) mod curves;
 pub(crate) mod film;
 pub(crate) mod folder;
 pub(crate) mod frames;
@@ -19,6 +20,7 @@ mod rows;
 pub(crate) mod saved;
 pub(crate) mod session;
 mod step_table;
+pub(crate) mod study;
 pub(crate) mod vtk;
 
 use std::fmt::Display;

@@ -4,6 +4,7 @@
 
 mod assess;
 mod bad_input;
+mod bench;
 mod cache;
 mod centreline;
 mod common;
@@ -11,6 +12,7 @@ mod compare;
 mod course;
 mod dataset;
 mod device;
+mod evidence;
 mod experiment;
 mod export;
 mod guide;

@@ -229,13 +229,13 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     // What is no state, and one that is damaged at any byte.
     let bytes = std::fs::read(&state).unwrap();
     let damaged = at("damaged");
-    let newer = [b"endowire state 23", &bytes["endowire state 22".len()..]].concat();
+    let newer = [b"endowire state 24", &bytes["endowire state 23".len()..]].concat();
     let mut changed = bytes.clone();
     let middle = changed.len() / 2;
     changed[middle] ^= 1;
     let reported = [
         (text.clone().into_bytes(), "is no saved state"),
-        (newer, "its format is \"endowire state 23\""),
+        (newer, "its format is \"endowire state 24\""),
         (changed, "is not whole or was changed"),
         (bytes[..bytes.len() - 1].to_vec(), "is not whole"),
         (bytes[..20].to_vec(), "is not whole"),
@@ -449,7 +449,7 @@ fn what_a_script_injects_is_recorded_drawn_and_goes_on_as_if_nothing_had_been_be
     assert_eq!((rows[2][0], rows[2][3], rows[2][4], rows.len()), ("26", "2.0", "8.0", 3));
     let steps = std::fs::read_to_string(at("whole/steps.csv")).unwrap();
     assert_eq!(rows[1][..6], ["10", &end_s(&steps, 10), "device", "6.0", "4.0", "40.0"]);
-    let tips = |step: usize| steps.lines().nth(step).unwrap().split(',').skip(7).take(3).collect::<Vec<_>>();
+    let tips = |step: usize| steps.lines().nth(step).unwrap().split(',').skip(8).take(3).collect::<Vec<_>>();
     assert_eq!(
         (&rows[1][6..9], &rows[2][6..9]),
         (&tips(10)[..], &tips(26)[..]),

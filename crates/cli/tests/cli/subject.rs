@@ -226,8 +226,9 @@ fn a_folder_of_a_run_says_what_of_a_subject_it_cannot_tell() {
 #[test]
 fn who_pushes_on_in_a_wrong_branch_is_stopped() {
     let folder = tempfile::tempdir().unwrap();
-    // Without the turn that leads up to the liver.
-    let pushes = "[[script]]\nrotate_deg = 270.0\n\n[[script]]\nadvance_mm = 320.0\nstep_mm = 1.0\n";
+    // A third of the turn that leads up to the liver.
+    let pushes = "[[script]]\nrotate_deg = 270.0\n\n[[script]]\nadvance_mm = 116.0\nstep_mm = 1.0\n\n\
+                  [[script]]\nrotate_deg = 120.0\n\n[[script]]\nadvance_mm = 200.0\nstep_mm = 1.0\n";
     let reference = folder.path().join("pushes.toml");
     std::fs::write(&reference, pushes).unwrap();
     let shipped = assets().join("subjects/references/right_hepatic.toml");

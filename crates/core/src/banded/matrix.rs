@@ -128,7 +128,7 @@ impl Shift {
 
     /// Adds `factor` times row `i` of the shift to that row of a matrix.
     #[inline(always)]
-    pub(super) fn add_to<const C: usize>(&self, i: usize, factor: f64, row: &mut [f64; C]) {
+    pub(crate) fn add_to<const C: usize>(&self, i: usize, factor: f64, row: &mut [f64; C]) {
         let own = i % (C / 2);
         row[own] += factor * self.diagonal[i];
         row[C / 2 + own] += factor * self.next[i];

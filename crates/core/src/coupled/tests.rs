@@ -78,6 +78,36 @@ fn solution_and_inertia_agree_with_faer() {
 }
 
 #[test]
+fn columns_that_are_kept_have_the_bits_of_a_factorisation_from_the_beginning() {
+    let mut shift = Shift::default();
+    shift.reset(8 * 12);
+    shift.diagonal.fill(0.1);
+    let (band, couplings) = random::<16>(12, 7);
+    let b: Vec<f64> = (0..band.dimension()).map(|i| (i as f64).cos()).collect();
+    let solved = |factor: &mut CoupledFactor, band: &BandMatrix<16>, by: f64| {
+        let inertia = factor.factor_shifted(band, &couplings, &shift, by).unwrap();
+        let mut x = b.clone();
+        factor.solve::<16>(&mut x);
+        (inertia, x)
+    };
+    let mut kept = CoupledFactor::default();
+    let first = solved(&mut kept, &band, 1.0);
+    for node in 0..12 {
+        let mut other = band.clone();
+        other.add(8 * node + 2, 8 * node + 3, 0.5);
+        let again = solved(&mut kept, &other, 1.0);
+        assert_eq!(again, solved(&mut CoupledFactor::default(), &other, 1.0), "node {node}");
+        assert_ne!(again.1, first.1, "node {node}");
+        // A factorisation that ends early leaves nothing behind that is taken for a factor.
+        let mut broken = band.clone();
+        broken.add(8 * node, 8 * node, f64::NAN);
+        assert!(kept.factor_shifted(&broken, &couplings, &shift, 1.0).is_err());
+        assert_eq!(first, solved(&mut kept, &band, 1.0), "node {node}");
+    }
+    assert_ne!(first.1, solved(&mut kept, &band, 2.0).1);
+}
+
+#[test]
 fn what_is_no_number_is_reported() {
     let (mut band, couplings) = random::<12>(6, 3);
     let mut shift = Shift::default();

@@ -29,6 +29,16 @@ pub struct Tally {
     /// Largest angle by which an element bends in any step, degrees ([`StepReport::largest_bend_rad`](super::StepReport::largest_bend_rad)).
     #[serde(default)]
     pub max_turn_deg: f64,
+    /// Largest push force of any step, N; 0 if the hand only pulled.
+    #[serde(default)]
+    pub max_push_force_n: f64,
+    /// Largest torque of any step, N·mm, in either direction.
+    #[serde(default)]
+    pub max_torque_nmm: f64,
+    /// Largest angle by which the tip's rotation differed from the hand's in any step, rad; with several instruments that of
+    /// the innermost.
+    #[serde(default)]
+    pub max_tip_lag_rad: f64,
     /// Whether the last step has left motion to the next ([`StepReport::behind`](super::StepReport::behind)).
     #[serde(default)]
     pub ends_under_way: bool,
@@ -54,6 +64,10 @@ impl Tally {
         most.sum_n = most.sum_n.max(force.sum_n);
         most.largest_n = most.largest_n.max(force.largest_n);
         most.tip_n = most.tip_n.max(force.tip_n);
+        self.max_push_force_n = self.max_push_force_n.max(report.push_force_n);
+        self.max_torque_nmm = self.max_torque_nmm.max(report.torque_nmm.abs());
+        let lag_rad = report.rotation_rad - report.tip_rotation_rad;
+        self.max_tip_lag_rad = self.max_tip_lag_rad.max(lag_rad.abs());
         self.max_turn_deg = self.max_turn_deg.max(report.largest_bend_rad.to_degrees());
     }
 

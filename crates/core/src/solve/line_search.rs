@@ -49,6 +49,15 @@ struct Merit {
     scale: f64,
 }
 
+/// A trial that is taken.
+#[derive(Debug, Clone, Copy)]
+struct Taken {
+    part: f64,
+    /// Changes of the energy and of the merit.
+    energy_change: f64,
+    change: f64,
+}
+
 /// A step for the line search.
 #[derive(Debug, Clone, Copy)]
 struct Stride {
@@ -106,7 +115,7 @@ impl<const C: usize> Newton<C> {
         for attempt in 0..self.tuning.trials {
             part = self.place_trial(problem, state, part);
             search.assembled = false;
-            let (energy_change, change);
+            let (mut energy_change, mut change);
             if below_rounding {
                 change = part * (1.0 - 0.5 * part) * merit.slope;
                 energy_change = change;
@@ -118,6 +127,11 @@ impl<const C: usize> Newton<C> {
                     continue;
                 }
             }
+            if part == 1.0 && shift > 0.0 && free && !below_rounding {
+                let first = Taken { part, energy_change, change };
+                let longer = self.lengthen(problem, state, (&merit, turn), first);
+                Taken { part, energy_change, change } = longer;
+            }
             self.steps.push(StepRecord {
                 energy_change,
                 merit_change: change,
@@ -126,13 +140,40 @@ impl<const C: usize> Newton<C> {
                 fraction: part,
                 shift,
             });
-            problem.external.visit_contacts(&mut |contacts| contacts.accept_forces(part));
+            // Targets are those of a full step.
+            problem.external.visit_contacts(&mut |contacts| contacts.accept_forces(part.min(1.0)));
             std::mem::swap(state, &mut self.trial);
             problem.supports.follow(state);
             return Ok(if part == 1.0 { whole_turn } else { f64::INFINITY });
         }
         problem.supports.multipliers = multipliers;
         Err(StopReason::NoDescent)
+    }
+
+    /// Lengthens a full step under a shift, if the merit falls on, and sets the trial to its end.
+    ///
+    /// A shift that makes the matrix positive definite also shortens the step along the directions of least curvature.
+    /// Where those are curved downwards by little, as on the way from a fold, full steps are many times too short.
+    fn lengthen(
+        &mut self,
+        problem: &mut Problem<'_>,
+        state: &RodState,
+        (merit, turn): (&Merit, f64),
+        taken: Taken,
+    ) -> Taken {
+        let NewtonTuning { lengthening: part, least_gain, largest_turn_rad, .. } = self.tuning;
+        if part <= 1.0 || part * turn > largest_turn_rad {
+            return taken;
+        }
+        std::mem::swap(&mut self.trial, &mut self.other);
+        if self.place_trial(problem, state, part) == part {
+            let change = self.energy(problem.elements, problem.external, state) - merit.energy;
+            if change < least_gain * taken.change {
+                return Taken { part, energy_change: change, change };
+            }
+        }
+        std::mem::swap(&mut self.trial, &mut self.other);
+        taken
     }
 
     /// Measures the step from the assembled state.

@@ -9,6 +9,10 @@ pub struct NewtonTuning {
 
     /// Largest number of trials of a line search.
     pub trials: usize,
+    /// A full step under a shift is also tried at this many times its length. At 1 it is not.
+    pub lengthening: f64,
+    /// The longer step is taken if the merit falls by this many times as much.
+    pub least_gain: f64,
     /// Armijo's constant: the fraction of the decrease predicted by the slope that a trial must reach. Far below 0 any
     /// trial is accepted.
     pub armijo: f64,
@@ -90,6 +94,8 @@ impl NewtonTuning {
     pub const DEFAULT: Self = Self {
         largest_turn_rad: 1.4,
         trials: 24,
+        lengthening: 2.0,
+        least_gain: 1.5,
         armijo: 1e-4,
         least_cut: 0.1,
         largest_cut: 0.6,

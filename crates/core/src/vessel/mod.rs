@@ -44,7 +44,7 @@ pub use hints::wall_hints;
 pub use lumen::{Lumen, Meshed};
 pub use mesh::SurfaceMesh;
 pub(crate) use mesh::inward_vertex_normals;
-pub use motion::{Displacement, MotionMode, VesselMotion};
+pub use motion::{Displacement, MotionMode, VesselMotion, Waveform};
 pub use opening::Opening;
 pub use path::{CentrelinePath, OnPath};
 pub use query::{Nearest, WallQuery};

@@ -1,7 +1,7 @@
 //! `endowire device`: device files as tables and pictures.
 
 mod picture;
-mod table;
+pub(super) mod table;
 
 use std::path::{Path, PathBuf};
 

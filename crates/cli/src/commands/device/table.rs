@@ -163,7 +163,7 @@ pub(super) fn range(values: [f64; 2], significant: i32) -> String {
 }
 
 /// A positive number with `significant` digits, and with all digits before the decimal point.
-fn digits(value: f64, significant: i32) -> String {
+pub(in crate::commands) fn digits(value: f64, significant: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
@@ -172,7 +172,7 @@ fn digits(value: f64, significant: i32) -> String {
 }
 
 /// Aligned columns; the last column has any width.
-pub(super) fn columns(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+pub(in crate::commands) fn columns(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let head: Vec<String> = head.iter().map(|text| (*text).to_owned()).collect();
     let lines: Vec<Vec<String>> = std::iter::once(head).chain(rows).collect();
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use endowire_core::device::Stack;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_report::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, Vessel, base64};
+use endowire_methods::Scene;
+use endowire_report::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, Vessel, base64, setup};
 use endowire_sweep::{EndedBy, UntilOutcome};
 use serde_json::Value;
 
@@ -16,10 +17,11 @@ use crate::output::recording::Recording;
 const MOST_FRAME_BYTES: usize = 2_000_000;
 const MOST_FRAMES: usize = 24;
 
-/// Gathers the data recorded in `folder`.
+/// Gathers the data recorded in `folder`, of a run in this scene.
 pub(super) fn collect(
     folder: &Path,
     recording: &Recording,
+    scene: &Scene,
     stack: &Stack,
     vessel: &SurfaceMesh,
 ) -> Result<Run, Failure> {
@@ -35,6 +37,8 @@ pub(super) fn collect(
         events: events(&rows, &summary),
         series: Series::of(&rows),
         frames: frames(folder),
+        setup: setup(scene, stack)?,
+        others: vec![],
         summary,
     })
 }
