@@ -148,7 +148,7 @@ fn every_command_of_the_guide_works() {
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
     // That nothing is run would also be no failure.
-    let all = "assess compare completions dataset device doctor experiment export fluoro man new play render report rod run subject sweep verify vessel";
+    let all = "assess bench compare completions dataset device doctor experiment export fluoro man new play render report rod run subject sweep verify vessel";
     assert_eq!(commands.into_iter().collect::<Vec<_>>().join(" "), all);
 }
 
