@@ -72,9 +72,8 @@ impl TorqueTest {
     /// Settings out of range, and a device that is too thick for the track. A step without an equilibrium ends the
     /// test, not with an error.
     pub fn run(&self, device: &Device, track: &Track, store: &dyn WallStore) -> Result<TorqueResponse> {
-        let reach_mm = track.reach_mm(device);
-        let mut simulation = track.simulation(&held_at(device, reach_mm)?, self.friction, store)?;
-        match advance(&mut simulation, reach_mm, ADVANCE_MM, |_| ()) {
+        let mut simulation = track.simulation(device, self.friction, store)?;
+        match advance(&mut simulation, track.reach_mm(device), ADVANCE_MM, |_| ()) {
             Ok(()) => self.turn(&mut simulation),
             Err(reason) => {
                 let inserted_mm = simulation.report().inserted_mm;
@@ -126,19 +125,6 @@ impl TorqueTest {
         let inserted_mm = simulation.report().inserted_mm;
         Ok(TorqueResponse { unconverged, ended, ..TorqueResponse::of(points, &whips, inserted_mm) })
     }
-}
-
-/// A device without what lies behind `length_mm` from its tip: the hand holds it there, and no tail twists between hand and
-/// track, so that devices of different lengths are compared over the same stretch.
-fn held_at(device: &Device, length_mm: f64) -> Result<Device> {
-    let mut left_mm = length_mm;
-    let mut sections = device.sections().to_vec();
-    sections.retain_mut(|section| {
-        section.length_mm = section.length_mm.min(left_mm);
-        left_mm -= section.length_mm;
-        section.length_mm > 0.0
-    });
-    Device::new(sections)
 }
 
 /// Angles of hand and tip.
