@@ -127,7 +127,8 @@ impl<const C: usize> Newton<C> {
                     continue;
                 }
             }
-            if part == 1.0 && shift > 0.0 && free && !below_rounding {
+            let presses = contacts.size_mj > 0.0;
+            if part == 1.0 && shift > 0.0 && free && presses && !below_rounding {
                 let first = Taken { part, energy_change, change };
                 let longer = self.lengthen(problem, state, (&merit, turn), first);
                 Taken { part, energy_change, change } = longer;
@@ -153,7 +154,9 @@ impl<const C: usize> Newton<C> {
     /// Lengthens a full step under a shift, if the merit falls on, and sets the trial to its end.
     ///
     /// A shift that makes the matrix positive definite also shortens the step along the directions of least curvature.
-    /// Where those are curved downwards by little, as on the way from a fold, full steps are many times too short.
+    /// Where those are curved downwards by little, as on the way from a fold along walls and loops, full steps are many
+    /// times too short. A rod that touches nothing is not held back so, and turns too far in longer steps: it may end in
+    /// a saddle.
     fn lengthen(
         &mut self,
         problem: &mut Problem<'_>,
