@@ -2,7 +2,7 @@
 
 use crate::exam::Standing;
 use crate::goal::{Goal, PackingGoal};
-use crate::score::{Scored, Verdict};
+use crate::score::{Band, Scored, Verdict};
 use crate::subject::{Limits, Threshold};
 
 impl Goal {
@@ -99,7 +99,12 @@ impl Verdict {
             Some(ended) => format!("{} after {:.2} s", ended.by.words(), ended.time_s),
             None => "the session ended before the goal was reached".to_owned(),
         };
-        format!("{how}, {:.0} of 100: {end}", self.score)
+        let fault = match self.band {
+            Band::Blind => "; instruments were moved unseen",
+            Band::Reckless => "; a grave fault",
+            _ => "",
+        };
+        format!("{how}, {:.0} of 100: {end}{fault}", self.score)
     }
 }
 
@@ -114,7 +119,7 @@ mod tests {
         let words = |name: &str, value: Option<f64>| {
             let metric = *metrics.iter().find(|metric| metric.name == name).unwrap();
             let metric = crate::Metric { value, ..metric };
-            Scored { metric, threshold: None, passed: None, unjudged: None }.value_words()
+            Scored { metric, threshold: None, passed: None, credit: None, unjudged: None }.value_words()
         };
         assert_eq!(words("reversals", Some(6.0)), "6");
         assert_eq!(words("path_ratio", Some(1.23456)), "1.235");

@@ -114,6 +114,7 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
         field_mm2: 40_000.0,
         primary_deg: 40.0,
         secondary_deg: 0.0,
+        ..BeamState::default()
     };
     // The first eight seconds are seen, or all and the time after.
     let off_s = if fault == Fault::Beam { end_s } else { 8.0 + unit(splitmix64(seed, 3)) };
