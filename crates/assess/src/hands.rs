@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::record::{REST_MM, Record, Sample};
+use crate::record::{REST_MM, Record};
 use crate::stretch::{Stretch, common, joined};
 use crate::total::total;
 
@@ -137,7 +137,7 @@ pub(crate) fn unseen_share(record: &Record) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{BeamMode, BeamState, Hand};
+    use crate::record::{BeamMode, BeamState, Hand, Sample};
 
     /// Samples of a tenth of a second with these advances, mm, and rotations, turns.
     fn record(moves: impl IntoIterator<Item = [f64; 2]>) -> Record {

@@ -46,7 +46,7 @@ function read() {
   element("task-limits").textContent = task.limits.join(", ") || "nothing";
   rows("task-counts", task.counts, (one) => [measure(one), cell(one.asked), cell(one.points)]);
   // A script begins where the scene does.
-  element("watch").hidden = hasBegun;
+  element("watch").hidden = hasBegun || task.exam;
   element("task-dialog").showModal();
 }
 

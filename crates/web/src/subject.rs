@@ -8,6 +8,8 @@ use serde::Serialize;
 pub(crate) struct Task<'a> {
     name: &'a str,
     level: u8,
+    /// Whether the 3D view is hidden and nothing can be undone or shown.
+    exam: bool,
     text: &'a str,
     /// The goal, in words.
     goal: String,
@@ -31,6 +33,7 @@ impl<'a> Task<'a> {
         Self {
             name: &subject.name,
             level: subject.level,
+            exam: subject.exam,
             text: subject.text.trim(),
             goal: subject.goal.words(),
             limits: subject.limits.words(),

@@ -163,7 +163,7 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
 #[test]
 fn limits_end_it_when_they_are_passed() {
     // The tip rests at 50 mm until 40 s.
-    let mut slow = pushed(|_| 0.5);
+    let mut slow = unseen(|_| 0.5);
     slow.samples.truncate(5);
     slow.samples.push(Sample { time_s: 40.0, hands: vec![Hand::default()], ..slow.samples[4].clone() });
     assert_eq!(end(&score(&slow)), Some((EndedBy::Time, 30.0)));
@@ -273,7 +273,7 @@ fn no_subject_can_do_without_the_beam() {
 fn contrast_medium_counts_where_the_tip_is_at_its_target() {
     let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
     let ml = |time_s, volume_ml| injection(time_s, volume_ml, 97.0);
-    let mut record = pushed(|_| 0.5);
+    let mut record = unseen(|_| 0.5);
     record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
     // The goal is reached once all of it has flowed, 4 ml at 5 ml/s.
     for (injections, expected) in [
@@ -290,7 +290,7 @@ fn contrast_medium_counts_where_the_tip_is_at_its_target() {
 #[test]
 fn contrast_medium_counts_where_it_leaves_and_not_where_the_foremost_tip_is() {
     let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
-    let mut record = pushed(|_| 0.5);
+    let mut record = unseen(|_| 0.5);
     record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
     let scored = |record: &Record| {
         let mut followed = exam(asked.clone());

@@ -173,7 +173,7 @@ fn every_measure_tells_the_trainees_apart_that_it_should_and_no_others() {
         (
             Fault::Delay,
             &["total_s", "idle_s", "submovements", "time_in_trunk_s"],
-            &["spectral_arc_length", "submovement_s"],
+            &["submovement_s"],
             &["tip_path_mm", "reversals", "contrast_ml", "wall_force_n", "wrong_branches", "beam_on_s"],
         ),
         (

@@ -67,7 +67,9 @@ fn task_lines(task: &Subject) -> Vec<Line> {
     let row = |threshold: &Threshold| (TEXT, format!("  {}: {}", threshold.metric, threshold.words()));
     let head = (CHOSEN, format!("{} (level {})", task.name, task.level));
     let text = (TEXT, task.text.clone());
-    [head, text].into_iter().chain(task.threshold.iter().map(row)).collect()
+    let exam = (WARN, "An exam: the 3D view is hidden, and nothing can be undone.".to_owned());
+    let exam = task.exam.then_some(exam);
+    [head, text].into_iter().chain(exam).chain(task.threshold.iter().map(row)).collect()
 }
 
 fn standing_lines(standing: &Standing) -> Vec<Line> {
