@@ -167,7 +167,9 @@ impl Lab {
             field_mm2: self.open_mm2(),
             primary_deg,
             secondary_deg,
-            entrance_ngy: self.last_delivered.map(|frame| self.frame_ngy() * frame.entrance_ngy / frame.frame_ngy),
+            entrance_ngy: self
+                .last_delivered
+                .map(|frame| self.frame_ngy() * frame.entrance_ngy / frame.frame_ngy),
             entrance_mm2: Some(self.open_mm2() * self.nearer()),
             mode: Some(match self.fluoro.xray.mode {
                 Mode::Fluoro => BeamMode::Fluoro,

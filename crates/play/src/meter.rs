@@ -30,20 +30,21 @@ pub(crate) struct Delivered {
 pub(crate) struct Meter {
     /// The beam of each plane; made when the beam is first on.
     planes: Vec<Renderer>,
-    /// Revision of the room that they were made for.
-    revision: Option<u64>,
+    /// Revision of the room that they were made for, and what they found.
+    measured: Option<(u64, Option<Delivered>)>,
 }
 
 impl Meter {
-    /// The exposure in a room that was not measured yet; `None` if it was.
+    /// The exposure in a room, measured once for each; `None` if that has failed.
     ///
     /// # Errors
     /// As [`Renderer::of_wall`]. The room counts as measured.
     pub(crate) fn measure(&mut self, lab: &Lab, wall: &Wall) -> Result<Option<Delivered>> {
         let revision = lab.revisions()[0];
-        if self.revision.replace(revision) == Some(revision) {
-            return Ok(None);
+        if let Some((_, delivered)) = self.measured.filter(|(known, _)| *known == revision) {
+            return Ok(delivered);
         }
+        self.measured = Some((revision, None));
         let specs = lab.fluoro().planes();
         self.planes.truncate(specs.len());
         let mut each: Vec<Exposure> = Vec::with_capacity(specs.len());
@@ -63,6 +64,7 @@ impl Meter {
             kvp: first.kvp,
             current_ma: first.pulse.map(|pulse| pulse.current_ma),
         });
+        self.measured = Some((revision, delivered));
         Ok(delivered)
     }
 

@@ -17,8 +17,8 @@ use crate::input::Input;
 use crate::lab::Lab;
 use crate::lumens::lumens;
 use crate::meter::Meter;
-use crate::replay::Inputs;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
+use crate::replay::Inputs;
 use crate::telemetry::Telemetry;
 
 /// Largest number of events that are kept.
@@ -116,6 +116,11 @@ impl Session {
             endowire_core::error::in_range(name, limit, 1e6)?;
         }
         let lab = Lab::new(view, side_px, simulation.lumen().wall(&NoStore)?.mesh())?;
+        let mut meter = Meter::default();
+        if lab.fluoro().patient.ct.is_some() {
+            // A tomogram takes seconds to read: hands do not wait for it at the first step on the pedal.
+            meter.measure(&lab, simulation.lumen().wall(&NoStore)?)?;
+        }
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];
         let (history, telemetry) = (History::new(&simulation), Telemetry::new(&simulation));
         Ok(Self {
@@ -136,7 +141,7 @@ impl Session {
             telemetry,
             sac: None,
             exam: None,
-            meter: Meter::default(),
+            meter,
             inputs: Vec::new(),
         })
     }

@@ -95,8 +95,7 @@ impl Place {
             before_s = sample.time_s;
             let hands = sample.hands.iter().enumerate();
             let moved = hands.map(|(index, hand)| (index, hand.advance_mm, hand.rotate_rad.to_degrees()));
-            let moved: Vec<_> =
-                moved.filter(|(_, mm, deg)| mm.abs() > REST || deg.abs() > REST).collect();
+            let moved: Vec<_> = moved.filter(|(_, mm, deg)| mm.abs() > REST || deg.abs() > REST).collect();
             if moved.is_empty() {
                 continue;
             }

@@ -122,7 +122,12 @@ fn reverse(plan: Vec<Act>) -> Vec<Act> {
 
 fn back_and_forth(piece: Vec<(usize, f64, f64)>, part: f64) -> Vec<Act> {
     let of = |by: f64| {
-        Act::Move(piece.iter().map(|(instrument, mm, deg)| (*instrument, mm * by, deg * by.abs() / (1.0 + 2.0 * part))).collect())
+        Act::Move(
+            piece
+                .iter()
+                .map(|(instrument, mm, deg)| (*instrument, mm * by, deg * by.abs() / (1.0 + 2.0 * part)))
+                .collect(),
+        )
     };
     vec![of(1.0 + part), of(-part)]
 }
@@ -220,9 +225,9 @@ impl Hands<'_> {
     }
 
     fn go(&mut self, moves: &[(usize, f64, f64)]) {
-        let takes = moves.iter().map(|(_, mm, deg)| {
-            (mm.abs() / self.kind.mm_per_s).max(deg.abs() / self.kind.deg_per_s)
-        });
+        let takes = moves
+            .iter()
+            .map(|(_, mm, deg)| (mm.abs() / self.kind.mm_per_s).max(deg.abs() / self.kind.deg_per_s));
         let ticks = (takes.fold(0.0, f64::max) * TICKS_PER_S).round().max(1.0);
         if self.kind.beam == Beam::WithMotion {
             self.pedal(true, Mode::Fluoro);

@@ -47,6 +47,11 @@ impl Session {
         self.happened(EventKind::Ended, text);
     }
 
+    /// Whether the task of a subject is still being read: nothing was done yet. A clock stands meanwhile.
+    pub fn waits_for_hands(&self) -> bool {
+        self.exam.is_some() && self.ticks == 0 && self.inputs.is_empty()
+    }
+
     /// Progress of the subject, if there is one.
     pub fn standing(&self) -> Option<Standing> {
         self.exam.as_ref().map(|exam| exam.standing(self.telemetry.record()))

@@ -101,6 +101,21 @@ mod tests {
     }
 
     #[test]
+    fn the_whole_head_is_inside_its_skin() {
+        let trunk =
+            Trunk::new(&TorsoSpec::default(), Vec3::new(-40.0, -50.0, 0.0), Vec3::new(40.0, 30.0, 300.0));
+        let mut head = SurfaceMesh { vertices_mm: vec![], triangles: vec![] };
+        trunk.head(&mut head, 0.0);
+        let outside: Vec<&Vec3> = head.vertices_mm.iter().filter(|place| !trunk.has_in_head(place)).collect();
+        assert!(
+            head.vertices_mm.len() > 1000 && outside.is_empty(),
+            "{} {:?}",
+            outside.len(),
+            outside.first()
+        );
+    }
+
+    #[test]
     fn what_is_not_wanted_is_not_there() {
         let spec = TorsoSpec { spine: false, ribs: false, lungs: false, ..TorsoSpec::default() };
         let body = Body::new(&spec, (Vec3::zeros(), Vec3::repeat(100.0)));

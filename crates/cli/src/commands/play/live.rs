@@ -210,7 +210,9 @@ pub(crate) fn physics(
             }
         }
         let (before, clock) = (session.steps(), Instant::now());
-        session.tick();
+        if !session.waits_for_hands() {
+            session.tick();
+        }
         let step_ms = ms(clock.elapsed());
         if session.steps() != before {
             steps_ms.push(step_ms);

@@ -42,9 +42,7 @@ pub(crate) fn run(
                     Err(refused) => Err(refused),
                     Ok(Line::Input(input)) => session.apply(&input).map_err(|e| e.to_string()),
                     Ok(Line::Order(Order::Read {} | Order::Quit {})) => Ok(()),
-                    Ok(Line::Order(Order::Wait { ticks })) => {
-                        wait(ticks, &mut session, record, interrupted)?
-                    }
+                    Ok(Line::Order(Order::Wait { ticks })) => wait(ticks, &mut session, record, interrupted)?,
                     Ok(Line::Order(Order::Picture { file, window })) => {
                         picture(&file, window, &session, &mut pictures)
                     }
