@@ -7,6 +7,7 @@ use crate::injection::flowed_ml;
 use crate::metric::{Better, Group, Metric};
 use crate::record::{BeamMode, Record};
 use crate::smoothness::{PAUSE_S, smoothness_of_movements, speeds, submovements};
+use crate::titles::title;
 use crate::total::total;
 use crate::way::Way;
 
@@ -30,7 +31,7 @@ fn lower(
     definition: &'static str,
     study: &'static str,
 ) -> Metric {
-    Metric { name, group, value, unit, better: Better::Lower, definition, study }
+    Metric { name, title: title(name), group, value, unit, better: Better::Lower, definition, study }
 }
 
 fn higher(metric: Metric) -> Metric {

@@ -118,7 +118,9 @@ pub(crate) fn moving_in_acquisition_s(record: &Record) -> Option<f64> {
             acquired.push((state.time_s, end_s));
         }
     }
-    Some(total(common(&moving(record, 0.0), &joined(acquired, 0.0)).iter().map(|(from_s, to_s)| to_s - from_s)))
+    Some(total(
+        common(&moving(record, 0.0), &joined(acquired, 0.0)).iter().map(|(from_s, to_s)| to_s - from_s),
+    ))
 }
 
 /// Share of the time in which a hand moves and nobody can see what it does: the beam is off, or the tip that moves is
@@ -183,7 +185,9 @@ mod tests {
             let mut moved = record([[8.0, 0.0]; 3]);
             if rest {
                 moved.samples.iter_mut().for_each(|sample| sample.time_s += 2.0);
-                moved.samples.insert(0, Sample { time_s: 2.0, hands: vec![Hand::default()], ..Sample::default() });
+                moved
+                    .samples
+                    .insert(0, Sample { time_s: 2.0, hands: vec![Hand::default()], ..Sample::default() });
             }
             push_speed_mm_per_s(&moved).unwrap()
         };
@@ -196,7 +200,12 @@ mod tests {
     #[test]
     fn hands_that_move_in_cine_are_timed() {
         let mut moved = record([[1.0, 0.0], [1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]);
-        let on = |time_s: f64, mode: Option<BeamMode>| BeamState { time_s, on: true, mode, ..BeamState::default() };
+        let on = |time_s: f64, mode: Option<BeamMode>| BeamState {
+            time_s,
+            on: true,
+            mode,
+            ..BeamState::default()
+        };
         moved.beam = Some(vec![on(0.0, Some(BeamMode::Fluoro)), on(0.1, Some(BeamMode::Cine))]);
         assert!((moving_in_acquisition_s(&moved).unwrap() - 0.2).abs() < 1e-9);
         moved.beam = Some(vec![on(0.0, None)]);

@@ -41,6 +41,7 @@ mod spectrum;
 mod stretch;
 mod subject;
 mod timeline;
+mod titles;
 mod total;
 mod unjudged;
 mod way;

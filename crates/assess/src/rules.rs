@@ -19,8 +19,10 @@ const MOST_MM_PER_S: f64 = 35.0;
 /// Speed up to which the whole credit is given, in parts of the largest.
 const CALM: f64 = 0.75;
 
-const OF_BEAM: &str = "rule: instruments are moved under fluoroscopy (SIR and ESC curricula); a tenth allows for the foot";
-const OF_COHORT: &str = "simulated cohort: the reference hands stay far below it, each kind that wastes it is above";
+const OF_BEAM: &str =
+    "rule: instruments are moved under fluoroscopy (SIR and ESC curricula); a tenth allows for the foot";
+const OF_COHORT: &str =
+    "simulated cohort: the reference hands stay far below it, each kind that wastes it is above";
 const OF_SPEED: &str = "a choice: 0.4 s go by until an eye and a hand have reacted to a picture; the tip then goes less than twice the width of the vessels for which the device is made";
 
 /// A threshold of a measure of which less is better.
@@ -43,10 +45,7 @@ pub(crate) fn common(radius_mm: Option<f64>, exam: bool) -> Vec<Threshold> {
     let fastest = if small { MOST_SMALL_MM_PER_S } else { MOST_MM_PER_S };
     vec![
         Threshold { grave: true, ..most(BLIND, [0.25 * unseen, unseen], 2.0, OF_BEAM) },
-        Threshold {
-            grave: true,
-            ..most("push_speed_mm_per_s", [CALM * fastest, fastest], 1.0, OF_SPEED)
-        },
+        Threshold { grave: true, ..most("push_speed_mm_per_s", [CALM * fastest, fastest], 1.0, OF_SPEED) },
         most("reversals", [4.0, 12.0], 1.0, OF_COHORT),
         most("needless_turns", [0.5, 1.0], 1.0, OF_COHORT),
         most("beam_on_idle_s", [5.0, 25.0], 1.0, OF_COHORT),

@@ -142,7 +142,15 @@ impl Score {
             .iter()
             .filter_map(|one| Some(Unjudged { what: one.metric.name.to_owned(), why: one.unjudged? }));
         let unjudged = not_measured.chain(limits(&subject.limits, record)).collect();
-        Self { schema: SCHEMA, subject: subject.stem(), exam: subject.exam, verdict, limits: subject.limits, unjudged, metrics }
+        Self {
+            schema: SCHEMA,
+            subject: subject.stem(),
+            exam: subject.exam,
+            verdict,
+            limits: subject.limits,
+            unjudged,
+            metrics,
+        }
     }
 
     /// What cannot be judged, grouped by reason, one sentence each.

@@ -196,13 +196,16 @@ impl Threshold {
             return Err(Error::parameter(format!("{key}.grave"), true, remedy));
         }
         if let Some((good, limit)) = self.good.zip(limit) {
-            let holds = good.is_finite() && self.holds(good) && (metric.better == Better::Higher || good >= 0.0);
+            let holds =
+                good.is_finite() && self.holds(good) && (metric.better == Better::Higher || good >= 0.0);
             if !holds {
-                let remedy = format!("the whole credit is given up to there: give what meets {right} = {limit}");
+                let remedy =
+                    format!("the whole credit is given up to there: give what meets {right} = {limit}");
                 return Err(Error::parameter(format!("{key}.good"), good, remedy));
             }
         }
-        let blind = self.metric == BLIND && (limit.is_some_and(|limit| limit > MOST_UNSEEN) || self.points == 0.0);
+        let blind =
+            self.metric == BLIND && (limit.is_some_and(|limit| limit > MOST_UNSEEN) || self.points == 0.0);
         if blind {
             let remedy = format!(
                 "instruments are moved under fluoroscopy in every subject: ask for at most {MOST_UNSEEN}, with points, or leave the threshold out"

@@ -1,7 +1,11 @@
 //! Subjects and scores in words, for display.
 
+use std::sync::OnceLock;
+
 use crate::exam::Standing;
 use crate::goal::{Goal, PackingGoal};
+use crate::metric::Metric;
+use crate::record::Record;
 use crate::score::{Band, Scored, Verdict};
 use crate::subject::{Limits, Threshold};
 
@@ -61,11 +65,28 @@ impl Limits {
     }
 }
 
+/// All measures, without values.
+fn measures() -> &'static [Metric] {
+    static ALL: OnceLock<Vec<Metric>> = OnceLock::new();
+    ALL.get_or_init(|| crate::assess(&Record::default(), None))
+}
+
 impl Threshold {
-    /// The threshold in words.
+    /// The measure in words; its name if there is none of this name.
+    pub fn title(&self) -> &str {
+        self.measure().map_or(&self.metric, |metric| metric.title)
+    }
+
+    /// The threshold in words, with its unit.
     pub fn words(&self) -> String {
-        let most = self.at_most.map(|most| format!("at most {most}"));
-        most.or_else(|| self.at_least.map(|least| format!("at least {least}"))).unwrap_or_default()
+        let unit = self.measure().map(|metric| metric.unit).filter(|unit| *unit != "1");
+        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
+        let most = self.at_most.map(|most| format!("at most {most}{unit}"));
+        most.or_else(|| self.at_least.map(|least| format!("at least {least}{unit}"))).unwrap_or_default()
+    }
+
+    fn measure(&self) -> Option<&'static Metric> {
+        measures().iter().find(|metric| metric.name == self.metric)
     }
 }
 
@@ -111,7 +132,6 @@ impl Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Record;
 
     #[test]
     fn numbers_are_whole_where_they_count_and_have_their_units() {

@@ -14,8 +14,8 @@ let watched = false, hasBegun = false, scored = false;
 const cell = (text) => Object.assign(document.createElement("td"), { textContent: text });
 
 /** A measure by its name, with what it is. */
-function measure({ name, definition }) {
-  const told = cell(name);
+function measure({ title, definition }) {
+  const told = cell(title);
   told.append(Object.assign(document.createElement("small"), { textContent: definition }));
   return told;
 }

@@ -57,7 +57,8 @@ impl ThreeD {
     /// The next frame. From a graphics processor, it is the one requested earlier, once it has arrived.
     pub(crate) fn next(&mut self, snapshot: &Snapshot, pictures: &mut Pictures) -> Result<Option<Image>> {
         let hidden = snapshot.hides_three_d();
-        let seen = Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1], hidden));
+        let seen =
+            Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1], hidden));
         if let Some(on) = self.graphics.as_mut().filter(|_| !hidden) {
             match on.next(snapshot, pictures, self.seen != seen) {
                 Ok((image, asked)) => {

@@ -140,7 +140,10 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
         ["beam_on_s", "beam_on_idle_s", "moving_in_acquisition_s", "unseen_share", "limits.beam_s"]
     );
     let [words] = unseen.unjudged_words().try_into().unwrap();
-    assert!(words.starts_with("not judged: beam_on_s, ") && words.contains("no beam was recorded"), "{words}");
+    assert!(
+        words.starts_with("not judged: beam_on_s, ") && words.contains("no beam was recorded"),
+        "{words}"
+    );
     assert!(exam(of_beam).score(&pushed(|_| 0.5)).unjudged.is_empty());
     // Where nothing was done, that is the reason, and not that instruments or a sac are missing.
     let of_two =
@@ -252,7 +255,9 @@ fn credit_falls_from_the_good_value_to_half_at_the_threshold() {
 
 #[test]
 fn no_subject_can_do_without_the_beam() {
-    for (asked, refused) in [("at_most = 0.5", true), ("at_most = 0.1\npoints = 0", true), ("at_most = 0.05", false)] {
+    for (asked, refused) in
+        [("at_most = 0.5", true), ("at_most = 0.1\npoints = 0", true), ("at_most = 0.05", false)]
+    {
         let more = format!("[[threshold]]\nmetric = \"unseen_share\"\n{asked}");
         let text = format!("{FILE}\n{more}");
         let read = Subject::from_toml(&text, Path::new("subjects/end.toml"));
