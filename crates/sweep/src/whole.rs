@@ -1,8 +1,8 @@
 //! The writer of files. A file is written under a temporary name of its own and then renamed, so that it is complete or
 //! absent, whoever else writes it at the same time.
 //!
-//! Only regular files are replaced. A device or a pipe, such as `/dev/null` or `/dev/stdout`, is written to, as by any
-//! other program. Temporary files are new and locked while they are written: no link is followed, and what a killed
+//! Only regular files are replaced. A device of characters, such as `/dev/null`, is written to, as by any other program;
+//! pipes, disks and sockets are refused: a pipe that nobody reads would be waited for without end. Temporary files are new and locked while they are written: no link is followed, and what a killed
 //! program leaves can be told from what another is writing.
 
 use std::ffi::{OsStr, OsString};
@@ -96,17 +96,17 @@ fn sync_folder(folder: &Path) {
     let _ = folder;
 }
 
-/// Writes to what is no regular file: a device takes what it is given, and is never replaced.
+/// Writes to a device, which takes what it is given, and is never replaced.
 fn write_through(
     path: &Path,
     kind: FileType,
     write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>,
 ) -> io::Result<()> {
     if !takes_bytes(kind) {
-        let what = if kind.is_dir() { "is a folder" } else { "is neither a file nor a pipe" };
+        let what = if kind.is_dir() { "is a folder" } else { "is no regular file" };
         return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("{what}: give the name of a file")));
     }
-    // Writers may go back in their file, which no pipe can.
+    // Writers may go back in their file, which no device can.
     let mut whole = NamedTempFile::new()?;
     write(&mut whole)?;
     let mut whole = File::open(whole.path())?;
@@ -115,11 +115,11 @@ fn write_through(
     place.flush()
 }
 
-/// Whether it is a pipe or a device of characters, such as a terminal or /dev/null.
+/// Whether it is a device of characters, such as a terminal or /dev/null.
 #[cfg(unix)]
 fn takes_bytes(kind: FileType) -> bool {
     use std::os::unix::fs::FileTypeExt as _;
-    kind.is_fifo() || kind.is_char_device()
+    kind.is_char_device()
 }
 
 #[cfg(not(unix))]

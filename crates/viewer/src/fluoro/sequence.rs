@@ -22,6 +22,11 @@ const DSA_SHARES: Window = [-0.15, 1.05];
 const DSA_OUTLIERS: f64 = 0.02;
 /// Smaller opacities do not count as contrast medium.
 const LEAST_OPACITY: f32 = 0.02;
+/// Part of the window, at its dark end, in which medium keeps its shades that is denser than black: beyond the densest
+/// part of the anatomy, so that nothing else is compressed.
+const SHOULDER: f32 = 0.3;
+/// How far beyond the densest medium it ends, so that its darkest part is not black.
+const BEYOND: f32 = 0.1;
 /// Strongest opacification assumed for a window if nothing is injected.
 const FAINTEST: f32 = 0.3;
 /// Roadmap values shown white and black, around a grey background, and the value of the strongest vessel.
@@ -45,6 +50,8 @@ pub(crate) struct Sequence {
     /// Absorbed energy of a pixel at unit signal, keV.
     kev: f64,
     window: Window,
+    /// Values from which on darker ones are compressed, and the densest that is still told from black.
+    shoulder: Option<[f32; 2]>,
     /// Pixels that are always black: those behind blades, with scatter and noise alone.
     shutter: Vec<u32>,
     bits: u32,
@@ -82,6 +89,7 @@ impl Sequence {
             let values = logarithm(fluoroscope.still.signal.signal.clone());
             shading(&values, &shown, c_arm).iter().map(|v| share * v).collect()
         });
+        let mut shoulder = None;
         let window = match (mode, spec.xray.window) {
             // Line integrals refer to the open beam, signals to the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
@@ -91,7 +99,10 @@ impl Sequence {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
                 let [white, black] = fitted(&values, &shown, c_arm.size_px());
-                [white, black.max(densest(fluoroscope, mask.as_deref()))]
+                // What shows the anatomy has the same greys whether or not medium will come.
+                let densest = densest(fluoroscope, mask.as_deref());
+                shoulder = (densest > black).then_some([black - SHOULDER, densest + BEYOND]);
+                [white, black]
             }
             (_, Some(window)) => window.map(|p| p as f32),
             (Mode::Dsa, None) => {
@@ -114,6 +125,7 @@ impl Sequence {
             mode,
             kev,
             window,
+            shoulder,
             shutter,
             bits: spec.bits,
             noisy: spec.detector.noise,
@@ -179,6 +191,10 @@ impl Sequence {
     }
 
     fn shown(&self, mut values: Vec<f32>, fluoroscope: &Fluoroscope) -> Image {
+        if let Some([from, densest]) = self.shoulder {
+            let share = (self.window[1] - from) / (densest - from);
+            values.iter_mut().filter(|v| **v > from).for_each(|v| *v = from + share * (*v - from));
+        }
         self.shutter.iter().for_each(|&pixel| values[pixel as usize] = f32::INFINITY);
         picture(&values, self.window, fluoroscope.c_arm.size_px(), self.bits, !self.noisy)
     }
@@ -230,8 +246,7 @@ fn is_open(fluoroscope: &Fluoroscope, pixel: usize) -> bool {
     fluoroscope.c_arm.openness(pixel) >= 1.0
 }
 
-/// Densest displayed value where contrast medium ever comes, without the darkest few pixels; a vessel full of it
-/// keeps its shades.
+/// Densest displayed value where contrast medium ever comes, without the darkest few pixels.
 fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
     let Some([still, full]) = opacified(fluoroscope) else { return f32::MIN };
     let filled = (0..full.len()).filter(|&i| is_open(fluoroscope, i) && full[i] - still[i] > LEAST_OPACITY);
