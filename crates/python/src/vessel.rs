@@ -393,7 +393,7 @@ impl Vessel {
         lumen: UnpickledLumen<'_>,
         centreline: Option<Numbers<'_>>,
         inlet: Option<usize>,
-        targets: Vec<(String, usize)>,
+        targets: List<(String, usize)>,
     ) -> PyResult<Self> {
         let lumen = match lumen {
             UnpickledLumen::Wall(wall) => postcard::from_bytes::<Wall>(&wall)
@@ -408,7 +408,7 @@ impl Vessel {
                 SweptVessel::new(tree, resolution).map_err(exception)?.into()
             }
         };
-        let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
+        let targets: Vec<Target> = targets.0.into_iter().map(|(name, row)| Target { name, row }).collect();
         let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
         let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?;
         let line = tree.map(|tree| Line { tree, inlet });

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::vessel::VesselMotion;
-use endowire_viewer::{FrameTime, Seen};
+use endowire_viewer::{FrameTime, Moment, Seen};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -94,13 +94,19 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let displacement = motion.as_ref().map(|motion| motion.at(ended_s(step)));
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
-            moment: moment(k),
-            shape: &shape,
-            inserted_mm: &inserted_mm,
-            coils: &coils::after(&left, step),
-            contacts: &contacts,
-            displacement: displacement.as_ref(),
-            before: before.map(|(inserted_mm, shape, time_s)| Seen { shape, inserted_mm, time_s: *time_s }),
+            moment: Moment {
+                frame: moment(k),
+                shape: &shape,
+                inserted_mm: &inserted_mm,
+                coils: &coils::after(&left, step),
+                contacts: &contacts,
+                displacement: displacement.as_ref(),
+                before: before.map(|(inserted_mm, shape, time_s)| Seen {
+                    shape,
+                    inserted_mm,
+                    time_s: *time_s,
+                }),
+            },
         })?;
         bar.inc(1);
     }
