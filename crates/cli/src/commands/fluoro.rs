@@ -54,7 +54,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
     let injections = now.injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
-    scenes::tell_found_centreline(&args.scene, &scene);
+    scenes::tell_found(&args.scene, &scene);
     for k in 0..frames {
         let since_s = k as f64 / frames_per_s;
         let time_s = args.time + since_s;

@@ -60,7 +60,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
-    scenes::tell_found_centreline(&path, &scene);
+    scenes::tell_found(&path, &scene);
     let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;

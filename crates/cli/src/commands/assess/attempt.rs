@@ -124,7 +124,7 @@ pub(super) fn measured(
     let Place { path, scene, .. } = &places.all[place];
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let tree = scene.centreline(&places.cache).map_err(in_scene)?;
-    scenes::tell_found_centreline(path, scene);
+    scenes::tell_found(path, scene);
     let target = args.target.clone().or_else(|| target(scene));
     let way = Way::of_record(&record, tree, target.as_deref(), args.within_mm).map_err(in_scene)?;
     let metrics = endowire_assess::assess(&record, way.as_ref());

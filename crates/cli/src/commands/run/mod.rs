@@ -51,7 +51,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation), &cache)?;
     frames.check_angiogram(Some(&script)).map_err(in_scene)?;
     if !args.quiet {
-        scenes::tell_found_centreline(&args.scene, &scene);
+        scenes::tell_found(&args.scene, &scene);
     }
     if let Some(held) = frames.held().filter(|_| !args.quiet) {
         tell(format_args!("{}: {held}", args.scene.display()));
