@@ -244,6 +244,8 @@ pub(crate) fn beam(beam: &[BeamState]) -> Result<()> {
                 ("field_mm2", state.field_mm2, Must::NotBeBelowZero),
                 ("primary_deg", state.primary_deg, Must::BeNumber),
                 ("secondary_deg", state.secondary_deg, Must::BeNumber),
+                ("entrance_ngy", state.entrance_ngy.unwrap_or(0.0), Must::NotBeBelowZero),
+                ("entrance_mm2", state.entrance_mm2.unwrap_or(0.0), Must::NotBeBelowZero),
             ],
         )?;
     }

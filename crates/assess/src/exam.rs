@@ -112,6 +112,7 @@ impl Exam {
     pub fn new(subject: Subject, site: &Site<'_>) -> Result<Self> {
         let reach = Reach::new(&subject.goal, site).and_then(|reach| subject.check_at(site).map(|()| reach));
         let reach = reach.map_err(|error| Error::content(subject.path(), error.to_string()))?;
+        let subject = subject.with_common(site.radius_mm);
         Ok(Self { subject: Arc::new(subject), reach, seen: 0, wall_force_n: 0.0, score: None })
     }
 

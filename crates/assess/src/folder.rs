@@ -9,6 +9,7 @@ use serde::Deserialize;
 use crate::check;
 use crate::injection::{Injection, Outlet};
 use crate::record::{BEAM, BeamState, Hand, Packed, Record, Sample};
+use crate::score::SCHEMA;
 use crate::session::SessionFile;
 
 /// Tables of a folder, and its summary.
@@ -68,7 +69,8 @@ pub(crate) fn read_in_scene(folder: &Path) -> Result<SessionFile> {
             "says which scene the run is of, and is missing or names none; give the folder of a recorded run";
         return Err(Error::content(&folder.join(SUMMARY), remedy));
     };
-    Ok(SessionFile { scene_file, set, recorded_unix_s: None, record: read(folder)? })
+    let record = read(folder)?;
+    Ok(SessionFile { schema: SCHEMA, scene_file, set, recorded_unix_s: None, inputs: None, record })
 }
 
 /// Name of a step in messages.
@@ -239,6 +241,7 @@ impl Step {
             jumped: self.jumped,
             packing: None,
             undone: false,
+            out_of_picture: false,
         }
     }
 }

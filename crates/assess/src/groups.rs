@@ -1,9 +1,13 @@
 //! The measures, group by group. All values come from the record: nothing is simulated again.
 
+use crate::hands::{
+    moving, moving_in_acquisition_s, needless_turns, push_speed_mm_per_s, reversals, unseen_share,
+};
 use crate::injection::flowed_ml;
 use crate::metric::{Better, Group, Metric};
-use crate::record::{REST_MM, Record};
-use crate::smoothness::{spectral_arc_length, speeds, submovements};
+use crate::record::{BeamMode, Record};
+use crate::smoothness::{PAUSE_S, smoothness_of_movements, speeds, submovements};
+use crate::titles::title;
 use crate::total::total;
 use crate::way::Way;
 
@@ -11,8 +15,6 @@ use crate::way::Way;
 const MOST_OF_TIME: f64 = 0.95;
 /// Shortest path, mm, with which a path length is compared.
 const SHORTEST_MM: f64 = 1.0;
-/// Shortest time, s, over which the speed of a hand is a mean: a single tick of a wheel is no pace.
-const PACE_S: f64 = 0.5;
 
 const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
 const RAFII: &str = "Rafii-Tari et al. 2017: motion and forces of hands and catheters";
@@ -29,7 +31,7 @@ fn lower(
     definition: &'static str,
     study: &'static str,
 ) -> Metric {
-    Metric { name, group, value, unit, better: Better::Lower, definition, study }
+    Metric { name, title: title(name), group, value, unit, better: Better::Lower, definition, study }
 }
 
 fn higher(metric: Metric) -> Metric {
@@ -87,6 +89,20 @@ fn radiation(record: &Record) -> Vec<Metric> {
         let on = record.beam_stretches()?.filter(|(state, _)| state.on);
         Some(total(on.map(|(state, end_s)| each(state) * (end_s - state.time_s))))
     };
+    // Known only where it was recorded all the while.
+    let known = |is: fn(&crate::BeamState) -> bool| {
+        record.beam.as_ref().is_some_and(|beam| beam.iter().filter(|state| state.on).all(is))
+    };
+    let entrance = sum(|state| state.frames_per_s * state.entrance_ngy.unwrap_or(0.0) * 1e-3)
+        .filter(|_| known(|state| state.entrance_ngy.is_some()));
+    let entrance_area = sum(|state| {
+        let each_ugy = state.entrance_ngy.unwrap_or(0.0) * 1e-3;
+        state.frames_per_s * each_ugy * state.entrance_mm2.unwrap_or(0.0) * 1e-2
+    });
+    let entrance_area =
+        entrance_area.filter(|_| known(|state| state.entrance_ngy.and(state.entrance_mm2).is_some()));
+    let acquired = sum(|state| f64::from(u8::from(state.mode.is_some_and(BeamMode::acquires))))
+        .filter(|_| known(|state| state.mode.is_some()));
     let frames = sum(|state| state.frames_per_s);
     let kerma = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3);
     // 1 µGy·mm² is 10⁻² µGy·cm².
@@ -107,6 +123,25 @@ fn radiation(record: &Record) -> Vec<Metric> {
             "µGy·cm²",
             kerma_area,
             "air kerma at the detector times the open area, summed over frames",
+        ),
+        of(
+            "entrance_ugy",
+            "µGy",
+            entrance,
+            "air kerma at the patient entrance reference point, 150 mm before the isocentre, summed over frames",
+        ),
+        of(
+            "entrance_area_ugycm2",
+            "µGy·cm²",
+            entrance_area,
+            "the same times the open area there: the kerma–area product",
+        ),
+        of("acquisition_s", "s", acquired, "time with the beam on in cine or subtraction"),
+        of(
+            "moving_in_acquisition_s",
+            "s",
+            moving_in_acquisition_s(record),
+            "time of it in which a hand moves: fluoroscopy shows as much, at a tenth of the dose",
         ),
         of("runs", "1", runs, "how often the beam was switched on"),
         of("frames", "1", frames.map(f64::round), "frames while the beam was on, as a whole number"),
@@ -157,10 +192,9 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let begins_s = path.first().map_or(0.0, |first| first.0);
     let moves = |(_, sample): &(f64, &crate::Sample)| sample.time_s > begins_s && !sample.rests();
     let moving_s = total(record.timed().filter(moves).map(|(took_s, _)| took_s));
-    let (count, mean_s) = submovements(&speeds);
+    let turned_back = reversals(record);
+    let (count, mean_s) = submovements(&speeds, begins_s, &turned_back);
     let hands = || record.samples.iter().flat_map(|sample| sample.hands.iter().enumerate());
-    let most = record.hand_count();
-    let reversals: usize = (0..most).map(|hand| reversals(record, hand)).sum();
     let turned = total(hands().map(|(_, hand)| hand.rotate_rad.abs()));
     let retracted = total(hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)));
     vec![
@@ -182,51 +216,35 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
         higher(of(
             "spectral_arc_length",
             "1",
-            spectral_arc_length(&speeds),
-            "less the arc length of the scaled amplitude spectrum of the tip's speed, sampled each 0.05 s, to 5 % of its largest amplitude",
+            smoothness_of_movements(&speeds, begins_s, &moving(record, PAUSE_S)),
+            "less the arc length of the scaled amplitude spectrum of the tip's speed, sampled each 0.05 s, to 5 % of its largest amplitude; of each movement between pauses of half a second, as a mean over their time",
             ESTRADA,
         )),
         of(
             "submovements",
             "1",
             Some(count as f64),
-            "stretches of at least 0.1 s with the tip faster than 2 mm/s",
+            "stretches of at least 0.1 s with the tip faster than 2 mm/s, divided where a hand turns back",
             ESTRADA,
         ),
         higher(of("submovement_s", "s", mean_s, "mean duration of these", ESTRADA)),
-        of("reversals", "1", Some(reversals as f64), "changes of hands between pushing and pulling", RAFII),
+        of(
+            "reversals",
+            "1",
+            Some(turned_back.len() as f64),
+            "changes of hands between pushing and pulling",
+            RAFII,
+        ),
         of("turns", "1", Some(turned / std::f64::consts::TAU), "turns of hands to either side", RAFII),
+        of(
+            "needless_turns",
+            "1",
+            Some(needless_turns(record)),
+            "turns beyond the shortest way to each direction and half a turn to look, for each 20 mm of the way",
+            RAFII,
+        ),
         of("retracted_mm", "mm", Some(retracted), "length pulled back by hands", REVIEW),
     ]
-}
-
-/// How often the motion of an instrument changed between pushing and pulling.
-fn reversals(record: &Record, hand: usize) -> usize {
-    let advances = record.samples.iter().filter_map(|sample| sample.hands.get(hand));
-    let signs: Vec<bool> =
-        advances.map(|hand| hand.advance_mm).filter(|mm| mm.abs() > REST_MM).map(|mm| mm > 0.0).collect();
-    signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
-}
-
-/// Fastest push of an instrument, mm/s: the largest of its mean speeds over the shortest runs of steps that take at
-/// least [`PACE_S`]; `None` if the record is shorter.
-fn push_speed_mm_per_s(record: &Record, hand: usize) -> Option<f64> {
-    let advance_mm = |sample: &crate::Sample| sample.hands.get(hand).map_or(0.0, |hand| hand.advance_mm);
-    let steps: Vec<(f64, f64)> =
-        record.timed().map(|(took_s, sample)| (took_s, advance_mm(sample).max(0.0))).collect();
-    let (mut first, mut took_s, mut pushed_mm) = (0, 0.0, 0.0);
-    let mut fastest: Option<f64> = None;
-    for (step_s, step_mm) in &steps {
-        (took_s, pushed_mm) = (took_s + step_s, pushed_mm + step_mm);
-        while took_s - steps[first].0 >= PACE_S {
-            (took_s, pushed_mm) = (took_s - steps[first].0, pushed_mm - steps[first].1);
-            first += 1;
-        }
-        if took_s >= PACE_S {
-            fastest = Some(fastest.unwrap_or(0.0).max(pushed_mm / took_s));
-        }
-    }
-    fastest
 }
 
 fn safety(record: &Record) -> Vec<Metric> {
@@ -255,7 +273,6 @@ fn safety(record: &Record) -> Vec<Metric> {
         .zip(beam_on_idle_s(record))
         .map(|(on_s, on_idle_s)| (record.end_s() - idle_s - (on_s - on_idle_s)).max(0.0));
     let jumps = samples.iter().filter(|sample| sample.jumped).count();
-    let paces = (0..record.hand_count()).filter_map(|hand| push_speed_mm_per_s(record, hand));
     vec![
         of("wall_force_n", "N", Some(most(&|s| s.wall_force_n)), "largest sum of wall forces", RAFII),
         of(
@@ -291,10 +308,17 @@ fn safety(record: &Record) -> Vec<Metric> {
         ),
         of("moving_without_beam_s", "s", blind_s, "time with a hand moving and the beam off", BOYLE),
         of(
+            "unseen_share",
+            "1",
+            unseen_share(record),
+            "share of the time with a hand moving in which the beam is off or the tip that moves is not in the picture",
+            BOYLE,
+        ),
+        of(
             "push_speed_mm_per_s",
             "mm/s",
-            paces.fold(None, |fastest: Option<f64>, pace| Some(fastest.unwrap_or(0.0).max(pace))),
-            "fastest push of a hand, as a mean over half a second or the step that takes longer",
+            push_speed_mm_per_s(record),
+            "fastest push of a hand, as a mean over half a second",
             RAFII,
         ),
     ]

@@ -66,6 +66,8 @@ impl Better {
 pub struct Metric {
     /// Name, in lower case and with its unit.
     pub name: &'static str,
+    /// The same for people, without unit.
+    pub title: &'static str,
     /// Its group.
     pub group: Group,
     /// Its value; `None` if the data that it needs were not recorded, or if it has no meaning for this procedure.

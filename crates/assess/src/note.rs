@@ -46,6 +46,7 @@ impl Record {
             jumped: report.jumped && !rests,
             packing: packing.map(|Packing { density, outside_mm, .. }| Packed { density, outside_mm }),
             undone: false,
+            out_of_picture: false,
         };
         match self.samples.last_mut() {
             Some(last)

@@ -1,5 +1,6 @@
 //! Distance to a goal, sample by sample.
 
+use endowire_core::device::{Instrument, Stack};
 use endowire_core::error::nearest_name;
 use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result};
@@ -19,10 +20,19 @@ pub struct Site<'a> {
     pub tree: Option<&'a CentrelineTree>,
     /// Names of the instruments, innermost first.
     pub instruments: &'a [String],
+    /// Radius of the thinnest of them, mm ([`thinnest_mm`]): how fast it may be pushed depends on it. `None` if it is not
+    /// known.
+    pub radius_mm: Option<f64>,
     /// Whether the scene has a sac whose packing is recorded.
     pub has_sac: bool,
     /// Whether all instruments are known to be solid: medium then leaves through the sheath alone.
     pub all_solid: bool,
+}
+
+/// Radius of the thinnest instrument, mm, each where it is thickest.
+pub fn thinnest_mm(stack: &Stack) -> f64 {
+    let thickest = |one: &Instrument| one.device.sections().iter().map(|s| s.radius_mm).fold(0.0, f64::max);
+    stack.instruments().iter().map(thickest).fold(f64::INFINITY, f64::min)
 }
 
 /// Progress towards a goal.

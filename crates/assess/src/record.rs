@@ -82,6 +82,9 @@ pub struct Sample {
     /// before to this one leads no motion.
     #[serde(default, skip_serializing_if = "is_false")]
     pub undone: bool,
+    /// Whether the tip of an instrument that moved was outside the picture: beside the detector or behind a blade.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub out_of_picture: bool,
 }
 
 /// Whether a flag is left out of a session file.
@@ -116,8 +119,30 @@ impl Sample {
     }
 }
 
+/// What the beam is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BeamMode {
+    /// Fluoroscopy.
+    #[default]
+    Fluoro,
+    /// A run that is stored, with ten times the dose.
+    Cine,
+    /// Subtraction angiography.
+    Dsa,
+    /// Fluoroscopy over an angiogram.
+    Roadmap,
+}
+
+impl BeamMode {
+    /// Whether its pictures are acquired to be stored.
+    pub(crate) fn acquires(self) -> bool {
+        matches!(self, Self::Cine | Self::Dsa)
+    }
+}
+
 /// State of the beam and the C-arm from a time on: a row of beam.csv.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamState {
     /// Time since the start, increasing from row to row.
@@ -134,6 +159,16 @@ pub struct BeamState {
     pub primary_deg: f64,
     /// Secondary angle of the C-arm (cranial/caudal).
     pub secondary_deg: f64,
+    /// Air kerma at the patient entrance reference point per frame; `None` if it was not recorded. It grows with the
+    /// thickness behind the C-arm's angles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub entrance_ngy: Option<f64>,
+    /// Area at that point that the collimator leaves open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub entrance_mm2: Option<f64>,
+    /// What it is used for; `None` if it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<BeamMode>,
 }
 
 /// The record of a procedure.

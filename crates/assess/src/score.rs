@@ -5,12 +5,44 @@ use serde::Serialize;
 use crate::exam::{Ended, EndedBy};
 use crate::metric::Metric;
 use crate::record::Record;
+use crate::rules::BLIND;
 use crate::subject::{Limits, Subject, Threshold};
 use crate::total::total;
 use crate::unjudged::{Unjudged, limits, why_absent};
 
-/// The score when all thresholds are met.
-const BEST: f64 = 100.0;
+/// Number of the JSON documents of scores and measures; it grows when a key changes its meaning or goes.
+pub const SCHEMA: u32 = 2;
+
+/// How a subject was done. Within each band the score grows with the credit of all thresholds; no credit leads from one
+/// band into a better one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Band {
+    /// The goal was reached and all thresholds are met: 80 to 100.
+    Passed,
+    /// A threshold is missed, or cannot be judged: 40 to 80.
+    Missed,
+    /// A threshold is missed whose fault is grave: 20 to 40.
+    Reckless,
+    /// Instruments were moved unseen: 5 to 10, or less with another grave fault.
+    Blind,
+    /// The goal was not reached: 0.
+    NotReached,
+}
+
+impl Band {
+    /// The scores without any credit and with all of it.
+    fn ends(self, also_reckless: bool) -> [f64; 2] {
+        match (self, also_reckless) {
+            (Self::Passed, _) => [80.0, 100.0],
+            (Self::Missed, _) => [40.0, 80.0],
+            (Self::Reckless, _) => [20.0, 40.0],
+            (Self::Blind, false) => [5.0, 10.0],
+            (Self::Blind, true) => [0.0, 5.0],
+            (Self::NotReached, _) => [0.0, 0.0],
+        }
+    }
+}
 
 /// A measure and the threshold for it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,6 +54,8 @@ pub struct Scored {
     pub threshold: Option<Threshold>,
     /// Whether the threshold is met; `None` if there is none or it cannot be judged.
     pub passed: Option<bool>,
+    /// Part of the threshold's points that it brings, 0 to 1; `None` if there is none or it cannot be judged.
+    pub credit: Option<f64>,
     /// Why the threshold cannot be judged. It then counts as missed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unjudged: Option<&'static str>,
@@ -32,8 +66,10 @@ pub struct Scored {
 pub struct Verdict {
     /// Whether the goal was reached and all thresholds with points are met.
     pub passed: bool,
-    /// Points of the thresholds that are met, in percent of all points; 0 if the goal was not reached.
+    /// From 0 to 100: the credit of all thresholds, within its band.
     pub score: f64,
+    /// The band of the score.
+    pub band: Band,
     /// Its end; `None` if it was left before.
     pub ended: Option<Ended>,
 }
@@ -41,8 +77,12 @@ pub struct Verdict {
 /// The score of a subject and the measures behind it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Score {
+    /// Number of this document's kind: [`SCHEMA`].
+    pub schema: u32,
     /// Name of the subject in commands.
     pub subject: String,
+    /// Whether it was done as an exam.
+    pub exam: bool,
     /// The result.
     #[serde(flatten)]
     pub verdict: Verdict,
@@ -56,35 +96,61 @@ pub struct Score {
     pub metrics: Vec<Scored>,
 }
 
+impl Verdict {
+    /// The result of these measures at this end.
+    fn of(metrics: &[Scored], ended: Option<Ended>) -> Self {
+        let counted = || {
+            let points = |one: &Scored| one.threshold.as_ref().map(|threshold| threshold.points);
+            metrics.iter().filter_map(move |one| Some((one, points(one).filter(|points| *points > 0.0)?)))
+        };
+        let is_grave = |one: &Scored| one.threshold.as_ref().is_some_and(|threshold| threshold.grave);
+        let missed = |grave: &dyn Fn(&Scored) -> bool| {
+            counted().any(|(one, _)| one.passed == Some(false) && grave(one))
+        };
+        let blind = missed(&|one| one.metric.name == BLIND);
+        let reckless = missed(&|one| one.metric.name != BLIND && is_grave(one));
+        let reached = ended.is_some_and(|ended| ended.by == EndedBy::Goal);
+        let band = match (reached, blind, reckless) {
+            (false, ..) => Band::NotReached,
+            (true, true, _) => Band::Blind,
+            (true, false, true) => Band::Reckless,
+            _ if counted().all(|(one, _)| one.passed == Some(true)) => Band::Passed,
+            _ => Band::Missed,
+        };
+        let all = total(counted().map(|(_, points)| points));
+        let brought = total(counted().map(|(one, points)| points * one.credit.unwrap_or(0.0)));
+        let [none, whole] = band.ends(reckless);
+        let credit = if all > 0.0 { brought / all } else { 1.0 };
+        Self { passed: band == Band::Passed, score: none + (whole - none) * credit, band, ended }
+    }
+}
+
 impl Score {
     /// The score of a record with these measures.
     pub(crate) fn new(subject: &Subject, record: &Record, metrics: &[Metric], ended: Option<Ended>) -> Self {
         let scored = |metric: &Metric| {
             let threshold = subject.threshold.iter().find(|threshold| threshold.metric == metric.name);
-            let passed = threshold.zip(metric.value).map(|(threshold, value)| threshold.holds(value));
+            let judged = threshold.zip(metric.value);
+            let passed = judged.map(|(threshold, value)| threshold.holds(value));
+            let credit = judged.map(|(threshold, value)| threshold.credit(value));
             let unjudged = threshold.filter(|_| passed.is_none()).map(|_| why_absent(metric, record));
-            Scored { metric: *metric, threshold: threshold.cloned(), passed, unjudged }
+            Scored { metric: *metric, threshold: threshold.cloned(), passed, credit, unjudged }
         };
         let metrics: Vec<Scored> = metrics.iter().map(scored).collect();
-        let points = |of: &dyn Fn(&Scored) -> bool| -> f64 {
-            let counted = metrics.iter().filter(|one| of(one)).filter_map(|one| one.threshold.as_ref());
-            total(counted.map(|threshold| threshold.points))
-        };
-        let (all, kept) = (points(&|_| true), points(&|one| one.passed == Some(true)));
-        let reached = ended.is_some_and(|ended| ended.by == EndedBy::Goal);
-        let counts = |one: &Scored| one.threshold.as_ref().is_some_and(|threshold| threshold.points > 0.0);
-        let all_kept = metrics.iter().filter(|one| counts(one)).all(|one| one.passed == Some(true));
-        let score = match (reached, all_kept) {
-            (false, _) => 0.0,
-            (true, true) => BEST,
-            (true, false) => BEST * kept / all,
-        };
-        let verdict = Verdict { passed: reached && all_kept, score, ended };
+        let verdict = Verdict::of(&metrics, ended);
         let not_measured = metrics
             .iter()
             .filter_map(|one| Some(Unjudged { what: one.metric.name.to_owned(), why: one.unjudged? }));
         let unjudged = not_measured.chain(limits(&subject.limits, record)).collect();
-        Self { subject: subject.stem(), verdict, limits: subject.limits, unjudged, metrics }
+        Self {
+            schema: SCHEMA,
+            subject: subject.stem(),
+            exam: subject.exam,
+            verdict,
+            limits: subject.limits,
+            unjudged,
+            metrics,
+        }
     }
 
     /// What cannot be judged, grouped by reason, one sentence each.

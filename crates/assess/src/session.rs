@@ -9,6 +9,7 @@ use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 use crate::record::Record;
+use crate::score::SCHEMA;
 use crate::{check, folder};
 
 /// Keys of `[view]` that concern pictures alone: neither a time nor the beam nor what is injected depends on them.
@@ -18,6 +19,9 @@ const OF_PICTURES: [&str; 7] = ["backend", "bits", "camera", "every", "film", "s
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SessionFile {
+    /// Number of this file's kind: [`SCHEMA`]; 1 in files that do not have it.
+    #[serde(default = "first_schema")]
+    pub schema: u32,
     /// Scene file.
     pub scene_file: PathBuf,
     /// Overridden keys of the scene, `KEY=VALUE`.
@@ -26,8 +30,16 @@ pub struct SessionFile {
     /// alone, so that its file is the same at any date.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded_unix_s: Option<u64>,
+    /// What hands did, by which the session can be repeated; `None` if it was not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inputs: Option<serde_json::Value>,
     /// The record.
     pub record: Record,
+}
+
+/// The kind of files without a number.
+fn first_schema() -> u32 {
+    1
 }
 
 impl SessionFile {
@@ -49,6 +61,11 @@ impl SessionFile {
     /// [`Error::Content`] if it is not a session, or has an impossible value or an unknown key.
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let session: Self = serde_json::from_slice(bytes).map_err(|error| not_a_session(path, &error))?;
+        if !(1..=SCHEMA).contains(&session.schema) {
+            let remedy = format!("this program reads files up to {SCHEMA}: use the one that wrote it");
+            let error = Error::parameter("schema", session.schema, remedy);
+            return Err(Error::content(path, error.to_string()));
+        }
         let in_record =
             |error: Error| Error::content(path, format!("record.{error}; record the session again"));
         session.record.check().map_err(in_record)?;

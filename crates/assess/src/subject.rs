@@ -12,6 +12,7 @@ use crate::goal::Goal;
 use crate::metric::{Better, Metric};
 use crate::reach::Site;
 use crate::record::Record;
+use crate::rules::{self, BLIND, MOST_UNSEEN};
 use crate::unjudged::why_never;
 
 /// Levels, from the easiest.
@@ -42,7 +43,10 @@ pub struct Subject {
     /// Limits that end it early.
     #[serde(default)]
     pub limits: Limits,
-    /// Thresholds of measures.
+    /// Whether it is an exam: the 3D view is hidden, nothing can be undone, and hardly anything may be moved unseen.
+    #[serde(default)]
+    pub exam: bool,
+    /// Thresholds of measures. An exam adds those that count in every subject.
     #[serde(default)]
     pub threshold: Vec<Threshold>,
     #[serde(skip)]
@@ -76,10 +80,23 @@ pub struct Threshold {
     /// Smallest value, for a measure of which more is better.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_least: Option<f64>,
+    /// Value up to which the whole credit is given; from there it falls to half of it at the threshold. Without it, all
+    /// values that meet the threshold count alike.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub good: Option<f64>,
     /// Points in the score; 1 by default. With 0 the measure is reported and need not be met.
     #[serde(default = "one")]
     pub points: f64,
+    /// Whether missing it endangers the patient: the score is then at most 40.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub grave: bool,
+    /// Where its value comes from: a study, a cohort or a choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
 }
+
+/// Credit at a threshold.
+const HALF: f64 = 0.5;
 
 fn one() -> f64 {
     1.0
@@ -112,6 +129,19 @@ impl Threshold {
     /// Whether a value meets the threshold.
     pub(crate) fn holds(&self, value: f64) -> bool {
         self.at_most.is_none_or(|most| value <= most) && self.at_least.is_none_or(|least| value >= least)
+    }
+
+    /// Part of its points that a value brings: 1 up to `good`, half at the threshold, and falling beyond it.
+    pub(crate) fn credit(&self, value: f64) -> f64 {
+        let limit = self.at_most.or(self.at_least).unwrap_or(value);
+        // Above 0 beyond the threshold, whichever way is better.
+        let beyond = if self.at_most.is_some() { value - limit } else { limit - value };
+        let margin = self.good.map_or(0.0, |good| (limit - good).abs());
+        if beyond > 0.0 {
+            let scale = limit.abs().max(f64::MIN_POSITIVE);
+            return (HALF * (1.0 - beyond / scale)).max(0.0);
+        }
+        if margin > 0.0 { (HALF - HALF * beyond / margin).min(1.0) } else { 1.0 }
     }
 
     /// Checks it against the measure that it names; `key` is its name in messages.
@@ -160,6 +190,27 @@ impl Threshold {
         if !(0.0..=LARGEST).contains(&self.points) {
             let remedy = format!("must be a number from 0 to {LARGEST}; with 0 it is only reported");
             return Err(Error::parameter(format!("{key}.points"), self.points, remedy));
+        }
+        if self.grave && self.points == 0.0 {
+            let remedy = "what endangers the patient counts: give it points, or leave this out";
+            return Err(Error::parameter(format!("{key}.grave"), true, remedy));
+        }
+        if let Some((good, limit)) = self.good.zip(limit) {
+            let holds =
+                good.is_finite() && self.holds(good) && (metric.better == Better::Higher || good >= 0.0);
+            if !holds {
+                let remedy =
+                    format!("the whole credit is given up to there: give what meets {right} = {limit}");
+                return Err(Error::parameter(format!("{key}.good"), good, remedy));
+            }
+        }
+        let blind =
+            self.metric == BLIND && (limit.is_some_and(|limit| limit > MOST_UNSEEN) || self.points == 0.0);
+        if blind {
+            let remedy = format!(
+                "instruments are moved under fluoroscopy in every subject: ask for at most {MOST_UNSEEN}, with points, or leave the threshold out"
+            );
+            return Err(Error::parameter(format!("{key}.at_most"), limit.unwrap_or_default(), remedy));
         }
         Ok(())
     }
@@ -246,6 +297,23 @@ impl Subject {
             }
         }
         Ok(())
+    }
+
+    /// Adds the thresholds that count in every subject, unless it has its own. Who works blind, or endangers the patient
+    /// by speed, does so in every subject.
+    pub(crate) fn with_common(mut self, radius_mm: Option<f64>) -> Self {
+        for common in rules::common(radius_mm, self.exam) {
+            match self.threshold.iter_mut().find(|own| own.metric == common.metric) {
+                None => self.threshold.push(common),
+                Some(own) if own.metric == BLIND => {
+                    own.grave = true;
+                    own.at_most = own.at_most.zip(common.at_most).map(|(own, common)| own.min(common));
+                    own.good = own.good.filter(|good| own.at_most.is_some_and(|most| *good <= most));
+                }
+                Some(own) => own.grave |= common.grave && own.points > 0.0,
+            }
+        }
+        self
     }
 
     /// Refuses thresholds of measures that have no value at a site.

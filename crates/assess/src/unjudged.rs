@@ -25,9 +25,17 @@ pub(crate) fn why_absent(metric: &Metric, record: &Record) -> &'static str {
     if record.is_empty() {
         return "nothing was done in the session";
     }
-    let of_beam = ["beam_on_s", "beam_on_idle_s", "moving_without_beam_s"].contains(&metric.name);
-    if of_beam || metric.group == Group::Radiation {
-        return if record.beam.is_none() { NO_BEAM } else { "the beam was never on" };
+    let of_beam = ["beam_on_s", "beam_on_idle_s", "moving_without_beam_s", "unseen_share"];
+    if record.beam.is_none() && (of_beam.contains(&metric.name) || metric.group == Group::Radiation) {
+        return NO_BEAM;
+    }
+    match metric.name {
+        "entrance_ugy" | "entrance_area_ugycm2" | "acquisition_s" | "moving_in_acquisition_s" => {
+            return "it was not recorded: the record is of an earlier version, or beam.csv does not give it";
+        }
+        "unseen_share" => return "no hand moved",
+        _ if metric.group == Group::Radiation => return "the beam was never on",
+        _ => {}
     }
     match metric.name {
         "against_wall_ml" => {

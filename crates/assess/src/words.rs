@@ -1,8 +1,12 @@
 //! Subjects and scores in words, for display.
 
+use std::sync::OnceLock;
+
 use crate::exam::Standing;
 use crate::goal::{Goal, PackingGoal};
-use crate::score::{Scored, Verdict};
+use crate::metric::Metric;
+use crate::record::Record;
+use crate::score::{Band, Scored, Verdict};
 use crate::subject::{Limits, Threshold};
 
 impl Goal {
@@ -61,11 +65,28 @@ impl Limits {
     }
 }
 
+/// All measures, without values.
+fn measures() -> &'static [Metric] {
+    static ALL: OnceLock<Vec<Metric>> = OnceLock::new();
+    ALL.get_or_init(|| crate::assess(&Record::default(), None))
+}
+
 impl Threshold {
-    /// The threshold in words.
+    /// The measure in words; its name if there is none of this name.
+    pub fn title(&self) -> &str {
+        self.measure().map_or(&self.metric, |metric| metric.title)
+    }
+
+    /// The threshold in words, with its unit.
     pub fn words(&self) -> String {
-        let most = self.at_most.map(|most| format!("at most {most}"));
-        most.or_else(|| self.at_least.map(|least| format!("at least {least}"))).unwrap_or_default()
+        let unit = self.measure().map(|metric| metric.unit).filter(|unit| *unit != "1");
+        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
+        let most = self.at_most.map(|most| format!("at most {most}{unit}"));
+        most.or_else(|| self.at_least.map(|least| format!("at least {least}{unit}"))).unwrap_or_default()
+    }
+
+    fn measure(&self) -> Option<&'static Metric> {
+        measures().iter().find(|metric| metric.name == self.metric)
     }
 }
 
@@ -99,14 +120,18 @@ impl Verdict {
             Some(ended) => format!("{} after {:.2} s", ended.by.words(), ended.time_s),
             None => "the session ended before the goal was reached".to_owned(),
         };
-        format!("{how}, {:.0} of 100: {end}", self.score)
+        let fault = match self.band {
+            Band::Blind => "; instruments were moved unseen",
+            Band::Reckless => "; a grave fault",
+            _ => "",
+        };
+        format!("{how}, {:.0} of 100: {end}{fault}", self.score)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Record;
 
     #[test]
     fn numbers_are_whole_where_they_count_and_have_their_units() {
@@ -114,7 +139,7 @@ mod tests {
         let words = |name: &str, value: Option<f64>| {
             let metric = *metrics.iter().find(|metric| metric.name == name).unwrap();
             let metric = crate::Metric { value, ..metric };
-            Scored { metric, threshold: None, passed: None, unjudged: None }.value_words()
+            Scored { metric, threshold: None, passed: None, credit: None, unjudged: None }.value_words()
         };
         assert_eq!(words("reversals", Some(6.0)), "6");
         assert_eq!(words("path_ratio", Some(1.23456)), "1.235");

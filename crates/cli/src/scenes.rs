@@ -134,8 +134,12 @@ pub(crate) fn let_medium_flow(
     view.check_places()
 }
 
-/// Reports that the centre line was extracted from the surface, if one was needed and the scene names none.
-pub(crate) fn tell_found_centreline(path: &Path, scene: &Scene) {
+/// Reports what was mended on the surface, and that the centre line was extracted from it, if one was needed and the
+/// scene names none.
+pub(crate) fn tell_found(path: &Path, scene: &Scene) {
+    for mended in scene.mended() {
+        tell(format_args!("{}: {mended}", path.display()));
+    }
     let Some(tree) = scene.found_centreline() else { return };
     let targets: Vec<&str> = tree.targets().iter().map(|target| target.name.as_str()).collect();
     tell(format_args!(

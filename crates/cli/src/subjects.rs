@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_assess::{Exam, Score, Scored, Site, Subject, Threshold};
+use endowire_assess::{Exam, Score, Scored, Site, Subject, Threshold, thinnest_mm};
 use endowire_core::insertion::Simulation;
 use endowire_methods::{Scene, Setting};
 use endowire_play::{Limits, lumens};
@@ -90,7 +90,8 @@ pub(crate) fn exam(
     }
     let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
     let all_solid = !lumens(stack, &ViewSpec::of_scene(scene, path)?).contains(&true);
-    let site = Site { tree, instruments: &instruments, has_sac: scene.vessel.sac.is_some(), all_solid };
+    let (radius_mm, has_sac) = (Some(thinnest_mm(stack)), scene.vessel.sac.is_some());
+    let site = Site { tree, instruments: &instruments, radius_mm, has_sac, all_solid };
     Ok(Exam::new(subject, &site)?)
 }
 

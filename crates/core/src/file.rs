@@ -42,6 +42,45 @@ impl Files for InMemory {
     }
 }
 
+/// What a file is instead of any input, if its first bytes leave no doubt: a pointer, a page or an archive that holds it.
+pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    const BEGINNINGS: [(&[u8], &str); 9] = [
+        (b"version https://git-lfs", "is a pointer of Git LFS, not the file itself: fetch it (git lfs pull)"),
+        (b"PK\x03\x04", "is a ZIP archive: unpack it, and name the file in it"),
+        (b"PK\x05\x06", "is an empty ZIP archive"),
+        (b"\x1f\x8b", "is a gzip archive: unpack it, and name the file in it"),
+        (b"7z\xbc\xaf\x27\x1c", "is a 7z archive: unpack it, and name the file in it"),
+        (b"Rar!\x1a\x07", "is a RAR archive: unpack it, and name the file in it"),
+        (b"\xfd7zXZ\0", "is an xz archive: unpack it, and name the file in it"),
+        (b"\x28\xb5\x2f\xfd", "is a zstd archive: unpack it, and name the file in it"),
+        (b"%PDF-", "is a PDF document, not the file that is meant"),
+    ];
+    let page = || {
+        let mark = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        let begins = |tag: &[u8]| mark.get(..tag.len()).is_some_and(|text| text.eq_ignore_ascii_case(tag));
+        begins(b"<!doctype html") || begins(b"<html")
+    };
+    if page() {
+        return Some(
+            "is a web page, not the file itself: download the file (\"raw\" or \"download\" on that page)",
+        );
+    }
+    BEGINNINGS.iter().find(|(begin, _)| bytes.starts_with(begin)).map(|(_, text)| *text)
+}
+
+/// The text of a file in UTF-8 or UTF-16, with or without a byte order mark.
+///
+/// # Errors
+/// [`Error::Content`] for what is no text, with what it is instead where that is plain.
+pub fn text(bytes: &[u8], path: &Path) -> Result<String> {
+    if let Some(kind) = foreign(bytes) {
+        return Err(Error::content(path, kind));
+    }
+    String::from_utf8(crate::text::without_mark(bytes).into_owned()).map_err(|e| {
+        Error::content(path, format!("is no text in UTF-8 or UTF-16: {}: save it as UTF-8", e.utf8_error()))
+    })
+}
+
 fn check_size(path: &Path, bytes: u64, limit: u64) -> Result<()> {
     if bytes > limit {
         return Err(Error::content(path, format!("is larger than {limit} bytes, the most that is read")));

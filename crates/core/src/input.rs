@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use whole::Whole;
 pub use words::plain;
 
-use crate::file::{FileSystem, Files};
+use crate::file::{self, FileSystem, Files};
 use crate::{Error, Result};
 
 /// Largest input file in bytes: scenes and cases are kilobytes.
@@ -32,8 +32,7 @@ pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
 /// # Errors
 /// As [`from_toml`].
 pub fn from_toml_of<T: DeserializeOwned>(files: &dyn Files, path: &Path) -> Result<(T, String)> {
-    let text = String::from_utf8(files.read(path, SIZE_LIMIT)?)
-        .map_err(|e| Error::content(path, format!("is no text: {}", e.utf8_error())))?;
+    let text = file::text(&files.read(path, SIZE_LIMIT)?, path)?;
     Ok((parse_toml(&text, path)?, text))
 }
 
@@ -85,7 +84,11 @@ fn explain(error: &toml::de::Error, text: &str, fits: impl Fn(&str) -> bool) -> 
             None => culprit(text, line, fits).unwrap_or_else(|| format!("line {line}: ")),
         }
     });
-    let hint = nearest(&message);
+    let hint = match message.contains("escape") || message.contains("unicode") {
+        true => ": in double quotes \\ begins an escape: write / in paths, or put them in single quotes"
+            .to_owned(),
+        false => nearest(&message),
+    };
     format!("{place}{message}{hint}")
 }
 

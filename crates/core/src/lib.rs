@@ -65,6 +65,7 @@ pub mod scene;
 pub mod shape;
 pub mod solve;
 pub mod statics;
+mod text;
 pub mod tuning;
 pub mod vessel;
 

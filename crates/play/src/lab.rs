@@ -1,12 +1,12 @@
 //! The cath lab: C-arm, table, collimator, pedal, injector, camera.
 
-use endowire_assess::BeamState;
+use endowire_assess::{BeamMode, BeamState};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Error, Result, Vec3};
 use endowire_viewer::{CameraSpec, InjectionSpec, Mode, Pose, View, ViewSpec};
 
 use crate::TICKS_PER_S;
-use crate::session::Delivered;
+use crate::meter::Delivered;
 
 /// Fraction of the field that the vessel fills if the scene gives no field.
 const FILL: f64 = 0.92;
@@ -42,7 +42,7 @@ pub struct Lab {
     /// Dose in earlier configurations, and the number of ticks with the beam on in the current one.
     dose: Dose,
     room_ticks: u64,
-    /// Exposure of the last frame, which may be of an earlier configuration.
+    /// Exposure of the last frame that was measured, which may be of an earlier configuration.
     last_delivered: Option<Delivered>,
 }
 
@@ -136,7 +136,7 @@ impl Lab {
         (self.dose + self.room_dose()).detector_ngy / 1000.0
     }
 
-    /// Air kerma at the entrance reference points so far, µGy; `None` before a live picture was drawn.
+    /// Air kerma at the entrance reference points so far, µGy; `None` before the beam was on.
     pub fn entrance_ugy(&self) -> Option<f64> {
         self.last_delivered.map(|_| (self.dose + self.room_dose()).entrance_ngy / 1000.0)
     }
@@ -167,7 +167,23 @@ impl Lab {
             field_mm2: self.open_mm2(),
             primary_deg,
             secondary_deg,
+            entrance_ngy: self
+                .last_delivered
+                .map(|frame| self.frame_ngy() * frame.entrance_ngy / frame.frame_ngy),
+            entrance_mm2: Some(self.open_mm2() * self.nearer()),
+            mode: Some(match self.fluoro.xray.mode {
+                Mode::Fluoro => BeamMode::Fluoro,
+                Mode::Cine => BeamMode::Cine,
+                Mode::Dsa => BeamMode::Dsa,
+                Mode::Roadmap => BeamMode::Roadmap,
+            }),
         }
+    }
+
+    /// Area at the entrance reference point over that at the detector.
+    fn nearer(&self) -> f64 {
+        let arm = &self.fluoro.c_arm;
+        (arm.reference_mm() / arm.sid_mm).powi(2)
     }
 
     /// Open area at the detector, mm².
@@ -177,14 +193,12 @@ impl Lab {
         side_mm * side_mm * self.open[0] * self.open[1]
     }
 
-    /// Dose in the current configuration. One in which nothing was drawn counts at the entrance as the one before.
+    /// Dose in the current configuration. One that was not measured counts at the entrance as the one before.
     fn room_dose(&self) -> Dose {
         let detector_ngy = self.frame_ngy() * self.room_ticks as f64 * self.fluoro.frames_per_s / TICKS_PER_S;
-        let arm = &self.fluoro.c_arm;
-        let nearer = (arm.reference_mm() / arm.sid_mm).powi(2);
         let entrance = self.last_delivered.map_or(0.0, |frame| frame.entrance_ngy / frame.frame_ngy);
         let entrance_ngy = detector_ngy * entrance;
-        Dose { detector_ngy, entrance_ngy, area_ngymm2: entrance_ngy * self.open_mm2() * nearer }
+        Dose { detector_ngy, entrance_ngy, area_ngymm2: entrance_ngy * self.open_mm2() * self.nearer() }
     }
 
     /// Air kerma at the detectors per frame, nGy.
@@ -197,7 +211,7 @@ impl Lab {
         self.delivered().map_or_else(wanted_ngy, |frame| frame.frame_ngy)
     }
 
-    /// Exposure of a frame in this configuration, once one is drawn.
+    /// Exposure of a frame in this configuration, once it is measured.
     fn delivered(&self) -> Option<Delivered> {
         self.last_delivered.filter(|frame| frame.revision == self.revisions[0])
     }

@@ -12,9 +12,11 @@ mod input;
 mod keys;
 mod lab;
 mod lumens;
+mod meter;
 mod pad;
 mod pictures;
 mod readout;
+mod replay;
 mod script;
 mod session;
 mod telemetry;
@@ -27,8 +29,9 @@ pub use lumens::lumens;
 pub use pad::{Button, PAD, Pad};
 pub use pictures::{Pictures, Sharpened, Sharpening};
 pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
+pub use replay::Inputs;
 pub use script::script_head;
-pub use session::{Delivered, Session, Snapshot, TICK_SOLVES};
+pub use session::{Session, Snapshot, TICK_SOLVES};
 
 /// Ticks per second.
 pub const TICKS_PER_S: f64 = 60.0;

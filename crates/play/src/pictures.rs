@@ -4,17 +4,21 @@
 //! that. Callers that draw on a clock use [`Pictures::soon`] and carry out [`Sharpening`] on another thread; all
 //! others wait ([`Pictures::fluoro`]).
 
+use endowire_core::shape::Shape;
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
-use endowire_viewer::{DeviceView, Exposure, FrameTime, Image, Pushed, Renderer, ViewSpec};
+use endowire_viewer::{Image, Moment, Pushed, Renderer, Seen, ViewSpec};
 
-use crate::session::{Delivered, Snapshot};
+use crate::session::Snapshot;
 
 /// Ratio of picture size to coarse picture size: 128 of 512 pixels, which is enough to see a wire.
 const COARSER: u32 = 4;
 /// Number of frames for which the room must be unchanged before it is drawn sharply.
 const REST: u32 = 3;
+
+/// Grey of a 3D view that is hidden.
+const HIDDEN: u8 = 40;
 
 /// The pictures of a session.
 #[derive(Debug)]
@@ -27,6 +31,25 @@ pub struct Pictures {
     held: Vec<Image>,
     /// Revision of the room in the last frame, and for how many frames it has been unchanged.
     rested: (u64, u32),
+    /// The last live frame: a pulse shows the motion since then.
+    before: Option<Before>,
+}
+
+/// What a live frame has shown.
+#[derive(Debug)]
+struct Before {
+    shape: Shape,
+    inserted_mm: Vec<f64>,
+    time_s: f64,
+    step: usize,
+}
+
+impl Before {
+    /// As the moment before a snapshot; `None` where the session has gone back to an earlier step, which is no motion.
+    fn of(&self, snapshot: &Snapshot) -> Option<Seen<'_>> {
+        let goes_on = self.step <= snapshot.readout.step;
+        goes_on.then_some(Seen { shape: &self.shape, inserted_mm: &self.inserted_mm, time_s: self.time_s })
+    }
 }
 
 /// The renderers of one plane, each with the revision of the room for which it was made.
@@ -82,7 +105,7 @@ impl Pictures {
     /// As [`Pushed::new`].
     pub fn new(scene: &Scene, first: &Snapshot, wall: Wall) -> Result<Self> {
         let pushed = Pushed::new(scene, first.lab.fluoro())?;
-        Ok(Self { pushed, wall, planes: vec![], three_d: None, held: vec![], rested: (0, 0) })
+        Ok(Self { pushed, wall, planes: vec![], three_d: None, held: vec![], rested: (0, 0), before: None })
     }
 
     /// The fluoroscopic picture of each plane: live while the pedal is pressed, otherwise the last ones; empty before
@@ -151,35 +174,6 @@ impl Pictures {
         Ok(())
     }
 
-    /// Exposure of a frame of all planes; `None` before one was drawn in the current room.
-    pub fn delivered(&self, snapshot: &Snapshot) -> Option<Delivered> {
-        let revision = snapshot.lab.revisions()[0];
-        let exposure = |plane: &Plane| {
-            let now = [&plane.sharp, &plane.coarse].into_iter().flatten().find(|made| made.0 == revision)?;
-            now.1.exposure()
-        };
-        let each: Vec<Exposure> = self.planes.iter().map(exposure).collect::<Option<_>>()?;
-        let first = each.first()?;
-        Some(Delivered {
-            revision,
-            frame_ngy: each.iter().map(|one| one.dose_ngy).sum(),
-            entrance_ngy: each.iter().map(|one| one.entrance_ngy).sum(),
-            kvp: first.kvp,
-            current_ma: first.pulse.map(|pulse| pulse.current_ma),
-        })
-    }
-
-    /// The same, computed if exposure control has to choose it.
-    ///
-    /// # Errors
-    /// As [`Self::fluoro`].
-    pub fn expose(&mut self, snapshot: &Snapshot) -> Result<Option<Delivered>> {
-        if snapshot.lab.is_live() && snapshot.lab.fluoro().exposure.is_some() {
-            self.sharpen(snapshot)?;
-        }
-        Ok(self.delivered(snapshot))
-    }
-
     /// Prepares the sharp renderer of each plane.
     fn sharpen(&mut self, snapshot: &Snapshot) -> Result<()> {
         let revision = snapshot.lab.revisions()[0];
@@ -196,8 +190,8 @@ impl Pictures {
         let revision = snapshot.lab.revisions()[0];
         let specs = snapshot.lab.fluoro().planes();
         self.planes.resize_with(specs.len(), Plane::default);
-        self.pushed.leave(&snapshot.coils)?;
-        let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
+        let before = self.before.take();
+        let moment = moment(snapshot, before.as_ref().and_then(|before| before.of(snapshot)));
         let mut images = Vec::with_capacity(specs.len());
         for (plane, spec) in self.planes.iter_mut().zip(specs) {
             let sharp = plane.sharp.as_mut().filter(|(drawn, _)| *drawn == revision);
@@ -210,19 +204,29 @@ impl Pictures {
                     made(&mut plane.coarse, sharp, (revision, &coarse), &self.wall)?
                 }
             };
-            renderer.move_vessel(snapshot.displacement.as_ref())?;
-            images.push(fluoro(renderer, &views, snapshot.moment)?);
+            let image = renderer.draw(&mut self.pushed, &moment)?.fluoro;
+            images.push(image.ok_or_else(|| Error::parameter("view.views", "fluoro", "was not drawn"))?);
         }
+        self.before = Some(Before {
+            shape: snapshot.shape.clone(),
+            inserted_mm: snapshot.inserted_mm.clone(),
+            time_s: snapshot.moment.time_s,
+            step: snapshot.readout.step,
+        });
         Ok(images)
     }
 
-    /// The 3D view.
+    /// The 3D view; blank while an exam hides it.
     ///
     /// # Errors
     /// As [`Renderer::new`] and [`Renderer::render_at`].
     pub fn three_d(&mut self, snapshot: &Snapshot) -> Result<Image> {
-        let (renderer, views) = self.ready_for_three_d(snapshot)?;
-        let image = renderer.render_at(&views, snapshot.moment)?.three_d;
+        if snapshot.hides_three_d() {
+            return Ok(Image::blank(snapshot.lab.three_d().size_px, HIDDEN));
+        }
+        let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
+        let renderer = made(&mut self.three_d, None, room, &self.wall)?;
+        let image = renderer.draw(&mut self.pushed, &moment(snapshot, None))?.three_d;
         image.ok_or_else(|| Error::parameter("view.views", "3d", "was not drawn"))
     }
 
@@ -236,24 +240,16 @@ impl Pictures {
         snapshot: &Snapshot,
         graphics: &endowire_viewer::Graphics,
     ) -> Result<endowire_viewer::Drawing> {
-        let (renderer, views) = self.ready_for_three_d(snapshot)?;
-        renderer.three_d_on(graphics, &views)
+        let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
+        let renderer = made(&mut self.three_d, None, room, &self.wall)?;
+        let moment = moment(snapshot, None);
+        renderer.set(&moment)?;
+        renderer.three_d_on(graphics, &moment.devices(&mut self.pushed)?)
     }
 
     /// Draws the 3D view anew, for instance on another graphics processor than before.
     pub fn forget_three_d(&mut self) {
         self.three_d = None;
-    }
-
-    /// The renderer of the 3D view in the state of a snapshot, and the devices.
-    fn ready_for_three_d(&mut self, snapshot: &Snapshot) -> Result<(&mut Renderer, Vec<DeviceView>)> {
-        let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
-        self.pushed.leave(&snapshot.coils)?;
-        let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
-        let renderer = made(&mut self.three_d, None, room, &self.wall)?;
-        renderer.move_vessel(snapshot.displacement.as_ref())?;
-        renderer.show_contacts(&snapshot.contacts);
-        Ok((renderer, views))
     }
 
     /// Name of the backend that draws the fluoroscopic picture.
@@ -283,7 +279,15 @@ fn made<'a>(
     place.as_mut().map(|(_, renderer)| renderer).ok_or_else(none)
 }
 
-fn fluoro(renderer: &mut Renderer, views: &[DeviceView], moment: FrameTime) -> Result<Image> {
-    let image = renderer.render_at(views, moment)?.fluoro;
-    image.ok_or_else(|| Error::parameter("view.views", "fluoro", "was not drawn"))
+/// The moment of a snapshot.
+fn moment<'a>(snapshot: &'a Snapshot, before: Option<Seen<'a>>) -> Moment<'a> {
+    Moment {
+        frame: snapshot.moment,
+        shape: &snapshot.shape,
+        inserted_mm: &snapshot.inserted_mm,
+        coils: &snapshot.coils,
+        contacts: &snapshot.contacts,
+        displacement: snapshot.displacement.as_ref(),
+        before,
+    }
 }

@@ -114,7 +114,7 @@ pub struct LabReadout {
     /// Air kerma at the detectors so far, µGy; as delivered by exposure control, if it acts.
     pub dose_ugy: f64,
     /// Air kerma at the patient entrance reference points so far, µGy, without backscatter: 150 mm before the
-    /// isocentre. Absent until a live picture has been drawn, since it depends on the patient.
+    /// isocentre. Absent until the beam was on, since it depends on the patient.
     pub entrance_ugy: Option<f64>,
     /// Kerma–area product so far, µGy·m².
     pub kerma_area_ugym2: Option<f64>,

@@ -16,7 +16,9 @@ use crate::history::{Done, History, Injected, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
 use crate::lumens::lumens;
+use crate::meter::Meter;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
+use crate::replay::Inputs;
 use crate::telemetry::Telemetry;
 
 /// Largest number of events that are kept.
@@ -64,6 +66,9 @@ pub struct Session {
     sac: Option<(Sac, Option<Packing>)>,
     /// The exam, if the session is a subject.
     exam: Option<Exam>,
+    meter: Meter,
+    /// All inputs, each with the number of ticks before it.
+    inputs: Vec<(u64, Input)>,
 }
 
 /// Data for drawing one frame.
@@ -87,19 +92,11 @@ pub struct Snapshot {
     pub readout: Readout,
 }
 
-/// Exposure of one fluoroscopic frame of all planes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Delivered {
-    /// Revision of the room ([`Lab::revisions`]).
-    pub(crate) revision: u64,
-    /// Air kerma at the detectors, nGy.
-    pub(crate) frame_ngy: f64,
-    /// Air kerma at the entrance reference points, nGy.
-    pub(crate) entrance_ngy: f64,
-    /// Voltage of the first plane, kV.
-    pub(crate) kvp: f64,
-    /// Its current, with exposure control, mA.
-    pub(crate) current_ma: Option<f64>,
+impl Snapshot {
+    /// Whether the 3D view is hidden: in an exam, until it has ended.
+    pub fn hides_three_d(&self) -> bool {
+        self.readout.subject.as_ref().is_some_and(|one| one.task.exam && one.verdict.is_none())
+    }
 }
 
 impl std::fmt::Debug for Session {
@@ -123,6 +120,11 @@ impl Session {
             return Err(Error::parameter("device.section.steer", "given", remedy));
         }
         let lab = Lab::new(view, side_px, simulation.lumen().wall(&NoStore)?.mesh())?;
+        let mut meter = Meter::default();
+        if lab.fluoro().patient.ct.is_some() {
+            // A tomogram takes seconds to read: hands do not wait for it at the first step on the pedal.
+            meter.measure(&lab, simulation.lumen().wall(&NoStore)?)?;
+        }
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];
         let (history, telemetry) = (History::new(&simulation), Telemetry::new(&simulation));
         Ok(Self {
@@ -143,6 +145,8 @@ impl Session {
             telemetry,
             sac: None,
             exam: None,
+            meter,
+            inputs: Vec::new(),
         })
     }
 
@@ -188,7 +192,8 @@ impl Session {
     /// # Errors
     /// [`Error::Parameter`] for a value that is out of range or a name that does not exist.
     pub fn apply(&mut self, input: &Input) -> Result<()> {
-        let done = self.carry_out(input);
+        self.inputs.push((self.ticks, input.clone()));
+        let done = self.check_in_exam(input).and_then(|()| self.carry_out(input));
         if let Err(error) = &done {
             self.happened(kind_of(error), error.to_string());
         }
@@ -335,6 +340,7 @@ impl Session {
     pub fn tick(&mut self) {
         // The beam state of a tick is that at its beginning.
         let begun_s = self.time_s();
+        self.measure();
         self.telemetry.beam(self.lab.beam(begun_s));
         self.ticks += 1;
         self.lab.tick();
@@ -383,6 +389,25 @@ impl Session {
     /// Records a step that ends at `time_s`, with these motions.
     fn note(&mut self, time_s: f64, motions: &[Motion]) {
         self.telemetry.step(time_s, motions, (&self.simulation, packing(self.sac.as_ref())));
+        if self.lab.is_live() && !motions.is_empty() {
+            let tips = motions.iter().filter_map(|motion| self.simulation.tip_of_mm(motion.instrument));
+            let tips: Vec<_> = tips.collect();
+            // What is still in the sheath moves out of sight anyway.
+            let out = !tips.is_empty() && !tips.iter().any(|tip_mm| self.meter.shows(tip_mm));
+            self.telemetry.in_picture(!out);
+        }
+    }
+
+    /// Measures the beam, if it is on in a room that was not measured yet.
+    fn measure(&mut self) {
+        if !self.lab.is_live() {
+            return;
+        }
+        let wall = self.simulation.lumen().wall(&NoStore);
+        match wall.and_then(|wall| self.meter.measure(&self.lab, wall)) {
+            Ok(delivered) => delivered.into_iter().for_each(|delivered| self.lab.exposed(delivered)),
+            Err(error) => self.happened(kind_of(&error), error.to_string()),
+        }
     }
 
     /// The record of instruments, beam and injector so far, for assessment; it includes undone steps and rests.
@@ -520,6 +545,12 @@ impl Session {
         &self.events
     }
 
+    /// What hands did, from which [`Inputs::repeat_in`] repeats the session to the bit, with its rests, its beam
+    /// and what was undone.
+    pub fn inputs(&self) -> Inputs {
+        Inputs::of(self.ticks, self.solves, &self.inputs)
+    }
+
     /// The simulation.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
@@ -534,11 +565,6 @@ impl Session {
     /// All motions and injections as `[[script]]` tables of a scene file, which repeat them to the bit.
     pub fn script(&self) -> String {
         self.history.script(&self.simulation)
-    }
-
-    /// Stores the exposure of a drawn frame for the current room; until then the nominal dose counts.
-    pub fn exposed(&mut self, delivered: Delivered) {
-        self.lab.exposed(delivered);
     }
 
     /// Data for drawing the current state.

@@ -51,6 +51,13 @@ impl Telemetry {
         }
     }
 
+    /// Records whether the tip that moved in the last step was in the picture.
+    pub(crate) fn in_picture(&mut self, is_seen: bool) {
+        if let Some(last) = self.record.samples.last_mut() {
+            last.out_of_picture = !is_seen;
+        }
+    }
+
     /// Records a rest until `time_s`, if nothing is recorded of that time: a script's step that was not finished.
     pub(crate) fn rest_until(&mut self, time_s: f64, state: (&Simulation, Option<Packing>)) {
         if self.record.samples.last().map_or(0.0, |last| last.time_s) < time_s {

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_assess::{Attempt, Course, Exam, Metric, Record, Score, SessionFile, Site, Subject, Way};
+use endowire_assess::{
+    Attempt, Course, Exam, Metric, Record, Score, SessionFile, Site, Subject, Way, thinnest_mm,
+};
 use endowire_core::Error;
 use endowire_core::device::Stack;
 use endowire_core::vessel::{CentrelineTree, NoStore};
@@ -12,6 +14,7 @@ use endowire_methods::{Setting, scene_with};
 use endowire_viewer::ViewSpec;
 use pyo3::prelude::*;
 
+use crate::arrays::List;
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::interrupt::interruptible;
@@ -84,7 +87,8 @@ impl InScene {
         }
         let instruments: Vec<String> = stack.instruments().iter().map(|one| one.name.clone()).collect();
         let has_sac = scene.vessel.sac.is_some();
-        let site = Site { tree, instruments: &instruments, has_sac, ..Site::default() };
+        let radius_mm = Some(thinnest_mm(&stack));
+        let site = Site { tree, instruments: &instruments, radius_mm, has_sac, ..Site::default() };
         let set = settings.iter().map(ToString::to_string).collect();
         Ok(Self { exam: Exam::new(subject, &site)?, scene: path, set, stack })
     }
@@ -165,7 +169,7 @@ pub(crate) fn score<'py>(
 #[pyo3(signature = (paths, *, subject=None, centreline=None, target=None, within_mm=5.0))]
 pub(crate) fn course<'py>(
     py: Python<'py>,
-    paths: Vec<PathBuf>,
+    paths: List<PathBuf>,
     subject: Option<PathBuf>,
     centreline: Option<PathBuf>,
     target: Option<String>,
@@ -179,6 +183,7 @@ pub(crate) fn course<'py>(
             "a subject says where to go: leave one of the two out",
         ));
     }
+    let paths = paths.0;
     check_distinct(&paths)?;
     let course = interruptible(py, move || {
         let subject =

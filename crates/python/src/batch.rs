@@ -247,7 +247,9 @@ impl Batch {
     ///
     /// Returns the failures, as `step`.
     fn detach<'py>(&self, py: Python<'py>, instruments: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-        let each = instruments.try_iter()?.map(|one| match one? {
+        // One more than there are shows that there are too many: an iterator may have no end.
+        let count = self.with(py, |members| members.starts.len());
+        let each = instruments.try_iter()?.take(count + 1).map(|one| match one? {
             one if one.is_none() => Ok(None),
             one => natural("instruments", &one).map(Some),
         });

@@ -3,8 +3,11 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
+use endowire_core::shape::Shape;
 use endowire_core::vessel::NoStore;
-use endowire_viewer::{self as viewer, DevicePart, FrameTime, Image, PixelFormat, View, ViewSpec};
+use endowire_viewer::{
+    self as viewer, DevicePart, FrameTime, Image, PixelFormat, Pushed, Seen, View, ViewSpec,
+};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -21,6 +24,17 @@ use crate::vessel::Vessel;
 #[pyclass(frozen, module = "endowire", name = "Renderer")]
 pub(crate) struct Renderer {
     inner: Mutex<viewer::Renderer>,
+    /// The last frame: a pulse shows the motion of the same simulation since then.
+    before: Mutex<Option<Before>>,
+}
+
+/// What a frame has shown.
+struct Before {
+    /// Address of its simulation: another one has not moved.
+    of: usize,
+    shape: Shape,
+    inserted_mm: Vec<f64>,
+    time_s: f64,
 }
 
 /// The frames of one state: `three_d`, 8-bit RGBA of shape (height, width, 4), and `fluoro`, 8 or 16 bits of shape
@@ -62,7 +76,7 @@ impl Renderer {
         }
         let spec = planes.swap_remove(plane);
         let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, lumen.wall(&NoStore)?))?;
-        Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
+        Ok(Self { inner: Mutex::new(made.map_err(exception)?), before: Mutex::new(None) })
     }
 
     /// Runs `work` on the renderer with the interpreter released.
@@ -128,7 +142,8 @@ impl Renderer {
     }
 
     /// Draws the views of a simulation in its current state. `frame` is the number of the frame, which determines its
-    /// noise and its time; by default the next one.
+    /// noise and its time; by default the next one. With `xray.pulse_ms` it shows the motion since the last frame of this
+    /// simulation.
     ///
     /// Raises InputError for a view that requests no frames, for a negative frame, and for a simulation that cannot be
     /// drawn.
@@ -145,13 +160,34 @@ impl Renderer {
             return Err(refuse("view.views", "[]", "nothing is drawn: give \"3d\", \"fluoro\" or both"));
         }
         self.move_vessel(py, simulation)?;
-        let frames = self.with(py, |renderer| match frame {
-            None => renderer.render(&views),
-            Some(frame) => {
-                let time_s = frame as f64 / renderer.spec().frames_per_s;
-                renderer.render_at(&views, FrameTime { frame, time_s })
-            }
+        let of = std::ptr::from_ref(simulation) as usize;
+        let (stack, shape, inserted_mm) = simulation.with(py, |simulation| {
+            (simulation.stack().clone(), simulation.shape().clone(), simulation.report().lengths_mm())
+        });
+        let parts = views.iter().zip(simulation.pushed());
+        let parts = parts.map(
+            |(view, one)| {
+                if view.parts.is_empty() { one.parts.clone() } else { view.parts.clone() }
+            },
+        );
+        let pushed = Pushed::of_parts(stack, parts.collect());
+        let before = self.before.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let (frames, time_s) = self.with(py, |renderer| {
+            let moment = match frame {
+                None => renderer.next_frame(),
+                Some(frame) => FrameTime { frame, time_s: frame as f64 / renderer.spec().frames_per_s },
+            };
+            let before = before.as_ref().filter(|before| before.of == of).map(|before| Seen {
+                shape: &before.shape,
+                inserted_mm: &before.inserted_mm,
+                time_s: before.time_s,
+            });
+            let now = Seen { shape: &shape, inserted_mm: &inserted_mm, time_s: moment.time_s };
+            let pulse = pushed.pulse(before, now, renderer);
+            Ok((renderer.render_pulse(&views, &pulse, moment)?, moment.time_s))
         })?;
+        let now = Before { of, shape, inserted_mm, time_s };
+        *self.before.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
         let of = |image: Option<Image>| image.map(|image| pixels(py, image)).transpose();
         Ok(Frames { three_d: of(frames.three_d)?, fluoro: of(frames.fluoro)? })
     }

@@ -90,7 +90,8 @@ impl State {
             Err(e) if e.kind() == ErrorKind::NotFound && path.symlink_metadata().is_err() => path.clone(),
             Err(e) => return Err(failed(e)),
         };
-        if place.exists() && !is_state(&place).map_err(failed)? {
+        // What is in a device or a pipe is not read: it is not lost, either.
+        if place.exists() && !whole::is_special(&place) && !is_state(&place).map_err(failed)? {
             return Err(InputError::new_err(format!(
                 "{}: is there and no state of endowire: give another name, or remove it first",
                 path.display()

@@ -9,8 +9,8 @@ use endowire_core::input::nearest;
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
     CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, Lumen, NoStore,
-    Opening, Resolution, SurfaceFrame, SurfaceMesh, SweptVessel, Target, Wall, anatomy, check_with,
-    wall_hints,
+    Opening, Repair, RepairOptions, Resolution, SurfaceFrame, SurfaceMesh, SweptVessel, Target, Wall,
+    anatomy, check_with, wall_hints,
 };
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
@@ -122,31 +122,51 @@ impl Vessel {
     /// of the file. `axes` is "LPS" or "RAS", if the file's header is silent or wrong (by default LPS, the axes of
     /// scenes).
     ///
-    /// Warns (UserWarning) if the unit may be wrong, and if openings face each other. Raises InputError for a file
-    /// that cannot be read or is not usable as a wall.
+    /// `repair`: "all" faults are mended, and closed bodies and sheets in the lumen become walls; "none" refuses a
+    /// surface that cannot be a wall as it is. `keep_open_mm` are places of holes that are meant, shape (n, 3).
+    ///
+    /// Warns (UserWarning) of what was mended (`repairs`), if the unit may be wrong, and if openings face each other.
+    /// Raises InputError for a file that cannot be read or is not usable as a wall.
     #[staticmethod]
-    #[pyo3(signature = (path, unit_mm = 1.0, axes = None))]
-    fn read(py: Python<'_>, path: PathBuf, unit_mm: f64, axes: Option<&str>) -> PyResult<Self> {
+    #[pyo3(signature = (path, unit_mm = 1.0, axes = None, repair = "all", keep_open_mm = None))]
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        unit_mm: f64,
+        axes: Option<&str>,
+        repair: &str,
+        keep_open_mm: Option<Numbers<'_>>,
+    ) -> PyResult<Self> {
         let frame = frame(unit_mm, axes)?;
+        let options = repair_options(repair, keep_open_mm.as_ref())?;
         let reported = path.display().to_string();
         let made = interruptible(py, move || {
-            let wall = Wall::from_surface(&SurfaceMesh::read(&path, frame)?)?;
+            let wall = Wall::repaired(&SurfaceMesh::read(&path, frame)?, &options)?;
             wall_hints(&wall, frame.unit_mm).map(|hints| (wall, hints))
         })?;
         let (wall, hints) = made.map_err(exception)?;
-        for hint in hints {
+        for hint in wall.report().mended().into_iter().chain(hints) {
             warn(py, &format!("{reported}: {hint}"))?;
         }
         Ok(Self::of_wall(wall))
     }
 
     /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3),
-    /// counter-clockwise seen from outside. The surface is repaired if possible.
+    /// counter-clockwise seen from outside. The surface is repaired if possible; `repair` and `keep_open_mm` are as in
+    /// `read`.
     ///
-    /// Raises InputError for arrays of the wrong shape, for invalid indices, and for a surface that is not usable as
-    /// a wall.
+    /// Warns (UserWarning) of what was mended (`repairs`). Raises InputError for arrays of the wrong shape, for invalid
+    /// indices, and for a surface that is not usable as a wall.
     #[staticmethod]
-    fn from_arrays(py: Python<'_>, vertices_mm: Numbers<'_>, triangles: Numbers<'_>) -> PyResult<Self> {
+    #[pyo3(signature = (vertices_mm, triangles, repair = "all", keep_open_mm = None))]
+    fn from_arrays(
+        py: Python<'_>,
+        vertices_mm: Numbers<'_>,
+        triangles: Numbers<'_>,
+        repair: &str,
+        keep_open_mm: Option<Numbers<'_>>,
+    ) -> PyResult<Self> {
+        let options = repair_options(repair, keep_open_mm.as_ref())?;
         let vertices_mm: Vec<Vec3> = rows("vertices_mm", &vertices_mm)?.into_iter().map(Vec3::from).collect();
         // Indices are taken as floats and checked: a conversion to integers would drop fractions.
         let index = |corner: f64| {
@@ -161,8 +181,12 @@ impl Vessel {
             .map(|[a, b, c]| Ok([index(a)?, index(b)?, index(c)?]))
             .collect::<PyResult<_>>()?;
         let surface = SurfaceMesh { vertices_mm, triangles };
-        let made = interruptible(py, move || Wall::from_surface(&surface))?;
-        Ok(Self::of_wall(made.map_err(exception)?))
+        let made = interruptible(py, move || Wall::repaired(&surface, &options))?;
+        let wall = made.map_err(exception)?;
+        for mended in wall.report().mended() {
+            warn(py, &mended)?;
+        }
+        Ok(Self::of_wall(wall))
     }
 
     /// Builds the wall of a centre-line tree: a built-in anatomy ("straight_tube", "curved_tube", "aortic_arch",
@@ -220,6 +244,17 @@ impl Vessel {
             })
             .collect();
         document::write(py, &openings)
+    }
+
+    /// What was mended on its surface, and what in its lumen was taken as a wall: dictionaries of kind (such as
+    /// "hole_closed", "piece_dropped", "body_in_lumen", "sheet_in_lumen", "part_united"), triangles, at_mm and size_mm
+    /// (middle and sides of the bounding box). Empty for a surface that is taken as it was given, and for a centre line.
+    #[getter]
+    fn repairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match &self.lumen {
+            Lumen::Meshed(_) => document::write(py, &self.wall(py)?.report().repairs),
+            Lumen::Swept(_) => document::write(py, &Vec::<Repair>::new()),
+        }
     }
 
     /// Its centre line, shape (n, 5): x, y, z, radius (mm) and the row of the parent (-1 for the root).
@@ -393,7 +428,7 @@ impl Vessel {
         lumen: UnpickledLumen<'_>,
         centreline: Option<Numbers<'_>>,
         inlet: Option<usize>,
-        targets: Vec<(String, usize)>,
+        targets: List<(String, usize)>,
     ) -> PyResult<Self> {
         let lumen = match lumen {
             UnpickledLumen::Wall(wall) => postcard::from_bytes::<Wall>(&wall)
@@ -408,7 +443,7 @@ impl Vessel {
                 SweptVessel::new(tree, resolution).map_err(exception)?.into()
             }
         };
-        let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
+        let targets: Vec<Target> = targets.0.into_iter().map(|(name, row)| Target { name, row }).collect();
         let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
         let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?;
         let line = tree.map(|tree| Line { tree, inlet });
@@ -562,12 +597,18 @@ fn unknown(path: &Path, error: Error) -> PyErr {
 }
 
 /// Warns as `warnings.warn` does, at the line of the caller.
-fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
 /// Units and axes of a surface file.
+fn repair_options(repair: &str, keep_open_mm: Option<&Numbers<'_>>) -> PyResult<RepairOptions> {
+    let mending = repair.parse().map_err(exception)?;
+    let places = keep_open_mm.map(|places| rows("keep_open_mm", places)).transpose()?.unwrap_or_default();
+    Ok(RepairOptions { mending, keep_open_mm: places.into_iter().map(Vec3::from).collect() })
+}
+
 fn frame(unit_mm: f64, axes: Option<&str>) -> PyResult<SurfaceFrame> {
     let axes = axes.map(str::parse).transpose().map_err(exception)?;
     Ok(SurfaceFrame { unit_mm, axes })

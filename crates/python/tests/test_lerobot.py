@@ -187,8 +187,14 @@ def test_what_cannot_be_written_is_refused(written, vessel, wire, tmp_path):
 
     with pytest.raises(endowire.InputError, match="not a vector"):
         LeRobotLog(gymnasium.make("CartPole-v1"), tmp_path)
-    with pytest.raises(endowire.InputError, match="is not empty"):
+    with pytest.raises(endowire.InputError, match="its log has other features"):
         LeRobotLog(env(tip_mm=observations.Tip()), written)
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "a.txt").write_text("mine")
+    with pytest.raises(endowire.InputError, match="is not empty, and no log of endowire"):
+        LeRobotLog(env(tip_mm=observations.Tip()), tmp_path / "own")
+    (tmp_path / "own" / "a.txt").unlink()
+    (tmp_path / "own").rmdir()
     with pytest.raises(endowire.InputError, match="63 × 48 pixels: a film needs even numbers"):
         LeRobotLog(env(fluoro=observations.Fluoroscopy(size_px=(63, 48))), tmp_path)
     with pytest.raises(endowire.InputError, match="must have no /"):
@@ -200,3 +206,33 @@ def test_what_cannot_be_written_is_refused(written, vessel, wire, tmp_path):
     log.close()
     assert json.loads((tmp_path / "meta/info.json").read_text())["video_path"] is None
     assert not (tmp_path / "videos").exists()
+
+
+def test_a_log_that_is_killed_is_whole_and_goes_on(written, task, tmp_path):
+    from endowire.gym.lerobot_log import LeRobotLog
+
+    def episode(env, number, length):
+        env.reset(seed=number)
+        for action in actions(LENGTHS[number], number)[:length]:
+            env.step(action)
+
+    folder = tmp_path / "set"
+    killed = LeRobotLog(InsertionEnv(task), folder, task="into the tube")
+    episode(killed, 0, LENGTHS[0])
+    episode(killed, 1, 2)
+    # It is killed here: the first episode is counted, and of the second there may be parts.
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert (info["total_episodes"], info["total_frames"]) == (1, LENGTHS[0])
+    # And one file of it, if it was killed between two.
+    (folder / "data/chunk-000/file-001.parquet").write_bytes(b"torn")
+    (folder / "meta/.info.json.part").write_text("{")
+    with pytest.raises(endowire.InputError, match="the log in .* is of 'into the tube'"):
+        LeRobotLog(InsertionEnv(task), folder, task="out of it")
+    env = LeRobotLog(InsertionEnv(task), folder, task="into the tube")
+    for number in (1, 2):
+        episode(env, number, LENGTHS[number])
+    env.close()
+    files = {path.relative_to(folder) for path in folder.rglob("*") if path.is_file()}
+    assert files == {path.relative_to(written) for path in written.rglob("*") if path.is_file()}
+    for file in files:
+        assert (folder / file).read_bytes() == (written / file).read_bytes(), file

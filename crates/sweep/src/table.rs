@@ -48,10 +48,8 @@ struct Column {
 /// A file that cannot be written.
 pub(crate) fn write(path: &Path, columns: &Columns, rows: &[Row]) -> Result<()> {
     let columns = self::columns(columns, rows);
-    let written = whole::write(path, |part| {
-        let file = File::create(part)?;
-        write_to(file, &columns).map_err(std::io::Error::other)
-    });
+    let written =
+        whole::write(path, |file| write_to(file.try_clone()?, &columns).map_err(std::io::Error::other));
     written.map_err(|e| Error::file(path, e))
 }
 

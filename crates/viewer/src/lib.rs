@@ -40,6 +40,7 @@ mod gpu;
 #[path = "no_gpu.rs"]
 mod gpu;
 mod material;
+mod moment;
 mod output;
 mod patient;
 mod pulse;
@@ -58,6 +59,7 @@ pub use fluoro::FrameTime;
 #[cfg(feature = "gpu")]
 pub use gpu::{Drawing, Graphics};
 pub use material::Material;
+pub use moment::Moment;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,
 };

@@ -68,6 +68,12 @@ impl Pushed {
         Ok(pushed)
     }
 
+    /// Instruments with the materials of their parts.
+    pub fn of_parts(stack: Stack, parts: Vec<Vec<DevicePart>>) -> Self {
+        let count = stack.instruments().len();
+        Self { stack, parts, kinds: vec![None; count], part_names: vec![vec![]; count], coils: Vec::new() }
+    }
+
     /// Makes views show these coils, detached from instruments of the stack, after all inserted instruments.
     ///
     /// # Errors

@@ -132,9 +132,13 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render_at`].
     pub fn render(&mut self, devices: &[DeviceView]) -> Result<Frames> {
+        self.render_at(devices, self.next_frame())
+    }
+
+    /// Number and time of the next frame, according to `frames_per_s`.
+    pub fn next_frame(&self) -> FrameTime {
         let frame = self.next_frame;
-        let moment = FrameTime { frame, time_s: frame as f64 / self.setup.spec.frames_per_s };
-        self.render_at(devices, moment)
+        FrameTime { frame, time_s: frame as f64 / self.setup.spec.frames_per_s }
     }
 
     /// Draws the wanted views of a moment: its number seeds the noise, its time determines the contrast medium.

@@ -14,8 +14,8 @@ let watched = false, hasBegun = false, scored = false;
 const cell = (text) => Object.assign(document.createElement("td"), { textContent: text });
 
 /** A measure by its name, with what it is. */
-function measure({ name, definition }) {
-  const told = cell(name);
+function measure({ title, definition }) {
+  const told = cell(title);
   told.append(Object.assign(document.createElement("small"), { textContent: definition }));
   return told;
 }
@@ -46,7 +46,7 @@ function read() {
   element("task-limits").textContent = task.limits.join(", ") || "nothing";
   rows("task-counts", task.counts, (one) => [measure(one), cell(one.asked), cell(one.points)]);
   // A script begins where the scene does.
-  element("watch").hidden = hasBegun;
+  element("watch").hidden = hasBegun || task.exam;
   element("task-dialog").showModal();
 }
 

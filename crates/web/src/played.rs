@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use endowire_assess::{Exam, SessionFile, Site};
+use endowire_assess::{Exam, SCHEMA, SessionFile, Site, thinnest_mm};
 use endowire_core::file::{Files, InMemory};
 use endowire_core::insertion::Script;
 use endowire_core::methods::MethodChoice;
@@ -64,6 +64,7 @@ impl Played {
         let names: Vec<String> =
             simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
         let all_solid = !lumens(simulation.stack(), &view).contains(&true);
+        let radius_mm = thinnest_mm(simulation.stack());
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let setup = setup(&scene, simulation.stack())?;
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
@@ -76,7 +77,7 @@ impl Played {
         if let Some(subject) = subject {
             let tree = subject.goal.target().map(|_| scene.centreline(&NoStore)).transpose()?;
             let has_sac = scene.vessel.sac.is_some();
-            let site = Site { tree, instruments: &names, has_sac, all_solid };
+            let site = Site { tree, instruments: &names, radius_mm: Some(radius_mm), has_sac, all_solid };
             session = session.with_exam(Exam::new(subject, &site)?);
         }
         let first = session.snapshot();
@@ -107,9 +108,12 @@ impl Played {
     /// The session file for assessment, recorded at this time; the scene's path is relative to `folder`.
     pub(crate) fn session_file(&self, folder: &Path, recorded_unix_s: Option<u64>) -> SessionFile {
         SessionFile {
+            schema: SCHEMA,
             scene_file: folder.join(&self.scene_path),
             set: self.settings.iter().map(ToString::to_string).collect(),
             recorded_unix_s,
+            // Inputs are numbers and names, which are always JSON.
+            inputs: serde_json::to_value(self.session.inputs()).ok(),
             record: self.session.record().clone(),
         }
     }
@@ -211,11 +215,7 @@ impl Played {
         draw: impl for<'a> FnOnce(&'a mut Pictures, &Snapshot) -> Result<&'a [Image]>,
     ) -> Result<Vec<Image>> {
         let snapshot = self.session.snapshot();
-        let images = draw(&mut self.pictures, &snapshot)?.to_vec();
-        if let Some(delivered) = self.pictures.delivered(&snapshot) {
-            self.session.exposed(delivered);
-        }
-        Ok(images)
+        Ok(draw(&mut self.pictures, &snapshot)?.to_vec())
     }
 
     /// The computations for sharp pictures, once the room no longer changes.

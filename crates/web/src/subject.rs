@@ -8,6 +8,8 @@ use serde::Serialize;
 pub(crate) struct Task<'a> {
     name: &'a str,
     level: u8,
+    /// Whether the 3D view is hidden and nothing can be undone or shown.
+    exam: bool,
     text: &'a str,
     /// The goal, in words.
     goal: String,
@@ -20,6 +22,7 @@ pub(crate) struct Task<'a> {
 #[derive(Debug, Serialize)]
 struct Counts<'a> {
     name: &'a str,
+    title: &'a str,
     definition: &'static str,
     asked: String,
     points: f64,
@@ -31,6 +34,7 @@ impl<'a> Task<'a> {
         Self {
             name: &subject.name,
             level: subject.level,
+            exam: subject.exam,
             text: subject.text.trim(),
             goal: subject.goal.words(),
             limits: subject.limits.words(),
@@ -42,7 +46,7 @@ impl<'a> Task<'a> {
 fn counts<'a>(threshold: &'a Threshold, measures: &[Metric]) -> Counts<'a> {
     let name = threshold.metric.as_str();
     let definition = measures.iter().find(|one| one.name == name).map_or("", |one| one.definition);
-    Counts { name, definition, asked: threshold.words(), points: threshold.points }
+    Counts { name, title: threshold.title(), definition, asked: threshold.words(), points: threshold.points }
 }
 
 /// A score, as in `endowire assess --json`, and in words.
@@ -58,6 +62,7 @@ pub(crate) struct Graded<'a> {
 #[derive(Debug, Serialize)]
 struct Row<'a> {
     name: &'a str,
+    title: &'a str,
     definition: &'a str,
     value: String,
     asked: Option<String>,
@@ -76,6 +81,7 @@ impl<'a> Graded<'a> {
 fn row(scored: &Scored) -> Row<'_> {
     Row {
         name: scored.metric.name,
+        title: scored.metric.title,
         definition: scored.metric.definition,
         value: scored.value_words(),
         asked: scored.threshold.as_ref().map(Threshold::words),

@@ -7,8 +7,8 @@ use endowire_core::{Error, Result};
 use endowire_play::{Pictures, Snapshot};
 use endowire_viewer::{Graphics, Image};
 
-/// State shown by a frame: the step, the tip, and the room.
-type Seen = (usize, Option<[f64; 3]>, u64);
+/// State shown by a frame: the step, the tip, the room, and whether it is hidden.
+type Seen = (usize, Option<[f64; 3]>, u64, bool);
 
 /// Draws the 3D view when its state has changed.
 #[derive(Debug)]
@@ -56,8 +56,10 @@ impl ThreeD {
 
     /// The next frame. From a graphics processor, it is the one requested earlier, once it has arrived.
     pub(crate) fn next(&mut self, snapshot: &Snapshot, pictures: &mut Pictures) -> Result<Option<Image>> {
-        let seen = Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]));
-        if let Some(on) = &mut self.graphics {
+        let hidden = snapshot.hides_three_d();
+        let seen =
+            Some((snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1], hidden));
+        if let Some(on) = self.graphics.as_mut().filter(|_| !hidden) {
             match on.next(snapshot, pictures, self.seen != seen) {
                 Ok((image, asked)) => {
                     if asked {

@@ -45,21 +45,22 @@ export interface Readout {
 
 /** The task of a training subject in words, and the thresholds of its measures. */
 export interface Task {
-  name: string; level: number; text: string;
-  goal: string; limits: string[]; counts: { name: string; definition: string; asked: string; points: number }[];
+  name: string; level: number; exam: boolean; text: string;
+  goal: string; limits: string[]; counts: { name: string; title: string; definition: string; asked: string; points: number }[];
 }
 
 /** The result of a training subject; `ended` is null if it was left before its end. */
-export interface Verdict { passed: boolean; score: number; ended: { by: "goal" | "time" | "beam" | "contrast" | "wall_force"; time_s: number } | null; }
+export interface Verdict { passed: boolean; score: number; band: "passed" | "missed" | "reckless" | "blind" | "not_reached"; ended: { by: "goal" | "time" | "beam" | "contrast" | "wall_force"; time_s: number } | null; }
 
 /** The score of a training subject: numbers as in `endowire assess --json` in `metrics`, and text in `words` and `rows`. */
 export interface Score extends Verdict {
-  subject: string; words: string; unjudged?: { what: string; why: string }[];
+  schema: number; exam: boolean; subject: string; words: string; unjudged?: { what: string; why: string }[];
   metrics: {
-    name: string; group: string; value: number | null; unit: string; better: "lower" | "higher"; definition: string; study: string;
-    threshold: { at_most?: number; at_least?: number; points: number } | null; passed: boolean | null; unjudged?: string;
+    name: string; title: string; group: string; value: number | null; unit: string; better: "lower" | "higher"; definition: string; study: string;
+    threshold: { at_most?: number; at_least?: number; good?: number; points: number; grave?: boolean; source?: string } | null;
+    passed: boolean | null; credit: number | null; unjudged?: string;
   }[];
-  rows: { name: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null; kept: string | null }[];
+  rows: { name: string; title: string; definition: string; value: string; asked: string | null; points: number | null; passed: boolean | null; kept: string | null }[];
 }
 
 /** The record of instruments, beam and injector: one sample per tick or step of a script; consecutive rests are one sample. */
@@ -67,7 +68,7 @@ export interface SessionRecord {
   samples: {
     time_s: number; tip_mm: [number, number, number] | null; wall_force_n: number; tip_force_n: number; jumped: boolean;
     hands: { advance_mm: number; rotate_rad: number; inserted_mm: number; push_force_n: number | null; torque_nmm: number; tip_mm?: [number, number, number] }[];
-    packing?: { density: number; outside_mm: number }; undone?: boolean;
+    packing?: { density: number; outside_mm: number }; undone?: boolean; out_of_picture?: boolean;
   }[];
   instruments?: string[];
   injections: {

@@ -1,6 +1,6 @@
 //! States of a beam that are alike but for time and pedal.
 
-use endowire_assess::BeamState;
+use endowire_assess::{BeamMode, BeamState};
 
 /// On or off from there on.
 pub(crate) fn beam(time_s: f64, on: bool) -> BeamState {
@@ -12,5 +12,7 @@ pub(crate) fn beam(time_s: f64, on: bool) -> BeamState {
         field_mm2: 1e4,
         primary_deg: 0.0,
         secondary_deg: 0.0,
+        mode: Some(BeamMode::Fluoro),
+        ..BeamState::default()
     }
 }

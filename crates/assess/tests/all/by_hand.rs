@@ -29,6 +29,7 @@ fn record() -> Record {
         field_mm2: 10_000.0,
         primary_deg,
         secondary_deg: 0.0,
+        ..BeamState::default()
     };
     Record {
         samples: vec![
@@ -73,10 +74,12 @@ fn each_measure_is_what_it_says() {
         ("path_ratio", 178.0 / 138.0),
         // From 1 s on, but for 2 s of rest.
         ("tip_speed_mm_per_s", 178.0 / 7.0),
-        ("submovements", 2.0),
-        ("submovement_s", 3.5),
+        // From 1 s to 5 s, in which the hand turns back once, and from 7 s on.
+        ("submovements", 3.0),
+        ("submovement_s", 7.0 / 3.0),
         ("reversals", 2.0),
         ("turns", 0.0),
+        ("needless_turns", 0.0),
         ("retracted_mm", 20.0),
         ("wall_force_n", 0.3),
         ("wall_force_95_n", 0.3),
@@ -86,6 +89,7 @@ fn each_measure_is_what_it_says() {
         ("hand_torque_nmm", 0.0),
         ("jumps", 1.0),
         ("moving_without_beam_s", 5.0),
+        ("unseen_share", 5.0 / 8.0),
         // 90 mm in two seconds.
         ("push_speed_mm_per_s", 45.0),
         ("wrong_branches", 1.0),
@@ -101,7 +105,10 @@ fn each_measure_is_what_it_says() {
     assert_eq!(value("catheter_ahead_s"), None, "of one instrument");
     assert_eq!((value("packing_density"), value("coil_outside_mm")), (None, None), "without a sac");
     let reported: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
-    assert_eq!(reported.len(), by_hand.len() + 4);
+    for name in ["entrance_ugy", "entrance_area_ugycm2", "acquisition_s", "moving_in_acquisition_s"] {
+        assert_eq!(value(name), None, "{name} was not recorded");
+    }
+    assert_eq!(reported.len(), by_hand.len() + 8);
     assert!(Group::ALL.iter().all(|group| metrics.iter().any(|metric| metric.group == *group)));
 }
 

@@ -5,7 +5,9 @@ use crate::beam;
 use std::path::Path;
 
 use beam::beam;
-use endowire_assess::{EndedBy, Exam, Hand, Injection, Outlet, Record, Sample, Score, Site, Subject};
+use endowire_assess::{
+    Band, EndedBy, Exam, Hand, Injection, Outlet, Record, SCHEMA, Sample, Score, Site, Subject,
+};
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
 
@@ -66,7 +68,13 @@ fn pushed(force_n: impl Fn(usize) -> f64) -> Record {
         wall_force_n: force_n(k),
         ..Sample::default()
     };
-    Record { samples: (1..=10).map(sample).collect(), ..Record::default() }
+    let beam = Some(vec![beam(0.0, true)]);
+    Record { samples: (1..=10).map(sample).collect(), beam, ..Record::default() }
+}
+
+/// The same without any record of a beam.
+fn unseen(force_n: impl Fn(usize) -> f64) -> Record {
+    Record { beam: None, ..pushed(force_n) }
 }
 
 /// The subject on the line, with a wire in a catheter and no sac.
@@ -105,14 +113,13 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert_eq!((clean.verdict.passed, clean.verdict.score, clean.subject.as_str()), (true, 100.0, "end"));
     let total = clean.metrics.iter().find(|one| one.metric.name == "total_s").unwrap();
     assert_eq!((total.metric.value, total.passed), (Some(10.0), Some(true)));
-    assert_eq!(clean.asked().count(), 3);
+    assert_eq!((clean.asked().count(), clean.schema, clean.verdict.band), (9, SCHEMA, Band::Passed));
 
-    // Who pushes too hard keeps one point of four, and does not pass; who pushes much too hard is stopped.
+    // Who pushes too hard does not pass, and keeps a quarter of the three points of eleven; who pushes much too hard is
+    // stopped.
     let hard = score(&pushed(|k| if k == 4 { 1.5 } else { 0.5 }));
-    assert_eq!(
-        (hard.verdict.passed, hard.verdict.score, end(&hard).unwrap().0),
-        (false, 25.0, EndedBy::Goal)
-    );
+    assert_eq!((hard.verdict.band, end(&hard).unwrap().0), (Band::Missed, EndedBy::Goal));
+    assert!((hard.verdict.score - (40.0 + 40.0 * 8.75 / 11.0)).abs() < 1e-9, "{:?}", hard.verdict);
     let rough = score(&pushed(|k| if k == 4 { 2.5 } else { 0.5 }));
     assert_eq!((rough.verdict.passed, rough.verdict.score), (false, 0.0));
     assert_eq!(end(&rough), Some((EndedBy::WallForce, 4.0)));
@@ -122,24 +129,29 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert!(exam(reported).score(&pushed(|_| 0.5)).verdict.passed);
     let of_beam = [("\"total_s\"", "\"beam_on_s\""), ("at_most = 20.0", "at_most = 12.0")];
     let of_beam = subject(&of_beam).unwrap();
-    let unseen = exam(of_beam.clone()).score(&pushed(|_| 0.5));
-    assert_eq!((unseen.verdict.passed, unseen.verdict.score), (false, 75.0));
+    let unseen = exam(of_beam.clone()).score(&unseen(|_| 0.5));
+    assert_eq!((unseen.verdict.passed, unseen.verdict.band), (false, Band::Missed));
     // It is not missed either, and the reason is reported: the limit of the beam has the same.
     let threshold = unseen.metrics.iter().find(|one| one.metric.name == "beam_on_s").unwrap();
     assert_eq!((threshold.passed, threshold.kept_words()), (None, "not judged"));
     let unjudged: Vec<&str> = unseen.unjudged.iter().map(|one| one.what.as_str()).collect();
-    assert_eq!(unjudged, ["beam_on_s", "limits.beam_s"]);
+    assert_eq!(
+        unjudged,
+        ["beam_on_s", "beam_on_idle_s", "moving_in_acquisition_s", "unseen_share", "limits.beam_s"]
+    );
     let [words] = unseen.unjudged_words().try_into().unwrap();
-    assert!(words.starts_with("not judged: beam_on_s, limits.beam_s: no beam was recorded"), "{words}");
-    let seen = Record { beam: Some(vec![beam(0.0, true)]), ..pushed(|_| 0.5) };
-    assert!(exam(of_beam).score(&seen).unjudged.is_empty());
+    assert!(
+        words.starts_with("not judged: beam_on_s, ") && words.contains("no beam was recorded"),
+        "{words}"
+    );
+    assert!(exam(of_beam).score(&pushed(|_| 0.5)).unjudged.is_empty());
     // Where nothing was done, that is the reason, and not that instruments or a sac are missing.
     let of_two =
         [("\"spectral_arc_length\"", "\"catheter_ahead_s\""), ("at_least = -100.0", "at_most = 1.0")];
     let of_two = subject(&of_two).unwrap();
     let nothing = exam(of_two).score(&Record { beam: Some(vec![]), ..Record::default() });
-    let [of_ahead] = nothing.unjudged.as_slice() else { panic!("{:?}", nothing.unjudged) };
-    assert_eq!(of_ahead.why, "nothing was done in the session");
+    assert!(nothing.unjudged.iter().any(|one| one.what == "catheter_ahead_s"), "{:?}", nothing.unjudged);
+    assert!(nothing.unjudged.iter().all(|one| one.why == "nothing was done in the session"));
 
     // What comes after the end does not count, and who stops before it has no score.
     let mut longer = pushed(|_| 0.5);
@@ -154,7 +166,7 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
 #[test]
 fn limits_end_it_when_they_are_passed() {
     // The tip rests at 50 mm until 40 s.
-    let mut slow = pushed(|_| 0.5);
+    let mut slow = unseen(|_| 0.5);
     slow.samples.truncate(5);
     slow.samples.push(Sample { time_s: 40.0, hands: vec![Hand::default()], ..slow.samples[4].clone() });
     assert_eq!(end(&score(&slow)), Some((EndedBy::Time, 30.0)));
@@ -189,24 +201,84 @@ fn what_is_used_stands_still_once_it_has_ended() {
     assert_eq!(used(&record), at_the_end);
 }
 
+/// The score of a subject with more thresholds, of a record that reaches its goal.
+fn score_of(record: &Record, more: &str) -> Score {
+    let text = format!("{FILE}\n{more}");
+    let subject = Subject::from_toml(&text, Path::new("subjects/end.toml")).unwrap();
+    (*exam(subject).score(record)).clone()
+}
+
 #[test]
-fn a_score_of_nothing_has_no_sign() {
-    // The goal is reached, and no threshold is met.
-    let one = FILE.find("[[threshold]]").unwrap();
-    let text = format!("{}[[threshold]]\nmetric = \"hand_force_n\"\nat_most = 0.001\n", &FILE[..one]);
+fn a_grave_fault_and_blindness_cannot_be_made_good_by_anything_else() {
     let mut record = pushed(|_| 0.5);
     record.samples[3].hands[0].push_force_n = Some(0.5);
-    let strict = Subject::from_toml(&text, Path::new("subjects/end.toml")).unwrap();
-    let score = exam(strict).score(&record);
-    assert!(score.verdict.score == 0.0 && score.verdict.score.is_sign_positive());
-    assert_eq!(score.verdict.words(), "not passed, 0 of 100: the goal is reached after 10.00 s");
+    let missed = "[[threshold]]\nmetric = \"hand_force_n\"\nat_most = 0.1\npoints = 0.01";
+    let of = |record: &Record, more: &str| {
+        let verdict = score_of(record, more).verdict;
+        (verdict.band, verdict.score)
+    };
+    let (band, score) = of(&record, missed);
+    assert!(band == Band::Missed && (79.0..80.0).contains(&score), "{score}");
+    let grave = format!("{missed}\ngrave = true");
+    let (band, score) = of(&record, &grave);
+    assert!(band == Band::Reckless && (39.0..40.0).contains(&score), "{score}");
+    // Moved unseen: with the beam off, or beside its picture.
+    let dark = Record { beam: Some(vec![beam(0.0, false)]), ..record.clone() };
+    let mut beside = record.clone();
+    beside.samples.iter_mut().for_each(|sample| sample.out_of_picture = true);
+    for blind in [dark, beside] {
+        let (band, score) = of(&blind, missed);
+        assert!(band == Band::Blind && (5.0..10.0).contains(&score), "{score}");
+        let (band, score) = of(&blind, &grave);
+        assert!(band == Band::Blind && score < 5.0, "{score}");
+    }
+    // Too fast for the instrument: as of its thickness, or as the subject asks.
+    let fast = pushed(|_| 0.5);
+    let slow = "[[threshold]]\nmetric = \"push_speed_mm_per_s\"\nat_most = 5.0";
+    assert_eq!((of(&fast, "").0, of(&fast, slow).0), (Band::Passed, Band::Reckless));
+}
+
+#[test]
+fn credit_falls_from_the_good_value_to_half_at_the_threshold() {
+    let with = |good: &str| {
+        let changed = subject(&[("at_most = 20.0", &format!("at_most = 20.0\n{good}"))]).unwrap();
+        let score = exam(changed).score(&pushed(|_| 0.5));
+        let total = score.metrics.iter().find(|one| one.metric.name == "total_s").unwrap();
+        (total.credit.unwrap(), score.verdict.passed)
+    };
+    // Ten seconds.
+    assert_eq!((with(""), with("good = 15.0")), ((1.0, true), (1.0, true)));
+    assert_eq!(with("good = 0.0"), (0.75, true));
+    let error = subject(&[("at_most = 20.0", "at_most = 20.0\ngood = 30.0")]).unwrap_err();
+    assert!(error.contains("threshold[1].good = 30: the whole credit is given up to there"), "{error}");
+}
+
+#[test]
+fn no_subject_can_do_without_the_beam() {
+    for (asked, refused) in
+        [("at_most = 0.5", true), ("at_most = 0.1\npoints = 0", true), ("at_most = 0.05", false)]
+    {
+        let more = format!("[[threshold]]\nmetric = \"unseen_share\"\n{asked}");
+        let text = format!("{FILE}\n{more}");
+        let read = Subject::from_toml(&text, Path::new("subjects/end.toml"));
+        assert_eq!(read.is_err(), refused, "{asked}");
+    }
+    // An exam asks for more: a second of ten without the beam.
+    let late = Record { beam: Some(vec![beam(0.4, true)]), ..pushed(|_| 0.5) };
+    let of = |exams: &str| {
+        let changed = subject(&[("level = 2", &format!("level = 2\n{exams}"))]).unwrap();
+        let score = exam(changed).score(&late);
+        (score.verdict.band, score.exam)
+    };
+    assert_eq!(of(""), (Band::Passed, false));
+    assert_eq!(of("exam = true"), (Band::Blind, true));
 }
 
 #[test]
 fn contrast_medium_counts_where_the_tip_is_at_its_target() {
     let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
     let ml = |time_s, volume_ml| injection(time_s, volume_ml, 97.0);
-    let mut record = pushed(|_| 0.5);
+    let mut record = unseen(|_| 0.5);
     record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
     // The goal is reached once all of it has flowed, 4 ml at 5 ml/s.
     for (injections, expected) in [
@@ -223,7 +295,7 @@ fn contrast_medium_counts_where_the_tip_is_at_its_target() {
 #[test]
 fn contrast_medium_counts_where_it_leaves_and_not_where_the_foremost_tip_is() {
     let asked = subject(&[("tip_within_mm = 5.0", "tip_within_mm = 5.0\ninject_ml = 4.0")]).unwrap();
-    let mut record = pushed(|_| 0.5);
+    let mut record = unseen(|_| 0.5);
     record.samples.push(Sample { time_s: 20.0, hands: vec![Hand::default()], ..record.samples[9].clone() });
     let scored = |record: &Record| {
         let mut followed = exam(asked.clone());

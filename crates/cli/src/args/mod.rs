@@ -194,6 +194,9 @@ pub(crate) struct AssessArgs {
     /// Score them by a training subject, given by its file or its name in assets/subjects, until its goal is reached or a limit is exceeded
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["target", "within_mm", "scene"])]
     pub(crate) subject: Option<PathBuf>,
+    /// Carry each session out again by its recorded inputs, and score what they lead to: a session file that was changed is refused
+    #[arg(long, requires = "subject")]
+    pub(crate) verify: bool,
     /// Distance from the target at which the tip counts as arrived
     #[arg(long, default_value_t = 5.0, value_name = "MM", allow_negative_numbers = true)]
     pub(crate) within_mm: f64,

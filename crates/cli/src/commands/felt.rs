@@ -1,8 +1,6 @@
 //! The wall in contact with devices, as written, reported and drawn by `endowire vessel check`.
 
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use endowire_core::contact::{ContactMesh, WallProperties};
@@ -12,6 +10,7 @@ use serde::Serialize;
 
 use crate::args::FeltArgs;
 use crate::failure::Failure;
+use crate::output::chart::write_png;
 
 /// Radius of the wire for which the wall is smoothed, mm: 0.014″, the thinnest. For thicker wires the wall differs
 /// only at septa.
@@ -161,13 +160,8 @@ fn draw(path: &Path, felt: &Conditioned<'_>, wall: &Wall, limit_mm: f64) -> Resu
             }
         }
     }
-    let write = || -> Result<(), png::EncodingError> {
-        let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width as u32, height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.write_header()?.write_image_data(&pixels)
-    };
-    write().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+    let written = write_png(path, (width as u32, height as u32), &pixels);
+    written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
 }
 
 /// Colour of a deviation relative to the limit, positive inside.

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use endowire_core::insertion::{DetachedCoil, Script, Simulation, Step, Tally};
+use endowire_core::insertion::{Contact, DetachedCoil, Script, Simulation, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, VesselMotion};
-use endowire_viewer::{ContactView, FrameTime};
+use endowire_viewer::{ContactView, FrameTime, Moment, Seen};
 
 use super::studio::{Plan, Still, Studio, Went};
 use crate::args::{FluoroArgs, ViewChoice};
@@ -46,29 +46,43 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         Some(simulation) => simulation.lumen().wall(&cache).map_err(in_scene)?.clone(),
         None => scene.wall(&cache).map_err(in_scene)?,
     };
-    let now = match &mut simulation {
+    let motion = VesselMotion::new(&scene.vessel.motion).map_err(in_scene)?;
+    let mut now = match &mut simulation {
         Some(simulation) => after(simulation, &script, steps, args, plan.frames_per_s())?,
-        None => {
-            let motion = VesselMotion::new(&scene.vessel.motion).map_err(in_scene)?;
-            Now { displacement: motion.map(|motion| motion.at(0.0)), ..Now::default() }
-        }
+        None => Now::default(),
     };
     let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
     let injections = now.injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
-    scenes::tell_found_centreline(&args.scene, &scene);
+    scenes::tell_found(&args.scene, &scene);
     for k in 0..frames {
-        let time_s = args.time + k as f64 / frames_per_s;
-        let moment = FrameTime { frame: k as u64, time_s };
+        let since_s = k as f64 / frames_per_s;
+        let time_s = args.time + since_s;
+        let before = now.seen();
+        match (&mut simulation, &motion) {
+            // An empty vessel moves by the clock of its medium.
+            (None, Some(motion)) => now.displacement = Some(motion.at(time_s)),
+            (Some(simulation), Some(motion)) if k > 0 && motion.changes() => {
+                now.follow(simulation, 1.0 / frames_per_s)
+                    .map_err(|e| Failure::Computation(format!("{}: frame {k}: {e}", args.scene.display())))?;
+            }
+            _ => {}
+        }
         studio.draw(&Still {
             name: format!("frame_{k:06}"),
-            moment,
-            shape: &now.shape,
-            inserted_mm: &now.inserted_mm,
-            coils: &now.coils,
-            contacts: &now.contacts,
-            before: None,
-            displacement: now.displacement.as_ref(),
+            moment: Moment {
+                frame: FrameTime { frame: k as u64, time_s },
+                shape: &now.shape,
+                inserted_mm: &now.inserted_mm,
+                coils: &now.coils,
+                contacts: &now.contacts,
+                displacement: now.displacement.as_ref(),
+                before: before.as_ref().filter(|_| k > 0).map(|(shape, inserted_mm)| Seen {
+                    shape,
+                    inserted_mm,
+                    time_s: time_s - 1.0 / frames_per_s,
+                }),
+            },
         })?;
     }
     let mut written = studio.finish()?;
@@ -92,6 +106,35 @@ struct Now {
     /// Number of steps carried out, and their statistics.
     steps: usize,
     tally: Tally,
+}
+
+impl Now {
+    /// The devices as they are, if any are in.
+    fn seen(&self) -> Option<(Shape, Vec<f64>)> {
+        (!self.inserted_mm.is_empty()).then(|| (self.shape.clone(), self.inserted_mm.clone()))
+    }
+
+    /// Lets the vessel move on while hands rest; the devices follow it.
+    fn follow(&mut self, simulation: &mut Simulation, duration_s: f64) -> endowire_core::Result<()> {
+        let time_s = Some(simulation.time_s() + duration_s);
+        let rest = Step { moves: vec![].into(), detach: None, solves: None, time_s, duration_s };
+        rest.carry_out(simulation)?;
+        self.steps += 1;
+        self.tally.count(self.steps, simulation);
+        self.take(simulation);
+        Ok(())
+    }
+
+    /// Takes the shape of the devices and the vessel's place.
+    fn take(&mut self, simulation: &Simulation) {
+        let report = simulation.report();
+        let contact = |c: &Contact| ContactView { position_mm: c.position_mm, force_n: c.total_n() };
+        self.shape = simulation.shape().clone();
+        self.inserted_mm = report.lengths_mm();
+        self.coils = simulation.coils().to_vec();
+        self.contacts = report.contacts.iter().map(contact).collect();
+        self.displacement = simulation.displacement();
+    }
 }
 
 /// Carries out the first steps of the script.
@@ -119,18 +162,7 @@ fn after(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let report = simulation.report();
-    let contacts = report.contacts.iter();
-    Ok(Now {
-        shape: simulation.shape().clone(),
-        inserted_mm: report.lengths_mm(),
-        coils: simulation.coils().to_vec(),
-        contacts: contacts
-            .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
-            .collect(),
-        injections,
-        displacement: simulation.displacement(),
-        steps: taken,
-        tally,
-    })
+    let mut now = Now { injections, steps: taken, tally, ..Now::default() };
+    now.take(simulation);
+    Ok(now)
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::vessel::VesselMotion;
-use endowire_viewer::{FrameTime, Seen};
+use endowire_viewer::{FrameTime, Moment, Seen};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -60,7 +60,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
-    scenes::tell_found_centreline(&path, &scene);
+    scenes::tell_found(&path, &scene);
     let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
@@ -94,13 +94,19 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let displacement = motion.as_ref().map(|motion| motion.at(ended_s(step)));
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
-            moment: moment(k),
-            shape: &shape,
-            inserted_mm: &inserted_mm,
-            coils: &coils::after(&left, step),
-            contacts: &contacts,
-            displacement: displacement.as_ref(),
-            before: before.map(|(inserted_mm, shape, time_s)| Seen { shape, inserted_mm, time_s: *time_s }),
+            moment: Moment {
+                frame: moment(k),
+                shape: &shape,
+                inserted_mm: &inserted_mm,
+                coils: &coils::after(&left, step),
+                contacts: &contacts,
+                displacement: displacement.as_ref(),
+                before: before.map(|(inserted_mm, shape, time_s)| Seen {
+                    shape,
+                    inserted_mm,
+                    time_s: *time_s,
+                }),
+            },
         })?;
         bar.inc(1);
     }

@@ -59,6 +59,7 @@ struct Shown<'a> {
     subject: String,
     name: &'a str,
     level: u8,
+    exam: bool,
     text: &'a str,
     scene: PathBuf,
     /// Overridden keys of the scene.
@@ -112,13 +113,15 @@ fn list(folder: &Path, json: bool) -> Result<(), Failure> {
 
 fn show(which: &Path, cache: &Cache, json: bool) -> Result<(), Failure> {
     let subject = subjects::read(which)?;
-    // What does not fit its scene is refused here as in `run`.
-    subjects::in_scene(&subject, cache)?;
+    // What does not fit its scene is refused here as in `run`. An exam has the thresholds that every subject has.
+    let (_, _, exam) = subjects::in_scene(&subject, cache)?;
+    let subject = exam.subject();
     let document = Shown {
         provenance: Provenance::new(&[read_input(subject.path())?], 0),
         subject: subject.stem(),
         name: &subject.name,
         level: subject.level,
+        exam: subject.exam,
         text: subject.text.trim(),
         scene: subject.resolve(&subject.scene),
         scene_set: &subject.set,
@@ -143,8 +146,15 @@ fn text_of(shown: &Shown<'_>) -> String {
     if !limits.is_empty() {
         lines.push(format!("ends at    {}", limits.join(", ")));
     }
+    if shown.exam {
+        lines.push("exam       the 3D view is hidden, and nothing can be undone".to_owned());
+    }
     lines.extend(shown.thresholds.iter().map(|Named { metric, threshold }| {
-        format!("threshold  {metric:<22} {:<16} points {}", threshold.words(), threshold.points)
+        let grave = if threshold.grave { ", grave" } else { "" };
+        format!("threshold  {metric:<22} {:<16} points {}{grave}", threshold.words(), threshold.points)
+    }));
+    lines.extend(shown.thresholds.iter().filter_map(|Named { metric, threshold }| {
+        Some(format!("source     {metric:<22} {}", threshold.source.as_ref()?))
     }));
     lines.join("\n")
 }

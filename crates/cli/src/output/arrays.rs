@@ -1,7 +1,6 @@
 //! Shapes and contacts of a run as arrays. During the run each array grows in its own file, so that a run that is
 //! killed keeps every step; at the end they are packed into shapes.npz.
 
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -128,7 +127,7 @@ impl ShapeArrays {
 
     /// Packs the arrays into shapes.npz; if that fails, the growing ones stay.
     pub(crate) fn pack(mut self, recording: &Path) -> io::Result<()> {
-        whole::write(&recording.join(PACKED), |part| npz::write(File::create(part)?, &mut self.arrays))?;
+        whole::write(&recording.join(PACKED), |file| npz::write(file.try_clone()?, &mut self.arrays))?;
         // Some systems cannot remove an open file.
         drop(self.arrays);
         remove_growing(&self.folder)

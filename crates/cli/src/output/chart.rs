@@ -7,6 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
+use super::whole;
 use crate::failure::Failure;
 
 /// Result of drawing on a backend.
@@ -65,7 +66,7 @@ pub(crate) fn write(
 /// Draws a chart to a file, SVG or PNG by its extension.
 pub(crate) fn write_file(path: &Path, size: (u32, u32), chart: &impl Chart) -> Result<(), Failure> {
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("svg") => std::fs::write(path, svg(size, chart)?),
+        Some("svg") => whole::write_bytes(path, svg(size, chart)?.as_bytes()),
         Some("png") => {
             register();
             let mut pixels = vec![0; 3 * (size.0 * size.1) as usize];
@@ -105,12 +106,13 @@ fn draw<B: DrawingBackend>(backend: B, chart: &impl Chart) -> Result<(), Failure
 
 /// Writes an RGB picture of three bytes per pixel.
 pub(crate) fn write_png(path: &Path, size: (u32, u32), rgb: &[u8]) -> std::io::Result<()> {
-    let file = std::io::BufWriter::new(std::fs::File::create(path)?);
-    let mut encoder = png::Encoder::new(file, size.0, size.1);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgb)?;
-    writer.finish()?;
-    Ok(())
+    whole::write(path, |file| {
+        let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), size.0, size.1);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(rgb)?;
+        writer.finish()?;
+        Ok(())
+    })
 }

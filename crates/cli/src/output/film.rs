@@ -25,22 +25,26 @@ pub(crate) fn write(
         tell(format_args!("endowire: no {name} in {}: no frame was drawn", folder.display()));
         return Ok(None);
     };
-    // The extension determines the format, so an unfinished file is marked at the start of its name.
-    let part = folder.join(format!("part-{name}"));
-    let made = || -> endowire_core::Result<()> {
+    let path = folder.join(&name);
+    let made = |part: &Path| -> endowire_core::Result<()> {
         let first = side_by_side(folder, first)?;
-        let mut film = Animation::new(&part, &first, steps.len() as u32, Pace::even(frames_per_s))?;
+        let mut film = Animation::new(part, &first, steps.len() as u32, Pace::even(frames_per_s))?;
         film.push(&first)?;
         steps[1..].iter().try_for_each(|step| film.push(&side_by_side(folder, step)?))?;
         film.finish()
     };
-    let path = folder.join(&name);
-    let made = made().map_err(Failure::from);
-    let made = made.and_then(|()| std::fs::rename(&part, &path).map_err(|e| Failure::write(&path, &e)));
-    if made.is_err() {
-        let _ = whole::remove(&part);
+    let mut failed = None;
+    let written = whole::write_at(&path, |part| {
+        made(part).map_err(|error| {
+            let text = error.to_string();
+            failed = Some(error);
+            std::io::Error::other(text)
+        })
+    });
+    match (failed, written) {
+        (Some(error), _) => Err(error.into()),
+        (None, written) => written.map(|()| Some(name)).map_err(|e| Failure::write(&path, &e)),
     }
-    made.map(|()| Some(name))
 }
 
 /// The step number in the name of a frame, step_NUMBER_VIEW.png.

@@ -164,7 +164,7 @@ fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
             whole::remove(&path)?;
             removed.push(name.to_owned());
         }
-        whole::remove(&whole::unfinished(&path))?;
+        whole::remove_unfinished(&path)?;
     }
     if recording {
         let growing = folder.join(arrays::GROWING);

@@ -8,7 +8,7 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{VesselMotion, Wall};
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
-use endowire_viewer::{Exposure, FrameTime, Mode, Pushed, Renderer, Seen, View, ViewSpec};
+use endowire_viewer::{Exposure, FrameTime, Mode, Moment, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
 
 use super::film;
@@ -205,18 +205,20 @@ impl FrameWriter {
             }
             self.injected = false;
         }
-        if let Some(motion) = &self.motion {
-            let displacement = motion.at(time_s);
-            self.planes.iter_mut().try_for_each(|plane| plane.move_vessel(Some(&displacement)))?;
-        }
-        self.pushed.leave(recorder.coils())?;
-        let views = self.pushed.views(shape, inserted_mm);
-        let moment = FrameTime { frame: step as u64, time_s };
+        let displacement = self.motion.as_ref().map(|motion| motion.at(time_s));
         let before = self.before.as_ref();
         let before = before.map(|b| Seen { shape: &b.shape, inserted_mm: &b.inserted_mm, time_s: b.time_s });
         for (plane, names) in self.planes.iter_mut().zip([["3d", "fluoro"], ["3d_b", "fluoro_b"]]) {
-            let pulse = self.pushed.pulse(before, Seen { shape, inserted_mm, time_s }, plane);
-            let frames = plane.render_pulse(&views, &pulse, moment)?;
+            let moment = Moment {
+                frame: FrameTime { frame: step as u64, time_s },
+                shape,
+                inserted_mm,
+                coils: recorder.coils(),
+                contacts: &[],
+                displacement: displacement.as_ref(),
+                before,
+            };
+            let frames = plane.draw(&mut self.pushed, &moment)?;
             for (name, image) in names.into_iter().zip([&frames.three_d, &frames.fluoro]) {
                 if let Some(image) = image {
                     recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;

@@ -11,6 +11,8 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
+use super::whole;
+
 /// Size of a number in bytes, for both kinds.
 const NUMBER_BYTES: u64 = 8;
 
@@ -136,10 +138,12 @@ fn header(kind: &str, shape: &str) -> Vec<u8> {
 
 /// Writes a map of 32-bit floats, row by row, as a `.npy` file.
 pub(crate) fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result<()> {
-    let mut file = BufWriter::new(File::create(path)?);
-    file.write_all(&header("<f4", &format!("({}, {width})", values.len() / width.max(1))))?;
-    values.iter().try_for_each(|v| file.write_all(&v.to_le_bytes()))?;
-    file.flush()
+    whole::write(path, |file| {
+        let mut file = BufWriter::new(file);
+        file.write_all(&header("<f4", &format!("({}, {width})", values.len() / width.max(1))))?;
+        values.iter().try_for_each(|v| file.write_all(&v.to_le_bytes()))?;
+        file.flush()
+    })
 }
 
 /// A small array in memory.
@@ -164,17 +168,19 @@ impl Array {
 
 /// Packs arrays in memory into a `.npz` file.
 pub(crate) fn write_arrays(path: &Path, arrays: &[Array]) -> io::Result<()> {
-    let mut archive = ZipWriter::new(BufWriter::new(File::create(path)?));
-    let options = SimpleFileOptions::default()
-        .compression_method(zip::CompressionMethod::Stored)
-        .last_modified_time(zip::DateTime::default());
-    for array in arrays {
-        archive.start_file(format!("{}.npy", array.name), options)?;
-        let sides: Vec<String> = array.shape.iter().map(|n| format!("{n},")).collect();
-        archive.write_all(&header(array.kind, &format!("({})", sides.join(" "))))?;
-        archive.write_all(&array.bytes)?;
-    }
-    archive.finish()?.flush()
+    whole::write(path, |file| {
+        let mut archive = ZipWriter::new(BufWriter::new(file));
+        let options = SimpleFileOptions::default()
+            .compression_method(zip::CompressionMethod::Stored)
+            .last_modified_time(zip::DateTime::default());
+        for array in arrays {
+            archive.start_file(format!("{}.npy", array.name), options)?;
+            let sides: Vec<String> = array.shape.iter().map(|n| format!("{n},")).collect();
+            archive.write_all(&header(array.kind, &format!("({})", sides.join(" "))))?;
+            archive.write_all(&array.bytes)?;
+        }
+        archive.finish()?.flush()
+    })
 }
 
 /// The numbers of an array of 8-byte numbers packed by [`write()`], as little-endian bytes.

@@ -354,7 +354,7 @@ impl Recorder {
         }
         let name = folder::frame_name(step, view);
         let path = folder.join(&name);
-        whole::write(&path, write).map_err(|e| Failure::write(&path, &e))?;
+        whole::write_at(&path, write).map_err(|e| Failure::write(&path, &e))?;
         self.frames.push(format!("frames/{name}"));
         Ok(())
     }

@@ -34,7 +34,7 @@ pub(crate) struct PointArray {
 impl PolyData {
     /// Writes a `.vtp` file, completely or not at all.
     pub(crate) fn write(&self, path: &Path) -> io::Result<()> {
-        whole::write(path, |part| std::fs::write(part, self.document()))
+        whole::write_bytes(path, self.document().as_bytes())
     }
 
     fn document(&self) -> String {
@@ -72,7 +72,7 @@ pub(crate) fn write_series(path: &Path, times: &[(f64, Vec<String>)]) -> io::Res
         }
     }
     text += "</Collection>\n</VTKFile>\n";
-    whole::write(path, |part| std::fs::write(part, text))
+    whole::write_bytes(path, text.as_bytes())
 }
 
 fn head(kind: &str) -> String {

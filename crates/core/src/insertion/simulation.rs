@@ -366,7 +366,8 @@ impl Simulation {
     /// taken from, to the bit. After an error nothing has changed.
     ///
     /// # Errors
-    /// A state of another method, vessel, wall, device, sheath or element length ([`Error::Parameter`]).
+    /// A state of another method, vessel, wall, device, sheath or element length, and one with a number that is not
+    /// finite ([`Error::Parameter`]).
     pub fn restore(&mut self, state: &State) -> Result<()> {
         if !(0.0..=LATEST_S).contains(&state.time_s()) {
             let remedy = format!("must be a time from 0 to {LATEST_S} s: restore a state of this scene");
@@ -376,6 +377,7 @@ impl Simulation {
             let remedy = "it was taken in another scene: its vessel, wall, instruments or sheath are others; restore a state of this scene";
             return Err(Error::parameter("state.scene", format!("{:016x}", state.scene()), remedy));
         }
+        state.check_finite()?;
         self.method.restore(&self.scene.surroundings([self.time_s; 2]), state)?;
         self.time_s = state.time_s();
         self.fields_before = Arc::clone(&self.fields);

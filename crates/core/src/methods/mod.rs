@@ -2,6 +2,7 @@
 
 mod command;
 mod detached;
+mod finite;
 pub mod kirchhoff;
 mod report;
 mod sheath;

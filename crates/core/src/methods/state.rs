@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Rotation3;
 use serde::{Deserialize, Serialize};
 
+use super::finite;
 use super::kirchhoff::KirchhoffState;
 use crate::device::Device;
 use crate::methods::StepReport;
@@ -116,6 +117,17 @@ impl State {
     /// The same state of a scene at a time since the start, s.
     pub(crate) fn of_scene(self, scene: u64, time_s: f64) -> Self {
         Self { scene, time_s, ..self }
+    }
+
+    /// Refuses numbers that no insertion has: a state may come from a file, or from anybody.
+    ///
+    /// # Errors
+    /// The key of the first number that is not finite.
+    pub(crate) fn check_finite(&self) -> Result<()> {
+        finite::check(self).map_err(|found| {
+            let remedy = "must be a finite number: restore a state that was written by an insertion";
+            Error::parameter(format!("state.{}", found.path()), "not finite", remedy)
+        })
     }
 
     /// The number of the scene that it belongs to; 0 for none.

@@ -69,6 +69,9 @@ pub struct SceneOf<M> {
     /// The vessel's centre line, once needed.
     #[serde(skip)]
     pub(super) centreline: OnceLock<CentrelineTree>,
+    /// What was mended on its surface, once read.
+    #[serde(skip)]
+    mended: OnceLock<Vec<String>>,
 }
 
 fn of_file_system() -> Arc<dyn Files> {
@@ -256,6 +259,13 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             if let Some(axes) = spec.axes {
                 return Err(Error::parameter("vessel.axes", axes.name(), remedy));
             }
+            let remedy = "only with vessel.file: a tree is not repaired";
+            if let Some(mending) = spec.repair {
+                return Err(Error::parameter("vessel.repair", format!("{mending:?}").to_lowercase(), remedy));
+            }
+            if let Some(place) = spec.keep_open_mm.first() {
+                return Err(Error::parameter("vessel.keep_open_mm", format!("{place:?}"), remedy));
+            }
             self.centreline_path()?;
             let tree = CentrelineTree::read_of(&*self.files, &path).map_err(|e| missing_tree(&path, e))?;
             let resolution = spec.resolution(&tree)?;
@@ -277,8 +287,21 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 }
                 other => missing("vessel.file", other),
             })?;
-        let recipe = WallRecipe::Repaired { surface: &surface };
-        store.wall(&recipe).map(Lumen::from).map_err(|e| Error::content(&path, e.to_string()))
+        let recipe = WallRecipe::Repaired { surface: &surface, options: &spec.repair_options() };
+        let wall = store.wall(&recipe).map_err(|error| match error {
+            Error::Parameter { name, value, remedy } if name == "keep_open_mm" => {
+                Error::Parameter { name: format!("vessel.{name}"), value, remedy }
+            }
+            other => Error::content(&path, other.to_string()),
+        })?;
+        let _ = self.mended.set(wall.report().mended());
+        Ok(wall.into())
+    }
+
+    /// What was mended on its surface and what in its lumen was taken as a wall, a sentence each, once the surface was
+    /// read; none for a vessel from a tree.
+    pub fn mended(&self) -> &[String] {
+        self.mended.get().map_or(&[], Vec::as_slice)
     }
 
     /// Attributes an error of a vessel from a tree to the tree's file.

@@ -8,7 +8,9 @@ use super::sac::SacSpec;
 use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
-use crate::vessel::{CentrelineTree, MotionMode, Opening, PatientAxes, Resolution, SurfaceFrame};
+use crate::vessel::{
+    CentrelineTree, Mending, MotionMode, Opening, PatientAxes, RepairOptions, Resolution, SurfaceFrame,
+};
 use crate::{Error, Result, Vec3};
 
 /// `[vessel]`: a surface file, or a centre-line tree from which the surface is built.
@@ -21,6 +23,11 @@ pub struct VesselSpec {
     pub unit_mm: Option<f64>,
     /// Axes of the surface file, overriding those of its header.
     pub axes: Option<PatientAxes>,
+    /// What of the surface file is mended; all if absent.
+    pub repair: Option<Mending>,
+    /// Places of holes in it that are meant and stay open, such as fenestrations, mm.
+    #[serde(default)]
+    pub keep_open_mm: Vec<[f64; 3]>,
     /// Centre-line table (x y z radius parent, mm) from which the wall is built; rows may name targets.
     pub tree: Option<PathBuf>,
     /// Centre-line table for `file`, used instead of a computed one.
@@ -45,6 +52,14 @@ impl VesselSpec {
     /// The coordinate frame of `file`.
     pub(super) fn frame(&self) -> SurfaceFrame {
         SurfaceFrame { unit_mm: self.unit_mm.unwrap_or(1.0), axes: self.axes }
+    }
+
+    /// The repair of `file`.
+    pub(super) fn repair_options(&self) -> RepairOptions {
+        RepairOptions {
+            mending: self.repair.unwrap_or_default(),
+            keep_open_mm: self.keep_open_mm.iter().map(|place| Vec3::from(*place)).collect(),
+        }
     }
 
     /// Resolution of the wall built from `tree`.

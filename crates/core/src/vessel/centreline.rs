@@ -12,11 +12,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::CentrelinePath;
 use super::point_lists::{self, Columns};
+use super::{CentrelinePath, line_files};
 use crate::error::nearest_name;
-use crate::file::{FileSystem, Files};
-use crate::{Error, Result, Vec3};
+use crate::file::{FileSystem, Files, foreign};
+use crate::{Error, Result, Vec3, text};
 
 /// A point of a centre line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -227,7 +227,30 @@ impl CentrelineTree {
     /// # Errors
     /// As [`Self::read`], except those of reading the file.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
-        Self::parse(&String::from_utf8_lossy(bytes)).map_err(|reason| Error::content(path, reason))
+        let bad = |reason| Error::content(path, reason);
+        if let Some(kind) = foreign(bytes) {
+            return Err(bad(kind.to_owned()));
+        }
+        match line_files::read(bytes, path) {
+            Some(lines) => lines.and_then(|lines| Self::of_lines(&lines)).map_err(bad),
+            None => Self::parse(&String::from_utf8_lossy(&text::without_mark(bytes))).map_err(bad),
+        }
+    }
+
+    /// The tree of lines of points, which begin or end where the first begins.
+    fn of_lines(lines: &[Vec<CentrelineNode>]) -> std::result::Result<Self, String> {
+        for (number, line) in lines.iter().enumerate() {
+            for (index, node) in line.iter().enumerate() {
+                check_numbers(node).map_err(|(column, value, remedy)| {
+                    format!("line {number}, point {index}: {column} = {value}: {remedy}")
+                })?;
+            }
+        }
+        let nodes = point_lists::joined(lines)?;
+        if nodes.len() < 2 {
+            return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
+        }
+        Self::new(nodes).map_err(|error| error.to_string())
     }
 
     /// Reads the text of a table; the error names line and value.

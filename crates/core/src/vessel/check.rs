@@ -153,7 +153,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
         return Err(Error::parameter("septum_mm", septum_mm, "must be a thickness in mm, 0 or more"));
     }
     let welding = Welding::of(surface)?;
-    let wall = Wall::mended(welding.clone(), true)?;
+    let wall = Wall::mended(welding.clone(), Some(&[]))?;
     // If only welding and turning over was needed, the wall is the surface as given: it is neither welded nor
     // searched again.
     let as_given = wall.report().is_as_given();

@@ -238,7 +238,12 @@ const ALIKE: f64 = 0.7;
 /// Fraction of the radius by which the two parts of such a vessel may overlap.
 const OVERLAP: f64 = 0.25;
 
-/// Pairs of openings of similar size that face each other at a distance of at most the larger radius.
+/// Distance, in radii of the larger one, up to which openings of one axis face each other; how far from the axis they may be,
+/// in the same radii, and the largest cosine between them.
+const ON_ONE_AXIS: (f64, f64, f64) = (3.0, 0.5, -0.95);
+
+/// Pairs of openings of similar size that face each other: at a distance of at most the larger radius, or farther on one
+/// axis.
 pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
     let mut pairs = Vec::new();
     for (i, a) in openings.iter().enumerate() {
@@ -247,7 +252,14 @@ pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
             let offset = b.centre_mm - a.centre_mm;
             // The ends of a short tube face away from each other.
             let is_before = offset.dot(&a.direction) >= -OVERLAP * a.radius_mm;
-            if is_before && offset.norm() <= a.radius_mm && a.direction.dot(&b.direction) <= OPPOSITE {
+            let cosine = a.direction.dot(&b.direction);
+            let (far, aside, straight) = ON_ONE_AXIS;
+            let (_, off_axis_mm) = a.beyond_and_off_axis_mm(&b.centre_mm);
+            let is_near = offset.norm() <= a.radius_mm && cosine <= OPPOSITE;
+            let is_in_line = offset.norm() <= far * a.radius_mm
+                && off_axis_mm <= aside * a.radius_mm
+                && cosine <= straight;
+            if is_before && (is_near || is_in_line) {
                 pairs.push([a.index, b.index]);
             }
         }

@@ -51,9 +51,17 @@ pub(super) fn tree(points: &[CentrelineNode]) -> Result<Vec<CentrelineNode>, Str
         let is_new = [a, b].iter().all(|point| point.position_mm == first_mm);
         !is_new && (b.position_mm - a.position_mm).norm() < a.radius_mm.max(b.radius_mm)
     };
+    joined(points.chunk_by(follows))
+}
+
+/// The tree of lines that begin or end where the first begins.
+pub(super) fn joined<L: AsRef<[CentrelineNode]>>(
+    lines: impl IntoIterator<Item = L>,
+) -> Result<Vec<CentrelineNode>, String> {
     let sphere = |node: &CentrelineNode| Sphere { centre_mm: node.position_mm, radius_mm: node.radius_mm };
     let mut growing = Growing::default();
-    for (number, stretch) in points.chunk_by(follows).enumerate() {
+    for (number, stretch) in lines.into_iter().enumerate() {
+        let stretch = stretch.as_ref();
         let mut line: Vec<Sphere> = stretch.iter().map(sphere).collect();
         if let (Some(root), [first, .., last]) = (growing.nodes.first(), line.as_slice()) {
             let away = |end: &Sphere| (end.centre_mm - root.position_mm).norm();

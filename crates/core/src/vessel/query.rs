@@ -94,10 +94,18 @@ impl WallQuery {
     /// # Errors
     /// [`Error::Mesh`] if there are no triangles.
     pub fn new(wall: &Wall) -> Result<Self> {
-        if wall.mesh().triangles.is_empty() {
+        Self::of_mesh(wall.mesh().clone())
+    }
+
+    /// Queries on a consistently oriented mesh.
+    ///
+    /// # Errors
+    /// As [`WallQuery::new`].
+    pub(super) fn of_mesh(mesh: SurfaceMesh) -> Result<Self> {
+        if mesh.triangles.is_empty() {
             return Err(Error::Mesh("no wall to query: it has no triangles".into()));
         }
-        Ok(Self { mesh: wall.mesh().clone(), ready: OnceLock::new() })
+        Ok(Self { mesh, ready: OnceLock::new() })
     }
 
     #[inline]

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::{
-    CentrelineEnd, CentrelineTree, Conditioning, ExtractedCentreline, GeneratedWall, Resolution, SurfaceMesh,
-    Wall, condition,
+    CentrelineEnd, CentrelineTree, Conditioning, ExtractedCentreline, GeneratedWall, RepairOptions,
+    Resolution, SurfaceMesh, Wall, condition,
 };
 use crate::Result;
 
@@ -18,10 +18,12 @@ pub enum WallRecipe<'a> {
         /// Its resolution.
         resolution: Resolution,
     },
-    /// A repaired surface, [`Wall::from_surface`].
+    /// A repaired surface, [`Wall::repaired`].
     Repaired {
         /// The surface as given, mm.
         surface: &'a SurfaceMesh,
+        /// What is mended.
+        options: &'a RepairOptions,
     },
     /// The uniform mesh of a wall for contact, [`Wall::with_even_rims`] and [`condition`].
     Even {
@@ -36,11 +38,11 @@ impl WallRecipe<'_> {
     /// Makes the wall.
     ///
     /// # Errors
-    /// As [`GeneratedWall::new`], [`Wall::from_surface`] and [`condition`].
+    /// As [`GeneratedWall::new`], [`Wall::repaired`] and [`condition`].
     pub fn make(&self) -> Result<Wall> {
         match self {
             Self::Generated { tree, resolution } => Ok(GeneratedWall::new(tree, *resolution)?.wall),
-            Self::Repaired { surface } => Wall::from_surface(surface),
+            Self::Repaired { surface, options } => Wall::repaired(surface, options),
             Self::Even { wall, options } => {
                 let trimmed = wall.with_even_rims()?;
                 let even = condition(trimmed.mesh(), options)?;
@@ -102,7 +104,8 @@ impl WallStore for NoStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vessel::anatomy;
+    use crate::Vec3;
+    use crate::vessel::{Mending, anatomy};
 
     fn tube() -> Wall {
         let tree = anatomy::tree("curved_tube").unwrap();
@@ -121,13 +124,21 @@ mod tests {
         let fewer = Conditioning { most_triangles: 1000, ..Conditioning::default() };
         let generated = |tree, resolution| WallRecipe::Generated { tree, resolution };
         let even = |wall, options| WallRecipe::Even { wall, options };
+        let repaired = |surface, options| WallRecipe::Repaired { surface, options };
+        let options = [
+            RepairOptions::default(),
+            RepairOptions { mending: Mending::None, ..RepairOptions::default() },
+            RepairOptions { keep_open_mm: vec![Vec3::x()], ..RepairOptions::default() },
+        ];
         let recipes = [
             generated(&trees[0], Resolution::EdgeMm(1.0)),
             generated(&trees[0], Resolution::EdgeMm(2.0)),
             generated(&trees[0], Resolution::Triangles(1)),
             generated(&trees[1], Resolution::EdgeMm(1.0)),
-            WallRecipe::Repaired { surface: wall.mesh() },
-            WallRecipe::Repaired { surface: &moved },
+            repaired(wall.mesh(), &options[0]),
+            repaired(&moved, &options[0]),
+            repaired(&moved, &options[1]),
+            repaired(&moved, &options[2]),
             even(&wall, Conditioning::default()),
             even(&moved_wall, Conditioning::default()),
             even(&wall, coarse),

@@ -47,6 +47,9 @@ const DIRECTIONS: [[f64; 3]; 14] = [
     [-1.0, -1.0, -1.0],
 ];
 
+/// Area of a neck, over the square of the radius of the largest ball, up to which there is none: rounding.
+const NO_NECK: f64 = 1e-9;
+
 /// A sac and its neck.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sac {
@@ -120,6 +123,11 @@ impl Sac {
                 "no plane between it and the artery cuts off a sac: it has no neck, or an opening of its own";
             return Err(Error::parameter("dome", crate::error::vector(&dome_mm), remedy));
         };
+        if beyond.area_mm2 <= NO_NECK * radius_mm * radius_mm {
+            let remedy = "is not joined to the artery: no lumen leads from one to the other; unite the two (\"boolean union\") in a \
+                          program for meshes";
+            return Err(Error::parameter("dome", crate::error::vector(&dome_mm), remedy));
+        }
         let neck_diameter_mm = (4.0 * beyond.area_mm2 / std::f64::consts::PI).sqrt();
         Ok(Self {
             neck_mm: beyond.middle_mm,

@@ -5,6 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::in_front::Ends;
 use super::mesh::retain_numbered;
 use super::opening::{self, Boundary, Opening};
+use super::repairs::{Mending, Repair, RepairKind, RepairOptions, named};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;
@@ -26,7 +27,7 @@ pub struct Wall {
 }
 
 /// What [`Wall::from_surface`] found and changed.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RepairReport {
     /// Triangles as given.
     pub triangles_given: usize,
@@ -84,6 +85,15 @@ pub struct RepairReport {
     pub intersections_capped: bool,
     /// Triangles cut out because they intersected or were folded.
     pub fold_triangles_removed: usize,
+    /// Closed bodies in the lumen, taken as walls.
+    pub bodies_in_lumen: usize,
+    /// Sheets in the lumen, taken as thin walls with two sides.
+    pub sheets_in_lumen: usize,
+    /// Parts that overlapped others and were united with them, and bodies that were taken off.
+    pub parts_united: usize,
+    /// What was mended where, in the order of the work: everything counted above except merged or unused vertices,
+    /// triangles without area, duplicates and turned triangles, which change no surface.
+    pub repairs: Vec<Repair>,
 }
 
 impl RepairReport {
@@ -102,39 +112,74 @@ impl RepairReport {
             self.triangles_added,
             self.intersections_found,
             self.fold_triangles_removed,
+            self.bodies_in_lumen,
+            self.sheets_in_lumen,
+            self.parts_united,
         ];
         more.iter().all(|count| *count == 0) && !self.intersections_capped
+    }
+
+    /// One line for each kind of what was mended on the surface, and of what in its lumen was taken as a wall, with
+    /// sizes and places of the largest; empty for a surface that is taken as it was given.
+    pub fn mended(&self) -> Vec<String> {
+        let at_least = if self.intersections_capped { "or more " } else { "" };
+        let still = format!("{at_least}pairs of triangles still intersect: mend the surface there");
+        let kept = self.repairs.iter().filter(|repair| repair.kind == RepairKind::HoleKept).count();
+        let lines = [
+            (self.cracks_closed, RepairKind::CrackJoined, "vertices merged over cracks"),
+            (self.edges_sewn, RepairKind::SeamSewn, "edges sewn to vertices of the other side of a seam"),
+            (
+                self.sheets_removed,
+                RepairKind::SheetRemoved,
+                "triangles of fins, second layers and membranes removed",
+            ),
+            (self.edges_cut, RepairKind::EdgeCut, "edges of more than two triangles cut apart"),
+            (self.pieces_dropped, RepairKind::PieceDropped, "small or flat pieces dropped"),
+            (
+                self.skins_dropped,
+                RepairKind::SkinDropped,
+                "outer skins of a double wall dropped, the inner one is the lumen",
+            ),
+            (self.bodies_in_lumen, RepairKind::BodyInLumen, "closed bodies in the lumen taken as walls"),
+            (
+                self.sheets_in_lumen,
+                RepairKind::SheetInLumen,
+                "sheets in the lumen taken as thin walls with two sides",
+            ),
+            (
+                self.parts_united,
+                RepairKind::PartUnited,
+                "parts that overlapped the rest without being joined, united with it",
+            ),
+            (self.holes_filled, RepairKind::HoleClosed, "holes and tears closed"),
+            (kept, RepairKind::HoleKept, "holes left open as asked"),
+            (
+                self.fold_triangles_removed,
+                RepairKind::FoldReplaced,
+                "intersecting or folded triangles cut out and replaced",
+            ),
+            (self.intersections_left, RepairKind::StillCrossing, &still),
+        ];
+        let line = |(count, kind, text): (usize, RepairKind, &str)| match named(&self.repairs, kind) {
+            places if places.is_empty() => format!("{count} {text}"),
+            places => format!("{count} {text}: {places}"),
+        };
+        lines.into_iter().filter(|(count, ..)| *count > 0).map(line).collect()
     }
 
     /// One line per change or irregularity; empty for a clean surface.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        let mut note = |count: usize, text: &str| {
-            if count > 0 {
-                notes.push(format!("{count} {text}"));
-            }
-        };
-        note(self.vertices_welded, "duplicate vertices welded");
-        note(self.vertices_unreferenced, "unused vertices dropped");
-        note(self.degenerate_removed, "degenerate triangles removed");
-        note(self.duplicates_removed, "duplicate triangles removed");
-        note(self.triangles_flipped, "triangles turned over");
-        note(self.cracks_closed, "vertices merged over cracks");
-        note(self.edges_sewn, "edges sewn to vertices of the other side of a seam");
-        note(self.sheets_removed, "triangles of fins and second layers removed");
-        note(self.edges_cut, "edges of more than two triangles cut apart");
-        note(self.pieces_dropped, "small or flat pieces dropped");
-        note(self.skins_dropped, "outer skins of a double wall dropped: the inner one is the lumen");
-        note(self.holes_filled, "holes and tears closed");
-        note(self.fold_triangles_removed, "intersecting or folded triangles cut out and replaced");
-        let at_least = if self.intersections_capped { "or more " } else { "" };
-        note(
-            self.intersections_left,
-            &format!("{at_least}pairs of triangles still intersect: mend the surface there"),
-        );
-        note(self.stray_edges, "open edges form no loop");
-        note(self.non_manifold_edges, "edges belong to more than two triangles");
-        note(self.one_sided_edges, "edges make the surface one-sided");
+        let counted = |count: usize, text: &str| (count > 0).then(|| format!("{count} {text}"));
+        notes.extend(counted(self.vertices_welded, "duplicate vertices welded"));
+        notes.extend(counted(self.vertices_unreferenced, "unused vertices dropped"));
+        notes.extend(counted(self.degenerate_removed, "degenerate triangles removed"));
+        notes.extend(counted(self.duplicates_removed, "duplicate triangles removed"));
+        notes.extend(counted(self.triangles_flipped, "triangles turned over"));
+        notes.extend(self.mended());
+        notes.extend(counted(self.stray_edges, "open edges form no loop"));
+        notes.extend(counted(self.non_manifold_edges, "edges belong to more than two triangles"));
+        notes.extend(counted(self.one_sided_edges, "edges make the surface one-sided"));
         if self.components > 1 {
             notes.push(format!(
                 "{} separate pieces, the smallest of {} triangles",
@@ -156,7 +201,26 @@ impl Wall {
     /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate that is used is not
     /// finite, and for more than 10,000 openings.
     pub fn from_surface(surface: &SurfaceMesh) -> Result<Self> {
-        Self::mended(Welding::of(surface)?, true)
+        Self::repaired(surface, &RepairOptions::default())
+    }
+
+    /// [`Wall::from_surface`] with other choices of what is mended.
+    ///
+    /// # Errors
+    /// As [`Wall::from_surface`]; [`Error::Parameter`] naming `keep_open_mm` for a place without a hole; with
+    /// [`Mending::None`] [`Error::Mesh`] for a surface that cannot be a wall as it is.
+    pub fn repaired(surface: &SurfaceMesh, options: &RepairOptions) -> Result<Self> {
+        match options.mending {
+            Mending::All => Self::mended(Welding::of(surface)?, Some(&options.keep_open_mm)),
+            Mending::None => {
+                if let Some(place) = options.keep_open_mm.first() {
+                    let remedy = "nothing is closed with repair = \"none\": leave it out";
+                    return Err(Error::parameter("keep_open_mm", crate::error::vector(place), remedy));
+                }
+                let wall = Self::mended(Welding::of(surface)?, None)?;
+                repair::refuse_unmended(&wall.mesh, &wall.report).map_or(Ok(wall), Err)
+            }
+        }
     }
 
     /// A wall of `surface` with only vertices welded, triangles without area removed and the winding made consistent;
@@ -165,12 +229,13 @@ impl Wall {
     /// # Errors
     /// As [`Wall::from_surface`].
     pub fn welded(surface: &SurfaceMesh) -> Result<Self> {
-        Self::mended(Welding::of(surface)?, false)
+        Self::mended(Welding::of(surface)?, None)
     }
 
-    /// [`Wall::from_surface`], or only [`Wall::welded`], of a surface whose vertices are merged.
-    pub(super) fn mended(welding: Welding, whole: bool) -> Result<Self> {
-        let (mesh, mut edges, mut report) = Self::prepared(welding, whole)?;
+    /// [`Wall::repaired`] with holes kept open at these places, or only [`Wall::welded`], of a surface whose vertices
+    /// are merged.
+    pub(super) fn mended(welding: Welding, keep_open_mm: Option<&[Vec3]>) -> Result<Self> {
+        let (mesh, mut edges, mut report) = Self::prepared(welding, keep_open_mm)?;
         let boundary = count(&mesh, &mut edges, &mut report);
         if report.openings > MOST_OPENINGS {
             return Err(Error::Mesh(format!(
@@ -186,13 +251,16 @@ impl Wall {
 
     /// The report on a surface of which only vertices were merged, whatever number of openings it has.
     pub(super) fn report_on(welding: Welding) -> Result<RepairReport> {
-        let (mesh, mut edges, mut report) = Self::prepared(welding, false)?;
+        let (mesh, mut edges, mut report) = Self::prepared(welding, None)?;
         count(&mesh, &mut edges, &mut report);
         Ok(report)
     }
 
     /// The mesh of [`Self::mended`] with its edges, and what was changed.
-    fn prepared(welding: Welding, whole: bool) -> Result<(SurfaceMesh, Edges, RepairReport)> {
+    fn prepared(
+        welding: Welding,
+        keep_open_mm: Option<&[Vec3]>,
+    ) -> Result<(SurfaceMesh, Edges, RepairReport)> {
         let Welding { mut mesh, tolerance_mm, merged, .. } = welding;
         let mut report = RepairReport {
             triangles_given: mesh.triangles.len(),
@@ -207,7 +275,7 @@ impl Wall {
         report.vertices_unreferenced = drop_unreferenced(&mut mesh) - report.vertices_welded;
         let mut edges = Edges::default();
         report.duplicates_removed = remove_duplicates(&mut mesh.triangles, &mut edges);
-        if whole {
+        if keep_open_mm.is_some() {
             repair::join_sheets(&mut mesh, &mut edges, tolerance_mm, &mut report);
         }
         if mesh.triangles.is_empty() {
@@ -222,8 +290,9 @@ impl Wall {
         report.triangles_flipped = before.iter().zip(&mesh.triangles).filter(|(a, b)| a != b).count();
         report.inside_out = report.triangles_flipped == mesh.triangles.len();
         report.one_sided_edges = consistency.contradictions;
-        if whole {
-            repair::cure(&mut mesh, &mut edges, tolerance_mm, &mut report);
+        match keep_open_mm {
+            Some(places) => repair::cure(&mut mesh, &mut edges, tolerance_mm, places, &mut report)?,
+            None => repair::turn_bodies(&mut mesh, &mut edges),
         }
         Ok((mesh, edges, report))
     }

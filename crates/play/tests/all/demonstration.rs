@@ -198,8 +198,8 @@ fn what_is_shown_is_measured_as_what_is_run() {
         record.note(time_s, &step.moves, &simulation, None);
     }
     for ((name, value), (_, of_run)) in measured(session.record()).into_iter().zip(measured(&record)) {
-        // The script injects; the run here has no injector.
-        if name == "contrast_ml" || name == "injections" || name == "largest_rate_ml_per_s" {
+        // The script injects; the run here has neither an injector nor a beam.
+        if ["contrast_ml", "injections", "largest_rate_ml_per_s", "unseen_share"].contains(&name) {
             continue;
         }
         let (value, of_run) = (value.unwrap_or(-1.0), of_run.unwrap_or(-1.0));

@@ -7,7 +7,7 @@ use endowire_core::Vec3;
 use endowire_core::insertion::{Injection, Simulation, Step};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
-use endowire_play::{EventKind, Input, Limits, Pictures, Session};
+use endowire_play::{EventKind, Input, Inputs, Limits, Pictures, Session, TICK_SOLVES};
 use endowire_viewer::{ExposureSpec, Image, Mode, ViewSpec};
 
 fn scene(name: &str) -> (PathBuf, Scene) {
@@ -594,13 +594,9 @@ fn entrance_kerma_and_kerma_area_are_those_of_the_open_field() {
     let view = ViewSpec::of_scene(&scene, &path).unwrap();
     let simulation = scene.simulation(&NoStore).unwrap();
     let mut session = Session::new(simulation, view, 64, Limits::default()).unwrap();
-    let wall = session.simulation().lumen().wall(&NoStore).unwrap().clone();
-    let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
     session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
-    (0..60).for_each(|_| session.tick());
     assert_eq!(session.readout().lab.entrance_ugy, None, "it depends on a patient who was not seen");
-    pictures.fluoro(&session.snapshot()).unwrap();
-    session.exposed(pictures.delivered(&session.snapshot()).unwrap());
+    (0..60).for_each(|_| session.tick());
     let whole = session.readout().lab;
     // A second of 30 frames of 30 nGy at the detector, the tissue, and distances of 1100 and 600 mm.
     let (entrance, area) = (whole.entrance_ugy.unwrap(), whole.kerma_area_ugym2.unwrap());
@@ -612,8 +608,6 @@ fn entrance_kerma_and_kerma_area_are_those_of_the_open_field() {
     // Half of the width for another second: as much at the entrance, half as much on the area.
     session.apply(&Input::Collimate { width: 0.5, height: 1.0 }).unwrap();
     (0..60).for_each(|_| session.tick());
-    pictures.fluoro(&session.snapshot()).unwrap();
-    session.exposed(pictures.delivered(&session.snapshot()).unwrap());
     let narrow = session.readout().lab;
     assert!((narrow.entrance_ugy.unwrap() / entrance - 2.0).abs() < 0.05, "{:?}", narrow.entrance_ugy);
     let more = narrow.kerma_area_ugym2.unwrap() / area - 1.0;
@@ -621,33 +615,66 @@ fn entrance_kerma_and_kerma_area_are_those_of_the_open_field() {
 }
 
 #[test]
-fn dose_is_what_exposure_control_brings() {
+fn dose_is_what_exposure_control_brings_whether_or_not_pictures_are_drawn() {
     let (path, scene) = scene("curved_tube.toml");
-    let dose = |most_ma: f64, known_after: usize| {
+    let dose = |most_ma: f64| {
         let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
         view.xray.pulse_ms = 8.0;
         let control = ExposureSpec { current_ma: [0.01, most_ma], curve: vec![[100.0, 125.0]] };
         view.exposure = Some(control);
         let simulation = scene.simulation(&NoStore).unwrap();
         let mut session = Session::new(simulation, view, 64, Limits::default()).unwrap();
-        let wall = session.simulation().lumen().wall(&NoStore).unwrap().clone();
-        let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
         session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
-        for tick in 0..60 {
-            session.tick();
-            if tick == known_after {
-                let delivered = pictures.expose(&session.snapshot()).unwrap().unwrap();
-                session.exposed(delivered);
-            }
-        }
-        session.readout().lab.dose_ugy
+        (0..60).for_each(|_| session.tick());
+        (session.readout().lab.dose_ugy, session.record().beam.clone().unwrap())
     };
-    // A second of 30 frames of 30 nGy, if the tube can; the ticks before it was known count alike.
+    // A second of 30 frames of 30 nGy, if the tube can.
     let wanted = 30.0 * 0.03;
-    assert!((dose(1000.0, 5) - wanted).abs() < 1e-9);
-    let weak = dose(0.02, 5);
+    let (strong, _) = dose(1000.0);
+    assert!((strong - wanted).abs() < 1e-9);
+    let (weak, beam) = dose(0.02);
     assert!(weak < 0.5 * wanted && weak > 0.0, "{weak}");
-    assert_eq!(dose(0.02, 40), weak);
+    // The record has the same from the first tick on, and what it is at the entrance.
+    let [state] = beam.as_slice() else { panic!("{beam:?}") };
+    assert!((state.dose_ngy * 30.0 / 1000.0 - weak).abs() < 1e-9);
+    assert!(state.entrance_ngy.unwrap() > 10.0 * state.dose_ngy, "{state:?}");
+}
+
+#[test]
+fn a_session_is_repeated_by_its_inputs_and_a_tip_beside_the_picture_is_not_seen() {
+    let (path, scene) = scene("curved_tube.toml");
+    let begun = || {
+        let view = ViewSpec::of_scene(&scene, &path).unwrap();
+        let simulation = scene.simulation(&NoStore).unwrap();
+        Session::new(simulation, view, 64, Limits::default()).unwrap()
+    };
+    let mut session = begun().with_ticks(TICK_SOLVES).unwrap();
+    let push = |session: &mut Session, ticks: usize| {
+        session.apply(&Input::Move { instrument: None, mm_per_s: 20.0, deg_per_s: 45.0 }).unwrap();
+        (0..ticks).for_each(|_| session.tick());
+        session.apply(&Input::Stop {}).unwrap();
+    };
+    session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
+    push(&mut session, 60);
+    assert!(session.record().samples.iter().all(|sample| !sample.out_of_picture));
+    session.apply(&Input::Undo {}).unwrap();
+    session.apply(&Input::Table { right_mm: 500.0, down_mm: 0.0, second: false }).unwrap();
+    session.apply(&Input::Zoom { factor: 10.0 }).unwrap();
+    push(&mut session, 30);
+    assert!(session.record().samples.iter().any(|sample| sample.out_of_picture));
+    let inputs = serde_json::to_string(&session.inputs()).unwrap();
+    let inputs: Inputs = serde_json::from_str(&inputs).unwrap();
+    let again = inputs.repeat_in(begun()).unwrap();
+    assert_eq!(again.record(), session.record());
+    // A script is not the work of hands, and a session has an end.
+    for wrong in [
+        r#"{"ticks": 3, "inputs": [[0, {"do": "script"}]]}"#,
+        r#"{"ticks": 3, "inputs": [[4, {"do": "stop"}]]}"#,
+        r#"{"ticks": 1000000000000, "inputs": []}"#,
+    ] {
+        let wrong: Inputs = serde_json::from_str(wrong).unwrap();
+        assert!(wrong.repeat_in(begun()).unwrap_err().is_input());
+    }
 }
 
 #[test]

@@ -1,6 +1,14 @@
 //! Trainees who work in the simulator itself: what the physics answers to their hands tells them apart.
 
+#[path = "../../examples/cohort/plan.rs"]
+pub(crate) mod plan;
+#[path = "../../examples/cohort/trainee.rs"]
+mod trainee;
+
 use std::path::Path;
+
+use plan::Place;
+use trainee::{Class, KINDS};
 
 use endowire_assess::{Exam, Score, Site, Subject};
 use endowire_core::vessel::NoStore;
@@ -69,5 +77,33 @@ fn who_pushes_on_with_the_hook_against_the_wall_is_reported_from_who_turns_it_fi
             let pushing = score(subject, pushing, 65.0, pace);
             assert!(!pushing.verdict.passed && pushing.verdict.score < 90.0, "{subject} {pace}: {pushing:?}");
         }
+    }
+}
+
+/// Scores of all kinds in a subject, with their classes.
+fn cohort(subject: &str) -> Vec<(Class, &'static str, Score)> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/subjects").join(subject);
+    let place = Place::of(&path);
+    let plan = place.plan();
+    KINDS.iter().map(|kind| (kind.class, kind.name, (*kind.score(&place, &plan)).clone())).collect()
+}
+
+#[test]
+fn a_cohort_is_ordered_as_a_teacher_would() {
+    // The others take longer: `cargo run --example cohort` has all ten.
+    for subject in ["straight_tube.toml", "first_loops.toml", "coeliac_breathing.toml"] {
+        let all = cohort(subject);
+        let of = |class: Class| all.iter().filter(move |one| one.0 == class).map(|one| one.2.verdict.score);
+        let ends = |class: Class| (of(class).fold(f64::MAX, f64::min), of(class).fold(f64::MIN, f64::max));
+        let classes = [Class::Good, Class::Slow, Class::Wasteful, Class::Reckless, Class::Blind];
+        for pair in classes.windows(2) {
+            let (better, worse) = (ends(pair[0]), ends(pair[1]));
+            assert!(better.0 > worse.1, "{subject}: {pair:?} {better:?} {worse:?}");
+        }
+        for (class, name, score) in &all {
+            let passes = matches!(class, Class::Good | Class::Slow);
+            assert_eq!(score.verdict.passed, passes, "{subject}: {name} {:?}", score.verdict);
+        }
+        assert!(ends(Class::Good).0 >= 90.0 && ends(Class::Reckless).1 <= 40.0, "{subject}");
     }
 }

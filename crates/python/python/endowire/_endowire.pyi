@@ -14,9 +14,17 @@ __version__: str
 @final
 class Vessel:
     @staticmethod
-    def read(path: str | PathLike[str], unit_mm: float = 1.0, axes: str | None = None) -> Vessel: ...
+    def read(
+        path: str | PathLike[str],
+        unit_mm: float = 1.0,
+        axes: str | None = None,
+        repair: str = "all",
+        keep_open_mm: ArrayLike | None = None,
+    ) -> Vessel: ...
     @staticmethod
-    def from_arrays(vertices_mm: ArrayLike, triangles: ArrayLike) -> Vessel: ...
+    def from_arrays(
+        vertices_mm: ArrayLike, triangles: ArrayLike, repair: str = "all", keep_open_mm: ArrayLike | None = None
+    ) -> Vessel: ...
     @staticmethod
     def generate(
         tree: str | PathLike[str] | ArrayLike, edge_mm: float | None = None, triangles: int | None = None
@@ -27,6 +35,8 @@ class Vessel:
     def triangles(self) -> NDArray[np.uint32]: ...
     @property
     def openings(self) -> list[dict[str, Any]]: ...
+    @property
+    def repairs(self) -> list[dict[str, Any]]: ...
     @property
     def centreline(self) -> NDArray[np.float64]: ...
     @property

@@ -6,7 +6,7 @@ use crate::crossing::CrossingTest;
 use endowire_core::contact::{ContactMesh, WallProperties};
 use endowire_core::insertion::Sheath;
 use endowire_core::vessel::{
-    Conditioning, NoStore, SurfaceFrame, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore,
+    Conditioning, NoStore, RepairOptions, SurfaceFrame, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore,
 };
 use endowire_core::{Error, Result};
 
@@ -68,7 +68,7 @@ impl Surface {
     pub fn read(file: &SurfaceFile, store: &dyn WallStore) -> Result<Self> {
         let mesh = SurfaceMesh::read(&file.path, file.frame)?;
         let wall = store
-            .wall(&WallRecipe::Repaired { surface: &mesh })
+            .wall(&WallRecipe::Repaired { surface: &mesh, options: &RepairOptions::default() })
             .map_err(|e| Error::content(&file.path, e.to_string()))?;
         let aimed = Conditioning::default();
         let even = store.wall(&WallRecipe::Even { wall: &wall, options: aimed })?;

@@ -198,7 +198,7 @@ impl Fluoroscope {
         self.still = Still { signal, scatter };
     }
 
-    /// Whether a pixel shows the body, between the blades.
+    /// Whether a pixel shows the body, and no blade.
     pub(crate) fn shows_body(&self) -> Vec<bool> {
         let any = |pixel: usize| {
             let (first, stride) = self.first_ray(pixel);
@@ -206,7 +206,7 @@ impl Fluoroscope {
                 .iter()
                 .any(|&ray| self.anatomy.is_body(ray))
         };
-        (0..self.pixels()).map(|pixel| self.c_arm.openness(pixel) >= 0.5 && any(pixel)).collect()
+        (0..self.pixels()).map(|pixel| self.c_arm.openness(pixel) >= 1.0 && any(pixel)).collect()
     }
 
     /// Number of pixels.

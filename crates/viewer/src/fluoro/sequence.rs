@@ -22,6 +22,11 @@ const DSA_SHARES: Window = [-0.15, 1.05];
 const DSA_OUTLIERS: f64 = 0.02;
 /// Smaller opacities do not count as contrast medium.
 const LEAST_OPACITY: f32 = 0.02;
+/// Part of the window, at its dark end, in which medium keeps its shades that is denser than black: beyond the densest
+/// part of the anatomy, so that nothing else is compressed.
+const SHOULDER: f32 = 0.3;
+/// How far beyond the densest medium it ends, so that its darkest part is not black.
+const BEYOND: f32 = 0.1;
 /// Strongest opacification assumed for a window if nothing is injected.
 const FAINTEST: f32 = 0.3;
 /// Roadmap values shown white and black, around a grey background, and the value of the strongest vessel.
@@ -45,10 +50,15 @@ pub(crate) struct Sequence {
     /// Absorbed energy of a pixel at unit signal, keV.
     kev: f64,
     window: Window,
+    /// Values from which on darker ones are compressed, and the densest that is still told from black.
+    shoulder: Option<[f32; 2]>,
     /// Pixels that are always black: those behind blades, with scatter and noise alone.
     shutter: Vec<u32>,
     bits: u32,
     noisy: bool,
+    /// Time of a frame at the view's rate, s, and the time of the last frame.
+    frame_s: f64,
+    last_s: Option<f64>,
     /// Subtracted from −ln of each frame: the stored mask or angiogram, or shading.
     mask: Option<Vec<f32>>,
     /// Weighted mean of the last frames, the newest weighing most.
@@ -62,6 +72,7 @@ pub(crate) struct Sequence {
 #[derive(Debug, Clone)]
 pub(crate) struct Afterglow {
     frame: Vec<f32>,
+    last_s: Option<f64>,
     mask: Vec<f32>,
 }
 
@@ -78,6 +89,7 @@ impl Sequence {
             let values = logarithm(fluoroscope.still.signal.signal.clone());
             shading(&values, &shown, c_arm).iter().map(|v| share * v).collect()
         });
+        let mut shoulder = None;
         let window = match (mode, spec.xray.window) {
             // Line integrals refer to the open beam, signals to the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
@@ -87,7 +99,10 @@ impl Sequence {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
                 let [white, black] = fitted(&values, &shown, c_arm.size_px());
-                [white, black.max(densest(fluoroscope, mask.as_deref()))]
+                // What shows the anatomy has the same greys whether or not medium will come.
+                let densest = densest(fluoroscope, mask.as_deref());
+                shoulder = (densest > black).then_some([black - SHOULDER, densest + BEYOND]);
+                [white, black]
             }
             (_, Some(window)) => window.map(|p| p as f32),
             (Mode::Dsa, None) => {
@@ -110,9 +125,12 @@ impl Sequence {
             mode,
             kev,
             window,
+            shoulder,
             shutter,
             bits: spec.bits,
             noisy: spec.detector.noise,
+            frame_s: 1.0 / spec.frames_per_s,
+            last_s: None,
             mask,
             held: vec![],
             mask_read: vec![],
@@ -122,12 +140,13 @@ impl Sequence {
 
     /// The detector's memory of the last frame.
     pub(crate) fn into_afterglow(mut self) -> Afterglow {
-        Afterglow { frame: self.detector.take_stored(), mask: self.mask_read }
+        Afterglow { frame: self.detector.take_stored(), last_s: self.last_s, mask: self.mask_read }
     }
 
     /// Continues with a detector's memory: the next mask is that of a run with the same motion.
     pub(crate) fn go_on_from(&mut self, afterglow: Afterglow) {
         self.detector.store(afterglow.frame);
+        self.last_s = afterglow.last_s;
         self.mask_before = afterglow.mask;
     }
 
@@ -149,6 +168,10 @@ impl Sequence {
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
         let signal = fluoroscope.signal(pulse, time)?;
+        // A frame that is drawn again, or before the last one, is one of a run at the view's rate.
+        let since_s = self.last_s.map_or(self.frame_s, |last_s| moment.time_s - last_s);
+        self.detector.after(if since_s > 0.0 { since_s } else { self.frame_s });
+        self.last_s = Some(moment.time_s);
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
@@ -168,6 +191,10 @@ impl Sequence {
     }
 
     fn shown(&self, mut values: Vec<f32>, fluoroscope: &Fluoroscope) -> Image {
+        if let Some([from, densest]) = self.shoulder {
+            let share = (self.window[1] - from) / (densest - from);
+            values.iter_mut().filter(|v| **v > from).for_each(|v| *v = from + share * (*v - from));
+        }
         self.shutter.iter().for_each(|&pixel| values[pixel as usize] = f32::INFINITY);
         picture(&values, self.window, fluoroscope.c_arm.size_px(), self.bits, !self.noisy)
     }
@@ -201,6 +228,7 @@ impl Sequence {
         let mut mean = vec![0.0; signal.signal.len()];
         // The last frame's part, of which a mask has nothing: it has its share of the previous mask.
         let held = self.detector.take_stored();
+        self.detector.after(self.frame_s);
         for k in 0..MASK_FRAMES {
             self.detector.store(self.mask_before.clone());
             let read =
@@ -213,11 +241,15 @@ impl Sequence {
     }
 }
 
-/// Densest displayed value where contrast medium ever comes, without the darkest few pixels; a vessel full of it
-/// keeps its shades.
+/// Whether a pixel is not touched by a blade: behind one there is scatter alone, which medium darkens like a signal.
+fn is_open(fluoroscope: &Fluoroscope, pixel: usize) -> bool {
+    fluoroscope.c_arm.openness(pixel) >= 1.0
+}
+
+/// Densest displayed value where contrast medium ever comes, without the darkest few pixels.
 fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
     let Some([still, full]) = opacified(fluoroscope) else { return f32::MIN };
-    let filled = (0..full.len()).filter(|&i| full[i] - still[i] > LEAST_OPACITY);
+    let filled = (0..full.len()).filter(|&i| is_open(fluoroscope, i) && full[i] - still[i] > LEAST_OPACITY);
     let values = filled.map(|i| full[i] - mask.map_or(0.0, |mask| mask[i])).collect();
     but_for_outliers(values).unwrap_or(f32::MIN)
 }
@@ -225,11 +257,12 @@ fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
 /// Strongest subtracted value that contrast medium ever causes, without the darkest few pixels.
 fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     let Some([still, full]) = opacified(fluoroscope) else { return FAINTEST };
-    let opacities = full.into_iter().zip(still).map(|(v, still)| v - still);
+    let open = (0..full.len()).filter(|&i| is_open(fluoroscope, i));
+    let opacities = open.map(|i| full[i] - still[i]);
     but_for_outliers(opacities.filter(|v| *v > LEAST_OPACITY).collect()).map_or(FAINTEST, |v| v.max(FAINTEST))
 }
 
-/// Values without contrast medium and with its maximum over time, between the blades; `None` without injections.
+/// Values without contrast medium and with its maximum over time; `None` without injections.
 fn opacified(fluoroscope: &Fluoroscope) -> Option<[Vec<f32>; 2]> {
     let still = &fluoroscope.still;
     let full = fluoroscope.opacified(still).ok()?;

@@ -16,7 +16,7 @@ use endowire_core::{Error, Result};
 use super::{Image, Pace, PixelFormat};
 use crate::c_arm::CArm;
 use crate::fingerprint::fingerprint;
-use crate::spec::Mode;
+use crate::spec::{Mode, reference_mm};
 use crate::xray::{Exposure, Pulse};
 
 /// Metadata of a file of angiographic frames.
@@ -108,7 +108,7 @@ impl Angiogram<'_> {
         let mut object = InMemDicomObject::new_empty();
         identify(&mut object, own, plane);
         self.describe(&mut object, plane);
-        self.place(&mut object, first);
+        self.place(&mut object, first, frames.len());
         self.time(&mut object, frames.len());
         pixels(&mut object, frames, first);
         object
@@ -165,7 +165,7 @@ impl Angiogram<'_> {
     }
 
     /// Tube, positioner, blades and detector.
-    fn place(&self, object: &mut InMemDicomObject, first: &Image) {
+    fn place(&self, object: &mut InMemDicomObject, first: &Image, frames: usize) {
         let [primary, secondary] = self.c_arm.angles_deg();
         let pitch = decimal(self.c_arm.pixel_mm());
         for (tag, value) in [
@@ -217,6 +217,12 @@ impl Angiogram<'_> {
         if turn % 90.0 == 0.0 {
             put(object, tags::FIELD_OF_VIEW_ROTATION, VR::DS, &decimal(turn.rem_euclid(360.0)));
         }
+        put(
+            object,
+            tags::IMAGE_AND_FLUOROSCOPY_AREA_DOSE_PRODUCT,
+            VR::DS,
+            &decimal(self.area_dose_dgycm2(frames)),
+        );
         let Some(opening) = self.c_arm.opening_px() else { return };
         let size = [first.width(), first.height()].map(f64::from);
         let edge = |k: usize, sign: f64| {
@@ -231,6 +237,17 @@ impl Angiogram<'_> {
         ] {
             put(object, tag, VR::IS, &value);
         }
+    }
+
+    /// Kerma–area product of so many frames, dGy·cm²: air kerma at the entrance reference point times the area there
+    /// that the blades leave open.
+    fn area_dose_dgycm2(&self, frames: usize) -> f64 {
+        let size_px = self.c_arm.size_px().map(f64::from);
+        let open_px = self.c_arm.opening_px().map_or(size_px, |open| [0, 1].map(|k| open[k].min(size_px[k])));
+        let nearer = reference_mm(self.c_arm.sod_mm()) / self.c_arm.sid_mm();
+        let sides_cm = open_px.map(|n| n * self.c_arm.pixel_mm() * nearer / 10.0);
+        // 1 dGy = 10⁸ nGy.
+        frames as f64 * self.exposure.entrance_ngy * 1e-8 * sides_cm[0] * sides_cm[1]
     }
 
     /// Cine and multi-frame.

@@ -44,6 +44,12 @@ impl Image {
         Self { width, height, format, data }
     }
 
+    /// A picture of one grey, as RGBA.
+    pub fn blank([width, height]: [u32; 2], grey: u8) -> Self {
+        let data = [grey, grey, grey, 255].repeat(width as usize * height as usize);
+        Self::new(width, height, PixelFormat::Rgba8, data)
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.width

@@ -101,6 +101,19 @@ mod tests {
     }
 
     #[test]
+    fn the_back_of_the_head_is_inside_its_skin() {
+        let high = Vec3::new(40.0, 30.0, 300.0);
+        let trunk = Trunk::new(&TorsoSpec::default(), Vec3::new(-40.0, -50.0, 0.0), high);
+        let mut head = SurfaceMesh { vertices_mm: vec![], triangles: vec![] };
+        trunk.head(&mut head, 0.0);
+        // Behind the mastoids.
+        let back = head.vertices_mm.iter().filter(|place| place.y > trunk.spine_y(place.z) + 20.0);
+        let back: Vec<&Vec3> = back.collect();
+        let outside = back.iter().filter(|place| !trunk.has_in_head(place)).count();
+        assert!(back.len() > 100 && outside == 0, "{outside} of {}", back.len());
+    }
+
+    #[test]
     fn what_is_not_wanted_is_not_there() {
         let spec = TorsoSpec { spine: false, ribs: false, lungs: false, ..TorsoSpec::default() };
         let body = Body::new(&spec, (Vec3::zeros(), Vec3::repeat(100.0)));

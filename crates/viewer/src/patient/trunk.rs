@@ -27,7 +27,9 @@ const NECK_MM: [f64; 2] = [60.0, 64.0];
 /// Start and end of the neck above the apices of the lungs.
 const NECK_ABOVE_MM: [f64; 2] = [38.0, 105.0];
 /// Height of the head above the neck, and its half width and half depth.
-const HEAD_MM: [f64; 3] = [205.0, 78.0, 98.0];
+const HEAD_MM: [f64; 3] = [165.0, 78.0, 98.0];
+/// Squareness of the head below its middle, where occiput and neck are full; above, it is an ellipsoid.
+const OCCIPUT_POWER: f64 = 2.6;
 
 #[derive(Debug)]
 pub(super) struct Trunk {
@@ -127,18 +129,28 @@ impl Trunk {
         // The head: an ellipsoid, joined to the neck.
         let up = (z - head) / HEAD_MM[0];
         if up > -0.1 {
-            let round = (1.0 - (2.0 * up.clamp(0.0, 0.995) - 1.0).powi(2)).sqrt();
+            let from_middle = 2.0 * up.clamp(0.0, 0.995) - 1.0;
+            let power = if from_middle < 0.0 { OCCIPUT_POWER } else { 2.0 };
+            let round = libm::pow(1.0 - libm::pow(from_middle.abs(), power), 1.0 / power);
             let joined = step(up, 0.5, 0.4);
             let [w0, d0] = [HEAD_MM[1] * round, HEAD_MM[2] * round];
             let blend = |head: f64, neck: f64| head.max(neck * joined);
             (w, d) = (blend(w0, w), blend(d0, d));
-            y -= 14.0 * step(up, 0.0, 0.35);
+            y += 7.0 * step(up, 0.0, 0.35);
         }
         w += 10.0 * step(z, head - 30.0, head + 5.0) * step(up, 0.4, 0.15);
         // Jaw and face reach forward.
         let face = 17.0 * step(z, head - 75.0, head - 45.0) * step(z, head + 70.0, head + 10.0);
         (d, y) = (d + face, y - face);
         ([w, d], y, mix(0.8, 1.0, shoulder))
+    }
+
+    /// Whether a place of the head is inside the skin.
+    #[cfg(test)]
+    pub(super) fn has_in_head(&self, place: &Vec3) -> bool {
+        let ([w, d], y, _) = self.skin_at(place.z);
+        let [u, v] = [(place.x - self.spine[0]) / w, (place.y - y) / d];
+        u * u + v * v < 1.0
     }
 
     /// Rings of the skin from the lowest to the top of the head, counter-clockwise seen from above.

@@ -67,8 +67,13 @@ const REFERENCE_MM: f64 = 150.0;
 impl CArmSpec {
     /// Distance from the source to the patient entrance reference point, mm.
     pub fn reference_mm(&self) -> f64 {
-        (self.sod_mm - REFERENCE_MM).max(1.0)
+        reference_mm(self.sod_mm)
     }
+}
+
+/// The same for a distance from the source to the isocentre, mm.
+pub(crate) fn reference_mm(sod_mm: f64) -> f64 {
+    (sod_mm - REFERENCE_MM).max(1.0)
 }
 
 /// Angles of a C-arm in clinical words: LAO or RAO with an angle, CRA or CAU with an angle, or AP.

@@ -12,8 +12,8 @@ use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 pub use anatomy::{CtSpec, FlowSpec, InjectionSpec, PatientSpec, TorsoSpec};
-pub(crate) use c_arm::PITCH_MM;
 pub use c_arm::{CArmSpec, Pose};
+pub(crate) use c_arm::{PITCH_MM, reference_mm};
 pub use exposure::ExposureSpec;
 pub use xray::{DetectorSpec, Mode, XRaySpec};
 

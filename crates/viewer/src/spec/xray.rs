@@ -142,7 +142,8 @@ pub struct DetectorSpec {
     /// Dose whose photon noise equals the electronic noise of reading a pixel, 0 to 10,000: flat detectors have 1 to
     /// 10 nGy, 0 is none.
     pub electronic_ngy: f64,
-    /// Fraction of the last frame that is read again, 0 to 0.99.
+    /// Fraction of a frame that is read again a thirtieth of a second later, 0 to 0.99: at other rates what has not decayed
+    /// by then.
     pub lag: f64,
     /// Fraction of scattered photons behind the grid, 0 to 0.95. Behind 20 cm of tissue two thirds of all photons are
     /// scattered; a grid that lets seven tenths of the others and a tenth of these through leaves a quarter.

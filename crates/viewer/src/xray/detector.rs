@@ -4,8 +4,8 @@
 //! penumbra of f (SID − SOD)/SOD for the isocentre; here it is a Gaussian of the same variance, for all depths that
 //! of the isocentre. Of the signal, n = Poisson(λ) photons of the local mean energy arrive; the scintillator's light
 //! spreads over the neighbours, signal and noise alike (a Gaussian of deviation `blur_mm`); reading adds electronic
-//! noise, as strong as that of the photons of `electronic_ngy`, per pixel; and a fraction `lag` of the last stored
-//! signal is read again.
+//! noise, as strong as that of the photons of `electronic_ngy`, per pixel; and a part of the last stored signal is read
+//! again. It decays with time, whatever the number of frames: λ = `lag` after a thirtieth of a second, λ^(30 t) after t.
 //!
 //! Random words depend on (seed, geometry, frame, pixel): every pose and plane has independent noise.
 
@@ -20,6 +20,9 @@ use crate::spec::{DetectorSpec, XRaySpec};
 /// Streams of random words.
 const QUANTA: u32 = 0;
 const ELECTRONS: u32 = 1;
+
+/// Time after which `lag` of a signal is left, s: the detectors that it is measured of have thirty frames a second.
+const LAG_S: f64 = 1.0 / 30.0;
 
 /// Number of pixels whose random words are computed together.
 const BLOCK: usize = 4 * LANES;
@@ -36,7 +39,10 @@ pub(crate) struct Detector {
     light: Blur,
     /// Standard deviation of the electronic noise of a pixel, keV.
     electronic_kev: f32,
-    lag: f32,
+    /// Fraction of a signal that is left after [`LAG_S`].
+    lag: f64,
+    /// Time from the last signal read to the next, s.
+    after_s: f64,
     /// The last signal read; empty before the first.
     stored: Vec<f32>,
     /// Widest vector instructions available: the operations are the same with any.
@@ -56,7 +62,8 @@ impl Detector {
             focal_spot: Blur::new(penumbra_px / 12.0_f64.sqrt(), c_arm.size_px()),
             light: Blur::new(spec.blur_mm / c_arm.pixel_mm(), c_arm.size_px()),
             electronic_kev: if spec.noise { electronic_kev as f32 } else { 0.0 },
-            lag: spec.lag as f32,
+            lag: spec.lag,
+            after_s: LAG_S,
             stored: vec![],
             arch: pulp::Arch::new(),
         }
@@ -70,6 +77,11 @@ impl Detector {
     /// Stores the signal of which the next frame has its share.
     pub(crate) fn store(&mut self, signal: Vec<f32>) {
         self.stored = signal;
+    }
+
+    /// Sets the time from the last frame to the next.
+    pub(crate) fn after(&mut self, after_s: f64) {
+        self.after_s = after_s;
     }
 
     /// Reads one frame. `signal` and `energy` (signal times keV per photon) are those of the pixels; `kev` is the
@@ -92,8 +104,9 @@ impl Detector {
             self.add_electronic(&mut image, kev, frame);
         }
         if self.stored.len() == image.len() && self.lag > 0.0 {
+            let left = libm::pow(self.lag, self.after_s / LAG_S) as f32;
             for (new, old) in image.iter_mut().zip(&self.stored) {
-                *new += self.lag * (old - *new);
+                *new += left * (old - *new);
             }
         }
         if self.lag > 0.0 {
@@ -361,6 +374,15 @@ mod tests {
         let mut detector = detector(&spec);
         assert_eq!(detector.read(vec![1.0; 256], vec![60.0; 256], 1.0, 0), [1.0; 256]);
         assert_eq!(detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 1), [1.75; 256]);
+        // With half of the time between, twice as many frames keep as much: it is of time, not of frames.
+        detector.after(0.5 * LAG_S);
+        detector.store(vec![1.0; 256]);
+        detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 2);
+        let after_two = detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 3);
+        assert!((after_two[0] - 1.75).abs() < 1e-6, "{}", after_two[0]);
+        detector.after(10.0 * LAG_S);
+        detector.store(vec![1.0; 256]);
+        assert!((detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 4)[0] - 2.0).abs() < 1e-5);
         detector.take_stored();
         assert_eq!(detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 2), [2.0; 256]);
     }

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::{SurfaceMesh, Wall};
-use endowire_viewer::{Backend, CArmSpec, FlowSpec, InjectionSpec, PathLengths, Renderer, View, ViewSpec};
+use endowire_viewer::{
+    Backend, CArmSpec, FlowSpec, FrameTime, Image, InjectionSpec, PathLengths, Renderer, TorsoSpec, View,
+    ViewSpec,
+};
 
 fn vessel(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels").join(name)
@@ -206,4 +209,36 @@ fn largest_step(paths: &PathLengths) -> (f32, [usize; 2]) {
         }
     }
     (largest / most, place)
+}
+
+#[test]
+fn the_open_field_has_the_same_greys_whether_or_not_medium_will_come() {
+    // Before the injection, with and without blades.
+    let wall = wall("arch");
+    let mut spec = view("aortic_arch", 80.0, 0.0, injection(20.0, None));
+    spec.size_px = [96, 96];
+    (spec.c_arm.field_mm, spec.detector.noise) = (Some(380.0), false);
+    spec.patient.torso = Some(TorsoSpec::default());
+    let drawn = |blades: bool, injected: bool| {
+        let mut spec = spec.clone();
+        spec.c_arm.collimation_mm = blades.then_some([150.0; 2]);
+        if !injected {
+            spec.injection.clear();
+        }
+        let mut renderer = Renderer::of_wall(&spec, &wall).unwrap();
+        let moment = FrameTime { frame: 0, time_s: 0.0 };
+        renderer.render_at(&[], moment).unwrap().fluoro.unwrap()
+    };
+    for blades in [false, true] {
+        let [with, without] = [true, false].map(|injected| drawn(blades, injected));
+        let middle = |image: &Image| {
+            let at = |k: u32| image.pixel(48 + k % 30 - 15, 48 + k / 30 - 15).unwrap()[0];
+            let mut greys: Vec<u8> = (0..900).map(at).collect();
+            greys.sort_unstable();
+            [45, 450, 855].map(|place| greys[place])
+        };
+        let (a, b) = (middle(&with), middle(&without));
+        assert!(a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 3), "{blades}: {a:?} {b:?}");
+        assert!(a[0] > 20 && a[2] < 250 && a[2] > a[0] + 40, "{blades}: a picture: {a:?}");
+    }
 }

@@ -95,8 +95,8 @@ fn a_subject_is_read_done_by_hand_scored_and_saved() {
     assert_eq!(text(&mut browser, "task-name"), "A wire through a straight tube (level 1)");
     assert!(text(&mut browser, "task-text").contains("Counts:"));
     assert_eq!(text(&mut browser, "task-goal"), "tip within 8 mm of opening 1");
-    assert_eq!(text(&mut browser, "task-limits"), "time 60 s, beam 60 s, wall force 0.2 N");
-    assert_eq!(browser.eval("document.querySelectorAll('#task-counts tbody tr').length"), 5);
+    assert_eq!(text(&mut browser, "task-limits"), "time 300 s, beam 240 s, wall force 0.2 N");
+    assert_eq!(browser.eval("document.querySelectorAll('#task-counts tbody tr').length"), 8);
     // Time stands still while it is read, and pictures go on.
     browser.wait(READY);
     let time_s = "(async () => (await import('./screen.js')).readout.time_s)()";
@@ -121,10 +121,10 @@ fn a_subject_is_read_done_by_hand_scored_and_saved() {
     let file = browser.eval("window.saved");
     let (exam, _) = native::subject("straight_tube.toml", 64);
     let assessed = native::assessed(exam, file.as_str().unwrap());
-    assert_eq!(rows.as_array().unwrap().len(), 5);
+    assert_eq!(rows.as_array().unwrap().len(), 8);
     for row in rows.as_array().unwrap() {
         let metrics = assessed["metrics"].as_array().unwrap();
-        let metric = metrics.iter().find(|metric| metric["name"] == row[1]).unwrap();
+        let metric = metrics.iter().find(|metric| metric["title"] == row[1]).unwrap();
         assert_eq!(row[0] == "kept", metric["passed"] == true, "{row} {metric}");
         let value: f64 = row[2].as_str().unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!((value - metric["value"].as_f64().unwrap()).abs() <= 5e-4, "{row} {metric}");

@@ -7,6 +7,7 @@ use endowire_assess::{Metric, Record, Score, SessionFile, Subject, Way};
 use endowire_core::device::Stack;
 use endowire_methods::Scene;
 
+use super::verified;
 use crate::args::AssessArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -30,6 +31,8 @@ pub(super) struct Attempt {
     pub(super) way: Option<Way>,
     pub(super) metrics: Vec<Metric>,
     pub(super) score: Option<Arc<Score>>,
+    /// Whether it was carried out again, with the same record.
+    pub(super) verified: bool,
 }
 
 /// A scene in which sessions were recorded.
@@ -121,7 +124,7 @@ pub(super) fn measured(
     let Place { path, scene, .. } = &places.all[place];
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let tree = scene.centreline(&places.cache).map_err(in_scene)?;
-    scenes::tell_found_centreline(path, scene);
+    scenes::tell_found(path, scene);
     let target = args.target.clone().or_else(|| target(scene));
     let way = Way::of_record(&record, tree, target.as_deref(), args.within_mm).map_err(in_scene)?;
     let metrics = endowire_assess::assess(&record, way.as_ref());
@@ -134,6 +137,7 @@ pub(super) fn measured(
         way,
         metrics,
         score: None,
+        verified: false,
     })
 }
 
@@ -142,11 +146,12 @@ fn target(scene: &Scene) -> Option<String> {
     scene.script.iter().rev().find_map(|line| line.until.as_ref()?.target.clone())
 }
 
-/// Scores sessions by a subject; returns the provenance and the attempts.
+/// Scores sessions by a subject, after carrying them out again if `verify`; returns the provenance and the attempts.
 pub(super) fn scored(
     subject: &Subject,
     sessions: Vec<Given<'_>>,
     places: &mut Places<'_>,
+    verify: bool,
 ) -> Result<(Provenance, Vec<Attempt>), Failure> {
     let settings = subjects::settings(subject)?;
     let (scene, path, exam) = subjects::in_scene(subject, &places.cache)?;
@@ -156,7 +161,13 @@ pub(super) fn scored(
     let mut attempts = vec![];
     for (session, of_file) in sessions {
         of_file.check_in((&path, &set), &stack, session)?;
+        let again = verify.then(|| {
+            let scene = (&places.all[place].scene, path.as_path());
+            verified::repeated(&of_file, session, scene, &exam, &places.cache)
+        });
+        let again = again.transpose()?;
         let SessionFile { record, recorded_unix_s, .. } = of_file;
+        let record = again.unwrap_or(record);
         exam.check(&record).map_err(|error| Failure::from(error).at(session.display()))?;
         let score = exam.clone().score(&record);
         attempts.push(Attempt {
@@ -168,6 +179,7 @@ pub(super) fn scored(
             way: exam.way().cloned(),
             metrics: score.metrics.iter().map(|one| one.metric).collect(),
             score: Some(score),
+            verified: verify,
         });
     }
     Ok((provenance, attempts))

@@ -5,10 +5,11 @@ mod course;
 mod files;
 mod page;
 mod text;
+mod verified;
 
 use std::path::Path;
 
-use endowire_assess::{Metric, Noticed, Score, noticed};
+use endowire_assess::{Metric, Noticed, SCHEMA, Score, noticed};
 use endowire_report::assessed_page;
 use serde::Serialize;
 
@@ -35,6 +36,7 @@ struct Document<'a> {
 enum Assessed<'a> {
     One(Box<Session<'a>>),
     Several {
+        schema: u32,
         sessions: Vec<Session<'a>>,
         courses: &'a [CourseOf<'a>],
         /// Sessions in which nothing was done.
@@ -50,6 +52,9 @@ struct Session<'a> {
     /// Time of the recording, seconds since 1970-01-01 UTC; `None` if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     recorded_unix_s: Option<u64>,
+    /// Whether it was carried out again, with the same record.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    verified: bool,
     #[serde(flatten)]
     by: By<'a>,
     noticed: Vec<Noticed>,
@@ -60,7 +65,7 @@ struct Session<'a> {
 #[serde(untagged)]
 enum By<'a> {
     Subject(&'a Score),
-    Measures { scene: &'a str, target: Option<&'a str>, metrics: &'a [Metric] },
+    Measures { schema: u32, scene: &'a str, target: Option<&'a str>, metrics: &'a [Metric] },
 }
 
 /// Measures each session, scores it if a subject is given, and prints the results.
@@ -72,7 +77,7 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     let mut places = Places::new(args);
     let (sessions, left_out) = attempt::read(&files)?;
     let (provenance, mut attempts) = match &args.subject {
-        Some(which) => attempt::scored(&subjects::read(which)?, sessions, &mut places)?,
+        Some(which) => attempt::scored(&subjects::read(which)?, sessions, &mut places, args.verify)?,
         None => {
             let contents = files.iter().map(|file| read_input(&files::content(file)));
             let contents = contents.collect::<Result<Vec<_>, _>>()?;
@@ -85,6 +90,7 @@ pub(crate) fn assess(args: &AssessArgs) -> Result<(), Failure> {
     let reported = match attempts.as_slice() {
         [attempt] if left_out.is_empty() => Assessed::One(Box::new(reported(attempt, &places))),
         all => Assessed::Several {
+            schema: SCHEMA,
             sessions: all.iter().map(|attempt| reported(attempt, &places)).collect(),
             courses: &courses,
             left_out: &left_out,
@@ -101,6 +107,7 @@ fn reported<'a>(attempt: &'a Attempt, places: &'a Places<'_>) -> Session<'a> {
     let by = match &attempt.score {
         Some(score) => By::Subject(score),
         None => By::Measures {
+            schema: SCHEMA,
             scene: &places.of(attempt).scene.name,
             target: attempt.target.as_deref(),
             metrics: &attempt.metrics,
@@ -109,6 +116,7 @@ fn reported<'a>(attempt: &'a Attempt, places: &'a Places<'_>) -> Session<'a> {
     Session {
         session: &attempt.session,
         recorded_unix_s: attempt.recorded_unix_s,
+        verified: attempt.verified,
         by,
         noticed: noticed(&attempt.record, attempt.way.as_ref()),
     }

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::args::CompareArgs;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{answer, progress, to_json};
+use crate::output::{answer, progress, to_json, whole};
 use crate::studies::{CANDIDATES, CASES};
 use case::{Case, TruthNote};
 use front::Front;
@@ -134,7 +134,8 @@ fn finish(
         format!("compare {:?} {:?} {:?} {}", args.cases, args.methods, args.elements, args.limit_s);
     let document = Document { provenance: Provenance::of_program(&arguments), truths, rows, fronts, files };
     let path = args.out.join("compare.json");
-    std::fs::write(&path, to_json(&document)? + "\n").map_err(|e| Failure::write(&path, &e))?;
+    whole::write_bytes(&path, (to_json(&document)? + "\n").as_bytes())
+        .map_err(|e| Failure::write(&path, &e))?;
     answer(&document, args.json, || text(&document, cases))
 }
 
@@ -273,14 +274,11 @@ fn read<T: DeserializeOwned>(table: &Path) -> Result<Vec<T>, Failure> {
 
 fn write<T: Serialize>(table: &Path, rows: &[T]) -> Result<(), Failure> {
     let save = || -> std::io::Result<()> {
-        // Written atomically, so that an interrupt leaves a valid table.
-        let part = table.with_extension("part");
-        let mut writer = csv::Writer::from_path(&part)?;
+        let mut writer = csv::Writer::from_writer(Vec::new());
         for row in rows {
             writer.serialize(row)?;
         }
-        writer.flush()?;
-        std::fs::rename(&part, table)
+        whole::write_bytes(table, &writer.into_inner().map_err(csv::IntoInnerError::into_error)?)
     };
     save().map_err(|e| Failure::write(table, &e))
 }

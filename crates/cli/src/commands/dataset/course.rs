@@ -108,7 +108,7 @@ impl Course {
         }
         scenes::let_medium_flow(&mut view, &scene, cache).map_err(failed)?;
         view.injection.extend(injected.iter().map(Injected::spec));
-        scenes::tell_found_centreline(file, &scene);
+        scenes::tell_found(file, &scene);
         view.validate().map_err(failed)?;
         let views = shot::planes(spec, &view, first);
         Ok(Self {

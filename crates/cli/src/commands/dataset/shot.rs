@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
-use endowire_viewer::{Labels, ViewSpec};
+use endowire_viewer::{FrameTime, Labels, Moment, Seen, ViewSpec};
 use serde::{Deserialize, Serialize};
 
 use super::coco::{Annotation, ImageRow, annotations};
@@ -58,8 +58,21 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let moment = &course.moments[(progress * last as f64).round() as usize];
         let time_s = moment.time_s + of.within(What::Time, spec.vary.time_s);
         let way = course.way_of_tip(moment);
-        pushed.leave(&moment.coils)?;
-        let devices = pushed.views(&moment.shape, &moment.inserted_mm);
+        let before = moment.step.checked_sub(1).map(|before| &course.moments[before]);
+        let shown = Moment {
+            frame: FrameTime { frame: m as u64, time_s },
+            shape: &moment.shape,
+            inserted_mm: &moment.inserted_mm,
+            coils: &moment.coils,
+            contacts: &[],
+            displacement: moment.displacement.as_ref(),
+            before: before.map(|before| Seen {
+                shape: &before.shape,
+                inserted_mm: &before.inserted_mm,
+                time_s: time_s - (moment.step_time_s - before.step_time_s),
+            }),
+        };
+        let devices = shown.devices(&mut pushed)?;
         let in_line = moment.inserted_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0).map(|(i, _)| i);
         let drawn = in_line.chain(moment.coils.iter().map(|coil| coil.instrument));
         let drawn: Vec<(usize, &str)> = drawn.map(|i| (i, course.instruments[i].as_str())).collect();
@@ -67,10 +80,8 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let contacts: Vec<Vec3> = moment.contacts.iter().map(|c| c.position_mm).collect();
         for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
             let id = (shot * spec.moments + m) * spec.views() + plane;
-            renderer.move_vessel(moment.displacement.as_ref())?;
             way.iter().try_for_each(|(then_s, place_mm)| renderer.follow_tip(*then_s, *place_mm))?;
-            let frame = endowire_viewer::FrameTime { frame: m as u64, time_s };
-            let Some(image) = renderer.render_at(&devices, frame)?.fluoro else { continue };
+            let Some(image) = renderer.draw(&mut pushed, &shown)?.fluoro else { continue };
             let labels = renderer.labels(&devices, &contacts)?;
             let [file_name, arrays] = [format!("images/{id:07}.png"), format!("arrays/{id:07}.npz")];
             image.write_png(folder.join(&file_name))?;

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::args::ExperimentCommand;
 use crate::failure::Failure;
-use crate::output::to_json;
+use crate::output::{to_json, whole};
 
 /// Runs the requested experiment.
 pub(crate) fn experiment(command: &ExperimentCommand) -> Result<(), Failure> {
@@ -56,5 +56,5 @@ fn write<R: Serialize>(
     };
     save().map_err(|e| Failure::write(folder, &e))?;
     let path = folder.join(format!("{name}.json"));
-    std::fs::write(&path, to_json(document)? + "\n").map_err(|e| Failure::write(&path, &e))
+    whole::write_bytes(&path, (to_json(document)? + "\n").as_bytes()).map_err(|e| Failure::write(&path, &e))
 }

@@ -7,7 +7,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use endowire_play::{Delivered, Input, Pictures, Session, Sharpened, Sharpening, Snapshot, TICKS_PER_S};
+use endowire_play::{Input, Pictures, Session, Sharpened, Sharpening, Snapshot, TICKS_PER_S};
 use endowire_viewer::Image;
 use serde::Serialize;
 
@@ -51,7 +51,6 @@ pub(crate) struct FrameTime {
 pub(crate) struct Newest {
     moment: Mutex<Option<FrameTime>>,
     /// Dose chosen by exposure control.
-    delivered: Mutex<Option<Delivered>>,
     there: Condvar,
     ended: AtomicBool,
 }
@@ -210,11 +209,10 @@ pub(crate) fn physics(
                 break;
             }
         }
-        if let Some(delivered) = locked(&newest.delivered).take() {
-            session.exposed(delivered);
-        }
         let (before, clock) = (session.steps(), Instant::now());
-        session.tick();
+        if !session.waits_for_hands() {
+            session.tick();
+        }
         let step_ms = ms(clock.elapsed());
         if session.steps() != before {
             steps_ms.push(step_ms);
@@ -308,10 +306,12 @@ fn draw_with(
             Ok(all) => all.into_iter().for_each(|one| drop(to.send(one))),
             Err(error) => failure = Some(error.to_string()),
         }
-        if let Some(delivered) = pictures.delivered(snapshot) {
-            *locked(&newest.delivered) = Some(delivered);
-        }
-        let seen = (snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]);
+        let seen = (
+            snapshot.readout.step,
+            snapshot.readout.tip_mm,
+            snapshot.lab.revisions()[1],
+            snapshot.hides_three_d(),
+        );
         if number.is_multiple_of(THREE_D_EVERY) && drawn_3d != Some(seen) {
             drawn_3d = Some(seen);
             match pictures.three_d(snapshot) {

@@ -42,10 +42,7 @@ pub(crate) fn run(
                     Err(refused) => Err(refused),
                     Ok(Line::Input(input)) => session.apply(&input).map_err(|e| e.to_string()),
                     Ok(Line::Order(Order::Read {} | Order::Quit {})) => Ok(()),
-                    Ok(Line::Order(Order::Wait { ticks })) => {
-                        let waited = wait(ticks, &mut session, record, interrupted)?;
-                        waited.and_then(|()| expose(&mut session, &mut pictures))
-                    }
+                    Ok(Line::Order(Order::Wait { ticks })) => wait(ticks, &mut session, record, interrupted)?,
                     Ok(Line::Order(Order::Picture { file, window })) => {
                         picture(&file, window, &session, &mut pictures)
                     }
@@ -78,12 +75,6 @@ fn wait(
         record.keep(session)?;
     }
     Ok(Ok(()))
-}
-
-fn expose(session: &mut Session, pictures: &mut Pictures) -> Done {
-    let delivered = pictures.expose(&session.snapshot()).map_err(|e| e.to_string())?;
-    delivered.into_iter().for_each(|delivered| session.exposed(delivered));
-    Ok(())
 }
 
 fn picture(file: &Path, window: bool, session: &Session, pictures: &mut Pictures) -> Done {

@@ -153,7 +153,7 @@ pub(crate) fn open(
     simulation.lumen().wall(cache).map_err(in_scene)?;
     let script = scene.steps(simulation.stack(), cache).map_err(in_scene)?;
     scenes::let_medium_flow(&mut view, scene, cache).map_err(in_scene)?;
-    scenes::tell_found_centreline(path, scene);
+    scenes::tell_found(path, scene);
     let sac = scene.sac(simulation.lumen(), cache).map_err(in_scene)?;
     let session = Session::new(simulation, view, side_px, limits).map_err(in_scene)?;
     Ok((session.with_sac(sac), script))

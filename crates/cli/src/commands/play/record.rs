@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use endowire_assess::SessionFile;
+use endowire_assess::{SCHEMA, SessionFile};
 use endowire_methods::Setting;
 use endowire_play::{Session, Went, script_head};
 
@@ -94,10 +94,14 @@ impl Record {
             }
         }
         let text = format!("{}{}", self.head, session.script());
+        let inputs = serde_json::to_value(session.inputs())
+            .map_err(|e| Failure::Computation(format!("the inputs cannot be written as JSON: {e}")))?;
         let of_session = SessionFile {
+            schema: SCHEMA,
             scene_file: self.scene.clone(),
             set: self.set.clone(),
             recorded_unix_s: self.recorded_unix_s,
+            inputs: Some(inputs),
             record: session.record().clone(),
         };
         let script = self.path.clone();

@@ -43,11 +43,15 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
     }
     let sac = scene.sac(simulation.lumen(), &cache).map_err(in_scene)?;
+    if let Some(path) = &args.save_state {
+        // What runs that were killed while they saved have left.
+        whole::remove_unfinished(path).map_err(|e| Failure::write(path, &e))?;
+    }
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, (&scene, sac.as_ref()), &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation), &cache)?;
     frames.check_angiogram(Some(&script)).map_err(in_scene)?;
     if !args.quiet {
-        scenes::tell_found_centreline(&args.scene, &scene);
+        scenes::tell_found(&args.scene, &scene);
     }
     if let Some(held) = frames.held().filter(|_| !args.quiet) {
         tell(format_args!("{}: {held}", args.scene.display()));

@@ -5,13 +5,12 @@ mod wishes;
 
 use std::path::{Path, PathBuf};
 
-use endowire_core::insertion::{DetachedCoil, Tally};
-use endowire_core::shape::Shape;
+use endowire_core::insertion::Tally;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Animation, ContactView, DeviceView, FrameTime, Frames, InjectionSpec, Labels, Mask, Mode, Pace,
-    PathLengths, Pushed, Renderer, Seen, View, ViewSpec,
+    Animation, DeviceView, Frames, InjectionSpec, Labels, Mask, Mode, Moment, Pace, PathLengths, Pushed,
+    Renderer, Seen, View, ViewSpec,
 };
 use serde::Serialize;
 
@@ -21,7 +20,7 @@ use crate::failure::Failure;
 use crate::output::frames::tomogram_holds;
 use crate::output::manifest::Manifest;
 use crate::output::npz::write_map;
-use crate::output::{print_json, tell, to_json};
+use crate::output::{print_json, tell, to_json, whole};
 use crate::scenes;
 use plane::{Plane, write_dicom};
 
@@ -29,17 +28,7 @@ use plane::{Plane, write_dicom};
 pub(super) struct Still<'a> {
     /// Beginning of its file names.
     pub(super) name: String,
-    pub(super) moment: FrameTime,
-    pub(super) shape: &'a Shape,
-    /// Inserted length of the device, or of each instrument, mm.
-    pub(super) inserted_mm: &'a [f64],
-    /// Detached coils.
-    pub(super) coils: &'a [DetachedCoil],
-    pub(super) contacts: &'a [ContactView],
-    /// Displacement of the vessel, if it moves.
-    pub(super) displacement: Option<&'a Displacement>,
-    /// The previous state, if pulses show the motion since then.
-    pub(super) before: Option<Seen<'a>>,
+    pub(super) moment: Moment<'a>,
 }
 
 /// The JSON document of `render` and `fluoro`.
@@ -233,7 +222,7 @@ impl<'a> Studio<'a> {
 
     /// Draws a state and writes the requested files.
     pub(super) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
-        if let Some(empty) = self.empty(still.moment.time_s) {
+        if let Some(empty) = self.empty(still.moment.frame.time_s) {
             tell(format_args!("endowire: {empty}"));
         }
         let drawn = self.draw_all(still);
@@ -253,8 +242,7 @@ impl<'a> Studio<'a> {
     }
 
     fn draw_all(&mut self, still: &Still) -> Result<(), Failure> {
-        self.plan.pushed.leave(still.coils)?;
-        let views = self.plan.pushed.views(still.shape, still.inserted_mm);
+        let views = still.moment.devices(&mut self.plan.pushed)?;
         let orbited = match self.plan.args.orbit.filter(|_| self.plan.spec.wants(View::ThreeD)) {
             Some(orbit_deg) => Some(self.orbited(orbit_deg, &views, still)?),
             None => None,
@@ -264,13 +252,10 @@ impl<'a> Studio<'a> {
         let mut fluoro = Vec::with_capacity(self.planes.len());
         let wanted = orbited.is_none() || self.plan.spec.wants(View::Fluoro);
         for plane in self.planes.iter_mut().filter(|_| wanted) {
-            plane.renderer.move_vessel(still.displacement)?;
-            plane.renderer.show_contacts(still.contacts);
+            // A mask of a new position of the C-arm is taken where the vessel is now.
+            plane.renderer.set(&still.moment)?;
             plane.turn(&views, turn_deg)?;
-            let now =
-                Seen { shape: still.shape, inserted_mm: still.inserted_mm, time_s: still.moment.time_s };
-            let pulse = self.plan.pushed.pulse(still.before, now, &plane.renderer);
-            let frames = plane.renderer.render_pulse(&views, &pulse, still.moment)?;
+            let frames = plane.renderer.draw(&mut self.plan.pushed, &still.moment)?;
             three_d = three_d.or(frames.three_d);
             if let (Some(image), true) = (&frames.fluoro, self.plan.args.dicom.is_some()) {
                 plane.keep(image.clone());
@@ -303,9 +288,8 @@ impl<'a> Studio<'a> {
         let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.plan.spec.clone() };
         (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit_deg * self.part(), Some(orbit_deg));
         let mut orbiting = Renderer::of_wall(&spec, &self.wall)?;
-        orbiting.move_vessel(still.displacement)?;
-        orbiting.show_contacts(still.contacts);
-        Ok(orbiting.render_at(views, still.moment)?.three_d)
+        orbiting.set(&still.moment)?;
+        Ok(orbiting.render_at(views, still.moment.frame)?.three_d)
     }
 
     /// Writes the frames of the first plane, separately and side by side, and adds them to the animation.
@@ -341,9 +325,9 @@ impl<'a> Studio<'a> {
     fn write_data(&mut self, still: &Still, plane: usize, views: &[DeviceView]) -> Result<(), Failure> {
         let ending = self.planes[plane].ending;
         if self.plan.args.labels {
-            let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
+            let contacts: Vec<_> = still.moment.contacts.iter().map(|c| c.position_mm).collect();
             let mut labels = self.planes[plane].renderer.labels(views, &contacts)?;
-            let shown = self.plan.pushed.shown(still.inserted_mm);
+            let shown = self.plan.pushed.shown(still.moment.inserted_mm);
             labels.devices.iter_mut().zip(shown).for_each(|(label, shown)| label.shown = Some(shown));
             let path = self.file(&format!("{}_mask{ending}.png", still.name))?;
             labels.mask.write_png(&path)?;
@@ -352,12 +336,13 @@ impl<'a> Studio<'a> {
                 mask.image().write_png(&path)?;
             }
             let path = self.file(&format!("{}_labels{ending}.json", still.name))?;
-            std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
+            whole::write_bytes(&path, (to_json(&labels)? + "\n").as_bytes())
+                .map_err(|e| Failure::write(&path, &e))?;
         }
         if self.plan.args.raw {
             let renderer = &mut self.planes[plane].renderer;
-            let paths = renderer.path_lengths_at(views, still.moment.time_s)?;
-            let left = renderer.transmission_at(views, still.moment.time_s)?;
+            let paths = renderer.path_lengths_at(views, still.moment.frame.time_s)?;
+            let left = renderer.transmission_at(views, still.moment.frame.time_s)?;
             let line: Vec<f32> = left.iter().map(|t| -t.ln()).collect();
             for (name, map) in maps(&paths, &line) {
                 let path = self.file(&format!("{}_{name}{ending}.npy", still.name))?;

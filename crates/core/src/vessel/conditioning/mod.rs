@@ -12,7 +12,7 @@
 //!    and so they do where the two surfaces are too far apart (`deviation`).
 //! 5. Blades, spikes and folds that no even mesh can hold are cut off (`spikes`), beyond the limit if need be.
 //!
-//! Openings stay open, nothing is welded, and what is not a manifold stays where it is.
+//! Small bodies in the lumen are left out of this (`small`). Openings stay open, nothing is welded, and what is not a manifold stays where it is.
 
 mod bumps;
 mod corners;
@@ -22,6 +22,7 @@ mod fairing;
 mod reference;
 mod remesh;
 mod sizes;
+mod small;
 mod spikes;
 #[cfg(test)]
 mod tests;
@@ -128,13 +129,24 @@ impl<'a> Conditioned<'a> {
 pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result<Conditioned<'a>> {
     options.check()?;
     validate(surface)?;
+    let Some((rest, bodies)) = small::apart(surface) else { return Ok(even(surface, options)) };
+    let rest = even(&rest, options);
+    let mut mesh = rest.mesh.into_owned();
+    let first = mesh.vertices_mm.len() as u32;
+    mesh.vertices_mm.extend(bodies.vertices_mm);
+    mesh.triangles.extend(bodies.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
+    Ok(Conditioned { mesh: Cow::Owned(mesh), changed: true, ..rest })
+}
+
+/// [`condition`] of a surface without small bodies.
+fn even<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Conditioned<'a> {
     let reference = Reference::new(surface);
     let mut corners = Corners::new(surface, options.deviation_mm);
     let even = Evenness::of(&corners, |v| corners.at(v));
     corners.set_normals();
     let mut too_many = sizes::set(&mut corners, &reference, &[], options.wanted());
     if even.is_even() && evenness::is_fine_enough(&corners) && fairing::roughness(&corners) <= ROUGH {
-        return Ok(Conditioned::new(Cow::Borrowed(surface), &even, false));
+        return Conditioned::new(Cow::Borrowed(surface), &even, false);
     }
     let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
     remesher.run(&mut corners, REMESHINGS.0);
@@ -159,7 +171,7 @@ pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result
     let at: Vec<Vec3> = corners.vertices.iter().map(|v| v.at).collect();
     let even = Evenness::of(&corners, |v| at[v as usize]);
     let mesh = corners.surface(|v| at[v as usize]);
-    Ok(Conditioned::new(Cow::Owned(mesh), &even, too_many))
+    Conditioned::new(Cow::Owned(mesh), &even, too_many)
 }
 
 fn faired(corners: &mut Corners, reference: &Reference, last: bool) -> Vec<Vec3> {

@@ -39,7 +39,7 @@ impl PatientAxes {
     }
 
     /// Transforms a point of these axes to those of scenes, LPS.
-    pub(super) fn to_lps(self, point: Vec3) -> Vec3 {
+    pub(in crate::vessel) fn to_lps(self, point: Vec3) -> Vec3 {
         match self {
             Self::Lps => point,
             Self::Ras => Vec3::new(-point.x, -point.y, point.z),

@@ -9,16 +9,17 @@ mod obj;
 mod ply;
 mod scalar;
 mod stl;
-mod text;
 mod vtk;
 
 use std::path::Path;
 
 use super::SurfaceMesh;
-use crate::file::{FileSystem, Files};
+use crate::file::{FileSystem, Files, foreign};
+use crate::text;
 use crate::{Error, Result, Vec3};
 use frame::ToldAxes;
 pub use frame::{PatientAxes, SurfaceFrame};
+pub(super) use vtk::parse_lines as vtp_lines;
 
 /// The supported formats, for messages.
 const KNOWN: &str = "use .stl, .obj, .ply, .vtp or .vtk";
@@ -67,13 +68,12 @@ impl Format {
 
     /// The real kind of a file with this extension, if its first bytes leave no doubt that it differs.
     fn but_seems(self, bytes: &[u8]) -> Option<&'static str> {
-        let begins: [(&[u8], Option<Self>, &str); 6] = [
+        let begins: [(&[u8], Option<Self>, &str); 5] = [
             (b"ply\n", Some(Self::Ply), "PLY files (.ply) do"),
             (b"ply\r", Some(Self::Ply), "PLY files (.ply) do"),
             (b"# vtk DataFile", Some(Self::Vtk), "legacy VTK files (.vtk) do"),
             (b"<VTKFile", Some(Self::Vtp), "VTK's XML files (.vtp) do"),
             (b"<?xml", Some(Self::Vtp), "XML files, such as .vtp, do"),
-            (&[0x1f, 0x8b], None, "gzip archives do: unpack it"),
         ];
         let (_, other, name) = begins.into_iter().find(|(begin, ..)| bytes.starts_with(begin))?;
         (other != Some(self)).then_some(name)
@@ -156,6 +156,9 @@ impl SurfaceMesh {
 fn parse(format: Format, bytes: &[u8]) -> std::result::Result<Parsed, Reason> {
     if bytes.is_empty() {
         return Err("the file is empty".into());
+    }
+    if let Some(kind) = foreign(bytes) {
+        return Err(kind.into());
     }
     let bytes = text::without_mark(bytes);
     let parsed = match format {

@@ -6,8 +6,8 @@
 use std::fmt::Write;
 
 use super::faces::Faces;
-use super::text::lines;
 use super::{Parsed, Reason};
+use crate::text::lines;
 use crate::vessel::SurfaceMesh;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {

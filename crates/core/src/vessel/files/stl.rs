@@ -5,9 +5,9 @@
 //! to 32 bits. The format itself is 50 bytes per triangle.
 
 use super::faces::Faces;
-use super::text::lines;
 use super::{Parsed, Reason, ToldAxes};
 use crate::Vec3;
+use crate::text::lines;
 use crate::vessel::SurfaceMesh;
 
 /// Header of free text, then the triangle count.

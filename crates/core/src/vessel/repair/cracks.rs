@@ -8,14 +8,15 @@ use std::collections::HashMap;
 
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
+use crate::vessel::repairs::{Repair, RepairKind, of_triangles};
 use crate::vessel::topology::{DisjointSets, EdgeTable};
 
 /// Largest width of a crack, relative to the shortest adjacent open edge.
 const WIDTH: f64 = 0.05;
 
-/// Merges vertices across cracks of a mesh whose edges are in `table`; returns how many were merged. Triangles may
-/// become duplicates, none loses its area.
-pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
+/// Merges vertices across cracks of a mesh whose edges are in `table`, notes where, and returns how many were merged.
+/// Triangles may become duplicates, none loses its area.
+pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mut Vec<Repair>) -> usize {
     // The shortest open edge at each of its vertices.
     let mut reach = vec![f64::INFINITY; mesh.vertices_mm.len()];
     for uses in table.edges().filter(|uses| uses.len() == 1) {
@@ -61,13 +62,17 @@ pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
     }
     let merged = open.iter().filter(|v| sets.find(**v) != **v).count();
     if merged > 0 {
-        for triangle in &mut mesh.triangles {
+        let mut at_cracks = Vec::new();
+        for (index, triangle) in mesh.triangles.iter_mut().enumerate() {
             let moved = triangle.map(|v| sets.find(v));
             // A chain of close vertices may bring two corners of a triangle together; such a triangle keeps its own.
-            if moved[0] != moved[1] && moved[1] != moved[2] && moved[2] != moved[0] {
+            let is_whole = moved[0] != moved[1] && moved[1] != moved[2] && moved[2] != moved[0];
+            if is_whole && moved != *triangle {
                 *triangle = moved;
+                at_cracks.push(index as u32);
             }
         }
+        noted.extend(of_triangles(RepairKind::CrackJoined, mesh, at_cracks));
     }
     merged
 }

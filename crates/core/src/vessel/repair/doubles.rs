@@ -10,6 +10,7 @@ use parry3d_f64::shape::TriMesh;
 
 use super::pieces::drop_triangles;
 use crate::Vec3;
+use crate::vessel::repairs::{Repair, RepairKind, of_groups};
 use crate::vessel::topology::{EdgeTable, NONE};
 use crate::vessel::{SurfaceMesh, mesh};
 
@@ -19,8 +20,13 @@ const PATCH: f64 = 0.3;
 /// a vessel, as long as wide, is off by a tenth or more.
 const BESIDE: f64 = 0.05;
 
-/// Drops open pieces that lie on larger ones everywhere, and returns the numbers of pieces and triangles dropped.
-pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
+/// Drops open pieces that lie on larger ones everywhere, notes them, and returns the numbers of pieces and triangles
+/// dropped.
+pub(super) fn drop_doubles(
+    mesh: &mut SurfaceMesh,
+    table: &EdgeTable,
+    noted: &mut Vec<Repair>,
+) -> (usize, usize) {
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {
         return (0, 0);
@@ -49,6 +55,8 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize,
                 .all(|at| ground.distance_to_local_point(DVec3::new(at.x, at.y, at.z), false) <= reach_mm);
         }
     }
+    let dropped = |t: usize| Some(piece_of[t]).filter(|piece| patch[*piece as usize]);
+    noted.extend(of_groups(RepairKind::PieceDropped, mesh, dropped));
     let triangles = drop_triangles(mesh, &piece_of, |piece| patch[piece]);
     (patch.iter().filter(|patch| **patch).count(), triangles)
 }

@@ -6,7 +6,8 @@
 //! a large part of its area, such as two vessels that cross, is not repaired: that would cut the vessel open.
 
 use super::fill::fill;
-use crate::vessel::crossings::crossings;
+use crate::vessel::crossings::{Crossings, crossings};
+use crate::vessel::repairs::{Repair, RepairKind, of_triangles};
 use crate::vessel::topology::{DisjointSets, EdgeTable};
 use crate::vessel::{SurfaceMesh, mesh, opening};
 
@@ -42,19 +43,31 @@ struct State {
     pairs: Vec<[u32; 2]>,
     removed: usize,
     added: usize,
+    noted: Vec<Repair>,
 }
 
-/// Repairs a consistently oriented mesh.
-pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> Cured {
-    let found = crossings(mesh, tolerance_mm, None, MOST_PAIRS);
+/// The intersections of a mesh, as many as are repaired.
+pub(super) fn find(mesh: &SurfaceMesh, tolerance_mm: f64) -> Crossings {
+    crossings(mesh, tolerance_mm, None, MOST_PAIRS)
+}
+
+/// Repairs these intersections of a consistently oriented mesh, and notes where.
+pub(super) fn cure(
+    mesh: &mut SurfaceMesh,
+    tolerance_mm: f64,
+    found: Crossings,
+    noted: &mut Vec<Repair>,
+) -> Cured {
     let mut cured =
         Cured { found: found.pairs.len(), left: found.pairs.len(), capped: found.capped, ..Cured::default() };
     if found.pairs.is_empty() || found.capped {
+        noted.extend(left(mesh, &found.pairs));
         return cured;
     }
     let openings = |mesh: &SurfaceMesh, table: &EdgeTable| opening::boundary(mesh, table).openings.len();
     let loops = openings(mesh, &EdgeTable::new(&mesh.triangles));
-    let mut state = State { mesh: mesh.clone(), pairs: found.pairs, removed: 0, added: 0 };
+    let mut state = State { mesh: mesh.clone(), pairs: found.pairs, removed: 0, added: 0, noted: Vec::new() };
+    let (mut done, mut still) = (Vec::new(), left(mesh, &state.pairs));
     for rings in 0..ROUNDS {
         let Some(next) = round(&state, rings, tolerance_mm) else { break };
         state = next;
@@ -62,13 +75,20 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> Cured {
         let sound = openings(&state.mesh, &table) <= loops && table.non_manifold() == 0;
         if sound && state.pairs.len() < cured.left {
             (cured.left, cured.removed, cured.added) = (state.pairs.len(), state.removed, state.added);
+            (done, still) = (state.noted.clone(), left(&state.mesh, &state.pairs));
             mesh.clone_from(&state.mesh);
         }
         if state.pairs.is_empty() {
             break;
         }
     }
+    noted.extend(done.into_iter().chain(still));
     cured
+}
+
+/// Where these pairs of triangles intersect.
+fn left(mesh: &SurfaceMesh, pairs: &[[u32; 2]]) -> Vec<Repair> {
+    of_triangles(RepairKind::StillCrossing, mesh, pairs.iter().flatten().copied())
 }
 
 /// One round; `None` if there is nothing that it may cut out.
@@ -98,7 +118,10 @@ fn round(state: &State, rings: usize, tolerance_mm: f64) -> Option<State> {
         pairs: Vec::new(),
         removed: state.removed,
         added: state.added,
+        noted: state.noted.clone(),
     };
+    let cut_out = (0..bad.len()).filter(|t| bad[*t] || fragments[*t]).map(|t| t as u32);
+    next.noted.extend(of_triangles(RepairKind::FoldReplaced, mesh, cut_out));
     for (index, triangle) in mesh.triangles.iter().enumerate() {
         if !bad[index] && !fragments[index] {
             number[index] = next.mesh.triangles.len() as u32;

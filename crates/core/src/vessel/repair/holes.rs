@@ -7,8 +7,10 @@
 use super::fill::fill;
 use crate::Vec3;
 use crate::vessel::opening::{self, Opening};
+use crate::vessel::repairs::{Repair, RepairKind};
 use crate::vessel::topology::EdgeTable;
 use crate::vessel::{SurfaceMesh, mesh};
+use crate::{Error, Result, error};
 
 /// Length of the mean of all c above which a loop is an end.
 const COHERENT: f64 = 0.5;
@@ -26,6 +28,8 @@ const RING_FLAT: f64 = 0.03;
 const LARGEST: f64 = 0.05;
 /// Pieces of fewer triangles have borders, not holes.
 const SMALLEST_PIECE: u32 = 8;
+/// Distance from the middle of a hole, in radii of it, at which a place still names it.
+const NAMED_WITHIN: f64 = 2.0;
 
 /// The result of [`fill_holes`].
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
@@ -35,32 +39,77 @@ pub(super) struct Filled {
 }
 
 /// Closes the holes and tears of a consistently oriented mesh, whose edges are in `table`, and leaves the ends of the
-/// vessel open.
-pub(super) fn fill_holes(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Filled {
+/// vessel open, and the holes nearest to the places of `keep_open_mm`. Notes both.
+///
+/// # Errors
+/// [`Error::Parameter`] naming `keep_open_mm` for a place without a hole.
+pub(super) fn fill_holes(
+    mesh: &mut SurfaceMesh,
+    table: &EdgeTable,
+    keep_open_mm: &[Vec3],
+    noted: &mut Vec<Repair>,
+) -> Result<Filled> {
     let mut filled = Filled::default();
     if table.edges().all(|uses| uses.len() != 1) {
-        return filled;
+        kept(&[], keep_open_mm)?;
+        return Ok(filled);
     }
     let loops = opening::boundary(mesh, table);
     let (piece, count) = table.components(mesh.triangles.len());
     let mut sizes = vec![0_u32; count];
     piece.iter().for_each(|p| sizes[*p as usize] += 1);
     let total_mm2: f64 = (0..mesh.triangles.len()).map(|i| mesh::area(&mesh.corners(i))).sum();
-    let mut added = Vec::new();
-    for (opening, triangle) in loops.openings.iter().zip(&loops.first_triangle) {
-        let small = sizes[piece[*triangle as usize] as usize] < SMALLEST_PIECE;
+    let is_hole = |(opening, triangle): &(&Opening, &u32)| {
+        let small = sizes[piece[**triangle as usize] as usize] < SMALLEST_PIECE;
         let rim = Rim::of(mesh, table, opening);
-        if small || !rim.is_some_and(|rim| rim.is_hole(opening.boundary.len(), LARGEST * total_mm2)) {
-            continue;
-        }
-        if let Some(triangles) = fill(mesh, table, &opening.boundary) {
+        !small && rim.is_some_and(|rim| rim.is_hole(opening.boundary.len(), LARGEST * total_mm2))
+    };
+    let holes: Vec<&Opening> = loops
+        .openings
+        .iter()
+        .zip(&loops.first_triangle)
+        .filter(is_hole)
+        .map(|(opening, _)| opening)
+        .collect();
+    let meant = kept(&holes, keep_open_mm)?;
+    let mut added = Vec::new();
+    for (number, hole) in holes.iter().enumerate() {
+        let is_meant = meant.contains(&number);
+        if !is_meant {
+            let Some(triangles) = fill(mesh, table, &hole.boundary) else { continue };
             filled.holes += 1;
             filled.triangles += triangles.len();
             added.extend(triangles);
         }
+        let kind = if is_meant { RepairKind::HoleKept } else { RepairKind::HoleClosed };
+        let rim = hole.boundary.iter().map(|v| mesh.vertices_mm[*v as usize]);
+        noted.extend(Repair::at(kind, hole.boundary.len(), rim));
     }
     mesh.triangles.extend(added);
-    filled
+    Ok(filled)
+}
+
+/// The numbers of the holes that these places name, each the nearest one.
+fn kept(holes: &[&Opening], keep_open_mm: &[Vec3]) -> Result<Vec<usize>> {
+    let named = |place: &Vec3| {
+        let off_mm = |hole: &Opening| (hole.centre_mm - place).norm();
+        let nearest = (0..holes.len()).min_by(|a, b| off_mm(holes[*a]).total_cmp(&off_mm(holes[*b])));
+        let Some(nearest) = nearest else {
+            let remedy = "the surface has no hole that would be closed: leave it out";
+            return Err(Error::parameter("keep_open_mm", error::vector(place), remedy));
+        };
+        let hole = holes[nearest];
+        if off_mm(hole) <= NAMED_WITHIN * hole.radius_mm {
+            return Ok(nearest);
+        }
+        let remedy = format!(
+            "no hole is there: the nearest, of radius {:.2} mm, is at {}",
+            hole.radius_mm,
+            error::vector(&hole.centre_mm)
+        );
+        Err(Error::parameter("keep_open_mm", error::vector(place), remedy))
+    };
+    keep_open_mm.iter().map(named).collect()
 }
 
 /// The position of the wall at a loop of open edges.
@@ -104,6 +153,11 @@ impl Rim {
             round: 4.0 * std::f64::consts::PI * area.norm() / (around * around),
             off_plane: off_plane / opening.radius_mm.max(f64::MIN_POSITIVE),
         })
+    }
+
+    /// Whether the wall reaches the loop along the vessel.
+    pub(super) fn is_end(&self) -> bool {
+        self.coherence > COHERENT
     }
 
     /// Whether the loop is damage.

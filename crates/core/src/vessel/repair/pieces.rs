@@ -1,8 +1,14 @@
-//! Pieces that are not vessels: specks, patches that float over the surface, the outer skin of a wall with two.
+//! Pieces that are not vessels: specks, patches that float over the surface, the outer skin of a wall with two, and
+//! what lies in the lumen.
+//!
+//! A speck is small against the vessel and outside of it. What lies in the lumen was drawn there, whatever its size: it
+//! becomes a wall (`contents`).
 
+use super::contents::{self, Inner};
 use super::holes::Rim;
 use crate::Vec3;
-use crate::vessel::topology::EdgeTable;
+use crate::vessel::repairs::{Repair, RepairKind, of_groups};
+use crate::vessel::topology::{EdgeTable, Edges};
 use crate::vessel::wall::signed_volume;
 use crate::vessel::{SurfaceMesh, inside, mesh, opening};
 
@@ -22,6 +28,9 @@ const SKIN: f64 = 0.15;
 const ASKED: usize = 16;
 const INSIDE: f64 = 0.8;
 
+/// Distance from the middle of an opening, in radii of it, within which a skin of its wall ends.
+const AT_OPENING: f64 = 1.2;
+
 /// Number of pieces, the largest, that are compared: they are few once specks are removed; if not, this is not a
 /// vessel with two skins.
 const MOST: usize = 8;
@@ -35,6 +44,10 @@ pub(super) struct Dropped {
     pub(super) skins: usize,
     /// Triangles of both.
     pub(super) triangles: usize,
+    /// Closed bodies in the lumen.
+    pub(super) bodies: usize,
+    /// Sheets in the lumen.
+    pub(super) sheets: usize,
 }
 
 /// One connected piece.
@@ -51,6 +64,16 @@ struct Piece {
 }
 
 impl Piece {
+    /// Whether it is a few stray triangles, far smaller than anything that is drawn.
+    fn is_debris(&self, largest_mm2: f64) -> bool {
+        self.triangles < FEWEST && self.area_mm2 < SPECK * largest_mm2
+    }
+
+    /// Whether its bounds meet those of another one.
+    fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.bounds[0][k] <= other.bounds[1][k] && other.bounds[0][k] <= self.bounds[1][k])
+    }
+
     /// Whether its bounds are within those of another one.
     fn may_be_in(&self, outer: &Self) -> bool {
         let [low, high] = outer.bounds;
@@ -78,8 +101,9 @@ pub(in crate::vessel) fn nested(mesh: &SurfaceMesh, table: &EdgeTable) -> usize 
     closed.filter(|rank| order[..*rank].iter().any(|outer| lies_in(order[*rank], *outer))).count()
 }
 
-/// Drops the pieces of a consistently oriented mesh that are not vessels; `table` holds its edges.
-pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped {
+/// Drops the pieces of a consistently oriented mesh that are neither vessels nor in the lumen of one, makes walls of
+/// those in a lumen, and notes both; `table` holds its edges.
+pub(super) fn sort(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mut Vec<Repair>) -> Dropped {
     let mut dropped = Dropped::default();
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {
@@ -88,6 +112,25 @@ pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped 
     let mut pieces = measure(mesh, table, &piece_of, count);
     let main = (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)));
     let Some(main) = main.filter(|main| pieces[*main].triangles >= FEWEST) else { return dropped };
+    let small = mark_small(&mut pieces, main);
+    dropped.skins = drop_skins(mesh, table, &piece_of, &mut pieces);
+    let skins: Vec<bool> = pieces.iter().map(|piece| piece.gone).collect();
+    let inner = inner(mesh, &piece_of, &mut pieces, &small);
+    let is_skin = |p: usize| skins[p] && !small.contains(&p);
+    dropped.specks = small.iter().filter(|p| pieces[**p].gone).count();
+    for (kind, is_of_kind) in [(RepairKind::SkinDropped, true), (RepairKind::PieceDropped, false)] {
+        let dropped = |t: usize| {
+            Some(piece_of[t]).filter(|p| pieces[*p as usize].gone && is_skin(*p as usize) == is_of_kind)
+        };
+        noted.extend(of_groups(kind, mesh, dropped));
+    }
+    (dropped.bodies, dropped.sheets) = contents::make_walls(mesh, &piece_of, &inner, noted);
+    dropped.triangles = drop_triangles(mesh, &piece_of, |piece| pieces[piece].gone);
+    dropped
+}
+
+/// Marks the pieces that are small against the largest one, and returns their numbers.
+fn mark_small(pieces: &mut [Piece], main: usize) -> Vec<usize> {
     let largest = pieces[main].area_mm2;
     for piece in pieces.iter_mut() {
         let share = piece.area_mm2 / largest;
@@ -95,11 +138,94 @@ pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped 
         piece.gone = share < SPECK
             || (share < BLOB && (piece.loops == 0 || flat))
             || (share < SHEET && piece.loops > 0 && piece.sheet);
-        dropped.specks += usize::from(piece.gone);
     }
-    dropped.skins = drop_skins(mesh, &piece_of, &mut pieces);
-    dropped.triangles = drop_triangles(mesh, &piece_of, |piece| pieces[piece].gone);
-    dropped
+    (0..pieces.len()).filter(|p| pieces[*p].gone).collect()
+}
+
+/// What lies in the lumen of a consistently oriented mesh, for each piece, with the piece of each triangle; `table` holds
+/// its edges. `None` if nothing does.
+fn all_inner(mesh: &SurfaceMesh, table: &EdgeTable) -> Option<(Vec<Option<Inner>>, Vec<u32>)> {
+    let (piece_of, count) = table.components(mesh.triangles.len());
+    if count < 2 {
+        return None;
+    }
+    let mut pieces = measure(mesh, table, &piece_of, count);
+    let main =
+        (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)))?;
+    if pieces[main].triangles < FEWEST {
+        return None;
+    }
+    let small = mark_small(&mut pieces, main);
+    let inner = inner(mesh, &piece_of, &mut pieces, &small);
+    inner.iter().any(Option::is_some).then_some((inner, piece_of))
+}
+
+/// Turns over the closed bodies in the lumen of a mesh of outward triangles, so that they face it.
+pub(in crate::vessel) fn turn_bodies(mesh: &mut SurfaceMesh, edges: &mut Edges) {
+    let Some((inner, piece_of)) = all_inner(mesh, edges.of(&mesh.triangles)) else { return };
+    for (triangle, piece) in mesh.triangles.iter_mut().zip(&piece_of) {
+        if inner[*piece as usize] == Some(Inner::Body) {
+            triangle.swap(1, 2);
+            edges.changed();
+        }
+    }
+}
+
+/// The sheets in the lumen of a consistently oriented mesh.
+pub(super) fn sheets_in_lumen(mesh: &SurfaceMesh, table: &EdgeTable) -> Vec<Repair> {
+    let Some((inner, piece_of)) = all_inner(mesh, table) else { return Vec::new() };
+    let is_sheet = |t: usize| Some(piece_of[t]).filter(|p| inner[*p as usize] == Some(Inner::Sheet));
+    of_groups(RepairKind::SheetInLumen, mesh, is_sheet)
+}
+
+/// What lies in the lumen of a piece that stays, for each piece; such pieces are no longer dropped.
+fn inner(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece], small: &[usize]) -> Vec<Option<Inner>> {
+    let mut inner = vec![None; pieces.len()];
+    let kind_of = |piece: &Piece| if piece.loops == 0 { Inner::Body } else { Inner::Sheet };
+    // Large pieces, each against the larger ones.
+    let mut order: Vec<usize> = (0..pieces.len()).filter(|p| !pieces[*p].gone).collect();
+    order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
+    order.truncate(MOST);
+    for rank in 1..order.len() {
+        let p = order[rank];
+        let lies_in = |outer: &usize| {
+            let (a, b) = (&pieces[p], &pieces[*outer]);
+            a.may_be_in(b) && is_inside(mesh, piece_of, p, *outer, a.triangles)
+        };
+        let vessels = order[..rank].iter().filter(|outer| inner[**outer].is_none());
+        if vessels.into_iter().any(lies_in) {
+            inner[p] = Some(kind_of(&pieces[p]));
+        }
+    }
+    // Small ones, against all that stay.
+    let stays = |p: usize| !pieces[p].gone && inner[p].is_none();
+    let largest_mm2 = pieces.iter().map(|piece| piece.area_mm2).fold(0.0, f64::max);
+    let vessels: Vec<usize> = (0..pieces.len()).filter(|p| stays(*p)).collect();
+    // A closed piece may stand in the wall.
+    let may_be = |p: usize, q: usize| match pieces[p].loops {
+        0 => pieces[p].meets(&pieces[q]),
+        _ => pieces[p].may_be_in(&pieces[q]),
+    };
+    let near: Vec<usize> = small
+        .iter()
+        .copied()
+        .filter(|p| pieces[*p].gone && !pieces[*p].is_debris(largest_mm2))
+        .filter(|p| vessels.iter().any(|q| may_be(*p, *q)))
+        .collect();
+    if near.is_empty() {
+        return inner;
+    }
+    let Some(lumen) = contents::LumenOf::new(mesh, |t| stays(piece_of[t] as usize)) else { return inner };
+    let share = lumen.shares_inside(mesh, piece_of, &near);
+    for (p, share) in near.into_iter().zip(share) {
+        if share >= INSIDE {
+            inner[p] = Some(kind_of(&pieces[p]));
+        }
+        // A body that stands in the wall, or a small sac, is united with the vessel later.
+        let stands_in_wall = pieces[p].loops == 0 && share > 0.0;
+        pieces[p].gone &= inner[p].is_none() && !stands_in_wall;
+    }
+    inner
 }
 
 /// Drops the triangles of some pieces, and returns their number; `piece_of` gives the piece of each.
@@ -146,8 +272,9 @@ fn measure(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], count: usize
     pieces
 }
 
-/// Marks pieces that contain another one of their kind: that one is the lumen, they are the outside of the wall.
-fn drop_skins(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece]) -> usize {
+/// Marks pieces that contain another one of their kind, which leads to all of their openings: that one is the lumen,
+/// they are the outside of the wall.
+fn drop_skins(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], pieces: &mut [Piece]) -> usize {
     let mut order: Vec<usize> = (0..pieces.len()).filter(|p| !pieces[*p].gone).collect();
     order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
     let mut skins = 0;
@@ -157,7 +284,10 @@ fn drop_skins(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece]) -> usi
             let (a, b) = (&pieces[outer], &pieces[inner]);
             let alike = b.area_mm2 >= SKIN * a.area_mm2
                 && (b.bounds[1] - b.bounds[0]).norm() >= 0.7 * (a.bounds[1] - a.bounds[0]).norm();
-            alike && b.may_be_in(a) && is_inside(mesh, piece_of, inner, outer, b.triangles)
+            alike
+                && b.may_be_in(a)
+                && reaches_openings(mesh, table, piece_of, inner, outer)
+                && is_inside(mesh, piece_of, inner, outer, b.triangles)
         });
         if holds {
             pieces[outer].gone = true;
@@ -165,6 +295,27 @@ fn drop_skins(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece]) -> usi
         }
     }
     skins
+}
+
+/// Whether piece `inner` reaches every opening of piece `outer`: a lumen does, a body in it does not.
+fn reaches_openings(
+    mesh: &SurfaceMesh,
+    table: &EdgeTable,
+    piece_of: &[u32],
+    inner: usize,
+    outer: usize,
+) -> bool {
+    let boundary = opening::boundary(mesh, table);
+    let of_outer = boundary
+        .openings
+        .iter()
+        .zip(&boundary.first_triangle)
+        .filter(|(_, triangle)| piece_of[**triangle as usize] as usize == outer);
+    let of_inner = || (0..piece_of.len()).filter(|t| piece_of[*t] as usize == inner);
+    of_outer.map(|(opening, _)| opening).all(|opening| {
+        let reach_mm = AT_OPENING * opening.radius_mm;
+        of_inner().flat_map(|t| mesh.corners(t)).any(|v| (v - opening.centre_mm).norm() <= reach_mm)
+    })
 }
 
 /// Whether most of piece `inner` is inside piece `outer`, closed by its caps.

@@ -9,6 +9,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
+use crate::vessel::repairs::{Repair, RepairKind, of_triangles};
 use crate::vessel::topology::{EdgeTable, EdgeUse};
 
 /// Largest distance of a vertex from an edge on which it lies, relative to the edge's length; it must not exceed the
@@ -40,8 +41,8 @@ fn undirected((a, b): (u32, u32)) -> (u32, u32) {
 }
 
 /// Splits open edges of a mesh, whose edges are in `table`, at the vertices of the other side of a seam, and merges
-/// vertices opposite each other; returns the numbers of edges split and vertices merged.
-pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
+/// vertices opposite each other; notes where, and returns the numbers of edges split and vertices merged.
+pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mut Vec<Repair>) -> (usize, usize) {
     let open: Vec<EdgeUse> = table.edges().filter(|uses| uses.len() == 1).map(|uses| uses[0]).collect();
     let Some(rims) = Rims::new(mesh, &open) else { return (0, 0) };
     let opposite = rims.opposite();
@@ -72,12 +73,15 @@ pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
         opposite.iter().map(|(from, to)| (*from, *to)).filter(|(_, to)| at_seams.contains(to)).collect();
     target.sort_unstable();
     let moved = |v: u32| target.binary_search_by_key(&v, |(from, _)| *from).map_or(v, |at| target[at].1);
-    for triangle in &mut mesh.triangles {
+    let mut at_seams: Vec<u32> = splits.iter().map(|split| split.edge.triangle).collect();
+    for (index, triangle) in mesh.triangles.iter_mut().enumerate() {
         let own = triangle.map(moved);
-        if own[0] != own[1] && own[1] != own[2] && own[2] != own[0] {
+        if own != *triangle && own[0] != own[1] && own[1] != own[2] && own[2] != own[0] {
             *triangle = own;
+            at_seams.push(index as u32);
         }
     }
+    noted.extend(of_triangles(RepairKind::SeamSewn, mesh, at_seams));
     (splits.len(), target.len())
 }
 

@@ -7,6 +7,7 @@
 
 use crate::Vec3;
 use crate::vessel::mesh::retain_numbered;
+use crate::vessel::repairs::{Repair, RepairKind, of_groups, of_triangles};
 use crate::vessel::topology::{DisjointSets, EdgeTable, EdgeUse, Edges};
 use crate::vessel::{SurfaceMesh, mesh};
 
@@ -26,15 +27,15 @@ pub(super) struct Resolved {
     pub(super) cut: usize,
 }
 
-/// Removes superfluous sheets and cuts the other edges of more than two triangles.
-pub(super) fn resolve(mesh: &mut SurfaceMesh, edges: &mut Edges) -> Resolved {
+/// Removes superfluous sheets, cuts the other edges of more than two triangles, and notes where.
+pub(super) fn resolve(mesh: &mut SurfaceMesh, edges: &mut Edges, noted: &mut Vec<Repair>) -> Resolved {
     let mut resolved = Resolved::default();
     for _ in 0..ROUNDS {
         let table = edges.of(&mesh.triangles);
         if table.non_manifold() == 0 {
             return resolved;
         }
-        let removed = Sheets::new(mesh, table).remove(mesh);
+        let removed = Sheets::new(mesh, table).remove(mesh, noted);
         resolved.removed += removed;
         if removed == 0 {
             break;
@@ -43,9 +44,11 @@ pub(super) fn resolve(mesh: &mut SurfaceMesh, edges: &mut Edges) -> Resolved {
     }
     let table = edges.of(&mesh.triangles);
     let sheets = Sheets::new(mesh, table);
+    let crowded = table.edges().filter(|uses| uses.len() > 2).flatten().map(|used| used.triangle);
+    noted.extend(of_triangles(RepairKind::EdgeCut, mesh, crowded));
     resolved.cut = cut(mesh, table, &sheets.of);
     edges.changed();
-    resolved.removed += prune(mesh);
+    resolved.removed += prune(mesh, noted);
     resolved
 }
 
@@ -101,7 +104,7 @@ impl Sheets {
 
     /// Removes the sheets that no edge needs: intruders, or without any, small ones. Returns the number of triangles
     /// removed.
-    fn remove(&self, mesh: &mut SurfaceMesh) -> usize {
+    fn remove(&self, mesh: &mut SurfaceMesh, noted: &mut Vec<Repair>) -> usize {
         let crowded = |s: &usize| !self.edges[*s].is_empty();
         let mut order: Vec<usize> = (0..self.area.len()).filter(crowded).collect();
         // The smallest first; among equals the later in the file.
@@ -111,6 +114,10 @@ impl Sheets {
         for candidates in [intruders, others] {
             let gone = self.spare(&candidates);
             let before = mesh.triangles.len();
+            if gone.contains(&true) {
+                let removed = |t: usize| Some(self.of[t]).filter(|sheet| gone[*sheet as usize]);
+                noted.extend(of_groups(RepairKind::SheetRemoved, mesh, removed));
+            }
             retain_numbered(&mut mesh.triangles, |index, _| !gone[self.of[index] as usize]);
             if mesh.triangles.len() < before {
                 return before - mesh.triangles.len();
@@ -147,7 +154,7 @@ impl Sheets {
 
 /// Removes triangles, the smallest first, until no edge has more than two; returns their number. The last resort for
 /// complicated clusters.
-pub(super) fn prune(mesh: &mut SurfaceMesh) -> usize {
+pub(super) fn prune(mesh: &mut SurfaceMesh, noted: &mut Vec<Repair>) -> usize {
     let before = mesh.triangles.len();
     loop {
         let table = EdgeTable::new(&mesh.triangles);
@@ -167,6 +174,8 @@ pub(super) fn prune(mesh: &mut SurfaceMesh) -> usize {
         if !any {
             return before - mesh.triangles.len();
         }
+        let pruned = (0..gone.len() as u32).filter(|t| gone[*t as usize]);
+        noted.extend(of_triangles(RepairKind::SheetRemoved, mesh, pruned));
         retain_numbered(&mut mesh.triangles, |index, _| !gone[index]);
     }
 }

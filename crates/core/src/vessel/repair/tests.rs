@@ -139,7 +139,7 @@ fn a_curved_patch_on_the_surface_is_no_vessel() {
     add(&mut apart, clean.mesh(), &patch, |v| v + Vec3::y() * 3.0);
     let before = apart.triangles.len();
     let table = EdgeTable::new(&apart.triangles);
-    assert_eq!(doubles::drop_doubles(&mut apart, &table), (0, 0));
+    assert_eq!(doubles::drop_doubles(&mut apart, &table, &mut Vec::new()), (0, 0));
     assert_eq!(apart.triangles.len(), before);
 }
 
@@ -308,15 +308,15 @@ fn folds_and_spikes_are_cut_out_and_filled() {
 }
 
 #[test]
-fn vessels_that_cross_are_left_and_named() {
+fn vessels_that_cross_are_united_and_named() {
     let clean = fork();
     let all: Vec<usize> = (0..clean.mesh().triangles.len()).collect();
     let mut both = clean.mesh().clone();
     add(&mut both, clean.mesh(), &all, |v| Vec3::new(v.y - 15.3, v.x + 15.1, v.z + 1.0));
     let wall = Wall::from_surface(&both).unwrap();
-    assert!(wall.report().components == 2 && wall.report().intersections_left > 0);
+    assert_eq!((wall.report().components, wall.report().parts_united), (1, 1));
     assert!(
-        wall.report().notes().iter().any(|note| note.contains("still intersect")),
+        wall.report().notes().iter().any(|note| note.contains("overlapped the rest without being joined")),
         "{:?}",
         wall.report().notes()
     );

@@ -1,8 +1,9 @@
 """Episodes as a data set of `LeRobot <https://github.com/huggingface/lerobot>`_, for imitation learning: numbers as
 Parquet, fluoroscopic pictures as mp4, in the layout of LeRobotDataset v3.0.
 
-It requires pyarrow and PyAV: ``pip install "endowire[lerobot]"``. Each episode has its own files, so that everything
-written is valid whenever the program ends.
+It requires pyarrow and PyAV: ``pip install "endowire[lerobot]"``. Each episode has its own files, and is counted once
+they are complete: whenever the program ends, or is killed, what was finished is a valid data set, and a log of the
+same environment goes on with it.
 """
 
 from __future__ import annotations
@@ -21,13 +22,11 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from .. import InputError
-from .lerobot_numbers import LEVELS, Numbers, of_levels, of_rows, together
-from .logs import new_folder, watched
+from .lerobot_files import CHUNK, FILE, INFO, STATS, TASKS
+from .lerobot_files import drop_unfinished, finish, known, part, write_json, write_table
+from .lerobot_numbers import LEVELS, Numbers, from_lists, of_levels, of_rows, together
+from .logs import watched
 
-#: Largest number of files in a folder.
-_CHUNK = 1000
-#: LeRobot's templates of file paths.
-_FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 #: Resolution of frame rates in mp4.
 _FINEST_RATE = 10_000
 #: Distance of key frames, small so that a single frame is read quickly; crf 18 preserves the noise of pictures.
@@ -42,8 +41,8 @@ _PLACE = {
 
 
 class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Writes each episode of an environment to the data set ``folder``, which must be new or empty; an episode is
-    complete after the next `reset` or `close`.
+    """Writes each episode of an environment to the data set ``folder``, which must be new, empty, or a log of such an
+    environment, which then goes on; an episode is complete after the next `reset` or `close`.
 
     A frame contains an observation and the action that followed: ``observation.state``, all numbers of the
     observation concatenated; ``observation.images.NAME`` for its pictures (``NAME_0`` and so on for several planes);
@@ -58,7 +57,8 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         task: str = "steer the tip to the target",
     ) -> None:
         inner = watched(env)
-        self._inner, self._task, self.folder = inner, task, new_folder(folder)
+        self._inner, self._task, self.folder = inner, task, Path(folder)
+        before = known(self.folder)
         super().__init__(env)
         self._fps = Fraction(1.0 / inner.task.control_period_s).limit_denominator(_FINEST_RATE)
         spaces: dict[str, Any] = inner.task.observation_spaces()
@@ -79,10 +79,27 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._features = self._described(spaces)
         self._observed: dict[str, NDArray[Any]] = {}
         self._rows: list[dict[str, Any]] = []
-        self._writers: dict[str, tuple[av.container.OutputContainer, Any]] = {}
+        self._writers: dict[str, tuple[av.container.OutputContainer, Any, Path]] = {}
         self._levels: dict[str, NDArray[np.int64]] = {}
         self._episodes, self._frames = 0, 0
         self._stats: dict[str, Numbers] = {}
+        self._told = before is not None
+        if before is not None:
+            self._go_on(before)
+
+    def _go_on(self, before: dict[str, Any]) -> None:
+        """Continues the log that is in the folder."""
+        described = json.loads(json.dumps(self._about()))
+        for key in ("fps", "features"):
+            if before.get(key) != described[key]:
+                raise InputError(f"folder = {self.folder}: its log has other {key}: give a new one")
+        tasks = pyarrow.parquet.read_table(self.folder / TASKS)["task"].to_pylist()
+        if tasks != [self._task]:
+            raise InputError(f"task = {self._task!r}: the log in {self.folder} is of {tasks[0]!r}")
+        self._episodes, self._frames = before["total_episodes"], before["total_frames"]
+        stats = json.loads((self.folder / STATS).read_text(encoding="utf-8"))
+        self._stats = {name: from_lists(numbers) for name, numbers in stats.items()}
+        drop_unfinished(self.folder, self._episodes)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -93,6 +110,10 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         return result
 
     def step(self, action: NDArray[Any]) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        if not self._told:
+            # From here on the folder is that of a log.
+            self._tell_all()
+            self._told = True
         result = self.env.step(action)
         observed, reward, terminated, truncated, info = result
         row: dict[str, Any] = {"action": self._inner._episodes.action[0].ravel().astype(np.float32)}
@@ -151,22 +172,21 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._fps.numerator if self._fps.denominator == 1 else float(self._fps)
 
     def _file(self, template: str, **names: str) -> Path:
-        """Path of a file of the current episode; its folder is created."""
-        chunk, file = divmod(self._episodes, _CHUNK)
-        path = self.folder / template.format(chunk_index=chunk, file_index=file, **names)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path
+        """Path of a file of the current episode."""
+        chunk, file = divmod(self._episodes, CHUNK)
+        return self.folder / template.format(chunk_index=chunk, file_index=file, **names)
 
     def _shoot(self, key: str, picture: NDArray[np.uint8]) -> None:
         """Adds a picture to a film."""
         if key not in self._writers:
-            film = av.open(self._file(f"videos/{{video_key}}/{_FILE}.mp4", video_key=key), "w")
+            path = self._file(f"videos/{{video_key}}/{FILE}.mp4", video_key=key)
+            film = av.open(part(path), "w", format="mp4")
             stream = film.add_stream(_CODEC, rate=self._fps, options=_OPTIONS)
             stream.height, stream.width = picture.shape
             stream.pix_fmt = "yuv420p"
-            self._writers[key] = film, stream
+            self._writers[key] = film, stream, path
             self._levels[key] = np.zeros(LEVELS, dtype=np.int64)
-        film, stream = self._writers[key]
+        film, stream, _ = self._writers[key]
         self._levels[key] += np.bincount(picture.ravel(), minlength=LEVELS)
         colours = np.repeat(picture[..., None], 3, axis=2)
         film.mux(stream.encode(av.VideoFrame.from_ndarray(colours, format="rgb24")))
@@ -176,9 +196,10 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         if not self._rows:
             return
         count = len(self._rows)
-        for film, stream in self._writers.values():
+        for film, stream, path in self._writers.values():
             film.mux(stream.encode())
             film.close()
+            finish(path)
         steps = np.arange(count)
         columns: dict[str, NDArray[Any]] = {
             name: np.array([row[name] for row in self._rows]) for name in self._rows[0]
@@ -192,7 +213,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             for name, feature in self._features.items()
             if name not in self._films
         }
-        pyarrow.parquet.write_table(pyarrow.table(table), self._file(f"data/{_FILE}.parquet"))
+        write_table(self._file(f"data/{FILE}.parquet"), pyarrow.table(table))
         stats = {name: of_rows(columns[name]) for name in table}
         stats |= {key: of_levels(levels, count) for key, levels in self._levels.items()}
         self._tell_episode(count, stats)
@@ -203,7 +224,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def _tell_episode(self, count: int, stats: dict[str, Numbers]) -> None:
         """Writes the row of an episode in `meta/episodes`."""
-        chunk, file = divmod(self._episodes, _CHUNK)
+        chunk, file = divmod(self._episodes, CHUNK)
         row: dict[str, Any] = {"episode_index": self._episodes, "tasks": [self._task], "length": count}
         row |= {"data/chunk_index": chunk, "data/file_index": file}
         row |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + count}
@@ -215,7 +236,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             row |= {f"stats/{name}/{kind}": values.tolist() for kind, values in numbers.items()}
         row |= {"meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
         table = pyarrow.table({name: [value] for name, value in row.items()})
-        pyarrow.parquet.write_table(table, self._file(f"meta/episodes/{_FILE}.parquet"))
+        write_table(self._file(f"meta/episodes/{FILE}.parquet"), table)
 
     def _tell_all(self) -> None:
         """Writes the data about all episodes so far."""
@@ -224,27 +245,31 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         index = {"index_columns": ["task"], "columns": [{**column, "metadata": None}], "column_indexes": []}
         tasks = pyarrow.table({"task_index": [0], "task": [self._task]})
         tasks = tasks.replace_schema_metadata({"pandas": json.dumps(index)})
-        pyarrow.parquet.write_table(tasks, self.folder / "meta/tasks.parquet")
+        write_table(self.folder / TASKS, tasks)
         stats = {
             name: {kind: values.tolist() for kind, values in own.items()} for name, own in self._stats.items()
         }
-        (self.folder / "meta/stats.json").write_text(json.dumps(stats, indent=4), encoding="utf-8")
-        info = {
+        write_json(self.folder / STATS, stats)
+        # Last: an episode counts once all its files are there.
+        write_json(self.folder / INFO, self._about())
+
+    def _about(self) -> dict[str, Any]:
+        """`info.json`."""
+        return {
             "codebase_version": "v3.0",
             "robot_type": "endowire",
             "total_episodes": self._episodes,
             "total_frames": self._frames,
             "total_tasks": 1,
-            "chunks_size": _CHUNK,
+            "chunks_size": CHUNK,
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
             "fps": self._rate(),
             "splits": {"train": f"0:{self._episodes}"},
-            "data_path": f"data/{_FILE}.parquet",
-            "video_path": f"videos/{{video_key}}/{_FILE}.mp4" if self._films else None,
+            "data_path": f"data/{FILE}.parquet",
+            "video_path": f"videos/{{video_key}}/{FILE}.mp4" if self._films else None,
             "features": self._features,
         }
-        (self.folder / "meta/info.json").write_text(json.dumps(info, indent=4), encoding="utf-8")
 
 
 def _column(values: NDArray[Any], dtype: str, length: int) -> pyarrow.Array:

@@ -59,3 +59,8 @@ def together(before: Numbers | None, own: Numbers) -> Numbers:
     numbers = {"min": np.minimum(before["min"], own["min"]), "max": np.maximum(before["max"], own["max"])}
     numbers |= {"mean": mean, "std": np.sqrt(weighted(*squares)), "count": total}
     return {**numbers, **{name: weighted(before[name], own[name]) for name in _QUANTILES}}
+
+
+def from_lists(numbers: dict[str, Any]) -> Numbers:
+    """Statistics as they are written in JSON."""
+    return {kind: np.array(values) for kind, values in numbers.items()}

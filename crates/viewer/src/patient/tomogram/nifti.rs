@@ -10,7 +10,7 @@ use std::path::Path;
 
 use endowire_core::nalgebra::Matrix3;
 use endowire_core::{Error, Result, Vec3};
-use flate2::bufread::GzDecoder;
+use flate2::bufread::MultiGzDecoder;
 use nifti::{
     Endianness, InMemNiftiObject, InMemNiftiVolume, NiftiError, NiftiHeader, NiftiObject, NiftiVolume,
     RandomAccessNiftiVolume, ReaderOptions,
@@ -18,6 +18,9 @@ use nifti::{
 
 use super::{MOST_VOXELS, Scan};
 
+/// Size of a header of the first format, bytes, and its magic string where voxels are in another file.
+const FIRST_BYTES: u64 = 348;
+const FIRST_OF_PAIR: &[u8; 4] = b"ni1\0";
 /// Size of a header of the second format, bytes.
 const SECOND_BYTES: usize = 540;
 /// Start of its magic string in a file of header and voxels, and in one of a pair.
@@ -31,6 +34,7 @@ const SECOND_OF_PAIR: &[u8] = b"ni2\0";
 pub(super) fn read(path: &Path) -> Result<Scan> {
     let bad = |reason: String| Error::content(path, reason);
     let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
+    named(path).map_err(bad)?;
     let header = second(path).map_err(bad)?;
     let (header, placed, volume) = match header {
         Some((mut header, placed, offset)) => {
@@ -43,10 +47,18 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
         }
         None => {
             // The header first: it gives the memory the volume needs.
-            let mut header = NiftiHeader::from_file(path).map_err(unreadable)?;
+            let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
+            let mut header = NiftiHeader::from_reader(&mut voxels).map_err(unreadable)?;
             check_size(&header).map_err(bad)?;
             let is_scaled = scaled(&mut header).map_err(bad)?;
             let placed = Placed::first(&header);
+            if &header.magic != FIRST_OF_PAIR {
+                let offset = (header.vox_offset as u64).saturating_sub(FIRST_BYTES);
+                io::copy(&mut (&mut voxels).take(offset), &mut io::sink())
+                    .map_err(|e| unreadable(e.into()))?;
+                let volume = InMemNiftiVolume::from_reader(voxels, &header).map_err(unreadable)?;
+                return scan(&volume, &placed, &header).map_err(bad);
+            }
             let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
             let read = object.into_volume();
             // The library applies the file's scaling.
@@ -58,10 +70,19 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
             (header, placed, volume)
         }
     };
+    scan(&volume, &placed, &header).map_err(bad)
+}
+
+/// The scan of a volume.
+fn scan(
+    volume: &InMemNiftiVolume,
+    placed: &Placed,
+    header: &NiftiHeader,
+) -> std::result::Result<Scan, String> {
     let dim = volume.dim().to_vec();
     let [nx, ny, nz] = match dim.as_slice() {
         [x, y, z] | [x, y, z, 1] => [*x, *y, *z],
-        other => return Err(bad(format!("a volume has three dimensions, not {other:?}"))),
+        other => return Err(format!("a volume has three dimensions, not {other:?}")),
     };
     let mut hu = Vec::with_capacity(usize::from(nx) * usize::from(ny) * usize::from(nz));
     let extra: &[u16] = if dim.len() == 4 { &[0] } else { &[] };
@@ -70,12 +91,42 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
             for x in 0..nx {
                 let place: Vec<u16> = [x, y, z].iter().chain(extra).copied().collect();
                 let value = volume.get_f32(&place);
-                hu.push(value.map_err(|e| bad(format!("voxel [{x}, {y}, {z}] cannot be read: {e}")))?);
+                hu.push(value.map_err(|e| format!("voxel [{x}, {y}, {z}] cannot be read: {e}"))?);
             }
         }
     }
-    let (axes, origin_mm) = placed.in_lps(header.xyzt_units).map_err(bad)?;
+    let (axes, origin_mm) = placed.in_lps(header.xyzt_units)?;
     Ok(Scan { size: [nx, ny, nz].map(usize::from), axes, origin_mm, hu })
+}
+
+/// What a file is in place of NIfTI, if its first bytes leave no doubt.
+fn named(path: &Path) -> std::result::Result<(), String> {
+    const BEGINNING: u64 = 4096;
+    let mut bytes = Vec::new();
+    // Unreadable files are reported by the reader of the first format.
+    let read = File::open(path).and_then(|file| file.take(BEGINNING).read_to_end(&mut bytes));
+    if read.is_err() || bytes.starts_with(&[0x1f, 0x8b]) {
+        return Ok(());
+    }
+    let meta: [&[u8]; 3] = [b"ObjectType", b"NDims", b"Comment"];
+    let other = if bytes.starts_with(b"NRRD") {
+        Some("an NRRD volume")
+    } else if meta.iter().any(|key| bytes.starts_with(key)) {
+        Some("a MetaImage volume (.mha, .mhd)")
+    } else if bytes.get(128..132) == Some(b"DICM") {
+        return Err("is a single DICOM file: give the folder of its slices, one file each; of an enhanced file, which has all \
+                    slices, write NIfTI (dcm2niix, or 3D Slicer: Save, .nii.gz)"
+            .into());
+    } else {
+        None
+    };
+    match (other, endowire_core::file::foreign(&bytes)) {
+        (Some(kind), _) => {
+            Err(format!("is {kind}, and NIfTI is read: write it as .nii.gz (3D Slicer: Save, .nii.gz)"))
+        }
+        (None, Some(kind)) => Err(kind.into()),
+        (None, None) => Ok(()),
+    }
 }
 
 /// Whether values are to be scaled; a slope of 0 or NaN means that they are stored unscaled (as in nibabel), and
@@ -91,11 +142,11 @@ fn scaled(header: &mut NiftiHeader) -> std::result::Result<bool, String> {
     }
 }
 
-/// A file's bytes, decompressed if needed.
+/// A file's bytes, decompressed if needed; the file may be of several compressed parts.
 fn plain(path: &Path) -> io::Result<Box<dyn Read>> {
     let mut file = BufReader::new(File::open(path)?);
     let compressed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
-    Ok(if compressed { Box::new(GzDecoder::new(file)) } else { Box::new(file) })
+    Ok(if compressed { Box::new(MultiGzDecoder::new(file)) } else { Box::new(file) })
 }
 
 /// Rejects a volume too large for memory, and one whose header contradicts itself about the size of a voxel.

@@ -64,10 +64,12 @@ fn write(
 }
 
 fn task_lines(task: &Subject) -> Vec<Line> {
-    let row = |threshold: &Threshold| (TEXT, format!("  {}: {}", threshold.metric, threshold.words()));
+    let row = |threshold: &Threshold| (TEXT, format!("  {}: {}", threshold.title(), threshold.words()));
     let head = (CHOSEN, format!("{} (level {})", task.name, task.level));
     let text = (TEXT, task.text.clone());
-    [head, text].into_iter().chain(task.threshold.iter().map(row)).collect()
+    let exam = (WARN, "An exam: the 3D view is hidden, and nothing can be undone.".to_owned());
+    let exam = task.exam.then_some(exam);
+    [head, text].into_iter().chain(exam).chain(task.threshold.iter().map(row)).collect()
 }
 
 fn standing_lines(standing: &Standing) -> Vec<Line> {
@@ -86,7 +88,7 @@ fn score_lines(score: &Score) -> Vec<Line> {
     let rows = score.asked().map(|(scored, threshold)| {
         let (kept, value) = (scored.kept_words(), scored.value_words());
         let colour = if scored.passed == Some(true) { TEXT } else { WARN };
-        (colour, format!("  {kept:<10} {}: {value}, {}", scored.metric.name, threshold.words()))
+        (colour, format!("  {kept:<10} {}: {value}, {}", scored.metric.title, threshold.words()))
     });
     let end = (TEXT, "What is done now does not count. Esc ends.".to_owned());
     std::iter::once(head).chain(rows).chain([end]).collect()

@@ -1,9 +1,9 @@
 //! The header of a PLY file: the elements, and the properties of their rows.
 
 use super::super::scalar::{Order, Scalar};
-use super::super::text::shown;
 use super::super::{Reason, ToldAxes};
 use super::MEND;
+use crate::text::shown;
 
 /// Encoding of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

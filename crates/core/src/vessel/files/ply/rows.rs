@@ -2,7 +2,7 @@
 
 use super::super::Reason;
 use super::super::scalar::{Order, Scalar};
-use super::super::text::{lines, number, shown};
+use crate::text::{lines, number, shown};
 
 /// Rows from which values are taken.
 pub(super) trait Rows {

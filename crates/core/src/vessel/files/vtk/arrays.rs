@@ -10,8 +10,8 @@ use flate2::read::ZlibDecoder;
 use roxmltree::Node;
 
 use super::super::scalar::{Order, Scalar};
-use super::super::text::{number, shown};
 use super::super::{Reason, SIZE_LIMIT};
+use crate::text::{number, shown};
 
 /// Compression of arrays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

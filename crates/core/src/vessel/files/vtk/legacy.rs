@@ -5,10 +5,10 @@
 
 use super::super::faces::Faces;
 use super::super::scalar::{Order, Scalar};
-use super::super::text::{number, shown};
 use super::super::{Parsed, Reason};
 use super::{Cells, EXTRACT};
 use crate::Vec3;
+use crate::text::{number, shown};
 
 pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     let mut input = Input { rest: bytes, line: 1, is_binary: false };

@@ -12,6 +12,7 @@ use super::faces::Faces;
 use super::scalar::index;
 pub(super) use legacy::parse as parse_legacy;
 pub(super) use xml::parse as parse_xml;
+pub(in crate::vessel) use xml::parse_lines;
 
 /// What to do about data that are not a surface.
 const EXTRACT: &str =

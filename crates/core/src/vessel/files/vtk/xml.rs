@@ -3,17 +3,35 @@
 use roxmltree::{Document, Node};
 
 use super::super::faces::Faces;
-use super::super::text::shown;
+use super::super::frame::ToldAxes;
 use super::super::{Parsed, Reason};
 use super::arrays::Encoding;
 use super::{Cells, EXTRACT};
 use crate::Vec3;
+use crate::text::shown;
 use crate::vessel::SurfaceMesh;
 
 /// The element with appended data, which are not XML.
 const APPENDED: &[u8] = b"<AppendedData";
 
-pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
+/// Points of a line, each with its radius if there is one.
+pub(crate) type Line = Vec<(Vec3, Option<f64>)>;
+
+/// A file that is read: its polygonal data and the arrays in it.
+struct Open<'a, 'i> {
+    data: Node<'a, 'i>,
+    encoding: Encoding<'a>,
+    axes: ToldAxes,
+}
+
+impl<'a, 'i> Open<'a, 'i> {
+    fn pieces(&self) -> impl Iterator<Item = Node<'a, 'i>> {
+        self.data.children().filter(|node| node.has_tag_name("Piece"))
+    }
+}
+
+/// The XML of a file, and the data appended to it.
+fn parts(bytes: &[u8]) -> (String, Option<&[u8]>) {
     let appended = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
     let (head, tail) = bytes.split_at(appended.unwrap_or(bytes.len()));
     // Comments may be in any encoding; only ASCII matters.
@@ -21,7 +39,10 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     if appended.is_some() {
         text += "</VTKFile>";
     }
-    let document = Document::parse(&text).map_err(|e| format!("is no XML that can be read: {e}"))?;
+    (text, appended.map(|_| tail))
+}
+
+fn open<'a, 'i>(document: &'a Document<'i>, appended: Option<&'a [u8]>) -> Result<Open<'a, 'i>, Reason> {
     let file = document.root_element();
     if file.tag_name().name() != "VTKFile" {
         return Err(format!(
@@ -34,14 +55,54 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
         "PolyData" => "has no element PolyData: it is cut off".to_owned(),
         other => format!("holds data of type {:?}, not PolyData: {EXTRACT}", shown(other)),
     })?;
-    let encoding = Encoding::new(file, appended.and_then(|_| data_in(tail)))?;
-    let mut parsed = Parsed::default();
+    let encoding = Encoding::new(file, appended.and_then(data_in))?;
+    let mut axes = ToldAxes::default();
     if let Some(space) = child(data, "FieldData").and_then(|field| named(field, "SPACE")) {
         let letters = encoding.numbers(space)?;
-        parsed.axes.say(
+        axes.say(
             &letters.iter().map(|c| char::from(*c as u8)).take_while(|c| *c != '\0').collect::<String>(),
         );
     }
+    Ok(Open { data, encoding, axes })
+}
+
+/// The lines of a file in the axes of scenes; `is_radius` tells the name of the array with their radii.
+pub(crate) fn parse_lines(bytes: &[u8], is_radius: impl Fn(&str) -> bool) -> Result<Vec<Line>, Reason> {
+    let (text, appended) = parts(bytes);
+    let document = Document::parse(&text).map_err(|e| format!("is no XML that can be read: {e}"))?;
+    let file = open(&document, appended)?;
+    let axes = file.axes.axes()?;
+    let mut lines = Vec::new();
+    for piece in file.pieces() {
+        let at = |name: &str| child(piece, name);
+        let points = at("Points").and_then(|points| child(points, "DataArray"));
+        let points = points.map_or_else(|| Ok(Vec::new()), |points| file.encoding.numbers(points))?;
+        let radii = at("PointData")
+            .and_then(|data| data.children().find(|array| array.attribute("Name").is_some_and(&is_radius)));
+        let radii = radii.map(|radii| file.encoding.numbers(radii)).transpose()?;
+        for line in cells(piece, "Lines", &file.encoding)?.iter() {
+            let point = |number: &i64| {
+                let index = usize::try_from(*number).ok();
+                let place = index.and_then(|index| points.chunks_exact(3).nth(index));
+                let place =
+                    place.ok_or_else(|| format!("a line names point {number}, which is not there"))?;
+                let radius = radii.as_ref().zip(index).and_then(|(radii, index)| radii.get(index).copied());
+                Ok((axes.to_lps(Vec3::new(place[0], place[1], place[2])), radius))
+            };
+            lines.push(line.iter().map(point).collect::<Result<Line, Reason>>()?);
+        }
+    }
+    match lines.is_empty() {
+        true => Err("holds no lines: a centre line is a line of points".into()),
+        false => Ok(lines),
+    }
+}
+
+pub(crate) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
+    let (text, appended) = parts(bytes);
+    let document = Document::parse(&text).map_err(|e| format!("is no XML that can be read: {e}"))?;
+    let Open { data, encoding, axes } = open(&document, appended)?;
+    let mut parsed = Parsed { axes, ..Parsed::default() };
     let (mut others, mut pieces) = (0, 0);
     for node in data.children().filter(|node| node.has_tag_name("Piece")) {
         let piece = surface(node, &encoding).map_err(|why| format!("piece {pieces}: {why}"))?;

@@ -2,22 +2,35 @@
 
 use std::borrow::Cow;
 
-/// The bytes of a file without a byte order mark. ASCII text in UTF-16 with its mark becomes UTF-8.
-pub(super) fn without_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let units = |of: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
+/// Code units of UTF-16 without a mark that must be ASCII to tell it.
+const TOLD_BY: usize = 32;
+
+/// The bytes of a file without a byte order mark; UTF-16 becomes UTF-8, without a mark if it begins with ASCII.
+pub(crate) fn without_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let units = |bytes: &[u8], of: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes.chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
         Cow::Owned(String::from_utf16_lossy(&units).into_bytes())
+    };
+    // ASCII text in UTF-16 has a zero in every other place, and no binary format begins so.
+    let is_ascii = |letter: usize| {
+        let told = bytes.chunks_exact(2).take(TOLD_BY);
+        bytes.len() >= 8
+            && told.into_iter().all(|pair| {
+                pair[1 - letter] == 0 && matches!(pair[letter], b'\t' | b'\n' | b'\r' | b' '..=b'~')
+            })
     };
     match bytes {
         [0xef, 0xbb, 0xbf, rest @ ..] => Cow::Borrowed(rest),
-        [0xff, 0xfe, _, 0, ..] => units(u16::from_le_bytes),
-        [0xfe, 0xff, 0, _, ..] => units(u16::from_be_bytes),
+        [0xff, 0xfe, _, 0, ..] => units(&bytes[2..], u16::from_le_bytes),
+        [0xfe, 0xff, 0, _, ..] => units(&bytes[2..], u16::from_be_bytes),
+        _ if is_ascii(0) => units(bytes, u16::from_le_bytes),
+        _ if is_ascii(1) => units(bytes, u16::from_be_bytes),
         _ => Cow::Borrowed(bytes),
     }
 }
 
 /// Lines with their numbers, from 1. They end with LF, CR LF or CR.
-pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut rest = (!text.is_empty()).then_some(text);
     let mut number = 0;
     std::iter::from_fn(move || {
@@ -35,12 +48,12 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 /// A number in the syntax of various languages: Fortran's exponent is a D.
-pub(super) fn number(word: &str) -> Option<f64> {
+pub(crate) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| word.replace(['d', 'D'], "e").parse().ok())
 }
 
 /// The beginning of a text, which may be a whole binary file, for messages.
-pub(super) fn shown(text: &str) -> String {
+pub(crate) fn shown(text: &str) -> String {
     /// Largest length shown.
     const SHOWN: usize = 60;
     text.chars().take(SHOWN).chain((text.chars().count() > SHOWN).then_some('…')).collect()
@@ -63,7 +76,9 @@ mod tests {
         assert_eq!(*without_mark(b"\xef\xbb\xbfv 1"), *b"v 1");
         assert_eq!(*without_mark(b"\xff\xfev\0 \x001\0"), *b"v 1");
         assert_eq!(*without_mark(b"\xfe\xff\0v\0 \x001"), *b"v 1");
-        for other in [&b"\xff\xfe\x01\x02"[..], b"\xff", b"", b"v 1"] {
+        assert_eq!(*without_mark(b"v\0 \x001\0\n\0"), *b"v 1\n");
+        assert_eq!(*without_mark(b"\0v\0 \x001\0\n"), *b"v 1\n");
+        for other in [&b"\xff\xfe\x01\x02"[..], b"v\0\0\0\0\0\0\0", b"\xff", b"", b"v 1"] {
             assert_eq!(*without_mark(other), *other);
         }
     }

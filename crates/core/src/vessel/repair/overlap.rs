@@ -1,0 +1,299 @@
+//! Parts that overlap without being joined: a branch, a sac or a stretch of vessel that was put to another one, and a body
+//! that stands in the wall.
+//!
+//! Closed by caps, the parts of a vessel are united, and bodies are taken off. A cap of which most is left is an opening
+//! again; one that another part has taken most of is not, and its rest is wall.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::contents::LumenOf;
+use super::holes::Rim;
+use super::solid::{Closed, Solid};
+use crate::vessel::crossings::Crossings;
+use crate::vessel::mesh::retain_numbered;
+use crate::vessel::opening::{self, Boundary};
+use crate::vessel::repairs::{Repair, RepairKind, of_groups};
+use crate::vessel::topology::{DisjointSets, EdgeTable};
+use crate::vessel::wall::signed_volume;
+use crate::vessel::{SurfaceMesh, mesh};
+use crate::{Error, Result, Vec3};
+
+/// Depth to which one vessel must be in another, in radii of the narrower one, to be a part of it: two that graze each
+/// other in a segmentation are not joined.
+const DEEP: f64 = 0.25;
+/// Part of a rim that must lie in another part for a vessel that begins there.
+const BEGINS: f64 = 0.5;
+/// Part of a cap that must be left for an opening.
+const OPEN: f64 = 0.5;
+/// Number of pieces above which no rims are compared: a vessel in parts has fewer.
+const MOST_PIECES: usize = 64;
+
+/// The pieces of a mesh, and which of them overlap.
+pub(super) struct Overlaps {
+    piece_of: Vec<u32>,
+    pieces: Vec<Piece>,
+    boundary: Boundary,
+    pairs: BTreeSet<(u32, u32)>,
+}
+
+/// One connected piece.
+#[derive(Debug, Clone)]
+struct Piece {
+    bounds: (Vec3, Vec3),
+    area_mm2: f64,
+    volume_mm3: f64,
+    loops: usize,
+    /// Whether it is closed, or ends as vessels end: a patch with a border is no part of a vessel.
+    is_part: bool,
+}
+
+impl Piece {
+    fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.bounds.0[k] <= other.bounds.1[k] && other.bounds.0[k] <= self.bounds.1[k])
+    }
+
+    /// The radius of a tube of its area and volume, mm.
+    fn radius_mm(&self) -> f64 {
+        2.0 * self.volume_mm3.abs() / self.area_mm2.max(f64::MIN_POSITIVE)
+    }
+
+    /// Whether it is a closed body that faces the lumen around it.
+    fn is_body(&self) -> bool {
+        self.loops == 0 && self.volume_mm3 < 0.0
+    }
+}
+
+impl Overlaps {
+    /// Of a consistently oriented mesh with these edges and intersections; `None` if no parts overlap.
+    pub(super) fn find(mesh: &SurfaceMesh, table: &EdgeTable, found: &Crossings) -> Option<Self> {
+        let (piece_of, count) = table.components(mesh.triangles.len());
+        if count < 2 || found.capped {
+            return None;
+        }
+        let boundary = opening::boundary(mesh, table);
+        let pieces = measured(mesh, table, &piece_of, count, &boundary);
+        let mut overlaps = Self { piece_of, pieces, boundary, pairs: BTreeSet::new() };
+        let between = |pair: &[u32; 2]| {
+            let [a, b] = pair.map(|t| overlaps.piece_of[t as usize]);
+            let are_parts = [a, b].iter().all(|p| overlaps.pieces[*p as usize].is_part);
+            (a != b && are_parts).then_some((a.min(b), a.max(b)))
+        };
+        let crossing: BTreeSet<(u32, u32)> = found.pairs.iter().filter_map(between).collect();
+        let mut lumens: BTreeMap<u32, Option<LumenOf>> = BTreeMap::new();
+        let mut pairs = BTreeSet::new();
+        for (a, b) in overlaps.near().into_iter().chain(crossing.iter().copied()) {
+            for piece in [a, b] {
+                lumens.entry(piece).or_insert_with(|| LumenOf::new(mesh, |t| overlaps.piece_of[t] == piece));
+            }
+            let lumen = |piece: u32| lumens.get(&piece).and_then(Option::as_ref);
+            let is_begun = |of: u32, within: u32| lumen(within).is_some_and(|l| overlaps.begins(mesh, of, l));
+            let has_closed = [a, b].iter().any(|p| overlaps.pieces[*p as usize].loops == 0);
+            let joined = is_begun(a, b)
+                || is_begun(b, a)
+                || crossing.contains(&(a, b))
+                    && (has_closed
+                        || [(a, b), (b, a)].iter().any(|(p, q)| overlaps.is_deep(mesh, *p, *q, lumen(*q))));
+            if joined {
+                pairs.insert((a, b));
+            }
+        }
+        overlaps.pairs = pairs;
+        (!overlaps.pairs.is_empty()).then_some(overlaps)
+    }
+
+    /// Pairs of pieces of which one has a rim within the bounds of the other.
+    fn near(&self) -> BTreeSet<(u32, u32)> {
+        let mut pairs = BTreeSet::new();
+        if self.pieces.len() > MOST_PIECES {
+            return pairs;
+        }
+        for (opening, triangle) in self.boundary.openings.iter().zip(&self.boundary.first_triangle) {
+            let own = self.piece_of[*triangle as usize];
+            for (other, piece) in (0..).zip(&self.pieces) {
+                let at = &opening.centre_mm;
+                let within = (0..3).all(|k| piece.bounds.0[k] <= at[k] && at[k] <= piece.bounds.1[k]);
+                let are_parts = piece.is_part && self.pieces[own as usize].is_part;
+                if other != own && within && are_parts && piece.loops > 0 {
+                    pairs.insert((own.min(other), own.max(other)));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// Whether a rim of piece `of` lies in a lumen.
+    fn begins(&self, mesh: &SurfaceMesh, of: u32, lumen: &LumenOf) -> bool {
+        let own = self.boundary.openings.iter().zip(&self.boundary.first_triangle);
+        own.filter(|(_, triangle)| self.piece_of[**triangle as usize] == of).any(|(opening, _)| {
+            let inside = opening.boundary.iter().filter(|v| lumen.holds(&mesh.vertices_mm[**v as usize]));
+            inside.count() as f64 >= BEGINS * opening.boundary.len() as f64
+        })
+    }
+
+    /// Whether piece `of` reaches far into the lumen of another one.
+    fn is_deep(&self, mesh: &SurfaceMesh, of: u32, other: u32, lumen: Option<&LumenOf>) -> bool {
+        let [a, b] = [of, other].map(|p| &self.pieces[p as usize]);
+        let deep_mm = DEEP * a.radius_mm().min(b.radius_mm());
+        let Some(lumen) = lumen.filter(|_| a.meets(b)) else { return false };
+        let own = (0..self.piece_of.len()).filter(|t| self.piece_of[*t] == of);
+        let mut vertices: Vec<u32> = own.flat_map(|t| mesh.triangles[t]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices.iter().any(|v| lumen.depth_mm(&mesh.vertices_mm[*v as usize]) > deep_mm)
+    }
+
+    /// Intersections within one piece, which must be repaired before it is united with others.
+    pub(super) fn own(&self, found: &Crossings) -> Vec<[u32; 2]> {
+        let piece = |t: u32| self.piece_of[t as usize];
+        found.pairs.iter().copied().filter(|[a, b]| piece(*a) == piece(*b)).collect()
+    }
+
+    /// Unites what overlaps, notes it, and returns the number of parts that were put to others.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if parts cannot be united.
+    pub(super) fn unite(&self, mesh: &mut SurfaceMesh, noted: &mut Vec<Repair>) -> Result<usize> {
+        let mut sets = DisjointSets::new(self.pieces.len());
+        self.pairs.iter().for_each(|(a, b)| sets.join(*a, *b));
+        let (group_of, groups) = sets.number();
+        let mut parts = 0;
+        let mut gone = vec![false; self.pieces.len()];
+        let mut added = Vec::new();
+        for group in 0..groups as u32 {
+            let members: Vec<u32> =
+                (0..self.pieces.len() as u32).filter(|p| group_of[*p as usize] == group).collect();
+            if members.len() < 2 {
+                continue;
+            }
+            let united = self.united(mesh, &members).ok_or_else(|| self.refused(mesh, &members))?;
+            added.extend(united);
+            members.iter().for_each(|p| gone[*p as usize] = true);
+            parts += members.len() - 1;
+            // All but the largest were put to it.
+            let main = members.iter().copied().max_by(|a, b| {
+                let area = |p: u32| self.pieces[p as usize].area_mm2;
+                area(*a).total_cmp(&area(*b)).then(b.cmp(a))
+            });
+            let put = |t: usize| Some(self.piece_of[t]).filter(|p| members.contains(p) && Some(*p) != main);
+            noted.extend(of_groups(RepairKind::PartUnited, mesh, put));
+        }
+        retain_numbered(&mut mesh.triangles, |t, _| !gone[self.piece_of[t] as usize]);
+        for Closed { vertices_mm, triangles } in added {
+            let first = mesh.vertices_mm.len() as u32;
+            mesh.vertices_mm.extend(vertices_mm);
+            mesh.triangles.extend(triangles.iter().map(|(triangle, _)| triangle.map(|v| v + first)));
+        }
+        Ok(parts)
+    }
+
+    /// The surface of some pieces united, without the caps of its openings; `None` if that fails.
+    fn united(&self, mesh: &SurfaceMesh, members: &[u32]) -> Option<Vec<Closed>> {
+        let is_cut = |p: &&u32| self.is_in_wall(mesh, **p, members);
+        let (bodies, vessels): (Vec<u32>, Vec<u32>) = members.iter().partition(|p| is_cut(p));
+        let mut vessels = vessels.iter().map(|p| Solid::new(&self.closed(mesh, *p, false)));
+        let first = vessels.next()??;
+        let whole = vessels.try_fold(first, |whole, next| whole.with(&next?))?;
+        let mut bodies = bodies.iter().map(|p| {
+            let turned = self.pieces[*p as usize].is_body();
+            Solid::new(&self.closed(mesh, *p, turned))
+        });
+        let whole = bodies.try_fold(whole, |whole, next| whole.without(&next?))?;
+        Some(vec![self.opened(mesh, whole.triangles())])
+    }
+
+    /// Whether a closed piece stands in the wall of others: most of it is in their lumen.
+    fn is_in_wall(&self, mesh: &SurfaceMesh, piece: u32, members: &[u32]) -> bool {
+        let own = &self.pieces[piece as usize];
+        if own.is_body() {
+            return true;
+        }
+        let others = |t: usize| self.piece_of[t] != piece && members.contains(&self.piece_of[t]);
+        let share = |lumen: LumenOf| lumen.shares_inside(mesh, &self.piece_of, &[piece as usize])[0];
+        own.loops == 0 && LumenOf::new(mesh, others).map_or(0.0, share) >= 0.5
+    }
+
+    /// A piece closed by caps. Its triangles have their numbers in the mesh, those of caps the numbers beyond, by
+    /// opening.
+    fn closed(&self, mesh: &SurfaceMesh, piece: u32, turned: bool) -> Closed {
+        let mut closed = SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: Vec::new() };
+        let mut numbers = Vec::new();
+        for (t, triangle) in (0..).zip(&mesh.triangles).filter(|(t, _)| self.piece_of[*t as usize] == piece) {
+            let [a, b, c] = *triangle;
+            closed.triangles.push(if turned { [a, c, b] } else { [a, b, c] });
+            numbers.push(t);
+        }
+        let caps = mesh.triangles.len() as u32;
+        let openings = self.boundary.openings.iter().zip(&self.boundary.first_triangle);
+        for (number, (opening, triangle)) in (0..).zip(openings) {
+            if self.piece_of[*triangle as usize] == piece {
+                opening.close(&mut closed);
+                numbers.resize(closed.triangles.len(), caps + number);
+            }
+        }
+        crate::vessel::wall::drop_unreferenced(&mut closed);
+        Closed {
+            vertices_mm: closed.vertices_mm,
+            triangles: closed.triangles.into_iter().zip(numbers).collect(),
+        }
+    }
+
+    /// Without the caps of which most is left.
+    fn opened(&self, mesh: &SurfaceMesh, mut whole: Closed) -> Closed {
+        let caps = mesh.triangles.len() as u32;
+        let area = |t: &[u32; 3]| mesh::area(&t.map(|v| whole.vertices_mm[v as usize]));
+        let mut left_mm2 = vec![0.0; self.boundary.openings.len()];
+        for (triangle, number) in whole.triangles.iter().filter(|(_, number)| *number >= caps) {
+            left_mm2[(number - caps) as usize] += area(triangle);
+        }
+        let is_open = |number: u32| {
+            let opening = (number - caps) as usize;
+            let full_mm2: f64 = self.boundary.openings[opening].cap(mesh).map(|cap| mesh::area(&cap)).sum();
+            left_mm2[opening] > OPEN * full_mm2
+        };
+        let open: Vec<bool> = (0..left_mm2.len() as u32).map(|number| is_open(caps + number)).collect();
+        whole.triangles.retain(|(_, number)| *number < caps || !open[(*number - caps) as usize]);
+        whole
+    }
+
+    /// The error for parts that cannot be united.
+    fn refused(&self, mesh: &SurfaceMesh, members: &[u32]) -> Error {
+        let each = of_groups(RepairKind::PartUnited, mesh, |t| {
+            Some(self.piece_of[t]).filter(|p| members.contains(p))
+        });
+        let places: Vec<String> = each.iter().map(ToString::to_string).collect();
+        Error::Mesh(format!(
+            "{} parts overlap without being joined, and could not be united: {}; unite them in a program for meshes (\"boolean \
+             union\"), or move them apart",
+            members.len(),
+            places.join(", ")
+        ))
+    }
+}
+
+fn measured(
+    mesh: &SurfaceMesh,
+    table: &EdgeTable,
+    piece_of: &[u32],
+    count: usize,
+    boundary: &Boundary,
+) -> Vec<Piece> {
+    let empty = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    let mut pieces =
+        vec![Piece { bounds: empty, area_mm2: 0.0, volume_mm3: 0.0, loops: 0, is_part: true }; count];
+    let origin = mesh.vertices_mm.first().copied().unwrap_or_default();
+    for (t, p) in piece_of.iter().enumerate() {
+        let (piece, corners) = (&mut pieces[*p as usize], mesh.corners(t));
+        piece.area_mm2 += mesh::area(&corners);
+        piece.volume_mm3 += signed_volume(&corners, origin);
+        for corner in &corners {
+            piece.bounds = (piece.bounds.0.inf(corner), piece.bounds.1.sup(corner));
+        }
+    }
+    for (opening, triangle) in boundary.openings.iter().zip(&boundary.first_triangle) {
+        let piece = &mut pieces[piece_of[*triangle as usize] as usize];
+        piece.loops += 1;
+        piece.is_part &= Rim::of(mesh, table, opening).is_some_and(|rim| rim.is_end());
+        piece.volume_mm3 += opening.cap(mesh).map(|cap| signed_volume(&cap, origin)).sum::<f64>();
+    }
+    pieces
+}

@@ -1,0 +1,119 @@
+//! Parts that were put together without a union are united, bodies in the wall are taken off, and what only lies beside a
+//! vessel is not joined to it.
+
+use std::f64::consts::PI;
+
+use super::shapes::{add, ball, tube};
+use crate::Vec3;
+use crate::vessel::{ExtractedCentreline, Mending, RepairKind, RepairOptions, Sac, SurfaceMesh, Wall, check};
+
+/// A trunk of radius 5 mm from z = 0 to 80 mm, with these parts.
+fn trunk_with(parts: &[SurfaceMesh]) -> SurfaceMesh {
+    let mut mesh = tube(Vec3::zeros(), Vec3::z() * 80.0, 5.0, (32, 36));
+    parts.iter().for_each(|part| add(&mut mesh, part));
+    mesh
+}
+
+fn branch(from: [f64; 3], to: [f64; 3], radius_mm: f64) -> SurfaceMesh {
+    tube(Vec3::from(from), Vec3::from(to), radius_mm, (24, 25))
+}
+
+#[test]
+fn branches_are_united_with_their_trunk() {
+    for (parts, openings) in [
+        (vec![branch([0.0, 0.0, 40.0], [40.0, 0.0, 40.0], 2.5)], 3),
+        (vec![branch([0.0, 0.0, 35.0], [30.0, 0.0, 65.0], 2.5)], 3),
+        (vec![branch([0.0, 0.0, 40.0], [40.0, 0.0, 40.0], 1.0)], 3),
+        (
+            vec![
+                branch([0.0, 0.0, 30.0], [40.0, 0.0, 30.0], 2.0),
+                branch([0.0, 0.0, 50.0], [-40.0, 0.0, 50.0], 2.0),
+            ],
+            4,
+        ),
+        // Right through, and one that begins within the first.
+        (vec![branch([-40.0, 1.0, 40.0], [40.0, 1.0, 40.0], 2.0)], 4),
+        (
+            vec![
+                branch([0.0, 0.0, 40.0], [40.0, 0.0, 40.0], 2.5),
+                branch([20.0, 0.0, 40.0], [30.0, 25.0, 40.0], 1.5),
+            ],
+            4,
+        ),
+    ] {
+        let mesh = trunk_with(&parts);
+        let wall = Wall::from_surface(&mesh).unwrap();
+        let report = wall.report();
+        assert_eq!((report.parts_united, report.components), (parts.len(), 1), "{:?}", report.notes());
+        assert_eq!(wall.openings().len(), openings, "{:?}", wall.openings());
+        let checked = check(wall.mesh()).unwrap();
+        assert!(checked.is_sound(), "{:?}", checked.faults());
+        assert!(!check(&mesh).unwrap().is_sound());
+        let named = report.repairs.iter().filter(|repair| repair.kind == RepairKind::PartUnited).count();
+        assert_eq!(named, parts.len());
+        let line = ExtractedCentreline::of(&wall, None, &[]).unwrap();
+        assert!(line.unreached.is_empty(), "{:?}", line.unreached);
+        // All radii of the rims are as drawn.
+        let widest = wall.openings()[0].radius_mm;
+        assert!((widest - 5.0).abs() < 1e-9, "{widest}");
+        let apart = Wall::repaired(&mesh, &RepairOptions { mending: Mending::None, ..Default::default() });
+        assert_eq!(apart.unwrap().report().components, parts.len() + 1);
+    }
+}
+
+#[test]
+fn a_vessel_pushed_into_another_is_one() {
+    let mut mesh = tube(Vec3::zeros(), Vec3::z() * 45.0, 4.0, (32, 20));
+    add(&mut mesh, &tube(Vec3::z() * 35.0, Vec3::z() * 80.0, 3.9, (32, 20)));
+    let wall = Wall::from_surface(&mesh).unwrap();
+    assert_eq!((wall.report().parts_united, wall.openings().len()), (1, 2), "{:?}", wall.report().notes());
+    let (wide, narrow) = (PI * 16.0 * 45.0, PI * 3.9 * 3.9 * 35.0);
+    assert!((wall.volume_mm3() / (wide + narrow) - 1.0).abs() < 0.01, "{}", wall.volume_mm3());
+    assert!(check(wall.mesh()).unwrap().is_sound());
+}
+
+#[test]
+fn a_sac_that_overlaps_its_artery_is_joined_and_one_apart_is_none() {
+    let artery = || tube(Vec3::z() * -20.0, Vec3::z() * 20.0, 2.0, (24, 40));
+    for (off_mm, is_joined) in [(4.5, true), (4.0, true), (7.0, false)] {
+        let mut mesh = artery();
+        add(&mut mesh, &ball(Vec3::y() * off_mm, 3.0, 16));
+        let wall = Wall::from_surface(&mesh).unwrap();
+        assert_eq!(wall.report().parts_united, usize::from(is_joined));
+        let sac = Sac::measure(&wall, Vec3::y() * off_mm, Vec3::zeros());
+        if is_joined {
+            let sac = sac.unwrap();
+            assert!((0.8..4.6).contains(&sac.neck_diameter_mm), "{sac:?}");
+            assert!(sac.volume_mm3 < 4.0 / 3.0 * PI * 27.0);
+        } else {
+            let refused = sac.unwrap_err().to_string();
+            assert!(refused.contains("is not joined to the artery"), "{refused}");
+        }
+    }
+}
+
+#[test]
+fn a_body_in_the_wall_is_taken_off() {
+    for (off_mm, radius_mm) in [(4.0, 2.0), (3.5, 1.0), (4.6, 1.0)] {
+        let body = ball(Vec3::new(off_mm, 0.0, 40.0), radius_mm, 12);
+        let empty = Wall::from_surface(&trunk_with(&[])).unwrap().volume_mm3();
+        let wall = Wall::from_surface(&trunk_with(std::slice::from_ref(&body))).unwrap();
+        let told = wall.report().notes();
+        let is_within = off_mm + radius_mm < 4.9;
+        assert_eq!(wall.report().parts_united, usize::from(!is_within), "{told:?}");
+        assert_eq!(wall.report().pieces_dropped, 0, "{told:?}");
+        assert!(
+            wall.volume_mm3() < empty && wall.volume_mm3() > empty - body.signed_volume_mm3() - 1e-9,
+            "{told:?}"
+        );
+        assert_eq!(wall.openings().len(), 2, "{told:?}");
+    }
+}
+
+#[test]
+fn vessels_that_graze_each_other_stay_two() {
+    let mesh = trunk_with(&[branch([-40.0, 6.8, 40.0], [40.0, 6.8, 40.0], 2.0)]);
+    let wall = Wall::from_surface(&mesh).unwrap();
+    assert_eq!((wall.report().parts_united, wall.report().components), (0, 2), "{:?}", wall.report().notes());
+    assert!(!check(&mesh).unwrap().is_sound());
+}
