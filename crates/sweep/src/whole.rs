@@ -21,23 +21,29 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Begin and end of the temporary names of a file. The end has its extension, by which some writers choose a format.
-fn around(path: &Path) -> [OsString; 2] {
-    let (mut begins, mut ends) = (OsString::from(HIDDEN), OsString::from(PART));
+/// Begin of the temporary names of a file.
+fn begins(path: &Path) -> OsString {
+    let mut begins = OsString::from(HIDDEN);
     begins.push(path.file_name().unwrap_or_default());
     begins.push(".");
+    begins
+}
+
+/// End of a temporary name that has the file's extension, by which some writers choose a format.
+fn part_with_extension(path: &Path) -> OsString {
+    let mut ends = OsString::from(PART);
     if let Some(extension) = path.extension() {
         ends.push(".");
         ends.push(extension);
     }
-    [begins, ends]
+    ends
 }
 
-/// A new temporary file beside a path.
-fn part_of(path: &Path) -> io::Result<NamedTempFile> {
-    let [begins, ends] = around(path);
+/// A new temporary file beside a path, whose name ends so.
+fn part_of(path: &Path, ends: &OsStr) -> io::Result<NamedTempFile> {
+    let begins = begins(path);
     let mut part = tempfile::Builder::new();
-    part.prefix(&begins).suffix(&ends);
+    part.prefix(&begins).suffix(ends);
     #[cfg(unix)]
     {
         // As of a file that is created: the user's mask takes the rest away.
@@ -61,7 +67,7 @@ pub fn write(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io
     if let Some(kind) = special(path) {
         return write_through(path, kind, |part| write(part.as_file_mut()));
     }
-    let mut part = part_of(path)?;
+    let mut part = part_of(path, OsStr::new(PART))?;
     // Some network file systems have no locks.
     let _ = part.as_file().try_lock();
     write(part.as_file_mut())?;
@@ -77,10 +83,22 @@ pub fn write(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io
 /// # Errors
 /// As [`write()`].
 pub fn write_at(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
+    write_part(path, OsStr::new(PART), write)
+}
+
+/// The same for what chooses a format by the extension of its file: that of the empty file is the same.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_in_format(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
+    write_part(path, &part_with_extension(path), write)
+}
+
+fn write_part(path: &Path, ends: &OsStr, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
     if let Some(kind) = special(path) {
         return write_through(path, kind, |part| write(part.path()));
     }
-    let part = part_of(path)?;
+    let part = part_of(path, ends)?;
     write(part.path())?;
     part.persist(path).map_err(|error| error.error)?;
     Ok(())
@@ -152,7 +170,8 @@ pub fn remove(path: &Path) -> io::Result<()> {
 /// # Errors
 /// A folder that cannot be read, other than one that does not exist.
 pub fn remove_unfinished(path: &Path) -> io::Result<()> {
-    let around = around(path);
+    let begins = begins(path);
+    let ends = [OsString::from(PART), part_with_extension(path)];
     let entries = match std::fs::read_dir(folder(path)) {
         Ok(entries) => entries,
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => return Ok(()),
@@ -160,7 +179,7 @@ pub fn remove_unfinished(path: &Path) -> io::Result<()> {
     };
     for entry in entries {
         let entry = entry?;
-        if !is_part(&entry.file_name(), &around) || !entry.file_type()?.is_file() {
+        if !is_part(&entry.file_name(), &begins, &ends) || !entry.file_type()?.is_file() {
             continue;
         }
         let path = entry.path();
@@ -173,11 +192,13 @@ pub fn remove_unfinished(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether a name is a temporary one with this begin and end.
-fn is_part(name: &OsStr, [begins, ends]: &[OsString; 2]) -> bool {
-    let rest = name.as_encoded_bytes().strip_prefix(begins.as_encoded_bytes());
-    let random = rest.and_then(|rest| rest.strip_suffix(ends.as_encoded_bytes()));
-    random.is_some_and(|random| !random.is_empty() && random.iter().all(u8::is_ascii_alphanumeric))
+/// Whether a name is a temporary one with this begin and one of these ends.
+fn is_part(name: &OsStr, begins: &OsStr, ends: &[OsString; 2]) -> bool {
+    let Some(rest) = name.as_encoded_bytes().strip_prefix(begins.as_encoded_bytes()) else { return false };
+    ends.iter().any(|ends| {
+        let random = rest.strip_suffix(ends.as_encoded_bytes());
+        random.is_some_and(|random| !random.is_empty() && random.iter().all(u8::is_ascii_alphanumeric))
+    })
 }
 
 /// Writes a file of these bytes.
@@ -240,7 +261,8 @@ mod tests {
     fn what_was_left_is_removed_and_what_is_being_written_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
-        for name in [".a.txt.xY3.part.txt", ".a.txt.part.txt", ".b.txt.xY3.part.txt", "a.txt.part"] {
+        for name in [".a.txt.xY3.part", ".a.txt.xY4.part.txt", ".a.txt.part", ".b.txt.xY3.part", "a.txt.part"]
+        {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         write(&path, |_| {
@@ -249,7 +271,7 @@ mod tests {
             Ok(())
         })
         .unwrap();
-        assert_eq!(names(folder.path()), [".a.txt.part.txt", ".b.txt.xY3.part.txt", "a.txt", "a.txt.part"]);
+        assert_eq!(names(folder.path()), [".a.txt.part", ".b.txt.xY3.part", "a.txt", "a.txt.part"]);
         remove_unfinished(&folder.path().join("none").join("a")).unwrap();
     }
 

@@ -34,7 +34,7 @@ pub(crate) fn write(
         film.finish()
     };
     let mut failed = None;
-    let written = whole::write_at(&path, |part| {
+    let written = whole::write_in_format(&path, |part| {
         made(part).map_err(|error| {
             let text = error.to_string();
             failed = Some(error);
