@@ -60,6 +60,7 @@ struct Shown<'a> {
     name: &'a str,
     level: u8,
     text: &'a str,
+    #[serde(serialize_with = "crate::output::path_text")]
     scene: PathBuf,
     /// Overridden keys of the scene.
     scene_set: &'a [String],
