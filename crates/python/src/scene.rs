@@ -19,7 +19,7 @@ use crate::interrupt::interruptible;
 use crate::report::StepReport;
 use crate::simulation::Simulation;
 use crate::start::Start;
-use crate::vessel::Vessel;
+use crate::vessel::{Vessel, warn};
 
 /// A scene file: vessel, instruments, method, script and views.
 #[pyclass(frozen, module = "endowire", name = "Scene")]

@@ -61,6 +61,7 @@ struct Shown<'a> {
     level: u8,
     exam: bool,
     text: &'a str,
+    #[serde(serialize_with = "crate::output::path_text")]
     scene: PathBuf,
     /// Overridden keys of the scene.
     scene_set: &'a [String],

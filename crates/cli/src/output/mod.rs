@@ -25,6 +25,7 @@ pub(crate) mod vtk;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
+use std::path::Path;
 
 pub(crate) use endowire_sweep::whole;
 use serde::Serialize;
@@ -76,6 +77,22 @@ pub(crate) fn answer(
     text: impl FnOnce() -> String,
 ) -> Result<(), Failure> {
     if json { print_json(document) } else { print(printable(text())) }
+}
+
+/// A path in a document. Where it is no text, as in a folder named in Latin-1, it has replacement characters.
+pub(crate) fn path_text<S: serde::Serializer>(path: impl AsRef<Path>, into: S) -> Result<S::Ok, S::Error> {
+    into.serialize_str(&path.as_ref().to_string_lossy())
+}
+
+/// As [`path_text`], for a path that may be absent.
+pub(crate) fn path_text_if_any<S: serde::Serializer>(
+    path: &Option<impl AsRef<Path>>,
+    into: S,
+) -> Result<S::Ok, S::Error> {
+    match path {
+        Some(path) => path_text(path, into),
+        None => into.serialize_none(),
+    }
 }
 
 /// A document as indented JSON.

@@ -36,9 +36,10 @@ pub(crate) struct Summary {
     /// Name of the scene.
     pub(crate) scene: String,
     /// File of the scene, for drawing frames later.
+    #[serde(serialize_with = "super::path_text")]
     pub(crate) scene_file: PathBuf,
     /// File of its script, if that is not the scene's own.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "super::path_text_if_any")]
     pub(crate) script_file: Option<PathBuf>,
     /// Name of the method.
     pub(crate) method: &'static str,

@@ -6,6 +6,7 @@ mod check;
 mod conditioning;
 mod crossings;
 mod extract;
+mod far;
 mod files;
 mod generate;
 mod hints;

@@ -9,7 +9,7 @@ use super::repairs::{Mending, Repair, RepairKind, RepairOptions, named};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;
-use super::{SurfaceMesh, orient, repair, sliver};
+use super::{SurfaceMesh, far, orient, repair, sliver};
 use crate::{Error, Result, Vec3};
 
 /// Ratio of volume to the cube of the surface's size below which it is a sheet without an inside.
@@ -217,7 +217,9 @@ impl Wall {
                     let remedy = "nothing is closed with repair = \"none\": leave it out";
                     return Err(Error::parameter("keep_open_mm", crate::error::vector(place), remedy));
                 }
-                let wall = Self::mended(Welding::of(surface)?, None)?;
+                let welding = Welding::of(surface)?;
+                far::refuse(&welding.mesh)?;
+                let wall = Self::mended(welding, None)?;
                 repair::refuse_unmended(&wall.mesh, &wall.report).map_or(Ok(wall), Err)
             }
         }
@@ -235,6 +237,9 @@ impl Wall {
     /// [`Wall::repaired`] with holes kept open at these places, or only [`Wall::welded`], of a surface whose vertices
     /// are merged.
     pub(super) fn mended(welding: Welding, keep_open_mm: Option<&[Vec3]>) -> Result<Self> {
+        if keep_open_mm.is_some() {
+            far::refuse(&welding.mesh)?;
+        }
         let (mesh, mut edges, mut report) = Self::prepared(welding, keep_open_mm)?;
         let boundary = count(&mesh, &mut edges, &mut report);
         if report.openings > MOST_OPENINGS {

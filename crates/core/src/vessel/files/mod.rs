@@ -75,6 +75,12 @@ impl Format {
             (b"<VTKFile", Some(Self::Vtp), "VTK's XML files (.vtp) do"),
             (b"<?xml", Some(Self::Vtp), "XML files, such as .vtp, do"),
         ];
+        // A binary STL has any title, and a count that fits its size.
+        let count = bytes.get(80..84).and_then(|count| count.try_into().ok()).map(u32::from_le_bytes);
+        let is_stl = count.is_some_and(|count| bytes.len() as u64 == 84 + 50 * u64::from(count));
+        if is_stl && self != Self::Stl {
+            return Some("binary STL files (.stl) do");
+        }
         let (_, other, name) = begins.into_iter().find(|(begin, ..)| bytes.starts_with(begin))?;
         (other != Some(self)).then_some(name)
     }
