@@ -1,6 +1,8 @@
 //! A cohort of simulated trainees in the training subjects, and the score of each kind:
 //! `cargo run --release -p endowire-play --example cohort -- left_carotid`, or without a name in all of them.
 
+#![allow(clippy::unwrap_used, reason = "a subject that cannot be played is to stop it")]
+
 mod plan;
 mod trainee;
 

@@ -112,15 +112,15 @@ fn drill(plan: Vec<Act>) -> Vec<Act> {
 
 /// Pushes as far again as it then pulls back, each 3 mm.
 fn jab(plan: Vec<Act>) -> Vec<Act> {
-    cut(plan, 3.0, |piece| back_and_forth(piece, 0.7))
+    cut(plan, 3.0, |piece| back_and_forth(&piece, 0.7))
 }
 
 /// The same each 8 mm, by the half.
 fn reverse(plan: Vec<Act>) -> Vec<Act> {
-    cut(plan, 8.0, |piece| back_and_forth(piece, 0.5))
+    cut(plan, 8.0, |piece| back_and_forth(&piece, 0.5))
 }
 
-fn back_and_forth(piece: Vec<(usize, f64, f64)>, part: f64) -> Vec<Act> {
+fn back_and_forth(piece: &[(usize, f64, f64)], part: f64) -> Vec<Act> {
     let of = |by: f64| {
         Act::Move(
             piece
