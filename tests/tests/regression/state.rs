@@ -367,7 +367,10 @@ fn a_state_with_numbers_out_of_place_is_refused() {
         (rod(&|s| drop(s["hands"].as_array_mut().unwrap().pop())), "state.instruments"),
         (rod(&|s| drop(s["hand_forces"].as_array_mut().unwrap().pop())), "state.hands"),
         (
-            rod(&|s| s["behind"] = vec![serde_json::json!({"advance_mm": 1.0, "rotate_rad": 0.0}); 2].into()),
+            rod(&|s| {
+                s["behind"] =
+                    vec![serde_json::json!({"advance_mm": 1.0, "rotate_rad": 0.0, "steer": 0.0}); 2].into()
+            }),
             "state.hands",
         ),
         (rod(&|s| s["touches"] = serde_json::json!([[1_000_000, touch]])), "state.touches"),

@@ -50,8 +50,8 @@ fn a_wire_leads_a_catheter_into_the_arch_and_is_withdrawn() {
     let (wire, catheter) = (&rows[2 * 79], &rows[2 * 79 + 1]);
     assert_eq!((wire[1].as_str(), catheter[1].as_str()), ("wire", "catheter"));
     assert!((number(wire, 4) - 220.0).abs() < 1e-9 && (number(catheter, 4) - 160.0).abs() < 1e-9);
-    assert!((number(wire, 13) - 60.0).abs() < 1e-9 && (number(catheter, 13) - 160.0).abs() < 1e-9);
-    let apart: f64 = (8..11).map(|c| (number(wire, c) - number(catheter, c)).powi(2)).sum();
+    assert!((number(wire, 14) - 60.0).abs() < 1e-9 && (number(catheter, 14) - 160.0).abs() < 1e-9);
+    let apart: f64 = (9..12).map(|c| (number(wire, c) - number(catheter, c)).powi(2)).sum();
     assert!((50.0..60.0).contains(&apart.sqrt()), "{apart}");
 
     let frames = folder.path().join("frames");

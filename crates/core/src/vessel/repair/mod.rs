@@ -156,13 +156,15 @@ pub(super) fn cure(
     if cured.added > 0 {
         sliver::remove_degenerate(mesh, tolerance_mm);
     }
-    if filled.triangles + cured.added > 0 {
-        // Rare: two fillings that share a chord, or a flip that met another.
-        report.sheets_removed += sheets::prune(mesh, noted);
-    }
-    if dropped.triangles + dropped.bodies + dropped.sheets + filled.triangles + cured.removed + cured.added
-        > 0
-    {
+    let made = report.triangles_added + dropped.bodies + dropped.sheets + report.parts_united;
+    let pruned = if made > 0 {
+        // Rare: two fillings that share a chord, a flip that met another, a part that touches one along an edge.
+        sheets::prune(mesh, noted)
+    } else {
+        0
+    };
+    report.sheets_removed += pruned;
+    if made + pruned + dropped.triangles + report.fold_triangles_removed > 0 {
         edges.changed();
         drop_unreferenced(mesh);
     }
