@@ -168,18 +168,24 @@ pub fn remove(path: &Path) -> io::Result<()> {
 /// Removes what programs that were killed have left of a file, but nothing that is being written.
 ///
 /// # Errors
-/// A folder that cannot be read, other than one that does not exist.
+/// As [`remove_unfinished_in`].
 pub fn remove_unfinished(path: &Path) -> io::Result<()> {
-    let begins = begins(path);
-    let ends = [OsString::from(PART), part_with_extension(path)];
-    let entries = match std::fs::read_dir(folder(path)) {
+    remove_unfinished_in(folder(path), |name| path.file_name() == Some(name))
+}
+
+/// The same for all files of a folder whose own names are `ours`.
+///
+/// # Errors
+/// A folder that cannot be read, other than one that does not exist.
+pub fn remove_unfinished_in(folder: &Path, ours: impl Fn(&OsStr) -> bool) -> io::Result<()> {
+    let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => return Ok(()),
         Err(e) => return Err(e),
     };
     for entry in entries {
         let entry = entry?;
-        if !is_part(&entry.file_name(), &begins, &ends) || !entry.file_type()?.is_file() {
+        if !whole_name(&entry.file_name()).is_some_and(&ours) || !entry.file_type()?.is_file() {
             continue;
         }
         let path = entry.path();
@@ -192,13 +198,20 @@ pub fn remove_unfinished(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether a name is a temporary one with this begin and one of these ends.
-fn is_part(name: &OsStr, begins: &OsStr, ends: &[OsString; 2]) -> bool {
-    let Some(rest) = name.as_encoded_bytes().strip_prefix(begins.as_encoded_bytes()) else { return false };
-    ends.iter().any(|ends| {
-        let random = rest.strip_suffix(ends.as_encoded_bytes());
-        random.is_some_and(|random| !random.is_empty() && random.iter().all(u8::is_ascii_alphanumeric))
-    })
+/// The own name of the file of a temporary name.
+fn whole_name(part: &OsStr) -> Option<&OsStr> {
+    let hidden = part.to_str()?.strip_prefix(HIDDEN)?;
+    let own = |ends: &str| {
+        let (own, random) = hidden.strip_suffix(ends)?.rsplit_once('.')?;
+        (!random.is_empty() && random.bytes().all(|letter| letter.is_ascii_alphanumeric()))
+            .then_some(OsStr::new(own))
+    };
+    let with_extension = || {
+        let (_, extension) = hidden.rsplit_once('.')?;
+        own(&format!("{PART}.{extension}"))
+            .filter(|own| Path::new(own).extension() == Some(OsStr::new(extension)))
+    };
+    own(PART).or_else(with_extension)
 }
 
 /// Writes a file of these bytes.

@@ -369,7 +369,7 @@ fn a_state_with_numbers_out_of_place_is_refused() {
         (
             rod(&|s| {
                 s["behind"] =
-                    vec![serde_json::json!({"advance_mm": 1.0, "rotate_rad": 0.0, "steer": 0.0}); 2].into()
+                    vec![serde_json::json!({"advance_mm": 1.0, "rotate_rad": 0.0, "steer": 0.0}); 2].into();
             }),
             "state.hands",
         ),

@@ -1,6 +1,7 @@
 //! The folder of a recording, and the file of a session. Only one run at a time may hold a folder, only one session a
 //! file, and only files of an earlier recording are removed from a folder.
 
+use std::ffi::OsStr;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -20,6 +21,8 @@ const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
 /// Locked by the run that records, and by what draws a data set; by a session, with the name of its script before it. The empty file remains
 /// afterwards: only the lock counts, and it is released when a program dies.
 const LOCK: &str = ".endowire-lock";
+/// Files of a recording, apart from frames and films.
+const NAMES: [&str; 7] = [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, PACKING, arrays::PACKED];
 
 /// The right to record into a folder or a file, until it is dropped.
 pub(crate) struct Claim {
@@ -53,14 +56,20 @@ pub(crate) fn claim(folder: &Path, force: bool) -> Result<Claim, Failure> {
     Ok(claim)
 }
 
-/// Locks the folder of a recording that resumes.
+/// Locks the folder of a recording that resumes, and removes what a run that was killed has left unfinished there.
 pub(crate) fn claim_again(folder: &Path) -> Result<Claim, Failure> {
-    lock(&folder.join(LOCK), || {
+    let claim = lock(&folder.join(LOCK), || {
         let folder = folder.display();
         format!(
             "--out {folder}: another run is recording into this folder: wait until it has ended, or give another folder"
         )
-    })
+    })?;
+    let is_ours = |name: &OsStr| NAMES.iter().chain(&FILMS).any(|ours| name == *ours);
+    let is_frame = |name: &OsStr| name.to_str().is_some_and(is_frame_name);
+    whole::remove_unfinished_in(folder, is_ours)
+        .and_then(|()| whole::remove_unfinished_in(&folder.join("frames"), is_frame))
+        .map_err(|e| Failure::write(folder, &e))?;
+    Ok(claim)
 }
 
 /// Locks the folder of a data set.
@@ -155,16 +164,13 @@ fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
     let mut removed = vec![];
     // Films, like frames, are removed only if the folder is a recording.
     let films = FILMS.iter().copied().filter(|_| recording);
-    for name in
-        [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, PACKING, arrays::PACKED].into_iter().chain(films)
-    {
+    for name in NAMES.into_iter().chain(films) {
         let path = folder.join(name);
         // For a link, this is the link itself and not its target.
         if path.symlink_metadata().is_ok() {
             whole::remove(&path)?;
             removed.push(name.to_owned());
         }
-        whole::remove_unfinished(&path)?;
     }
     if recording {
         let growing = folder.join(arrays::GROWING);

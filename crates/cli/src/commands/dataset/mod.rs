@@ -173,6 +173,10 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<Claim, Failure> {
     let made = FOLDERS.iter().try_for_each(|name| std::fs::create_dir_all(folder.join(name)));
     made.map_err(|e| Failure::write(folder, &e))?;
     let claim = claim_dataset(folder)?;
+    // What a call that was killed has left unfinished.
+    let tidied =
+        FOLDERS.iter().try_for_each(|name| whole::remove_unfinished_in(&folder.join(name), |_| true));
+    tidied.map_err(|e| Failure::write(folder, &e))?;
     // Another call may have been faster.
     check(provenance, folder)?;
     let (path, reported) = (folder.join("dataset.json"), to_json(provenance)?);
