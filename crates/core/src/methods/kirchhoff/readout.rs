@@ -31,9 +31,9 @@ impl<const C: usize> Tools<C> {
         });
         let KirchhoffState { rod, twists, hand_forces, energy, across_n, .. } = state;
         energy.tail = self.tails.write(rod, twists, hand_forces);
-        let rubbed = self.tails.rub(sheath, *across_n, rod, hand_forces);
-        self.around_mj = rubbed.around_mj;
-        rubbed.along_mj
+        let at_grips = self.tails.grip_friction(sheath, *across_n, rod, hand_forces);
+        self.around_mj = at_grips.around_mj;
+        at_grips.along_mj
     }
 
     /// Writes them without friction outside the body. Returns the forces at the sheath's mouth, unless nothing is

@@ -85,18 +85,18 @@ impl Tails {
     }
 
     /// Writes the friction at the grips along the line, with this force across it at the mouth, N.
-    pub(super) fn rub(
+    pub(super) fn grip_friction(
         &self,
         sheath: &Sheath,
         across_n: f64,
         rod: &RodState,
         forces: &mut [HandForce],
-    ) -> Rubbed {
-        let mut rubbed = Rubbed::default();
+    ) -> GripFriction {
+        let mut dissipated = GripFriction::default();
         for (k, tail) in self.each.iter().enumerate() {
-            rubbed.around_mj = rubbed.around_mj.map(|mj| mj + tail.let_go_mj);
+            dissipated.around_mj = dissipated.around_mj.map(|mj| mj + tail.let_go_mj);
             if !tail.is_in {
-                rubbed.along_mj += tail.friction_n * tail.advance_mm.abs();
+                dissipated.along_mj += tail.friction_n * tail.advance_mm.abs();
                 continue;
             }
             let turned = tail.on(rod);
@@ -113,17 +113,17 @@ impl Tails {
             if let Grip::Valve(outer) = tail.grip {
                 forces[outer].outside_n -= along_n;
             }
-            rubbed.along_mj += along_n * tail.advance_mm;
+            dissipated.along_mj += along_n * tail.advance_mm;
             let around_mj = tail.around_mj(&turned);
-            rubbed.around_mj = [0, 1].map(|k| rubbed.around_mj[k] + around_mj[k]);
+            dissipated.around_mj = [0, 1].map(|k| dissipated.around_mj[k] + around_mj[k]);
         }
-        rubbed
+        dissipated
     }
 }
 
 /// Energy dissipated by friction outside the body, mJ.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Rubbed {
+pub(super) struct GripFriction {
     /// Against advance: hands do it at once, beside what they do on the device.
     pub(super) along_mj: f64,
     /// Against turning, of what hands do by their torque, at least and at most.
