@@ -134,7 +134,7 @@ pub(crate) fn let_medium_flow(
     view.check_places()
 }
 
-/// Reports what was mended on the surface, and that the centre line was extracted from it, if one was needed and the
+/// Reports what was repaired on the surface, and that the centre line was extracted from it, if one was needed and the
 /// scene names none.
 pub(crate) fn tell_found(path: &Path, scene: &Scene) {
     for mended in scene.mended() {

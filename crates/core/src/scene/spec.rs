@@ -69,7 +69,7 @@ pub struct SceneOf<M> {
     /// The vessel's centre line, once needed.
     #[serde(skip)]
     pub(super) centreline: OnceLock<CentrelineTree>,
-    /// What was mended on its surface, once read.
+    /// What was repaired on its surface, once read.
     #[serde(skip)]
     mended: OnceLock<Vec<String>>,
 }
@@ -298,7 +298,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(wall.into())
     }
 
-    /// What was mended on its surface and what in its lumen was taken as a wall, a sentence each, once the surface was
+    /// What was repaired on its surface and what in its lumen was taken as a wall, a sentence each, once the surface was
     /// read; none for a vessel from a tree.
     pub fn mended(&self) -> &[String] {
         self.mended.get().map_or(&[], Vec::as_slice)

@@ -23,7 +23,7 @@ pub struct VesselSpec {
     pub unit_mm: Option<f64>,
     /// Axes of the surface file, overriding those of its header.
     pub axes: Option<PatientAxes>,
-    /// What of the surface file is mended; all if absent.
+    /// What of the surface file is repaired; all if absent.
     pub repair: Option<Mending>,
     /// Places of holes in it that are meant and stay open, such as fenestrations, mm.
     #[serde(default)]

@@ -22,7 +22,7 @@ pub enum WallRecipe<'a> {
     Repaired {
         /// The surface as given, mm.
         surface: &'a SurfaceMesh,
-        /// What is mended.
+        /// What is repaired.
         options: &'a RepairOptions,
     },
     /// The uniform mesh of a wall for contact, [`Wall::with_even_rims`] and [`condition`].

@@ -1,4 +1,4 @@
-//! What was mended on a surface, and what in its lumen was taken as a wall: how much, how large and where.
+//! What was repaired on a surface, and what in its lumen was taken as a wall: how much, how large and where.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::{Error, Result, Vec3};
 /// Places named in one line of text.
 const NAMED: usize = 5;
 
-/// What is mended on a surface that is read.
+/// What is repaired on a surface that is read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mending {
@@ -38,7 +38,7 @@ impl std::str::FromStr for Mending {
 /// Choices for the repair of a surface, [`Wall::repaired`](super::Wall::repaired).
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RepairOptions {
-    /// What is mended.
+    /// What is repaired.
     pub mending: Mending,
     /// Places of holes that are meant, such as fenestrations, mm: the hole nearest to each is not closed.
     pub keep_open_mm: Vec<Vec3>,
@@ -76,7 +76,7 @@ pub enum RepairKind {
     PartUnited,
 }
 
-/// One mended place, or one thing in the lumen.
+/// One repaired place, or one thing in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Repair {
     /// What was done.

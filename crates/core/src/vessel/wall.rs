@@ -91,7 +91,7 @@ pub struct RepairReport {
     pub sheets_in_lumen: usize,
     /// Parts that overlapped others and were united with them, and bodies that were taken off.
     pub parts_united: usize,
-    /// What was mended where, in the order of the work: everything counted above except merged or unused vertices,
+    /// What was repaired where, in the order of the work: everything counted above except merged or unused vertices,
     /// triangles without area, duplicates and turned triangles, which change no surface.
     pub repairs: Vec<Repair>,
 }
@@ -119,7 +119,7 @@ impl RepairReport {
         more.iter().all(|count| *count == 0) && !self.intersections_capped
     }
 
-    /// One line for each kind of what was mended on the surface, and of what in its lumen was taken as a wall, with
+    /// One line for each kind of what was repaired on the surface, and of what in its lumen was taken as a wall, with
     /// sizes and places of the largest; empty for a surface that is taken as it was given.
     pub fn mended(&self) -> Vec<String> {
         let at_least = if self.intersections_capped { "or more " } else { "" };
@@ -204,7 +204,7 @@ impl Wall {
         Self::repaired(surface, &RepairOptions::default())
     }
 
-    /// [`Wall::from_surface`] with other choices of what is mended.
+    /// [`Wall::from_surface`] with other choices of what is repaired.
     ///
     /// # Errors
     /// As [`Wall::from_surface`]; [`Error::Parameter`] naming `keep_open_mm` for a place without a hole; with

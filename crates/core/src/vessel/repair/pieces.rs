@@ -105,14 +105,7 @@ pub(in crate::vessel) fn nested(mesh: &SurfaceMesh, table: &EdgeTable) -> usize 
 /// those in a lumen, and notes both; `table` holds its edges.
 pub(super) fn sort(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mut Vec<Repair>) -> Dropped {
     let mut dropped = Dropped::default();
-    let (piece_of, count) = table.components(mesh.triangles.len());
-    if count < 2 {
-        return dropped;
-    }
-    let mut pieces = measure(mesh, table, &piece_of, count);
-    let main = (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)));
-    let Some(main) = main.filter(|main| pieces[*main].triangles >= FEWEST) else { return dropped };
-    let small = mark_small(&mut pieces, main);
+    let Some((mut pieces, piece_of, small)) = by_size(mesh, table) else { return dropped };
     dropped.skins = drop_skins(mesh, table, &piece_of, &mut pieces);
     let skins: Vec<bool> = pieces.iter().map(|piece| piece.gone).collect();
     let inner = inner(mesh, &piece_of, &mut pieces, &small);
@@ -127,6 +120,23 @@ pub(super) fn sort(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mut Vec<Re
     (dropped.bodies, dropped.sheets) = contents::make_walls(mesh, &piece_of, &inner, noted);
     dropped.triangles = drop_triangles(mesh, &piece_of, |piece| pieces[piece].gone);
     dropped
+}
+
+/// The pieces of a mesh, the piece of each triangle, and the numbers of those that are small against the largest one, which
+/// are marked; `None` if there is one piece, or none that is a vessel. `table` holds the edges.
+fn by_size(mesh: &SurfaceMesh, table: &EdgeTable) -> Option<(Vec<Piece>, Vec<u32>, Vec<usize>)> {
+    let (piece_of, count) = table.components(mesh.triangles.len());
+    if count < 2 {
+        return None;
+    }
+    let mut pieces = measure(mesh, table, &piece_of, count);
+    let main =
+        (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)))?;
+    if pieces[main].triangles < FEWEST {
+        return None;
+    }
+    let small = mark_small(&mut pieces, main);
+    Some((pieces, piece_of, small))
 }
 
 /// Marks the pieces that are small against the largest one, and returns their numbers.
@@ -145,17 +155,7 @@ fn mark_small(pieces: &mut [Piece], main: usize) -> Vec<usize> {
 /// What lies in the lumen of a consistently oriented mesh, for each piece, with the piece of each triangle; `table` holds
 /// its edges. `None` if nothing does.
 fn all_inner(mesh: &SurfaceMesh, table: &EdgeTable) -> Option<(Vec<Option<Inner>>, Vec<u32>)> {
-    let (piece_of, count) = table.components(mesh.triangles.len());
-    if count < 2 {
-        return None;
-    }
-    let mut pieces = measure(mesh, table, &piece_of, count);
-    let main =
-        (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)))?;
-    if pieces[main].triangles < FEWEST {
-        return None;
-    }
-    let small = mark_small(&mut pieces, main);
+    let (mut pieces, piece_of, small) = by_size(mesh, table)?;
     let inner = inner(mesh, &piece_of, &mut pieces, &small);
     inner.iter().any(Option::is_some).then_some((inner, piece_of))
 }
