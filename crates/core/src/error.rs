@@ -58,7 +58,7 @@ pub enum PhysicalEnd {
     Left {
         /// Number of the opening.
         opening: usize,
-        /// Distance of the tip beyond its plane, mm.
+        /// Distance of the device's farthest point beyond its plane, mm.
         beyond_mm: f64,
         /// Largest distance allowed, mm.
         limit_mm: f64,
@@ -79,7 +79,7 @@ impl std::fmt::Display for PhysicalEnd {
         match self {
             Self::Left { opening, beyond_mm, limit_mm } => write!(
                 f,
-                "the tip has left the vessel through opening {opening} by {beyond_mm:.1} mm, and beyond {limit_mm} mm nothing \
+                "the device has left the vessel through opening {opening} by {beyond_mm:.1} mm, and beyond {limit_mm} mm nothing \
                  is known: stop the script earlier or use a vessel that goes on"
             ),
             Self::Blocked { position_mm, lumen_radius_mm, device_radius_mm } => write!(

@@ -170,9 +170,9 @@ impl Insertion {
         let Progress { chain, posture, from_tip_mm } = &self.progress;
         let report = &mut self.report;
         report.inserted_mm = from_tip_mm[0];
-        let tip = posture.positions_mm[posture.positions_mm.len() - 1];
+        let line = posture.positions_mm.iter().copied();
         report.left_through =
-            left_through(surroundings.lumen.openings(), &tip).map(|(opening, _)| opening.index);
+            left_through(surroundings.lumen.openings(), line).map(|(opening, _)| opening.index);
         let mut load = WallLoad::new(&self.wall, surroundings, from_tip_mm);
         let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
         let Strain { bend_mj, twist_mj, twist_rad } = self.model.strain(chain, posture);

@@ -170,7 +170,7 @@ impl StepReport {
         self.of_contacts(py, |c| c.penetration_mm)
     }
 
-    /// The opening through which the tip has left the vessel, while it is outside; None inside.
+    /// The opening through which the device has left the vessel, while its tip is not back; None inside.
     #[getter]
     fn left_through(&self) -> Option<usize> {
         self.report.left_through

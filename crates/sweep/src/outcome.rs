@@ -44,7 +44,7 @@ pub struct RunOutcome {
     /// Statistics of the steps.
     #[serde(flatten)]
     pub tally: Tally,
-    /// The opening through which the tip has left the vessel at the end, if it has.
+    /// The opening through which the device has left the vessel at the end, if it has.
     pub left_through: Option<usize>,
 }
 

@@ -165,20 +165,62 @@ pub(crate) fn leave_mm(opening: &Opening) -> f64 {
     (opening.beyond_mm - LEFT_MM).max(0.0)
 }
 
-/// The opening beyond whose plane `x` lies, within its extension, and the distance beyond it, mm.
-pub fn left_through<'a>(openings: &'a [Opening], x: &Vec3) -> Option<(&'a Opening, f64)> {
-    openings.iter().find_map(|o| {
-        let (beyond, lateral) = o.beyond_and_off_axis_mm(x);
-        (beyond > 0.0 && beyond <= o.beyond_mm && lateral < 1.5 * o.radius_mm).then_some((o, beyond))
+/// Whether `x` lies beyond an opening, in its extension.
+pub(crate) fn is_beyond_an_opening(openings: &[Opening], x: &Vec3) -> bool {
+    openings.iter().any(|o| {
+        let (beyond_mm, lateral_mm) = o.beyond_and_off_axis_mm(x);
+        beyond_mm > 0.0 && beyond_mm <= o.beyond_mm && is_in_front(o, lateral_mm)
     })
 }
 
-/// Rejects a tip that, `ahead_mm` farther, would be too far beyond an opening.
+/// Whether a point so far off an opening's axis lies in front of it.
+fn is_in_front(opening: &Opening, lateral_mm: f64) -> bool {
+    lateral_mm < 1.5 * opening.radius_mm
+}
+
+/// The opening through which a device whose points are given from its entry to its tip has left the vessel, and how
+/// far its farthest point beyond is beyond the opening's plane, mm.
+///
+/// It is judged along the device and not by its tip's place: the last opening that the device passes outwards, unless
+/// it comes back through it. So a tip that is carried past an extension's end in one command, or a device that turns
+/// back outside, has left as well.
+pub fn left_through(openings: &[Opening], line: impl IntoIterator<Item = Vec3>) -> Option<(&Opening, f64)> {
+    let mut left: Option<(&Opening, f64)> = None;
+    let mut before: Option<Vec3> = None;
+    for point in line {
+        if let Some(start) = before {
+            if let Some((opening, outwards)) = passed(openings, &start, &point) {
+                left = outwards.then_some((opening, 0.0));
+            }
+            if let Some((opening, farthest_mm)) = &mut left {
+                *farthest_mm = farthest_mm.max(opening.beyond_and_off_axis_mm(&point).0);
+            }
+        }
+        before = Some(point);
+    }
+    left
+}
+
+/// The opening that a segment passes, and whether outwards.
+fn passed<'a>(openings: &'a [Opening], start: &Vec3, end: &Vec3) -> Option<(&'a Opening, bool)> {
+    openings.iter().filter(|o| o.beyond_mm > 0.0).find_map(|o| {
+        let height_mm = |x: &Vec3| (x - o.centre_mm).dot(&o.direction);
+        let (from_mm, to_mm) = (height_mm(start), height_mm(end));
+        if (from_mm > 0.0) == (to_mm > 0.0) {
+            return None;
+        }
+        let at = start + (end - start) * (from_mm / (from_mm - to_mm));
+        is_in_front(o, o.beyond_and_off_axis_mm(&at).1).then_some((o, to_mm > 0.0))
+    })
+}
+
+/// Rejects a device that, `ahead_mm` farther, would be too far beyond an opening; its points are given from its entry
+/// to its tip.
 ///
 /// # Errors
 /// [`PhysicalEnd::Left`].
-pub fn check_inside(openings: &[Opening], tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
-    let Some((opening, beyond_mm)) = left_through(openings, tip_mm) else { return Ok(()) };
+pub fn check_inside(openings: &[Opening], line: impl IntoIterator<Item = Vec3>, ahead_mm: f64) -> Result<()> {
+    let Some((opening, beyond_mm)) = left_through(openings, line) else { return Ok(()) };
     let limit_mm = leave_mm(opening);
     if beyond_mm + ahead_mm > limit_mm {
         return Err(Error::End(PhysicalEnd::Left { opening: opening.index, beyond_mm, limit_mm }));
@@ -261,14 +303,31 @@ mod tests {
         );
     }
 
-    #[test]
-    fn a_point_past_an_opening_has_left_through_it() {
+    /// A straight tube of 100 mm along z, and a device in it as the points of a line.
+    fn left_a_tube(heights_mm: &[f64], off_mm: &[f64]) -> Option<f64> {
         let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0))
             .unwrap()
             .wall;
         let top = wall.openings().iter().find(|o| o.direction.z > 0.5).unwrap();
-        let found = left_through(wall.openings(), &Vec3::new(1.0, 0.0, 105.0)).unwrap();
-        assert!(found.0.index == top.index && (found.1 - 5.0).abs() < 1e-6);
-        assert!(left_through(wall.openings(), &Vec3::new(1.0, 0.0, 95.0)).is_none());
+        let line = heights_mm.iter().zip(off_mm).map(|(z, x)| Vec3::new(*x, 0.0, *z));
+        left_through(wall.openings(), line).map(|(opening, beyond_mm)| {
+            assert_eq!(opening.index, top.index);
+            beyond_mm
+        })
+    }
+
+    #[test]
+    fn a_device_has_left_through_the_opening_that_it_passes_last() {
+        let is = |found: Option<f64>, beyond_mm: f64| (found.unwrap() - beyond_mm).abs() < 1e-6;
+        assert!(is(left_a_tube(&[0.0, 95.0, 105.0], &[0.0, 0.0, 1.0]), 5.0));
+        assert!(left_a_tube(&[0.0, 50.0, 95.0], &[0.0, 0.0, 1.0]).is_none());
+        // In one command past the end of the extension, and then back beside the tube.
+        assert!(is(left_a_tube(&[0.0, 90.0, 140.0], &[0.0; 3]), 40.0));
+        assert!(is(left_a_tube(&[0.0, 90.0, 140.0, 90.0], &[0.0, 0.0, 30.0, 60.0]), 40.0));
+        // A hairpin: as far as its bend, until its tip is back.
+        assert!(is(left_a_tube(&[0.0, 95.0, 115.0, 101.0], &[0.0, 0.0, 0.5, 1.0]), 15.0));
+        assert!(left_a_tube(&[0.0, 95.0, 115.0, 90.0], &[0.0, 0.0, 0.5, 1.0]).is_none());
+        // Beside an opening nothing is passed.
+        assert!(left_a_tube(&[90.0, 110.0], &[60.0, 60.0]).is_none());
     }
 }

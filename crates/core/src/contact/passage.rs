@@ -15,7 +15,7 @@ use std::collections::BinaryHeap;
 use rustc_hash::FxHashSet;
 
 use super::ContactSurface;
-use super::extension::left_through;
+use super::extension::is_beyond_an_opening;
 use crate::Vec3;
 use crate::rod::Frame;
 use crate::tuning::PassageTuning;
@@ -136,7 +136,7 @@ impl<'a> Grid<'a> {
         while let Some(way) = ways.pop() {
             let at = self.place(way.to);
             if self.distance_mm(&at).0 >= self.tuning.ahead * self.radius_mm
-                || left_through(self.openings, &at).is_some()
+                || is_beyond_an_opening(self.openings, &at)
             {
                 return Some(Narrow { radius_mm: way.least_mm, place_mm: self.place(way.narrowest) });
             }

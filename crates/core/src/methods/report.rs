@@ -202,7 +202,7 @@ pub struct StepReport {
     pub contacts: Vec<Contact>,
     /// Drag of blood flow on the device, N; zero without flow.
     pub drag_n: Vec3,
-    /// The opening through which the tip has left the vessel, while it is beyond it.
+    /// The opening through which the device has left the vessel, while its tip is not back.
     pub left_through: Option<usize>,
     /// Newton iterations of this step, including failed attempts.
     pub iterations: u32,

@@ -250,8 +250,8 @@ impl Input {
             }
             _ => 0.0,
         };
-        let tip = self.positions_mm.last().unwrap_or(&sheath.position_mm);
+        let line = self.positions_mm.iter().copied();
         report.left_through =
-            left_through(surroundings.lumen.openings(), tip).map(|(opening, _)| opening.index);
+            left_through(surroundings.lumen.openings(), line).map(|(opening, _)| opening.index);
     }
 }

@@ -139,8 +139,8 @@ impl Method for Li2011 {
         let target_mm = if target_mm < ZERO_LENGTH_MM { 0.0 } else { target_mm };
         let travel_mm = target_mm - self.state.report.inserted_mm;
         if travel_mm > 0.0 {
-            let tip_mm = self.state.shape.tip_mm().unwrap_or(surroundings.sheath.position_mm);
-            check_inside(surroundings.lumen.openings(), &tip_mm, travel_mm)?;
+            let line = self.state.shape.positions_mm.iter().copied();
+            check_inside(surroundings.lumen.openings(), line, travel_mm)?;
         }
         let before = self.state.clone();
         match self.carry(surroundings, target_mm) {

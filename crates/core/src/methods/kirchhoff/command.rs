@@ -60,8 +60,8 @@ impl<const C: usize> Workspace<C> {
         let advance_mm = line_advance_mm(&tools.guess.motions);
         if advance_mm > 0.0 {
             let displaced = surroundings.displacement(0.0);
-            let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
-            check_inside(surroundings.lumen.openings(), &tip_mm, advance_mm)?;
+            let line = from.material_line(environment.displaced(displaced.as_ref()).wall());
+            check_inside(surroundings.lumen.openings(), line, advance_mm)?;
         }
         Ok(())
     }
@@ -127,8 +127,8 @@ impl<const C: usize> Workspace<C> {
             let lost = match tried {
                 Ok(found) if course.shortens(&part, &found) => continue,
                 Ok(found) => {
-                    let tip_mm = there.wall().material(&next.state.tip_mm());
-                    if let Err(left) = check_inside(surroundings.lumen.openings(), &tip_mm, 0.0) {
+                    let line = next.state.material_line(there.wall());
+                    if let Err(left) = check_inside(surroundings.lumen.openings(), line, 0.0) {
                         break Err(left);
                     }
                     let way_mm = was.state.rod.farthest_mm(&next.state.rod);

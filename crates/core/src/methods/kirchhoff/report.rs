@@ -69,9 +69,8 @@ fn write_state(environment: &Environment<'_>, to: Start<'_>, report: &mut StepRe
     report.angles = state.has_angles;
     report.behind.clone_from(&state.behind);
     let displacement = surroundings.displacement(1.0);
-    let tip_mm = environment.displaced(displacement.as_ref()).wall().material(&state.tip_mm());
-    report.left_through =
-        left_through(surroundings.lumen.openings(), &tip_mm).map(|(opening, _)| opening.index);
+    let line = state.material_line(environment.displaced(displacement.as_ref()).wall());
+    report.left_through = left_through(surroundings.lumen.openings(), line).map(|(opening, _)| opening.index);
     report.instruments.clear();
     report.instruments.extend(instruments(to, stack));
     let inner = report.hand(0);

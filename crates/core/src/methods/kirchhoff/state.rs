@@ -12,7 +12,7 @@ use super::mesh::Fineness;
 use super::part::{Effort, Found};
 use super::step_control::{StepControl, Stride};
 use super::tail::Twist;
-use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce, PairForce, Touch};
+use crate::contact::{ContactSurface, InnerFriction, KnownPoints, MovedWall, NormalForce, PairForce, Touch};
 use crate::device::Stack;
 use crate::methods::{Command, Energy, Sheath, Surroundings};
 use crate::rod::RodState;
@@ -193,9 +193,9 @@ impl KirchhoffState {
         self.touches.iter().fold(0.0, |deepest_mm, (_, touch)| touch.contact.penetration_mm.max(deepest_mm))
     }
 
-    /// Position of the tip, mm.
-    pub(super) fn tip_mm(&self) -> Vec3 {
-        self.rod.positions[self.rod.elements()]
+    /// Places of its nodes in the vessel at rest, mm, from the entry to the tip.
+    pub(super) fn material_line(&self, wall: MovedWall<'_>) -> impl Iterator<Item = Vec3> {
+        self.rod.positions[..=self.rod.elements()].iter().map(move |x| wall.material(x))
     }
 
     /// Allocates for up to `elements` elements and `points` contact points.
