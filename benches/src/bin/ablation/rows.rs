@@ -48,6 +48,8 @@ fn groups() -> [Group; 14] {
                 ),
                 other!(newton.rooms = 1.0),
                 other!(newton.rooms = 8.0),
+                without!("a nearer limit at a saddle", newton.indefinite_rooms = 1.0),
+                other!(newton.indefinite_rooms = 0.1),
                 other!(newton.room_rad = 0.5),
                 other!(newton.room_rad = 3.0),
                 other!(steps.nearer = 0.05),

@@ -5,6 +5,10 @@
 //! their steps until it is close (E. L. Allgower, K. Georg, *Numerical Continuation Methods*, 1990, chapter 6; P.
 //! Deuflhard, *Newton Methods for Nonlinear Problems*, 2004, chapter 5). The vessel determines what is close: the
 //! room of a node is its clearance, or the radius of the vessel if it touches the wall.
+//!
+//! Where the stiffness is indefinite at an iterate, the energy has a saddle between the prediction and the result:
+//! there the path bends away to one side, and a stable branch on the other side is as near (an imperfect pitchfork).
+//! The neighbourhood is then a part of its size.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +23,8 @@ pub(crate) struct Neighbourhood {
     angles: Vec<f64>,
     /// Whether Newton's method stops when an iterate leaves the neighbourhood.
     pub(crate) bounds: bool,
+    /// Whether the stiffness was indefinite at an iterate.
+    is_indefinite: bool,
 }
 
 impl Neighbourhood {
@@ -35,6 +41,12 @@ impl Neighbourhood {
         self.nodes.extend(places.map(|(at_mm, room_mm)| (*at_mm, tuning.rooms * room_mm)));
         self.angles.clear();
         self.angles.extend(carried(state));
+        self.is_indefinite = false;
+    }
+
+    /// The stiffness is indefinite at an iterate.
+    pub(crate) fn is_at_a_saddle(&mut self) {
+        self.is_indefinite = true;
     }
 
     /// Largest deviation of a state from the prediction, as a fraction of the allowed one.
@@ -43,7 +55,8 @@ impl Neighbourhood {
         let off = places.map(|(x, (at_mm, most_mm))| (x - at_mm).norm() / most_mm).fold(0.0, f64::max);
         let turn = |(angle, was): (f64, &f64)| (angle - was).abs() / tuning.room_rad;
         let turns = carried(state).zip(&self.angles).map(turn);
-        turns.fold(off, f64::max)
+        let part = if self.is_indefinite { tuning.indefinite_rooms } else { 1.0 };
+        turns.fold(off, f64::max) / part
     }
 
     /// Position of the node with the largest deviation from its prediction relative to its room, mm.
@@ -91,6 +104,10 @@ mod tests {
         assert!(!near.is_left_by(&moved(1, 2.9), &tuning) && near.is_left_by(&moved(1, 3.1), &tuning));
         near.bounds = false;
         assert!(!near.is_left_by(&moved(1, 3.1), &tuning));
+        near.is_at_a_saddle();
+        let off = near.off(&moved(1, 0.5), &tuning);
+        assert!((off * tuning.indefinite_rooms - 0.5).abs() < 1e-12, "{off}");
+        near.begin(&rod, &[0.5, 0.5, 4.0], &tuning);
         let mut turned = rod.clone();
         turned.angles[2] += 0.3;
         assert!((near.off(&turned, &tuning) - 0.3).abs() < 1e-12);

@@ -219,6 +219,9 @@ impl<const C: usize> Newton<C> {
                     let step = (size.relative, shift);
                     self.line_search(&mut problem, state, &mut search, step, &contacts)
                 });
+            if shift > 0.0 {
+                self.neighbourhood.is_at_a_saddle();
+            }
             self.last_shift = shift.max(self.tuning.shift_decay * self.last_shift);
             match searched {
                 Ok(_) if state.is_folded(elements) => return report.stopped(StopReason::Folded),

@@ -77,6 +77,8 @@ pub struct NewtonTuning {
     pub rooms: f64,
     /// Largest difference of a node's material angle from its prediction, rad.
     pub room_rad: f64,
+    /// Fraction of these distances that is allowed where the stiffness was indefinite at an iterate.
+    pub indefinite_rooms: f64,
     /// An iterate this many times farther than allowed does not return. Below that it may: the first steps from a
     /// prediction can be long where contacts open.
     pub stray: f64,
@@ -122,6 +124,7 @@ impl NewtonTuning {
         correction_rad: 0.3,
         rooms: 2.0,
         room_rad: 1.0,
+        indefinite_rooms: 0.5,
         stray: 3.0,
         saddle_iterations: 6,
         saddle_rad: 0.5,
