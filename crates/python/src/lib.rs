@@ -13,6 +13,7 @@ mod document;
 mod error;
 mod forked;
 mod frames;
+mod gradient;
 mod instrument;
 mod interrupt;
 mod moves;
@@ -41,6 +42,8 @@ mod _endowire {
     use super::control::Controller;
     #[pymodule_export]
     use super::frames::{Frames, Renderer, check_view};
+    #[pymodule_export]
+    use super::gradient::Gradient;
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]

@@ -6,7 +6,7 @@ use endowire_core::Vec3;
 use endowire_core::device::line_mm;
 use endowire_core::field::FieldSpec;
 use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce};
-use endowire_core::methods::MethodChoice;
+use endowire_core::methods::{MethodChoice, Parameter};
 use endowire_methods::AnyMethod;
 use endowire_viewer::DeviceView;
 use numpy::{PyArray1, PyArray2};
@@ -17,10 +17,11 @@ use pyo3::types::PyDict;
 use crate::arrays::{List, Numbers, Real, lengths_mm, natural, natural_or, place, points, shown};
 use crate::document;
 use crate::error::{exception, refuse};
+use crate::gradient::Gradient;
 use crate::instrument::Instrument;
 use crate::moves::{of_each, together};
 use crate::report::StepReport;
-use crate::start::{Arguments, Start};
+use crate::start::{self, Arguments, Start};
 use crate::state::{State, fields_of};
 use crate::vessel::Vessel;
 
@@ -125,6 +126,24 @@ impl Simulation {
         })
         .chain(left)
         .collect()
+    }
+
+    /// Derivatives of what commands lead to.
+    fn gradients_of(
+        &self,
+        py: Python<'_>,
+        commands: &[Vec<insertion::Move>],
+        by: &[String],
+    ) -> PyResult<Vec<Gradient>> {
+        let found = self.with(py, |simulation| {
+            let stack = simulation.stack();
+            let each = by.iter().map(|word| Parameter::named(word, stack));
+            let by: Vec<Parameter> = each.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+            let words: Vec<String> = by.iter().map(|parameter| parameter.name(stack)).collect();
+            let all = simulation.gradients(commands, &by)?;
+            Ok(all.into_iter().map(|gradient| Gradient { gradient, by: words.clone() }).collect())
+        });
+        found.map_err(exception)
     }
 
     fn of_hands<'py>(
@@ -246,6 +265,64 @@ impl Simulation {
         let (moves, solves) = (self.moves(advance_mm, rotate_rad, steer)?, natural("solves", solves)?);
         let ticked = self.with(py, |simulation| simulation.tick(&moves, solves, time_s).cloned());
         ticked.map(StepReport::new).map_err(exception)
+    }
+
+    /// Derivatives of what `step` with this command would lead to from here; nothing changes, and time stands still. `by` is a list of
+    /// words: "advance", "rotate", "hand" (both) and "steer" of the command; "EI[k]", "GJ[k]", "rest_u[k]", "rest_v[k]" and
+    /// "rest[k]" (both) of section k, the tip's 0; "wall", its modulus, and "friction", its coefficient. Those of an instrument begin
+    /// with its name, "catheter.EI[1]"; without one they are of the innermost. Returns the Gradient.
+    ///
+    /// Raises what `step` raises; InputError for a parameter that does not exist or has no derivative, for other methods than
+    /// kirchhoff, for loops that touch and for detached coils; ComputationError where the command passes a jump.
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, by, steer=None))]
+    fn gradient(
+        &self,
+        py: Python<'_>,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+        by: List<String>,
+        steer: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Gradient> {
+        let moves = self.moves(advance_mm, rotate_rad, steer)?;
+        Ok(self.gradients_of(py, &[moves], &by.0)?.remove(0))
+    }
+
+    /// The same simulation, in the same state, where parameters have other values: a dictionary of words of `gradient` and numbers,
+    /// {"EI[0]": 5.0, "friction": 0.1}. Moduli of regions of the wall change in proportion. The instruments lie where they lay until
+    /// the next step that moves them.
+    ///
+    /// Raises InputError for a parameter that does not exist or belongs to a command, and a value that is out of range.
+    fn changed(&self, py: Python<'_>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let values =
+            values.iter().map(|(word, value)| Ok((word.extract::<String>()?, value.extract::<Real>()?.0)));
+        let values: Vec<(String, f64)> = values.collect::<PyResult<_>>()?;
+        let now = self.with(py, |simulation| simulation.clone());
+        let changed = start::changed(&now, &values)?;
+        Ok(Self::new(changed, Arc::new(Py::new(py, Start::changed(&self.start, values)?)?)))
+    }
+
+    /// The value of a parameter, a word of `gradient`.
+    ///
+    /// Raises InputError for a parameter that does not exist or belongs to a command.
+    fn value(&self, py: Python<'_>, of: &str) -> PyResult<f64> {
+        let values = self.with(py, |simulation| {
+            let parameters = Parameter::named(of, simulation.stack())?;
+            parameters.iter().map(|parameter| simulation.value(parameter)).collect::<Result<Vec<_>, _>>()
+        });
+        match values.map_err(exception)?[..] {
+            [Some(value)] => Ok(value),
+            [None] => Err(refuse("of", format!("{of:?}"), "belongs to a command")),
+            _ => Err(refuse("of", format!("{of:?}"), "stands for two: name each")),
+        }
+    }
+
+    /// As `gradient`, of commands one after the other: an array as that of `run`. Returns a Gradient for each. Derivatives go through
+    /// all commands, since friction remembers; "advance", "rotate" and "steer" are of the first, and stay in those that follow.
+    ///
+    /// Raises what `gradient` raises.
+    #[pyo3(signature = (moves, *, by))]
+    fn gradients(&self, py: Python<'_>, moves: Numbers<'_>, by: List<String>) -> PyResult<Vec<Gradient>> {
+        self.gradients_of(py, &crate::moves::moves(&moves, None, self.pushed().len())?, &by.0)
     }
 
     /// The linear solves (`StepReport.solves`) after which `step` with this command ends, with what is behind from

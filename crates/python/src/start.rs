@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use endowire_core::device::{self, Stack};
 use endowire_core::insertion::{self, WallProperties};
+use endowire_core::methods::Parameter;
 use endowire_core::scene::SheathSpec;
 use endowire_core::vessel::NoStore;
 use endowire_methods::AnyMethod;
@@ -29,6 +30,8 @@ pub(crate) struct Start {
 enum MadeOf {
     Arguments(Py<Vessel>, Box<Arguments>),
     Scene(Py<Scene>),
+    /// Another start, with other values of parameters.
+    Changed(Py<Start>, Vec<(String, f64)>),
 }
 
 /// Arguments of `Simulation` besides vessel and instruments.
@@ -79,6 +82,18 @@ impl Start {
         Ok(Self { instruments, simulation: Mutex::new(simulation), made_of })
     }
 
+    /// The same start where parameters have other values.
+    pub(crate) fn changed(this: &Py<Self>, values: Vec<(String, f64)>) -> PyResult<Self> {
+        let start = this.get();
+        let simulation = changed(&start.simulation(), &values)?;
+        let mut instruments = start.instruments.clone();
+        for (instrument, now) in instruments.iter_mut().zip(simulation.stack().devices()) {
+            instrument.device = now.clone();
+        }
+        let this = Python::attach(|py| this.clone_ref(py));
+        Ok(Self { instruments, simulation: Mutex::new(simulation), made_of: MadeOf::Changed(this, values) })
+    }
+
     /// The simulation; Ctrl-C ends its long steps.
     pub(crate) fn simulation(&self) -> insertion::Simulation {
         let mut simulation = self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -101,6 +116,10 @@ impl Start {
             MadeOf::Scene(scene) => {
                 Ok((slf.get_type().getattr("_of_scene")?, (scene,).into_pyobject(py)?.into_any()))
             }
+            MadeOf::Changed(start, values) => {
+                let parts = (start, values.clone()).into_pyobject(py)?;
+                Ok((slf.get_type().getattr("_changed")?, parts.into_any()))
+            }
         }
     }
 
@@ -117,9 +136,29 @@ impl Start {
     }
 
     #[staticmethod]
+    fn _changed(start: Py<Self>, values: Vec<(String, f64)>) -> PyResult<Self> {
+        Self::changed(&start, values)
+    }
+
+    #[staticmethod]
     fn _of_scene(scene: &Bound<'_, Scene>) -> PyResult<Self> {
         Self::of_scene(scene)
     }
+}
+
+/// A simulation in its state, where the parameters of these words have other values.
+pub(crate) fn changed(
+    simulation: &insertion::Simulation,
+    values: &[(String, f64)],
+) -> PyResult<insertion::Simulation> {
+    let mut parameters = Vec::with_capacity(values.len());
+    for (word, value) in values {
+        let [parameter] = Parameter::named(word, simulation.stack()).map_err(exception)?[..] else {
+            return Err(refuse("changed", format!("{word:?}"), "stands for two: name each"));
+        };
+        parameters.push((parameter, *value));
+    }
+    simulation.changed(&parameters).map_err(exception)
 }
 
 impl Arguments {

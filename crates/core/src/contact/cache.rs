@@ -137,6 +137,12 @@ impl KnownPoints {
         self.points.iter_mut().for_each(|known| known.from_tip_mm += farther_mm);
     }
 
+    /// Lower bounds of the gaps between the wall and points of these radii that do not press, mm.
+    pub(crate) fn gaps_mm(&self, radii_mm: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+        let free = self.points.iter().zip(radii_mm).filter(|(known, _)| !known.presses);
+        free.map(|(known, radius_mm)| (known.base_clearance_mm - radius_mm).max(0.0))
+    }
+
     /// Number of points.
     pub(crate) fn len(&self) -> usize {
         self.points.len()

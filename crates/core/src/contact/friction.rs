@@ -106,6 +106,16 @@ impl Friction {
         self.law.acts()
     }
 
+    /// ε of the step, mm; infinite without friction.
+    pub(crate) fn stick_mm(&self) -> f64 {
+        if self.acts() { self.law.stick_mm } else { f64::INFINITY }
+    }
+
+    /// The same friction with another coefficient.
+    pub(crate) fn set_coefficient(&mut self, coefficient: f64) {
+        self.law.coefficient = coefficient;
+    }
+
     /// Begins a step: `state` is the device after it has slid along its own curve, with the angles it had before.
     ///
     /// `before` are the points of the last equilibrium and `forces` the normal forces on them, the first estimate.

@@ -138,18 +138,27 @@ impl WallProperties {
         ))
     }
 
+    /// Checks the values outside regions.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub(crate) fn check_outside_regions(&self) -> Result<()> {
+        in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
+        check_friction("vessel.wall.friction", self.friction)?;
+        if (0.0..=LARGEST_DEVIATION_MM).contains(&self.deviation_mm) {
+            return Ok(());
+        }
+        let remedy = format!("must be from 0 (surface as it is meshed) to {LARGEST_DEVIATION_MM}");
+        Err(Error::parameter("vessel.wall.deviation_mm", self.deviation_mm, remedy))
+    }
+
     /// Checks all values, and that every region contains part of the wall of `lumen`, whose mesh comes from `store`
     /// if there are any.
     ///
     /// # Errors
     /// Values out of range; a region that changes nothing or contains no vertex.
     pub(crate) fn check(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<()> {
-        in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
-        check_friction("vessel.wall.friction", self.friction)?;
-        if !(0.0..=LARGEST_DEVIATION_MM).contains(&self.deviation_mm) {
-            let remedy = format!("must be from 0 (surface as it is meshed) to {LARGEST_DEVIATION_MM}");
-            return Err(Error::parameter("vessel.wall.deviation_mm", self.deviation_mm, remedy));
-        }
+        self.check_outside_regions()?;
         for (index, region) in self.region.iter().enumerate() {
             let name = format!("vessel.wall.region[{index}]");
             let key = |key: &str| format!("{name}.{key}");

@@ -216,6 +216,11 @@ impl Device {
         device
     }
 
+    /// Changes a section, without a check.
+    pub(crate) fn change_section(&mut self, section: usize, change: impl FnOnce(&mut Section)) {
+        change(&mut self.sections[section]);
+    }
+
     /// The value to which it is steered.
     pub(crate) fn steered_to(&self) -> f64 {
         self.steered

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::Device;
+use super::{Device, Section};
 use crate::contact::{check_friction, check_valve};
 use crate::error::nearest_name;
 use crate::rod::MAX_ANGLES;
@@ -202,6 +202,23 @@ impl Stack {
             }
         }
         Cow::Owned(steered)
+    }
+
+    /// Changes a section of an instrument, which stays as it is otherwise: its set of angles too.
+    pub(crate) fn change_section(
+        &mut self,
+        (instrument, section): (usize, usize),
+        change: impl FnOnce(&mut Section),
+    ) {
+        self.instruments[instrument].device.change_section(section, change);
+    }
+
+    /// Checks all sections.
+    ///
+    /// # Errors
+    /// As [`Device::new`].
+    pub(crate) fn check_sections(&self) -> Result<()> {
+        self.devices().try_for_each(|device| Device::new(device.sections().to_vec()).map(drop))
     }
 
     /// Number of sets of material angles on the line.

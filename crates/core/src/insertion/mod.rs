@@ -2,6 +2,8 @@
 
 mod batch;
 mod builder;
+#[cfg(test)]
+mod gradient_tests;
 mod mark;
 mod nodes;
 mod packing;

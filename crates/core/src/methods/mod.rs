@@ -3,6 +3,7 @@
 mod command;
 mod detached;
 mod finite;
+mod gradient;
 pub mod kirchhoff;
 mod report;
 mod sheath;
@@ -10,6 +11,7 @@ mod state;
 
 pub use command::{Command, Move};
 pub use detached::DetachedCoil;
+pub use gradient::{Gradient, Margin, Parameter, Slope};
 pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
@@ -127,6 +129,21 @@ pub trait Method: Send {
     /// methods whose commands always go to their end.
     fn most_solves(&self, _moves: &[Move]) -> Option<usize> {
         None
+    }
+
+    /// Derivatives of what commands lead to, one after the other, from the state as it is; the state does not change. Each
+    /// command was `checked` against the report before it.
+    ///
+    /// # Errors
+    /// A method without gradients; as [`Method::step`]; a parameter that does not exist, and a result that has no derivative.
+    fn gradients(
+        &self,
+        _surroundings: &Surroundings<'_>,
+        _commands: &[Vec<Move>],
+        _by: &[Parameter],
+        _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
+    ) -> Result<Vec<Gradient>> {
+        Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))
     }
 
     /// Drops motion of the hands that earlier commands have left over ([`StepReport::behind`]).

@@ -7,6 +7,7 @@
 pub(crate) mod contacts;
 pub mod external;
 mod factors;
+mod krylov;
 mod line_search;
 pub(crate) mod neighbourhood;
 pub mod newton;
@@ -20,6 +21,7 @@ mod trial;
 mod unsymmetric;
 
 pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
+pub(crate) use krylov::gmres;
 pub(crate) use neighbourhood::Neighbourhood;
 pub use newton::Newton;
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};

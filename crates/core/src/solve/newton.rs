@@ -112,6 +112,18 @@ impl<const C: usize> Newton<C> {
         self.assemble_parts(elements, supports, external, state);
     }
 
+    /// Assembles the forces at `state` without the matrix; what was factored before stays.
+    pub(crate) fn assemble_forces(
+        &mut self,
+        elements: &[ElementData],
+        supports: &Supports,
+        external: &mut dyn External,
+        state: &RodState,
+    ) {
+        self.assembly.hessian = false;
+        self.assemble_parts(elements, supports, external, state);
+    }
+
     /// Assembles the system at `state`, without the matrix unless the assembly wants it.
     pub(super) fn assemble_parts(
         &mut self,

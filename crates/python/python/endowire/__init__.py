@@ -10,6 +10,7 @@ from ._endowire import (
     Batch,
     Controller,
     Frames,
+    Gradient,
     Instrument,
     Record,
     Renderer,
@@ -27,6 +28,7 @@ from ._endowire import (
     solve_rod,
     sweep,
 )
+from .fitting import Fit, Observed, fit
 from .errors import ComputationError, EndOfWay, EndowireError, InputError
 
 __all__ = [
@@ -35,9 +37,12 @@ __all__ = [
     "Controller",
     "EndOfWay",
     "EndowireError",
+    "Fit",
     "Frames",
+    "Gradient",
     "InputError",
     "Instrument",
+    "Observed",
     "Record",
     "Renderer",
     "Scene",
@@ -50,6 +55,7 @@ __all__ = [
     "assets_path",
     "check_vessel",
     "course",
+    "fit",
     "merge_sweeps",
     "score",
     "solve_rod",

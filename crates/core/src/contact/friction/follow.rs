@@ -16,6 +16,8 @@ pub(super) enum Renewal {
     Begins,
     /// Renewed at every base.
     Follows,
+    /// Renewed at every base, from the depths there: for derivatives.
+    Depths,
     /// Not renewed, until an equilibrium shows that they differ from the contact forces.
     Settled,
     /// Not renewed.
@@ -54,10 +56,12 @@ impl Coulomb {
         contacts: impl Iterator<Item = (&'a mut Slider, Vec3, [f64; 2])>,
         least_n: f64,
     ) {
-        let follows = matches!(self.renewal, Renewal::Begins | Renewal::Follows);
+        let follows = !matches!(self.renewal, Renewal::Settled | Renewal::Held);
+        let by_depth = self.renewal == Renewal::Depths;
         let (mut change, mut off) = (Difference::new(least_n), Difference::new(least_n));
         for (slider, normal, [force_n, presses_n]) in contacts {
             slider.seen = (normal, presses_n);
+            let force_n = if by_depth { presses_n } else { force_n };
             if follows {
                 // Most points are clear of the wall.
                 if slider.force_n != 0.0 || force_n != 0.0 {
@@ -86,6 +90,11 @@ impl Coulomb {
         }
         self.renewal = Renewal::Follows;
         false
+    }
+
+    /// Renews normal forces from the depths at each base.
+    pub(in crate::contact) fn follow_depths(&mut self) {
+        self.renewal = Renewal::Depths;
     }
 
     /// Stops renewing normal forces.

@@ -32,6 +32,11 @@ impl WallContact<'_> {
         self.friction.follow(pressed, least_n);
     }
 
+    /// From now on the normal forces of friction are those of the depths at each base.
+    pub(crate) fn follow_depths(&mut self) {
+        self.friction.law.follow_depths();
+    }
+
     /// Holds the normal forces of friction.
     pub(crate) fn hold_friction(&mut self) {
         self.friction.law.hold();

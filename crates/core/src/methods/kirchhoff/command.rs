@@ -18,6 +18,7 @@ use super::configuration::Start;
 use super::course::{Course, Next, Rest};
 use super::extrapolation::Correction;
 use super::hands::{lengths, line_advance_mm, set_motions};
+use super::nearby::Nearby;
 use super::part::Effort;
 use super::report::Took;
 use super::state::{KirchhoffState, UnderWay};
@@ -79,6 +80,20 @@ impl<const C: usize> Workspace<C> {
         moves: &[Move],
         solves: usize,
     ) -> Result<Driven> {
+        self.carry_out_beside(environment, from, (moves, solves), None)
+    }
+
+    /// As [`Workspace::carry_out`], and follows what slightly other parameters lead to.
+    ///
+    /// # Errors
+    /// As [`Method::step`](crate::methods::Method::step), and where there is no derivative.
+    pub(super) fn carry_out_beside(
+        &mut self,
+        environment: &Environment<'_>,
+        from: &KirchhoffState,
+        (moves, solves): (&[Move], usize),
+        mut nearby: Option<&mut Nearby>,
+    ) -> Result<Driven> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
@@ -130,6 +145,19 @@ impl<const C: usize> Workspace<C> {
                     let line = next.state.material_line(there.wall());
                     if let Err(left) = check_inside(surroundings.lumen.openings(), line, 0.0) {
                         break Err(left);
+                    }
+                    let beside = nearby.as_deref_mut().map_or(Ok(()), |nearby| {
+                        let is_last = *hands == way.target && part.to == 1.0;
+                        nearby.follow(
+                            tools,
+                            &there,
+                            (was, passage),
+                            (attempt, &found),
+                            (&next.state, is_last),
+                        )
+                    });
+                    if let Err(none) = beside {
+                        break Err(none);
                     }
                     let way_mm = was.state.rod.farthest_mm(&next.state.rod);
                     let lies = way_mm

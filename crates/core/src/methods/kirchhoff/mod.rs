@@ -64,6 +64,7 @@ mod material;
 mod mesh;
 #[cfg(test)]
 mod motion_tests;
+mod nearby;
 mod options;
 mod part;
 mod readout;
@@ -97,7 +98,9 @@ use std::sync::Arc;
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::{Stack, line_mm};
 use crate::field::FieldLoad;
-use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{
+    Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings,
+};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, RodState, TWISTED};
 use crate::shape::Shape;
@@ -421,12 +424,7 @@ impl<const C: usize> Kirchhoff<C> {
 
     /// Stores the centre lines of the state; the device's nodes are at these arc lengths from the tip.
     fn write_shape(&mut self, from_tip_mm: &[f64]) {
-        let rod = &self.state.rod;
-        self.shape.positions_mm.clone_from(&rod.positions);
-        self.shape.tangents.clear();
-        self.shape.tangents.extend(rod.frames.iter().map(|f| f.t));
-        self.shape.from_tip_mm.clear();
-        self.shape.from_tip_mm.extend_from_slice(from_tip_mm);
+        write_line(&self.state, from_tip_mm, &mut self.shape);
         self.coils.clear();
         self.coils.extend(self.state.coils.iter().map(FreeCoil::reported));
     }
@@ -468,6 +466,16 @@ impl<const C: usize> Method for Kirchhoff<C> {
             report.converged = false;
         }
         done
+    }
+
+    fn gradients(
+        &self,
+        surroundings: &Surroundings<'_>,
+        commands: &[Vec<Move>],
+        by: &[Parameter],
+        checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
+    ) -> Result<Vec<Gradient>> {
+        self.gradients_of(surroundings, (commands, by), checked)
     }
 
     fn most_solves(&self, moves: &[Move]) -> Option<usize> {
@@ -585,6 +593,15 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
 /// The name of the method in scenes and states.
 const NAME: &str = "kirchhoff";
+
+/// Writes the centre line of a state whose nodes are at these arc lengths from the tip.
+fn write_line(state: &KirchhoffState, from_tip_mm: &[f64], shape: &mut Shape) {
+    shape.positions_mm.clone_from(&state.rod.positions);
+    shape.tangents.clear();
+    shape.tangents.extend(state.rod.frames.iter().map(|f| f.t));
+    shape.from_tip_mm.clear();
+    shape.from_tip_mm.extend_from_slice(from_tip_mm);
+}
 
 /// Meshes the inserted length.
 fn meshed(environment: &Environment<'_>, hands: &[Hand], mesh: &mut Mesh) {

@@ -148,20 +148,51 @@ impl<const C: usize> Search<'_, '_, C> {
             tuning: self.tuning.newton,
             ..NewtonOptions::default()
         };
-        let (elements, supports) = (self.elements, &mut *self.supports);
-        let found = if self.loops.is_none() && self.beside.iter().all(Option::is_none) {
-            self.newton.solve(elements, supports, self.contact, self.state, &options)
-        } else {
-            let loops = self.loops.as_deref_mut().map(|loops| loops as &mut dyn External);
-            let [one, two, three] = &mut self.beside;
-            let [one, two, three] =
-                [one, two, three].map(|beside| beside.as_mut().map(|it| &mut **it as &mut dyn External));
-            let mut outside = Together([Some(&mut *self.contact), loops, one, two, three]);
-            self.newton.solve(elements, supports, &mut outside, self.state, &options)
-        };
+        let elements = self.elements;
+        let found = self.with_outside(|newton, supports, outside, state| {
+            newton.solve(elements, supports, outside, state, &options)
+        });
         self.iterations += found.iterations;
         self.solves += found.solves;
         found
+    }
+
+    /// Calls `what` with all that acts on the rod.
+    fn with_outside<T>(
+        &mut self,
+        what: impl FnOnce(&mut Newton<C>, &mut Supports, &mut dyn External, &mut RodState) -> T,
+    ) -> T {
+        if self.loops.is_none() && self.beside.iter().all(Option::is_none) {
+            return what(self.newton, self.supports, self.contact, self.state);
+        }
+        let loops = self.loops.as_deref_mut().map(|loops| loops as &mut dyn External);
+        let [one, two, three] = &mut self.beside;
+        let [one, two, three] =
+            [one, two, three].map(|beside| beside.as_mut().map(|it| &mut **it as &mut dyn External));
+        let mut outside = Together([Some(&mut *self.contact), loops, one, two, three]);
+        what(self.newton, self.supports, &mut outside, self.state)
+    }
+
+    /// Assembles the forces at the state with lagged ones as they are there, and the matrix if `hessian`.
+    pub(super) fn assemble(&mut self, lagged: &Lagged<'_>, hessian: bool) {
+        self.assemble_once(hessian);
+        if lagged.flow.is_some() || !self.contact.between().places().is_empty() {
+            self.renew(lagged);
+            self.assemble_once(hessian);
+        }
+    }
+
+    /// Whether forces are lagged, and so missing in the matrix.
+    pub(super) fn lags(&mut self, lagged: &Lagged<'_>) -> bool {
+        self.has_friction || lagged.flow.is_some() || !self.contact.between().places().is_empty()
+    }
+
+    fn assemble_once(&mut self, hessian: bool) {
+        let elements = self.elements;
+        self.with_outside(|newton, supports, outside, state| match hessian {
+            true => newton.assemble(elements, supports, outside, state),
+            false => newton.assemble_forces(elements, supports, outside, state),
+        });
     }
 
     /// Calls `what` on the self-contact, if modelled.

@@ -49,7 +49,7 @@ pub(super) struct Attempt<'a> {
 impl<const C: usize> Tools<C> {
     /// Slides the device at `start` to the positions of the hands, on the mesh of the length then inserted, with its
     /// friction and knowledge of the wall; coils do not move.
-    fn transport_to(
+    pub(super) fn transport_to(
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
@@ -149,7 +149,7 @@ impl<const C: usize> Tools<C> {
     }
 
     /// Stores what the next sub-step starts with, and removes the coils from the line.
-    fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
+    pub(super) fn keep(&self, start: Start<'_>, mesh: &mut Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
         self.loops.keep(&mut after.pairs);
         self.cache.keep(&mut after.known);

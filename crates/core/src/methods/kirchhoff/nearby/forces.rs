@@ -1,0 +1,205 @@
+//! The forces at the end of a part and beside it, and the motions that balance small ones.
+
+use super::super::configuration::Configuration;
+use super::super::material::element;
+use super::super::part::Effort;
+use super::super::search::{Lagged, Search};
+use super::super::state::KirchhoffState;
+use super::super::workspace::Tools;
+use super::{Acting, End, singular};
+use crate::contact::WallContact;
+use crate::methods::kirchhoff::Environment;
+use crate::rod::{ElementData, Frame, Layout, RodState, Supports};
+use crate::solve::{External, gmres};
+use crate::{Result, Vec3};
+
+/// Largest rotation, rad, of a node in the differences along a direction; as [`super::STEP`].
+const TURN_RAD: f64 = 3e-6;
+/// Accuracy of dx/dp, of what these differences have, and the most products for it.
+const ACCURACY: (f64, usize) = (1e-8, 40);
+/// With a larger residual dx/dp is not found.
+const LEAST_ACCURACY: f64 = 1e-5;
+
+impl<const C: usize> Tools<C> {
+    /// Begins a part on one side and calls `what` at the configuration of its end; `None` if the mesh is another one.
+    pub(super) fn beside<T>(
+        &mut self,
+        acting: &Acting<'_>,
+        end: &End<'_>,
+        next: &mut Configuration,
+        what: impl FnOnce(&mut Search<'_, '_, C>, &Lagged<'_>) -> T,
+    ) -> Option<T> {
+        let Acting { environment, materials, start, attempt } = acting;
+        let (surroundings, options) = (&environment.surroundings, environment.options);
+        self.friction.set_coefficient(surroundings.properties.largest_friction());
+        self.transport_to(environment, *start, *attempt, next);
+        let triads = self.triads(next);
+        let (mesh, after) = next.parts();
+        if (mesh.elements.len(), mesh.points.len()) != (end.state.rod.elements(), end.state.known.len()) {
+            return None;
+        }
+        if let Some(stack) = materials {
+            let all = (&mesh.inserted_mm[..], mesh.inserted_mm.len());
+            for (ends, data) in mesh.from_tip_mm.windows(2).zip(&mut mesh.elements) {
+                *data = element(stack, all, (ends[0], ends[1]), mesh.flush_mm);
+            }
+        }
+        let KirchhoffState { rod, touches, .. } = after;
+        rod.copy_from(&end.state.rod);
+        if !end.triads.is_empty() {
+            measure_beside(rod, &end.triads, &triads);
+        }
+        rod.place(&mesh.elements);
+        let stack = materials.unwrap_or(surroundings.stack);
+        let (cache, friction) = (&mut self.cache, &mut self.friction);
+        let mut contact =
+            WallContact::new(environment.wall(), &mesh.points, cache, friction, stack.softest_nmm2());
+        contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
+        contact.follow_depths();
+        let start_angles = self.tails.held();
+        let mut supports = Supports { start_tangent: true, start_angles, ..Supports::default() };
+        let mut fields = environment.field_load(&*mesh);
+        let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
+        let tails = self.tails.act().then_some(&mut self.tails as &mut dyn External);
+        let mut search = Search {
+            newton: &mut self.newton,
+            guess: &mut self.guess,
+            contact: &mut contact,
+            loops: None,
+            beside: [None, fields, tails],
+            supports: &mut supports,
+            elements: &mesh.elements,
+            state: rod,
+            has_friction: environment.has_friction(),
+            tolerance: options.tolerance,
+            effort: Effort::Near,
+            tuning: &options.tuning,
+            most: 0,
+            most_solves: 0,
+            resumed: None,
+            iterations: 0,
+            solves: 0,
+            slides: 0,
+        };
+        let found = what(&mut search, &Lagged { flow: surroundings.flow, stack, mesh });
+        contact.touches(&mesh.elements, rod, touches);
+        Some(found)
+    }
+
+    /// Completes the state at the end of a part: that after the way if its forces were assembled, as in the last part, or else
+    /// the one before it, which then goes.
+    pub(super) fn finish(
+        &mut self,
+        acting: &Acting<'_>,
+        (own, is_last): (Environment<'_>, bool),
+        (way, by): (&[f64], f64),
+        next: &mut Configuration,
+    ) {
+        if is_last {
+            let (mesh, after) = next.parts();
+            self.keep(acting.start, mesh, after);
+            self.write_forces(&own, next);
+            return;
+        }
+        let hands = acting.attempt.hands;
+        self.tails.begin(&own, (acting.start.state, hands));
+        let (mesh, after) = next.parts();
+        let KirchhoffState { rod, twists, hand_forces, .. } = after;
+        advance::<C>(&mesh.elements, &rod.clone(), (way, by), rod);
+        self.tails.write(rod, twists, hand_forces);
+    }
+
+    /// The triads from which the spin of the device is measured in the part that was begun last.
+    pub(super) fn triads(&self, next: &Configuration) -> Vec<Frame> {
+        let moved = &self.guess.before_motion;
+        let friction = self.friction.acts();
+        match (friction, moved.is_empty()) {
+            (false, _) => Vec::new(),
+            (true, true) => next.state.rod.frames.clone(),
+            (true, false) => moved.clone(),
+        }
+    }
+
+    /// The motion that balances these forces at the end of a part, whose matrix has been factored.
+    pub(super) fn respond(
+        &mut self,
+        (nominal, end): (&Acting<'_>, &End<'_>),
+        (right, lags, most_mm): (&[f64], bool, f64),
+        next: &mut Configuration,
+    ) -> Result<Vec<f64>> {
+        let found = self.beside(nominal, end, next, |search, lagged| {
+            let (elements, base) = (search.elements, search.state.clone());
+            let search = std::cell::RefCell::new(search);
+            let precondition = |forces: &[f64]| {
+                let mut way = forces.to_vec();
+                search.borrow().newton.apply_inverse(elements, &mut way);
+                way
+            };
+            // All of it is in Newton's matrix.
+            if !lags {
+                return (precondition(right), 0.0);
+            }
+            let apply = |way: &[f64]| {
+                let (turn, twist) = RodState::largest_turn::<C>(elements, &base, way);
+                let turned = TURN_RAD / turn.max(twist).max(f64::MIN_POSITIVE);
+                let part = turned.min(most_mm / longest_mm::<C>(way).max(f64::MIN_POSITIVE));
+                let [less, more] = [-part, part].map(|part| {
+                    let search = &mut **search.borrow_mut();
+                    go(search, &base, (way, part));
+                    search.assemble(lagged, false);
+                    rows(search)
+                });
+                less.iter().zip(&more).map(|(less, more)| (more - less) / (2.0 * part)).collect()
+            };
+            gmres(right, ACCURACY, precondition, apply)
+        });
+        match found {
+            Some((way, off)) if off <= LEAST_ACCURACY && way.iter().all(|part| part.is_finite()) => Ok(way),
+            _ => Err(singular()),
+        }
+    }
+}
+
+/// The longest motion of a node, mm.
+pub(super) fn longest_mm<const C: usize>(way: &[f64]) -> f64 {
+    let nodes = way.len() / Layout::<C>::BLOCK - 1;
+    let at = |i: usize| Vec3::from_column_slice(&way[Layout::<C>.position(i)..][..3]).norm();
+    (0..nodes).map(at).fold(0.0, f64::max)
+}
+
+/// Sets the state of a search to that after a piece of a way from another one.
+pub(super) fn go<const C: usize>(search: &mut Search<'_, '_, C>, from: &RodState, way: (&[f64], f64)) {
+    advance::<C>(search.elements, from, way, search.state);
+}
+
+/// The state after a piece of a way, with its axial forces.
+fn advance<const C: usize>(
+    elements: &[ElementData],
+    from: &RodState,
+    (way, part): (&[f64], f64),
+    to: &mut RodState,
+) {
+    let way: Vec<f64> = way.iter().map(|value| value * part).collect();
+    to.advance::<C>(elements, from, &way, 1.0);
+    to.take_tensions::<C>(elements, from, &way);
+}
+
+/// The rows of the forces that a search has assembled, as Newton's matrix has them.
+pub(super) fn rows<const C: usize>(search: &Search<'_, '_, C>) -> Vec<f64> {
+    let assembly = &search.newton.assembly;
+    assembly.residual.iter().zip(&assembly.correction).map(|(row, more)| row + more).collect()
+}
+
+/// Measures the spin of a rod from triads that are turned as `own` are against those of the part's end.
+fn measure_beside(rod: &mut RodState, ends: &[Frame], own: &[Frame]) {
+    let turned: Vec<Frame> = ends
+        .iter()
+        .zip(own)
+        .zip(&rod.frames)
+        .map(|((end, own), at)| {
+            let (end, own) = (end.transported_to(&at.t), own.transported_to(&at.t));
+            at.turned(libm::atan2(end.v.dot(&own.u), end.u.dot(&own.u)))
+        })
+        .collect();
+    rod.measure_from(&turned);
+}

@@ -1,0 +1,335 @@
+//! Derivatives of a command: the states beside it, to which slightly other parameters lead.
+//!
+//! The end x of each part of a command is an equilibrium of the forces R that depend on the start x₀ of the part, the hands and
+//! the scene, all of them on a parameter p. Where contacts keep their status R is smooth, and
+//!
+//! ```text
+//! R(x, x₀, p) = 0:    ∂R/∂x · dx/dp = −(∂R/∂p + ∂R/∂x₀ · dx₀/dp)
+//! ```
+//!
+//! (P. Michaleris, D. A. Tortorelli, C. A. Vidal, *Tangent operators and design sensitivity formulations for transient non-linear
+//! coupled problems*, Int. J. Numer. Meth. Eng. 37 (1994)). So derivatives go from part to part as the device does, and friction,
+//! which slips from where the part began, remembers. Each parameter has two states, a little below and above; these are the only
+//! derivatives that are kept. The right-hand side is the difference of R, at the same x, between both sides.
+//!
+//! ∂R/∂x is more than Newton's matrix: within a Newton step the normal forces of friction, the drag of blood and the forces
+//! between instruments are lagged, and loads that follow the rod have no symmetric stiffness. Here R contains them as they are at x
+//! ([`Search::assemble`]), its products with a direction are differences too, and Newton's factors are the preconditioner
+//! ([`gmres`]). Without any of these Newton's factors
+//! suffice.
+//!
+//! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
+//! anchored anew, has no derivative.
+
+mod command;
+mod forces;
+mod read;
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use super::Environment;
+use super::carried::{Passage, taken_along};
+use super::configuration::{Configuration, Start};
+use super::hands::{Hand, steered};
+use super::part::{Effort, Found, Limits};
+use super::state::{KirchhoffState, UnderWay};
+use super::substep::{Attempt, Part};
+use super::workspace::Tools;
+use crate::contact::WallProperties;
+use crate::device::Stack;
+use crate::methods::{Parameter, Slope, Surroundings};
+use crate::rod::Frame;
+use crate::solve::Neighbourhood;
+use crate::{Error, Result};
+use forces::{go, longest_mm, rows};
+
+/// Change of a parameter to either side, as a fraction of its scale: differences then have as many digits from rounding as from
+/// curvature.
+const STEP: f64 = 1e-5;
+/// Largest motion of a node in all differences, as a fraction of the slip within which friction sticks.
+const STICKING: f64 = 1e-2;
+/// The scene and the state where one parameter is a little less, or more.
+#[derive(Debug)]
+struct Side {
+    /// Change of the parameter.
+    by: f64,
+    stack: Stack,
+    properties: WallProperties,
+    at: Configuration,
+    /// At the end of the part that is followed.
+    next: Configuration,
+}
+
+/// The states beside a command.
+pub(super) struct Nearby {
+    parameters: Vec<Parameter>,
+    sides: Vec<[Side; 2]>,
+    /// Whether one side of a parameter has another mesh.
+    cut: Vec<bool>,
+    /// Hands at the start of the first command, and at its end; none in those that follow.
+    first: Option<[Vec<Hand>; 2]>,
+    /// Whether no part was followed yet.
+    begins: bool,
+    next: Configuration,
+}
+
+/// The end of a part, beside which others are sought.
+struct End<'a> {
+    state: &'a KirchhoffState,
+    /// Triads from which the spin of the device is measured in it; none for the end itself.
+    triads: Vec<Frame>,
+}
+
+/// What acts in a part on one side.
+struct Acting<'a> {
+    environment: Environment<'a>,
+    /// Instruments, if nodes are those of others.
+    materials: Option<&'a Stack>,
+    start: Start<'a>,
+    attempt: Attempt<'a>,
+}
+
+impl Nearby {
+    /// Beside a command, the first one, from a state to those hands.
+    ///
+    /// # Errors
+    /// A parameter that does not exist there, or has no derivative.
+    pub(super) fn new(
+        environment: &Environment<'_>,
+        from: Start<'_>,
+        target: Vec<Hand>,
+        by: &[Parameter],
+    ) -> Result<Self> {
+        let at = || Configuration { mesh: from.mesh.clone(), state: Arc::new(from.state.clone()) };
+        let side = |parameter: &Parameter, by: f64| {
+            let (stack, properties) = changed(&environment.surroundings, parameter, by)?;
+            Ok::<Side, Error>(Side { by, stack, properties, at: at(), next: at() })
+        };
+        let mut sides = Vec::with_capacity(by.len());
+        for parameter in by {
+            let step = STEP * scale(environment, parameter)?;
+            sides.push([side(parameter, -step)?, side(parameter, step)?]);
+        }
+        Ok(Self {
+            parameters: by.to_vec(),
+            sides,
+            cut: vec![false; by.len()],
+            first: Some([from.state.hands.clone(), target]),
+            begins: true,
+            next: at(),
+        })
+    }
+
+    /// Beside the next command.
+    pub(super) fn go_on(self) -> Self {
+        Self { first: None, ..self }
+    }
+
+    /// Follows an accepted part from `was`, to `end`, with the passage of a moving vessel; in the last one of the command forces
+    /// and energies are read too.
+    ///
+    /// # Errors
+    /// [`Error::Computation`] where there is no derivative.
+    pub(super) fn follow<const C: usize>(
+        &mut self,
+        tools: &mut Tools<C>,
+        environment: &Environment<'_>,
+        (was, passage): (Start<'_>, Option<Passage<'_>>),
+        (attempt, found): (Attempt<'_>, &Found),
+        (end, is_last): (&KirchhoffState, bool),
+    ) -> Result<()> {
+        let jumps = attempt.part.effort == Effort::Flight || found.off > 1.0 || found.balance.is_set_free();
+        if jumps || found.slides > 0 || found.is_interrupted {
+            return Err(Error::Computation(
+                "gradient: the command passes a jump, where its result has no derivative: end it before, or begin behind".to_owned(),
+            ));
+        }
+        let under_way = UnderWay {
+            part_mm: attempt.part.part_mm,
+            effort: attempt.part.effort,
+            state: end.clone(),
+            neighbourhood: Neighbourhood::default(),
+            shift: 0.0,
+            iterations: 0,
+        };
+        let part = Part { resumed: Some(&under_way), ..attempt.part };
+        let mut end = End { state: end, triads: Vec::new() };
+        let own = steered(environment.surroundings.stack, attempt.hands);
+        let nominal_start = taken_along(was, passage);
+        let nominal = Acting {
+            environment: environment.steered(&own),
+            materials: None,
+            start: nominal_start.as_ref().map_or(was, |state| Start { mesh: was.mesh, state }),
+            attempt: Attempt { part, left: passage.map(|passage| (was, passage)), ..attempt },
+        };
+        let progress =
+            self.first.as_ref().map_or(1.0, |first| progress(first, attempt.hands, attempt.part.to));
+        let Self { parameters, sides, cut, begins, next, .. } = self;
+        let assembled = tools.beside(&nominal, &end, next, |search, lagged| {
+            search.assemble(lagged, true);
+            let lags = search.lags(lagged) || !search.newton.assembly.rank_ones.is_empty();
+            let is_regular = search.newton.factor(search.elements, search.supports).is_some();
+            (rows(search), lags, is_regular)
+        });
+        let Some((at_end, lags, true)) = assembled else { return Err(singular()) };
+        end.triads = tools.triads(next);
+        let most_mm = STICKING * tools.friction.stick_mm();
+        // Where all sides begin in the same state they may come nearer.
+        let begins = std::mem::take(begins);
+        for ((parameter, sides), cut) in parameters.iter().zip(sides).zip(cut) {
+            let mut may_come_nearer = begins;
+            let (hands, way) = loop {
+                let hands = [0, 1].map(|k| moved(parameter, attempt.hands, sides[k].by * progress));
+                let mut forces = [at_end.clone(), at_end.clone()];
+                for ((side, forces), hands) in sides.iter_mut().zip(&mut forces).zip(&hands) {
+                    let there = side.with(environment, parameter, (hands, passage), part, |beside, _| {
+                        tools.beside(beside, &end, next, |search, lagged| {
+                            search.assemble(lagged, false);
+                            rows(search)
+                        })
+                    });
+                    match there {
+                        Some(there) => *forces = there,
+                        // The mesh there is another one.
+                        None => (side.by, *cut) = (0.0, true),
+                    }
+                    std::mem::swap(&mut side.next, next);
+                }
+                let between = sides[1].by - sides[0].by;
+                if between == 0.0 {
+                    let remedy = "the mesh changes on both sides: give a slightly other command";
+                    return Err(parameter.refused(remedy));
+                }
+                let right: Vec<f64> =
+                    forces[0].iter().zip(&forces[1]).map(|(less, more)| (less - more) / between).collect();
+                let way = tools.respond((&nominal, &end), (&right, lags, most_mm), next)?;
+                let by = most_mm / longest_mm::<C>(&way).max(f64::MIN_POSITIVE);
+                let is_near = sides.iter().all(|side| side.by.abs() <= by);
+                if is_near || !std::mem::take(&mut may_come_nearer) {
+                    break (hands, way);
+                }
+                for side in sides.iter_mut().filter(|side| side.by != 0.0) {
+                    side.by = by.copysign(side.by);
+                    (side.stack, side.properties) = changed(&environment.surroundings, parameter, side.by)?;
+                }
+            };
+            for (side, hands) in sides.iter_mut().zip(&hands) {
+                let by = side.by;
+                if by == 0.0 {
+                    tools.beside(&nominal, &end, next, |search, lagged| search.assemble(lagged, false));
+                    tools.finish(&nominal, (nominal.environment, is_last), (&way, 0.0), next);
+                } else {
+                    std::mem::swap(&mut side.next, next);
+                    side.with(environment, parameter, (hands, passage), part, |beside, own| {
+                        if is_last {
+                            tools.beside(beside, &end, next, |search, lagged| {
+                                go(search, &search.state.clone(), (&way, by));
+                                search.assemble(lagged, false);
+                            });
+                        }
+                        tools.finish(beside, (own, is_last), (&way, by), next);
+                    });
+                }
+                std::mem::swap(&mut side.at, next);
+            }
+        }
+        tools.friction.set_coefficient(environment.surroundings.properties.largest_friction());
+        Ok(())
+    }
+
+    /// Derivatives at the end of the command.
+    pub(super) fn slopes(&self, end: &KirchhoffState) -> Vec<Slope> {
+        let all = self.sides.iter().zip(&self.cut);
+        all.map(|(sides, cut)| read::slope(sides, end, *cut)).collect()
+    }
+}
+
+impl Side {
+    /// Calls `what` with this side in a part, and with the environment in which its forces are read.
+    fn with<T>(
+        &self,
+        environment: &Environment<'_>,
+        parameter: &Parameter,
+        (hands, passage): (&[Hand], Option<Passage<'_>>),
+        part: Part<'_>,
+        what: impl FnOnce(&Acting<'_>, Environment<'_>) -> T,
+    ) -> T {
+        let was = self.at.start();
+        let start = taken_along(was, passage);
+        let own = steered(&self.stack, hands);
+        let surroundings = Surroundings { properties: &self.properties, ..environment.surroundings };
+        let aside = Environment { surroundings, ..*environment };
+        let own_environment = aside.steered(&own);
+        // Nodes follow from the rest shape, and must not move with it.
+        let reshaped = matches!(parameter, Parameter::RestCurvature { .. });
+        let others: Cow<'_, Stack> = steered(environment.surroundings.stack, hands);
+        let limits = Limits { iterations: 0, solves: 0 };
+        let beside = Acting {
+            environment: if reshaped { aside.steered(&others) } else { own_environment },
+            materials: reshaped.then_some(&*own),
+            start: start.as_ref().map_or(was, |state| Start { mesh: was.mesh, state }),
+            attempt: Attempt { part, hands, limits, left: passage.map(|passage| (was, passage)) },
+        };
+        what(&beside, own_environment)
+    }
+}
+
+/// How far hands have come in a command from and to these, 0 to 1; without motion `to`.
+fn progress([from, target]: &[Vec<Hand>; 2], hands: &[Hand], to: f64) -> f64 {
+    let all = from.iter().zip(target).zip(hands);
+    let parts = all.flat_map(|((from, target), at)| {
+        let values = |hand: &Hand| [hand.inserted_mm, hand.turn_rad, hand.steer];
+        let (from, target, at) = (values(from), values(target), values(at));
+        [0, 1, 2].map(|k| (target[k] - from[k], at[k] - from[k]))
+    });
+    let longest = parts.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    longest.filter(|(whole, _)| *whole != 0.0).map_or(to, |(whole, so_far)| so_far / whole)
+}
+
+/// The hands where a parameter that moves one is changed.
+fn moved(parameter: &Parameter, hands: &[Hand], by: f64) -> Vec<Hand> {
+    let mut hands = hands.to_vec();
+    match *parameter {
+        Parameter::Advance { instrument } => hands[instrument].inserted_mm += by,
+        Parameter::Rotation { instrument } => hands[instrument].turn_rad += by,
+        Parameter::Steering { instrument } => hands[instrument].steer += by,
+        _ => {}
+    }
+    hands
+}
+
+/// The instruments and the wall where a parameter is changed.
+fn changed(
+    surroundings: &Surroundings<'_>,
+    parameter: &Parameter,
+    by: f64,
+) -> Result<(Stack, WallProperties)> {
+    let (mut stack, mut wall) = (surroundings.stack.clone(), surroundings.properties.clone());
+    if let Some(value) = parameter.value(&stack, &wall)? {
+        parameter.set(&mut stack, &mut wall, value + by);
+    }
+    Ok((stack, wall))
+}
+
+/// The scale of a parameter.
+///
+/// # Errors
+/// One that does not exist.
+fn scale(environment: &Environment<'_>, parameter: &Parameter) -> Result<f64> {
+    let Surroundings { stack, properties, .. } = environment.surroundings;
+    let value = parameter.value(stack, properties)?;
+    Ok(match *parameter {
+        Parameter::Advance { .. } => environment.options.element_mm,
+        Parameter::RestCurvature { instrument, section, .. } => {
+            1.0 / stack.instruments()[instrument].device.sections()[section].length_mm
+        }
+        _ => value.unwrap_or(1.0),
+    })
+}
+
+fn singular() -> Error {
+    Error::Computation(
+        "gradient: the equilibrium after the command is about to snap, where its derivatives are infinite: end it before".to_owned(),
+    )
+}
