@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.mark.parametrize(
     "document",
-    ["README.md", "crates/python/README.md", "docs/guide/10-python.md", "docs/guide/16-learning.md", "docs/guide/19-gradients.md"],
+    ["README.md", "crates/python/README.md", "docs/guide/10-python.md", "docs/guide/16-learning.md", "docs/guide/20-gradients.md"],
 )
 def test_the_code_works(document, tmp_path, monkeypatch, capsys):
     (tmp_path / "assets").symlink_to(ROOT / "assets")

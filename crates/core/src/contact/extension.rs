@@ -323,7 +323,7 @@ mod tests {
         assert!(left_a_tube(&[0.0, 50.0, 95.0], &[0.0, 0.0, 1.0]).is_none());
         // In one command past the end of the extension, and then back beside the tube.
         assert!(is(left_a_tube(&[0.0, 90.0, 140.0], &[0.0; 3]), 40.0));
-        assert!(is(left_a_tube(&[0.0, 90.0, 140.0, 90.0], &[0.0, 0.0, 30.0, 60.0]), 40.0));
+        assert!(is(left_a_tube(&[0.0, 90.0, 110.0, 140.0, 90.0], &[0.0, 0.0, 0.0, 30.0, 60.0]), 40.0));
         // A hairpin: as far as its bend, until its tip is back.
         assert!(is(left_a_tube(&[0.0, 95.0, 115.0, 101.0], &[0.0, 0.0, 0.5, 1.0]), 15.0));
         assert!(left_a_tube(&[0.0, 95.0, 115.0, 90.0], &[0.0, 0.0, 0.5, 1.0]).is_none());

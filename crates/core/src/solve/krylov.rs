@@ -107,7 +107,7 @@ mod tests {
         // With the inverse one is enough.
         let diagonal = |v: &[f64]| vec![v[0] / 2.0, v[1] / 4.0];
         let (x, _) = gmres(&[2.0, 2.0], (1e-14, 1), diagonal, |v| vec![2.0 * v[0], 4.0 * v[1]]);
-        assert_eq!(x, [1.0, 0.5]);
+        assert!((x[0] - 1.0).abs() + (x[1] - 0.5).abs() < 1e-15, "{x:?}");
         assert_eq!(gmres(&[0.0; 2], (1e-14, 5), diagonal, diagonal).0, [0.0; 2]);
     }
 }
