@@ -1,4 +1,4 @@
-//! Gamepad bindings: sticks move and rotate the selected instrument, buttons act as keys.
+//! Gamepad bindings: sticks move, rotate and steer the selected instrument, buttons act as keys.
 
 use std::collections::BTreeSet;
 
@@ -8,6 +8,7 @@ use crate::keys::Modifiers;
 pub const PAD: &[(&str, &str)] = &[
     ("left stick, up down", "push, pull, as fast as it leans"),
     ("right stick, left right", "turn, as fast as it leans"),
+    ("right stick, up down; pressed", "bend the tip that is steered, as fast as it leans; straight"),
     ("right / left bumper with these", "coarse (four times) / fine (a fifth)"),
     ("right, left trigger (hold)", "fluoroscopy, cine"),
     ("upper, left button (hold)", "DSA, roadmap"),
@@ -38,11 +39,12 @@ pub enum Button {
     CrossRight,
     CrossUp,
     CrossDown,
+    RightStick,
 }
 
 impl Button {
     /// All buttons.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Lower,
         Self::Right,
         Self::Left,
@@ -57,6 +59,7 @@ impl Button {
         Self::CrossRight,
         Self::CrossUp,
         Self::CrossDown,
+        Self::RightStick,
     ];
 
     /// The key with the same effect; `None` for the bumpers, which act as Shift and Ctrl.
@@ -75,6 +78,7 @@ impl Button {
             Self::CrossRight => "KeyL",
             Self::CrossUp => "KeyO",
             Self::CrossDown => "KeyK",
+            Self::RightStick => "KeyW",
         })
     }
 }
@@ -86,14 +90,16 @@ pub struct Pad {
     pub up: f64,
     /// Deflection of the right stick to the right, −1 to 1.
     pub right: f64,
+    /// Deflection of the right stick upwards, −1 to 1.
+    pub bend: f64,
     /// Pressed buttons.
     pub down: BTreeSet<Button>,
 }
 
 impl Pad {
-    /// Fractions of the usual advance and rotation speeds.
-    pub(crate) fn leans(&self) -> [f64; 2] {
-        [self.up, self.right].map(share)
+    /// Fractions of the usual speeds of advance, rotation and steering.
+    pub(crate) fn leans(&self) -> [f64; 3] {
+        [self.up, self.right, self.bend].map(share)
     }
 
     /// Modifier keys that the bumpers stand for.
@@ -127,7 +133,7 @@ mod tests {
     use crate::{Input, Keys};
 
     fn held(up: f64, right: f64, down: &[Button]) -> Pad {
-        Pad { up, right, down: down.iter().copied().collect() }
+        Pad { up, right, bend: 0.0, down: down.iter().copied().collect() }
     }
 
     fn moved(name: &str, mm_per_s: f64, deg_per_s: f64) -> Input {

@@ -21,8 +21,7 @@ pub(crate) use part::PartTable;
 pub use part::{Coat, CutError, Part};
 pub(crate) use stack::LENGTH_SLACK_MM;
 pub use stack::{Instrument, Stack, line_mm};
-pub(crate) use steer::MOST_STEER;
-pub use steer::Steer;
+pub use steer::{MOST_STEER, Steer};
 
 use serde::{Deserialize, Serialize};
 
