@@ -169,11 +169,15 @@ mod tests {
         assert_eq!((line.piece_s, line.end_s, line.tip_mm.len()), (2.0, 4.0, 2));
         assert_eq!(line.hands[0].push_mm_per_s, [15.0, 0.0]);
         assert_eq!(line.hands[0].inserted_mm, [30.0, 30.0]);
+        assert_eq!(line.hands[0].steer_per_s, [0.0, 0.0]);
         assert_eq!(
             (line.wall_force_n.clone(), line.hands[0].force_n.clone()),
             (vec![0.5, 0.2], vec![0.5, 0.2])
         );
         assert_eq!(line.tip_mm[0], Some(Vec3::new(30.0, 0.0, 0.0)));
+        let mut steered = record.clone();
+        steered.samples[2].hands[0].steer_by = -0.5;
+        assert_eq!(Timeline::of(&steered, None, 2).hands[0].steer_per_s, [0.0, -0.25]);
         // No interval is shorter than 0.1 s, however many are requested; the total advance is preserved.
         let fine = Timeline::of(&record, None, 1000);
         assert_eq!(fine.tip_mm.len(), 40);

@@ -311,6 +311,37 @@ mod tests {
     }
 
     #[test]
+    fn tips_bend_where_they_are_steered_and_a_selected_wire_says_that_it_is_not() {
+        let mut keys = Keys::new(vec!["wire".to_owned(), "catheter".to_owned()]);
+        keys.steered[1] = true;
+        let bent = |name: &str, to: Option<f64>, per_s: Option<f64>| Input::Steer {
+            instrument: Some(name.to_owned()),
+            to,
+            per_s,
+        };
+        // The wire is asked as long as a key is down, to be refused.
+        assert_eq!(keys.key("KeyS", true, false), [bent("wire", Some(1.0), Some(0.5))]);
+        assert!(keys.key("KeyS", true, true).is_empty() && keys.key("KeyS", false, false).is_empty());
+        keys.key("Tab", true, false);
+        assert_eq!(keys.key("KeyA", true, false), [bent("catheter", Some(-1.0), Some(0.5))]);
+        let fine = Modifiers { shift: false, control: true };
+        assert_eq!(keys.modify(fine), [moved("catheter", 0.0, 0.0), bent("catheter", Some(-1.0), Some(0.1))]);
+        // Both keys together hold it.
+        assert_eq!(keys.key("KeyS", true, false), [bent("catheter", None, None)]);
+        keys.key("KeyS", false, false);
+        assert_eq!(keys.let_go(), [bent("catheter", None, None)]);
+        assert!(keys.let_go().is_empty());
+        keys.modify(Modifiers::default());
+        // Straight at the usual rate; keys that were down no longer count.
+        keys.key("KeyA", true, false);
+        assert_eq!(keys.key("KeyW", true, false), [bent("catheter", Some(0.0), Some(0.5))]);
+        assert_eq!(keys.key("KeyW", false, false), []);
+        // All together: those that are steered.
+        keys.key("Digit0", true, false);
+        assert_eq!(keys.key("KeyS", true, false), [bent("catheter", Some(1.0), Some(0.5))]);
+    }
+
+    #[test]
     fn pedals_are_held_or_locked() {
         let mut keys = Keys::new(vec!["device".to_owned()]);
         let pedal = |down, mode| [Input::Pedal { down, mode: Some(mode) }];

@@ -127,6 +127,7 @@ fn share(lean: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use endowire_core::device::{Device, Section, Steer};
     use endowire_viewer::Mode;
 
     use super::*;
@@ -215,6 +216,27 @@ mod tests {
         ] {
             assert_eq!(press(button, bumper), (inputs, vec![]), "{button:?}");
         }
+    }
+
+    #[test]
+    fn the_right_stick_bends_a_steered_tip_and_leaves_others_alone() {
+        let rest = Pad::default();
+        let bent = Pad { bend: 0.575, ..Pad::default() };
+        let mut plain = Keys::new(vec!["wire".to_owned()]);
+        assert_eq!(plain.pad(&rest, &bent), [moved("wire", 0.0, 0.0)]);
+        let steer = Some(Steer { plane_deg: 0.0, curvature_per_mm_at_1: 0.02 });
+        let tip = Section { steer, ..Section::straight(60.0, 0.9, 60.0) };
+        let mut keys = Keys::of(&Device::new(vec![tip]).unwrap().into());
+        let steer = |to: Option<f64>, per_s: Option<f64>| Input::Steer {
+            instrument: Some("device".to_owned()),
+            to,
+            per_s,
+        };
+        let still = moved("device", 0.0, 0.0);
+        assert_eq!(keys.pad(&rest, &bent), [still.clone(), steer(Some(1.0), Some(0.25))]);
+        assert_eq!(keys.pad(&bent, &rest), [still, steer(None, None)]);
+        let pressed = held(0.0, 0.0, &[Button::RightStick]);
+        assert_eq!(keys.pad(&rest, &pressed), [steer(Some(0.0), Some(0.5))]);
     }
 
     #[test]
