@@ -106,7 +106,8 @@ impl Hand {
     /// Change of the steering in the next tick, from this value.
     fn steers_by(&mut self, from: f64) -> f64 {
         let Some((to, per_s)) = self.steer else { return 0.0 };
-        let most = per_s / TICKS_PER_S;
+        // Rounded up: what rounding left over would be a step of its own at the end.
+        let most = (per_s / TICKS_PER_S * STEERS_PER_UNIT).ceil() / STEERS_PER_UNIT;
         let next = steer_value(from + (to - from).clamp(-most, most));
         if next == to {
             self.steer = None;
