@@ -30,7 +30,7 @@ fn device(section: Section) -> Device {
 }
 
 /// In a vessel so wide that nothing touches it, its first direction along x.
-fn free(stack: impl Into<Stack>) -> Simulation {
+fn free(stack: impl Into<Stack>, element_mm: f64) -> Simulation {
     let node = |i: usize| CentrelineNode {
         position_mm: Vec3::z() * (100.0 * i as f64),
         radius_mm: 150.0,
@@ -39,13 +39,19 @@ fn free(stack: impl Into<Stack>) -> Simulation {
     let tree = CentrelineTree::new((0..4).map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(40.0)).unwrap();
     let sheath = Sheath::new(Vec3::z() * 5.0, Vec3::z()).unwrap().bending_towards(Vec3::x()).unwrap();
-    let options = KirchhoffOptions { element_mm: 1.0, tolerance: 1e-11, ..KirchhoffOptions::default() };
+    let options = KirchhoffOptions { element_mm, tolerance: 1e-11, ..KirchhoffOptions::default() };
     Simulation::builder(made.wall, stack, sheath).method(&options).build().unwrap()
 }
 
-/// Where the tip of a length out of the sheath hangs under a force per length, from where it is without, mm.
+/// Where the tip of a length out of the sheath hangs under a force per length, from where it is without, mm: by two lengths of
+/// elements, since a load acts at points, with an error of the square of their distance.
 fn hangs_mm(section: Section, per_mm: Vec3) -> Vec3 {
-    let mut simulation = free(device(section));
+    let [coarse, fine] = [1.0, 0.5].map(|element_mm| hangs_by_mm(section, per_mm, element_mm));
+    (fine * 4.0 - coarse) / 3.0
+}
+
+fn hangs_by_mm(section: Section, per_mm: Vec3, element_mm: f64) -> Vec3 {
+    let mut simulation = free(device(section), element_mm);
     simulation.step(Command::advance(LENGTH_MM)).unwrap();
     let before = simulation.shape().tip_mm().unwrap();
     let weight: Arc<dyn Field> = Arc::new(Weight::new(0, per_mm).unwrap());
@@ -141,11 +147,11 @@ fn integrated(per_mm: Vec3) -> Vec3 {
 fn a_flat_cantilever_that_bends_far_agrees_with_the_equations_of_the_rod() {
     for load_deg in [20.0, 45.0, 75.0] {
         let (sin, cos) = f64::to_radians(load_deg).sin_cos();
-        let load = Vec3::new(cos, sin, 0.0) * 6e-4;
+        let load = Vec3::new(cos, sin, 0.0) * 8e-5;
         let tip = hangs_mm(flat(0.0), load) + Vec3::z() * LENGTH_MM;
         let expected = integrated(load);
         let off = (tip - expected).norm() / LENGTH_MM;
-        assert!(expected.z < 0.85 * LENGTH_MM, "{expected}");
+        assert!(expected.xy().norm() > 0.25 * LENGTH_MM, "{expected}");
         assert!(off < 2e-6, "{load_deg}°: {off:e} {tip} {expected}");
         // The twin: with the planes exchanged it is elsewhere.
         let other = hangs_mm(flat(90.0), load) + Vec3::z() * LENGTH_MM;
@@ -162,7 +168,7 @@ fn a_round_wire_bends_a_flat_catheter_towards_its_soft_plane() {
     let instrument = |name: &str, device: Device| Instrument { name: name.into(), device, may_lead: true };
     let wire = Device::uniform(500.0, 0.4, wire_nmm2).unwrap();
     let stack = vec![instrument("wire", wire), instrument("catheter", device(catheter))];
-    let mut simulation = free(Stack::new(stack).unwrap());
+    let mut simulation = free(Stack::new(stack).unwrap(), 1.0);
     let moved = |instrument: usize| Move { instrument, command: Command::advance(LENGTH_MM) };
     simulation.step_together(&[moved(0), moved(1)]).unwrap();
     let curvature = Vec3::new(rest[0] * SOFT / (SOFT + wire_nmm2), rest[1] * STIFF / (STIFF + wire_nmm2), 0.0);
@@ -228,7 +234,7 @@ fn a_flat_wire_turns_its_soft_plane_into_that_of_the_bend() {
         assert!((energies[k] - energies[k + steps / 2]).abs() < 0.02 * most, "{k} {energies:?}");
     }
     assert!(most > 2.0 * least, "{least} {most}");
-    let (_, put_in_mj, jumps, least, most) = turned(1.0);
+    let (_, put_in_mj, jumps, least, most) = turned(20.0);
     assert_eq!(jumps, 2, "a flip each half turn");
     assert!(put_in_mj > 0.2 * (most - least), "what is let go was put in: {put_in_mj} {least} {most}");
 }
@@ -261,20 +267,20 @@ fn pushing_puts_in_what_is_stored() {
     let options = KirchhoffOptions { element_mm: 3.0, ..KirchhoffOptions::default() };
     let stack = Device::new(vec![hook, flat(-20.0)]).unwrap();
     let mut simulation = Simulation::builder(made.wall, stack, sheath).method(&options).build().unwrap();
-    for _ in 0..40 {
-        simulation.step(Command::advance(2.0)).unwrap();
-    }
+    simulation.step(Command::advance(4.0)).unwrap();
     let first = simulation.report().clone();
-    let (mut was_n, mut put_in_mj) = (first.push_force_n, 0.0);
-    for _ in 0..200 {
+    let (mut was_n, mut put_in_mj, mut most_mj, mut off_mj) = (first.push_force_n, 0.0, 0.0f64, 0.0f64);
+    for _ in 0..1100 {
         let is = simulation.step(Command::advance(0.1)).unwrap();
         assert!(is.converged && !is.jumped);
         put_in_mj += 0.5 * (was_n + is.push_force_n) * 0.1;
         was_n = is.push_force_n;
+        let stored_mj = is.energy.total() - first.energy.total();
+        most_mj = most_mj.max(stored_mj.abs());
+        off_mj = off_mj.max((put_in_mj - stored_mj).abs());
     }
-    let stored_mj = simulation.report().energy.total() - first.energy.total();
-    assert!(stored_mj > 0.01, "{stored_mj}");
-    assert!((put_in_mj - stored_mj).abs() < 5e-3 * stored_mj, "{put_in_mj} {stored_mj}");
+    assert!(most_mj > 0.01, "{most_mj}");
+    assert!(off_mj < 5e-3 * most_mj, "{off_mj} {most_mj}");
 }
 
 #[test]

@@ -37,23 +37,18 @@ impl SoftPlane {
         }
         Ok(())
     }
-
-    /// Half of what it lacks against the stiffness across it, along and between the material directions: (a, b) of
-    /// B = EI + (a b; b −a) with the mean EI.
-    fn skew_nmm2(&self, across_nmm2: f64) -> [f64; 2] {
-        let half = 0.5 * (self.bending_stiffness_nmm2 - across_nmm2);
-        let (sin, cos) = libm::sincos(2.0 * self.plane_deg.to_radians());
-        [half * cos, half * sin]
-    }
 }
 
 impl Section {
-    /// Mean of the bending stiffness over all planes, N·mm², and how it differs between them (a, b):
-    /// B = EI + (a b; b −a) along the two material directions.
-    pub(crate) fn stiffness_nmm2(&self) -> (f64, [f64; 2]) {
+    /// Bending stiffness in the plane in which it bends most easily, N·mm², and what it is stiffer by in others (p, q, c):
+    /// B = EI + (p c; c q) along the two material directions.
+    pub(crate) fn stiffness_nmm2(&self) -> (f64, [f64; 3]) {
         let across = self.bending_stiffness_nmm2;
-        self.soft_plane.map_or((across, [0.0; 2]), |plane| {
-            (0.5 * (across + plane.bending_stiffness_nmm2), plane.skew_nmm2(across))
+        self.soft_plane.map_or((across, [0.0; 3]), |plane| {
+            let soft = plane.bending_stiffness_nmm2;
+            // Across p = (cos, sin).
+            let (sin, cos) = libm::sincos(plane.plane_deg.to_radians());
+            (soft, [sin * sin, cos * cos, -sin * cos].map(|part| (across - soft) * part))
         })
     }
 
@@ -84,7 +79,7 @@ mod tests {
                 assert!((0..2).all(|a| (moment[a] - expected * curvature[a]).abs() < 1e-12), "{plane_deg}");
             }
         }
-        assert_eq!(Section::straight(50.0, 0.4, 12.0).stiffness_nmm2(), (12.0, [0.0; 2]));
+        assert_eq!(Section::straight(50.0, 0.4, 12.0).stiffness_nmm2(), (12.0, [0.0; 3]));
         // Half of the energy of each plane at 45°, and the twist of the solid ellipse of both stiffnesses.
         let bent = Section { rest_curvature_per_mm: [0.1, 0.1], ..flat(0.0, 2.0) };
         assert!((bent.straightening_n() - 0.5 * 0.01 * (2.0 + 12.0)).abs() < 1e-15);

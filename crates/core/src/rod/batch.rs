@@ -75,7 +75,7 @@ pub(super) struct Instrument<S: Simd> {
     /// Whether it is stiffer in some planes than in others in any of them.
     pub(super) skewed: bool,
     bending: [Lanes<S>; 3],
-    skew: [[Lanes<S>; 2]; 3],
+    skew: [[Lanes<S>; 3]; 3],
     torsion: [Lanes<S>; 3],
     rest_curvature: [[Lanes<S>; 2]; 3],
     rest_twist: [Lanes<S>; 3],
@@ -91,9 +91,9 @@ impl<S: Simd> Instrument<S> {
         let [u, v] = self.rest_curvature[k];
         let mut moment = [stiff * u, stiff * v];
         if self.skewed && self.curved {
-            let [a, b] = self.skew[k];
-            moment[0] += (a * u + b * v) * GAUSS[k].weight;
-            moment[1] += (b * u - a * v) * GAUSS[k].weight;
+            let [p, q, c] = self.skew[k];
+            moment[0] += (p * u + c * v) * GAUSS[k].weight;
+            moment[1] += (c * u + q * v) * GAUSS[k].weight;
         }
         TorsionInput {
             moment,
@@ -104,9 +104,10 @@ impl<S: Simd> Instrument<S> {
 
     /// Weight × skew/h of Gauss point `k` of elements of these lengths.
     #[inline(always)]
-    pub(super) fn skew_input(&self, k: usize, length: Lanes<S>) -> [Lanes<S>; 2] {
+    pub(super) fn skew_input(&self, k: usize, length: Lanes<S>) -> [Lanes<S>; 3] {
         let scale = length.inverse() * GAUSS[k].weight;
-        [self.skew[k][0] * scale, self.skew[k][1] * scale]
+        let [p, q, c] = self.skew[k];
+        [p * scale, q * scale, c * scale]
     }
 
     /// ½∫κ⁰ᵀBκ⁰ ds over elements of these lengths, the constant that makes the bending energy zero in the rest state.
@@ -117,8 +118,8 @@ impl<S: Simd> Instrument<S> {
             let [a, b] = self.rest_curvature[k];
             sum += self.bending[k] * GAUSS[k].weight * (a * a + b * b);
             if self.skewed {
-                let [p, q] = self.skew[k];
-                sum += (p * (a * a - b * b) + q * (a * 2.0 * b)) * GAUSS[k].weight;
+                let [p, q, c] = self.skew[k];
+                sum += (p * a * a + q * b * b + c * (a * 2.0 * b)) * GAUSS[k].weight;
             }
         }
         length * 0.5 * sum
@@ -154,7 +155,7 @@ impl<S: Simd> Batch<S> {
             curved: false,
             skewed: false,
             bending: [zero; 3],
-            skew: [[zero; 2]; 3],
+            skew: [[zero; 3]; 3],
             torsion: [zero; 3],
             rest_curvature: [[zero; 2]; 3],
             rest_twist: [zero; 3],
@@ -179,14 +180,14 @@ impl<S: Simd> Batch<S> {
             let of = &mut batch.instruments[set];
             of.present = lanes.iter().any(|lane| lane.data.materials[set].is_present());
             of.curved = lanes.iter().any(|lane| lane.data.materials[set].rest_curvature != [[0.0; 2]; 3]);
-            of.skewed = lanes.iter().any(|lane| lane.data.materials[set].skew != [[0.0; 2]; 3]);
+            of.skewed = lanes.iter().any(|lane| lane.data.materials[set].skew != [[0.0; 3]; 3]);
             for k in 0..3 {
                 let of_lane = |lane: usize| &lanes[lane].data.materials[set];
                 of.torsion[k] = Lanes::gather(simd, |lane| of_lane(lane).torsion[k]);
                 of.rest_twist[k] = Lanes::gather(simd, |lane| of_lane(lane).rest_twist[k]);
                 of.angles[k] = Lanes::gather(simd, |lane| lanes[lane].angles[set][k]);
                 if of.skewed {
-                    for a in 0..2 {
+                    for a in 0..3 {
                         of.skew[k][a] = Lanes::gather(simd, |lane| of_lane(lane).skew[k][a]);
                     }
                 }

@@ -49,8 +49,7 @@ fn material(s: &mut u64) -> Material {
 fn skewed(mut data: ElementData, s: &mut u64) -> ElementData {
     for material in &mut data.materials[..2] {
         for k in 0..3 {
-            let (size, way) = (0.6 * material.bending[k] * noise(s), 3.0 * noise(s));
-            material.skew[k] = [size * way.cos(), size * way.sin()];
+            material.skew[k] = [positive(s), positive(s), noise(s)];
         }
     }
     data
@@ -178,8 +177,8 @@ fn a_skew_element_stores_what_its_planes_store() {
             let bend = 0.01;
             let second = first.transported(bend * way.cos(), bend * way.sin());
             let material = Material {
-                bending: [2.0; 3],
-                skew: [[1.0, 0.0]; 3],
+                bending: [1.0; 3],
+                skew: [[2.0, 0.0, 0.0]; 3],
                 torsion: [1.0; 3],
                 ..Material::NONE
             };

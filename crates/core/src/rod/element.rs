@@ -11,10 +11,10 @@ use std::ops::{Add, Mul, Sub};
 /// One instrument in an element, sampled at its Gauss points, as far as its material angle needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Bending stiffness EI of this instrument alone: the mean over all planes.
+    /// Bending stiffness EI of this instrument alone, in the plane in which it bends most easily.
     pub bending: [f64; 3],
-    /// How the stiffness differs between planes, B = EI + (a b; b −a) along d₁ and d₂: (a, b), 0 of round cross-sections.
-    pub skew: [[f64; 2]; 3],
+    /// What it is stiffer by in others, B = EI + (p c; c q) along d₁ and d₂: (p, q, c), 0 of round cross-sections.
+    pub skew: [[f64; 3]; 3],
     /// Torsional stiffness GJ; unused without twist.
     pub torsion: [f64; 3],
     /// Rest curvature along d₁ and d₂.
@@ -27,7 +27,7 @@ impl Material {
     /// No instrument: it has ended before this element.
     pub const NONE: Self = Self {
         bending: [0.0; 3],
-        skew: [[0.0; 2]; 3],
+        skew: [[0.0; 3]; 3],
         torsion: [0.0; 3],
         rest_curvature: [[0.0; 2]; 3],
         rest_twist: [0.0; 3],
@@ -45,7 +45,7 @@ impl Material {
 pub struct ElementData {
     /// Length h along the rod.
     pub length: f64,
-    /// Total bending stiffness EI of all instruments, the mean over all planes.
+    /// Total bending stiffness EI of all instruments, without what they are stiffer by in some planes.
     pub bending: [f64; 3],
     /// Axial flexibility ∫ds/EA; zero = inextensible.
     pub flexibility: f64,

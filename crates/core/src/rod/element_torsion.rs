@@ -39,13 +39,13 @@ struct AngleDerivatives<S: Simd> {
 impl<S: Simd> ShapeDerivatives<S> {
     /// Adds the products of the gradients of the curvatures along d₁ and d₂ in the energy of a skew stiffness.
     #[inline(always)]
-    fn add_square(&mut self, [a, b]: [Lanes<S>; 2], along: [Slope<S>; 2], [chord, end]: [(f64, f64); 2]) {
+    fn add_square(&mut self, [p, q, c]: [Lanes<S>; 3], along: [Slope<S>; 2], [chord, end]: [(f64, f64); 2]) {
         let [first, second] = along;
         let (c1, e1) = (weighed(first.y, first.z, chord), weighed(first.y, first.z, end));
         let (c2, e2) = (weighed(second.y, second.z, chord), weighed(second.y, second.z, end));
-        self.chord_chord += (c1.outer(c1) - c2.outer(c2)) * a + c1.outer(c2).with_transpose() * b;
-        self.chord_end += (c1.outer(e1) - c2.outer(e2)) * a + (c1.outer(e2) + c2.outer(e1)) * b;
-        self.end_end += (e1.outer(e1) - e2.outer(e2)) * a + e1.outer(e2).with_transpose() * b;
+        self.chord_chord += c1.outer(c1) * p + c2.outer(c2) * q + c1.outer(c2).with_transpose() * c;
+        self.chord_end += c1.outer(e1) * p + c2.outer(e2) * q + (c1.outer(e2) + c2.outer(e1)) * c;
+        self.end_end += e1.outer(e1) * p + e2.outer(e2) * q + e1.outer(e2).with_transpose() * c;
     }
 }
 

@@ -20,9 +20,16 @@ pub fn shares(from: f64, to: f64) -> [f64; 3] {
     ]
 }
 
-/// The stiffness B of a cross-section, from its mean and its skew, times a curvature along d₁ and d₂: a moment.
-pub fn times((bending, [a, b]): (f64, [f64; 2]), [u, v]: [f64; 2]) -> [f64; 2] {
-    [bending * u + (a * u + b * v), bending * v + (b * u - a * v)]
+/// A moment: the stiffness B = EI + (p c; c q) of a cross-section times a curvature along d₁ and d₂.
+pub fn times((bending, [p, q, c]): (f64, [f64; 3]), [u, v]: [f64; 2]) -> [f64; 2] {
+    [bending * u + (p * u + c * v), bending * v + (c * u + q * v)]
+}
+
+/// The curvature along d₁ and d₂ that a moment bends such a cross-section to.
+pub(super) fn bent_by((bending, [p, q, c]): (f64, [f64; 3]), [m, n]: [f64; 2]) -> [f64; 2] {
+    let (first, second) = (bending + p, bending + q);
+    let determinant = first * second - c * c;
+    [(second * m - c * n) / determinant, (first * n - c * m) / determinant]
 }
 
 impl Material {
@@ -36,7 +43,7 @@ impl Material {
         for k in 0..3 {
             let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
             let (all_bending, all_torsion) = (self.bending[k] + bending, self.torsion[k] + torsion);
-            if self.skew[k] == [0.0; 2] && part.skew[k] == [0.0; 2] {
+            if self.skew[k] == [0.0; 3] && part.skew[k] == [0.0; 3] {
                 for a in 0..2 {
                     let moment =
                         self.bending[k] * self.rest_curvature[k][a] + bending * part.rest_curvature[k][a];
@@ -46,12 +53,9 @@ impl Material {
                 let skew = part.skew[k].map(|skew| shares[k] * skew);
                 let own = times((self.bending[k], self.skew[k]), self.rest_curvature[k]);
                 let added = times((bending, skew), part.rest_curvature[k]);
-                self.skew[k] = [0, 1].map(|a| self.skew[k][a] + skew[a]);
-                // The inverse of B is as skew the other way, over its determinant.
-                let [a, b] = self.skew[k];
-                let determinant = all_bending * all_bending - a * a - b * b;
-                let moment = [0, 1].map(|axis| (own[axis] + added[axis]) / determinant);
-                self.rest_curvature[k] = times((all_bending, [-a, -b]), moment);
+                self.skew[k] = [0, 1, 2].map(|a| self.skew[k][a] + skew[a]);
+                let moment = [0, 1].map(|axis| own[axis] + added[axis]);
+                self.rest_curvature[k] = bent_by((all_bending, self.skew[k]), moment);
             }
             self.rest_twist[k] =
                 (self.torsion[k] * self.rest_twist[k] + torsion * part.rest_twist[k]) / all_torsion;
@@ -68,12 +72,12 @@ mod tests {
     fn skew_sections_share_an_element_by_their_moments() {
         let one = Material {
             bending: [3.0; 3],
-            skew: [[1.0, -0.5]; 3],
+            skew: [[1.0, 0.5, -0.5]; 3],
             torsion: [1.5; 3],
             rest_curvature: [[0.1, 0.2]; 3],
             ..Material::NONE
         };
-        let other = Material { skew: [[-2.0, 0.25]; 3], rest_curvature: [[-0.3, 0.0]; 3], ..one };
+        let other = Material { skew: [[0.2, 2.0, 0.25]; 3], rest_curvature: [[-0.3, 0.0]; 3], ..one };
         let mut sum = Material::NONE;
         sum.add_share(&one, &shares(0.0, 0.4));
         sum.add_share(&other, &shares(0.4, 1.0));

@@ -12,18 +12,19 @@
 //! plus −EI κ⁰·t′ + ½EI|κ⁰|² + ½GJ(τ − τ⁰)², κ⁰ = k₁d₁ + k₂d₂; this file computes the addition.
 //!
 //! A cross-section that is stiffer in one plane has ½(κ − κ⁰)ᵀB(κ − κ⁰) with κ = (κ₁, κ₂), κᵢ = t′·dᵢ, and a symmetric B
-//! (Antman, Nonlinear Problems of Elasticity, 2005, ch. VIII; Bergou et al., Discrete Elastic Rods, 2008, sec. 4). With its mean EI and B = EI I + (a b; b −a)
-//! the isotropic part is as above, the moment of the rest curvature is Bκ⁰ in place of EI κ⁰, and what is left is
+//! (Antman, Nonlinear Problems of Elasticity, 2005, ch. VIII; Bergou et al., Discrete Elastic Rods, 2008, sec. 4). With
+//! B = EI + (p c; c q), EI the stiffness in the plane in which it bends most easily, the isotropic part is as above, the moment of
+//! the rest curvature is Bκ⁰ in place of EI κ⁰, and what is left, never negative, is
 //!
 //! ```text
-//! N = ½a(κ₁² − κ₂²) + b κ₁κ₂ = ½(n₁κ₁ + n₂κ₂),  n₁ = aκ₁ + bκ₂,  n₂ = bκ₁ − aκ₂
-//! ∇N = n₁∇κ₁ + n₂∇κ₂,   ∇²N = n₁∇²κ₁ + n₂∇²κ₂ + a(∇κ₁∇κ₁ᵀ − ∇κ₂∇κ₂ᵀ) + b(∇κ₁∇κ₂ᵀ + ∇κ₂∇κ₁ᵀ)
+//! N = ½pκ₁² + ½qκ₂² + cκ₁κ₂ = ½(n₁κ₁ + n₂κ₂),  n₁ = pκ₁ + cκ₂,  n₂ = cκ₁ + qκ₂
+//! ∇N = n₁∇κ₁ + n₂∇κ₂,   ∇²N = n₁∇²κ₁ + n₂∇²κ₂ + p∇κ₁∇κ₁ᵀ + q∇κ₂∇κ₂ᵀ + c(∇κ₁∇κ₂ᵀ + ∇κ₂∇κ₁ᵀ)
 //! ```
 //!
-//! in y and z. Turning d₁ and d₂ by φ has ∂κ₁ = κ₂, ∂κ₂ = −κ₁: hence ∂N = n₁κ₂ − n₂κ₁, ∂²N = −4N, and
-//! ∂∇N = 2(aκ₂ − bκ₁)∇κ₁ + 2(aκ₁ + bκ₂)∇κ₂: it is this that couples bending to twist even where nothing is bent at rest. N takes
-//! κ per length of the rod and not of the curve, as the rest curvature's term does: that changes the element's error at order 4, and not
-//! its order.
+//! in y and z. Turning d₁ and d₂ by φ has ∂κ₁ = κ₂, ∂κ₂ = −κ₁: hence ∂N = n₁κ₂ − n₂κ₁, ∂²N = pκ₂² + qκ₁² − 2cκ₁κ₂ − 2N, and
+//! ∂∇N = (pκ₂ − qκ₂ − 2cκ₁)∇κ₁ + (pκ₁ − qκ₁ + 2cκ₂)∇κ₂: it is this that couples bending to twist even where nothing is bent at
+//! rest. N takes κ per length of the rod and not of the curve, as the rest curvature's term does, and without the arc factor: that
+//! changes the element's error at order 4, and not its order.
 
 use super::lanes::{Lanes, Matrix, Vector};
 use pulp::Simd;
@@ -122,13 +123,13 @@ impl<S: Simd> TwistValue<S> {
 
     /// The energy of its skew stiffness, times this weight.
     #[inline(always)]
-    pub(super) fn skew_energy(&self, phi: Lanes<S>, skew: [Lanes<S>; 2]) -> Lanes<S> {
+    pub(super) fn skew_energy(&self, phi: Lanes<S>, [p, q, c]: [Lanes<S>; 3]) -> Lanes<S> {
         let Self { y, z, a, g, .. } = *self;
         let (sin, cos) = phi.sin_cos();
         let lift = g * (z.x + y.dot(z) / a);
-        let along = |p: Lanes<S>, q: Lanes<S>| (z.y * p + z.z * q) / a - (y.y * p + y.z * q) * lift;
+        let along = |v: Lanes<S>, w: Lanes<S>| (z.y * v + z.z * w) / a - (y.y * v + y.z * w) * lift;
         let (first, second) = (along(cos, sin), along(-sin, cos));
-        (skew[0] * (first * first - second * second) + skew[1] * (first * 2.0 * second)) * 0.5
+        (p * first * first + q * second * second + c * (first * 2.0 * second)) * 0.5
     }
 
     /// The energy of its rest curvature.
@@ -259,7 +260,7 @@ impl<S: Simd> ReferenceTwist<S> {
     pub(super) fn add_skew(
         &self,
         phi: Lanes<S>,
-        [a, b]: [Lanes<S>; 2],
+        [p, q, c]: [Lanes<S>; 3],
         to: &mut PointDerivatives<S>,
     ) -> (Lanes<S>, AngleDensity<S>, [Slope<S>; 2]) {
         let zero = self.ia.like(0.0);
@@ -268,15 +269,15 @@ impl<S: Simd> ReferenceTwist<S> {
         let lift = self.lift();
         let (one, two) = (self.curvature(d1, &lift), self.curvature(d2, &lift));
         let (k1, k2) = (one.value, two.value);
-        let (n1, n2) = (a * k1 + b * k2, b * k1 - a * k2);
+        let (n1, n2) = (p * k1 + c * k2, c * k1 + q * k2);
         let w = -(d1 * n1 + d2 * n2);
         let along = self.curvature(w, &lift);
         self.take(w, &along, &lift, to);
         let value = (n1 * k1 + n2 * k2) * 0.5;
-        let (by1, by2) = ((a * k2 - b * k1) * 2.0, (a * k1 + b * k2) * 2.0);
+        let (by1, by2) = ((p - q) * k2 - c * 2.0 * k1, (p - q) * k1 + c * 2.0 * k2);
         let angle = AngleDensity {
             first: n1 * k2 - n2 * k1,
-            second: value * -4.0,
+            second: p * k2 * k2 + q * k1 * k1 - c * 2.0 * k1 * k2 - value * 2.0,
             along_y: one.along_y * by1 + two.along_y * by2,
             along_z: one.along_z * by1 + two.along_z * by2,
         };
