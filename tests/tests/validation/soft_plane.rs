@@ -30,7 +30,7 @@ fn device(section: Section) -> Device {
 }
 
 /// In a vessel so wide that nothing touches it, its first direction along x.
-fn free(stack: impl Into<Stack>, element_mm: f64) -> Simulation {
+fn free(stack: impl Into<Stack>) -> Simulation {
     let node = |i: usize| CentrelineNode {
         position_mm: Vec3::z() * (100.0 * i as f64),
         radius_mm: 150.0,
@@ -39,19 +39,14 @@ fn free(stack: impl Into<Stack>, element_mm: f64) -> Simulation {
     let tree = CentrelineTree::new((0..4).map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(40.0)).unwrap();
     let sheath = Sheath::new(Vec3::z() * 5.0, Vec3::z()).unwrap().bending_towards(Vec3::x()).unwrap();
-    let options = KirchhoffOptions { element_mm, tolerance: 1e-11, ..KirchhoffOptions::default() };
+    let options = KirchhoffOptions { element_mm: 1.0, tolerance: 1e-11, ..KirchhoffOptions::default() };
     Simulation::builder(made.wall, stack, sheath).method(&options).build().unwrap()
 }
 
-/// Where the tip of a length out of the sheath hangs under a force per length, from where it is without, mm: by two lengths of
-/// elements, since a load acts at points, with an error of the square of their distance.
+/// Where the tip of a device that is all out of the sheath, so that nothing outside twists, hangs under a force per length, from
+/// where it is without, mm.
 fn hangs_mm(section: Section, per_mm: Vec3) -> Vec3 {
-    let [coarse, fine] = [1.0, 0.5].map(|element_mm| hangs_by_mm(section, per_mm, element_mm));
-    (fine * 4.0 - coarse) / 3.0
-}
-
-fn hangs_by_mm(section: Section, per_mm: Vec3, element_mm: f64) -> Vec3 {
-    let mut simulation = free(device(section), element_mm);
+    let mut simulation = free(device(Section { length_mm: LENGTH_MM, ..section }));
     simulation.step(Command::advance(LENGTH_MM)).unwrap();
     let before = simulation.shape().tip_mm().unwrap();
     let weight: Arc<dyn Field> = Arc::new(Weight::new(0, per_mm).unwrap());
@@ -71,12 +66,14 @@ fn a_flat_cantilever_bends_in_each_plane_by_its_stiffness() {
             let (s, c) = f64::to_radians(load_deg).sin_cos();
             let load = (in_plane * c + across * s) * q;
             let expected = (in_plane * (c / SOFT) + across * (s / STIFF)) * (q * LENGTH_MM.powi(4) / 8.0);
-            let tip = hangs_mm(flat(plane_deg), load);
+            // Along the line it comes short by the square of that.
+            let across_mm = |tip: Vec3| Vec3::new(tip.x, tip.y, 0.0);
+            let tip = across_mm(hangs_mm(flat(plane_deg), load));
             let off = (tip - expected).norm() / expected.norm();
             assert!(off < 1e-6, "{plane_deg}° {load_deg}°: {off:e}");
             // The twin: a round one of the mean stiffness is far off.
             let round = Section { soft_plane: None, bending_stiffness_nmm2: 0.5 * (SOFT + STIFF), ..flat(0.0) };
-            let other = hangs_mm(round, load);
+            let other = across_mm(hangs_mm(round, load));
             assert!((other - expected).norm() / expected.norm() > 0.1);
         }
     }
@@ -151,7 +148,7 @@ fn a_flat_cantilever_that_bends_far_agrees_with_the_equations_of_the_rod() {
         let tip = hangs_mm(flat(0.0), load) + Vec3::z() * LENGTH_MM;
         let expected = integrated(load);
         let off = (tip - expected).norm() / LENGTH_MM;
-        assert!(expected.xy().norm() > 0.25 * LENGTH_MM, "{expected}");
+        assert!(expected.xy().norm() > 0.15 * LENGTH_MM, "{expected}");
         assert!(off < 2e-6, "{load_deg}°: {off:e} {tip} {expected}");
         // The twin: with the planes exchanged it is elsewhere.
         let other = hangs_mm(flat(90.0), load) + Vec3::z() * LENGTH_MM;
@@ -168,7 +165,7 @@ fn a_round_wire_bends_a_flat_catheter_towards_its_soft_plane() {
     let instrument = |name: &str, device: Device| Instrument { name: name.into(), device, may_lead: true };
     let wire = Device::uniform(500.0, 0.4, wire_nmm2).unwrap();
     let stack = vec![instrument("wire", wire), instrument("catheter", device(catheter))];
-    let mut simulation = free(Stack::new(stack).unwrap(), 1.0);
+    let mut simulation = free(Stack::new(stack).unwrap());
     let moved = |instrument: usize| Move { instrument, command: Command::advance(LENGTH_MM) };
     simulation.step_together(&[moved(0), moved(1)]).unwrap();
     let curvature = Vec3::new(rest[0] * SOFT / (SOFT + wire_nmm2), rest[1] * STIFF / (STIFF + wire_nmm2), 0.0);
@@ -195,7 +192,7 @@ fn in_bend(section: Section) -> Simulation {
     let options = KirchhoffOptions { element_mm: 3.0, ..KirchhoffOptions::default() };
     let stack = device(section);
     let mut simulation = Simulation::builder(made.wall, stack, sheath).method(&options).build().unwrap();
-    for _ in 0..60 {
+    for _ in 0..95 {
         assert!(simulation.step(Command::advance(2.0)).unwrap().converged);
     }
     simulation
@@ -233,7 +230,7 @@ fn a_flat_wire_turns_its_soft_plane_into_that_of_the_bend() {
     for k in 0..steps / 2 {
         assert!((energies[k] - energies[k + steps / 2]).abs() < 0.02 * most, "{k} {energies:?}");
     }
-    assert!(most > 2.0 * least, "{least} {most}");
+    assert!((most / least / (STIFF / SOFT) - 1.0).abs() < 0.01, "{least} {most}");
     let (_, put_in_mj, jumps, least, most) = turned(20.0);
     assert_eq!(jumps, 2, "a flip each half turn");
     assert!(put_in_mj > 0.2 * (most - least), "what is let go was put in: {put_in_mj} {least} {most}");
@@ -258,7 +255,7 @@ fn a_flat_wire_goes_on_from_states_and_copies_and_ticks_are_steps() {
     assert!(in_bend(flat(31.0)).restore(&state).is_err());
 }
 
-/// What a hand pushes in is what is stored, with a rest shape across a soft plane that comes out of the sheath.
+/// What a hand pushes in, and what the sheath lets go of as a rest shape between the planes comes out, is what is stored.
 #[test]
 fn pushing_puts_in_what_is_stored() {
     let hook = Section { length_mm: 25.0, rest_curvature_per_mm: [0.02, 0.01], ..flat(30.0) };
@@ -270,16 +267,21 @@ fn pushing_puts_in_what_is_stored() {
     simulation.step(Command::advance(4.0)).unwrap();
     let first = simulation.report().clone();
     let (mut was_n, mut put_in_mj, mut most_mj, mut off_mj) = (first.push_force_n, 0.0, 0.0f64, 0.0f64);
-    for _ in 0..1100 {
+    // ½ κ⁰ᵀBκ⁰, along the plane and across it.
+    let (sin, cos) = 30.0_f64.to_radians().sin_cos();
+    let (soft, stiff) = (0.02 * cos + 0.01 * sin, 0.01 * cos - 0.02 * sin);
+    let let_go_n = 0.5 * (SOFT * soft * soft + STIFF * stiff * stiff);
+    for _ in 0..1500 {
         let is = simulation.step(Command::advance(0.1)).unwrap();
         assert!(is.converged && !is.jumped);
         put_in_mj += 0.5 * (was_n + is.push_force_n) * 0.1;
         was_n = is.push_force_n;
         let stored_mj = is.energy.total() - first.energy.total();
         most_mj = most_mj.max(stored_mj.abs());
-        off_mj = off_mj.max((put_in_mj - stored_mj).abs());
+        let let_go_mj = let_go_n * (is.inserted_mm.min(25.0) - 4.0);
+        off_mj = off_mj.max((put_in_mj + let_go_mj - stored_mj).abs());
     }
-    assert!(most_mj > 0.01, "{most_mj}");
+    assert!(most_mj > 0.02, "{most_mj}");
     assert!(off_mj < 5e-3 * most_mj, "{off_mj} {most_mj}");
 }
 
