@@ -107,5 +107,10 @@ fn shown(one: &Move, steered: f64) -> Motion {
     let near = rad.to_degrees();
     let same = |deg: &f64| deg.to_radians().to_bits() == rad.to_bits();
     let rotate_deg = [near, near.next_up(), near.next_down()].into_iter().find(same).unwrap_or(near);
-    Motion { instrument: one.instrument, advance_mm, rotate_deg, steer: steer_value(steered + steer) - steered }
+    Motion {
+        instrument: one.instrument,
+        advance_mm,
+        rotate_deg,
+        steer: steer_value(steered + steer) - steered,
+    }
 }

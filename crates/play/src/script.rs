@@ -108,7 +108,12 @@ fn moves_evenly(motions: &[Motion], count: usize) -> bool {
 }
 
 /// Writes a line of a script, at whose end instruments are steered to these values.
-fn line(text: &mut String, (stack, steered): (&Stack, &[f64]), Done { motions, per_s, detach, solves }: &Done, count: usize) {
+fn line(
+    text: &mut String,
+    (stack, steered): (&Stack, &[f64]),
+    Done { motions, per_s, detach, solves }: &Done,
+    count: usize,
+) {
     if let Some(instrument) = detach {
         let name = &stack.instruments()[*instrument].name;
         let key = if stack.is_several() { format!("instrument = {name:?}\n") } else { String::new() };

@@ -256,7 +256,8 @@ impl Session {
         match to {
             Some(to) if !instrument.device.is_steerable() => {
                 let name = &instrument.name;
-                let remedy = format!("{name:?} is not steered: give a section of it steer, or select another");
+                let remedy =
+                    format!("{name:?} is not steered: give a section of it steer, or select another");
                 Err(Error::parameter("steer", to, remedy))
             }
             _ => Ok(()),

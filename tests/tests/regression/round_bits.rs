@@ -20,7 +20,9 @@ fn number(mut simulation: Simulation, moves: impl Fn(usize) -> Vec<Move>) -> u64
     let mut take = |value: f64| number = (number ^ value.to_bits()).wrapping_mul(0x0100_0000_01b3);
     for k in 0..60 {
         let report = simulation.step_together(&moves(k)).unwrap();
-        [report.push_force_n, report.torque_nmm, report.energy.bend, report.energy.twist].into_iter().for_each(&mut take);
+        [report.push_force_n, report.torque_nmm, report.energy.bend, report.energy.twist]
+            .into_iter()
+            .for_each(&mut take);
         for position in &simulation.shape().positions_mm {
             [position.x, position.y, position.z].into_iter().for_each(&mut take);
         }
@@ -50,7 +52,10 @@ fn round_devices_have_the_bits_that_they_had() {
         Device::new(sections.iter().map(inner).collect()).unwrap()
     };
     let instrument = |name: &str, device: Device| Instrument { name: name.into(), device, may_lead: true };
-    let both = vec![instrument("wire", hooked()), instrument("catheter", tube(&[hook, Section { length_mm: 200.0, ..shaft }]))];
+    let both = vec![
+        instrument("wire", hooked()),
+        instrument("catheter", tube(&[hook, Section { length_mm: 200.0, ..shaft }])),
+    ];
     let together = |k: usize| {
         let behind = Command { advance_mm: 1.5, rotate_rad: -0.1, steer: 0.0 };
         vec![Move { instrument: 0, command: command(k) }, Move { instrument: 1, command: behind }]
@@ -71,7 +76,10 @@ fn round_devices_have_the_bits_that_they_had() {
         0x026e_abf4_a643_b665,
         0x9ae8_92d6_c3cd_04c0,
     ];
-    assert_eq!(numbers.map(|number| format!("{number:016x}")), had.map(|number: u64| format!("{number:016x}")));
+    assert_eq!(
+        numbers.map(|number| format!("{number:016x}")),
+        had.map(|number: u64| format!("{number:016x}"))
+    );
     // The twin: a last bit of one stiffness is seen.
     let other = Section { bending_stiffness_nmm2: shaft.bending_stiffness_nmm2.next_up(), ..shaft };
     let almost = Device::new(vec![hook, other]).unwrap();

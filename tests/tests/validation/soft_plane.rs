@@ -72,7 +72,8 @@ fn a_flat_cantilever_bends_in_each_plane_by_its_stiffness() {
             let off = (tip - expected).norm() / expected.norm();
             assert!(off < 1e-6, "{plane_deg}° {load_deg}°: {off:e}");
             // The twin: a round one of the mean stiffness is far off.
-            let round = Section { soft_plane: None, bending_stiffness_nmm2: 0.5 * (SOFT + STIFF), ..flat(0.0) };
+            let round =
+                Section { soft_plane: None, bending_stiffness_nmm2: 0.5 * (SOFT + STIFF), ..flat(0.0) };
             let other = across_mm(hangs_mm(round, load));
             assert!((other - expected).norm() / expected.norm() > 0.1);
         }
@@ -160,7 +161,8 @@ fn a_flat_cantilever_that_bends_far_agrees_with_the_equations_of_the_rod() {
 #[test]
 fn a_round_wire_bends_a_flat_catheter_towards_its_soft_plane() {
     let rest = [0.008, 0.006];
-    let catheter = Section { radius_mm: 0.9, inner_radius_mm: Some(0.5), rest_curvature_per_mm: rest, ..flat(0.0) };
+    let catheter =
+        Section { radius_mm: 0.9, inner_radius_mm: Some(0.5), rest_curvature_per_mm: rest, ..flat(0.0) };
     let wire_nmm2 = 10.0;
     let instrument = |name: &str, device: Device| Instrument { name: name.into(), device, may_lead: true };
     let wire = Device::uniform(500.0, 0.4, wire_nmm2).unwrap();
@@ -168,7 +170,8 @@ fn a_round_wire_bends_a_flat_catheter_towards_its_soft_plane() {
     let mut simulation = free(Stack::new(stack).unwrap());
     let moved = |instrument: usize| Move { instrument, command: Command::advance(LENGTH_MM) };
     simulation.step_together(&[moved(0), moved(1)]).unwrap();
-    let curvature = Vec3::new(rest[0] * SOFT / (SOFT + wire_nmm2), rest[1] * STIFF / (STIFF + wire_nmm2), 0.0);
+    let curvature =
+        Vec3::new(rest[0] * SOFT / (SOFT + wire_nmm2), rest[1] * STIFF / (STIFF + wire_nmm2), 0.0);
     let arc = |curvature: Vec3| {
         let (k, angle) = (curvature.norm(), curvature.norm() * LENGTH_MM);
         curvature / k * ((1.0 - angle.cos()) / k) + Vec3::z() * (5.0 + angle.sin() / k)

@@ -235,7 +235,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     changed[middle] ^= 1;
     let reported = [
         (text.clone().into_bytes(), "is no saved state"),
-        (newer, "its format is \"endowire state 24\""),
+        (newer, "its format is \"endowire state 25\""),
         (changed, "is not whole or was changed"),
         (bytes[..bytes.len() - 1].to_vec(), "is not whole"),
         (bytes[..20].to_vec(), "is not whole"),

@@ -90,7 +90,10 @@ mod tests {
     fn what_is_no_soft_plane_is_refused_by_key() {
         assert!(Device::new(vec![flat(0.0, 12.0), flat(-360.0, 0.012)]).is_ok());
         for (bad, begins) in [
-            (flat(0.0, 12.1), "device.section[0].soft_plane.bending_stiffness_nmm2 = 12.1: must be from 0.012"),
+            (
+                flat(0.0, 12.1),
+                "device.section[0].soft_plane.bending_stiffness_nmm2 = 12.1: must be from 0.012",
+            ),
             (flat(0.0, 0.011), "device.section[0].soft_plane.bending_stiffness_nmm2 = 0.011"),
             (flat(0.0, f64::NAN), "device.section[0].soft_plane.bending_stiffness_nmm2 = NaN"),
             (flat(361.0, 3.0), "device.section[0].soft_plane.plane_deg = 361"),

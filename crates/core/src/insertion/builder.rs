@@ -101,7 +101,8 @@ impl<'a> SimulationBuilder<'a> {
             return Err(Error::parameter("method.name", method.name(), remedy));
         }
         if scene.stack.has_soft_plane() && !method.takes_soft_planes() {
-            let remedy = "knows one bending stiffness of a section: leave soft_plane out of them, or choose kirchhoff";
+            let remedy =
+                "knows one bending stiffness of a section: leave soft_plane out of them, or choose kirchhoff";
             return Err(Error::parameter("method.name", method.name(), remedy));
         }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;

@@ -172,7 +172,9 @@ fn a_skew_element_stores_what_its_planes_store() {
     let length = 0.02;
     let first = Frame::new(Vec3::z(), Some(Vec3::x()));
     for turned in [0.0, 0.4, 1.3, 2.9] {
-        for (plane, stiffness) in [(0.0, 3.0), (0.5 * std::f64::consts::PI, 1.0), (0.25 * std::f64::consts::PI, 2.0)] {
+        for (plane, stiffness) in
+            [(0.0, 3.0), (0.5 * std::f64::consts::PI, 1.0), (0.25 * std::f64::consts::PI, 2.0)]
+        {
             let way: f64 = plane + turned;
             let bend = 0.01;
             let second = first.transported(bend * way.cos(), bend * way.sin());

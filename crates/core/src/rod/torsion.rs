@@ -281,8 +281,7 @@ impl<S: Simd> ReferenceTwist<S> {
             along_y: one.along_y * by1 + two.along_y * by2,
             along_z: one.along_z * by1 + two.along_z * by2,
         };
-        let slopes =
-            [Slope { y: one.along_y, z: one.along_z }, Slope { y: two.along_y, z: two.along_z }];
+        let slopes = [Slope { y: one.along_y, z: one.along_z }, Slope { y: two.along_y, z: two.along_z }];
         (value, angle, slopes)
     }
 

@@ -166,8 +166,7 @@ fn what_cannot_be_steered_so_is_refused_and_changes_nothing() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes/curved_tube_exact.toml");
     let scene = Scene::read(&path).unwrap();
     let view = ViewSpec::of_scene(&scene, &path).unwrap();
-    let mut plain =
-        Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
+    let mut plain = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
     let text = plain.apply(&steer(Some(0.5), None)).unwrap_err().to_string();
     assert!(text.starts_with("steer = 0.5: \"device\" is not steered"), "{text}");
     assert!(plain.apply(&steer(None, None)).is_ok(), "it holds nothing");

@@ -105,7 +105,8 @@ impl BendTest {
     fn loaded(&self, device: &Device, from_tip_mm: f64) -> Result<(StaticCase, f64)> {
         self.check()?;
         if device.has_soft_plane() {
-            let remedy = "on its supports it would roll into that plane: measure a section of either stiffness alone";
+            let remedy =
+                "on its supports it would roll into that plane: measure a section of either stiffness alone";
             return Err(Error::parameter("device.section.soft_plane", "given", remedy));
         }
         if !self.reaches(device, from_tip_mm) {

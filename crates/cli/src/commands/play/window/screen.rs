@@ -190,8 +190,10 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
     let colour = if chosen { CHOSEN } else { TEXT };
     let mark = if chosen { ">" } else { " " };
     let steered = one.steer.map_or_else(String::new, |value| format!("  tip {}", bend(value)));
-    let length =
-        format!("{mark} {:<12} {:>7.1} mm in  {:>8.0}°{steered}", one.name, one.inserted_mm, one.rotation_deg);
+    let length = format!(
+        "{mark} {:<12} {:>7.1} mm in  {:>8.0}°{steered}",
+        one.name, one.inserted_mm, one.rotation_deg
+    );
     let x = writer.write(canvas, [12, y], 16, colour, &length);
     let push = one.push_force_n.map_or_else(|| "--".to_owned(), force);
     let force = format!("  push {push:>9}  torque {:>7} N·mm", signed(format!("{:.3}", one.torque_nmm)));
