@@ -12,7 +12,7 @@ pub fn elements(n: usize, twisted: bool) -> Vec<ElementData> {
         bending: [1.0; 3],
         torsion: [0.77; 3],
         rest_curvature: [[if twisted { 1.0 } else { 0.0 }, 0.0]; 3],
-        rest_twist: [0.0; 3],
+        ..Material::NONE
     };
     vec![ElementData::of(1.0 / n as f64, material); n]
 }

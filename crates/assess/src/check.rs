@@ -163,6 +163,7 @@ pub(crate) fn hand(entry: &str, hand: &Hand) -> Result<()> {
         [
             number("advance_mm", hand.advance_mm),
             number("rotate_rad", hand.rotate_rad),
+            number("steer_by", hand.steer_by),
             ("inserted_mm", inserted_mm, Must::NotBeBelowZero),
             number("push_force_n", hand.push_force_n.unwrap_or(0.0)),
             number("torque_nmm", hand.torque_nmm),

@@ -150,7 +150,7 @@ fn hands(folder: &Path, steps: &[Step]) -> Result<(Vec<String>, Hands)> {
     let most = steps.last().map_or(0, |step| step.step);
     let mut rows = by_step(rows, |row| row.step, most);
     let mut known: Option<Vec<String>> = None;
-    let mut all = BTreeMap::new();
+    let (mut all, mut steered) = (BTreeMap::new(), vec![]);
     for Step { step, .. } in steps {
         let rows = rows.remove(step).unwrap_or_default();
         let names: Vec<String> = rows.iter().map(|row| row.instrument.clone()).collect();
@@ -163,11 +163,15 @@ fn hands(folder: &Path, steps: &[Step]) -> Result<(Vec<String>, Hands)> {
             let name = format!("{}.instrument", entry(*step));
             return refused(&path, &name, format!("[{}]", names.join(", ")), &but);
         }
-        for row in &rows {
+        steered.resize(rows.len(), 0.0);
+        let mut hands = Vec::with_capacity(rows.len());
+        for (row, from) in rows.iter().zip(&mut steered) {
             let entry = format!("{}.{}", entry(*step), row.instrument);
-            in_table(&path, check::hand(&entry, &row.hand()))?;
+            let hand = row.hand(std::mem::replace(from, row.steer));
+            in_table(&path, check::hand(&entry, &hand))?;
+            hands.push(hand);
         }
-        all.insert(*step, rows.iter().map(InstrumentRow::hand).collect());
+        all.insert(*step, hands);
     }
     match rows.first_key_value() {
         Some((step, _)) => refused(&path, "step", step, &format!("is no step of {STEPS}")),
@@ -253,6 +257,9 @@ struct InstrumentRow {
     advance_mm: f64,
     rotate_rad: f64,
     inserted_mm: f64,
+    /// Value to which it is steered after the step; absent in recordings of earlier versions.
+    #[serde(default)]
+    steer: f64,
     tip_x_mm: Option<f64>,
     tip_y_mm: Option<f64>,
     tip_z_mm: Option<f64>,
@@ -261,13 +268,24 @@ struct InstrumentRow {
 }
 
 impl InstrumentRow {
-    fn hand(&self) -> Hand {
+    /// The hand, after a step that began with the instrument steered to `from`.
+    fn hand(&self, from: f64) -> Hand {
         let &Self { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, .. } = self;
+        let steer_by = self.steer - from;
         let tip_mm = match (self.tip_x_mm, self.tip_y_mm, self.tip_z_mm) {
             (Some(x), Some(y), Some(z)) => Some(Vec3::new(x, y, z)),
             _ => None,
         };
-        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, tip_mm, tip_at_rest_mm: None }
+        Hand {
+            advance_mm,
+            rotate_rad,
+            steer_by,
+            inserted_mm,
+            push_force_n,
+            torque_nmm,
+            tip_mm,
+            tip_at_rest_mm: None,
+        }
     }
 }
 

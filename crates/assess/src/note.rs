@@ -23,11 +23,12 @@ impl Record {
         let tip_of = |index: usize| (instruments.len() > 1).then(|| simulation.tip_of_mm(index)).flatten();
         let hands = report.hands().into_iter().enumerate().map(|(index, reported)| {
             let moved = moves.iter().find(|one| one.instrument == index);
-            let Command { advance_mm, rotate_rad, .. } = moved.map(|one| one.command).unwrap_or_default();
+            let Command { advance_mm, rotate_rad, steer } = moved.map(|one| one.command).unwrap_or_default();
             let tip_mm = tip_of(index);
             Hand {
                 advance_mm,
                 rotate_rad,
+                steer_by: steer,
                 inserted_mm: reported.inserted_mm,
                 push_force_n: reported.push_force_n,
                 torque_nmm: reported.torque_nmm,

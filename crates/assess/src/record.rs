@@ -15,9 +15,10 @@ use crate::{check, folder};
 /// Name of the beam log, beside steps.csv or a session's script; absent if the beam was not recorded.
 pub const BEAM: &str = "beam.csv";
 
-/// Motions below these count as rest: advance, mm, and rotation, rad.
+/// Motions below these count as rest: advance, mm, rotation, rad, and change of the steering.
 pub(crate) const REST_MM: f64 = 1e-9;
 const REST_RAD: f64 = 1e-9;
+const REST_STEER: f64 = 1e-9;
 /// Tip force above which a tip counts as pressed against a wall, N.
 pub(crate) const AGAINST_WALL_N: f64 = 1e-3;
 
@@ -29,6 +30,9 @@ pub struct Hand {
     pub advance_mm: f64,
     /// Rotation.
     pub rotate_rad: f64,
+    /// Change of the value to which it is steered.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub steer_by: f64,
     /// Inserted length after the step.
     pub inserted_mm: f64,
     /// Push force; `None` where it is undefined.
@@ -93,6 +97,12 @@ fn is_false(flag: &bool) -> bool {
     !*flag
 }
 
+/// Whether a number is left out of a session file.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
 impl Sample {
     /// Position of the tip to be compared with the centre line, which belongs to the vessel at rest.
     pub(crate) fn on_centreline_mm(&self) -> Option<Vec3> {
@@ -109,7 +119,8 @@ impl Sample {
 
     /// Whether no instrument moves.
     pub(crate) fn rests(&self) -> bool {
-        let moves = |hand: &Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
+        let turns = |hand: &Hand| hand.rotate_rad.abs() > REST_RAD || hand.steer_by.abs() > REST_STEER;
+        let moves = |hand: &Hand| hand.advance_mm.abs() > REST_MM || turns(hand);
         !self.hands.iter().any(moves)
     }
 
@@ -256,7 +267,7 @@ impl Record {
     pub(crate) fn flowed_out(mut self) -> Self {
         let end_s = self.injections.iter().map(Injection::end_s).fold(0.0, f64::max);
         if let Some(last) = self.samples.last().filter(|last| last.time_s < end_s) {
-            let rests = |hand: &Hand| Hand { advance_mm: 0.0, rotate_rad: 0.0, ..*hand };
+            let rests = |hand: &Hand| Hand { advance_mm: 0.0, rotate_rad: 0.0, steer_by: 0.0, ..*hand };
             let hands = last.hands.iter().map(rests).collect();
             self.samples.push(Sample { time_s: end_s, hands, jumped: false, ..last.clone() });
         }

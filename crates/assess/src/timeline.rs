@@ -17,6 +17,8 @@ pub struct HandLine {
     pub push_mm_per_s: Vec<f64>,
     /// Mean rotation speed, °/s.
     pub turn_deg_per_s: Vec<f64>,
+    /// Mean rate of steering, 1/s.
+    pub steer_per_s: Vec<f64>,
     /// Inserted length at the end of the interval, mm.
     pub inserted_mm: Vec<f64>,
     /// Largest magnitude of the push force, N.
@@ -116,6 +118,7 @@ impl Timeline {
             for (line, hand) in self.hands.iter_mut().zip(&sample.hands) {
                 line.push_mm_per_s[piece] += hand.advance_mm * share / self.piece_s;
                 line.turn_deg_per_s[piece] += hand.rotate_rad.to_degrees() * share / self.piece_s;
+                line.steer_per_s[piece] += hand.steer_by * share / self.piece_s;
                 line.inserted_mm[piece] = hand.inserted_mm;
                 let force_n = hand.push_force_n.map_or(0.0, f64::abs);
                 line.force_n[piece] = line.force_n[piece].max(force_n);
@@ -127,7 +130,13 @@ impl Timeline {
 impl HandLine {
     fn of(pieces: usize) -> Self {
         let none = || vec![0.0; pieces];
-        Self { push_mm_per_s: none(), turn_deg_per_s: none(), inserted_mm: none(), force_n: none() }
+        Self {
+            push_mm_per_s: none(),
+            turn_deg_per_s: none(),
+            steer_per_s: none(),
+            inserted_mm: none(),
+            force_n: none(),
+        }
     }
 }
 
@@ -160,11 +169,15 @@ mod tests {
         assert_eq!((line.piece_s, line.end_s, line.tip_mm.len()), (2.0, 4.0, 2));
         assert_eq!(line.hands[0].push_mm_per_s, [15.0, 0.0]);
         assert_eq!(line.hands[0].inserted_mm, [30.0, 30.0]);
+        assert_eq!(line.hands[0].steer_per_s, [0.0, 0.0]);
         assert_eq!(
             (line.wall_force_n.clone(), line.hands[0].force_n.clone()),
             (vec![0.5, 0.2], vec![0.5, 0.2])
         );
         assert_eq!(line.tip_mm[0], Some(Vec3::new(30.0, 0.0, 0.0)));
+        let mut steered = record.clone();
+        steered.samples[2].hands[0].steer_by = -0.5;
+        assert_eq!(Timeline::of(&steered, None, 2).hands[0].steer_per_s, [0.0, -0.25]);
         // No interval is shorter than 0.1 s, however many are requested; the total advance is preserved.
         let fine = Timeline::of(&record, None, 1000);
         assert_eq!(fine.tip_mm.len(), 40);

@@ -125,6 +125,10 @@ impl MethodChoice for AnyMethod {
         matches!(self, Self::Kirchhoff(options) if options.takes_steering())
     }
 
+    fn takes_soft_planes(&self) -> bool {
+        matches!(self, Self::Kirchhoff(options) if options.takes_soft_planes())
+    }
+
     fn check_detach(&self) -> Result<()> {
         match self {
             Self::Kirchhoff(options) => options.check_detach(),

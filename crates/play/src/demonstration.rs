@@ -3,9 +3,9 @@
 use endowire_core::Result;
 use endowire_core::insertion::{Command, Injection, Move, Script, ScriptRun, Simulation};
 
-use crate::hand::Motion;
+use crate::hand::{Motion, steer_value, steered};
 use crate::history::Done;
-use crate::{TICKS_PER_S, USUAL_DEG_PER_S, USUAL_MM_PER_S};
+use crate::{TICKS_PER_S, USUAL_DEG_PER_S, USUAL_MM_PER_S, USUAL_STEER_PER_S};
 
 /// Shortest duration of a step, s: limits the steps per tick to 16.
 const LEAST_S: f64 = 1.0 / (16.0 * TICKS_PER_S);
@@ -70,8 +70,9 @@ impl Demonstration {
                 step.moves.iter().all(|one| one.command == Command::default()) && step.detach.is_none();
             return Ok(Next::Later { rests });
         }
-        let motions =
-            step.moves.iter().map(shown).filter(|one| one.advance_mm != 0.0 || one.rotate_deg != 0.0);
+        let from = steered(simulation);
+        let motions = step.moves.iter().map(|one| shown(one, from[one.instrument]));
+        let motions = motions.filter(|one| !one.rests());
         let (detach, solves) = (step.detach, step.solves);
         let step = Done { motions: motions.collect(), per_s: 1.0 / took_s, detach, solves };
         self.run.carried_out();
@@ -92,18 +93,24 @@ impl Demonstration {
 /// Duration, s, of a step without a time.
 fn usual_s(moves: &[Move]) -> f64 {
     let each = moves.iter().map(|one| {
-        let (mm, rad) = (one.command.advance_mm.abs(), one.command.rotate_rad.abs());
-        (mm / USUAL_MM_PER_S).max(rad.to_degrees() / USUAL_DEG_PER_S)
+        let Command { advance_mm, rotate_rad, steer } = one.command;
+        let turns_s = rotate_rad.abs().to_degrees() / USUAL_DEG_PER_S;
+        (advance_mm.abs() / USUAL_MM_PER_S).max(turns_s).max(steer.abs() / USUAL_STEER_PER_S)
     });
     each.fold(0.0, f64::max)
 }
 
-/// Converts a move to millimetres and degrees. Not every angle in radians is the image of one in degrees; in that
-/// case the last bit differs.
-fn shown(one: &Move) -> Motion {
-    let (advance_mm, rad) = (one.command.advance_mm, one.command.rotate_rad);
+/// Converts a move to millimetres and degrees, of an instrument that is steered to this value. Not every angle in radians
+/// is the image of one in degrees; in that case the last bit differs, as it may of values that are steered to.
+fn shown(one: &Move, steered: f64) -> Motion {
+    let Command { advance_mm, rotate_rad: rad, steer } = one.command;
     let near = rad.to_degrees();
     let same = |deg: &f64| deg.to_radians().to_bits() == rad.to_bits();
     let rotate_deg = [near, near.next_up(), near.next_down()].into_iter().find(same).unwrap_or(near);
-    Motion { instrument: one.instrument, advance_mm, rotate_deg }
+    Motion {
+        instrument: one.instrument,
+        advance_mm,
+        rotate_deg,
+        steer: steer_value(steered + steer) - steered,
+    }
 }

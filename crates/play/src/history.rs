@@ -214,7 +214,7 @@ mod tests {
         let mut went = vec![history.went()];
         for k in 0..150 {
             let advance_mm = if k % 5 == 4 { -0.3 } else { 0.7 };
-            let motions = vec![Motion { instrument: 0, advance_mm, rotate_deg: 0.0 }];
+            let motions = vec![Motion { instrument: 0, advance_mm, rotate_deg: 0.0, steer: 0.0 }];
             let step = Done { motions, per_s: 60.0, detach: None, solves: None };
             step.carry_out(&mut simulation).unwrap();
             history.push(step, &simulation);

@@ -4,10 +4,11 @@ use endowire_viewer::{Mode, Pose};
 use serde::{Deserialize, Serialize};
 
 /// The names of all inputs, as `do` has them.
-pub const INPUTS: [&str; 17] = [
+pub const INPUTS: [&str; 18] = [
     "select",
     "move",
     "nudge",
+    "steer",
     "stop",
     "pedal",
     "inject",
@@ -56,6 +57,16 @@ pub enum Input {
         /// Rotation, degrees.
         #[serde(default)]
         deg: f64,
+    },
+    /// Steers an instrument whose tip bends by tendons: to a value at a rate, until it is there or until the next such
+    /// input. Without a value it is held where it is.
+    Steer {
+        /// Name of the instrument.
+        instrument: Option<String>,
+        /// Value, −1 to 1; 0 is straight, or the shape of its own.
+        to: Option<f64>,
+        /// Rate, 1/s; 0.5 if absent.
+        per_s: Option<f64>,
     },
     /// Stops all instruments.
     Stop {},

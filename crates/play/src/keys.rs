@@ -3,15 +3,17 @@
 
 use std::collections::BTreeSet;
 
+use endowire_core::device::Stack;
 use endowire_viewer::Mode;
 
 use crate::pad::Pad;
-use crate::{Input, USUAL_DEG_PER_S, USUAL_MM_PER_S};
+use crate::{Input, USUAL_DEG_PER_S, USUAL_MM_PER_S, USUAL_STEER_PER_S};
 
 /// Keys and their effects, for display; F1 and Esc are handled by the window or page.
 pub const KEYS: &[(&str, &str)] = &[
     ("up, down", "push, pull (hold)"),
     ("left, right", "turn (hold)"),
+    ("A, S (hold); W", "bend the tip that is steered, either way; straight"),
     ("Shift / Ctrl with these", "coarse (four times) / fine (a fifth)"),
     ("Tab, 1 to 9", "next instrument, instrument by number"),
     ("0", "all instruments together"),
@@ -41,6 +43,8 @@ pub struct Modifiers {
 #[derive(Debug)]
 pub struct Keys {
     instruments: Vec<String>,
+    /// Which of them are steered.
+    steered: Vec<bool>,
     /// The selected instrument; `None` for all.
     chosen: Option<usize>,
     /// Keys that are held, of those that act while held.
@@ -48,7 +52,7 @@ pub struct Keys {
     /// Of the keyboard, and of the gamepad.
     modifiers: [Modifiers; 2],
     /// Fractions of the usual speeds requested by the gamepad's sticks.
-    leans: [f64; 2],
+    leans: [f64; 3],
     /// Whether the beam is locked on.
     locked: bool,
     open: f64,
@@ -56,18 +60,28 @@ pub struct Keys {
 
 /// Keys that move instruments while held.
 const ARROWS: [&str; 4] = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
+/// Keys that bend a steered tip while held, towards −1 and 1.
+const BENDS: [&str; 2] = ["KeyA", "KeyS"];
 /// Keys that act as pedals while held.
 const PEDALS: [&str; 4] = ["Space", "KeyC", "KeyV", "KeyB"];
 
 impl Keys {
-    /// The initial state, without held keys, for a session with these instruments, innermost first.
+    /// The initial state, without held keys, for a session with the instruments of this stack.
+    pub fn of(stack: &Stack) -> Self {
+        let each = stack.instruments().iter();
+        let (names, steered) = each.map(|one| (one.name.clone(), one.device.is_steerable())).unzip();
+        Self { steered, ..Self::new(names) }
+    }
+
+    /// The same for instruments of these names, innermost first, of which none is steered.
     pub fn new(instruments: Vec<String>) -> Self {
         Self {
+            steered: vec![false; instruments.len()],
             instruments,
             chosen: Some(0),
             down: BTreeSet::new(),
             modifiers: [Modifiers::default(); 2],
-            leans: [0.0; 2],
+            leans: [0.0; 3],
             locked: false,
             open: 1.0,
         }
@@ -76,18 +90,21 @@ impl Keys {
     /// Handles a change of modifier keys, which changes the speeds.
     pub fn modify(&mut self, modifiers: Modifiers) -> Vec<Input> {
         self.modifiers[0] = modifiers;
-        self.moving()
+        self.going()
     }
 
     /// Handles a change of the gamepad's state.
     pub fn pad(&mut self, before: &Pad, now: &Pad) -> Vec<Input> {
-        let asked = (self.modifiers[1], self.leans);
+        let (asked, bent) = ((self.modifiers[1], self.leans), self.bending());
         (self.modifiers[1], self.leans) = (now.modifiers(), now.leans());
         let keys = now.keys_since(before);
         let mut inputs: Vec<Input> =
             keys.into_iter().flat_map(|(key, down)| self.key(key, down, false)).collect();
         if asked != (self.modifiers[1], self.leans) {
-            inputs.extend(self.moving());
+            inputs.extend(self.going());
+            if bent && !self.bending() {
+                inputs.extend(self.steering());
+            }
         }
         inputs
     }
@@ -99,11 +116,14 @@ impl Keys {
     /// Releases all held keys, because the window has lost the keyboard focus. Other sources of input are not
     /// affected.
     pub fn let_go(&mut self) -> Vec<Input> {
-        let held = |keys: [&str; 4]| keys.iter().any(|key| self.down.contains(key));
-        let (moves, shines) = (held(ARROWS), self.locked || held(PEDALS));
+        let held = |keys: &[&str]| keys.iter().any(|key| self.down.contains(key));
+        let (moves, bends, shines) = (held(&ARROWS), held(&BENDS), self.locked || held(&PEDALS));
         self.down.clear();
         self.locked = false;
         let mut inputs = if moves { self.moving() } else { vec![] };
+        if bends {
+            inputs.extend(self.steering());
+        }
         if shines {
             inputs.push(Input::Pedal { down: false, mode: None });
         }
@@ -112,7 +132,7 @@ impl Keys {
 
     /// Handles a key that goes down, repeats while held (`again`), or goes up; other keys have no effect.
     pub fn key(&mut self, code: &str, down: bool, again: bool) -> Vec<Input> {
-        if let Some(held) = ARROWS.into_iter().chain(PEDALS).find(|held| *held == code) {
+        if let Some(held) = ARROWS.into_iter().chain(BENDS).chain(PEDALS).find(|held| *held == code) {
             if down {
                 self.down.insert(held)
             } else {
@@ -126,6 +146,13 @@ impl Keys {
         let press = down && !again;
         match code {
             "ArrowUp" | "ArrowDown" | "ArrowLeft" | "ArrowRight" if !again => self.moving(),
+            "KeyA" | "KeyS" if !again => self.steering(),
+            "KeyW" if press => {
+                BENDS.iter().for_each(|key| {
+                    self.down.remove(key);
+                });
+                self.steer(Some(0.0), self.scale() * USUAL_STEER_PER_S, true)
+            }
             "Space" | "KeyC" | "KeyV" | "KeyB" if !again => {
                 self.locked = false;
                 let mode = match code {
@@ -182,26 +209,68 @@ impl Keys {
     fn choose(&mut self, index: Option<usize>) -> Vec<Input> {
         self.chosen = index;
         let select = index.map(|index| Input::Select { instrument: self.instruments[index].clone() });
-        std::iter::once(Input::Stop {}).chain(select).chain(self.moving()).collect()
+        std::iter::once(Input::Stop {}).chain(select).chain(self.going()).collect()
+    }
+
+    /// Factor of the usual speeds.
+    fn scale(&self) -> f64 {
+        let control = self.modifiers.iter().any(|held| held.control);
+        match (self.shift(), control) {
+            (true, false) => 4.0,
+            (false, true) => 0.2,
+            _ => 1.0,
+        }
+    }
+
+    /// Share of a speed that two keys and a stick ask for.
+    fn axis(&self, plus: &str, minus: &str, lean: f64) -> f64 {
+        let keys = f64::from(self.down.contains(plus)) - f64::from(self.down.contains(minus));
+        (keys + lean).clamp(-1.0, 1.0)
+    }
+
+    /// The instruments in the hand.
+    fn hands(&self) -> impl Iterator<Item = (usize, &String)> {
+        self.instruments.iter().enumerate().filter(|(index, _)| self.chosen.is_none_or(|c| c == *index))
     }
 
     /// The motion commanded by arrow keys and sticks.
     fn moving(&self) -> Vec<Input> {
-        let control = self.modifiers.iter().any(|held| held.control);
-        let axis = |plus, minus, lean: f64| {
-            let keys = f64::from(self.down.contains(&plus)) - f64::from(self.down.contains(&minus));
-            (keys + lean).clamp(-1.0, 1.0)
-        };
-        let scale = match (self.shift(), control) {
-            (true, false) => 4.0,
-            (false, true) => 0.2,
-            _ => 1.0,
-        };
-        let mm_per_s = scale * USUAL_MM_PER_S * axis("ArrowUp", "ArrowDown", self.leans[0]);
-        let deg_per_s = scale * USUAL_DEG_PER_S * axis("ArrowRight", "ArrowLeft", self.leans[1]);
-        let hands =
-            self.instruments.iter().enumerate().filter(|(index, _)| self.chosen.is_none_or(|c| c == *index));
-        hands.map(|(_, name)| Input::Move { instrument: Some(name.clone()), mm_per_s, deg_per_s }).collect()
+        let scale = self.scale();
+        let mm_per_s = scale * USUAL_MM_PER_S * self.axis("ArrowUp", "ArrowDown", self.leans[0]);
+        let deg_per_s = scale * USUAL_DEG_PER_S * self.axis("ArrowRight", "ArrowLeft", self.leans[1]);
+        let each = self.hands();
+        each.map(|(_, name)| Input::Move { instrument: Some(name.clone()), mm_per_s, deg_per_s }).collect()
+    }
+
+    /// The motion commanded, with the steering if it is asked for.
+    fn going(&self) -> Vec<Input> {
+        let steering = if self.bending() { self.steering() } else { vec![] };
+        self.moving().into_iter().chain(steering).collect()
+    }
+
+    /// Whether a key is held that bends a tip.
+    fn bend_is_down(&self) -> bool {
+        BENDS.iter().any(|key| self.down.contains(key))
+    }
+
+    /// Whether a tip is asked to bend.
+    fn bending(&self) -> bool {
+        self.bend_is_down() || self.leans[2] != 0.0
+    }
+
+    /// The steering commanded by keys and stick: to the largest bend as long as they ask for it.
+    fn steering(&self) -> Vec<Input> {
+        let share = self.axis(BENDS[1], BENDS[0], self.leans[2]);
+        let to = (share != 0.0).then_some(share.signum());
+        self.steer(to, self.scale() * USUAL_STEER_PER_S * share.abs(), self.bend_is_down())
+    }
+
+    /// Steers what is in the hand. Others than steered instruments are asked only if one is selected and a key asks, so
+    /// that its user is told why nothing bends.
+    fn steer(&self, to: Option<f64>, per_s: f64, by_key: bool) -> Vec<Input> {
+        let each = self.hands().filter(|(index, _)| self.steered[*index] || by_key && self.chosen.is_some());
+        let per_s = to.map(|_| per_s);
+        each.map(|(_, name)| Input::Steer { instrument: Some(name.clone()), to, per_s }).collect()
     }
 }
 
@@ -239,6 +308,37 @@ mod tests {
             keys.modify(Modifiers { shift: true, control: false }),
             [moved("wire", 0.0, 0.0), moved("catheter", 0.0, 0.0)]
         );
+    }
+
+    #[test]
+    fn tips_bend_where_they_are_steered_and_a_selected_wire_says_that_it_is_not() {
+        let mut keys = Keys::new(vec!["wire".to_owned(), "catheter".to_owned()]);
+        keys.steered[1] = true;
+        let bent = |name: &str, to: Option<f64>, per_s: Option<f64>| Input::Steer {
+            instrument: Some(name.to_owned()),
+            to,
+            per_s,
+        };
+        // The wire is asked as long as a key is down, to be refused.
+        assert_eq!(keys.key("KeyS", true, false), [bent("wire", Some(1.0), Some(0.5))]);
+        assert!(keys.key("KeyS", true, true).is_empty() && keys.key("KeyS", false, false).is_empty());
+        keys.key("Tab", true, false);
+        assert_eq!(keys.key("KeyA", true, false), [bent("catheter", Some(-1.0), Some(0.5))]);
+        let fine = Modifiers { shift: false, control: true };
+        assert_eq!(keys.modify(fine), [moved("catheter", 0.0, 0.0), bent("catheter", Some(-1.0), Some(0.1))]);
+        // Both keys together hold it.
+        assert_eq!(keys.key("KeyS", true, false), [bent("catheter", None, None)]);
+        keys.key("KeyS", false, false);
+        assert_eq!(keys.let_go(), [bent("catheter", None, None)]);
+        assert!(keys.let_go().is_empty());
+        keys.modify(Modifiers::default());
+        // Straight at the usual rate; keys that were down no longer count.
+        keys.key("KeyA", true, false);
+        assert_eq!(keys.key("KeyW", true, false), [bent("catheter", Some(0.0), Some(0.5))]);
+        assert_eq!(keys.key("KeyW", false, false), []);
+        // All together: those that are steered.
+        keys.key("Digit0", true, false);
+        assert_eq!(keys.key("KeyS", true, false), [bent("catheter", Some(1.0), Some(0.5))]);
     }
 
     #[test]

@@ -41,3 +41,7 @@ pub const USUAL_MM_PER_S: f64 = 10.0;
 
 /// Rotation speed of an instrument moved by a key, degrees/s, and of script steps without times.
 pub const USUAL_DEG_PER_S: f64 = 90.0;
+
+/// Rate at which a key steers an instrument, 1/s, and script steps without times do: two seconds from straight to the
+/// largest bend.
+pub const USUAL_STEER_PER_S: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! Gamepad bindings: sticks move and rotate the selected instrument, buttons act as keys.
+//! Gamepad bindings: sticks move, rotate and steer the selected instrument, buttons act as keys.
 
 use std::collections::BTreeSet;
 
@@ -8,6 +8,7 @@ use crate::keys::Modifiers;
 pub const PAD: &[(&str, &str)] = &[
     ("left stick, up down", "push, pull, as fast as it leans"),
     ("right stick, left right", "turn, as fast as it leans"),
+    ("right stick, up down; pressed", "bend the tip that is steered, as fast as it leans; straight"),
     ("right / left bumper with these", "coarse (four times) / fine (a fifth)"),
     ("right, left trigger (hold)", "fluoroscopy, cine"),
     ("upper, left button (hold)", "DSA, roadmap"),
@@ -38,11 +39,12 @@ pub enum Button {
     CrossRight,
     CrossUp,
     CrossDown,
+    RightStick,
 }
 
 impl Button {
     /// All buttons.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Lower,
         Self::Right,
         Self::Left,
@@ -57,6 +59,7 @@ impl Button {
         Self::CrossRight,
         Self::CrossUp,
         Self::CrossDown,
+        Self::RightStick,
     ];
 
     /// The key with the same effect; `None` for the bumpers, which act as Shift and Ctrl.
@@ -75,6 +78,7 @@ impl Button {
             Self::CrossRight => "KeyL",
             Self::CrossUp => "KeyO",
             Self::CrossDown => "KeyK",
+            Self::RightStick => "KeyW",
         })
     }
 }
@@ -86,14 +90,16 @@ pub struct Pad {
     pub up: f64,
     /// Deflection of the right stick to the right, −1 to 1.
     pub right: f64,
+    /// Deflection of the right stick upwards, −1 to 1.
+    pub bend: f64,
     /// Pressed buttons.
     pub down: BTreeSet<Button>,
 }
 
 impl Pad {
-    /// Fractions of the usual advance and rotation speeds.
-    pub(crate) fn leans(&self) -> [f64; 2] {
-        [self.up, self.right].map(share)
+    /// Fractions of the usual speeds of advance, rotation and steering.
+    pub(crate) fn leans(&self) -> [f64; 3] {
+        [self.up, self.right, self.bend].map(share)
     }
 
     /// Modifier keys that the bumpers stand for.
@@ -121,13 +127,14 @@ fn share(lean: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use endowire_core::device::{Device, Section, Steer};
     use endowire_viewer::Mode;
 
     use super::*;
     use crate::{Input, Keys};
 
     fn held(up: f64, right: f64, down: &[Button]) -> Pad {
-        Pad { up, right, down: down.iter().copied().collect() }
+        Pad { up, right, bend: 0.0, down: down.iter().copied().collect() }
     }
 
     fn moved(name: &str, mm_per_s: f64, deg_per_s: f64) -> Input {
@@ -209,6 +216,27 @@ mod tests {
         ] {
             assert_eq!(press(button, bumper), (inputs, vec![]), "{button:?}");
         }
+    }
+
+    #[test]
+    fn the_right_stick_bends_a_steered_tip_and_leaves_others_alone() {
+        let rest = Pad::default();
+        let bent = Pad { bend: 0.575, ..Pad::default() };
+        let mut plain = Keys::new(vec!["wire".to_owned()]);
+        assert_eq!(plain.pad(&rest, &bent), [moved("wire", 0.0, 0.0)]);
+        let steer = Some(Steer { plane_deg: 0.0, curvature_per_mm_at_1: 0.02 });
+        let tip = Section { steer, ..Section::straight(60.0, 0.9, 60.0) };
+        let mut keys = Keys::of(&Device::new(vec![tip]).unwrap().into());
+        let steer = |to: Option<f64>, per_s: Option<f64>| Input::Steer {
+            instrument: Some("device".to_owned()),
+            to,
+            per_s,
+        };
+        let still = moved("device", 0.0, 0.0);
+        assert_eq!(keys.pad(&rest, &bent), [still.clone(), steer(Some(1.0), Some(0.25))]);
+        assert_eq!(keys.pad(&bent, &rest), [still, steer(None, None)]);
+        let pressed = held(0.0, 0.0, &[Button::RightStick]);
+        assert_eq!(keys.pad(&rest, &pressed), [steer(Some(0.0), Some(0.5))]);
     }
 
     #[test]

@@ -82,6 +82,9 @@ pub struct InstrumentReadout {
     pub behind_mm: f64,
     /// Rotation of the tail, degrees.
     pub rotation_deg: f64,
+    /// Value to which it is steered, −1 to 1; `None` if no section of it is steered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steer: Option<f64>,
     /// Push force, N; `None` where it jumps.
     pub push_force_n: Option<f64>,
     /// Torque that holds the instrument, N·mm.

@@ -9,7 +9,7 @@ use endowire_methods::Setting;
 use crate::hand::Motion;
 use crate::history::{Done, Injected};
 
-/// Smallest step of a script line, mm and degrees: a smaller motion is a single step.
+/// Smallest step of a script line, mm, degrees and of the steering: a smaller motion is a single step.
 const LEAST: f64 = 1e-9;
 
 /// The head of a script to be saved as `file`: its scene, and the command that carries it out with these settings.
@@ -38,23 +38,30 @@ impl Lines<'_> {
     /// The script of steps with the injections between them, in order. Equal consecutive steps become one line if
     /// that gives the same bits.
     pub(crate) fn of<'a>(self, steps: &[Done], injected: impl Iterator<Item = &'a Injected>) -> String {
-        let mut text = String::new();
+        let (mut text, mut steered) = (String::new(), vec![0.0; self.stack.instruments().len()]);
         let mut reported = 0;
         for one in injected {
-            self.write(&mut text, &steps[reported..one.after_step]);
+            self.write(&mut text, &mut steered, &steps[reported..one.after_step]);
             reported = one.after_step;
             inject(&mut text, one, self.stack);
         }
-        self.write(&mut text, &steps[reported..]);
+        self.write(&mut text, &mut steered, &steps[reported..]);
         text
     }
 
-    fn write(self, text: &mut String, steps: &[Done]) {
+    /// Writes steps that begin with instruments steered to these values.
+    fn write(self, text: &mut String, steered: &mut [f64], steps: &[Done]) {
         for run in steps.chunk_by(|a, b| a == b) {
             let mut left = run.len();
             while left > 0 {
                 let count = (1..=left).rev().find(|count| self.cuts_evenly(&run[0], *count)).unwrap_or(1);
-                line(text, self.stack, &run[0], count);
+                for one in &run[0].motions {
+                    steered[one.instrument] += one.steer * count as f64;
+                }
+                line(text, (self.stack, steered), &run[0], count);
+                if let Some(instrument) = run[0].detach {
+                    steered[instrument] = 0.0;
+                }
                 left -= count;
             }
         }
@@ -75,7 +82,10 @@ pub(crate) fn step_s(Done { motions, per_s, .. }: &Done, count: usize) -> f64 {
     let each = motions.iter().map(|one| {
         let (mm, deg) = (one.advance_mm.abs(), (one.rotate_deg * many).to_radians().to_degrees().abs());
         let length_s = if mm == 0.0 { 0.0 } else { mm * many / (mm * per_s) };
-        length_s.max(if deg == 0.0 { 0.0 } else { deg / (one.rotate_deg.abs() * per_s) })
+        let steer = one.steer.abs();
+        let steers_s = if steer == 0.0 { 0.0 } else { steer * many / (steer * per_s) };
+        let turns_s = if deg == 0.0 { 0.0 } else { deg / (one.rotate_deg.abs() * per_s) };
+        length_s.max(turns_s).max(steers_s)
     });
     let duration_s = if motions.is_empty() { many / per_s } else { each.fold(0.0, f64::max) };
     duration_s * (1.0 / many)
@@ -86,17 +96,24 @@ fn moves_evenly(motions: &[Motion], count: usize) -> bool {
     let share = 1.0 / count as f64;
     let small = |value: f64| value != 0.0 && value.abs() < LEAST;
     motions.iter().all(|one| {
-        if small(one.advance_mm) || small(one.rotate_deg) {
+        if small(one.advance_mm) || small(one.rotate_deg) || small(one.steer) {
             return count == 1;
         }
         let whole_mm = one.advance_mm * count as f64;
         let whole_deg = one.rotate_deg * count as f64;
-        whole_mm * share == one.advance_mm && whole_deg.to_radians() * share == one.rotate_deg.to_radians()
+        whole_mm * share == one.advance_mm
+            && whole_deg.to_radians() * share == one.rotate_deg.to_radians()
+            && (one.steer * count as f64) * share == one.steer
     })
 }
 
-/// Writes a line of a script.
-fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach, solves }: &Done, count: usize) {
+/// Writes a line of a script, at whose end instruments are steered to these values.
+fn line(
+    text: &mut String,
+    (stack, steered): (&Stack, &[f64]),
+    Done { motions, per_s, detach, solves }: &Done,
+    count: usize,
+) {
     if let Some(instrument) = detach {
         let name = &stack.instruments()[*instrument].name;
         let key = if stack.is_several() { format!("instrument = {name:?}\n") } else { String::new() };
@@ -119,6 +136,11 @@ fn line(text: &mut String, stack: &Stack, Done { motions, per_s, detach, solves 
             keys.push(format!("rotate_deg = {:?}", one.rotate_deg * count as f64));
             keys.push(format!("step_deg = {:?}", one.rotate_deg.abs().max(LEAST)));
             keys.push(format!("speed_deg_per_s = {:?}", one.rotate_deg.abs() * per_s));
+        }
+        if one.steer != 0.0 {
+            keys.push(format!("steer = {:?}", steered[one.instrument]));
+            keys.push(format!("step_steer = {:?}", one.steer.abs().max(LEAST)));
+            keys.push(format!("speed_steer_per_s = {:?}", one.steer.abs() * per_s));
         }
         keys
     };

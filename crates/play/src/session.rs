@@ -11,7 +11,7 @@ use endowire_viewer::{ContactView, FrameTime, ViewSpec};
 
 use crate::TICKS_PER_S;
 use crate::demonstration::{Demonstration, Next};
-use crate::hand::{Hand, Motion};
+use crate::hand::{Hand, Motion, steered};
 use crate::history::{Done, History, Injected, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
@@ -110,14 +110,10 @@ impl Session {
     /// fluoroscopic picture of `side_px` pixels.
     ///
     /// # Errors
-    /// Limits that are not above 0; instruments that are steered; as [`ViewSpec::validate`].
+    /// Limits that are not above 0; as [`ViewSpec::validate`].
     pub fn new(simulation: Simulation, view: ViewSpec, side_px: u32, limits: Limits) -> Result<Self> {
         for (name, limit) in [("warn_n", limits.push_n), ("warn_nmm", limits.torque_nmm)] {
             endowire_core::error::in_range(name, limit, 1e6)?;
-        }
-        if simulation.stack().is_steerable() {
-            let remedy = "no hand here steers: leave it out of the sections, or run the scene's script (endowire run) or Python";
-            return Err(Error::parameter("device.section.steer", "given", remedy));
         }
         let lab = Lab::new(view, side_px, simulation.lumen().wall(&NoStore)?.mesh())?;
         let mut meter = Meter::default();
@@ -215,6 +211,14 @@ impl Session {
                 self.hands[index].nudge(*mm, *deg)?;
                 self.take_over();
             }
+            Input::Steer { instrument, to, per_s } => {
+                let index = self.index(instrument.as_deref())?;
+                self.check_steered(index, *to)?;
+                self.hands[index].steer(*to, *per_s)?;
+                if to.is_some() {
+                    self.take_over();
+                }
+            }
             Input::Stop {} => {
                 self.stop();
                 self.demonstration.iter_mut().for_each(|shown| shown.paused = true);
@@ -244,6 +248,20 @@ impl Session {
             }
         }
         Ok(())
+    }
+
+    /// Refuses to steer an instrument that has nothing to be steered.
+    fn check_steered(&self, index: usize, to: Option<f64>) -> Result<()> {
+        let instrument = &self.simulation.stack().instruments()[index];
+        match to {
+            Some(to) if !instrument.device.is_steerable() => {
+                let name = &instrument.name;
+                let remedy =
+                    format!("{name:?} is not steered: give a section of it steer, or select another");
+                Err(Error::parameter("steer", to, remedy))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn stop(&mut self) {
@@ -351,16 +369,15 @@ impl Session {
             return;
         }
         self.telemetry.rest_until(begun_s, (&self.simulation, packing(self.sac.as_ref())));
-        let lengths_mm = self.hands_mm();
+        let (lengths_mm, steered) = (self.hands_mm(), steered(&self.simulation));
         let instruments = self.simulation.stack().instruments();
         let mut motions = Vec::new();
         for (index, hand) in self.hands.iter_mut().enumerate() {
             let (in_mm, all_mm) = (lengths_mm[index], instruments[index].device.length_mm());
-            let (advance_mm, rotate_deg) = hand.tick([-in_mm.max(0.0), (all_mm - in_mm).max(0.0)]);
-            if advance_mm != 0.0 || rotate_deg != 0.0 {
-                motions.push(Motion { instrument: index, advance_mm, rotate_deg });
-            }
+            let room_mm = [-in_mm.max(0.0), (all_mm - in_mm).max(0.0)];
+            motions.push(hand.tick(index, room_mm, steered[index]));
         }
+        motions.retain(|motion| !motion.rests());
         if !motions.is_empty() {
             let step = Done { motions: motions.clone(), solves: self.solves, ..Self::resting() };
             let done = self.step(step, !self.moving);
@@ -644,6 +661,7 @@ impl Session {
                 inserted_mm: report.inserted_mm,
                 behind_mm: hand_mm - report.inserted_mm,
                 rotation_deg: report.rotation_rad.to_degrees(),
+                steer: one.device.is_steerable().then_some(report.steer),
                 push_force_n: report.push_force_n,
                 torque_nmm: report.torque_nmm,
                 warns: self.beyond(&report),

@@ -24,8 +24,8 @@ pub(crate) struct Instrument {
 #[pymethods]
 impl Instrument {
     /// An instrument made of sections, tip first: dictionaries with the keys of `[[device.section]]` of a scene file
-    /// (length_mm, radius_mm, bending_stiffness_nmm2, and optionally inner_radius_mm, torsional_stiffness_nmm2,
-    /// rest_curvature_per_mm). With `coil_mm` it is a coil on its pusher: so long, from the tip to the end of a section,
+    /// (length_mm, radius_mm, bending_stiffness_nmm2, and optionally inner_radius_mm, soft_plane, torsional_stiffness_nmm2,
+    /// rest_curvature_per_mm, steer). With `coil_mm` it is a coil on its pusher: so long, from the tip to the end of a section,
     /// is what `Simulation.detach` detaches.
     ///
     /// Raises InputError naming the section and the value that is out of range.

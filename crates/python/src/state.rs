@@ -16,7 +16,7 @@ use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
 /// First bytes of a saved state, which ends with a hash, and those common to all versions.
-const FORMAT: &[u8] = b"endowire.State 14\n";
+const FORMAT: &[u8] = b"endowire.State 15\n";
 const ANY_FORMAT: &[u8] = b"endowire.State ";
 
 /// Whether a file was written by `State.save` of any version, or is empty, so that overwriting it loses nothing.

@@ -29,6 +29,27 @@ def test_steering_is_reported_and_goes_on() -> None:
         simulation.step(steer=0.9)
 
 
+def test_a_flat_wire_bends_more_easily_in_its_soft_plane() -> None:
+    def bends(plane_deg: float, force: tuple[float, float, float]) -> float:
+        wire = {"length_mm": 200.0, "radius_mm": 0.2, "bending_stiffness_nmm2": 12.0}
+        wire["soft_plane"] = {"plane_deg": plane_deg, "bending_stiffness_nmm2": 3.0}
+        vessel = endowire.Vessel.generate("straight_tube")
+        simulation = endowire.Simulation(vessel, [endowire.Instrument([wire])], opening=0)
+        simulation.step(30.0)
+        straight_mm = np.array(simulation.tip_mm)
+        simulation.set_fields([{"kind": "weight", "force_n_per_mm": list(force)}])
+        simulation.step(0.0)
+        return float(np.linalg.norm(simulation.tip_mm - straight_mm))
+
+    weights = [(1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0)]
+    [[soft, stiff], [across, along]] = [[bends(plane, one) for one in weights] for plane in (0.0, 90.0)]
+    assert max(soft / stiff, stiff / soft) == pytest.approx(4.0, rel=0.02)
+    assert (soft, stiff) == pytest.approx((along, across), rel=1e-3)
+    with pytest.raises(endowire.InputError, match="soft_plane.bending_stiffness_nmm2 = 20"):
+        section = {"length_mm": 20.0, "radius_mm": 0.2, "bending_stiffness_nmm2": 12.0}
+        endowire.Instrument([section | {"soft_plane": {"plane_deg": 0.0, "bending_stiffness_nmm2": 20.0}}])
+
+
 def test_the_mouth_lags_behind_the_hand() -> None:
     simulation = _start()
     simulation.step(30.0)

@@ -65,8 +65,8 @@ pub fn setup<M: MethodChoice + DeserializeOwned + Default>(
 
 /// A device by its name and its extreme sizes.
 fn device_words(name: Option<&str>, device: &Device) -> String {
-    let stiffnesses = device.sections().iter().map(|section| section.bending_stiffness_nmm2);
-    let (low, high) = stiffnesses.fold((f64::MAX, 0.0f64), |(low, high), ei| (low.min(ei), high.max(ei)));
+    let stiffnesses = device.sections().iter().map(|one| (one.softest_nmm2(), one.bending_stiffness_nmm2));
+    let (low, high) = stiffnesses.fold((f64::MAX, 0.0f64), |(low, high), ei| (low.min(ei.0), high.max(ei.1)));
     let range = |low: f64, high: f64, digits: usize| match high - low > 0.005 * high {
         true => format!("{low:.digits$}–{high:.digits$}"),
         false => format!("{high:.digits$}"),

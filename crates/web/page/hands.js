@@ -74,13 +74,13 @@ export function buttons() {
 }
 
 /** How a gamepad is held, or the field as one: what was moved last counts. */
-const lean = (now) => hear("gamepad", [Uint8Array.from(now.buttons), now.up, now.right]);
+const lean = (now) => hear("gamepad", [Uint8Array.from(now.buttons), now.up, now.right, now.bend]);
 
 /** The round field: a stick under the finger. */
 export function field(hand, knob) {
   const move = (up, right) => {
     knob.style.transform = `translate(${right * 2.2}rem, ${-up * 2.2}rem)`;
-    lean({ buttons: [], up, right });
+    lean({ buttons: [], up, right, bend: 0 });
   };
   hand.addEventListener("pointerdown", (event) => {
     hand.setPointerCapture(event.pointerId);
@@ -101,8 +101,8 @@ export function gamepad() {
   const look = () => {
     const pad = navigator.getGamepads().find((one) => one?.mapping === "standard");
     const now = pad
-      ? { buttons: pad.buttons.flatMap((button, number) => (button.pressed ? [number] : [])), up: -pad.axes[1], right: pad.axes[2] }
-      : { buttons: [], up: 0, right: 0 };
+      ? { buttons: pad.buttons.flatMap((button, number) => (button.pressed ? [number] : [])), up: -pad.axes[1], right: pad.axes[2], bend: -pad.axes[3] }
+      : { buttons: [], up: 0, right: 0, bend: 0 };
     const text = JSON.stringify(now);
     if (text !== before && (before || pad)) lean(now);
     before = text;

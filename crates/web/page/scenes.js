@@ -4,6 +4,7 @@ export const SCENES = [
   ["scenes/arch_innominate.toml", "Arch: innominate artery"],
   ["scenes/arch_subclavian.toml", "Arch: left subclavian artery"],
   ["scenes/arch_vertebral.toml", "Arch: wire in a vertebral catheter"],
+  ["scenes/arch_steered.toml", "Arch: catheter with a steered tip"],
   ["scenes/arch_plaque.toml", "Arch: aneurysm and plaque"],
   ["scenes/arch_angiography.toml", "Arch: angiography"],
   ["scenes/aortic_arch.toml", "Arch: shaped wire in a patient"],

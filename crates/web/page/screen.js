@@ -23,6 +23,13 @@ const minutes = (s) => `${Math.floor(s / 60)}:${(s % 60).toFixed(1).padStart(4, 
 const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))}\u00a0mN` : `${minus(n.toFixed(2))}\u00a0N`);
 
+/** The value to which a tip is steered, with its sign; nothing for those that are not. */
+function bend(value) {
+  if (value === undefined) return "";
+  const text = minus(value.toFixed(2));
+  return `, tip ${Number(text) === 0 ? "straight" : text.replace(/^(?=\d)/, "+")}`;
+}
+
 /** Shows a frame. */
 export function show({ readout: now, planes, three: view, backend, backend3D }) {
   readout = now;
@@ -40,6 +47,7 @@ export function show({ readout: now, planes, three: view, backend, backend3D }) 
   element("lock").classList.toggle("on", lab.live);
   element("show").classList.toggle("on", now.demonstrates);
   element("detach").hidden = !now.packing;
+  element("steering").hidden = !now.instruments.some((one) => one.steer !== undefined);
   element("arm").textContent = pose(lab.lao_deg, lab.cra_deg);
   if (lab.second_deg) element("second-arm").textContent = pose(...lab.second_deg);
   element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.entrance_ugy === null ? "" : `${(lab.entrance_ugy / 1000).toFixed(2)} mGy, ${lab.kerma_area_ugym2.toFixed(1)} µGy·m²`}`;
@@ -70,7 +78,7 @@ function hands(now) {
     const [name, place, felt] = button.children;
     name.textContent = one.name;
     const ahead = Math.abs(one.behind_mm) < 0.05 ? "" : `, hand ${minus(one.behind_mm.toFixed(1))} mm ahead`;
-    place.textContent = `${one.inserted_mm.toFixed(1)} mm in${ahead}, ${minus(one.rotation_deg.toFixed(0))}°`;
+    place.textContent = `${one.inserted_mm.toFixed(1)} mm in${ahead}, ${minus(one.rotation_deg.toFixed(0))}°${bend(one.steer)}`;
     felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))}\u00a0N·mm${one.warns ? " – beyond the limit" : ""}`;
     button.classList.toggle("warns", one.warns);
     button.classList.toggle("chosen", now.selected === one.name && now.instruments.length > 1);

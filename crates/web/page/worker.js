@@ -187,7 +187,7 @@ const heard = {
   key: ([code, down, again]) => session.key(code, down, again),
   modify: ([shift, control]) => session.modify(shift, control),
   letGo: () => session.letGo(),
-  gamepad: ([pressed, up, right]) => session.gamepad(pressed, up, right),
+  gamepad: ([pressed, up, right, bend]) => session.gamepad(pressed, up, right, bend),
   input: (input) => session.apply(input),
 };
 

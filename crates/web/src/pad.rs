@@ -15,7 +15,7 @@ const BUTTONS: [Option<Button>; 16] = [
     Some(Button::Select),
     Some(Button::Start),
     None,
-    None,
+    Some(Button::RightStick),
     Some(Button::CrossUp),
     Some(Button::CrossDown),
     Some(Button::CrossLeft),
@@ -23,10 +23,10 @@ const BUTTONS: [Option<Button>; 16] = [
 ];
 
 /// State of a gamepad: indices of pressed buttons, and the deflections of the left stick upwards and of the right
-/// stick to the right, −1 to 1.
-pub(crate) fn held(pressed: &[u8], up: f64, right: f64) -> Pad {
+/// stick to the right and upwards, −1 to 1.
+pub(crate) fn held(pressed: &[u8], [up, right, bend]: [f64; 3]) -> Pad {
     let down = pressed.iter().filter_map(|number| *BUTTONS.get(usize::from(*number))?).collect();
-    Pad { up, right, down }
+    Pad { up, right, bend, down }
 }
 
 #[cfg(test)]
@@ -38,7 +38,7 @@ mod tests {
         for button in Button::ALL {
             assert_eq!(BUTTONS.iter().flatten().filter(|one| **one == button).count(), 1, "{button:?}");
         }
-        let pad = held(&[7, 10, 200], 0.5, -1.0);
-        assert_eq!((pad.up, pad.right, pad.down), (0.5, -1.0, [Button::RightTrigger].into()));
+        let pad = held(&[7, 10, 200], [0.5, -1.0, 0.25]);
+        assert_eq!((pad.up, pad.right, pad.bend, pad.down), (0.5, -1.0, 0.25, [Button::RightTrigger].into()));
     }
 }

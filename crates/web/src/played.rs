@@ -68,6 +68,7 @@ impl Played {
         let wall = simulation.lumen().wall(&NoStore)?.clone();
         let setup = setup(&scene, simulation.stack())?;
         let sac = scene.sac(simulation.lumen(), &NoStore)?;
+        let keys = Keys::of(simulation.stack());
         let session = Session::new(simulation, view, side_px, Limits::default())?;
         let mut session = session.with_ticks(TICK_SOLVES)?.with_sac(sac);
         if is_shown {
@@ -87,7 +88,7 @@ impl Played {
         });
         Ok(Self {
             session,
-            keys: Keys::new(names),
+            keys,
             scene_path,
             settings,
             script,

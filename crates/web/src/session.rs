@@ -97,9 +97,9 @@ impl Session {
     }
 
     /// Handles the state of a gamepad: indices of pressed buttons in the standard layout, and the deflections of the
-    /// left stick upwards and of the right stick to the right, −1 to 1.
-    pub fn gamepad(&mut self, pressed: &[u8], up: f64, right: f64) {
-        let before = std::mem::replace(&mut self.pad, pad::held(pressed, up, right));
+    /// left stick upwards and of the right stick to the right and upwards, −1 to 1.
+    pub fn gamepad(&mut self, pressed: &[u8], up: f64, right: f64, bend: f64) {
+        let before = std::mem::replace(&mut self.pad, pad::held(pressed, [up, right, bend]));
         let inputs = self.played.keys.pad(&before, &self.pad);
         self.played.take(&inputs);
     }

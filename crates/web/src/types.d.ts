@@ -6,6 +6,7 @@ export type Input =
   | { do: "select"; instrument: string }
   | { do: "move"; instrument?: string; mm_per_s?: number; deg_per_s?: number }
   | { do: "nudge"; instrument?: string; mm?: number; deg?: number }
+  | { do: "steer"; instrument?: string; to?: number; per_s?: number }
   | { do: "stop" } | { do: "script" } | { do: "detach"; instrument?: string } | { do: "undo" } | { do: "redo" }
   | { do: "pedal"; down: boolean; mode?: "fluoro" | "cine" | "dsa" | "roadmap" }
   | { do: "inject"; ml: number; ml_per_s: number }
@@ -22,7 +23,7 @@ export interface Readout {
   step: number; time_s: number; demonstrates: boolean; selected: string;
   unconverged_steps: number; jumps: number; relaxations: number;
   instruments: {
-    name: string; length_mm: number; inserted_mm: number; behind_mm: number; rotation_deg: number;
+    name: string; length_mm: number; inserted_mm: number; behind_mm: number; rotation_deg: number; steer?: number;
     push_force_n: number | null; torque_nmm: number; warns: boolean;
   }[];
   tip_mm: [number, number, number] | null; contacts: number; wall_force_n: number;

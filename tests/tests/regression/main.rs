@@ -10,6 +10,7 @@ mod hard_scenes;
 mod instruments;
 mod passages;
 mod robust_insertion;
+mod round_bits;
 mod sequences;
 mod state;
 mod wedged;

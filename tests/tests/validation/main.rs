@@ -7,6 +7,7 @@ mod found_centreline;
 mod insertion;
 mod path;
 mod rod;
+mod soft_plane;
 mod spoiled_surfaces;
 mod steered;
 mod tails;

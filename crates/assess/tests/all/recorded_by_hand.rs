@@ -400,6 +400,33 @@ step,instrument,advance_mm,rotate_rad,inserted_mm,tip_x_mm,tip_y_mm,tip_z_mm,pus
 ";
 
 #[test]
+fn a_run_that_steers_is_a_hand_that_moves() {
+    let read = |steered: [f64; 3]| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut lines = HANDS.lines();
+        let mut text = format!("{},steer\n", lines.next().unwrap());
+        for (index, line) in lines.enumerate() {
+            let value = if index % 2 == 1 { steered[index / 2] } else { 0.0 };
+            text += &format!("{line},{value}\n");
+        }
+        std::fs::write(folder.path().join("steps.csv"), STEPS).unwrap();
+        std::fs::write(folder.path().join("instruments.csv"), text).unwrap();
+        Record::read(folder.path()).unwrap()
+    };
+    let by = |record: &Record| -> Vec<f64> {
+        record.samples.iter().map(|sample| sample.hands[1].steer_by).collect()
+    };
+    let steered = read([0.0, 0.25, -0.25]);
+    assert_eq!(by(&steered), [0.0, 0.25, -0.5]);
+    assert!(steered.samples.iter().all(|sample| sample.hands[0].steer_by == 0.0));
+    assert_eq!(by(&read([0.0; 3])), [0.0; 3], "the twin");
+    // The same as a session, and what is not steered is not in its file.
+    let text = |record: &Record| serde_json::to_string(record).unwrap();
+    let again: Record = serde_json::from_str(&text(&steered)).unwrap();
+    assert!(again == steered && !text(&read([0.0; 3])).contains("steer"));
+}
+
+#[test]
 fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
     let whole = |name: &str| match name {
         "steps.csv" => STEPS.to_owned(),

@@ -19,7 +19,7 @@ use super::whole;
 use crate::failure::Failure;
 
 /// First line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 23";
+const FORMAT: &str = "endowire state 24";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// Hashes of everything that the steps up to a state depended on.

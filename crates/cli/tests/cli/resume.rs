@@ -229,13 +229,13 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     // What is no state, and one that is damaged at any byte.
     let bytes = std::fs::read(&state).unwrap();
     let damaged = at("damaged");
-    let newer = [b"endowire state 24", &bytes["endowire state 23".len()..]].concat();
+    let newer = [b"endowire state 25", &bytes["endowire state 24".len()..]].concat();
     let mut changed = bytes.clone();
     let middle = changed.len() / 2;
     changed[middle] ^= 1;
     let reported = [
         (text.clone().into_bytes(), "is no saved state"),
-        (newer, "its format is \"endowire state 24\""),
+        (newer, "its format is \"endowire state 25\""),
         (changed, "is not whole or was changed"),
         (bytes[..bytes.len() - 1].to_vec(), "is not whole"),
         (bytes[..20].to_vec(), "is not whole"),

@@ -11,6 +11,7 @@ mod part;
 mod quantity;
 mod rest_shape;
 mod secondary;
+mod soft_plane;
 mod stack;
 mod steer;
 mod winding;
@@ -19,13 +20,14 @@ pub(crate) use file::FileTable;
 pub use file::{DeviceFile, Kind};
 pub(crate) use part::PartTable;
 pub use part::{Coat, CutError, Part};
+pub use soft_plane::SoftPlane;
 pub(crate) use stack::LENGTH_SLACK_MM;
 pub use stack::{Instrument, Stack, line_mm};
-pub(crate) use steer::MOST_STEER;
-pub use steer::Steer;
+pub use steer::{MOST_STEER, Steer};
 
 use serde::{Deserialize, Serialize};
 
+use crate::rod::times;
 use crate::{Error, Result};
 
 /// A section of a device with constant properties.
@@ -39,9 +41,13 @@ pub struct Section {
     /// Radius of the lumen, mm; solid if absent. Less than `radius_mm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inner_radius_mm: Option<f64>,
-    /// Bending stiffness EI, N·mm².
+    /// Bending stiffness EI, N·mm²; with a soft plane that across it.
     pub bending_stiffness_nmm2: f64,
-    /// Torsional stiffness GJ, N·mm²; EI/1.3 if absent: a solid round wire of Poisson ratio 0.3.
+    /// The plane in which it bends more easily; absent where it bends alike in all planes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub soft_plane: Option<SoftPlane>,
+    /// Torsional stiffness GJ, N·mm²; EI/1.3 if absent: a solid round wire of Poisson ratio 0.3. With a soft plane, that of a
+    /// solid elliptic one: EI is then 2 EI₁EI₂/(EI₁ + EI₂).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torsional_stiffness_nmm2: Option<f64>,
     /// Rest curvature along the first and second material direction, 1/mm: a shaped tip.
@@ -60,6 +66,7 @@ impl Section {
             radius_mm,
             inner_radius_mm: None,
             bending_stiffness_nmm2,
+            soft_plane: None,
             torsional_stiffness_nmm2: None,
             rest_curvature_per_mm: [0.0; 2],
             steer: None,
@@ -68,7 +75,14 @@ impl Section {
 
     /// GJ, N·mm².
     pub fn torsion_nmm2(&self) -> f64 {
-        self.torsional_stiffness_nmm2.unwrap_or(self.bending_stiffness_nmm2 / 1.3)
+        self.torsional_stiffness_nmm2.unwrap_or_else(|| {
+            let across = self.bending_stiffness_nmm2;
+            let round = self.soft_plane.map_or(across, |plane| {
+                let soft = plane.bending_stiffness_nmm2;
+                2.0 * soft * across / (soft + across)
+            });
+            round / 1.3
+        })
     }
 
     /// Whether it has a rest shape, at some value of the steering.
@@ -76,10 +90,14 @@ impl Section {
         self.rest_curvature_per_mm != [0.0; 2] || self.steer.is_some()
     }
 
-    /// Energy per length to straighten it, ½ EI |κ⁰|², mJ/mm = N: also the force with which it comes out of a
+    /// Energy per length to straighten it, ½ EI |κ⁰|², in general ½ κ⁰ᵀBκ⁰, mJ/mm = N: also the force with which it comes out of a
     /// straight sheath.
     pub(crate) fn straightening_n(&self) -> f64 {
         let [u, v] = self.rest_curvature_per_mm;
+        if self.soft_plane.is_some() {
+            let [along_u, along_v] = times(self.stiffness_nmm2(), [u, v]);
+            return 0.5 * (along_u * u + along_v * v);
+        }
         0.5 * self.bending_stiffness_nmm2 * (u * u + v * v)
     }
 
@@ -89,10 +107,13 @@ impl Section {
             ("length_mm", self.length_mm, LENGTH_LIMIT_MM),
             ("radius_mm", self.radius_mm, RADIUS_LIMIT_MM),
             ("bending_stiffness_nmm2", self.bending_stiffness_nmm2, STIFFNESS_LIMIT_NMM2),
-            ("torsional_stiffness_nmm2", self.torsion_nmm2(), STIFFNESS_LIMIT_NMM2),
         ] {
             crate::error::in_range(&format!("{name}.{field}"), value, limit)?;
         }
+        let across_nmm2 = self.bending_stiffness_nmm2;
+        self.soft_plane.iter().try_for_each(|plane| plane.check(name, across_nmm2))?;
+        let torsional = format!("{name}.torsional_stiffness_nmm2");
+        crate::error::in_range(&torsional, self.torsion_nmm2(), STIFFNESS_LIMIT_NMM2)?;
         if self.radius_mm < LEAST_RADIUS_MM {
             let remedy = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
             return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, remedy));
@@ -183,10 +204,14 @@ impl Device {
     /// The same device as a coil on its pusher, with this length, from the tip on, that can be detached.
     ///
     /// # Errors
-    /// A length that is not positive and less than that of the device; a device that is steered.
+    /// A length that is not positive and less than that of the device; a device that is steered or has a soft plane.
     pub fn with_coil(self, coil_mm: f64) -> Result<Self> {
         if self.is_steerable() {
             return Err(Error::parameter("device.coil_mm", coil_mm, "a device that is steered is no coil"));
+        }
+        if self.has_soft_plane() {
+            let remedy = "a device with a soft plane is no coil: leave soft_plane out of its sections";
+            return Err(Error::parameter("device.coil_mm", coil_mm, remedy));
         }
         if coil_mm > 0.0 && coil_mm < self.length_mm {
             return Ok(Self { coil_mm, ..self });
@@ -201,6 +226,11 @@ impl Device {
     /// Whether any of its sections is steered.
     pub fn is_steerable(&self) -> bool {
         self.sections.iter().any(|section| section.steer.is_some())
+    }
+
+    /// Whether any of its sections bends more easily in one plane.
+    pub fn has_soft_plane(&self) -> bool {
+        self.sections.iter().any(|section| section.soft_plane.is_some())
     }
 
     /// The same device steered to a value from −1 to 1: with the rest curvature that its sections then have.
@@ -285,9 +315,9 @@ impl Device {
         &self.sections[self.sections.len() - 1]
     }
 
-    /// Whether the device has a rest shape, so that rotating its tail moves it.
+    /// Whether the device has a rest shape or a soft plane, so that rotating its tail moves it.
     pub fn is_shaped(&self) -> bool {
-        self.sections.iter().any(Section::is_shaped)
+        self.sections.iter().any(Section::is_shaped) || self.has_soft_plane()
     }
 
     /// Length from the tip within which the device has a rest shape, mm.

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use super::quantity::{Ends, Quantity, Way, one_of, second_moment_mm4};
 use super::secondary::{Arc, Secondary};
 use super::winding::Winding;
-use super::{LENGTH_LIMIT_MM, RADIUS_LIMIT_MM, STIFFNESS_LIMIT_NMM2, Section};
+use super::{LENGTH_LIMIT_MM, RADIUS_LIMIT_MM, STIFFNESS_LIMIT_NMM2, Section, SoftPlane};
 use crate::{Error, Result};
 
 /// Millimetres in an inch.
@@ -109,6 +109,8 @@ pub struct Part {
     inner_radius_mm: Option<Ends>,
     stiffness: Stiffness,
     torsion_nmm2: Option<Ends>,
+    /// The plane in which a section bends more easily; what a data sheet describes has none.
+    soft_plane: Option<SoftPlane>,
     /// Its arcs of the rest shape, tip first; a part with several is not tapered.
     arcs: Vec<Arc>,
     cuts: usize,
@@ -127,6 +129,7 @@ impl Part {
             inner_radius_mm: section.inner_radius_mm.map(Ends::constant),
             stiffness: Stiffness::Bending(Ends::constant(section.bending_stiffness_nmm2)),
             torsion_nmm2: section.torsional_stiffness_nmm2.map(Ends::constant),
+            soft_plane: section.soft_plane,
             arcs: vec![Arc { length_mm: section.length_mm, curvature_per_mm: section.rest_curvature_per_mm }],
             cuts: 1,
         }
@@ -155,6 +158,7 @@ impl Part {
             torsional_stiffness_nmm2: self.torsion_nmm2.map(|gj| gj.at(fraction)),
             rest_curvature_per_mm: self.arc(fraction).curvature_per_mm,
             steer: None,
+            soft_plane: self.soft_plane,
         }
     }
 
@@ -298,6 +302,7 @@ impl PartTable {
             inner_radius_mm: inner,
             stiffness,
             torsion_nmm2: torsion,
+            soft_plane: None,
             arcs: self.arcs(&place, length_mm, outer.ends)?,
             cuts: self.cuts(&place, tapered.into_iter().flatten().any(Ends::is_taper))?,
         };

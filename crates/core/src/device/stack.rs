@@ -189,6 +189,11 @@ impl Stack {
         self.devices().any(Device::is_steerable)
     }
 
+    /// Whether any of the instruments bends more easily in one plane.
+    pub fn has_soft_plane(&self) -> bool {
+        self.devices().any(Device::has_soft_plane)
+    }
+
     /// The same instruments steered to these values; those that are not steered have none.
     pub(crate) fn steered(&self, values: impl Iterator<Item = f64> + Clone) -> Cow<'_, Self> {
         let is_at = |(device, value): (&Device, f64)| device.steered_to() == value || !device.is_steerable();
@@ -290,7 +295,7 @@ impl Stack {
     /// Smallest bending stiffness, N·mm².
     pub(crate) fn softest_nmm2(&self) -> f64 {
         let sections = self.devices().flat_map(Device::sections);
-        sections.map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
+        sections.map(Section::softest_nmm2).fold(f64::MAX, f64::min)
     }
 
     /// Outer radius of the outermost instrument at this distance from the tip of the line, mm, with these lengths

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, Result};
 
 /// Values of the steering of a device: from the largest bend one way to the largest the other way.
-pub(crate) const MOST_STEER: f64 = 1.0;
+pub const MOST_STEER: f64 = 1.0;
 
 /// How a section bends when its device is steered to a value v from −1 to 1: its rest curvature is
 ///

@@ -100,6 +100,11 @@ impl<'a> SimulationBuilder<'a> {
                 "knows no devices that are steered: leave steer out of their sections, or choose kirchhoff";
             return Err(Error::parameter("method.name", method.name(), remedy));
         }
+        if scene.stack.has_soft_plane() && !method.takes_soft_planes() {
+            let remedy =
+                "knows one bending stiffness of a section: leave soft_plane out of them, or choose kirchhoff";
+            return Err(Error::parameter("method.name", method.name(), remedy));
+        }
         let method = method.start(&scene.surroundings([0.0; 2]), store)?;
         let (fields, fields_before) = (Arc::new([]), Arc::new([]));
         Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before, stop: None })

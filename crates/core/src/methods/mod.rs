@@ -242,6 +242,11 @@ pub trait MethodChoice: Debug {
         false
     }
 
+    /// Whether it supports sections that bend more easily in one plane.
+    fn takes_soft_planes(&self) -> bool {
+        false
+    }
+
     /// Checks whether coils can be detached with this method and its options.
     ///
     /// # Errors
@@ -286,6 +291,11 @@ impl MethodChoice for OwnMethod {
     fn takes_steering(&self) -> bool {
         let Self::Kirchhoff(options) = self;
         options.takes_steering()
+    }
+
+    fn takes_soft_planes(&self) -> bool {
+        let Self::Kirchhoff(options) = self;
+        options.takes_soft_planes()
     }
 
     fn check_detach(&self) -> Result<()> {

@@ -181,6 +181,7 @@ fn passes(device: &Device, from_tip_mm: f64, force_n: f64) -> (f64, f64) {
             break;
         }
         let [u, v] = section.rest_curvature_per_mm;
+        // Across a soft plane, where it has one: it need not lie in that of the path.
         let more_per_mm = (2.0 * force_n / section.bending_stiffness_nmm2).sqrt();
         bears_mm = bears_mm.max(1.0 / (libm::hypot(u, v) + more_per_mm));
         begin_mm += section.length_mm;

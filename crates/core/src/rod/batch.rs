@@ -72,7 +72,10 @@ pub(super) struct Instrument<S: Simd> {
     pub(super) present: bool,
     /// Whether it has rest curvature in any of them.
     pub(super) curved: bool,
+    /// Whether it is stiffer in some planes than in others in any of them.
+    pub(super) skewed: bool,
     bending: [Lanes<S>; 3],
+    skew: [[Lanes<S>; 3]; 3],
     torsion: [Lanes<S>; 3],
     rest_curvature: [[Lanes<S>; 2]; 3],
     rest_twist: [Lanes<S>; 3],
@@ -84,21 +87,40 @@ impl<S: Simd> Instrument<S> {
     /// Stiffness and rest state of Gauss point `k` of elements of these lengths, in the units of [`super::torsion`].
     #[inline(always)]
     pub(super) fn torsion_input(&self, k: usize, length: Lanes<S>) -> TorsionInput<S> {
-        let moment = self.bending[k] * GAUSS[k].weight;
+        let stiff = self.bending[k] * GAUSS[k].weight;
+        let [u, v] = self.rest_curvature[k];
+        let mut moment = [stiff * u, stiff * v];
+        if self.skewed && self.curved {
+            let [p, q, c] = self.skew[k];
+            moment[0] += (p * u + c * v) * GAUSS[k].weight;
+            moment[1] += (c * u + q * v) * GAUSS[k].weight;
+        }
         TorsionInput {
-            moment: [moment * self.rest_curvature[k][0], moment * self.rest_curvature[k][1]],
+            moment,
             stiffness: self.torsion[k] * GAUSS[k].weight / length,
             rest_twist: length * self.rest_twist[k],
         }
     }
 
-    /// ½∫EI|κ⁰|² ds over elements of these lengths, the constant that makes the bending energy zero in the rest state.
+    /// Weight × skew/h of Gauss point `k` of elements of these lengths.
+    #[inline(always)]
+    pub(super) fn skew_input(&self, k: usize, length: Lanes<S>) -> [Lanes<S>; 3] {
+        let scale = length.inverse() * GAUSS[k].weight;
+        let [p, q, c] = self.skew[k];
+        [p * scale, q * scale, c * scale]
+    }
+
+    /// ½∫κ⁰ᵀBκ⁰ ds over elements of these lengths, the constant that makes the bending energy zero in the rest state.
     #[inline(always)]
     pub(super) fn rest_energy(&self, length: Lanes<S>) -> Lanes<S> {
         let mut sum = length.like(0.0);
         for k in 0..3 {
             let [a, b] = self.rest_curvature[k];
             sum += self.bending[k] * GAUSS[k].weight * (a * a + b * b);
+            if self.skewed {
+                let [p, q, c] = self.skew[k];
+                sum += (p * a * a + q * b * b + c * (a * 2.0 * b)) * GAUSS[k].weight;
+            }
         }
         length * 0.5 * sum
     }
@@ -131,7 +153,9 @@ impl<S: Simd> Batch<S> {
         let none = Instrument {
             present: false,
             curved: false,
+            skewed: false,
             bending: [zero; 3],
+            skew: [[zero; 3]; 3],
             torsion: [zero; 3],
             rest_curvature: [[zero; 2]; 3],
             rest_twist: [zero; 3],
@@ -156,11 +180,17 @@ impl<S: Simd> Batch<S> {
             let of = &mut batch.instruments[set];
             of.present = lanes.iter().any(|lane| lane.data.materials[set].is_present());
             of.curved = lanes.iter().any(|lane| lane.data.materials[set].rest_curvature != [[0.0; 2]; 3]);
+            of.skewed = lanes.iter().any(|lane| lane.data.materials[set].skew != [[0.0; 3]; 3]);
             for k in 0..3 {
                 let of_lane = |lane: usize| &lanes[lane].data.materials[set];
                 of.torsion[k] = Lanes::gather(simd, |lane| of_lane(lane).torsion[k]);
                 of.rest_twist[k] = Lanes::gather(simd, |lane| of_lane(lane).rest_twist[k]);
                 of.angles[k] = Lanes::gather(simd, |lane| lanes[lane].angles[set][k]);
+                if of.skewed {
+                    for a in 0..3 {
+                        of.skew[k][a] = Lanes::gather(simd, |lane| of_lane(lane).skew[k][a]);
+                    }
+                }
                 if of.curved {
                     of.bending[k] = Lanes::gather(simd, |lane| of_lane(lane).bending[k]);
                     for a in 0..2 {

@@ -1,6 +1,8 @@
 //! The reaction of a clamp at the start of a rod, and the force that pushes the rod through it.
 
+use super::frame::Frame;
 use super::layout::{Layout, MAX_ANGLES};
+use super::share::{bent_by, times};
 use super::state::RodState;
 use crate::Vec3;
 
@@ -48,6 +50,24 @@ impl Clamp {
         let bend = rest_curvature - self.moment.cross(tangent) / bending;
         self.force.dot(tangent)
             - 0.5 * bending * bend.norm_squared()
+            - 0.5 * self.torque * self.torque / torsion
+    }
+
+    /// The same for a rod that is stiffer in some planes than in others: F = −n·t − ½t′ᵀBt′ − ½GJτ². Its stiffness B
+    /// ([`Material`](super::Material)) and its rest curvature are along the directions of its material triad.
+    pub fn skew_push_force(
+        &self,
+        material: &Frame,
+        stiffness: (f64, [f64; 3]),
+        torsion: f64,
+        rest_curvature: [f64; 2],
+    ) -> f64 {
+        let moment = self.moment.cross(&material.t);
+        let by = bent_by(stiffness, [material.u, material.v].map(|axis| axis.dot(&moment)));
+        let bend = [0, 1].map(|axis| rest_curvature[axis] - by[axis]);
+        let held = times(stiffness, bend);
+        self.force.dot(&material.t)
+            - 0.5 * (held[0] * bend[0] + held[1] * bend[1])
             - 0.5 * self.torque * self.torque / torsion
     }
 }

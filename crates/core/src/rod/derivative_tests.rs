@@ -41,7 +41,18 @@ fn material(s: &mut u64) -> Material {
         torsion: [positive(s), positive(s), positive(s)],
         rest_curvature: [[noise(s), noise(s)], [noise(s), noise(s)], [noise(s), noise(s)]],
         rest_twist: [noise(s), noise(s), noise(s)],
+        ..Material::NONE
     }
+}
+
+/// The same with two of its three instruments stiffer in some planes than in others.
+fn skewed(mut data: ElementData, s: &mut u64) -> ElementData {
+    for material in &mut data.materials[..2] {
+        for k in 0..3 {
+            material.skew[k] = [positive(s), positive(s), noise(s)];
+        }
+    }
+    data
 }
 
 /// An element with three instruments that have rest shapes, and one without.
@@ -127,17 +138,19 @@ fn element_derivatives_are_those_of_its_energy() {
             let mut s = seed * 77 + 5;
             let (d, mut q) = (data(&mut s), state(&mut s, angle, spread));
             q.chord *= stretch;
-            let of_widths = [
-                errors::<PLAIN>(&d, &q, 0.0),
-                errors::<TWISTED>(&d, &q, 0.0),
-                errors::<20>(&d, &q, 0.0),
-                errors::<24>(&d, &q, 0.0),
-            ];
-            for (sets, (g, h)) in of_widths.into_iter().enumerate() {
-                assert!(
-                    g < 1e-8 && h < 5e-7,
-                    "{sets} sets, angle {angle}, seed {seed}: gradient {g:e}, Hessian {h:e}"
-                );
+            for d in [d, skewed(d, &mut s)] {
+                let of_widths = [
+                    errors::<PLAIN>(&d, &q, 0.0),
+                    errors::<TWISTED>(&d, &q, 0.0),
+                    errors::<20>(&d, &q, 0.0),
+                    errors::<24>(&d, &q, 0.0),
+                ];
+                for (sets, (g, h)) in of_widths.into_iter().enumerate() {
+                    assert!(
+                        g < 1e-8 && h < 5e-7,
+                        "{sets} sets, angle {angle}, seed {seed}: gradient {g:e}, Hessian {h:e}"
+                    );
+                }
             }
         }
     }
@@ -149,6 +162,37 @@ fn a_wrong_derivative_is_seen() {
     let (d, q) = (data(&mut s), state(&mut s, 0.3, 0.2));
     for (g, h) in [errors::<TWISTED>(&d, &q, 1e-2), errors::<24>(&d, &q, 1e-2)] {
         assert!(g > 1e-8 && h > 5e-7);
+    }
+}
+
+/// A skew stiffness is what a rest curvature meets: with B = diag(3, 1) along d₁ and d₂ an element that is bent in either plane stores
+/// its part alone, whichever way it is turned.
+#[test]
+fn a_skew_element_stores_what_its_planes_store() {
+    let length = 0.02;
+    let first = Frame::new(Vec3::z(), Some(Vec3::x()));
+    for turned in [0.0, 0.4, 1.3, 2.9] {
+        for (plane, stiffness) in
+            [(0.0, 3.0), (0.5 * std::f64::consts::PI, 1.0), (0.25 * std::f64::consts::PI, 2.0)]
+        {
+            let way: f64 = plane + turned;
+            let bend = 0.01;
+            let second = first.transported(bend * way.cos(), bend * way.sin());
+            let material = Material {
+                bending: [1.0; 3],
+                skew: [[2.0, 0.0, 0.0]; 3],
+                torsion: [1.0; 3],
+                ..Material::NONE
+            };
+            let of_arc = (0.5 * bend).sin() / (0.5 * bend);
+            let chord = first.transported(0.5 * bend * way.cos(), 0.5 * bend * way.sin()).t * of_arc;
+            let angles = [[turned, turned, 0.0]; MAX_ANGLES];
+            let q = ElementState { first, second, chord, tension: 0.0, angles };
+            let energy = element_energy::<TWISTED>(&ElementData::of(length, material), &q);
+            let expected = 0.5 * stiffness * bend * bend / length;
+            assert!((energy.bend / expected - 1.0).abs() < 1e-8, "{turned} {plane}: {energy:?} {expected}");
+            assert!(energy.twist < 1e-12 * expected);
+        }
     }
 }
 

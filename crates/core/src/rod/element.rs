@@ -11,8 +11,10 @@ use std::ops::{Add, Mul, Sub};
 /// One instrument in an element, sampled at its Gauss points, as far as its material angle needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Bending stiffness EI of this instrument alone.
+    /// Bending stiffness EI of this instrument alone, in the plane in which it bends most easily.
     pub bending: [f64; 3],
+    /// What it is stiffer by in others, B = EI + (p c; c q) along d₁ and d₂: (p, q, c), 0 of round cross-sections.
+    pub skew: [[f64; 3]; 3],
     /// Torsional stiffness GJ; unused without twist.
     pub torsion: [f64; 3],
     /// Rest curvature along d₁ and d₂.
@@ -23,8 +25,13 @@ pub struct Material {
 
 impl Material {
     /// No instrument: it has ended before this element.
-    pub(crate) const NONE: Self =
-        Self { bending: [0.0; 3], torsion: [0.0; 3], rest_curvature: [[0.0; 2]; 3], rest_twist: [0.0; 3] };
+    pub const NONE: Self = Self {
+        bending: [0.0; 3],
+        skew: [[0.0; 3]; 3],
+        torsion: [0.0; 3],
+        rest_curvature: [[0.0; 2]; 3],
+        rest_twist: [0.0; 3],
+    };
 
     /// Whether there is an instrument.
     #[inline]
@@ -38,7 +45,7 @@ impl Material {
 pub struct ElementData {
     /// Length h along the rod.
     pub length: f64,
-    /// Total bending stiffness EI of all instruments.
+    /// Total bending stiffness EI of all instruments, without what they are stiffer by in some planes.
     pub bending: [f64; 3],
     /// Axial flexibility ∫ds/EA; zero = inextensible.
     pub flexibility: f64,
@@ -125,7 +132,7 @@ pub struct ElementState {
 /// Stored energy by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy<T = f64> {
-    /// Bending, ½∫EI|κ − κ⁰|² ds.
+    /// Bending, ½∫(κ − κ⁰)ᵀB(κ − κ⁰) ds.
     pub bend: T,
     /// Twist, ½∫GJ(τ − τ⁰)² ds.
     pub twist: T,

@@ -1,4 +1,4 @@
-//! Twist and rest curvature of one element: the part of its energy that depends on material frames.
+//! Twist, rest curvature and skew stiffness of one element: the part of its energy that depends on material frames.
 //!
 //! Instruments that share the centre line share its geometry; each is turned against it by its own angle. In the
 //! first node's triad the energy depends on the chord, the far tangent, and (φ₀, φ₁, b) of every instrument, φ₁ =
@@ -13,7 +13,7 @@ use super::element::{ElementSystem, Energy, angles};
 use super::lanes::{Lanes, Matrix, Vector};
 use super::layout::{Layout, MAX_ANGLES};
 use super::quadrature::{GAUSS, Point};
-use super::torsion::{PointDerivatives, ReferenceTwist};
+use super::torsion::{AngleDensity, PointDerivatives, ReferenceTwist, Slope};
 use pulp::Simd;
 
 /// Derivatives in the chord and the far tangent, both in the first triad.
@@ -36,7 +36,35 @@ struct AngleDerivatives<S: Simd> {
     angles_angles: [[Lanes<S>; 3]; 3],
 }
 
+impl<S: Simd> ShapeDerivatives<S> {
+    /// Adds the products of the gradients of the curvatures along d₁ and d₂ in the energy of a skew stiffness.
+    #[inline(always)]
+    fn add_square(&mut self, [p, q, c]: [Lanes<S>; 3], along: [Slope<S>; 2], [chord, end]: [(f64, f64); 2]) {
+        let [first, second] = along;
+        let (c1, e1) = (weighed(first.y, first.z, chord), weighed(first.y, first.z, end));
+        let (c2, e2) = (weighed(second.y, second.z, chord), weighed(second.y, second.z, end));
+        self.chord_chord += c1.outer(c1) * p + c2.outer(c2) * q + c1.outer(c2).with_transpose() * c;
+        self.chord_end += c1.outer(e1) * p + c2.outer(e2) * q + (c1.outer(e2) + c2.outer(e1)) * c;
+        self.end_end += e1.outer(e1) * p + e2.outer(e2) * q + e1.outer(e2).with_transpose() * c;
+    }
+}
+
 impl<S: Simd> AngleDerivatives<S> {
+    /// Adds derivatives in φ at a point, with the weights of the angles in φ, and of chord and far tangent in y and z.
+    #[inline(always)]
+    fn add(&mut self, own: &AngleDensity<S>, weight: &[f64; 3], [chord, end]: [(f64, f64); 2]) {
+        let in_chord = weighed(own.along_y, own.along_z, chord);
+        let in_end = weighed(own.along_y, own.along_z, end);
+        for i in 0..3 {
+            self.angles_chord[i] += in_chord * weight[i];
+            self.angles_end[i] += in_end * weight[i];
+            self.angles[i] += own.first * weight[i];
+            for j in i..3 {
+                self.angles_angles[i][j] += own.second * (weight[i] * weight[j]);
+            }
+        }
+    }
+
     /// All zero.
     #[inline(always)]
     fn zeros(simd: S) -> Self {
@@ -231,16 +259,14 @@ fn add_point<S: Simd, const C: usize>(
         if instrument.curved {
             let (bend, own) = twist.add_rest_curvature(phi, input.moment, &mut f);
             energy.bend += bend;
-            let in_chord = weighed(own.along_y, own.along_z, (yc, zc));
-            let in_end = weighed(own.along_y, own.along_z, (ye, ze));
-            for i in 0..3 {
-                spin.angles_chord[i] += in_chord * weight[i];
-                spin.angles_end[i] += in_end * weight[i];
-                spin.angles[i] += own.first * weight[i];
-                for j in i..3 {
-                    spin.angles_angles[i][j] += own.second * (weight[i] * weight[j]);
-                }
-            }
+            spin.add(&own, &weight, [(yc, zc), (ye, ze)]);
+        }
+        if instrument.skewed {
+            let skew = instrument.skew_input(k, s.length);
+            let (bend, own, along) = twist.add_skew(phi, skew, &mut f);
+            energy.bend += bend;
+            spin.add(&own, &weight, [(yc, zc), (ye, ze)]);
+            shape.add_square(skew, along, [(yc, zc), (ye, ze)]);
         }
     }
     twist.add_twist(torques, &mut f);

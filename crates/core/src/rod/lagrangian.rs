@@ -166,6 +166,9 @@ fn energy<S: Simd, const C: usize>(s: &Batch<S>) -> Energy<S::f64s> {
                     if instrument.curved {
                         bend += shared.rest_curvature_energy(phi, &input);
                     }
+                    if instrument.skewed {
+                        bend += shared.skew_energy(phi, instrument.skew_input(k, s.length));
+                    }
                 }
             }
         }

@@ -56,7 +56,7 @@ pub(crate) use lagrangian::{element_gradients, stored_energy};
 pub(crate) use layout::MAX_ANGLES;
 pub use layout::{Layout, PLAIN, TWISTED};
 pub use points::PointSum;
-pub use share::shares;
+pub use share::{shares, times};
 pub use state::RodState;
 pub use stencils::{Stencils, Triple};
 pub use supports::{EndAngle, Supports};

@@ -20,6 +20,18 @@ pub fn shares(from: f64, to: f64) -> [f64; 3] {
     ]
 }
 
+/// A moment: the stiffness B = EI + (p c; c q) of a cross-section times a curvature along d₁ and d₂.
+pub fn times((bending, [p, q, c]): (f64, [f64; 3]), [u, v]: [f64; 2]) -> [f64; 2] {
+    [bending * u + (p * u + c * v), bending * v + (c * u + q * v)]
+}
+
+/// The curvature along d₁ and d₂ that a moment bends such a cross-section to.
+pub(super) fn bent_by((bending, [p, q, c]): (f64, [f64; 3]), [m, n]: [f64; 2]) -> [f64; 2] {
+    let (first, second) = (bending + p, bending + q);
+    let determinant = first * second - c * c;
+    [(second * m - c * n) / determinant, (first * n - c * m) / determinant]
+}
+
 impl Material {
     /// Adds a share of a section to the instrument's material in this element; rest states are averaged, weighted by
     /// stiffness.
@@ -31,10 +43,19 @@ impl Material {
         for k in 0..3 {
             let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
             let (all_bending, all_torsion) = (self.bending[k] + bending, self.torsion[k] + torsion);
-            for a in 0..2 {
-                let moment =
-                    self.bending[k] * self.rest_curvature[k][a] + bending * part.rest_curvature[k][a];
-                self.rest_curvature[k][a] = moment / all_bending;
+            if self.skew[k] == [0.0; 3] && part.skew[k] == [0.0; 3] {
+                for a in 0..2 {
+                    let moment =
+                        self.bending[k] * self.rest_curvature[k][a] + bending * part.rest_curvature[k][a];
+                    self.rest_curvature[k][a] = moment / all_bending;
+                }
+            } else {
+                let skew = part.skew[k].map(|skew| shares[k] * skew);
+                let own = times((self.bending[k], self.skew[k]), self.rest_curvature[k]);
+                let added = times((bending, skew), part.rest_curvature[k]);
+                self.skew[k] = [0, 1, 2].map(|a| self.skew[k][a] + skew[a]);
+                let moment = [0, 1].map(|axis| own[axis] + added[axis]);
+                self.rest_curvature[k] = bent_by((all_bending, self.skew[k]), moment);
             }
             self.rest_twist[k] =
                 (self.torsion[k] * self.rest_twist[k] + torsion * part.rest_twist[k]) / all_torsion;
@@ -46,6 +67,39 @@ impl Material {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn skew_sections_share_an_element_by_their_moments() {
+        let one = Material {
+            bending: [3.0; 3],
+            skew: [[1.0, 0.5, -0.5]; 3],
+            torsion: [1.5; 3],
+            rest_curvature: [[0.1, 0.2]; 3],
+            ..Material::NONE
+        };
+        let other = Material { skew: [[0.2, 2.0, 0.25]; 3], rest_curvature: [[-0.3, 0.0]; 3], ..one };
+        let mut sum = Material::NONE;
+        sum.add_share(&one, &shares(0.0, 0.4));
+        sum.add_share(&other, &shares(0.4, 1.0));
+        for k in 0..3 {
+            let (p, q) = (shares(0.0, 0.4)[k], shares(0.4, 1.0)[k]);
+            let whole = times((sum.bending[k], sum.skew[k]), sum.rest_curvature[k]);
+            for a in 0..2 {
+                assert!((sum.skew[k][a] - p * one.skew[k][a] - q * other.skew[k][a]).abs() < 1e-12);
+                let parts = [(p, &one), (q, &other)].map(|(share, part)| {
+                    share * times((part.bending[k], part.skew[k]), part.rest_curvature[k])[a]
+                });
+                assert!((whole[a] - parts[0] - parts[1]).abs() < 1e-12);
+            }
+        }
+        // Alike ones are one.
+        let mut halves = Material::NONE;
+        halves.add_share(&one, &shares(0.0, 0.5));
+        halves.add_share(&one, &shares(0.5, 1.0));
+        for k in 0..3 {
+            assert!((0..2).all(|a| (halves.rest_curvature[k][a] - one.rest_curvature[k][a]).abs() < 1e-12));
+        }
+    }
 
     #[test]
     fn a_section_that_only_touches_an_element_leaves_its_material_as_it_is() {

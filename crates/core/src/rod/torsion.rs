@@ -10,6 +10,21 @@
 //!
 //! The energy of the isotropic cross-section, ½EI|t′ − κ⁰|² + ½GJ(τ − τ⁰)², is the bending energy of the straight rod
 //! plus −EI κ⁰·t′ + ½EI|κ⁰|² + ½GJ(τ − τ⁰)², κ⁰ = k₁d₁ + k₂d₂; this file computes the addition.
+//!
+//! A cross-section that is stiffer in one plane has ½(κ − κ⁰)ᵀB(κ − κ⁰) with κ = (κ₁, κ₂), κᵢ = t′·dᵢ, and a symmetric B
+//! (Antman, Nonlinear Problems of Elasticity, 2005, ch. VIII; Bergou et al., Discrete Elastic Rods, 2008, sec. 4). With
+//! B = EI + (p c; c q), EI the stiffness in the plane in which it bends most easily, the isotropic part is as above, the moment of
+//! the rest curvature is Bκ⁰ in place of EI κ⁰, and what is left, never negative, is
+//!
+//! ```text
+//! N = ½pκ₁² + ½qκ₂² + cκ₁κ₂ = ½(n₁κ₁ + n₂κ₂),  n₁ = pκ₁ + cκ₂,  n₂ = cκ₁ + qκ₂
+//! ∇N = n₁∇κ₁ + n₂∇κ₂,   ∇²N = n₁∇²κ₁ + n₂∇²κ₂ + p∇κ₁∇κ₁ᵀ + q∇κ₂∇κ₂ᵀ + c(∇κ₁∇κ₂ᵀ + ∇κ₂∇κ₁ᵀ)
+//! ```
+//!
+//! in y and z. Turning d₁ and d₂ by φ has ∂κ₁ = κ₂, ∂κ₂ = −κ₁: hence ∂N = n₁κ₂ − n₂κ₁, ∂²N = pκ₂² + qκ₁² − 2cκ₁κ₂ − 2N, and
+//! ∂∇N = (pκ₂ − qκ₂ − 2cκ₁)∇κ₁ + (pκ₁ − qκ₁ + 2cκ₂)∇κ₂: it is this that couples bending to twist even where nothing is bent at
+//! rest. N takes κ per length of the rod and not of the curve, as the rest curvature's term does, and without the arc factor: that
+//! changes the element's error at order 4, and not its order.
 
 use super::lanes::{Lanes, Matrix, Vector};
 use pulp::Simd;
@@ -51,7 +66,7 @@ pub(super) struct ReferenceTwist<S: Simd> {
 }
 
 /// Derivatives in y and z. The second derivative in z vanishes: both twist and curvature are linear in z, and the
-/// square of the twist is added in chord and far tangent.
+/// squares of the twist and of skew curvatures are added in chord and far tangent.
 #[derive(Clone, Copy)]
 pub(super) struct PointDerivatives<S: Simd> {
     /// Gradient in y.
@@ -104,6 +119,17 @@ impl<S: Simd> TwistValue<S> {
     pub(super) fn twist_energy(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
         let tau = dphi - self.twist - p.rest_twist;
         p.stiffness * 0.5 * tau * tau
+    }
+
+    /// The energy of its skew stiffness, times this weight.
+    #[inline(always)]
+    pub(super) fn skew_energy(&self, phi: Lanes<S>, [p, q, c]: [Lanes<S>; 3]) -> Lanes<S> {
+        let Self { y, z, a, g, .. } = *self;
+        let (sin, cos) = phi.sin_cos();
+        let lift = g * (z.x + y.dot(z) / a);
+        let along = |v: Lanes<S>, w: Lanes<S>| (z.y * v + z.z * w) / a - (y.y * v + y.z * w) * lift;
+        let (first, second) = (along(cos, sin), along(-sin, cos));
+        (p * first * first + q * second * second + c * (first * 2.0 * second)) * 0.5
     }
 
     /// The energy of its rest curvature.
@@ -197,8 +223,9 @@ impl<S: Simd> ReferenceTwist<S> {
 
     /// P = (z·w)/a − (y·w) G q with q = z₁ + b/a: (z·w, y·w, P) and its gradients in y and z.
     #[inline(always)]
-    fn curvature(&self, w: Vector<S>, q: Lanes<S>, gq: Vector<S>, lift: Vector<S>) -> Curvature<S> {
+    fn curvature(&self, w: Vector<S>, of: &Lift<S>) -> Curvature<S> {
         let Self { y, z, ia, g, .. } = *self;
+        let Lift { q, gq, lift, .. } = *of;
         let ia3 = ia * ia * ia;
         let (m, n) = (z.dot(w), y.dot(w));
         let value = m * ia - n * g * q;
@@ -215,31 +242,94 @@ impl<S: Simd> ReferenceTwist<S> {
         moment: [Lanes<S>; 2],
         to: &mut PointDerivatives<S>,
     ) -> (Lanes<S>, AngleDensity<S>) {
-        let Self { y, z, ia, b, g, dg, hg, .. } = *self;
-        let ia3 = ia * ia * ia;
-        let zero = ia.like(0.0);
-        let yy = y.outer(y);
+        let zero = self.ia.like(0.0);
         let (sin, cos) = phi.sin_cos();
         let w = Vector::new(zero, moment[0] * cos - moment[1] * sin, moment[0] * sin + moment[1] * cos);
         let wp = Vector::new(zero, -w.z, w.y);
+        let lift = self.lift();
+        let along = self.curvature(w, &lift);
+        let turned = self.curvature(wp, &lift);
+        self.take(w, &along, &lift, to);
+        let (along_y, along_z) = (-turned.along_y, -turned.along_z);
+        (-along.value, AngleDensity { first: -turned.value, second: along.value, along_y, along_z })
+    }
+
+    /// Adds the derivatives of the energy N of a skew stiffness, with its weight, but for the products of the gradients of
+    /// κ₁ and κ₂, which it returns; and returns N with its derivatives in φ.
+    #[inline(always)]
+    pub(super) fn add_skew(
+        &self,
+        phi: Lanes<S>,
+        [p, q, c]: [Lanes<S>; 3],
+        to: &mut PointDerivatives<S>,
+    ) -> (Lanes<S>, AngleDensity<S>, [Slope<S>; 2]) {
+        let zero = self.ia.like(0.0);
+        let (sin, cos) = phi.sin_cos();
+        let (d1, d2) = (Vector::new(zero, cos, sin), Vector::new(zero, -sin, cos));
+        let lift = self.lift();
+        let (one, two) = (self.curvature(d1, &lift), self.curvature(d2, &lift));
+        let (k1, k2) = (one.value, two.value);
+        let (n1, n2) = (p * k1 + c * k2, c * k1 + q * k2);
+        let w = -(d1 * n1 + d2 * n2);
+        let along = self.curvature(w, &lift);
+        self.take(w, &along, &lift, to);
+        let value = (n1 * k1 + n2 * k2) * 0.5;
+        let (by1, by2) = ((p - q) * k2 - c * 2.0 * k1, (p - q) * k1 + c * 2.0 * k2);
+        let angle = AngleDensity {
+            first: n1 * k2 - n2 * k1,
+            second: p * k2 * k2 + q * k1 * k1 - c * 2.0 * k1 * k2 - value * 2.0,
+            along_y: one.along_y * by1 + two.along_y * by2,
+            along_z: one.along_z * by1 + two.along_z * by2,
+        };
+        let slopes = [Slope { y: one.along_y, z: one.along_z }, Slope { y: two.along_y, z: two.along_z }];
+        (value, angle, slopes)
+    }
+
+    /// What the curvatures along all w have in common.
+    #[inline(always)]
+    fn lift(&self) -> Lift<S> {
+        let Self { y, z, ia, b, g, dg, .. } = *self;
+        let ia3 = ia * ia * ia;
         let q = z.x + b * ia;
         let dq = z * ia - y * (ia3 * b);
         let mut lift = y * ia;
         lift.x += ia.like(1.0);
         let gq = dg * q + dq * g;
-        let Curvature { m, n, value, along_y, along_z } = self.curvature(w, q, gq, lift);
-        let turned = self.curvature(wp, q, gq, lift);
-        to.gy -= along_y;
-        to.gz -= along_z;
+        Lift { q, dq, gq, lift }
+    }
+
+    /// Subtracts P along a w with its derivatives.
+    #[inline(always)]
+    fn take(&self, w: Vector<S>, along: &Curvature<S>, of: &Lift<S>, to: &mut PointDerivatives<S>) {
+        let Self { y, z, ia, b, g, dg, hg, .. } = *self;
+        let (Curvature { m, n, .. }, Lift { q, dq, gq, lift }) = (*along, *of);
+        let ia3 = ia * ia * ia;
+        let yy = y.outer(y);
+        to.gy -= along.along_y;
+        to.gz -= along.along_z;
         let hq = y.outer(z).with_transpose().with_diagonal(b) * (-ia3) + yy * (ia3 * 3.0 * ia * ia * b);
         to.hyy += (yy * (ia3 * -3.0 * ia * ia)).with_diagonal(ia3) * m
             + w.outer(gq).with_transpose()
             + (hg * q + dg.outer(dq).with_transpose() + hq * g) * n;
         // Rows y, columns z.
         to.hyz += y.outer(w) * ia3 + (w * g + dg * n).outer(lift) + (yy * (-ia3)).with_diagonal(ia) * (n * g);
-        let (along_y, along_z) = (-turned.along_y, -turned.along_z);
-        (-value, AngleDensity { first: -turned.value, second: value, along_y, along_z })
     }
+}
+
+/// q = z₁ + y·z/a with its gradient, the gradient of G q, and t₀ + t, of which all curvatures are made.
+#[derive(Clone, Copy)]
+struct Lift<S: Simd> {
+    q: Lanes<S>,
+    dq: Vector<S>,
+    gq: Vector<S>,
+    lift: Vector<S>,
+}
+
+/// Gradient of a curvature in y and z.
+#[derive(Clone, Copy)]
+pub(super) struct Slope<S: Simd> {
+    pub(super) y: Vector<S>,
+    pub(super) z: Vector<S>,
 }
 
 /// P along a w, with z·w and y·w, and its gradients.

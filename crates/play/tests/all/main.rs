@@ -5,4 +5,5 @@
 mod demonstration;
 mod detach;
 mod session;
+mod steering;
 mod trainees;

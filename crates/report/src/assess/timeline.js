@@ -13,6 +13,7 @@ const timeline = (() => {
       const name = instruments[k] || `hand ${k + 1}`, colour = COLOURS[k % COLOURS.length];
       all.push({ high: 64, name: `${name}, pushed or pulled (−)`, unit: "mm/s", curves: [{ of: hand.push_mm_per_s, colour, fill: true }], signed: true });
       if (hand.turn_deg_per_s.some(v => v !== 0)) all.push({ high: 44, name: `${name}, turned`, unit: "°/s", curves: [{ of: hand.turn_deg_per_s, colour, fill: true }], signed: true });
+      if (hand.steer_per_s.some(v => v !== 0)) all.push({ high: 44, name: `${name}, steered`, unit: "1/s", curves: [{ of: hand.steer_per_s, colour, fill: true }], signed: true });
     });
     all.push({ high: 90, name: "wall forces", force: true, limit: limits.wall_force_n, curves: [{ of: t.wall_force_n, colour: RED, name: "all" }, { of: t.tip_force_n, colour: COLOURS[3], name: "tip" }] });
     all.push({ high: 64, name: "forces of hands", force: true, curves: t.hands.map((hand, k) => ({ of: hand.force_n, colour: COLOURS[k % COLOURS.length], name: t.hands.length > 1 ? instruments[k] || `hand ${k + 1}` : "" })) });

@@ -104,6 +104,11 @@ impl BendTest {
     /// The length between the supports as a static case, and its compliance under the load at small deflections.
     fn loaded(&self, device: &Device, from_tip_mm: f64) -> Result<(StaticCase, f64)> {
         self.check()?;
+        if device.has_soft_plane() {
+            let remedy =
+                "on its supports it would roll into that plane: measure a section of either stiffness alone";
+            return Err(Error::parameter("device.section.soft_plane", "given", remedy));
+        }
         if !self.reaches(device, from_tip_mm) {
             let remedy = format!(
                 "must be at least half a span, {} mm, from both ends of the device, which is {} mm long",

@@ -5,7 +5,7 @@ pub(super) mod table;
 
 use std::path::{Path, PathBuf};
 
-use endowire_core::device::{DeviceFile, Kind};
+use endowire_core::device::{DeviceFile, Kind, Section};
 use endowire_viewer::device_parts;
 use serde::Serialize;
 
@@ -106,7 +106,7 @@ pub(crate) fn list(folder: &Path, out: Option<&Path>, json: bool) -> Result<(), 
 impl Row {
     fn new(file: String, device: DeviceFile) -> Self {
         let sections = device.device.sections();
-        let softest = sections.iter().map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min);
+        let softest = sections.iter().map(Section::softest_nmm2).fold(f64::MAX, f64::min);
         let stiffest = sections.iter().map(|s| s.bending_stiffness_nmm2).fold(0.0, f64::max);
         Self {
             file,

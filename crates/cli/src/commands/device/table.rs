@@ -1,6 +1,6 @@
 //! Parts of a device as table rows.
 
-use endowire_core::device::{Part, Section};
+use endowire_core::device::{Part, Section, SoftPlane};
 use serde::Serialize;
 
 /// One part. Pairs are its values at the end towards the tip and at the other end.
@@ -13,6 +13,8 @@ pub(super) struct PartRow {
     outer_diameter_mm: [f64; 2],
     inner_diameter_mm: Option<[f64; 2]>,
     bending_stiffness_nmm2: [f64; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    soft_plane: Option<SoftPlane>,
     torsional_stiffness_nmm2: [f64; 2],
     /// If the part has several arcs, that of the arc next to the tip.
     rest_curvature_per_mm: [f64; 2],
@@ -54,6 +56,7 @@ impl PartRow {
                 _ => None,
             },
             bending_stiffness_nmm2: both(|s| s.bending_stiffness_nmm2),
+            soft_plane: ends[0].soft_plane,
             torsional_stiffness_nmm2: both(Section::torsion_nmm2),
             rest_curvature_per_mm: [first, second],
             arcs: if part.has_secondary_shape() { sections.len() } else { 1 },
@@ -85,6 +88,14 @@ impl PartRow {
         let direction =
             if direction_deg.abs() < 0.05 { String::new() } else { format!(" to {direction_deg:.0}°") };
         format!("{:.3} ({:.0}°{direction})", curvature, self.bend_deg)
+    }
+
+    /// EI, with that in the soft plane.
+    fn stiffness(&self) -> String {
+        let across = range(self.bending_stiffness_nmm2, 3);
+        self.soft_plane.map_or(across.clone(), |SoftPlane { plane_deg, bending_stiffness_nmm2 }| {
+            format!("{across}, {} at {plane_deg:.0}°", digits(bending_stiffness_nmm2, 3))
+        })
     }
 
     fn material(&self) -> String {
@@ -136,7 +147,7 @@ pub(super) fn text(parts: &[PartRow]) -> String {
             french,
             inch,
             row.inner_diameter_mm.map_or_else(|| "–".to_owned(), |inner| diameters(inner)[0].clone()),
-            range(row.bending_stiffness_nmm2, 3),
+            row.stiffness(),
             range(row.torsional_stiffness_nmm2, 3),
             row.bend(),
             row.sections(),

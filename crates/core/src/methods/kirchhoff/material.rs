@@ -102,6 +102,7 @@ fn flush_sections(
 /// Whether both are of the same material.
 pub(super) fn is_same(a: &Section, b: &Section) -> bool {
     a.bending_stiffness_nmm2 == b.bending_stiffness_nmm2
+        && a.soft_plane == b.soft_plane
         && a.rest_curvature_per_mm == b.rest_curvature_per_mm
         && a.torsion_nmm2() == b.torsion_nmm2()
         && a.steer == b.steer
@@ -109,8 +110,10 @@ pub(super) fn is_same(a: &Section, b: &Section) -> bool {
 
 /// A section, at all Gauss points.
 fn material(section: &Section) -> Material {
+    let (bending, skew) = section.stiffness_nmm2();
     Material {
-        bending: GAUSS.map(|_| section.bending_stiffness_nmm2),
+        bending: GAUSS.map(|_| bending),
+        skew: GAUSS.map(|_| skew),
         torsion: GAUSS.map(|_| section.torsion_nmm2()),
         rest_curvature: GAUSS.map(|_| section.rest_curvature_per_mm),
         rest_twist: [0.0; 3],

@@ -138,6 +138,10 @@ impl MethodChoice for KirchhoffOptions {
         true
     }
 
+    fn takes_soft_planes(&self) -> bool {
+        true
+    }
+
     fn check_detach(&self) -> Result<()> {
         if self.self_contact {
             return Ok(());

@@ -30,8 +30,8 @@ impl<const C: usize> Tools<C> {
             (clamp.force - sheath.direction * clamp.force.dot(&sheath.direction)).norm()
         });
         let KirchhoffState { rod, twists, hand_forces, energy, across_n, .. } = state;
-        energy.tail = self.tails.write(rod, twists, hand_forces);
-        let at_grips = self.tails.grip_friction(sheath, *across_n, rod, hand_forces);
+        let (stored_mj, at_grips) = self.tails.write((sheath, *across_n), rod, twists, hand_forces);
+        energy.tail = stored_mj;
         self.around_mj = at_grips.around_mj;
         at_grips.along_mj
     }
@@ -79,15 +79,19 @@ impl<const C: usize> Tools<C> {
         let frame = rod.material_frame(0);
         let ends = (mesh.from_tip_mm[0], mesh.from_tip_mm[1]);
         let section = at_mouth(surroundings.device, ends, mesh.flush_mm);
-        let [along_u, along_v] = section.rest_curvature_per_mm;
-        let rest = frame.u * along_u + frame.v * along_v;
         // What comes in where the wall presses stores energy in it.
         let coming_in = state.touches.iter().filter_map(|(index, touch)| {
             let point = mesh.points.get(*index).filter(|point| mesh.is_coming_in(point))?;
             Some(touch.energy_mj / point.weight_mm)
         });
-        let (bending, torsion) = (section.bending_stiffness_nmm2, section.torsion_nmm2());
-        let clamped_n = clamp.push_force(&frame.t, bending, torsion, &rest);
+        let torsion = section.torsion_nmm2();
+        let clamped_n = if section.soft_plane.is_some() {
+            clamp.skew_push_force(&frame, section.stiffness_nmm2(), torsion, section.rest_curvature_per_mm)
+        } else {
+            let [along_u, along_v] = section.rest_curvature_per_mm;
+            let rest = frame.u * along_u + frame.v * along_v;
+            clamp.push_force(&frame.t, section.bending_stiffness_nmm2, torsion, &rest)
+        };
         let push_n = clamped_n + coming_in.sum::<f64>() + self.newton.unbalanced_along_n(rod);
         state.hand_forces[0] = HandForce { push_n, ..HandForce::default() };
         Some(clamp)

@@ -65,6 +65,7 @@ fn are_alike(a: &Section, b: &Section, Fineness { element_mm, tuning, .. }: Fine
         && alike(a.radius_mm, b.radius_mm)
         && libm::hypot(u, v) * element_mm <= tuning.alike_rad
         && a.steer == b.steer
+        && a.soft_plane == b.soft_plane
 }
 
 /// The stretches of a device from its tip on.

@@ -63,13 +63,22 @@ impl Tails {
         self.turning().map(|(_, tail)| tail.on(rod).body_nmm).sum()
     }
 
-    /// Writes twists of the tails, and what they add to the forces of the hands: torques, and the twist that comes in. Returns the stored energy, mJ.
-    pub(super) fn write(&self, rod: &RodState, twists: &mut Vec<Twist>, forces: &mut [HandForce]) -> f64 {
+    /// Writes twists of the tails, and what they add to the forces of the hands: torques, the twist that comes in, and friction at
+    /// the grips along the line, with this force across it at the mouth, N. Returns the stored energy, mJ, and what friction took.
+    pub(super) fn write(
+        &self,
+        (sheath, across_n): (&Sheath, f64),
+        rod: &RodState,
+        twists: &mut Vec<Twist>,
+        forces: &mut [HandForce],
+    ) -> (f64, GripFriction) {
         twists.clear();
-        let mut stored_mj = 0.0;
+        let (mut stored_mj, mut dissipated) = (0.0, GripFriction::default());
         for (k, tail) in self.each.iter().enumerate() {
+            dissipated.around_mj = dissipated.around_mj.map(|mj| mj + tail.let_go_mj);
             if !tail.is_in {
                 twists.push(Twist::relaxed(tail.hand_rad));
+                dissipated.along_mj += tail.friction_n * tail.advance_mm.abs();
                 continue;
             }
             let turned = tail.on(rod);
@@ -80,26 +89,6 @@ impl Tails {
             if let Grip::Valve(outer) = tail.grip {
                 forces[outer].torque_nmm -= turned.hand_nmm - turned.body_nmm;
             }
-        }
-        stored_mj
-    }
-
-    /// Writes the friction at the grips along the line, with this force across it at the mouth, N.
-    pub(super) fn grip_friction(
-        &self,
-        sheath: &Sheath,
-        across_n: f64,
-        rod: &RodState,
-        forces: &mut [HandForce],
-    ) -> GripFriction {
-        let mut dissipated = GripFriction::default();
-        for (k, tail) in self.each.iter().enumerate() {
-            dissipated.around_mj = dissipated.around_mj.map(|mj| mj + tail.let_go_mj);
-            if !tail.is_in {
-                dissipated.along_mj += tail.friction_n * tail.advance_mm.abs();
-                continue;
-            }
-            let turned = tail.on(rod);
             let slip_mm = libm::hypot(tail.advance_mm, tail.radius_mm * turned.slip_rad);
             if slip_mm <= ROUNDED_MM {
                 continue;
@@ -117,7 +106,7 @@ impl Tails {
             let around_mj = tail.around_mj(&turned);
             dissipated.around_mj = [0, 1].map(|k| dissipated.around_mj[k] + around_mj[k]);
         }
-        dissipated
+        (stored_mj, dissipated)
     }
 }
 

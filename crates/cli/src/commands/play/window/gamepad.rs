@@ -40,8 +40,9 @@ pub(super) fn listen(window: EventLoopProxy<Event>) {
 /// The current state of a gamepad.
 fn held(pad: &Gamepad<'_>) -> Pad {
     let down = Button::ALL.into_iter().filter(|button| pad.is_pressed(key(*button))).collect();
-    let [up, right] = [Axis::LeftStickY, Axis::RightStickX].map(|axis| f64::from(pad.value(axis)));
-    Pad { up, right, down }
+    let axes = [Axis::LeftStickY, Axis::RightStickX, Axis::RightStickY];
+    let [up, right, bend] = axes.map(|axis| f64::from(pad.value(axis)));
+    Pad { up, right, bend, down }
 }
 
 fn key(button: Button) -> Key {
@@ -60,5 +61,6 @@ fn key(button: Button) -> Key {
         Button::CrossRight => Key::DPadRight,
         Button::CrossUp => Key::DPadUp,
         Button::CrossDown => Key::DPadDown,
+        Button::RightStick => Key::RightThumb,
     }
 }

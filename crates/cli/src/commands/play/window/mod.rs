@@ -106,13 +106,12 @@ pub(super) fn run(
     };
     let events = EventLoop::<Event>::with_user_event().build().map_err(|e| no_display(e.to_string()))?;
     let writer = Writer::new().ok_or_else(|| no_display("the font cannot be read".to_owned()))?;
-    let names = session.simulation().stack().instruments().iter().map(|one| one.name.clone()).collect();
     let shared = Arc::new(Shared::default());
     let mut shell = Shell {
         title: format!("endowire: {}", args.scene.display()),
         shared: Arc::clone(&shared),
         to: sender,
-        keys: Keys::new(names),
+        keys: Keys::of(session.simulation().stack()),
         #[cfg(feature = "gamepad")]
         pad: endowire_play::Pad::default(),
         surface: None,

@@ -189,8 +189,11 @@ fn beam(lab: &LabReadout) -> String {
 fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout, y: usize, chosen: bool) {
     let colour = if chosen { CHOSEN } else { TEXT };
     let mark = if chosen { ">" } else { " " };
-    let length =
-        format!("{mark} {:<12} {:>7.1} mm in  {:>8.0}°", one.name, one.inserted_mm, one.rotation_deg);
+    let steered = one.steer.map_or_else(String::new, |value| format!("  tip {}", bend(value)));
+    let length = format!(
+        "{mark} {:<12} {:>7.1} mm in  {:>8.0}°{steered}",
+        one.name, one.inserted_mm, one.rotation_deg
+    );
     let x = writer.write(canvas, [12, y], 16, colour, &length);
     let push = one.push_force_n.map_or_else(|| "--".to_owned(), force);
     let force = format!("  push {push:>9}  torque {:>7} N·mm", signed(format!("{:.3}", one.torque_nmm)));
@@ -208,6 +211,12 @@ fn force(newtons: f64) -> String {
         return format!("{newtons:.3} N");
     }
     format!("{} mN", signed(format!("{:.1}", 1000.0 * newtons)))
+}
+
+/// The value to which a tip is steered.
+fn bend(value: f64) -> String {
+    let rounded = (100.0 * value).round() / 100.0;
+    if rounded == 0.0 { "straight".to_owned() } else { format!("{rounded:+.2}") }
 }
 
 /// A rounded number without a minus sign before zero.
