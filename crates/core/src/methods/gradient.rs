@@ -26,7 +26,7 @@ pub enum Parameter {
         /// The instrument.
         instrument: usize,
     },
-    /// Bending stiffness of a section, N·mm². Its torsional stiffness follows unless that is given.
+    /// Bending stiffness of a section, N·mm², of one with a soft plane that across it. Its torsional stiffness follows unless that is given.
     BendingStiffness {
         /// The instrument.
         instrument: usize,

@@ -104,9 +104,9 @@ impl<const C: usize> Tools<C> {
         let hands = acting.attempt.hands;
         self.tails.begin(&own, (acting.start.state, hands));
         let (mesh, after) = next.parts();
-        let KirchhoffState { rod, twists, hand_forces, .. } = after;
+        let KirchhoffState { rod, twists, hand_forces, across_n, .. } = after;
         advance::<C>(&mesh.elements, &rod.clone(), (way, by), rod);
-        self.tails.write(rod, twists, hand_forces);
+        self.tails.write((own.surroundings.sheath, *across_n), rod, twists, hand_forces);
     }
 
     /// The triads from which the spin of the device is measured in the part that was begun last.
