@@ -14,8 +14,9 @@ use crate::failure::Failure;
 use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
 
+/// The report on a surface file.
 #[derive(Serialize)]
-struct Document {
+pub(super) struct Document {
     #[serde(flatten)]
     provenance: Provenance,
     file: String,
@@ -88,6 +89,18 @@ fn report_on(
     provenance: Provenance,
     json: bool,
 ) -> Result<(), Failure> {
+    let document = checked(file, frame, septum_mm, felt, provenance)?;
+    answer(&document, json, || text(&document))
+}
+
+/// The report on a surface file.
+pub(super) fn checked(
+    file: &Path,
+    frame: SurfaceFrame,
+    septum_mm: f64,
+    felt: &FeltArgs,
+    provenance: Provenance,
+) -> Result<Document, Failure> {
     let surface = SurfaceMesh::read(file, frame)?;
     let report = check_with(&surface, frame.unit_mm, septum_mm).map_err(|error| match error {
         Error::Parameter { name, value, remedy } if name == "septum_mm" => {
@@ -97,22 +110,21 @@ fn report_on(
     })?;
     let felt = FeltReport::new(&surface, felt)?;
     let faults = report.faults();
-    let document = Document {
+    Ok(Document {
         provenance,
         file: file.display().to_string(),
         sound: faults.is_empty(),
         faults,
         report,
         felt,
-    };
-    answer(&document, json, || text(&document))
+    })
 }
 
 /// Largest number of openings listed in the text report.
 const OPENINGS_LISTED: usize = 20;
 
 /// The report as text.
-fn text(document: &Document) -> String {
+pub(super) fn text(document: &Document) -> String {
     let r = &document.report;
     let size: Vec<String> = (0..3).map(|k| format!("{:.1}", r.high_mm[k] - r.low_mm[k])).collect();
     let verdict = match (document.faults.join(", "), r.flat) {

@@ -15,6 +15,7 @@ mod device;
 mod evidence;
 mod experiment;
 mod export;
+mod from_labels;
 mod guide;
 mod instruments;
 mod killed;
