@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use endowire_core::Vec3;
 use endowire_core::passable::NO_FORCE_N;
-use endowire_core::vessel::{CentrelineEnd, Ends, Parts, PatientAxes, SurfaceFrame};
+use endowire_core::vessel::{CentrelineEnd, Ends, Mending, Parts, PatientAxes, SurfaceFrame};
 
 use crate::commands::parse_end;
 
@@ -20,6 +20,8 @@ pub(crate) enum VesselCommand {
         /// Count septa between lumens that are thinner than so many mm
         #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
         septum_mm: f64,
+        #[command(flatten)]
+        repair: RepairArgs,
         #[command(flatten)]
         felt: FeltArgs,
         /// Print the report as one JSON document on stdout
@@ -81,6 +83,17 @@ impl From<CoordinateArgs> for SurfaceFrame {
     fn from(CoordinateArgs { unit_mm, axes }: CoordinateArgs) -> Self {
         Self { unit_mm, axes }
     }
+}
+
+/// What of a surface is repaired, as `vessel.repair` and `vessel.keep_open_mm` of a scene say.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(crate) struct RepairArgs {
+    /// all: faults are mended; none: the surface is taken as it is, or refused
+    #[arg(long, value_name = "all|none", default_value = "all")]
+    pub(crate) repair: Mending,
+    /// A place x,y,z in mm: the hole nearest to it is meant, and is not closed (repeatable)
+    #[arg(long = "keep-open", value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
+    pub(crate) keep_open_mm: Vec<Vec3>,
 }
 
 /// Requests about the contact wall; without any of them it is not computed.

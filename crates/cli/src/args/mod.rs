@@ -24,7 +24,7 @@ pub(crate) use bench::{
 pub(crate) use evidence::EvidenceArgs;
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, FromLabelsArgs, GenerateArgs, PassableArgs,
-    SacArgs, VesselCommand,
+    RepairArgs, SacArgs, VesselCommand,
 };
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{

@@ -6,7 +6,7 @@ use endowire_viewer::read_label_map;
 use serde::Serialize;
 
 use super::vessel;
-use crate::args::{FeltArgs, FromLabelsArgs};
+use crate::args::{FeltArgs, FromLabelsArgs, RepairArgs};
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{answer, progress};
@@ -35,7 +35,14 @@ pub(crate) fn from_labels(args: &FromLabelsArgs) -> Result<(), Failure> {
     drop(map);
     surface.mesh.write(&args.out)?;
     waiting.set_message("checks the surface");
-    let check = vessel::checked(&args.out, 1.0.into(), 1.0, &FeltArgs::default(), provenance()?)?;
+    let check = vessel::checked(
+        &args.out,
+        1.0.into(),
+        1.0,
+        &RepairArgs::default(),
+        &FeltArgs::default(),
+        provenance()?,
+    )?;
     waiting.finish_and_clear();
     let document = Document {
         provenance: provenance()?,

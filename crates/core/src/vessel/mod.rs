@@ -38,7 +38,7 @@ mod wall;
 mod weld;
 
 pub use centreline::{CentrelineNode, CentrelineTree, Target};
-pub use check::{CheckReport, OpeningReport, check, check_with};
+pub use check::{CheckReport, OpeningReport, check, check_repaired, check_with};
 pub use conditioning::{Conditioned, Conditioning, condition};
 pub use extract::{CentrelineBranch, CentrelineEnd, ExtractedCentreline};
 pub use files::{PatientAxes, SurfaceFrame};

@@ -22,7 +22,12 @@ const SHORT_VOXELS: f64 = 1.5;
 /// Least area in which an end touches the border, in sections of its branch.
 pub(super) const LEAST_PATCH: f64 = 0.3;
 /// Least cosine between a vessel and the normal of the border where it leaves: one that runs along it only touches it.
-const STEEP: f64 = 0.3;
+const STEEP: f64 = 0.4;
+/// Part of the largest of these cosines that another side needs, through which the vessel leaves too.
+const ALIKE: f64 = 0.8;
+/// Ways from an end, in widths, that are near it, and those of the shell about it that shows whether it is an end.
+const NEAR: f64 = 1.5;
+const AROUND: [f64; 2] = [1.75, 2.5];
 /// Part of the largest clearance nearby that counts as the largest: of those places the nearest to the end is taken.
 const NEARLY: f32 = 0.9;
 
@@ -133,14 +138,17 @@ impl Search<'_> {
             if number > 1 && maximum.length_mm < SHORT * width_mm {
                 continue;
             }
-            let near = self.voxels.ways_mm(&[maximum.voxel], 1.5 * width_mm);
+            let around = self.voxels.ways_mm(&[maximum.voxel], AROUND[1] * width_mm);
+            let is_near = |way: &f32| f64::from(*way) <= NEAR * width_mm;
+            let near: Vec<f32> =
+                around.iter().map(|way| if is_near(way) { *way } else { f32::INFINITY }).collect();
             // A bounded way sees the sphere of this end, not that of a wide trunk behind.
             let radius_mm = self.radius_mm(&near).min(maximum.radius_mm);
             let middle = self.middle(&near, maximum.voxel);
             if let Some(place) = apart.get_mut(number) {
                 *place = middle;
             }
-            let left = self.left_through(&patches, &taken, &near, radius_mm);
+            let left = self.left_through(&patches, &taken, &around, radius_mm);
             if !left.is_empty() && maximum.length_mm >= (SHORT * width_mm).max(SHORT_VOXELS * voxel_mm) {
                 let of_side = |&k: &usize| {
                     let Patch { side, voxels } = &patches[k];
@@ -156,7 +164,7 @@ impl Search<'_> {
                     radius_mm,
                 });
             } else if maximum.length_mm >= (LONG * width_mm).max(LONG_VOXELS * voxel_mm)
-                && self.is_end(&near, width_mm)
+                && self.is_end(&around, width_mm)
             {
                 let (kind, tip) = (EndKind::Blunt, maximum.voxel);
                 tips.push(Tip { kind, tip, middle, patch: Vec::new(), radius_mm });
@@ -170,27 +178,31 @@ impl Search<'_> {
     fn left_through(&self, patches: &[Patch], taken: &[bool], near: &[f32], radius_mm: f64) -> Vec<usize> {
         let Some(outward) = self.outward(near, radius_mm) else { return Vec::new() };
         let section_mm2 = std::f64::consts::PI * radius_mm * radius_mm;
-        let is_left = |k: &usize| {
-            let patch = &patches[*k];
-            let way = patch.voxels.iter().map(|v| near[*v as usize]).fold(f32::INFINITY, f32::min);
-            !taken[*k] && f64::from(way) <= 2.0 * radius_mm && self.normal(patch.side).dot(&outward) >= STEEP
+        let cosine = |k: usize| self.normal(patches[k].side).dot(&outward);
+        let is_near = |k: &usize| {
+            let way = patches[*k].voxels.iter().map(|v| near[*v as usize]).fold(f32::INFINITY, f32::min);
+            !taken[*k] && f64::from(way) <= 2.0 * radius_mm && cosine(*k) >= STEEP
         };
-        let left: Vec<usize> = (0..patches.len()).filter(is_left).collect();
+        let mut left: Vec<usize> = (0..patches.len()).filter(is_near).collect();
+        // At an edge of the picture it leaves through two sides; in a bend it may touch another.
+        let best = left.iter().map(|k| cosine(*k)).fold(0.0, f64::max);
+        left.retain(|k| cosine(*k) >= ALIKE * best);
         let area_mm2: f64 = left.iter().map(|&k| self.area_mm2(&patches[k])).sum();
         if area_mm2 >= LEAST_PATCH * section_mm2 { left } else { Vec::new() }
     }
 
-    /// The direction in which a vessel ends: from the middle of what is farther away than a radius to that of what is
-    /// nearer.
+    /// The direction in which a vessel ends: from the middle of what is about three radii from its end to that of what is
+    /// one to two.
     fn outward(&self, near: &[f32], radius_mm: f64) -> Option<Vec3> {
         let mut sums = [(Vec3::zeros(), 0.0); 2];
         for voxel in 0..near.len() as u32 {
-            let way = f64::from(near[voxel as usize]);
-            if way.is_finite() {
-                let sum = &mut sums[usize::from(way > 1.5 * radius_mm)];
-                sum.0 += self.voxels.centre_mm(voxel);
-                sum.1 += 1.0;
-            }
+            let shell = match f64::from(near[voxel as usize]) / radius_mm {
+                way if (1.0..2.0).contains(&way) => 0,
+                way if (2.5..3.5).contains(&way) => 1,
+                _ => continue,
+            };
+            sums[shell].0 += self.voxels.centre_mm(voxel);
+            sums[shell].1 += 1.0;
         }
         let [(near, a), (far, b)] = sums;
         (near / a - far / b).try_normalize(1e-9).filter(|outward| outward.iter().all(|k| k.is_finite()))
@@ -205,11 +217,12 @@ impl Search<'_> {
         voxels.min_by(|a, b| distance(*a).total_cmp(&distance(*b)).then(a.cmp(b)))
     }
 
-    /// Whether the vessel goes on from here in a single direction: in a ring the way has maxima too.
+    /// Whether the vessel goes on from here in a single direction: in a ring the way has maxima too. So near the end, a
+    /// sphere about it holds all of the section, and what is around that is of one piece.
     fn is_end(&self, near: &[f32], width_mm: f64) -> bool {
         let is_shell = |v: u32| {
             let way = f64::from(near[v as usize]);
-            way.is_finite() && way > width_mm
+            way.is_finite() && way > AROUND[0] * width_mm
         };
         let mut is_new: Vec<bool> = (0..near.len() as u32).map(is_shell).collect();
         let mut pieces = 0;
@@ -227,10 +240,6 @@ impl Search<'_> {
                 }
             }
         }
-        eprintln!(
-            "DEBUG pieces {pieces} width {width_mm} near {}",
-            near.iter().filter(|w| w.is_finite()).count()
-        );
         pieces < 2
     }
 
