@@ -7,6 +7,7 @@ mod bad_input;
 mod bench;
 mod cache;
 mod centreline;
+mod check;
 mod common;
 mod compare;
 mod course;
