@@ -31,6 +31,9 @@ const AROUND: [f64; 2] = [1.75, 2.5];
 /// Part of the largest clearance nearby that counts as the largest: of those places the nearest to the end is taken.
 const NEARLY: f32 = 0.9;
 
+/// Smallest part of all voxels whose ends are looked for.
+const SPECK: f64 = 1e-3;
+
 /// How a vessel ends in a label map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -102,25 +105,40 @@ impl PartEnds {
 }
 
 impl Search<'_> {
-    /// The ends of each part.
+    /// The ends of each part that is not a speck.
     pub(super) fn parts(&self) -> Vec<PartEnds> {
         let mut is_new = vec![true; self.voxels.len()];
         let mut parts = Vec::new();
         for first in 0..self.voxels.len() as u32 {
-            if !is_new[first as usize] {
+            if !std::mem::take(&mut is_new[first as usize]) {
                 continue;
             }
-            let ways = self.voxels.ways_mm(&[first], f64::INFINITY);
-            let own: Vec<u32> =
-                (0..self.voxels.len() as u32).filter(|v| ways[*v as usize].is_finite()).collect();
-            own.iter().for_each(|v| is_new[*v as usize] = false);
-            parts.push(self.ends(&own, &ways));
+            let mut own = self.connected(first, &mut is_new);
+            if own.len() as f64 >= SPECK * self.voxels.len() as f64 {
+                own.sort_unstable();
+                parts.push(self.ends(&own));
+            }
         }
         parts
     }
 
-    /// The ends of a part, whose ways from any of its voxels are `ways`.
-    fn ends(&self, own: &[u32], ways: &[f32]) -> PartEnds {
+    /// The voxels that are connected to one through new ones, itself first; they are new no longer.
+    fn connected(&self, first: u32, is_new: &mut [bool]) -> Vec<u32> {
+        let (mut all, mut next) = (vec![first], 0);
+        while next < all.len() {
+            for other in self.voxels.around(all[next]) {
+                if std::mem::take(&mut is_new[other as usize]) {
+                    all.push(other);
+                }
+            }
+            next += 1;
+        }
+        all
+    }
+
+    /// The ends of a part.
+    fn ends(&self, own: &[u32]) -> PartEnds {
+        let ways = self.voxels.ways_mm(&own[..1], f64::INFINITY);
         let longer = |a: &u32, b: &u32| ways[*a as usize].total_cmp(&ways[*b as usize]).then(b.cmp(a));
         let root = own.iter().copied().max_by(longer).unwrap_or_default();
         let ways = self.voxels.ways_mm(&[root], f64::INFINITY);
@@ -231,14 +249,7 @@ impl Search<'_> {
                 continue;
             }
             pieces += 1;
-            let mut pending = vec![first as u32];
-            while let Some(voxel) = pending.pop() {
-                for other in self.voxels.around(voxel) {
-                    if std::mem::take(&mut is_new[other as usize]) {
-                        pending.push(other);
-                    }
-                }
-            }
+            self.connected(first as u32, &mut is_new);
         }
         pieces < 2
     }
@@ -337,16 +348,7 @@ impl Search<'_> {
                 if !std::mem::take(&mut is_new[*voxel as usize]) {
                     continue;
                 }
-                let (mut voxels, mut next) = (vec![*voxel], 0);
-                while next < voxels.len() {
-                    for other in self.voxels.around(voxels[next]) {
-                        if std::mem::take(&mut is_new[other as usize]) {
-                            voxels.push(other);
-                        }
-                    }
-                    next += 1;
-                }
-                patches.push(Patch { side, voxels });
+                patches.push(Patch { side, voxels: self.connected(*voxel, &mut is_new) });
             }
         }
         patches
