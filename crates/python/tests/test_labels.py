@@ -13,7 +13,7 @@ LABELS = Path(endowire.assets_path()) / "ct" / "abdomen_labels.nii.gz"
 def test_several_labels_are_one_vessel_with_openings():
     vessel = endowire.Vessel.from_labels(LABELS, [52, 65, 66])
     radii = [opening["radius_mm"] for opening in vessel.openings]
-    assert radii == pytest.approx([9.0, 5.0, 5.0, 3.3], rel=0.1)
+    assert radii == pytest.approx([9.0, 5.0, 5.0, 3.3], rel=0.15)
     assert len(vessel.targets) == 3
     one = endowire.Vessel.from_labels(LABELS, 65)
     assert len(one.openings) == 2

@@ -137,6 +137,11 @@ pub(super) fn text(document: &Document) -> String {
     let verdict = match (document.faults.join(", "), r.flat) {
         (faults, _) if faults.is_empty() => "sound".to_owned(),
         (faults, true) => format!("faulty: {faults}: no device can be in it"),
+        (faults, false) if r.separate_pieces > 0 => {
+            format!(
+                "faulty: {faults}; what can be is repaired on loading, as told below, and pieces are not joined: unite them, or delete them"
+            )
+        }
         (faults, false) => format!("faulty: {faults}; it is repaired on loading, as told below"),
     };
     let mut lines = vec![

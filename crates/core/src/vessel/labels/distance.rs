@@ -35,20 +35,15 @@ impl<'a> Voxels<'a> {
         self.index.len()
     }
 
-    /// Centre of a voxel, mm from the centre of the mask's first one.
+    /// Centre of a voxel, mm from the centre of the picture's first one.
     pub(super) fn centre_mm(&self, voxel: u32) -> Vec3 {
         let at = self.mask.place(self.index[voxel as usize] as usize);
-        self.axes * Vec3::from(at.map(|k| k as f64))
+        self.axes * Vec3::from_fn(|k, _| (at[k] as i64 + self.mask.from[k]) as f64)
     }
 
     /// From a voxel to the next one along each axis, mm.
     pub(super) fn axes(&self) -> &Matrix3<f64> {
         &self.axes
-    }
-
-    /// Side of a cube of a voxel's volume, mm.
-    pub(super) fn voxel_mm(&self) -> f64 {
-        self.axes.determinant().abs().cbrt()
     }
 
     /// The voxels inside that share a face or an edge with this one.

@@ -2,11 +2,8 @@
 
 use std::collections::VecDeque;
 
-/// Voxels of background around the label: where a vessel leaves the picture it is continued by [`CONTINUED`] voxels, and
-/// the surface needs one more.
-pub(super) const MARGIN: usize = CONTINUED + 1;
-/// Voxels by which a vessel is continued beyond the picture's border, so that smoothing does not round its rim.
-pub(super) const CONTINUED: usize = 4;
+/// Voxels of background around the label: the surface needs one.
+const MARGIN: usize = 1;
 
 /// Voxels in a box, the first index fastest.
 #[derive(Debug, Clone)]
@@ -56,6 +53,18 @@ impl Mask {
             }
         }
         Some(mask)
+    }
+
+    /// The same voxels with so many more of background on all sides.
+    pub(super) fn padded(&self, by: usize) -> Self {
+        let size = self.size.map(|n| n + 2 * by);
+        let from = self.from.map(|at| at - by as i64);
+        let mut padded = Self { size, from, inside: vec![false; size.iter().product()] };
+        for (index, _) in self.inside.iter().enumerate().filter(|(_, inside)| **inside) {
+            let own = padded.index(self.place(index).map(|k| k + by));
+            padded.inside[own] = true;
+        }
+        padded
     }
 
     pub(super) fn index(&self, [x, y, z]: [usize; 3]) -> usize {

@@ -26,7 +26,7 @@ use distance::Voxels;
 pub use ends::EndKind;
 use ends::{Search, Tip};
 pub use map::LabelMap;
-use mask::{CONTINUED, Mask};
+use mask::Mask;
 use net::Net;
 pub use options::{Ends, LabelOptions, Parts};
 pub use report::{LabelEnd, LabelReport};
@@ -103,9 +103,7 @@ impl LabelSurface {
                 report.border_touches += part.touches;
                 found.push(part);
             }
-            for tip in found.iter().flat_map(|part| &part.tips) {
-                continue_beyond(&search, tip, &mut continued);
-            }
+            continued = continued_beyond(&mask, &voxels, found.iter().flat_map(|part| &part.tips), &sides_mm);
         }
         let net = Net::of(&mut continued);
         if net.quads.len() > MOST_QUADS {
@@ -123,7 +121,9 @@ impl LabelSurface {
         let into = axes.try_inverse().unwrap_or_default();
         let lattice = Lattice { axes, into, within: WITHIN, edges };
         let volume_mm3 = continued.count() as f64 * axes.determinant().abs();
-        let at = smooth::smoothed(&net, &lattice, volume_mm3 * axes.determinant().signum());
+        let mut at = smooth::smoothed(&net, &lattice, volume_mm3 * axes.determinant().signum());
+        let from = axes * Vec3::from(continued.from.map(|k| k as f64));
+        at.iter_mut().for_each(|x| *x += from);
         let mut mesh = SurfaceMesh { vertices_mm: at, triangles: Vec::with_capacity(2 * net.quads.len()) };
         for quad in &net.quads {
             let mut quad = *quad;
@@ -149,7 +149,7 @@ impl LabelSurface {
                 let line = lines.as_ref().map_err(ToString::to_string).map(|lines| lines[number].as_ref());
                 let end = line.and_then(|line| {
                     let plane = cut::plane(tip, line, &voxels, voxel_mm)?;
-                    let outermost = outermost_mm(&voxels, tip, &plane);
+                    let outermost = outermost_mm(&voxels, tip, &sides_mm);
                     cut::cut(&mut mesh, &plane, &outermost, tip.radius_mm, voxel_mm)?;
                     Ok(plane)
                 });
@@ -157,34 +157,62 @@ impl LabelSurface {
             }
         }
         drop_unreferenced(&mut mesh);
-        let from = Vec3::from(mask.from.map(|k| k as f64));
-        let shift = map.origin_mm() + axes * from;
+        let shift = map.origin_mm();
         mesh.vertices_mm.iter_mut().for_each(|x| *x += shift);
         report.ends.iter_mut().for_each(|end| end.move_by(&shift));
         Ok(Self { mesh, report })
     }
 }
 
-/// Continues a vessel beyond the picture's border.
-fn continue_beyond(search: &Search<'_>, tip: &Tip, mask: &mut Mask) {
-    for (voxel, side) in &tip.patch {
-        let mut at = mask.place(search.voxels.index[*voxel as usize] as usize);
-        for _ in 0..CONTINUED {
-            at[side.axis] = if side.is_last { at[side.axis] + 1 } else { at[side.axis] - 1 };
-            let index = mask.index(at);
-            mask.inside[index] = true;
-        }
-    }
+/// Number of voxels by which a vessel is continued beyond the picture's border, along an axis with sides of `side_mm`.
+///
+/// Smoothing must not round its rim, and the largest sphere at the border must be that of the vessel, not of what a flat end
+/// leaves of it: among equal small ones the centre line would end anywhere.
+fn continued_by(tip: &Tip, side_mm: f64) -> usize {
+    /// Voxels for smoothing.
+    const LEAST: usize = 4;
+    /// Radii of the vessel for the sphere.
+    const RADII: f64 = 1.5;
+    /// Most voxels: a wider vessel has room for the sphere of an oblique section anyway.
+    const MOST: usize = 64;
+    (LEAST + (RADII * tip.radius_mm / side_mm) as usize).min(MOST)
 }
 
-/// A place on the surface's side of an end: the tip, or the middle of the border patch, and from there outwards.
-fn outermost_mm(voxels: &Voxels<'_>, tip: &Tip, plane: &cut::Plane) -> Vec3 {
-    match tip.kind {
-        EndKind::Blunt => voxels.centre_mm(tip.tip),
-        EndKind::Border => {
-            let sum: Vec3 = tip.patch.iter().map(|(voxel, _)| voxels.centre_mm(*voxel)).sum();
-            let middle = sum / tip.patch.len().max(1) as f64;
-            middle + plane.outward * (2.0 * CONTINUED as f64 * voxels.voxel_mm())
+/// The mask with vessels continued beyond the border where they leave the picture.
+fn continued_beyond<'a>(
+    mask: &Mask,
+    voxels: &Voxels<'_>,
+    tips: impl Iterator<Item = &'a Tip> + Clone,
+    sides_mm: &[f64; 3],
+) -> Mask {
+    let count = |tip: &Tip| {
+        let sides = tip.patch.iter().map(|(_, side)| continued_by(tip, sides_mm[side.axis]));
+        sides.max().unwrap_or(0)
+    };
+    let by = tips.clone().map(count).max().unwrap_or(0);
+    let mut continued = mask.padded(by);
+    for tip in tips {
+        for (voxel, side) in &tip.patch {
+            let mut at = mask.place(voxels.index[*voxel as usize] as usize).map(|k| k + by);
+            for _ in 0..continued_by(tip, sides_mm[side.axis]) {
+                at[side.axis] = if side.is_last { at[side.axis] + 1 } else { at[side.axis] - 1 };
+                let index = continued.index(at);
+                continued.inside[index] = true;
+            }
         }
     }
+    continued
+}
+
+/// A place on the surface's side of an end: the tip, or the middle of where the vessel is continued to.
+fn outermost_mm(voxels: &Voxels<'_>, tip: &Tip, sides_mm: &[f64; 3]) -> Vec3 {
+    if tip.patch.is_empty() {
+        return voxels.centre_mm(tip.tip);
+    }
+    let beyond = |(voxel, side): &(u32, ends::Side)| {
+        let count = continued_by(tip, sides_mm[side.axis]) as f64;
+        let step = voxels.axes().column(side.axis) * if side.is_last { count } else { -count };
+        voxels.centre_mm(*voxel) + step
+    };
+    tip.patch.iter().map(beyond).sum::<Vec3>() / tip.patch.len() as f64
 }
