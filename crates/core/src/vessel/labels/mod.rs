@@ -86,14 +86,14 @@ impl LabelSurface {
         report.left_out_voxels = sizes[kept..].iter().sum();
         report.filled_voxels = mask.fill_hollows();
         report.thin_part = mask.thin_part();
-        Self::of_mask(map, mask, options.ends, report)
+        Self::of_mask(map, &mask, options.ends, report)
     }
 
-    fn of_mask(map: &LabelMap, mask: Mask, ends: Ends, mut report: LabelReport) -> Result<Self> {
+    fn of_mask(map: &LabelMap, mask: &Mask, ends: Ends, mut report: LabelReport) -> Result<Self> {
         let axes = *map.axes_mm();
         let sides_mm: [f64; 3] = std::array::from_fn(|k| axes.column(k).norm());
-        let voxel_mm = (sides_mm[0] * sides_mm[1] * sides_mm[2]).cbrt();
-        let voxels = Voxels::of(&mask, axes);
+        let voxel_mm = libm::cbrt(sides_mm[0] * sides_mm[1] * sides_mm[2]);
+        let voxels = Voxels::of(mask, axes);
         let (mut found, mut continued) = (Vec::new(), mask.clone());
         if ends != Ends::None {
             let clearance_mm = voxels.clearance_mm();
@@ -103,7 +103,7 @@ impl LabelSurface {
                 report.border_touches += part.touches;
                 found.push(part);
             }
-            continued = continued_beyond(&mask, &voxels, found.iter().flat_map(|part| &part.tips), &sides_mm);
+            continued = continued_beyond(mask, &voxels, found.iter().flat_map(|part| &part.tips), &sides_mm);
         }
         let net = Net::of(&mut continued);
         if net.quads.len() > MOST_QUADS {

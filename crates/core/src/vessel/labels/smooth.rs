@@ -95,7 +95,7 @@ pub(super) fn smoothed(net: &Net, lattice: &Lattice, volume_mm3: f64) -> Vec<Vec
     let sides: Vec<f64> = lattice.axes.column_iter().map(|side| side.norm()).collect();
     // A sweep is a step of the heat equation of about STEP h²/4, h being the shortest edge.
     let finest = sides.iter().copied().fold(f64::MAX, f64::min) / lattice.edges as f64;
-    let voxel = (sides[0] * sides[1] * sides[2]).cbrt();
+    let voxel = libm::cbrt(sides[0] * sides[1] * sides[2]);
     let sweeps = |reach: f64, step: f64| 2.0 * (reach * voxel / finest).powi(2) / step;
     let all = (sweeps(REACH, STEP) as usize).clamp(SWEEPS, MOST_SWEEPS);
     let walk = (sweeps(SPREAD, GIVEN) as usize).clamp(1, MOST_SWEEPS);
