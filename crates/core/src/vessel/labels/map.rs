@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use crate::{Error, Result, Vec3};
 
 /// Labels named in an error.
-const NAMED: usize = 24;
+const NAMED: usize = 16;
 
 /// A segmentation: a label for each voxel, 0 being background. Voxel (i, j, k) is at `origin_mm` + `axes_mm` · (i, j, k) in
 /// the axes of scenes (left, posterior, superior); voxels may be oblique, flipped and of different sides.

@@ -5,12 +5,11 @@
 //! ([`Pieces`]). Its volume is that of the voxels to the bit, which smoothing can then keep; a triangulated isosurface of
 //! zeros and ones cuts every corner off instead (5 % of the section of a vessel of three voxels).
 //!
-//! No crate is used: of marching cubes and surface nets on crates.io (November 2026), `mcubes` 0.1.7, `marching-cubes`
-//! 0.1.2 and `isosurface` 0.1.0-alpha use the table of 1987 or that of Bourke, whose ambiguous faces leave holes in
-//! label maps, repeat vertices for every triangle and take dense single-precision fields; `fast-surface-nets` 0.2.1 and
-//! `surface-nets` 0.1.0 put one vertex into a cell, so that voxels that touch by an edge make edges of four faces; and
-//! `splashsurf_lib` 0.14 is made for particles. None of them names its guarantee, and all but two have not been released
-//! for two years.
+//! No crate is used. By their documentation, of those on crates.io (November 2026) `mcubes` 0.1.7, `marching-cubes` 0.1.2 and
+//! `isosurface` 0.1.0-alpha.0 are marching cubes by tables of 256 cases over dense fields of single precision, and say
+//! nothing about ambiguous faces, of which label maps are full; `fast-surface-nets` 0.2.1 and `surface-nets` 0.1.0 put
+//! one vertex into a cell, so that voxels that touch by an edge make edges of four faces; `splashsurf_lib` 0.14 is made for
+//! particles. An isosurface would also lose the exact volume.
 //!
 //! Voxels that share an edge are joined. Where background surrounds such an edge at both of its ends, the two passages
 //! would share it; then one of the two background voxels is filled, which is counted.
