@@ -22,7 +22,7 @@ const SHORT_VOXELS: f64 = 1.5;
 /// Least area in which an end touches the border, in sections of its branch.
 pub(super) const LEAST_PATCH: f64 = 0.3;
 /// Least cosine between a vessel and the normal of the border where it leaves: one that runs along it only touches it.
-const STEEP: f64 = 0.4;
+const STEEP: f64 = 0.55;
 /// Part of the largest of these cosines that another side needs, through which the vessel leaves too.
 const ALIKE: f64 = 0.8;
 /// Ways from an end, in widths, that are near it, and those of the shell about it that shows whether it is an end.

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-/// Voxels of background around the label: the surface needs one.
-const MARGIN: usize = 1;
+/// Voxels of background around the label: faces are looked for from the second voxel on, and the first of them is background.
+const MARGIN: usize = 2;
 
 /// Voxels in a box, the first index fastest.
 #[derive(Debug, Clone)]

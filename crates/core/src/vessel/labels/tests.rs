@@ -169,7 +169,7 @@ fn a_picture_cut_to_the_label_has_no_ends_at_its_sides() {
     // Half a circle whose top touches the border of a picture that is no larger than it.
     let is_in = |x: Vec3| {
         let ring = libm::hypot(x.x - 22.3, x.z) - 18.0;
-        libm::hypot(ring, x.y - 4.3) < 4.2 && x.z > 0.0
+        libm::hypot(ring, x.y - 4.3) < 4.2
     };
     let surface = made(&map([45, 9, 23], [1.0; 3], is_in));
     assert_eq!(surface.report.ends.len(), 2, "{:?}", surface.report);
