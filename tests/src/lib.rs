@@ -3,6 +3,7 @@
 pub mod bent_rod;
 pub mod damage;
 pub mod passages;
+pub mod phantom;
 pub mod readers;
 pub mod spoiled;
 pub mod sweep;

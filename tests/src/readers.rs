@@ -6,12 +6,14 @@ use endowire_assess::{Record, Subject};
 use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, State};
 use endowire_core::statics::{StaticCase, StaticProblem};
-use endowire_core::vessel::{CentrelineTree, GeneratedWall, NoStore, Resolution, SurfaceMesh, anatomy};
+use endowire_core::vessel::{
+    CentrelineTree, GeneratedWall, LabelOptions, LabelSurface, NoStore, Resolution, SurfaceMesh, anatomy,
+};
 use endowire_core::{Error, Result, Vec3};
 use endowire_methods::Scene;
 use endowire_sweep::Sweep;
 use endowire_verify::surfaces::Sidecar;
-use endowire_viewer::{CtSpec, Renderer, View, ViewSpec};
+use endowire_viewer::{CtSpec, Renderer, View, ViewSpec, read_label_map};
 
 fn surface(bytes: &[u8], name: &str) -> Result<()> {
     SurfaceMesh::from_bytes(bytes, Path::new(name), 1.0).map(drop)
@@ -154,6 +156,21 @@ pub fn tomogram(bytes: &[u8]) -> Result<()> {
     // What is left in the folder of temporary files is nobody's loss.
     let _ = std::fs::remove_file(&path);
     read
+}
+
+/// A label map (NIfTI of either format), and the surface of label 1.
+///
+/// # Errors
+/// As [`read_label_map`] and [`LabelSurface::of`], and a file that cannot be written for it.
+pub fn label_map(bytes: &[u8]) -> Result<()> {
+    let name = format!("endowire-{}-{:?}-labels.nii", std::process::id(), std::thread::current().id());
+    let path = std::env::temp_dir().join(name);
+    std::fs::write(&path, bytes).map_err(|e| Error::content(&path, e.to_string()))?;
+    let made = read_label_map(&path).and_then(|map| {
+        LabelSurface::of(&map, &LabelOptions::of(&[1])).map_err(|e| Error::content(&path, e.to_string()))
+    });
+    let _ = std::fs::remove_file(&path);
+    made.map(drop)
 }
 
 /// A tomogram of two slices (DICOM), one in each half of the bytes, and rays through it.

@@ -8,12 +8,13 @@ use std::sync::OnceLock;
 use endowire_core::input::nearest;
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
-    CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, Lumen, NoStore,
-    Opening, Repair, RepairOptions, Resolution, SurfaceFrame, SurfaceMesh, SweptVessel, Target, Wall,
-    anatomy, check_with, wall_hints,
+    CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, LabelOptions,
+    LabelSurface, Lumen, NoStore, Opening, Repair, RepairOptions, Resolution, SurfaceFrame, SurfaceMesh,
+    SweptVessel, Target, Wall, anatomy, check_with, wall_hints,
 };
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
+use endowire_viewer::read_label_map;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -185,6 +186,40 @@ impl Vessel {
         let wall = made.map_err(exception)?;
         for mended in wall.report().mended() {
             warn(py, &mended)?;
+        }
+        Ok(Self::of_wall(wall))
+    }
+
+    /// Makes the wall of a segmentation: a label map (NIfTI) as TotalSegmentator and 3D Slicer write them. `label` is the
+    /// number of the vessel's label, or several that together are the vessel. `parts`: the "largest" connected part, or
+    /// "all". `ends`: which ends of vessels are opened, "all", those at the picture's "border", or "none". Positions are
+    /// those of scenes (LPS), so that the tomogram of the segmentation fits as `patient.ct`.
+    ///
+    /// Warns (UserWarning) of what was left out, filled or not opened. Raises InputError for a file that is no label map
+    /// and for a label that it does not have.
+    #[staticmethod]
+    #[pyo3(signature = (path, label, parts = "largest", ends = "all"))]
+    fn from_labels(
+        py: Python<'_>,
+        path: PathBuf,
+        label: &Bound<'_, PyAny>,
+        parts: &str,
+        ends: &str,
+    ) -> PyResult<Self> {
+        let labels = match label.extract::<List<Bound<'_, PyAny>>>() {
+            Ok(several) => several.0.iter().map(|one| natural("label", one)).collect::<PyResult<_>>()?,
+            Err(_) => vec![natural("label", label)?],
+        };
+        let (parts, ends) = (parts.parse().map_err(exception)?, ends.parse().map_err(exception)?);
+        let options = LabelOptions { labels, parts, ends };
+        let reported = path.display().to_string();
+        let made = interruptible(py, move || {
+            let surface = LabelSurface::of(&read_label_map(&path)?, &options)?;
+            Wall::from_surface(&surface.mesh).map(|wall| (wall, surface.report.notes()))
+        })?;
+        let (wall, notes) = made.map_err(exception)?;
+        for note in notes.into_iter().chain(wall.report().mended()) {
+            warn(py, &format!("{reported}: {note}"))?;
         }
         Ok(Self::of_wall(wall))
     }

@@ -63,6 +63,7 @@ pub use moment::Moment;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,
 };
+pub use patient::read_label_map;
 pub use pulse::Seen;
 pub use pushed::{Pushed, ShownDevice};
 pub use renderer::{Frames, Renderer};

@@ -286,6 +286,30 @@ fn damaged_tomograms() {
     reads_or_refuses(&files, &places, readers::tomogram);
 }
 
+#[test]
+fn damaged_label_maps() {
+    // The header of a tomogram, with eight voxels of twelve labelled; as bytes and as decimal numbers.
+    let labels = (0..12_u8).map(|k| u8::from(k < 9));
+    let bytes: Vec<u8> = labels.clone().collect();
+    let float: Vec<u8> = labels.flat_map(|label| f32::from(label).to_le_bytes()).collect();
+    let places = [
+        "is no NIfTI volume",
+        "voxel",
+        "bitpix",
+        "dimensions",
+        "its affine",
+        "dim[",
+        "pair",
+        "scl_inter",
+        "no volume",
+        "axes_mm",
+        "label",
+        "mesh",
+    ];
+    let files = [nifti(1, 2, &bytes), nifti(1, 16, &float)];
+    reads_or_refuses(&files, &places, readers::label_map);
+}
+
 /// The tomogram of [`nifti`] in the second format.
 fn second_nifti(voxels: &[u8]) -> Vec<u8> {
     let mut bytes = vec![0; 544];

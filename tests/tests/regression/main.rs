@@ -9,6 +9,7 @@ mod deployments;
 mod hard_scenes;
 mod instruments;
 mod passages;
+mod phantom;
 mod robust_insertion;
 mod round_bits;
 mod sequences;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use endowire_core::Vec3;
 use endowire_core::passable::NO_FORCE_N;
-use endowire_core::vessel::{CentrelineEnd, PatientAxes, SurfaceFrame};
+use endowire_core::vessel::{CentrelineEnd, Ends, Mending, Parts, PatientAxes, SurfaceFrame};
 
 use crate::commands::parse_end;
 
@@ -21,6 +21,8 @@ pub(crate) enum VesselCommand {
         #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
         septum_mm: f64,
         #[command(flatten)]
+        repair: RepairArgs,
+        #[command(flatten)]
         felt: FeltArgs,
         /// Print the report as one JSON document on stdout
         #[arg(long)]
@@ -28,6 +30,9 @@ pub(crate) enum VesselCommand {
     },
     /// Build a wall from a centre-line tree
     Generate(GenerateArgs),
+    /// Make a surface of a segmentation: a label map as TotalSegmentator and 3D Slicer write them (NIfTI), smoothed within half a voxel and opened
+    /// at the ends of its vessels
+    FromLabels(FromLabelsArgs),
     /// Find the centre line of a surface, with the radius of the largest sphere about each point
     Centreline(CentrelineArgs),
     /// Measure the sac of an aneurysm: neck, volume, height
@@ -80,6 +85,17 @@ impl From<CoordinateArgs> for SurfaceFrame {
     }
 }
 
+/// What of a surface is repaired, as `vessel.repair` and `vessel.keep_open_mm` of a scene say.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(crate) struct RepairArgs {
+    /// all: faults are mended; none: the surface is taken as it is, or refused
+    #[arg(long, value_name = "all|none", default_value = "all")]
+    pub(crate) repair: Mending,
+    /// A place x,y,z in mm: the hole nearest to it is meant, and is not closed (repeatable)
+    #[arg(long = "keep-open", value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
+    pub(crate) keep_open_mm: Vec<Vec3>,
+}
+
 /// Requests about the contact wall; without any of them it is not computed.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct FeltArgs {
@@ -107,6 +123,32 @@ pub(crate) struct GenerateArgs {
     /// Number of triangles, met within a few percent
     #[arg(long, value_name = "COUNT")]
     pub(crate) triangles: Option<usize>,
+    /// Print the report as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Where a vessel ends: where its label touches the picture's border with at least a third of its section (the vessel goes on beyond the
+/// picture), and where a branch at least twice as long as wide ends within the picture (the segmentation stops there; shorter ones are domes and
+/// stumps, and stay closed). Each end is cut by a plane across the centre line: at the border as far inside as an oblique vessel needs, within the
+/// picture about a radius from its tip. Coordinates are those of scenes (left, posterior, superior, mm), so that the tomogram of the
+/// segmentation fits the vessel as the body in the beam ([view.patient.ct])
+#[derive(Debug, clap::Args)]
+pub(crate) struct FromLabelsArgs {
+    /// Label map (.nii, .nii.gz): whole numbers in any type, 0 for the background
+    pub(crate) file: PathBuf,
+    /// The label of the vessel (repeatable: several labels become one vessel)
+    #[arg(long, value_name = "NUMBER", required = true)]
+    pub(crate) label: Vec<u16>,
+    /// Surface file to write (.stl, .obj or .ply)
+    #[arg(long, value_name = "FILE", alias = "output")]
+    pub(crate) out: PathBuf,
+    /// Which parts of the label, if they do not touch: the largest, or all of at least eight voxels
+    #[arg(long, value_name = "largest|all", default_value = "largest")]
+    pub(crate) parts: Parts,
+    /// Which ends are opened: all, only those at the picture's border, or none
+    #[arg(long, value_name = "all|border|none", default_value = "all")]
+    pub(crate) ends: Ends,
     /// Print the report as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

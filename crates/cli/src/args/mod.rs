@@ -23,8 +23,8 @@ pub(crate) use bench::{
 };
 pub(crate) use evidence::EvidenceArgs;
 pub(crate) use inputs::{
-    CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, SacArgs,
-    VesselCommand,
+    CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, FromLabelsArgs, GenerateArgs, PassableArgs,
+    RepairArgs, SacArgs, VesselCommand,
 };
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{

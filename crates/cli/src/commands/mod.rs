@@ -12,6 +12,7 @@ mod experiment;
 mod export;
 mod felt;
 mod fluoro;
+mod from_labels;
 mod new;
 mod parallel;
 mod passable;
@@ -48,10 +49,11 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Dataset(args) => dataset::dataset(args),
         Command::Rod(args) => rod::rod(args),
         Command::Verify(args) => verify::verify(args),
-        Command::Vessel(VesselCommand::Check { file, frame, septum_mm, felt, json }) => {
-            vessel::check_file(file, (*frame).into(), *septum_mm, felt, *json)
+        Command::Vessel(VesselCommand::Check { file, frame, septum_mm, repair, felt, json }) => {
+            vessel::check_file(file, (*frame).into(), *septum_mm, repair, felt, *json)
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
+        Command::Vessel(VesselCommand::FromLabels(args)) => from_labels::from_labels(args),
         Command::Vessel(VesselCommand::Centreline(args)) => centreline::centreline(args),
         Command::Vessel(VesselCommand::Sac(args)) => sac::sac(args),
         Command::Vessel(VesselCommand::Passable(args)) => passable::passable_file(args),

@@ -4,18 +4,20 @@ use std::path::Path;
 
 use endowire_core::Error;
 use endowire_core::vessel::{
-    CentrelineTree, CheckReport, GeneratedWall, Resolution, SurfaceFrame, SurfaceMesh, anatomy, check_with,
+    CentrelineTree, CheckReport, GeneratedWall, RepairOptions, Resolution, SurfaceFrame, SurfaceMesh,
+    anatomy, check_repaired,
 };
 use serde::Serialize;
 
 use super::felt::FeltReport;
-use crate::args::{FeltArgs, GenerateArgs};
+use crate::args::{FeltArgs, GenerateArgs, RepairArgs};
 use crate::failure::Failure;
 use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
 
+/// The report on a surface file.
 #[derive(Serialize)]
-struct Document {
+pub(super) struct Document {
     #[serde(flatten)]
     provenance: Provenance,
     file: String,
@@ -33,11 +35,12 @@ pub(crate) fn check_file(
     file: &Path,
     frame: SurfaceFrame,
     septum_mm: f64,
+    repair: &RepairArgs,
     felt: &FeltArgs,
     json: bool,
 ) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(file)?], 0);
-    report_on(file, frame, septum_mm, felt, provenance, json)
+    report_on(file, frame, septum_mm, repair, felt, provenance, json)
 }
 
 /// Generates a wall from a tree, writes it, and reports on the written file.
@@ -57,7 +60,7 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     };
     let generated = GeneratedWall::new(&tree, resolution).map_err(|e| as_flag(e).at(args.tree.display()))?;
     generated.wall.mesh().write(&args.out)?;
-    report_on(&args.out, 1.0.into(), 1.0, &FeltArgs::default(), provenance, args.json)
+    report_on(&args.out, 1.0.into(), 1.0, &RepairArgs::default(), &FeltArgs::default(), provenance, args.json)
 }
 
 /// Replaces the core's name of a parameter in an error by the flag of the command line.
@@ -84,40 +87,61 @@ fn report_on(
     file: &Path,
     frame: SurfaceFrame,
     septum_mm: f64,
+    repair: &RepairArgs,
     felt: &FeltArgs,
     provenance: Provenance,
     json: bool,
 ) -> Result<(), Failure> {
+    let document = checked(file, frame, septum_mm, repair, felt, provenance)?;
+    answer(&document, json, || text(&document))
+}
+
+/// The report on a surface file.
+pub(super) fn checked(
+    file: &Path,
+    frame: SurfaceFrame,
+    septum_mm: f64,
+    repair: &RepairArgs,
+    felt: &FeltArgs,
+    provenance: Provenance,
+) -> Result<Document, Failure> {
     let surface = SurfaceMesh::read(file, frame)?;
-    let report = check_with(&surface, frame.unit_mm, septum_mm).map_err(|error| match error {
-        Error::Parameter { name, value, remedy } if name == "septum_mm" => {
-            Failure::from(Error::Parameter { name: "--septum-mm".to_owned(), value, remedy })
-        }
-        other => Failure::from(other).at(file.display()),
-    })?;
+    let options = RepairOptions { mending: repair.repair, keep_open_mm: repair.keep_open_mm.clone() };
+    let report =
+        check_repaired(&surface, frame.unit_mm, septum_mm, &options).map_err(|error| match error {
+            Error::Parameter { name, value, remedy } if name == "septum_mm" || name == "keep_open_mm" => {
+                let flag = if name == "septum_mm" { "--septum-mm" } else { "--keep-open" };
+                Failure::from(Error::Parameter { name: flag.to_owned(), value, remedy })
+            }
+            other => Failure::from(other).at(file.display()),
+        })?;
     let felt = FeltReport::new(&surface, felt)?;
     let faults = report.faults();
-    let document = Document {
+    Ok(Document {
         provenance,
         file: file.display().to_string(),
         sound: faults.is_empty(),
         faults,
         report,
         felt,
-    };
-    answer(&document, json, || text(&document))
+    })
 }
 
 /// Largest number of openings listed in the text report.
 const OPENINGS_LISTED: usize = 20;
 
 /// The report as text.
-fn text(document: &Document) -> String {
+pub(super) fn text(document: &Document) -> String {
     let r = &document.report;
     let size: Vec<String> = (0..3).map(|k| format!("{:.1}", r.high_mm[k] - r.low_mm[k])).collect();
     let verdict = match (document.faults.join(", "), r.flat) {
         (faults, _) if faults.is_empty() => "sound".to_owned(),
         (faults, true) => format!("faulty: {faults}: no device can be in it"),
+        (faults, false) if r.separate_pieces > 0 => {
+            format!(
+                "faulty: {faults}; what can be is repaired on loading, as told below, and pieces are not joined: unite them, or delete them"
+            )
+        }
         (faults, false) => format!("faulty: {faults}; it is repaired on loading, as told below"),
     };
     let mut lines = vec![

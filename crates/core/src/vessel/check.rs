@@ -6,7 +6,7 @@ use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3};
 use super::weld::Welding;
-use super::{RepairReport, SurfaceMesh, Wall, opening, repair, sliver};
+use super::{RepairOptions, RepairReport, SurfaceMesh, Wall, opening, repair, sliver};
 use crate::{Error, Result};
 
 /// Number of intersecting pairs named in a report; a list of thousands would not help.
@@ -56,6 +56,9 @@ pub struct CheckReport {
     /// Closed pieces of the repaired wall inside another piece, among its eight largest: volumes are added, and a device
     /// between the two is in the outer one.
     pub nested_pieces: usize,
+    /// Closed pieces of the repaired wall beside a vessel with openings, among its eight largest: nothing can get into them, as
+    /// into a sac that is not joined to its artery.
+    pub separate_pieces: usize,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
     /// Triangles wound against their neighbours or inwards.
@@ -126,6 +129,11 @@ impl CheckReport {
                 "pairs of openings that face each other",
             ),
             (self.nested_pieces, "closed piece inside another", "closed pieces inside another"),
+            (
+                self.separate_pieces,
+                "closed piece that is not joined to the vessel",
+                "closed pieces that are not joined to the vessel",
+            ),
         ];
         let counted = counts
             .iter()
@@ -149,11 +157,24 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
 /// # Errors
 /// As [`check`], and [`Error::Parameter`] for a thickness that is not a number of 0 or more.
 pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result<CheckReport> {
+    check_repaired(surface, unit_mm, septum_mm, &RepairOptions::default())
+}
+
+/// As [`check_with`], with other choices of what is repaired.
+///
+/// # Errors
+/// As [`check_with`] and [`Wall::repaired`].
+pub fn check_repaired(
+    surface: &SurfaceMesh,
+    unit_mm: f64,
+    septum_mm: f64,
+    repair: &RepairOptions,
+) -> Result<CheckReport> {
     if !(septum_mm.is_finite() && septum_mm >= 0.0) {
         return Err(Error::parameter("septum_mm", septum_mm, "must be a thickness in mm, 0 or more"));
     }
     let welding = Welding::of(surface)?;
-    let wall = Wall::mended(welding.clone(), Some(&[]))?;
+    let wall = Wall::repaired_from(welding.clone(), repair)?;
     // If only welding and turning over was needed, the wall is the surface as given: it is neither welded nor
     // searched again.
     let as_given = wall.report().is_as_given();
@@ -185,6 +206,8 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
         && volume_mm3 > rounding_mm3;
     let hints = hints(&wall, &survey, (high - low).norm(), unit_mm);
     let non_manifold_edges = table.non_manifold();
+    let [nested_pieces, separate_pieces] =
+        repair::nested_and_apart(wall.mesh(), &EdgeTable::new(&wall.mesh().triangles));
     Ok(CheckReport {
         triangles: surface.triangles.len(),
         vertices: surface.vertices_mm.len() - merged,
@@ -206,7 +229,8 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
             .collect(),
         inlet: wall.inlet().map(|opening| opening.index),
         facing_openings: opening::facing(wall.openings()),
-        nested_pieces: repair::nested(wall.mesh(), &EdgeTable::new(&wall.mesh().triangles)),
+        nested_pieces,
+        separate_pieces,
         non_manifold_edges,
         flipped_triangles: report.triangles_flipped,
         inside_out: report.inside_out,

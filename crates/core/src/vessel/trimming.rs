@@ -112,45 +112,54 @@ impl Line {
 
     /// Cuts off the parts of `teeth` beyond the line.
     fn cut(&self, mesh: &mut SurfaceMesh, teeth: &BTreeSet<u32>) {
-        let mut heights: BTreeMap<u32, f64> = BTreeMap::new();
-        for v in teeth.iter().flat_map(|t| mesh.triangles[*t as usize]) {
-            let beyond_mm = self.beyond_mm(&mesh.vertices_mm[v as usize]);
-            heights.insert(v, if beyond_mm.abs() < ON_LINE * self.edge_mm { 0.0 } else { beyond_mm });
-        }
-        let mut between: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        let mut kept = Vec::new();
-        for corners in teeth.iter().map(|t| mesh.triangles[*t as usize]) {
-            let mut polygon = Vec::with_capacity(4);
-            for k in 0..3 {
-                let [v, w] = [corners[k], corners[(k + 1) % 3]];
-                let [at, to] = [heights[&v], heights[&w]];
-                if at <= 0.0 {
-                    polygon.push(v);
-                }
-                if at * to < 0.0 {
-                    let vertices = &mut mesh.vertices_mm;
-                    polygon.push(*between.entry((v.min(w), v.max(w))).or_insert_with(|| {
-                        vertices.push(vertices[v as usize].lerp(&vertices[w as usize], at / (at - to)));
-                        vertices.len() as u32 - 1
-                    }));
-                }
-            }
-            // A triangle without a corner below the line is beyond it.
-            if corners.iter().any(|v| heights[v] < 0.0) {
-                let x = |k: usize| mesh.vertices_mm[polygon[k] as usize];
-                match polygon[..] {
-                    [a, b, c] => kept.push([a, b, c]),
-                    [a, b, c, d] if (x(2) - x(0)).norm() <= (x(3) - x(1)).norm() => {
-                        kept.extend([[a, b, c], [a, c, d]]);
-                    }
-                    [a, b, c, d] => kept.extend([[a, b, d], [b, c, d]]),
-                    _ => {}
-                }
-            }
-        }
-        let whole = (0..).zip(&mesh.triangles).filter(|(index, _)| !teeth.contains(index));
-        mesh.triangles = whole.map(|(_, triangle)| *triangle).chain(kept).collect();
+        let height = |x: &Vec3| {
+            let beyond_mm = self.beyond_mm(x);
+            if beyond_mm.abs() < ON_LINE * self.edge_mm { 0.0 } else { beyond_mm }
+        };
+        cut_off(mesh, teeth, height);
     }
+}
+
+/// Cuts off what is above height 0 of some triangles. Heights of their vertices that should count as 0, to avoid slivers,
+/// are to be 0.
+pub(super) fn cut_off(mesh: &mut SurfaceMesh, part: &BTreeSet<u32>, height: impl Fn(&Vec3) -> f64) {
+    let mut heights: BTreeMap<u32, f64> = BTreeMap::new();
+    for v in part.iter().flat_map(|t| mesh.triangles[*t as usize]) {
+        heights.insert(v, height(&mesh.vertices_mm[v as usize]));
+    }
+    let mut between: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+    let mut kept = Vec::new();
+    for corners in part.iter().map(|t| mesh.triangles[*t as usize]) {
+        let mut polygon = Vec::with_capacity(4);
+        for k in 0..3 {
+            let [v, w] = [corners[k], corners[(k + 1) % 3]];
+            let [at, to] = [heights[&v], heights[&w]];
+            if at <= 0.0 {
+                polygon.push(v);
+            }
+            if at * to < 0.0 {
+                let vertices = &mut mesh.vertices_mm;
+                polygon.push(*between.entry((v.min(w), v.max(w))).or_insert_with(|| {
+                    vertices.push(vertices[v as usize].lerp(&vertices[w as usize], at / (at - to)));
+                    vertices.len() as u32 - 1
+                }));
+            }
+        }
+        // A triangle without a corner below the line is beyond it.
+        if corners.iter().any(|v| heights[v] < 0.0) {
+            let x = |k: usize| mesh.vertices_mm[polygon[k] as usize];
+            match polygon[..] {
+                [a, b, c] => kept.push([a, b, c]),
+                [a, b, c, d] if (x(2) - x(0)).norm() <= (x(3) - x(1)).norm() => {
+                    kept.extend([[a, b, c], [a, c, d]]);
+                }
+                [a, b, c, d] => kept.extend([[a, b, d], [b, c, d]]),
+                _ => {}
+            }
+        }
+    }
+    let whole = (0..).zip(&mesh.triangles).filter(|(index, _)| !part.contains(index));
+    mesh.triangles = whole.map(|(_, triangle)| *triangle).chain(kept).collect();
 }
 
 impl Wall {

@@ -210,14 +210,18 @@ impl Wall {
     /// As [`Wall::from_surface`]; [`Error::Parameter`] naming `keep_open_mm` for a place without a hole; with
     /// [`Mending::None`] [`Error::Mesh`] for a surface that cannot be a wall as it is.
     pub fn repaired(surface: &SurfaceMesh, options: &RepairOptions) -> Result<Self> {
+        Self::repaired_from(Welding::of(surface)?, options)
+    }
+
+    /// [`Wall::repaired`] of a surface whose vertices are merged.
+    pub(super) fn repaired_from(welding: Welding, options: &RepairOptions) -> Result<Self> {
         match options.mending {
-            Mending::All => Self::mended(Welding::of(surface)?, Some(&options.keep_open_mm)),
+            Mending::All => Self::mended(welding, Some(&options.keep_open_mm)),
             Mending::None => {
                 if let Some(place) = options.keep_open_mm.first() {
                     let remedy = "nothing is closed with repair = \"none\": leave it out";
                     return Err(Error::parameter("keep_open_mm", crate::error::vector(place), remedy));
                 }
-                let welding = Welding::of(surface)?;
                 far::refuse(&welding.mesh)?;
                 let wall = Self::mended(welding, None)?;
                 repair::refuse_unmended(&wall.mesh, &wall.report).map_or(Ok(wall), Err)

@@ -64,7 +64,7 @@ __all__ = [
 
 
 def assets_path() -> _Path:
-    """The folder of the assets in the package: ``scenes``, ``devices`` (the catalogue), ``vessels`` and ``subjects``.
+    """The folder of the assets in the package: ``scenes``, ``devices`` (the catalogue), ``vessels``, ``subjects`` and ``ct``.
 
     For example, ``endowire.Scene(endowire.assets_path() / "scenes" / "arch_carotid.toml")`` reads a scene.
     """

@@ -26,6 +26,10 @@ class Vessel:
         vertices_mm: ArrayLike, triangles: ArrayLike, repair: str = "all", keep_open_mm: ArrayLike | None = None
     ) -> Vessel: ...
     @staticmethod
+    def from_labels(
+        path: str | PathLike[str], label: int | Sequence[int], parts: str = "largest", ends: str = "all"
+    ) -> Vessel: ...
+    @staticmethod
     def generate(
         tree: str | PathLike[str] | ArrayLike, edge_mm: float | None = None, triangles: int | None = None
     ) -> Vessel: ...

@@ -14,6 +14,7 @@ use endowire_core::{Error, Result};
 
 pub(crate) use body::Body;
 pub(crate) use tomogram::Volume;
+pub use tomogram::read_label_map;
 
 use crate::spec::ViewSpec;
 

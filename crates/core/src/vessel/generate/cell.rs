@@ -10,17 +10,17 @@
 use crate::Vec3;
 
 /// Edges of a cell. Edge 4 axis + du + 2 dv runs along `axis`, at `du` and `dv` of the two axes that follow it.
-pub(super) const EDGES: usize = 12;
+pub(in crate::vessel) const EDGES: usize = 12;
 
 /// No piece: the surface does not cross the edge.
 const NO_PIECE: u8 = u8::MAX;
 
 /// Pieces of surface in a cell.
-pub(super) struct Pieces {
+pub(in crate::vessel) struct Pieces {
     /// The piece that crosses each edge.
-    pub(super) of_edge: [u8; EDGES],
+    pub(in crate::vessel) of_edge: [u8; EDGES],
     /// Mean of the points where each piece crosses edges, from the cell's first corner, in cells.
-    pub(super) means: Vec<[f64; 3]>,
+    pub(in crate::vessel) means: Vec<[f64; 3]>,
 }
 
 /// Both ends of every edge.
@@ -40,7 +40,7 @@ const ENDS: [[[usize; 3]; 2]; EDGES] = {
 
 impl Pieces {
     /// The pieces in a cell with these values at its corners (x + 2 y + 4 z), if any.
-    pub(super) fn of(values: &[f64; 8]) -> Option<Self> {
+    pub(in crate::vessel) fn of(values: &[f64; 8]) -> Option<Self> {
         let inside = values.iter().filter(|value| **value < 0.0).count();
         if inside == 0 || inside == values.len() {
             return None;
@@ -107,7 +107,7 @@ impl Pieces {
     }
 
     /// Whether the surface passes through the side of the cell towards `axis`, the far one or the near one.
-    pub(super) fn passes(&self, axis: usize, far: bool) -> bool {
+    pub(in crate::vessel) fn passes(&self, axis: usize, far: bool) -> bool {
         let (u, v, side) = ((axis + 1) % 3, (axis + 2) % 3, usize::from(far));
         [u * 4 + 2 * side, u * 4 + 1 + 2 * side, v * 4 + side, v * 4 + side + 2]
             .iter()

@@ -20,6 +20,7 @@ use super::topology::EdgeTable;
 use super::wall::drop_unreferenced;
 use super::{CentrelineTree, SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3, parallel};
+pub(super) use cell::{EDGES, Pieces};
 use field::Field;
 pub(super) use field::{BLEND, BLEND_COSINES, HIDDEN};
 pub(crate) use sweep::any_perpendicular;
@@ -352,7 +353,7 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64, rounds: usize) -> Re
 }
 
 /// Edges of more than two quadrilaterals.
-fn crowded_edges(quads: &[[u32; 4]]) -> Vec<(u32, u32)> {
+pub(super) fn crowded_edges(quads: &[[u32; 4]]) -> Vec<(u32, u32)> {
     let edge = |quad: &[u32; 4], k: usize| {
         let (a, b) = (quad[k], quad[(k + 1) % 4]);
         (a.min(b), a.max(b))
@@ -429,7 +430,7 @@ fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
 }
 
 /// Adds a triangle or a quadrilateral, the latter divided along its shorter diagonal.
-fn push_polygon(vertices: &[Vec3], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
+pub(super) fn push_polygon(vertices: &[Vec3], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
     match *polygon {
         [a, b, c] => triangles.push([a, b, c]),
         [a, b, c, d] => {

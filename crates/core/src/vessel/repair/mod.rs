@@ -24,7 +24,7 @@ mod solid;
 mod tests;
 
 use overlap::Overlaps;
-pub(super) use pieces::{nested, turn_bodies};
+pub(super) use pieces::{nested_and_apart, turn_bodies};
 
 use super::crossings::Crossings;
 use super::repairs::{self, RepairKind};

@@ -80,6 +80,8 @@ fn a_sac_that_overlaps_its_artery_is_joined_and_one_apart_is_none() {
         add(&mut mesh, &ball(Vec3::y() * off_mm, 3.0, 16));
         let wall = Wall::from_surface(&mesh).unwrap();
         assert_eq!(wall.report().parts_united, usize::from(is_joined));
+        let checked = check(&mesh).unwrap();
+        assert_eq!(checked.separate_pieces, usize::from(!is_joined), "{:?}", checked.faults());
         let sac = Sac::measure(&wall, Vec3::y() * off_mm, Vec3::zeros());
         if is_joined {
             let sac = sac.unwrap();

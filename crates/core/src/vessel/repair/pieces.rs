@@ -82,12 +82,12 @@ impl Piece {
     }
 }
 
-/// Number of closed pieces of a consistently oriented mesh that lie inside another one, among the largest few; `table`
-/// holds its edges.
-pub(in crate::vessel) fn nested(mesh: &SurfaceMesh, table: &EdgeTable) -> usize {
+/// Numbers of closed pieces of a consistently oriented mesh, among the largest few, that lie inside another one, and of
+/// those that lie beside all others and are as large as a sac; `table` holds its edges.
+pub(in crate::vessel) fn nested_and_apart(mesh: &SurfaceMesh, table: &EdgeTable) -> [usize; 2] {
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {
-        return 0;
+        return [0; 2];
     }
     let pieces = measure(mesh, table, &piece_of, count);
     let mut order: Vec<usize> = (0..count).collect();
@@ -97,8 +97,12 @@ pub(in crate::vessel) fn nested(mesh: &SurfaceMesh, table: &EdgeTable) -> usize 
         let (a, b) = (&pieces[inner], &pieces[outer]);
         a.may_be_in(b) && is_inside(mesh, &piece_of, inner, outer, a.triangles)
     };
-    let closed = (1..order.len()).filter(|rank| pieces[order[*rank]].loops == 0);
-    closed.filter(|rank| order[..*rank].iter().any(|outer| lies_in(order[*rank], *outer))).count()
+    let closed: Vec<usize> = (1..order.len()).filter(|rank| pieces[order[*rank]].loops == 0).collect();
+    let is_nested = |rank: &&usize| order[..**rank].iter().any(|outer| lies_in(order[**rank], *outer));
+    let nested = closed.iter().filter(is_nested).count();
+    // Beside a vessel that has openings: closed vessels may be several.
+    let has_openings = order.iter().any(|piece| pieces[*piece].loops > 0);
+    [nested, if has_openings { closed.len() - nested } else { 0 }]
 }
 
 /// Drops the pieces of a consistently oriented mesh that are neither vessels nor in the lumen of one, makes walls of

@@ -5,6 +5,7 @@
 //! spectrum. A ray is marched in steps of half a voxel through the trilinear interpolation of the voxels.
 
 mod dicom;
+mod labels;
 mod nifti;
 mod warp;
 
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::c_arm::CArm;
 use crate::spec::CtSpec;
+pub use labels::read_label_map;
 use warp::Warp;
 
 /// Plausible sides of a voxel, mm: a mistake of units is often a factor of a thousand, and rays march by half a side.
@@ -309,5 +311,7 @@ fn trilinear<const K: usize>(size: [usize; 3], values: &[[f32; K]], at: [f32; 3]
 
 #[cfg(test)]
 mod format_tests;
+#[cfg(test)]
+mod label_tests;
 #[cfg(test)]
 mod tests;

@@ -27,76 +27,120 @@ const SECOND_BYTES: usize = 540;
 const SECOND: &[u8] = b"n+2\0";
 const SECOND_OF_PAIR: &[u8] = b"ni2\0";
 
-/// Reads a file of either format.
+/// Reads the Hounsfield units in a file of either format.
 ///
 /// # Errors
 /// [`Error::Content`] for an unusable volume.
 pub(super) fn read(path: &Path) -> Result<Scan> {
-    let bad = |reason: String| Error::content(path, reason);
-    let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
-    named(path).map_err(bad)?;
-    let header = second(path).map_err(bad)?;
-    let (header, placed, volume) = match header {
-        Some((mut header, placed, offset)) => {
-            check_size(&header).map_err(bad)?;
-            scaled(&mut header).map_err(bad)?;
-            let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
-            io::copy(&mut (&mut voxels).take(offset), &mut io::sink()).map_err(|e| unreadable(e.into()))?;
-            let volume = InMemNiftiVolume::from_reader(voxels, &header).map_err(unreadable)?;
-            (header, placed, volume)
-        }
-        None => {
-            // The header first: it gives the memory the volume needs.
-            let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
-            let mut header = NiftiHeader::from_reader(&mut voxels).map_err(unreadable)?;
-            check_size(&header).map_err(bad)?;
-            let is_scaled = scaled(&mut header).map_err(bad)?;
-            let placed = Placed::first(&header);
-            if &header.magic != FIRST_OF_PAIR {
-                let offset = (header.vox_offset as u64).saturating_sub(FIRST_BYTES);
-                io::copy(&mut (&mut voxels).take(offset), &mut io::sink())
-                    .map_err(|e| unreadable(e.into()))?;
-                let volume = InMemNiftiVolume::from_reader(voxels, &header).map_err(unreadable)?;
-                return scan(&volume, &placed, &header).map_err(bad);
-            }
-            let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
-            let read = object.into_volume();
-            // The library applies the file's scaling.
-            let volume = match is_scaled {
-                true => read,
-                false => InMemNiftiVolume::from_reader(read.into_raw_data().as_slice(), &header)
-                    .map_err(unreadable)?,
-            };
-            (header, placed, volume)
-        }
-    };
-    scan(&volume, &placed, &header).map_err(bad)
+    let stored = Stored::read(path)?;
+    let mut hu = Vec::with_capacity(stored.size.iter().product());
+    let filled = stored.each(|_, value| {
+        hu.push(value);
+        Ok(())
+    });
+    filled.map_err(|reason| Error::content(path, reason))?;
+    Ok(Scan { size: stored.size, axes: stored.axes, origin_mm: stored.origin_mm, hu })
 }
 
-/// The scan of a volume.
-fn scan(
-    volume: &InMemNiftiVolume,
-    placed: &Placed,
-    header: &NiftiHeader,
-) -> std::result::Result<Scan, String> {
-    let dim = volume.dim().to_vec();
-    let [nx, ny, nz] = match dim.as_slice() {
-        [x, y, z] | [x, y, z, 1] => [*x, *y, *z],
-        other => return Err(format!("a volume has three dimensions, not {other:?}")),
-    };
-    let mut hu = Vec::with_capacity(usize::from(nx) * usize::from(ny) * usize::from(nz));
-    let extra: &[u16] = if dim.len() == 4 { &[0] } else { &[] };
-    for z in 0..nz {
-        for y in 0..ny {
-            for x in 0..nx {
-                let place: Vec<u16> = [x, y, z].iter().chain(extra).copied().collect();
-                let value = volume.get_f32(&place);
-                hu.push(value.map_err(|e| format!("voxel [{x}, {y}, {z}] cannot be read: {e}"))?);
+/// The volume of a file, as it is stored.
+pub(super) struct Stored {
+    pub(super) size: [usize; 3],
+    /// Voxel (i, j, k) is at `origin_mm` + `axes` · (i, j, k), in LPS.
+    pub(super) axes: Matrix3<f64>,
+    pub(super) origin_mm: Vec3,
+    volume: InMemNiftiVolume,
+}
+
+impl Stored {
+    /// Reads a file of either format.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for an unusable volume.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let bad = |reason: String| Error::content(path, reason);
+        let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
+        named(path).map_err(bad)?;
+        let header = second(path).map_err(bad)?;
+        let (header, placed, volume) = match header {
+            Some((mut header, placed, offset)) => {
+                check_size(&header).map_err(bad)?;
+                scaled(&mut header).map_err(bad)?;
+                let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
+                io::copy(&mut (&mut voxels).take(offset), &mut io::sink())
+                    .map_err(|e| unreadable(e.into()))?;
+                let volume = loaded(voxels, &header).map_err(unreadable)?;
+                (header, placed, volume)
+            }
+            None => {
+                // The header first: it gives the memory the volume needs.
+                let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
+                let mut header = NiftiHeader::from_reader(&mut voxels).map_err(unreadable)?;
+                check_size(&header).map_err(bad)?;
+                let is_scaled = scaled(&mut header).map_err(bad)?;
+                let placed = Placed::first(&header);
+                if &header.magic != FIRST_OF_PAIR {
+                    let offset = (header.vox_offset as u64).saturating_sub(FIRST_BYTES);
+                    io::copy(&mut (&mut voxels).take(offset), &mut io::sink())
+                        .map_err(|e| unreadable(e.into()))?;
+                    let volume = loaded(voxels, &header).map_err(unreadable)?;
+                    return Self::new(volume, &placed, &header).map_err(bad);
+                }
+                let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
+                let read = object.into_volume();
+                // The library applies the file's scaling.
+                let volume = match is_scaled {
+                    true => read,
+                    false => {
+                        InMemNiftiVolume::from_raw_data(&header, read.into_raw_data()).map_err(unreadable)?
+                    }
+                };
+                (header, placed, volume)
+            }
+        };
+        Self::new(volume, &placed, &header).map_err(bad)
+    }
+
+    fn new(
+        volume: InMemNiftiVolume,
+        placed: &Placed,
+        header: &NiftiHeader,
+    ) -> std::result::Result<Self, String> {
+        let [nx, ny, nz] = match volume.dim() {
+            [x, y, z] | [x, y, z, 1] => [*x, *y, *z],
+            other => return Err(format!("a volume has three dimensions, not {other:?}")),
+        };
+        let (axes, origin_mm) = placed.in_lps(header.xyzt_units)?;
+        Ok(Self { size: [nx, ny, nz].map(usize::from), axes, origin_mm, volume })
+    }
+
+    /// Calls `take` with the place and the value of each voxel, scaled as the file says, the first index fastest.
+    pub(super) fn each(
+        &self,
+        mut take: impl FnMut([usize; 3], f32) -> std::result::Result<(), String>,
+    ) -> std::result::Result<(), String> {
+        let dimensions = self.volume.dim().len();
+        let [nx, ny, nz] = self.size.map(|n| n as u16);
+        for z in 0..nz {
+            for y in 0..ny {
+                for x in 0..nx {
+                    let value = self.volume.get_f32(&[x, y, z, 0][..dimensions]);
+                    let value = value.map_err(|e| format!("voxel [{x}, {y}, {z}] cannot be read: {e}"))?;
+                    take([x, y, z].map(usize::from), value)?;
+                }
             }
         }
+        Ok(())
     }
-    let (axes, origin_mm) = placed.in_lps(header.xyzt_units)?;
-    Ok(Scan { size: [nx, ny, nz].map(usize::from), axes, origin_mm, hu })
+}
+
+/// The volume of the bytes that follow. Memory grows with what is read: a header may promise anything.
+fn loaded(voxels: impl Read, header: &NiftiHeader) -> std::result::Result<InMemNiftiVolume, NiftiError> {
+    let dims = usize::from(header.dim[0]).clamp(1, 7);
+    let voxel = header.data_type()?.size_of() as u64;
+    let bytes = header.dim[1..=dims].iter().fold(voxel, |product, n| product.saturating_mul(u64::from(*n)));
+    let mut raw = Vec::new();
+    voxels.take(bytes).read_to_end(&mut raw)?;
+    InMemNiftiVolume::from_raw_data(header, raw)
 }
 
 /// What a file is in place of NIfTI, if its first bytes leave no doubt.
