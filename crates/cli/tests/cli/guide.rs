@@ -107,7 +107,7 @@ fn copy(from: &Path, to: &Path) {
 fn follow(chapter: &str) -> Result<Vec<Vec<String>>, String> {
     let actions = actions(chapter)?;
     let folder = tempfile::tempdir().unwrap();
-    for part in ["cases", "devices", "scenes", "subjects", "vessels"] {
+    for part in ["cases", "ct", "devices", "scenes", "subjects", "vessels"] {
         copy(&workspace().join("assets").join(part), &folder.path().join("assets").join(part));
     }
     let mut run = Vec::new();

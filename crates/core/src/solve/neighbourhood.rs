@@ -55,8 +55,12 @@ impl Neighbourhood {
         let off = places.map(|(x, (at_mm, most_mm))| (x - at_mm).norm() / most_mm).fold(0.0, f64::max);
         let turn = |(angle, was): (f64, &f64)| (angle - was).abs() / tuning.room_rad;
         let turns = carried(state).zip(&self.angles).map(turn);
-        let part = if self.is_indefinite { tuning.indefinite_rooms } else { 1.0 };
-        turns.fold(off, f64::max) / part
+        turns.fold(off, f64::max)
+    }
+
+    /// The largest [`Neighbourhood::off`] of an equilibrium.
+    pub(crate) fn most_off(&self, tuning: &NewtonTuning) -> f64 {
+        if self.is_indefinite { tuning.indefinite_rooms } else { 1.0 }
     }
 
     /// Position of the node with the largest deviation from its prediction relative to its room, mm.
@@ -69,7 +73,7 @@ impl Neighbourhood {
 
     /// Whether Newton's method should stop because this iterate is too far away.
     pub(crate) fn is_left_by(&self, state: &RodState, tuning: &NewtonTuning) -> bool {
-        self.bounds && self.off(state, tuning) > tuning.stray
+        self.bounds && self.off(state, tuning) > tuning.stray * self.most_off(tuning)
     }
 }
 
@@ -105,8 +109,9 @@ mod tests {
         near.bounds = false;
         assert!(!near.is_left_by(&moved(1, 3.1), &tuning));
         near.is_at_a_saddle();
-        let off = near.off(&moved(1, 0.5), &tuning);
-        assert!((off * tuning.indefinite_rooms - 0.5).abs() < 1e-12, "{off}");
+        near.bounds = true;
+        assert_eq!(near.most_off(&tuning), tuning.indefinite_rooms);
+        assert!(!near.is_left_by(&moved(1, 1.4), &tuning) && near.is_left_by(&moved(1, 1.6), &tuning));
         near.begin(&rod, &[0.5, 0.5, 4.0], &tuning);
         let mut turned = rod.clone();
         turned.angles[2] += 0.3;

@@ -290,7 +290,8 @@ impl<const C: usize> Tools<C> {
         let balanced = (found.converged || (!near && found.residual < settled)) && unsettled < settled;
         let goes_on =
             used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < tuning.steps.most_near;
-        let wrong = Lost::of(&found, (near, goes_on), balanced, off > 1.0 && !may_snap).or_else(|| {
+        let too_far = off > self.newton.neighbourhood.most_off(&tuning.newton) && !may_snap;
+        let wrong = Lost::of(&found, (near, goes_on), balanced, too_far).or_else(|| {
             contact.know_whole_base(&mesh.elements);
             let passes = tuning.steps.tests_passing && contact.passes_through(&mesh.elements, rod);
             passes.then_some(Lost::Passed)

@@ -90,11 +90,13 @@ proptest! {
             (Format::Stl, stl::bytes(&mesh)), (Format::Stl, ascii_stl(&mesh).into_bytes()), (Format::Obj, obj::bytes(&mesh)),
             (Format::Ply, ply::bytes(&mesh)), (Format::Ply, ply_variant(&mesh, false)), (Format::Ply, ply_variant(&mesh, true)),
         ];
-        for (format, bytes) in files {
+        for (k, (format, bytes)) in files.into_iter().enumerate() {
             let _ = parse(format, &bytes[..(bytes.len() as f64 * cut) as usize]);
             let mut changed = bytes.clone();
             changed[(bytes.len() as f64 * at) as usize] = byte;
-            if let Ok(surface) = parse(format, &changed) {
+            let read = parse(format, &changed);
+            // What takes long is made of one of them.
+            if let (Ok(surface), true) = (read, k == usize::from(byte) % 6) {
                 let _ = crate::vessel::Wall::from_surface(&surface.mesh);
             }
         }
