@@ -9,7 +9,7 @@ from endowire import Observed
 METHOD = {"name": "kirchhoff", "element_mm": 4.0, "tolerance": 1e-9}
 #: 30 commands of advance and rotation.
 MOVES = np.stack([np.full(30, 2.0), 0.1 * np.sin(np.arange(30.0))], axis=1)[:, None, :]
-SIGMA_MM = 0.2
+SIGMA_MM, SIGMA_N = 0.2, 1e-4
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +34,8 @@ def recorded(truth, rng):
             seen = Observed(k, "points", np.zeros(24), SIGMA_MM, from_tip_mm=from_tip_mm)
             places = seen.residual(truth.gradients(MOVES[: k + 1], by=["EI[0]"])[k])[0] * SIGMA_MM
             seen.value = places + SIGMA_MM * rng.standard_normal(24)
-            force_n = report.push_force_n + 1e-3 * rng.standard_normal(1)
-            observed += [seen, Observed(k, "push_force", force_n, 1e-3)]
+            force_n = report.push_force_n + SIGMA_N * rng.standard_normal(1)
+            observed += [seen, Observed(k, "push_force", force_n, SIGMA_N)]
     return observed
 
 
@@ -46,7 +46,8 @@ def test_stiffness_and_friction_are_found_again(vessel):
     assert found.converged and not found.not_shown, found
     off = (found.values - [6.0, 14.0, 0.15]) / found.sigma
     assert np.all(np.abs(off) < 3.5), (found.values, found.sigma)
-    assert np.all(found.sigma < 0.2 * found.values), (found.values, found.sigma)
+    # The stiffness of the tip shows best, that of the shaft hardly: its curve is given by the tube.
+    assert np.all(found.sigma < [0.1, 7.0, 0.05]), (found.values, found.sigma)
     # As many squares as numbers, less those that were fitted.
     assert abs(found.chi2 - found.n_residuals) < 4.0 * np.sqrt(2.0 * found.n_residuals)
     assert found.simulation.value("EI[1]") == found.values[1]

@@ -83,6 +83,6 @@ def test_what_has_no_derivative_is_refused(vessel):
         gradient.vjp("tip", [1.0, 2.0])
     with pytest.raises(endowire.InputError, match="1 parameters"):
         gradient.jvp("tip", [1.0, 2.0])
-    other = endowire.Simulation(vessel, wire(), method={"name": "mass_spring"})
+    other = endowire.Simulation(vessel, endowire.Instrument.uniform(300.0, 0.2, 5.0), method={"name": "mass-spring"})
     with pytest.raises(endowire.InputError, match="kirchhoff"):
         other.gradient(1.0, by=["advance"])
