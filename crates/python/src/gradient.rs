@@ -83,8 +83,8 @@ impl Gradient {
     }
 
     /// Distances of the nodes from the tip, mm, shape (n,), from the sheath to the tip.
-    #[getter]
-    fn from_tip_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    #[getter(from_tip_mm)]
+    fn distances_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.gradient.shape.from_tip_mm.clone())
     }
 

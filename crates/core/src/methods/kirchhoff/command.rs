@@ -143,21 +143,15 @@ impl<const C: usize> Workspace<C> {
                 Ok(found) if course.shortens(&part, &found) => continue,
                 Ok(found) => {
                     let line = next.state.material_line(there.wall());
-                    if let Err(left) = check_inside(surroundings.lumen.openings(), line, 0.0) {
-                        break Err(left);
-                    }
-                    let beside = nearby.as_deref_mut().map_or(Ok(()), |nearby| {
-                        let is_last = *hands == way.target && part.to == 1.0;
-                        nearby.follow(
-                            tools,
-                            &there,
-                            (was, passage),
-                            (attempt, &found),
-                            (&next.state, is_last),
-                        )
+                    let openings = surroundings.lumen.openings();
+                    let goes_on = check_inside(openings, line, 0.0).and_then(|()| {
+                        let (beside, to) = (nearby.as_deref_mut(), (&*next.state, &way.target[..]));
+                        beside.map_or(Ok(()), |beside| {
+                            beside.follow(tools, &there, (was, passage), (attempt, &found), to)
+                        })
                     });
-                    if let Err(none) = beside {
-                        break Err(none);
+                    if let Err(ended) = goes_on {
+                        break Err(ended);
                     }
                     let way_mm = was.state.rod.farthest_mm(&next.state.rod);
                     let lies = way_mm

@@ -126,8 +126,8 @@ impl Nearby {
         Self { first: None, ..self }
     }
 
-    /// Follows an accepted part from `was`, to `end`, with the passage of a moving vessel; in the last one of the command forces
-    /// and energies are read too.
+    /// Follows an accepted part from `was`, to `end`, with the passage of a moving vessel; in the last one of a command, in which
+    /// hands come to their target, forces and energies are read too.
     ///
     /// # Errors
     /// [`Error::Computation`] where there is no derivative.
@@ -137,7 +137,7 @@ impl Nearby {
         environment: &Environment<'_>,
         (was, passage): (Start<'_>, Option<Passage<'_>>),
         (attempt, found): (Attempt<'_>, &Found),
-        (end, is_last): (&KirchhoffState, bool),
+        (end, target): (&KirchhoffState, &[Hand]),
     ) -> Result<()> {
         let jumps = attempt.part.effort == Effort::Flight || found.off > 1.0 || found.balance.is_set_free();
         if jumps || found.slides > 0 || found.is_interrupted {
@@ -163,6 +163,7 @@ impl Nearby {
             start: nominal_start.as_ref().map_or(was, |state| Start { mesh: was.mesh, state }),
             attempt: Attempt { part, left: passage.map(|passage| (was, passage)), ..attempt },
         };
+        let is_last = attempt.hands == target && attempt.part.to == 1.0;
         let progress =
             self.first.as_ref().map_or(1.0, |first| progress(first, attempt.hands, attempt.part.to));
         let Self { parameters, sides, cut, begins, next, .. } = self;
