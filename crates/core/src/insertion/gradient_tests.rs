@@ -178,13 +178,13 @@ fn errors(mut now: Simulation, steps: usize, friction: f64) -> (Vec<f64>, usize)
 
 #[test]
 fn gradients_are_limits_of_differences() {
-    // Scene, several instruments, friction; and by how much nine of ten, and all, may be off. With friction the slip about the axis is measured
-    // along the way that Newton's iterates take, which differences of whole commands contain.
+    // Scene, several instruments, friction; and by how much nine of ten, and all, may be off. With friction they agree
+    // to parts in a thousand; why not nearer is open.
     for (tree, several, friction, most) in [
         ("curved_tube", false, 0.0, [1e-5, 1e-4]),
         ("aortic_arch", true, 0.0, [1e-5, 1e-4]),
         ("curved_tube", false, 0.2, [1e-3, 2e-3]),
-        ("curved_tube", true, 0.2, [5e-3, 2e-2]),
+        ("curved_tube", true, 0.2, [1e-3, 2e-3]),
     ] {
         let (errors, others) = errors(simulation(tree, several, friction), 24, friction);
         let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];

@@ -21,14 +21,15 @@ const ACCURACY: (f64, usize) = (1e-8, 40);
 const LEAST_ACCURACY: f64 = 1e-5;
 
 impl<const C: usize> Tools<C> {
-    /// Begins a part on one side and calls `what` at the configuration of its end; `None` if the mesh is another one.
+    /// Begins a part on one side and calls `what` at the configuration of its end. Returns its result with the triads from which
+    /// spin is measured there; `None` if the mesh is another one.
     pub(super) fn beside<T>(
         &mut self,
         acting: &Acting<'_>,
         end: &End<'_>,
         next: &mut Configuration,
         what: impl FnOnce(&mut Search<'_, '_, C>, &Lagged<'_>) -> T,
-    ) -> Option<T> {
+    ) -> Option<(T, Vec<Frame>)> {
         let Acting { environment, materials, start, attempt } = acting;
         let (surroundings, options) = (&environment.surroundings, environment.options);
         self.friction.set_coefficient(surroundings.properties.largest_friction());
@@ -83,7 +84,7 @@ impl<const C: usize> Tools<C> {
         };
         let found = what(&mut search, &Lagged { flow: surroundings.flow, stack, mesh });
         contact.touches(&mesh.elements, rod, touches);
-        Some(found)
+        Some((found, triads))
     }
 
     /// Completes the state at the end of a part: that after the way if its forces were assembled, as in the last part, or else
@@ -109,8 +110,8 @@ impl<const C: usize> Tools<C> {
         self.tails.write((own.surroundings.sheath, *across_n), rod, twists, hand_forces);
     }
 
-    /// The triads from which the spin of the device is measured in the part that was begun last.
-    pub(super) fn triads(&self, next: &Configuration) -> Vec<Frame> {
+    /// The triads from which the spin of the device is measured in the part that was begun last, slid and not yet solved.
+    fn triads(&self, next: &Configuration) -> Vec<Frame> {
         let moved = &self.guess.before_motion;
         let friction = self.friction.acts();
         match (friction, moved.is_empty()) {
@@ -154,7 +155,9 @@ impl<const C: usize> Tools<C> {
             gmres(right, ACCURACY, precondition, apply)
         });
         match found {
-            Some((way, off)) if off <= LEAST_ACCURACY && way.iter().all(|part| part.is_finite()) => Ok(way),
+            Some(((way, off), _)) if off <= LEAST_ACCURACY && way.iter().all(|part| part.is_finite()) => {
+                Ok(way)
+            }
             _ => Err(singular()),
         }
     }

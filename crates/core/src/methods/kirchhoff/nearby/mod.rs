@@ -173,8 +173,8 @@ impl Nearby {
             let is_regular = search.newton.factor(search.elements, search.supports).is_some();
             (rows(search), lags, is_regular)
         });
-        let Some((at_end, lags, true)) = assembled else { return Err(singular()) };
-        end.triads = tools.triads(next);
+        let Some(((at_end, lags, true), triads)) = assembled else { return Err(singular()) };
+        end.triads = triads;
         let most_mm = STICKING * tools.friction.stick_mm();
         // Where all sides begin in the same state they may come nearer.
         let begins = std::mem::take(begins);
@@ -191,7 +191,7 @@ impl Nearby {
                         })
                     });
                     match there {
-                        Some(there) => *forces = there,
+                        Some((there, _)) => *forces = there,
                         // The mesh there is another one.
                         None => (side.by, *cut) = (0.0, true),
                     }
