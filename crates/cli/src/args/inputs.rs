@@ -7,6 +7,7 @@ use endowire_core::Vec3;
 use endowire_core::passable::NO_FORCE_N;
 use endowire_core::vessel::{CentrelineEnd, Ends, Mending, Parts, PatientAxes, SurfaceFrame};
 
+use super::{CacheArgs, SetArgs};
 use crate::commands::parse_end;
 
 #[derive(Debug, Subcommand)]
@@ -39,6 +40,9 @@ pub(crate) enum VesselCommand {
     Sac(SacArgs),
     /// Report whether a device can follow the path to a target: room, narrowest place, sharpest bend; passes, tight, blocked or short
     Passable(PassableArgs),
+    /// Push the devices of a scene into a vessel that yields, and report what becomes of its course: lengths, tortuosity and angles between
+    /// named places before and after, and how far these have moved
+    Straighten(StraightenArgs),
 }
 
 #[derive(Debug, Subcommand)]
@@ -215,6 +219,22 @@ pub(crate) struct PassableArgs {
     pub(crate) picture: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) frame: CoordinateArgs,
+    /// Print the result as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct StraightenArgs {
+    /// Scene with a script and a table [vessel.yielding] (TOML)
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) set: SetArgs,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Draw the vessel before and after into this folder, in the views of the scene
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
     /// Print the result as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -24,7 +24,7 @@ pub(crate) use bench::{
 pub(crate) use evidence::EvidenceArgs;
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, FromLabelsArgs, GenerateArgs, PassableArgs,
-    RepairArgs, SacArgs, VesselCommand,
+    RepairArgs, SacArgs, StraightenArgs, VesselCommand,
 };
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{

@@ -3,7 +3,7 @@
 use endowire_core::Vec3;
 use endowire_core::device::{Stack, line_mm};
 use endowire_core::insertion::DetachedCoil;
-use endowire_core::vessel::VesselMotion;
+use endowire_core::vessel::Lumen;
 
 use crate::args::ExportArgs;
 use crate::cache::Cache;
@@ -11,6 +11,7 @@ use crate::failure::Failure;
 use crate::output::coils;
 use crate::output::instruments::Lengths;
 use crate::output::recording::Recording;
+use crate::output::vessel::Recorded;
 use crate::output::vtk::{PointArray, PolyData, write_series};
 use crate::output::{folder, progress, tell};
 use crate::scenes;
@@ -18,7 +19,7 @@ use crate::scenes;
 /// Value that contact points have instead of an instrument's index.
 const CONTACT: f64 = -1.0;
 
-/// Writes the vessel, a file for each step, and the list of these files; a vessel that moves once for each step.
+/// Writes the vessel, a file for each step, and the list of these files; a vessel that moves or yields once for each step.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     scenes::check_recorded(&args.set)?;
@@ -29,7 +30,8 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     }
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let stack = scene.stack().map_err(in_scene)?;
-    let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let cache = Cache::new(&args.cache);
+    let wall = scene.wall(&cache).map_err(in_scene)?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let left = coils::read(&args.dir, &stack)?;
     let steps = folder::step_times(&args.dir)?;
@@ -39,16 +41,16 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
         let path = out.join(name);
         data.write(&path).map_err(|e| Failure::write(&path, &e))
     };
-    let motion = VesselMotion::new(&scene.vessel.motion).map_err(in_scene)?;
-    let moves = motion.as_ref().is_some_and(VesselMotion::changes);
-    let vessel = |time_s: f64| {
-        let displacement = motion.as_ref().map(|motion| motion.at(time_s));
+    let places = Recorded::read(&args.dir, &scene, &Lumen::from(wall.clone()), &cache)?;
+    let moves = places.changes();
+    let vessel = |step: usize, time_s: f64| {
+        let displacement = places.at(step, time_s);
         let place = |v: &Vec3| displacement.as_ref().map_or(*v, |displacement| displacement.place(v));
         let points_mm = wall.mesh().vertices_mm.iter().map(place).collect();
         PolyData { points_mm, triangles: wall.mesh().triangles.clone(), ..PolyData::default() }
     };
     if !moves {
-        write("vessel.vtp", &vessel(0.0))?;
+        write("vessel.vtp", &vessel(0, 0.0))?;
     }
     let bar = progress::bar(recording.steps(), "step");
     let mut files = Vec::new();
@@ -59,7 +61,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
         let mut names = vec![name];
         if moves {
             let name = format!("vessel_{step:06}.vtp");
-            write(&name, &vessel(time_s))?;
+            write(&name, &vessel(step, time_s))?;
             names.push(name);
         }
         files.push((time_s, names));

@@ -23,6 +23,7 @@ mod rod;
 mod run;
 mod sac;
 mod shell;
+mod straighten;
 mod studio;
 mod subject;
 mod surfaces;
@@ -57,6 +58,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Vessel(VesselCommand::Centreline(args)) => centreline::centreline(args),
         Command::Vessel(VesselCommand::Sac(args)) => sac::sac(args),
         Command::Vessel(VesselCommand::Passable(args)) => passable::passable_file(args),
+        Command::Vessel(VesselCommand::Straighten(args)) => straighten::straighten(args),
         Command::Device(DeviceCommand::Show { file, out, json }) => device::show(file, out.as_deref(), *json),
         Command::Device(DeviceCommand::List { folder, out, json }) => {
             device::list(folder, out.as_deref(), *json)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use endowire_core::vessel::VesselMotion;
+use endowire_core::vessel::Lumen;
 use endowire_viewer::{FrameTime, Moment, Seen};
 
 use super::studio::{Plan, Still, Studio};
@@ -14,6 +14,7 @@ use crate::output::folder::{refuse_recording, step_times};
 use crate::output::injections::{self, Injected};
 use crate::output::instruments::Lengths;
 use crate::output::recording::Recording;
+use crate::output::vessel::Recorded;
 use crate::output::{progress, tell};
 use crate::scenes;
 
@@ -45,6 +46,8 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let cache = Cache::new(&args.frames.cache);
     let wall = scene.wall(&cache).map_err(|e| Failure::from(e).at(path.display()))?;
+    let lumen = Lumen::from(wall.clone());
+    let vessel = Recorded::read(&args.dir, &scene, &lumen, &cache)?;
     let seen = (path.as_path(), &scene);
     let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
@@ -61,7 +64,6 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let injections = injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
     scenes::tell_found(&path, &scene);
-    let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let left = coils::read(&args.dir, &stack)?;
@@ -74,7 +76,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             reported += 1;
             let (shape, time_s) = (recording.shape(reported), ended_s(reported));
             let inserted_mm = &lengths.after(reported, &shape)?;
-            let displacement = motion.as_ref().map(|motion| motion.at(time_s));
+            let displacement = vessel.at(reported, time_s);
             studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
         }
         let ending = if one { format!("_frame_{k:06}") } else { String::new() };
@@ -91,7 +93,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         };
         let before = before.as_ref();
         // The vessel rests too in a step that is drawn several times.
-        let displacement = motion.as_ref().map(|motion| motion.at(ended_s(step)));
+        let displacement = vessel.at(step, ended_s(step));
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
             moment: Moment {

@@ -14,7 +14,7 @@ use super::run::interrupts;
 use crate::args::{SweepArgs, SweepCommand};
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::frames::FrameWriter;
+use crate::output::frames::{Drawn, FrameWriter};
 use crate::output::provenance::{PROGRAM, Provenance};
 use crate::output::recorder::{Recorder, Summary};
 use crate::output::{print_json, progress, tell, whole};
@@ -175,7 +175,8 @@ impl endowire_sweep::Recorder for Recording {
         let step = self.recorder.steps() + 1;
         let time_s = time_s.unwrap_or_else(|| self.frames.time_s(step));
         let lengths_mm = simulation.report().lengths_mm();
-        let seen = (simulation.shape(), lengths_mm.as_slice());
+        let (inserted_mm, displacement) = (lengths_mm.as_slice(), simulation.displacement());
+        let seen = Drawn { shape: simulation.shape(), inserted_mm, displacement: displacement.as_ref() };
         let recorded = self.recorder.record(moves, time_s, simulation);
         let drawn = recorded.and_then(|()| self.frames.step((step, time_s), last, seen, &mut self.recorder));
         self.recorded = Instant::now();

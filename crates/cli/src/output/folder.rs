@@ -7,6 +7,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::coils::COILS;
+use super::vessel::{PLACES, VESSEL};
 use super::film::FILMS;
 use super::injections::INJECTIONS;
 use super::instruments::INSTRUMENTS;
@@ -22,7 +23,8 @@ const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
 /// afterwards: only the lock counts, and it is released when a program dies.
 const LOCK: &str = ".endowire-lock";
 /// Files of a recording, apart from frames and films.
-const NAMES: [&str; 7] = [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, PACKING, arrays::PACKED];
+const NAMES: [&str; 9] =
+    [SUMMARY, TABLE, INSTRUMENTS, INJECTIONS, COILS, VESSEL, PLACES, PACKING, arrays::PACKED];
 
 /// The right to record into a folder or a file, until it is dropped.
 pub(crate) struct Claim {

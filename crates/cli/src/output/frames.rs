@@ -5,7 +5,7 @@ use std::path::Path;
 
 use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::vessel::{VesselMotion, Wall};
+use endowire_core::vessel::{Displacement, Wall};
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
 use endowire_viewer::{Exposure, FrameTime, Mode, Moment, Pushed, Renderer, Seen, View, ViewSpec};
@@ -35,8 +35,6 @@ pub(crate) struct FrameWriter {
     pushed: Pushed,
     /// Wall of the vessel; `None` if no view is requested, to save the work.
     wall: Option<Wall>,
-    /// Motion of the vessel.
-    motion: Option<VesselMotion>,
     /// The renderers of one or two planes; empty if no view is requested, to save the work.
     planes: Vec<Renderer>,
     /// State after the previous step, if pulses show the motion since then.
@@ -45,6 +43,14 @@ pub(crate) struct FrameWriter {
     injected: bool,
     /// Material places of the tip after each step, with times, s; kept if the scene injects through it.
     tips: Vec<(f64, Vec3)>,
+}
+
+/// What is drawn of a step: the line, the inserted lengths, mm, and the displacement of the vessel if it ever moves.
+#[derive(Clone, Copy)]
+pub(crate) struct Drawn<'a> {
+    pub(crate) shape: &'a Shape,
+    pub(crate) inserted_mm: &'a [f64],
+    pub(crate) displacement: Option<&'a Displacement>,
 }
 
 /// The state after a step, with its time.
@@ -82,10 +88,9 @@ impl FrameWriter {
         }
         let wall = drawn.map(|simulation| simulation.lumen().wall(store).cloned());
         let wall = wall.transpose().map_err(in_scene)?;
-        let motion = drawn.and_then(|simulation| simulation.motion().cloned());
         let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
-        Ok(Self { spec, pushed, wall, motion, planes, before: None, injected: false, tips: vec![] })
+        Ok(Self { spec, pushed, wall, planes, before: None, injected: false, tips: vec![] })
     }
 
     /// Refuses a roadmap whose first frame may be drawn before anything is injected, by the scene or by its script: there
@@ -153,7 +158,7 @@ impl FrameWriter {
         &mut self,
         (step, time_s): (usize, f64),
         last: bool,
-        seen: (&Shape, &[f64]),
+        seen: Drawn<'_>,
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
         let due = last || step.is_multiple_of(self.spec.every as usize);
@@ -171,15 +176,14 @@ impl FrameWriter {
     /// start from its position then.
     pub(crate) fn stood(
         &mut self,
-        (shape, inserted_mm): (&Shape, &[f64]),
+        Drawn { shape, inserted_mm, displacement }: Drawn<'_>,
         time_s: f64,
     ) -> Result<(), Failure> {
         if self.planes.is_empty() {
             return Ok(());
         }
         if self.spec.injects_at_tip() {
-            let displacement = self.motion.as_ref().map(|motion| motion.at(time_s));
-            if let Some(tip_mm) = self.pushed.tip_at_rest_mm(shape, inserted_mm, displacement.as_ref()) {
+            if let Some(tip_mm) = self.pushed.tip_at_rest_mm(shape, inserted_mm, displacement) {
                 self.tips.push((time_s, tip_mm));
                 self.planes.iter_mut().try_for_each(|plane| plane.follow_tip(time_s, tip_mm))?;
             }
@@ -193,7 +197,7 @@ impl FrameWriter {
     fn draw(
         &mut self,
         (step, time_s): (usize, f64),
-        (shape, inserted_mm): (&Shape, &[f64]),
+        Drawn { shape, inserted_mm, displacement }: Drawn<'_>,
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
         if let (true, Some(wall)) = (self.injected, &self.wall) {
@@ -205,7 +209,6 @@ impl FrameWriter {
             }
             self.injected = false;
         }
-        let displacement = self.motion.as_ref().map(|motion| motion.at(time_s));
         let before = self.before.as_ref();
         let before = before.map(|b| Seen { shape: &b.shape, inserted_mm: &b.inserted_mm, time_s: b.time_s });
         for (plane, names) in self.planes.iter_mut().zip([["3d", "fluoro"], ["3d_b", "fluoro_b"]]) {
@@ -215,7 +218,7 @@ impl FrameWriter {
                 inserted_mm,
                 coils: recorder.coils(),
                 contacts: &[],
-                displacement: displacement.as_ref(),
+                displacement,
                 before,
             };
             let frames = plane.draw(&mut self.pushed, &moment)?;

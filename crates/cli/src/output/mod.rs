@@ -21,6 +21,7 @@ pub(crate) mod saved;
 pub(crate) mod session;
 mod step_table;
 pub(crate) mod study;
+pub(crate) mod vessel;
 pub(crate) mod vtk;
 
 use std::fmt::Display;

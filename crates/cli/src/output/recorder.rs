@@ -14,6 +14,7 @@ use endowire_sweep::RunOutcome;
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
+use super::vessel::VesselTables;
 use super::coils::CoilTable;
 use super::folder::{self, Claim};
 use super::frames::PlaneTold;
@@ -89,6 +90,7 @@ struct Row {
     wall_mj: f64,
     field_mj: f64,
     tail_mj: f64,
+    vessel_mj: f64,
     dissipated_mj: f64,
     contacts: usize,
     max_penetration_mm: f64,
@@ -107,6 +109,8 @@ struct Row {
     wall_force_largest_n: f64,
     wall_force_tip_n: f64,
     drag_n: f64,
+    /// Bound of the displacement of a vessel that yields.
+    vessel_displacement_mm: f64,
     time_s: f64,
 }
 
@@ -124,6 +128,7 @@ pub(crate) struct Recorder {
     /// Where the way of the tip begins, if that is known.
     pub(crate) start_mm: Option<Vec3>,
     coils: CoilTable,
+    vessel: Option<VesselTables>,
     /// Frames so far, relative to the folder.
     pub(crate) frames: Vec<String>,
     checkpoint: Option<Instant>,
@@ -137,9 +142,10 @@ impl Recorder {
         let claim = folder::claim(folder, force)?;
         let start = || -> io::Result<_> {
             let table = File::create(folder.join(folder::TABLE))?;
-            Ok((table, InstrumentTable::new(folder)?, ShapeArrays::new(folder)?))
+            let vessel = VesselTables::go_on(folder, 0, at)?;
+            Ok((table, InstrumentTable::new(folder)?, ShapeArrays::new(folder)?, vessel))
         };
-        let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let (table, instruments, arrays, vessel) = start().map_err(|e| Failure::write(folder, &e))?;
         Ok(Self {
             folder: folder.to_path_buf(),
             table: csv::Writer::from_writer(table),
@@ -149,6 +155,7 @@ impl Recorder {
             steps: 0,
             start_mm: Some(endowire_assess::start_mm(at)),
             coils: CoilTable::new(folder),
+            vessel,
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -197,9 +204,10 @@ impl Recorder {
             let table = OpenOptions::new().append(true).open(&table_path)?;
             table.set_len(kept.bytes)?;
             folder::remove_frames(folder)?;
-            Ok((table, InstrumentTable::go_on(folder, steps)?, arrays))
+            let vessel = VesselTables::go_on(folder, steps, at)?;
+            Ok((table, InstrumentTable::go_on(folder, steps)?, arrays, vessel))
         };
-        let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let (table, instruments, arrays, vessel) = start().map_err(|e| Failure::write(folder, &e))?;
         let start_mm = match recording {
             Some(_) => RecordedSummary::read(&folder.join(SUMMARY)).ok().and_then(|summary| summary.start_mm),
             None => Some(endowire_assess::start_mm(at)),
@@ -215,6 +223,7 @@ impl Recorder {
             steps,
             start_mm,
             coils,
+            vessel,
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -259,6 +268,7 @@ impl Recorder {
             wall_mj: report.energy.wall,
             field_mj: report.energy.field,
             tail_mj: report.energy.tail,
+            vessel_mj: report.energy.vessel,
             dissipated_mj: report.dissipated_mj,
             contacts: report.contacts.len(),
             max_penetration_mm: report.max_penetration_mm,
@@ -277,6 +287,9 @@ impl Recorder {
             wall_force_largest_n: force.largest_n,
             wall_force_tip_n: force.tip_n,
             drag_n: report.drag_n.norm(),
+            vessel_displacement_mm: simulation
+                .course()
+                .map_or(0.0, |course| course.largest_mm(simulation.course_mm())),
             time_s,
         };
         // Written last, so that every step of the table is also in the arrays.
@@ -286,6 +299,9 @@ impl Recorder {
                 packing.push(row.step, simulation)?;
             }
             self.coils.push(row.step, simulation)?;
+            if let Some(vessel) = &mut self.vessel {
+                vessel.push(row.step, simulation)?;
+            }
             self.table.serialize(row)?;
             self.table.flush()
         };
@@ -322,6 +338,8 @@ impl Recorder {
         let packing = || self.packing.as_ref().map_or(Ok(()), PackingTable::sync);
         let synced = self.arrays.sync().and_then(|()| self.instruments.sync()).and_then(|()| packing());
         let synced = synced.and_then(|()| self.coils.sync());
+        let vessel = || self.vessel.as_ref().map_or(Ok(()), VesselTables::sync);
+        let synced = synced.and_then(|()| vessel());
         let synced = synced.and_then(|()| self.table.get_ref().sync_data());
         synced.map_err(|e| Failure::write(&self.folder, &e))
     }

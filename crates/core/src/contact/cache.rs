@@ -186,6 +186,13 @@ impl ContactCache {
         self.set.clear();
     }
 
+    /// Goes on with the same points where material points have moved under them by at most so much, mm.
+    pub(super) fn look_again(&mut self, moved_mm: f64) {
+        self.readings.fill(TakenReading::NONE);
+        self.spans.iter_mut().for_each(|span| span.narrow(moved_mm));
+        self.set.clear();
+    }
+
     /// The distance that point `index` read at its base, if it is active there.
     pub(super) fn pressed(&self, index: usize) -> Option<&Distance> {
         match &self.readings[index].nearness {

@@ -74,6 +74,12 @@ impl<'a> MovedWall<'a> {
         self.displacement.map_or(*x, |displacement| displacement.material(x))
     }
 
+    /// The material point at position `x`, given one nearby.
+    #[inline]
+    pub(crate) fn material_near(&self, x: &Vec3, nearby: &Vec3) -> Vec3 {
+        self.displacement.map_or(*x, |displacement| displacement.material_near(x, nearby))
+    }
+
     /// Position of a material point.
     pub(crate) fn place(&self, material: &Vec3) -> Vec3 {
         self.displacement.map_or(*material, |displacement| displacement.place(material))

@@ -17,6 +17,7 @@ mod clear;
 mod contacts;
 mod friction;
 mod passing;
+mod reactions;
 mod reading;
 
 use super::cache::ContactCache;
@@ -30,6 +31,7 @@ use crate::solve::{Contacts, External, Sizes};
 
 pub(super) use clear::Span;
 pub(super) use contacts::PointPlace;
+pub(crate) use reactions::Reaction;
 use reading::Reading;
 
 /// Force scale of a device of this bending stiffness, N·mm², bent to this radius, mm, N.
@@ -63,8 +65,30 @@ impl<'a> WallContact<'a> {
         softest_nmm2: f64,
     ) -> Self {
         cache.look_at(points);
+        Self::of(surface.into(), points, (cache, friction), softest_nmm2)
+    }
+
+    /// As [`Self::new`], where material points of the vessel have moved under these points by at most so much since the
+    /// cache was used for them, mm.
+    pub(crate) fn again(
+        surface: MovedWall<'a>,
+        points: &'a [ContactPoint],
+        (cache, friction): (&'a mut ContactCache, &'a mut Friction),
+        softest_nmm2: f64,
+        moved_mm: f64,
+    ) -> Self {
+        cache.look_again(moved_mm);
+        Self::of(surface, points, (cache, friction), softest_nmm2)
+    }
+
+    fn of(
+        surface: MovedWall<'a>,
+        points: &'a [ContactPoint],
+        (cache, friction): (&'a mut ContactCache, &'a mut Friction),
+        softest_nmm2: f64,
+    ) -> Self {
         Self {
-            surface: surface.into(),
+            surface,
             points,
             least_moment_nmm: softest_nmm2 / cache.tuning.gentlest_bend_mm,
             drag: None,
@@ -77,7 +101,8 @@ impl<'a> WallContact<'a> {
 
     /// The material point of the vessel where point `index` is at a state; knowledge of the wall refers to these.
     fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
-        self.surface.material(&self.points[index].position(elements, state))
+        let x = self.points[index].position(elements, state);
+        self.surface.material_near(&x, &self.cache.points[index].base)
     }
 
     /// Distance from the wall within which a point of this radius is tracked, mm.
@@ -160,7 +185,7 @@ impl<'a> WallContact<'a> {
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
-        let material = self.surface.material(&x);
+        let material = self.surface.material_near(&x, &self.cache.points[index].base);
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
         let stiffness = self.surface.stiffness(&material, self.cache.points[index].piece);

@@ -10,7 +10,7 @@ use crate::flow::BloodFlow;
 use crate::methods::MethodChoice;
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::rod::MAX_ANGLES;
-use crate::vessel::{Lumen, NoStore, VesselMotion, WallStore};
+use crate::vessel::{Course, Lumen, NoStore, VesselMotion, WallStore};
 use crate::{Error, Result};
 
 /// A simulation to be built from vessel, device and sheath, and optional settings.
@@ -20,6 +20,7 @@ pub struct SimulationBuilder<'a> {
     sheath: Sheath,
     properties: WallProperties,
     motion: Option<VesselMotion>,
+    course: Option<Arc<Course>>,
     flow: Option<BloodFlow>,
     method: Option<&'a dyn MethodChoice>,
     store: &'a dyn WallStore,
@@ -32,7 +33,8 @@ const MOUTH_MM: f64 = 1e-3;
 impl<'a> SimulationBuilder<'a> {
     pub(super) fn new(lumen: Lumen, stack: Stack, sheath: Sheath) -> Self {
         let properties = WallProperties::default();
-        Self { lumen, stack, sheath, properties, motion: None, flow: None, method: None, store: &NoStore }
+        let (motion, course, flow, method) = (None, None, None, None);
+        Self { lumen, stack, sheath, properties, motion, course, flow, method, store: &NoStore }
     }
 
     /// Stiffness and friction of the wall; [`WallProperties::default`] unless set.
@@ -46,6 +48,13 @@ impl<'a> SimulationBuilder<'a> {
     #[must_use]
     pub fn motion(mut self, motion: Option<VesselMotion>) -> Self {
         self.motion = motion;
+        self
+    }
+
+    /// The course of a vessel that yields as a whole; only its wall does unless set.
+    #[must_use]
+    pub fn course(mut self, course: Option<Course>) -> Self {
+        self.course = course.map(Arc::new);
         self
     }
 
@@ -77,7 +86,7 @@ impl<'a> SimulationBuilder<'a> {
     /// an inside test, blood that flows nowhere in the vessel, wall properties or method options out of range, more
     /// than three instruments with friction, and features that the method does not support.
     pub fn build(self) -> Result<Simulation> {
-        let Self { lumen, stack, sheath, properties, motion, flow, method, store } = self;
+        let Self { lumen, stack, sheath, properties, motion, course, flow, method, store } = self;
         properties.check(&lumen, store)?;
         check_inside(&lumen, &sheath)?;
         flow.iter().try_for_each(|flow| flow.check_within(&lumen))?;
@@ -88,7 +97,8 @@ impl<'a> SimulationBuilder<'a> {
         let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
         let twists = properties.has_friction() || rub;
         let stack = if twists { stack.twisted()? } else { stack };
-        let scene = Environment { lumen, properties, sheath, stack, motion, flow, mark: OnceLock::new() };
+        let mark = OnceLock::new();
+        let scene = Environment { lumen, properties, sheath, stack, motion, course, flow, mark };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {

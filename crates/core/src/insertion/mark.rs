@@ -7,10 +7,12 @@ use crate::Vec3;
 use crate::random::splitmix64;
 use crate::vessel::{CentrelineNode, Lumen};
 
-/// A number that differs between scenes: instruments, sheath, wall and vessel. Never 0.
+/// A number that differs between scenes: instruments, sheath, wall, vessel and how it yields. Never 0.
 pub(super) fn of(scene: &Environment) -> u64 {
     let parts: [&dyn Debug; 3] = [&scene.stack, &scene.sheath, &scene.properties];
     let known = parts.into_iter().fold(0, |known, part| mixed(known, letters(&format!("{part:?}"))));
+    let yields = scene.course.iter().map(|course| format!("{:?}", course.spec()));
+    let known = yields.fold(known, |known, spec| mixed(known, letters(&spec)));
     let of_point = |x: &Vec3| [x.x, x.y, x.z].map(f64::to_bits);
     let vessel = match &scene.lumen {
         Lumen::Meshed(meshed) => {

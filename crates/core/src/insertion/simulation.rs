@@ -9,10 +9,10 @@ use crate::flow::BloodFlow;
 use crate::insertion::{SimulationBuilder, mark};
 use crate::methods::{
     Command, DetachedCoil, Gradient, LateralForce, Method, Move, Parameter, Sheath, State, StepReport, Stop,
-    Surroundings, WallForce,
+    Surroundings, WallForce, displacement,
 };
 use crate::shape::Shape;
-use crate::vessel::{Displacement, Lumen, VesselMotion};
+use crate::vessel::{Course, Displacement, Lumen, VesselMotion};
 use crate::{Error, Result, Vec3};
 
 /// A running insertion.
@@ -42,6 +42,8 @@ pub(super) struct Environment {
     pub(super) sheath: Sheath,
     pub(super) stack: Stack,
     pub(super) motion: Option<VesselMotion>,
+    /// The course of the vessel, if it yields.
+    pub(super) course: Option<Arc<Course>>,
     pub(super) flow: Option<BloodFlow>,
     /// A number that stands for it, once it was needed.
     pub(super) mark: OnceLock<u64>,
@@ -55,10 +57,10 @@ impl Environment {
 
     /// In a step from one time to another, s, outside of fields.
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
-        let Self { lumen, properties, sheath, stack, motion, flow, .. } = self;
+        let Self { lumen, properties, sheath, stack, motion, course, flow, .. } = self;
         let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
-        let fields = [&[][..]; 2];
-        Surroundings { lumen, properties, sheath, device, stack, motion, flow, fields, stop: None, time_s }
+        let (course, fields, stop) = (course.as_ref(), [&[][..]; 2], None);
+        Surroundings { lumen, properties, sheath, device, stack, motion, course, flow, fields, stop, time_s }
     }
 }
 
@@ -159,7 +161,7 @@ impl Simulation {
     /// # Errors
     /// A parameter that does not exist there or belongs to a command, and a value that the scene could not have.
     pub fn changed(&self, values: &[(Parameter, f64)]) -> Result<Self> {
-        let Environment { lumen, properties, sheath, stack, motion, flow, .. } = &*self.scene;
+        let Environment { lumen, properties, sheath, stack, motion, course, flow, .. } = &*self.scene;
         let (mut stack, mut properties) = (stack.clone(), properties.clone());
         for (parameter, value) in values {
             if parameter.value(&stack, &properties)?.is_none() {
@@ -170,8 +172,8 @@ impl Simulation {
         stack.check_sections()?;
         properties.check_outside_regions()?;
         let (lumen, sheath, motion, flow) = (lumen.clone(), *sheath, motion.clone(), flow.clone());
-        let mark = OnceLock::new();
-        let scene = Environment { lumen, properties, sheath, stack, motion, flow, mark };
+        let (course, mark) = (course.clone(), OnceLock::new());
+        let scene = Environment { lumen, properties, sheath, stack, motion, course, flow, mark };
         Ok(Self { scene: Arc::new(scene), ..self.clone() })
     }
 
@@ -493,7 +495,18 @@ impl Simulation {
 
     /// Displacement of the vessel; `None` if it never moves.
     pub fn displacement(&self) -> Option<Displacement> {
-        self.motion().map(|motion| motion.at(self.time_s))
+        let course = self.scene.course.as_ref();
+        displacement(self.motion(), course, self.time_s, self.method.course_mm())
+    }
+
+    /// The course of the vessel, if it yields.
+    pub fn course(&self) -> Option<&Course> {
+        self.scene.course.as_deref()
+    }
+
+    /// Displacements of the unknowns of the vessel's course, mm; empty if it does not yield.
+    pub fn course_mm(&self) -> &[Vec3] {
+        self.method.course_mm()
     }
 
     /// The vessel at rest.

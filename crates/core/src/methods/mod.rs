@@ -26,8 +26,8 @@ use crate::device::{Device, Stack};
 use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::shape::Shape;
-use crate::vessel::{Displacement, Lumen, VesselMotion, WallStore};
-use crate::{Error, Result};
+use crate::vessel::{Course, Displacement, Lumen, VesselMotion, WallStore};
+use crate::{Error, Result, Vec3};
 use kirchhoff::KirchhoffOptions;
 
 /// The environment of a method's unknowns, which it may read but not change.
@@ -45,6 +45,8 @@ pub struct Surroundings<'a> {
     pub stack: &'a Stack,
     /// Motion of the vessel; `None` if it rests.
     pub motion: Option<&'a VesselMotion>,
+    /// The course of the vessel, if it yields; `None` if only its wall does.
+    pub course: Option<&'a Arc<Course>>,
     /// Blood flow, which exerts drag on the device; `None` if not modelled.
     pub flow: Option<&'a BloodFlow>,
     /// The fields in which the device is before and after the step.
@@ -86,22 +88,40 @@ impl<'a> Surroundings<'a> {
         each.flat_map(|(fields, weight)| fields.iter().map(move |field| (&**field, weight)))
     }
 
-    /// Where the vessel is after this part of the step, 0 to 1; none where it never moves.
-    pub(crate) fn displacement(&self, part: f64) -> Option<Displacement> {
+    /// Where the vessel is after this part of the step, 0 to 1, its course displaced by `course_mm`; none where it never moves.
+    pub(crate) fn displacement(&self, part: f64, course_mm: &[Vec3]) -> Option<Displacement> {
         let [before, after] = self.time_s;
-        self.motion
-            .map(|motion| motion.at(if part == 1.0 { after } else { before + (after - before) * part }))
+        let time_s = if part == 1.0 { after } else { before + (after - before) * part };
+        displacement(self.motion, self.course, time_s, course_mm)
     }
 
-    /// Rejects a moving vessel and blood flow, for a method that supports neither.
+    /// Rejects a vessel that moves or yields, and blood flow, for a method that supports none of them.
     ///
     /// # Errors
-    /// Any motion and any flow.
+    /// Any of them.
     pub fn refuse_motion(&self, method: &str) -> Result<()> {
-        let given = [("motion", self.motion.is_some()), ("flow", self.flow.is_some())];
+        let given = [
+            ("motion", self.motion.is_some()),
+            ("yielding", self.course.is_some()),
+            ("flow", self.flow.is_some()),
+        ];
         let Some((key, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };
         let remedy = format!("{method} knows a vessel at rest: leave {key} out or use the method kirchhoff");
         Err(Error::parameter(format!("vessel.{key}"), "given", remedy))
+    }
+}
+
+/// Where a vessel is at a time, s, its course displaced by `course_mm`; none where it never moves.
+pub(crate) fn displacement(
+    motion: Option<&VesselMotion>,
+    course: Option<&Arc<Course>>,
+    time_s: f64,
+    course_mm: &[Vec3],
+) -> Option<Displacement> {
+    let moved = motion.map(|motion| motion.at(time_s));
+    match course {
+        Some(course) => Some(course.displaced(moved, course_mm)),
+        None => moved,
     }
 }
 
@@ -179,6 +199,11 @@ pub trait Method: Send {
 
     /// Coils that were detached, in their order.
     fn coils(&self) -> &[DetachedCoil] {
+        &[]
+    }
+
+    /// Displacements of the unknowns of the vessel's course, mm; empty if it does not yield.
+    fn course_mm(&self) -> &[Vec3] {
         &[]
     }
 

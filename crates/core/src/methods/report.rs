@@ -22,12 +22,15 @@ pub struct Energy {
     /// Twist of the tails, between the hands and the sheath's mouth; 0 for methods without it.
     #[serde(default)]
     pub tail: f64,
+    /// Of a vessel whose course yields; 0 where it does not.
+    #[serde(default)]
+    pub vessel: f64,
 }
 
 impl Energy {
     /// Sum of all terms, mJ.
     pub fn total(&self) -> f64 {
-        self.bend + self.twist + self.wall + self.field + self.tail
+        self.bend + self.twist + self.wall + self.field + self.tail + self.vessel
     }
 }
 

@@ -53,7 +53,7 @@ impl<const C: usize> Stencils for Assembly<C> {
         if Layout::<C>::ANGLES == 0 {
             return;
         }
-        let angles = angle_weights::<C>(e, xi, set);
+        let angles = angle_weights::<C>((e, xi, set));
         let columns = point_columns::<C>(state, element, e, xi);
         for (i, &(row, p)) in angles.iter().enumerate() {
             self.residual[row] += first * p;
@@ -116,14 +116,14 @@ impl<const C: usize> Assembly<C> {
 }
 
 /// Weights of the angles of a set in the angle of the point at ξ of element `e`.
-fn angle_weights<const C: usize>(e: usize, xi: f64, set: usize) -> [(usize, f64); 3] {
+pub(crate) fn angle_weights<const C: usize>((e, xi, set): (usize, f64, usize)) -> [(usize, f64); 3] {
     let l = Layout::<C>;
     let [w0, w1, wb] = Point::at(xi, 0.0).phi;
     [(l.angle(e, set), w0), (l.bubble(e, set), wb), (l.angle(e + 1, set), w1)]
 }
 
 /// Rows that move the point at ξ of element `e`, with its displacement per unit: w₀ dx₀ + s₀(u a + v b) + ….
-fn point_columns<const C: usize>(
+pub(crate) fn point_columns<const C: usize>(
     state: &RodState,
     element: &ElementData,
     e: usize,
@@ -184,5 +184,5 @@ pub(crate) fn point_turn<const C: usize>((e, xi, set): (usize, f64, usize), d: &
     if Layout::<C>::ANGLES == 0 {
         return 0.0;
     }
-    angle_weights::<C>(e, xi, set).iter().map(|(row, share)| share * d[*row]).sum()
+    angle_weights::<C>((e, xi, set)).iter().map(|(row, share)| share * d[*row]).sum()
 }

@@ -10,7 +10,7 @@ use super::spec::{missing, missing_tree};
 use crate::flow::BloodFlow;
 use crate::insertion::ScriptLine;
 use crate::methods::MethodChoice;
-use crate::vessel::{CentrelineEnd, CentrelineRecipe, CentrelineTree, Lumen, Wall, WallStore};
+use crate::vessel::{CentrelineEnd, CentrelineRecipe, CentrelineTree, Course, Lumen, Wall, WallStore};
 use crate::{Error, Result, Vec3};
 
 impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
@@ -31,7 +31,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 
     /// Whether the centre line must be, or was, computed from the surface: something needs one, and none is given.
     pub fn finds_centreline(&self) -> bool {
-        let is_needed = self.vessel.flow.is_some() || self.script.iter().any(ScriptLine::has_target);
+        let vessel = &self.vessel;
+        let is_needed = vessel.flow.is_some() || vessel.yielding.is_some() || self.script.iter().any(ScriptLine::has_target);
         !self.gives_centreline() && (is_needed || self.centreline.get().is_some())
     }
 
@@ -47,6 +48,16 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let Some(flow) = &self.vessel.flow else { return Ok(None) };
         let tree = self.known_or(store, || lumen.wall(store).cloned())?;
         BloodFlow::new(tree, flow).map(Some)
+    }
+
+    /// The course of a vessel that yields; `None` if only its wall does.
+    ///
+    /// # Errors
+    /// As [`SceneOf::centreline`] and [`Course::new`].
+    pub fn course(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<Option<Course>> {
+        let Some(spec) = &self.vessel.yielding else { return Ok(None) };
+        let tree = self.known_or(store, || lumen.wall(store).cloned())?;
+        Course::new(tree, spec).map(Some)
     }
 
     /// The file of the centre line and the key that names it; `None` if there is neither.

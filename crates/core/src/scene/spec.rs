@@ -552,10 +552,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     }
 
     fn built(&self, lumen: Lumen, stack: Stack, sheath: Sheath, store: &dyn WallStore) -> Result<Simulation> {
-        let flow = self.flow(&lumen, store)?;
+        let (course, flow) = (self.course(&lumen, store)?, self.flow(&lumen, store)?);
         Simulation::builder(lumen, stack, sheath)
             .properties(self.vessel.wall.clone())
             .motion(VesselMotion::new(&self.vessel.motion)?)
+            .course(course)
             .flow(flow)
             .method(&self.method)
             .store(store)

@@ -10,6 +10,7 @@ use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
 use crate::vessel::{
     CentrelineTree, Mending, MotionMode, Opening, PatientAxes, RepairOptions, Resolution, SurfaceFrame,
+    YieldingSpec,
 };
 use crate::{Error, Result, Vec3};
 
@@ -42,6 +43,8 @@ pub struct VesselSpec {
     /// Motion of the vessel: a sum of modes.
     #[serde(default)]
     pub motion: Vec<MotionMode>,
+    /// How it yields as a whole, along its centre line; only its wall does if absent.
+    pub yielding: Option<YieldingSpec>,
     /// Flow through its centre line, with drag on devices; none if absent.
     pub flow: Option<VesselFlow>,
     /// The sac to be filled by coils; none if absent.

@@ -4,13 +4,15 @@
 //! millimetres. Published diameters are averages of living adults; courses are drawn to resemble textbooks, not
 //! measured on a patient.
 
+mod aorto_iliac;
+
 use std::f64::consts::PI;
 
 use super::{CentrelineNode, CentrelineTree, Resolution, Target};
 use crate::Vec3;
 
 /// Names of the built-in vessels, for messages.
-pub const NAMES: [&str; 8] = [
+pub const NAMES: [&str; 10] = [
     "straight_tube",
     "curved_tube",
     "aortic_arch",
@@ -19,6 +21,8 @@ pub const NAMES: [&str; 8] = [
     "hepatic",
     "sidewall_aneurysm",
     "basilar_aneurysm",
+    "aorto_iliac",
+    "aorto_iliac_aneurysm",
 ];
 
 /// The built-in vessel of this name.
@@ -32,6 +36,8 @@ pub fn tree(name: &str) -> Option<CentrelineTree> {
         "hepatic" => hepatic(),
         "sidewall_aneurysm" => sidewall_aneurysm(),
         "basilar_aneurysm" => basilar_aneurysm(),
+        "aorto_iliac" => aorto_iliac::nodes(false),
+        "aorto_iliac_aneurysm" => aorto_iliac::nodes(true),
         _ => return None,
     };
     let closed = targets(name).iter().filter(|(_, name)| *name == DOME).map(|(row, _)| *row);
@@ -59,6 +65,7 @@ fn targets(name: &str) -> &'static [(usize, &'static str)] {
         ],
         "sidewall_aneurysm" => &[(5, "distal carotid"), (10, DOME)],
         "basilar_aneurysm" => &[(8, DOME), (11, "left posterior cerebral"), (14, "right posterior cerebral")],
+        "aorto_iliac" | "aorto_iliac_aneurysm" => &aorto_iliac::TARGETS,
         _ => &[],
     }
 }
@@ -74,6 +81,8 @@ pub fn description(name: &str) -> Option<&'static str> {
         "hepatic" => Some(HEPATIC),
         "sidewall_aneurysm" => Some(SIDEWALL_ANEURYSM),
         "basilar_aneurysm" => Some(BASILAR_ANEURYSM),
+        "aorto_iliac" => Some(aorto_iliac::AORTO_ILIAC),
+        "aorto_iliac_aneurysm" => Some(aorto_iliac::AORTO_ILIAC_ANEURYSM),
         _ => None,
     }
 }
@@ -87,6 +96,7 @@ pub fn asset_resolution(name: &str) -> Resolution {
         "aortic_arch" | "aortic_arch_ii" => Resolution::EdgeMm(2.25),
         "aortic_arch_iii" => Resolution::EdgeMm(2.4),
         "sidewall_aneurysm" | "basilar_aneurysm" => Resolution::EdgeMm(0.5),
+        "aorto_iliac" | "aorto_iliac_aneurysm" => Resolution::EdgeMm(2.2),
         _ => Resolution::EdgeMm(1.1),
     }
 }

@@ -36,6 +36,7 @@ mod topology;
 mod trimming;
 mod wall;
 mod weld;
+pub(crate) mod yielding;
 
 pub use centreline::{CentrelineNode, CentrelineTree, Target};
 pub use check::{CheckReport, OpeningReport, check, check_repaired, check_with};
@@ -60,3 +61,4 @@ pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use swept::SweptVessel;
 pub(crate) use swept::{ClosestFrom, InTube, SweptField, Tube};
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};
+pub use yielding::{Course, YieldingBranch, YieldingEnds, YieldingPreset, YieldingSpec, YieldingTether};

@@ -106,6 +106,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         device: &device,
         stack: &stack,
         motion: None,
+        course: None,
         flow: None,
         fields: [&[], &[]],
         stop: None,

@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 
 use super::reported::live;
 use crate::failure::Failure;
-use crate::output::frames::FrameWriter;
+use crate::output::frames::{Drawn, FrameWriter};
 use crate::output::injections::{self, Injected};
 use crate::output::provenance::Provenance;
 use crate::output::recorder::{Recorder, Summary};
@@ -84,7 +84,9 @@ impl SoFar<'_> {
     /// Draws the frames of a step that the scene requests.
     fn draw(&mut self, now: (usize, f64), last: bool, recorder: &mut Recorder) -> Result<(), Failure> {
         let lengths_mm = self.simulation.report().lengths_mm();
-        self.frames.step(now, last, (self.simulation.shape(), &lengths_mm), recorder)
+        let displacement = self.simulation.displacement();
+        let (shape, inserted_mm) = (self.simulation.shape(), &lengths_mm[..]);
+        self.frames.step(now, last, Drawn { shape, inserted_mm, displacement: displacement.as_ref() }, recorder)
     }
 }
 

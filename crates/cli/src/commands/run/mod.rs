@@ -19,7 +19,10 @@ use crate::output::provenance::Provenance;
 use crate::output::recorder::Recorder;
 use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
-use crate::output::{frames::FrameWriter, progress, tell, whole};
+use endowire_methods::Scene;
+
+use crate::output::frames::{Drawn, FrameWriter};
+use crate::output::{progress, tell, vessel, whole};
 use crate::scenes;
 use going::{Going, SoFar};
 
@@ -71,7 +74,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
         let times = (times_s.as_slice(), next.is_none());
         let seen = (earlier.as_ref(), course.injected.as_slice());
-        draw_again(&mut frames, seen, (&folder, &simulation), times, &mut recorder)?;
+        draw_again(&mut frames, (&scene, &cache), seen, (&folder, &simulation), times, &mut recorder)?;
         recorder
     } else {
         let recorder = Recorder::new(&folder, args.force, &simulation)?;
@@ -129,6 +132,7 @@ fn forget_state(path: &Path) -> Result<(), Failure> {
 /// frames. `times_s` are the end times of all steps so far.
 fn draw_again(
     frames: &mut FrameWriter,
+    (scene, cache): (&Scene, &Cache),
     (earlier, injected): (Option<&Recording>, &[Injected]),
     (folder, simulation): (&Path, &Simulation),
     (times_s, ended): (&[f64], bool),
@@ -138,12 +142,15 @@ fn draw_again(
     let Some(earlier) = earlier else {
         flowing.for_each(|one| frames.inject(one));
         if let Some(&time_s) = times_s.last() {
-            frames.stood((simulation.shape(), &simulation.report().lengths_mm()), time_s)?;
+            let displacement = simulation.displacement();
+            let (shape, inserted_mm) = (simulation.shape(), &simulation.report().lengths_mm()[..]);
+            frames.stood(Drawn { shape, inserted_mm, displacement: displacement.as_ref() }, time_s)?;
         }
         return Ok(());
     };
     let before = recorder.steps() - earlier.steps();
     let lengths = Lengths::read(folder, simulation.stack())?;
+    let vessel = vessel::Recorded::read(folder, scene, simulation.lumen(), cache)?;
     for row in 1..=earlier.steps() {
         let step = before + row;
         let shape = earlier.shape(row);
@@ -152,7 +159,10 @@ fn draw_again(
         while let Some(one) = flowing.next_if(|one| one.after_step < step) {
             frames.inject(one);
         }
-        frames.step((step, times_s[step - 1]), last, (&shape, &lengths_mm), recorder)?;
+        let time_s = times_s[step - 1];
+        let displacement = vessel.at(step, time_s);
+        let seen = Drawn { shape: &shape, inserted_mm: &lengths_mm, displacement: displacement.as_ref() };
+        frames.step((step, time_s), last, seen, recorder)?;
     }
     flowing.for_each(|one| frames.inject(one));
     Ok(())

@@ -76,6 +76,12 @@ impl Span {
         })
     }
 
+    /// Lessens the room of its points by so much, mm.
+    pub(in crate::contact) fn narrow(&mut self, by_mm: f64) {
+        self.room.free_mm = (self.room.free_mm - by_mm).max(0.0);
+        self.room.clearance_mm -= by_mm;
+    }
+
     /// Records the room of its points, which have been evaluated at a state.
     pub(super) fn look(&mut self, state: &RodState, room: Room) {
         (self.looked_at, self.room) = (nodes(self.element, state), room);
@@ -148,7 +154,8 @@ impl WallContact<'_> {
         if !std::mem::replace(&mut known.at_base, true) {
             for index in points.clone() {
                 let x = self.points[index].between(&base, length_mm);
-                self.read_base(index, elements, &self.surface.material(&x));
+                let material = self.surface.material_near(&x, &self.cache.points[index].base);
+                self.read_base(index, elements, &material);
             }
         }
         points

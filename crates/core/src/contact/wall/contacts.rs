@@ -51,6 +51,16 @@ fn straighten(
     }
 }
 
+/// A contact at its base: κ, N/mm, its stored energy, mJ, gradient and Hessian of that in its position, N and N/mm, and
+/// how far the gradient is from its force unknown, N.
+pub(super) struct Pressed {
+    kappa: f64,
+    stored_mj: f64,
+    pub(super) gradient: Vec3,
+    excess: Vec3,
+    pub(super) hessian: Matrix3<f64>,
+}
+
 impl Geometry for WallContact<'_> {
     type Stencil = PointPlace;
 
@@ -162,24 +172,35 @@ impl WallContact<'_> {
         sum: &mut PointSum,
         index: usize,
     ) {
-        let Some(d) = self.cache.pressed(index) else { return };
+        let Some(pressed) = self.pressed(index) else { return };
+        let (point, known) = (&self.points[index], &self.cache.points[index]);
+        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * pressed.kappa * known.base.amax());
+        into.add_value(pressed.stored_mj);
+        if !into.wants_hessian() {
+            sum.add(point.xi, &pressed.gradient, None);
+            return;
+        }
+        straighten((point.element, point.xi), &elements[point.element], state, &pressed.excess, into);
+        sum.add(point.xi, &pressed.gradient, Some(&pressed.hessian));
+    }
+
+    /// What the wall's elasticity does at a contact at its base; none where nothing presses.
+    pub(super) fn pressed(&self, index: usize) -> Option<Pressed> {
+        let d = self.cache.pressed(index)?;
         let (point, known) = (&self.points[index], &self.cache.points[index]);
         let stiffness = self.stiffness_at_base(index);
         let kappa = self.spring_with(index, &stiffness);
-        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * kappa * known.base.amax());
         let stored_mj = stiffness.factor * point.weight_mm * point.potential.value(d.value_mm);
-        into.add_value(stored_mj);
         let pressing = d.gradient * (kappa * (d.value_mm - point.potential.radius_mm));
         let (along, graded) = stiffness.graded(stored_mj, &pressing);
-        if !into.wants_hessian() {
-            sum.add(point.xi, &(pressing + along), None);
-            return;
-        }
-        let excess = pressing + d.gradient * known.force_n;
-        straighten((point.element, point.xi), &elements[point.element], state, &excess, into);
         let plane = d.gradient * d.gradient.transpose();
-        let hessian = plane * kappa - d.hessian * known.force_n + graded;
-        sum.add(point.xi, &(pressing + along), Some(&hessian));
+        Some(Pressed {
+            kappa,
+            stored_mj,
+            gradient: pressing + along,
+            excess: pressing + d.gradient * known.force_n,
+            hessian: plane * kappa - d.hessian * known.force_n + graded,
+        })
     }
 
     /// Merit of a point at a state, or the wall's energy there if forces have no target, mJ. Points are visited in

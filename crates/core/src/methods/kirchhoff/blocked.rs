@@ -117,6 +117,7 @@ mod tests {
             device: &device,
             stack: &stack,
             motion: None,
+            course: None,
             flow: None,
             fields: [&[], &[]],
             stop: None,

@@ -60,7 +60,7 @@ impl<const C: usize> Workspace<C> {
         set_motions(&way.start, &way.target, &mut tools.guess.motions);
         let advance_mm = line_advance_mm(&tools.guess.motions);
         if advance_mm > 0.0 {
-            let displaced = surroundings.displacement(0.0);
+            let displaced = surroundings.displacement(0.0, &from.course_mm);
             let line = from.material_line(environment.displaced(displaced.as_ref()).wall());
             check_inside(surroundings.lumen.openings(), line, advance_mm)?;
         }
@@ -98,7 +98,7 @@ impl<const C: usize> Workspace<C> {
         let Self { tools, mesh, now, next, way, hands, .. } = self;
         let surroundings = &environment.surroundings;
         let (start_mm, target_mm) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
-        let mut displaced = surroundings.displacement(0.0);
+        let mut displaced = surroundings.displacement(0.0, &from.course_mm);
         let mut course = Course::new(environment, from, (way, moves));
         let is_step = solves == usize::MAX;
         let solves = solves.min(course.most_solves);
@@ -119,7 +119,7 @@ impl<const C: usize> Workspace<C> {
             {
                 break Err(wedged);
             }
-            let then = surroundings.displacement(part.to);
+            let then = surroundings.displacement(part.to, &was.state.course_mm);
             let passage = displaced.as_ref().zip(then.as_ref()).filter(|(before, after)| before != after);
             let taken = taken_along(was, passage);
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
@@ -142,6 +142,12 @@ impl<const C: usize> Workspace<C> {
             let lost = match tried {
                 Ok(found) if course.shortens(&part, &found) => continue,
                 Ok(found) => {
+                    // A course has yielded further.
+                    let now_displaced = match surroundings.course {
+                        Some(_) => surroundings.displacement(part.to, &next.state.course_mm),
+                        None => then.clone(),
+                    };
+                    let there = there.displaced(now_displaced.as_ref());
                     let line = next.state.material_line(there.wall());
                     let openings = surroundings.lumen.openings();
                     let goes_on = check_inside(openings, line, 0.0).and_then(|()| {
@@ -159,7 +165,7 @@ impl<const C: usize> Workspace<C> {
                     course.accept(&part, &found, lies, iterations);
                     std::mem::swap(now, next);
                     way.go_on_from(hands);
-                    displaced = then;
+                    displaced = now_displaced;
                     continue;
                 }
                 Err(lost) => lost,

@@ -129,6 +129,7 @@ fn nothing_is_built_where_nothing_can_touch() {
         device: stack.first(),
         stack: &stack,
         motion: None,
+        course: None,
         flow: None,
         fields: [&[], &[]],
         stop: None,

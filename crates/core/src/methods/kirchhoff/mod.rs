@@ -88,6 +88,9 @@ mod transport;
 #[cfg(test)]
 mod transport_tests;
 mod workspace;
+mod yielding;
+#[cfg(test)]
+mod yielding_tests;
 
 pub use mesh::{Fineness, Mesh};
 pub use options::{Accuracy, KirchhoffOptions};
@@ -105,7 +108,7 @@ use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, RodState, TWISTED};
 use crate::shape::Shape;
 use crate::vessel::{Displacement, WallStore};
-use crate::{Error, Result};
+use crate::{Error, Result, Vec3};
 use coaxial::Nodes;
 use command::Driven;
 use configuration::Start;
@@ -415,6 +418,7 @@ impl<const C: usize> Kirchhoff<C> {
         state.check(&Belongs {
             stack: surroundings.stack,
             surface: &self.surface,
+            course: surroundings.course.map_or(0, |course| course.unknowns()),
             sheath: surroundings.sheath,
             fineness: self.options.fineness(),
             elements: mesh.elements.len(),
@@ -507,6 +511,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn coils(&self) -> &[DetachedCoil] {
         &self.coils
+    }
+
+    fn course_mm(&self) -> &[Vec3] {
+        &self.state.course_mm
     }
 
     fn takes_fields(&self) -> bool {

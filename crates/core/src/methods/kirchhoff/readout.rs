@@ -57,6 +57,7 @@ impl<const C: usize> Tools<C> {
             wall: in_wall_mj + in_loops_mj,
             field: environment.field_mj(mesh, rod),
             tail: 0.0,
+            vessel: surroundings.course.map_or(0.0, |course| course.energy_mj(&state.course_mm)),
         };
         let drag = surroundings.flow.map(|_| &self.drag);
         state.drag_n = drag.map_or_else(Vec3::zeros, Drag::total_n);

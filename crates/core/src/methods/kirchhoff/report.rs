@@ -68,7 +68,7 @@ fn write_state(environment: &Environment<'_>, to: Start<'_>, report: &mut StepRe
     report.drag_n = state.drag_n;
     report.angles = state.has_angles;
     report.behind.clone_from(&state.behind);
-    let displacement = surroundings.displacement(1.0);
+    let displacement = surroundings.displacement(1.0, &state.course_mm);
     let line = state.material_line(environment.displaced(displacement.as_ref()).wall());
     report.left_through = left_through(surroundings.lumen.openings(), line).map(|(opening, _)| opening.index);
     report.instruments.clear();

@@ -34,6 +34,10 @@ pub struct KirchhoffState {
     /// Motion of the hands that commands have not yet carried out; empty if the device is at rest where they are.
     pub(super) behind: Vec<Command>,
     pub(super) rod: RodState,
+    /// Displacements of the unknowns of the vessel's course, mm; empty if it does not yield.
+    pub(super) course_mm: Vec<Vec3>,
+    /// Their change in the last part, mm.
+    pub(super) course_change_mm: Vec<Vec3>,
     /// Whether it has material angles.
     pub(super) has_angles: bool,
     /// Stored energy.
@@ -140,6 +144,8 @@ pub(super) struct Belongs<'a> {
     /// Number of sets of angles.
     pub(super) sets: usize,
     pub(super) inner_friction: bool,
+    /// Unknowns of the vessel's course.
+    pub(super) course: usize,
     /// Number of instruments with one outside them, if there is friction between any.
     pub(super) inner: usize,
 }
@@ -153,6 +159,7 @@ impl KirchhoffState {
         rod.angles.resize(stack.angles().max(1), 0.0);
         rod.positions.push(sheath.position_mm);
         let hands = stack.instruments().len();
+        let still = vec![Vec3::zeros(); surroundings.course.map_or(0, |course| course.unknowns())];
         Self {
             hands: vec![Hand::default(); hands],
             hand_forces: vec![HandForce { jumps: stack.is_several(), ..HandForce::default() }; hands],
@@ -160,6 +167,8 @@ impl KirchhoffState {
             across_n: 0.0,
             behind: Vec::new(),
             rod,
+            course_mm: still.clone(),
+            course_change_mm: still,
             has_angles,
             energy: Energy::default(),
             touches: Vec::new(),
@@ -222,6 +231,8 @@ impl KirchhoffState {
         self.known.clear();
         self.pairs.clear();
         self.correction.clear();
+        self.course_mm.fill(Vec3::zeros());
+        self.course_change_mm.fill(Vec3::zeros());
     }
 
     /// Sets the positions of the hands.
@@ -242,6 +253,10 @@ impl KirchhoffState {
         if !r.fits(n, sets) {
             let remedy = format!("its lists are not those of {n} elements");
             return Err(other("rod", r.positions.len(), remedy));
+        }
+        if [self.course_mm.len(), self.course_change_mm.len()] != [belongs.course; 2] {
+            let remedy = format!("the vessel's course has {} unknowns here", belongs.course);
+            return Err(other("course_mm", self.course_mm.len(), remedy));
         }
         if self.has_angles != (belongs.sets > 0) {
             let remedy = "it has material angles where this simulation has none, or none where it has: another device or friction";
@@ -312,11 +327,12 @@ impl KirchhoffState {
             self.inner_friction.iter().flat_map(|rub| [rub.along, rub.around, rub.pressure_n_per_mm]);
         let motions = self.behind.iter().flat_map(|left| [left.advance_mm, left.rotate_rad, left.steer]);
         let turns = self.hands.iter().flat_map(|hand| [hand.inserted_mm, hand.turn_rad, hand.steer]);
+        let course = self.course_mm.iter().chain(&self.course_change_mm);
         let is_finite = r.is_finite()
             && motions
                 .chain(turns)
                 .chain([self.energy.total(), self.across_n])
-                .chain(self.drag_n.iter().copied())
+                .chain(self.drag_n.iter().chain(course.flatten()).copied())
                 .all(f64::is_finite)
             && self.hand_forces.iter().all(HandForce::is_finite)
             && self.twists.iter().all(Twist::is_finite)

@@ -6,18 +6,18 @@ use super::balance::Balance;
 use super::carried::{Passage, work_of_wall};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, line_advance_mm, longest_mm, set_motions, steered};
-use super::joined::{Resistance, join};
+use super::joined::join;
 use super::loops::{advances_mm, capsules};
 use super::mesh::Mesh;
 use super::part::{Effort, Found, Limits, Lost};
-use super::search::{Lagged, Search};
+use super::search::{Beginning, Bounds, Judged, Searched};
 use super::state::{KirchhoffState, UnderWay};
 use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
+use super::yielding::Yielding;
 use super::{Environment, inner_friction, meshed};
-use crate::contact::{ContactPoint, FrictionLaw, WallContact, least_force_n, stick_mm};
-use crate::rod::{RodState, Supports};
-use crate::solve::{External, StopReason};
+use crate::contact::{ContactPoint, FrictionLaw, least_force_n, stick_mm};
+use crate::rod::RodState;
 
 /// A part of a command.
 #[derive(Debug, Clone, Copy)]
@@ -202,7 +202,6 @@ impl<const C: usize> Tools<C> {
     }
 
     /// One part from `start`: slides and solves on `next`, whose content is invalid after a failure.
-    #[allow(clippy::too_many_lines, reason = "what is borrowed for the search lives through all of it")]
     pub(super) fn try_step(
         &mut self,
         environment: &Environment<'_>,
@@ -212,123 +211,56 @@ impl<const C: usize> Tools<C> {
     ) -> std::result::Result<Found, Lost> {
         let steered = steered(environment.surroundings.stack, attempt.hands);
         let environment = &environment.steered(&steered);
-        let (surroundings, options) = (&environment.surroundings, environment.options);
+        let options = environment.options;
         let tuning = &options.tuning;
-        let Attempt { part: Part { effort, part_mm, resumed, .. }, limits, left, .. } = attempt;
+        let Attempt { part: Part { effort, part_mm, .. }, limits, left, .. } = attempt;
         self.transport_to(environment, start, attempt, next);
-        let (mesh, after) = next.parts();
-        let rod = &mut after.rod;
-        let in_its_own_way =
-            options.self_contact && self.begin_loops(environment, (start, resumed), (mesh, rod));
-        let softest_nmm2 = surroundings.stack.softest_nmm2();
-        let (cache, friction) = (&mut self.cache, &mut self.friction);
-        let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
-        let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
-        let mut loops = options.self_contact.then_some(&mut self.loops);
-        let may_snap = part_mm <= tuning.steps.snap_radii * surroundings.device.min_radius_mm();
-        if let Some(resumed) = resumed {
-            let mut under_way = resumed.state.rod.clone();
-            join(&mut under_way, &resumed.state.coils);
-            self.guess.resume(&under_way, rod);
-            self.newton.neighbourhood.clone_from(&resumed.neighbourhood);
-        } else {
-            let (slid, repeats) = ((start, &*mesh, &mut *rod), tuning.steps.repeats);
-            let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), slid, repeats);
-            let inside = guessed && !in_its_own_way;
-            if in_its_own_way || (effort != Effort::Flight && !inside) {
-                self.counters.add(&contact.count());
-                return Err(Lost::Beyond);
-            }
-            contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
-            self.newton.neighbourhood.begin(rod, &self.guess.room_mm, &tuning.newton);
-        }
-        // What may end in a snap is solved once, wherever it leads.
-        self.newton.neighbourhood.bounds = effort != Effort::Flight && !may_snap;
-        let start_angles = self.tails.held();
-        let mut supports = Supports { start_tangent: true, start_angles, ..Supports::default() };
-        let per_mm4 = tuning.steps.coil_resistance_per_mm4;
-        let mut free =
-            (!self.joined.is_empty()).then(|| Resistance::of(&mesh.elements, rod, mesh.line() + 1, per_mm4));
-        let mut fields = environment.field_load(&*mesh);
-        let free = free.as_mut().map(|free| free as &mut dyn External);
-        let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
-        let tails = self.tails.act().then_some(&mut self.tails as &mut dyn External);
-        let mut search = Search {
-            newton: &mut self.newton,
-            guess: &mut self.guess,
-            contact: &mut contact,
-            loops,
-            beside: [free, fields, tails],
-            supports: &mut supports,
-            elements: &mesh.elements,
-            state: rod,
-            has_friction: environment.has_friction(),
-            tolerance: options.tolerance,
-            effort,
-            tuning,
-            most: match effort {
-                Effort::Near | Effort::Held => limits.iterations.min(options.max_iterations),
-                Effort::Flight => limits.iterations,
-            },
-            most_solves: limits.solves,
-            resumed: resumed.map(|resumed| (resumed.iterations, resumed.shift)),
-            iterations: 0,
-            solves: 0,
-            slides: 0,
-        };
-        let lagged = Lagged { flow: surroundings.flow, stack: surroundings.stack, mesh };
-        let (found, lagging) = search.run(&lagged);
-        let unsettled = search.unsettled().max(lagging);
-        let (taken, slides) = ((search.iterations, search.solves), search.slides);
-        let off = self.newton.neighbourhood.off(rod, &tuning.newton);
-        let used_up = found.reason == StopReason::MaxIterations && taken.1 >= limits.solves;
-        // A device that slides or relaxes when the solves are used up is seen on its way.
-        let is_interrupted = used_up && (effort == Effort::Flight || slides > 0);
-        let near = effort != Effort::Flight && !is_interrupted;
-        // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
-        let settled = tuning.friction.settled;
-        let balanced = (found.converged || (!near && found.residual < settled)) && unsettled < settled;
-        let goes_on =
-            used_up && resumed.map_or(0, |resumed| resumed.iterations) + taken.0 < tuning.steps.most_near;
-        let too_far = off > self.newton.neighbourhood.most_off(&tuning.newton) && !may_snap;
-        let wrong = Lost::of(&found, (near, goes_on), balanced, too_far).or_else(|| {
-            contact.know_whole_base(&mesh.elements);
-            let passes = tuning.steps.tests_passing && contact.passes_through(&mesh.elements, rod);
-            passes.then_some(Lost::Passed)
+        let mut course = Yielding::begin(environment, (start, attempt), &mut self.friction, &self.guess.motions);
+        let may_snap = part_mm <= tuning.steps.snap_radii * environment.surroundings.device.min_radius_mm();
+        let first = course.as_ref().map_or(environment.displacement, |course| Some(course.displacement()));
+        let searched = self.search_from(&environment.displaced(first), (start, attempt), (course.as_ref(), may_snap), next);
+        let elements = next.mesh.elements.len();
+        let searched = searched.and_then(|searched| match &mut course {
+            None => Ok(searched),
+            Some(course) => self.follow_course(environment, (searched, limits, may_snap), course, next),
         });
-        if wrong.is_none() {
-            contact.touches(&mesh.elements, rod, &mut after.touches);
-            if is_interrupted {
-                // The next command continues from here, with these normal forces.
-                contact.anchor_friction(&mesh.elements, rod);
+        let searched = match searched {
+            Ok(searched) => searched,
+            Err((wrong, taken)) => {
+                self.work.add(taken, elements);
+                return Err(wrong);
             }
+        };
+        self.work.add(searched.taken, elements);
+        let (mesh, after) = next.parts();
+        if let Some(course) = course {
+            course.keep(start.state, after);
         }
-        let by_drag_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
-        self.counters.add(&contact.count());
-        self.work.add(taken, mesh.elements.len());
-        if let Some(wrong) = wrong {
+        if let Some(wrong) = searched.wrong {
             if wrong == Lost::UnderWay {
                 self.keep(start, mesh, after);
             }
             return Err(wrong);
         }
-        let friction_mj = self.dissipated_mj(mesh, rod);
-        let farthest_mm = self.newton.neighbourhood.farthest(rod);
+        let friction_mj = self.dissipated_mj(mesh, &after.rod);
         self.keep(start, mesh, after);
         let outside_mj = self.write_forces(environment, next);
+        let residual = searched.found.residual;
         // Where the device is not at rest its own are arbitrary, and would count as work.
-        if found.residual > tuning.steps.at_rest {
+        if residual > tuning.steps.at_rest {
             next.parts().1.hand_forces.clone_from(&start.state.hand_forces);
         }
-        let balance = self.balance(environment, (start, next.start()), (left, by_drag_mj), friction_mj);
+        let by_others = (left, searched.by_drag_mj);
+        let balance = self.balance(environment, (start, next.start()), by_others, friction_mj);
         let after = next.parts().1;
         let lacks = balance.lacks();
         // Only a short part shows a jump: in a long one forces may go far beyond their values at its ends.
+        let near = effort != Effort::Flight && !searched.is_interrupted;
         if near && (lacks || (balance.is_set_free() && !may_snap)) {
             return Err(Lost::Unbalanced);
         }
-        let residual = found.residual;
         self.guess.teach(&after.rod, &mut after.correction);
+        let Searched { slides, unsettled, balanced, is_interrupted, off, farthest_mm, .. } = searched;
         Ok(Found {
             slides,
             outside_mj,
@@ -340,6 +272,59 @@ impl<const C: usize> Tools<C> {
             off,
             farthest_mm,
             balance,
+        })
+    }
+
+    /// Searches from the prediction of a part, or goes on where earlier commands have left it. An error says what was
+    /// taken.
+    fn search_from(
+        &mut self,
+        environment: &Environment<'_>,
+        (start, attempt): (Start<'_>, Attempt<'_>),
+        (course, may_snap): (Option<&Yielding<'_>>, bool),
+        next: &mut Configuration,
+    ) -> std::result::Result<Searched, (Lost, (usize, usize))> {
+        let options = environment.options;
+        let tuning = &options.tuning;
+        let Attempt { part: Part { effort, resumed, .. }, limits, .. } = attempt;
+        let (mesh, after) = next.parts();
+        let KirchhoffState { rod, touches, .. } = after;
+        let in_its_own_way =
+            options.self_contact && self.begin_loops(environment, (start, resumed), (mesh, rod));
+        let begin = |Beginning { newton, guess, contact, loops, state }: Beginning<'_, '_, C>| {
+            if let Some(resumed) = resumed {
+                let mut under_way = resumed.state.rod.clone();
+                join(&mut under_way, &resumed.state.coils);
+                guess.resume(&under_way, state);
+                newton.neighbourhood.clone_from(&resumed.neighbourhood);
+            } else {
+                let guessed = guess.choose(contact, loops, (start, mesh, state), tuning.steps.repeats);
+                let inside = guessed && !in_its_own_way;
+                if in_its_own_way || (effort != Effort::Flight && !inside) {
+                    return Err((Lost::Beyond, (0, 0)));
+                }
+                contact.rooms(&mesh.elements, state, &mut guess.room_mm);
+                newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
+            }
+            // What may end in a snap is solved once, wherever it leads.
+            newton.neighbourhood.bounds = effort != Effort::Flight && !may_snap;
+            Ok(())
+        };
+        let bounds = Bounds {
+            effort,
+            most: match effort {
+                Effort::Near | Effort::Held => limits.iterations.min(options.max_iterations),
+                Effort::Flight => limits.iterations,
+            },
+            most_solves: limits.solves,
+            resumed: resumed.map(|resumed| (resumed.iterations, resumed.shift)),
+            moved_mm: None,
+        };
+        let before = resumed.map_or(0, |resumed| resumed.iterations);
+        let judged = Judged { course: course.map(|course| (course, course.most_mm(environment))), before, may_snap };
+        let stack = environment.surroundings.stack;
+        self.with_search(environment, (mesh, stack, rod), bounds, begin, |search, lagged| {
+            search.searched(lagged, &judged, touches)
         })
     }
 }

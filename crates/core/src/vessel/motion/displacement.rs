@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 
 use super::fade::Fade;
 use crate::Vec3;
+use crate::vessel::yielding::Bent;
 
 /// A weighted rotation and displacement: w(X) (A X + b).
 #[derive(Debug, Clone, PartialEq)]
@@ -13,12 +14,13 @@ pub(super) struct Affine {
     pub(super) fade: Option<Fade>,
 }
 
-/// The displacement of a vessel at one time.
+/// The displacement of a vessel at one time: of its motion, and of its course where that yields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Displacement {
     modes: Vec<Affine>,
     /// Upper bound of |∂u/∂X|.
     steepest: f64,
+    course: Option<Bent>,
 }
 
 /// The field near a material point.
@@ -32,12 +34,20 @@ pub struct Local {
 
 /// Largest number of iterations; each at least halves the distance, and near the solution doubles the digits.
 const MOST: usize = 60;
+/// Bound of |∂u/∂X| in [`Displacement::stretch`]: motions stay below half, and a course below three quarters.
+const STEEPEST: f64 = 0.9;
 /// Residual, relative to a coordinate, that counts as rounding.
 const ROUNDING: f64 = f64::EPSILON;
 
 impl Displacement {
     pub(super) fn new(modes: Vec<Affine>, steepest: f64) -> Self {
-        Self { modes, steepest }
+        Self { modes, steepest, course: None }
+    }
+
+    /// The motion given, or none, of a vessel whose course has yielded.
+    pub(crate) fn with_course(motion: Option<Self>, course: Bent) -> Self {
+        let motion = motion.unwrap_or_else(|| Self::new(Vec::new(), 0.0));
+        Self { steepest: motion.steepest + course.steepest(), course: Some(course), ..motion }
     }
 
     /// u, mm.
@@ -46,7 +56,8 @@ impl Displacement {
             let v = mode.matrix * material + mode.offset;
             mode.fade.map_or(v, |fade| v * fade.at_mm((material - fade.centre()).norm()))
         });
-        each.sum()
+        let moved: Vec3 = each.sum();
+        self.course.as_ref().map_or(moved, |course| moved + course.displacement_mm(material))
     }
 
     /// x = X + u(X): position of a material point, mm.
@@ -56,6 +67,12 @@ impl Displacement {
 
     /// F = I + ∂u/∂X.
     pub(crate) fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
+        let gradient = self.of_modes(material);
+        self.course.as_ref().map_or(gradient, |course| gradient + course.gradient(material))
+    }
+
+    /// F of the motion alone.
+    fn of_modes(&self, material: &Vec3) -> Matrix3<f64> {
         let mut gradient = Matrix3::identity();
         for mode in &self.modes {
             match mode.fade {
@@ -81,12 +98,32 @@ impl Displacement {
                 *of += w2 * v[k] + mixed + mixed.transpose();
             }
         }
-        Local { inverse: inverse(&self.gradient(material)), second }
+        let Some(course) = &self.course else {
+            return Local { inverse: inverse(&self.gradient(material)), second };
+        };
+        let mut gradient = self.of_modes(material);
+        course.add_local(material, &mut gradient, &mut second);
+        Local { inverse: inverse(&gradient), second }
     }
 
     /// X with X + u(X) = x: the material point there. By Newton's method, one step for a rigid motion; if it does not
-    /// halve the distance, X = x − u(X) does, since |∂u/∂X| is less than half.
+    /// halve the distance, X = x − u(X) does, where |∂u/∂X| is less than half.
     pub fn material(&self, place: &Vec3) -> Vec3 {
+        self.material_near(place, place)
+    }
+
+    /// As [`Self::material`], given a material point nearby.
+    #[inline]
+    pub(crate) fn material_near(&self, place: &Vec3, nearby: &Vec3) -> Vec3 {
+        if let (Some(course), []) = (&self.course, &self.modes[..])
+            && let Some(material) = course.material(place, nearby)
+        {
+            return material;
+        }
+        self.inverse(place)
+    }
+
+    fn inverse(&self, place: &Vec3) -> Vec3 {
         let off = |x: &Vec3| place - self.place(x);
         let mut x = place - self.displacement_mm(place);
         let mut left = off(&x);
@@ -108,7 +145,7 @@ impl Displacement {
     /// Upper bound of the ratio of lengths between material points and in the moved vessel, either way: 1/(1 −
     /// |∂u/∂X|).
     pub(crate) fn stretch(&self) -> f64 {
-        1.0 / (1.0 - self.steepest)
+        1.0 / (1.0 - self.steepest.min(STEEPEST))
     }
 }
 

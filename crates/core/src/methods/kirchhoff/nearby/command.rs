@@ -24,6 +24,10 @@ impl<const C: usize> Kirchhoff<C> {
         (commands, by): (&[Vec<Move>], &[Parameter]),
         checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
+        if surroundings.course.is_some() {
+            let remedy = "derivatives of a vessel that yields are not there: leave it out";
+            return Err(Error::parameter("vessel.yielding", "given", remedy));
+        }
         if self.options.self_contact || !self.state.coils.is_empty() {
             let remedy = "gradients know no contact between loops, and no coils: set it to false";
             return Err(Error::parameter("method.self_contact", self.options.self_contact, remedy));

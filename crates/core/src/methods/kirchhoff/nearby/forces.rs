@@ -1,16 +1,17 @@
 //! The forces at the end of a part and beside it, and the motions that balance small ones.
 
+use std::convert::Infallible;
+
 use super::super::configuration::Configuration;
 use super::super::material::element;
 use super::super::part::Effort;
-use super::super::search::{Lagged, Search};
+use super::super::search::{Beginning, Bounds, Lagged, Search};
 use super::super::state::KirchhoffState;
 use super::super::workspace::Tools;
 use super::{Acting, End, singular};
-use crate::contact::WallContact;
 use crate::methods::kirchhoff::Environment;
-use crate::rod::{ElementData, Frame, Layout, RodState, Supports};
-use crate::solve::{External, gmres};
+use crate::rod::{ElementData, Frame, Layout, RodState};
+use crate::solve::gmres;
 use crate::{Result, Vec3};
 
 /// Largest rotation, rad, of a node in the differences along a direction; as [`super::STEP`].
@@ -31,7 +32,7 @@ impl<const C: usize> Tools<C> {
         what: impl FnOnce(&mut Search<'_, '_, C>, &Lagged<'_>) -> T,
     ) -> Option<(T, Vec<Frame>)> {
         let Acting { environment, materials, start, attempt } = acting;
-        let (surroundings, options) = (&environment.surroundings, environment.options);
+        let surroundings = &environment.surroundings;
         self.friction.set_coefficient(surroundings.properties.largest_friction());
         self.transport_to(environment, *start, *attempt, next);
         let triads = self.triads(next);
@@ -52,38 +53,16 @@ impl<const C: usize> Tools<C> {
         }
         rod.place(&mesh.elements);
         let stack = materials.unwrap_or(surroundings.stack);
-        let (cache, friction) = (&mut self.cache, &mut self.friction);
-        let mut contact =
-            WallContact::new(environment.wall(), &mesh.points, cache, friction, stack.softest_nmm2());
-        contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
-        contact.follow_depths();
-        let start_angles = self.tails.held();
-        let mut supports = Supports { start_tangent: true, start_angles, ..Supports::default() };
-        let mut fields = environment.field_load(&*mesh);
-        let fields = fields.as_mut().map(|fields| fields as &mut dyn External);
-        let tails = self.tails.act().then_some(&mut self.tails as &mut dyn External);
-        let mut search = Search {
-            newton: &mut self.newton,
-            guess: &mut self.guess,
-            contact: &mut contact,
-            loops: None,
-            beside: [None, fields, tails],
-            supports: &mut supports,
-            elements: &mesh.elements,
-            state: rod,
-            has_friction: environment.has_friction(),
-            tolerance: options.tolerance,
-            effort: Effort::Near,
-            tuning: &options.tuning,
-            most: 0,
-            most_solves: 0,
-            resumed: None,
-            iterations: 0,
-            solves: 0,
-            slides: 0,
+        let bounds = Bounds { effort: Effort::Near, most: 0, most_solves: 0, resumed: None, moved_mm: None };
+        let begin = |beginning: Beginning<'_, '_, C>| {
+            beginning.contact.follow_depths();
+            Ok::<_, Infallible>(())
         };
-        let found = what(&mut search, &Lagged { flow: surroundings.flow, stack, mesh });
-        contact.touches(&mesh.elements, rod, touches);
+        let Ok(found) = self.with_search(environment, (mesh, stack, rod), bounds, begin, |search, lagged| {
+            let found = what(search, lagged);
+            search.contact.touches(search.elements, search.state, touches);
+            found
+        });
         Some((found, triads))
     }
 

@@ -36,6 +36,7 @@ pub(super) fn slope(sides: &[Side; 2], end: &KirchhoffState, cut: bool) -> Slope
             wall: of(&|state| state.energy.wall),
             field: of(&|state| state.energy.field),
             tail: of(&|state| state.energy.tail),
+            vessel: of(&|state| state.energy.vessel),
         },
         contact_forces_n: if whole { (0..end.touches.len()).map(force).collect() } else { Vec::new() },
         one_sided: cut || !whole,

@@ -1,0 +1,60 @@
+//! What contacts exert on the wall at the base, and how that changes with where they are.
+
+use nalgebra::Matrix3;
+
+use super::{PointPlace, WallContact};
+use crate::Vec3;
+use crate::contact::set::Geometry;
+use crate::rod::RodState;
+
+/// A contact, elastic and with friction, at a state that was assembled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reaction {
+    /// Its point of the device.
+    pub(crate) place: PointPlace,
+    /// The material point of the vessel there.
+    pub(crate) material: Vec3,
+    /// Force on the wall, N: the gradient of the energies in the position of the point.
+    pub(crate) force_n: Vec3,
+    /// Derivatives of that in the position relative to the wall, N/mm, and in the material angle, N.
+    pub(crate) stiffness: Matrix3<f64>,
+    pub(crate) by_angle: Vec3,
+}
+
+impl WallContact<'_> {
+    /// All contacts at the state assembled last.
+    pub(crate) fn reactions(&self, state: &RodState) -> Vec<Reaction> {
+        let mut all = Vec::new();
+        for span in self.cache.spans.iter().filter(|span| span.at_base) {
+            for index in span.points.clone() {
+                let (point, material) = (&self.points[index], self.cache.points[index].base);
+                let none = Reaction {
+                    place: point.place(),
+                    material,
+                    force_n: Vec3::zeros(),
+                    stiffness: Matrix3::zeros(),
+                    by_angle: Vec3::zeros(),
+                };
+                let mut reaction = none;
+                if let Some(pressed) = self.pressed(index) {
+                    (reaction.force_n, reaction.stiffness) = (pressed.gradient, pressed.hessian);
+                }
+                let place = self.surface.place(&material);
+                if let Some(friction) = self.friction.derivatives(index, &place, point.angle(state)) {
+                    reaction.force_n += friction.gradient;
+                    reaction.stiffness += friction.hessian;
+                    reaction.by_angle = friction.mixed;
+                }
+                if reaction.force_n != Vec3::zeros() || reaction.stiffness != Matrix3::zeros() {
+                    all.push(reaction);
+                }
+            }
+        }
+        all
+    }
+
+    /// A negligible force, N.
+    pub(crate) fn negligible_n(&self) -> f64 {
+        self.least_force_n()
+    }
+}

@@ -1,0 +1,364 @@
+//! The course of a vessel that yields to the device in it.
+//!
+//! Device and course are in equilibrium together: with the device's x, the course's a, the wall's energy φ of the
+//! places yᵢ = xᵢ − Wᵢ a relative to the vessel, and the vessel's V = ½ aᵀ A a ([`crate::vessel::Course`]),
+//!
+//! ```text
+//! R(x, a) = 0,    A a = p(x, a),    p = Σ Wᵢᵀ gᵢ,    gᵢ = ∂φ/∂yᵢ
+//! ```
+//!
+//! The device's equilibrium is sought with the course held, by all that a rigid vessel needs; then the course follows
+//! by Newton's method on its own few unknowns, in which the device responds. With the device's stiffness K, which has been
+//! factored, and Hᵢ = ∂gᵢ/∂yᵢ,
+//!
+//! ```text
+//! Z = −K⁻¹ Σ Nᵢᵀ Hᵢ Wᵢ,    dx = −Z da,    M = −dp/da = Σ Wᵢᵀ Hᵢ (Nᵢ Z + Wᵢ)
+//! ```
+//!
+//! where Nᵢ is the motion of the place in that of the device. Friction has its share in Hᵢ, with the material angle as
+//! a further unknown of the device. Only the unknowns T that a contact reaches have forces; the others follow, so that
+//!
+//! ```text
+//! ((A⁻¹)_TT⁻¹ + M) a_T⁺ = p + M a_T,    a⁺ = (A⁻¹)_T (A⁻¹)_TT⁻¹ a_T⁺
+//! ```
+//!
+//! This is block elimination of Newton's method for both; what is left out of M, the change of W along the vessel,
+//! makes it nearly quadratic. The matrix is symmetric, and positive definite where device and vessel together are
+//! stable; where it is not, M of a device that does not respond is.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Environment;
+use super::configuration::{Configuration, Start};
+use super::part::{Effort, Limits, Lost};
+use super::search::{Beginning, Bounds, Judged, Lagged, Search, Searched};
+use super::state::KirchhoffState;
+use super::substep::Attempt;
+use super::workspace::Tools;
+use crate::Vec3;
+use crate::contact::{Friction, HandMotion, Reaction};
+use crate::rod::scatter::{angle_weights, point_columns, point_step, point_turn};
+use crate::rod::{Layout, RodState};
+use crate::solve::StopReason;
+use crate::vessel::{Course, Displacement};
+
+/// Most times that the course follows in a part.
+const MOST_ROUNDS: usize = 40;
+/// The course follows by at most so many radii of the device at once, mm, …
+const MOST_RADII: f64 = 2.0;
+/// … and turns the device by at most so much, rad.
+const MOST_TURN_RAD: f64 = 0.3;
+/// Forces on the course are balanced to this times the tolerance of equilibria.
+const OF_TOLERANCE: f64 = 1.0;
+
+/// The course in a part.
+pub(super) struct Yielding<'a> {
+    course: &'a Arc<Course>,
+    /// How much of what changes around the device is over after the part, 0 to 1.
+    to: f64,
+    amplitudes_mm: Vec<Vec3>,
+    displacement: Displacement,
+}
+
+/// How the course follows: its new amplitudes, mm, and the motion of the device with it.
+pub(super) struct Follows {
+    amplitudes_mm: Vec<Vec3>,
+    way: Vec<f64>,
+}
+
+impl<'a> Yielding<'a> {
+    /// The course at the start of a part, or where earlier commands have left it; none where only the wall yields. Slip
+    /// is measured on the material points of the vessel.
+    pub(super) fn begin(
+        environment: &Environment<'a>,
+        (start, attempt): (Start<'_>, Attempt<'_>),
+        friction: &mut Friction,
+        motions: &[HandMotion],
+    ) -> Option<Self> {
+        let course = environment.surroundings.course?;
+        let was = start.state;
+        let amplitudes_mm = match attempt.part.resumed {
+            Some(resumed) => resumed.state.course_mm.clone(),
+            // As the device, it is expected to go on as in the last part.
+            None => {
+                let factor = was.correction.repeats(motions).unwrap_or(0.0);
+                let each = was.course_mm.iter().zip(&was.course_change_mm);
+                each.map(|(at, change)| at + change * factor).collect()
+            }
+        };
+        let displacement = environment.surroundings.displacement(attempt.part.to, &amplitudes_mm)?;
+        if amplitudes_mm != was.course_mm {
+            let was = environment.surroundings.displacement(attempt.part.to, &start.state.course_mm)?;
+            friction.carry((&was, &displacement), motions);
+        }
+        Some(Self { course, to: attempt.part.to, amplitudes_mm, displacement })
+    }
+
+    pub(super) fn displacement(&self) -> &Displacement {
+        &self.displacement
+    }
+
+    /// Stores the course in the state after the part.
+    pub(super) fn keep(self, was: &KirchhoffState, after: &mut KirchhoffState) {
+        after.course_change_mm.clear();
+        after.course_change_mm.extend(self.amplitudes_mm.iter().zip(&was.course_mm).map(|(to, from)| to - from));
+        after.course_mm = self.amplitudes_mm;
+    }
+
+    /// How far it may follow at once, mm.
+    pub(super) fn most_mm(&self, environment: &Environment<'_>) -> f64 {
+        MOST_RADII * environment.surroundings.device.min_radius_mm()
+    }
+
+    /// How the course follows from an equilibrium of the device; none where it is in equilibrium too.
+    ///
+    /// # Errors
+    /// Stiffnesses that have no inverse.
+    pub(super) fn follow<const C: usize>(
+        &self,
+        search: &mut Search<'_, '_, C>,
+        lagged: &Lagged<'_>,
+        most_mm: f64,
+    ) -> Result<Option<Follows>, StopReason> {
+        // It was assembled last.
+        let reactions = search.contact.reactions(search.state);
+        let touched = Touched::new(self.course, &reactions);
+        let forces = touched.forces(&reactions);
+        let own = self.course.forces_n(&self.amplitudes_mm);
+        let mut given = vec![Vec3::zeros(); own.len()];
+        touched.unknowns.iter().zip(&forces).for_each(|(unknown, force)| given[*unknown] = *force);
+        let largest_n = forces.iter().map(Vec3::amax).fold(search.contact.negligible_n(), f64::max);
+        let off_n = own.iter().zip(&given).map(|(own, given)| (own - given).amax()).fold(0.0, f64::max);
+        if off_n <= OF_TOLERANCE * search.tolerance * largest_n {
+            return Ok(None);
+        }
+        search.assemble(lagged, true);
+        let factored = search.newton.factor(search.elements, search.supports);
+        factored.ok_or(StopReason::Singular)?;
+        let responses = touched.responses(search, &reactions);
+        let next = self.next(&touched, &forces, (&reactions, &responses), most_mm, search);
+        let amplitudes_mm = next.ok_or(StopReason::Singular)?;
+        let moved = |unknown: usize| amplitudes_mm[unknown] - self.amplitudes_mm[unknown];
+        let mut way = vec![0.0; responses.first().map_or(0, Vec::len)];
+        for (k, unknown) in touched.unknowns.iter().enumerate() {
+            let by = moved(*unknown);
+            for axis in 0..3 {
+                way.iter_mut().zip(&responses[3 * k + axis]).for_each(|(way, z)| *way -= z * by[axis]);
+            }
+        }
+        Ok(Some(Follows { amplitudes_mm, way }))
+    }
+
+    /// The amplitudes of the next round, mm.
+    fn next<const C: usize>(
+        &self,
+        touched: &Touched,
+        forces: &[Vec3],
+        (reactions, responses): (&[Reaction], &[Vec<f64>]),
+        most_mm: f64,
+        search: &Search<'_, '_, C>,
+    ) -> Option<Vec<Vec3>> {
+        let count = touched.unknowns.len();
+        let among = |i: usize, j: usize| self.course.compliance(touched.unknowns[i], touched.unknowns[j]);
+        let condensed = DMatrix::from_fn(count, count, among).cholesky()?.inverse();
+        let was = DVector::from_iterator(
+            3 * count,
+            touched.unknowns.iter().flat_map(|unknown| self.amplitudes_mm[*unknown].iter().copied().collect::<Vec<_>>()),
+        );
+        let given = DVector::from_iterator(3 * count, forces.iter().flat_map(|force| [force.x, force.y, force.z]));
+        let solved = |stiffness: DMatrix<f64>| {
+            let mut matrix = (&stiffness + stiffness.transpose()) * 0.5;
+            let right = &given + &matrix * &was;
+            for i in 0..count {
+                for j in 0..count {
+                    for axis in 0..3 {
+                        matrix[(3 * i + axis, 3 * j + axis)] += condensed[(i, j)];
+                    }
+                }
+            }
+            matrix.cholesky().map(|factors| factors.solve(&right))
+        };
+        let next = solved(touched.stiffness(search, reactions, responses))
+            .or_else(|| solved(touched.held_stiffness(reactions)))?;
+        // What the touched unknowns are pulled by, and all of them then.
+        let pulled: Vec<(usize, Vec3)> = (0..count)
+            .map(|i| {
+                let force = (0..count).map(|j| Vec3::from_column_slice(&next.as_slice()[3 * j..3 * j + 3]) * condensed[(i, j)]);
+                (touched.unknowns[i], force.sum())
+            })
+            .collect();
+        let all = self.course.yields_mm(&pulled);
+        let farthest_mm = all.iter().zip(&self.amplitudes_mm).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        if !farthest_mm.is_finite() {
+            return None;
+        }
+        let part = (most_mm / farthest_mm).min(1.0);
+        let between = |(to, from): (&Vec3, &Vec3)| from + (to - from) * part;
+        Some(all.iter().zip(&self.amplitudes_mm).map(between).collect())
+    }
+}
+
+/// The unknowns that contacts reach.
+struct Touched {
+    /// In ascending order.
+    unknowns: Vec<usize>,
+    /// Wᵢ: of each contact the numbers among these with their weights.
+    weights: Vec<Vec<(usize, f64)>>,
+}
+
+impl Touched {
+    fn new(course: &Course, reactions: &[Reaction]) -> Self {
+        let mut weights: Vec<Vec<(usize, f64)>> =
+            reactions.iter().map(|reaction| course.weights(&reaction.material)).collect();
+        let mut unknowns: Vec<usize> = weights.iter().flatten().map(|(unknown, _)| *unknown).collect();
+        unknowns.sort_unstable();
+        unknowns.dedup();
+        for (unknown, _) in weights.iter_mut().flatten() {
+            *unknown = unknowns.partition_point(|touched| touched < unknown);
+        }
+        Self { unknowns, weights }
+    }
+
+    /// p, N.
+    fn forces(&self, reactions: &[Reaction]) -> Vec<Vec3> {
+        let mut forces = vec![Vec3::zeros(); self.unknowns.len()];
+        for (reaction, weights) in reactions.iter().zip(&self.weights) {
+            weights.iter().for_each(|(k, weight)| forces[*k] += reaction.force_n * *weight);
+        }
+        forces
+    }
+
+    /// The columns of Z, three for each unknown.
+    fn responses<const C: usize>(&self, search: &Search<'_, '_, C>, reactions: &[Reaction]) -> Vec<Vec<f64>> {
+        let (elements, state) = (search.elements, &*search.state);
+        let rows = Layout::<C>::dimension(elements.len());
+        let mut columns = vec![vec![0.0; rows]; 3 * self.unknowns.len()];
+        for (reaction, weights) in reactions.iter().zip(&self.weights) {
+            let (e, xi, _) = reaction.place;
+            let ways = point_columns::<C>(state, &elements[e], e, xi);
+            let turns = angle_weights::<C>(reaction.place);
+            let turns = if Layout::<C>::ANGLES > 0 { &turns[..] } else { &[] };
+            for (k, weight) in weights {
+                for axis in 0..3 {
+                    let column = &mut columns[3 * k + axis];
+                    let pull = reaction.stiffness.column(axis) * -*weight;
+                    ways.iter().for_each(|(row, way)| column[*row] += way.dot(&pull));
+                    let turn = -weight * reaction.by_angle[axis];
+                    turns.iter().for_each(|(row, share)| column[*row] += share * turn);
+                }
+            }
+        }
+        for column in &mut columns {
+            for row in search.supports.held::<C>().into_iter().flatten() {
+                column[row] = 0.0;
+            }
+            search.newton.apply_inverse(elements, column);
+        }
+        columns
+    }
+
+    /// M.
+    fn stiffness<const C: usize>(
+        &self,
+        search: &Search<'_, '_, C>,
+        reactions: &[Reaction],
+        responses: &[Vec<f64>],
+    ) -> DMatrix<f64> {
+        let (elements, state) = (search.elements, &*search.state);
+        let mut matrix = self.held_stiffness(reactions);
+        for (column, response) in responses.iter().enumerate() {
+            for (reaction, weights) in reactions.iter().zip(&self.weights) {
+                let (e, xi, _) = reaction.place;
+                let way = point_step::<C>(state, &elements[e], (e, xi), response);
+                let turn = point_turn::<C>(reaction.place, response);
+                let change = reaction.stiffness * way + reaction.by_angle * turn;
+                for (k, weight) in weights {
+                    for axis in 0..3 {
+                        matrix[(3 * k + axis, column)] += change[axis] * weight;
+                    }
+                }
+            }
+        }
+        matrix
+    }
+
+    /// M of a device that does not respond.
+    fn held_stiffness(&self, reactions: &[Reaction]) -> DMatrix<f64> {
+        let size = 3 * self.unknowns.len();
+        let mut matrix = DMatrix::zeros(size, size);
+        for (reaction, weights) in reactions.iter().zip(&self.weights) {
+            for (i, one) in weights {
+                for (j, other) in weights {
+                    let mut block = matrix.fixed_view_mut::<3, 3>(3 * i, 3 * j);
+                    block += reaction.stiffness * (one * other);
+                }
+            }
+        }
+        matrix
+    }
+}
+
+impl<const C: usize> Tools<C> {
+    /// Lets the course follow an equilibrium of the device, and the device the course, until both are in equilibrium. An
+    /// error says what was taken.
+    pub(super) fn follow_course(
+        &mut self,
+        environment: &Environment<'_>,
+        (first, limits, may_snap): (Searched, Limits, bool),
+        course: &mut Yielding<'_>,
+        next: &mut Configuration,
+    ) -> Result<Searched, (Lost, (usize, usize))> {
+        let tuning = &environment.options.tuning;
+        let stack = environment.surroundings.stack;
+        let most_mm = course.most_mm(environment);
+        let (mesh, after) = next.parts();
+        let KirchhoffState { rod, touches, .. } = after;
+        let elements = &mesh.elements;
+        let mut searched = first;
+        for _ in 0..MOST_ROUNDS {
+            let Some(Follows { amplitudes_mm, mut way }) = searched.follows.take() else { return Ok(searched) };
+            let before = rod.clone();
+            let (turn, _) = RodState::largest_turn::<C>(elements, &before, &way);
+            let part = (MOST_TURN_RAD / turn).min(1.0);
+            let amplitudes_mm: Vec<Vec3> =
+                amplitudes_mm.iter().zip(&course.amplitudes_mm).map(|(to, from)| from + (to - from) * part).collect();
+            way.iter_mut().for_each(|value| *value *= part);
+            let farthest = |(to, from): (&Vec3, &Vec3)| (to - from).norm();
+            let farthest_mm = amplitudes_mm.iter().zip(&course.amplitudes_mm).map(farthest).fold(0.0, f64::max);
+            let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
+                return Ok(searched);
+            };
+            self.friction.carry((&course.displacement, &moved), &self.guess.motions);
+            let moved_mm = farthest_mm * moved.stretch();
+            (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
+            let there = environment.displaced(Some(&course.displacement));
+            let bounds = Bounds {
+                effort: Effort::Near,
+                most: limits.iterations.saturating_sub(searched.taken.0),
+                most_solves: limits.solves.saturating_sub(searched.taken.1),
+                resumed: None,
+                moved_mm: Some(moved_mm),
+            };
+            let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
+                state.advance::<C>(elements, &before, &way, 1.0);
+                state.take_tensions::<C>(elements, &before, &way);
+                if contact.is_outside(elements, state) {
+                    state.copy_from(&before);
+                }
+                contact.rooms(elements, state, &mut guess.room_mm);
+                newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
+                Ok::<_, Infallible>(())
+            };
+            let judged = Judged { course: Some((course, most_mm)), before: 0, may_snap };
+            let Ok(again) = self.with_search(&there, (mesh, stack, rod), bounds, begin, |search, lagged| {
+                search.searched(lagged, &judged, touches)
+            });
+            searched = searched.then(again);
+        }
+        let wrong = Some(Lost::Unsolved(StopReason::Unsettled, searched.found.residual));
+        Ok(Searched { wrong, ..searched })
+    }
+}

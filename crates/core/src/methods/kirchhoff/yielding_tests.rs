@@ -1,0 +1,161 @@
+//! A device in a vessel that yields, against beams on supports (reference case E5), and its balance of energy.
+
+use std::f64::consts::PI;
+
+use crate::Vec3;
+use crate::device::Device;
+use crate::insertion::{Command, Sheath, Simulation, WallProperties};
+use crate::methods::kirchhoff::{Accuracy, KirchhoffOptions};
+use crate::vessel::{
+    CentrelineNode, CentrelineTree, Course, Lumen, Resolution, SweptVessel, YieldingEnds, YieldingSpec,
+};
+
+/// A vessel along z that winds in x by this amplitude over this wavelength.
+fn winding((amplitude_mm, wave_mm): (f64, f64), length_mm: f64, radius_mm: f64) -> CentrelineTree {
+    let step_mm = 2.0;
+    let node = |row: usize| {
+        let z = step_mm * row as f64;
+        let x = amplitude_mm * libm::sin(2.0 * PI * z / wave_mm);
+        CentrelineNode { position_mm: Vec3::new(x, 0.0, z), radius_mm, parent: row.checked_sub(1) }
+    };
+    CentrelineTree::new((0..=(length_mm / step_mm) as usize).map(node).collect()).unwrap()
+}
+
+fn made_of(bending_nmm2: f64, support_n_per_mm2: f64) -> YieldingSpec {
+    YieldingSpec {
+        bending_stiffness_nmm2: Some(bending_nmm2),
+        support_n_per_mm2: Some(support_n_per_mm2),
+        ends: Some(YieldingEnds::Free),
+        ..YieldingSpec::default()
+    }
+}
+
+/// A straight wire of radius 0.4 mm in a vessel, a millimetre behind its first point.
+fn wire(tree: &CentrelineTree, yields: Option<&YieldingSpec>, bending_nmm2: f64, properties: WallProperties) -> Simulation {
+    let edge_mm = 0.5 * tree.nodes()[0].radius_mm.min(1.0);
+    let lumen = Lumen::from(SweptVessel::new(tree.clone(), Resolution::EdgeMm(edge_mm)).unwrap());
+    let nodes = tree.nodes();
+    let along = (nodes[1].position_mm - nodes[0].position_mm).normalize();
+    let sheath = Sheath::new(nodes[0].position_mm + along, along).unwrap();
+    let device = Device::uniform(600.0, 0.4, bending_nmm2).unwrap();
+    let options = KirchhoffOptions::of(Accuracy::Fine);
+    let course = yields.map(|spec| Course::new(tree, spec).unwrap());
+    let builder = Simulation::builder(lumen, device, sheath).properties(properties);
+    builder.course(course).method(&options).build().unwrap()
+}
+
+fn wall(modulus_n_per_mm2: f64, friction: f64) -> WallProperties {
+    WallProperties { modulus_n_per_mm2, friction, ..WallProperties::default() }
+}
+
+/// Half the difference of x at a crest and at the trough behind it, at these heights.
+fn amplitude_mm(simulation: &Simulation, [crest, trough]: [f64; 2]) -> f64 {
+    let x = |z: f64| {
+        let line = &simulation.shape().positions_mm;
+        let after = line.iter().position(|p| p.z > z).unwrap();
+        let (a, b) = (line[after - 1], line[after]);
+        a.x + (b.x - a.x) * (z - a.z) / (b.z - a.z)
+    };
+    0.5 * (x(crest) - x(trough))
+}
+
+/// E5: of the amplitude a there is left a (B q⁴ + k)/((B_d + B) q⁴ + k), and with a soft wall in between the device's is
+/// a/(1 + B_d q⁴ (1/K + 1/(B q⁴ + k))).
+#[test]
+fn a_stiff_wire_straightens_a_winding_vessel_as_a_composite_beam() {
+    let (high_mm, wave_mm) = (0.2, 60.0);
+    let tree = winding((high_mm, wave_mm), 540.0, 0.401);
+    let (bending, support, of_wire) = (300.0, 0.02, 2000.0);
+    let q4 = (2.0 * PI / wave_mm).powi(4);
+    for modulus in [2.0, 0.05] {
+        let spec = YieldingSpec { span_mm: Some(6.0), ..made_of(bending, support) };
+        let mut simulation = wire(&tree, Some(&spec), of_wire, wall(modulus, 0.0));
+        for _ in 0..53 {
+            simulation.step(Command::advance(10.0)).unwrap();
+        }
+        let of_vessel = bending * q4 + support;
+        let left = 1.0 / (1.0 + of_wire * q4 * (1.0 / modulus + 1.0 / of_vessel));
+        let found = amplitude_mm(&simulation, [255.0, 285.0]) / high_mm;
+        println!("{modulus}: {found} {left}");
+        assert!((found / left - 1.0).abs() < 0.02, "{modulus}: {found} {left}");
+    }
+}
+
+#[test]
+fn what_the_hand_does_is_stored_or_rubbed_off() {
+    let tree = winding((2.0, 120.0), 240.0, 1.5);
+    let spec = made_of(300.0, 0.005);
+    let closes = |friction: f64| {
+        let mut simulation = wire(&tree, Some(&spec), 5000.0, wall(1.0, friction));
+        let (mut work_mj, mut lost_mj, mut force_n) = (0.0, 0.0, 0.0);
+        let mut most_mj: f64 = 0.0;
+        for k in 0..400 {
+            let step_mm = if k < 200 { 1.0 } else { -1.0 };
+            let report = simulation.step(Command::advance(step_mm)).unwrap();
+            work_mj += 0.5 * (force_n + report.push_force_n) * step_mm;
+            (force_n, lost_mj) = (report.push_force_n, lost_mj + report.dissipated_mj);
+            most_mj = most_mj.max(report.energy.total());
+            assert!(report.energy.vessel >= 0.0 && report.converged);
+        }
+        println!("{friction}: {work_mj} {lost_mj} {most_mj}");
+        ((work_mj - lost_mj).abs() / most_mj, lost_mj / most_mj)
+    };
+    let (off, lost) = closes(0.0);
+    assert!(off < 1e-3 && lost == 0.0, "{off} {lost}");
+    let (off, lost) = closes(0.2);
+    assert!(off < 2e-2 * lost && lost > 0.1, "{off} {lost}");
+}
+
+#[test]
+fn steps_of_any_size_end_at_the_same_place_and_states_go_on_to_the_bit() {
+    let tree = winding((2.0, 120.0), 240.0, 1.5);
+    let spec = made_of(300.0, 0.005);
+    let at = |step_mm: f64, friction: f64| {
+        let mut simulation = wire(&tree, Some(&spec), 5000.0, wall(1.0, friction));
+        for _ in 0..(200.0 / step_mm) as usize {
+            simulation.step(Command::advance(step_mm)).unwrap();
+        }
+        simulation
+    };
+    let off = |a: &Simulation, b: &Simulation| (a.shape().tip_mm().unwrap() - b.shape().tip_mm().unwrap()).norm();
+    for friction in [0.0, 0.1] {
+        let [small, large] = [1.0, 20.0].map(|step_mm| at(step_mm, friction));
+        println!("{friction}: {}", off(&small, &large));
+        assert!(off(&small, &large) < 0.05, "{friction}: {}", off(&small, &large));
+    }
+    let mut first = at(20.0, 0.1);
+    let mut again = wire(&tree, Some(&spec), 5000.0, wall(1.0, 0.1));
+    again.restore(&first.state()).unwrap();
+    for one in [&mut first, &mut again] {
+        one.step(Command::advance(3.0)).unwrap();
+    }
+    assert_eq!(first.report(), again.report());
+    assert_eq!(first.course_mm(), again.course_mm());
+    // Ticks end where the step does.
+    let mut ticked = at(20.0, 0.1);
+    ticked.tick(&[crate::methods::Move { instrument: 0, command: Command::advance(3.0) }], 3, None).unwrap();
+    for _ in 0..200 {
+        ticked.tick(&[], 3, None).unwrap();
+    }
+    assert!(ticked.report().behind.is_empty());
+    assert!(off(&ticked, &first) < 0.01, "{}", off(&ticked, &first));
+    // Another vessel is refused.
+    let other = YieldingSpec { span_mm: Some(5.0), ..spec.clone() };
+    assert!(wire(&tree, Some(&other), 5000.0, wall(1.0, 0.1)).restore(&first.state()).is_err());
+}
+
+#[test]
+fn a_vessel_that_hardly_yields_is_one_whose_wall_alone_does() {
+    let tree = winding((2.0, 120.0), 120.0, 1.5);
+    let tip = |spec: Option<&YieldingSpec>| {
+        let mut simulation = wire(&tree, spec, 50.0, wall(1.0, 0.0));
+        for _ in 0..20 {
+            simulation.step(Command::advance(5.0)).unwrap();
+        }
+        assert_eq!(simulation.displacement().is_some(), spec.is_some());
+        simulation.shape().tip_mm().unwrap()
+    };
+    let still = tip(None);
+    assert!((tip(Some(&made_of(1e6, 1e5))) - still).norm() < 1e-4);
+    assert!((tip(Some(&made_of(1.0, 1e-4))) - still).norm() > 0.1);
+}
