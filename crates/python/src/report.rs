@@ -122,6 +122,12 @@ impl StepReport {
         self.report.energy.tail
     }
 
+    /// Energy in the course of a vessel that yields, mJ; 0 where only its wall does.
+    #[getter]
+    fn vessel_energy_mj(&self) -> f64 {
+        self.report.energy.vessel
+    }
+
     /// Deepest penetration of the wall, mm; 0 without contact.
     #[getter]
     fn max_penetration_mm(&self) -> f64 {

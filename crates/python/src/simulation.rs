@@ -402,6 +402,23 @@ impl Simulation {
         self.with(py, |simulation| simulation.time_s())
     }
 
+    /// Where the named places of a vessel that yields are now, mm: the targets of its centre line, each an array of shape
+    /// (3,); empty where only the wall yields.
+    #[getter]
+    fn places_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let places = self.with(py, |simulation| {
+            let displacement = simulation.displacement();
+            let place = |at: &Vec3| displacement.as_ref().map_or(*at, |now| now.place(at));
+            let each = simulation.course().into_iter().flat_map(|course| course.places());
+            each.map(|(name, at)| (name.clone(), place(at))).collect::<Vec<_>>()
+        });
+        let all = PyDict::new(py);
+        for (name, place) in places {
+            all.set_item(name, PyArray1::from_vec(py, vec![place.x, place.y, place.z]))?;
+        }
+        Ok(all)
+    }
+
     /// Number of instruments.
     #[getter]
     fn n_instruments(&self) -> usize {

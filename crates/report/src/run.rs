@@ -138,13 +138,14 @@ pub struct Row {
     wall_mj: f64,
     field_mj: Option<f64>,
     tail_mj: Option<f64>,
+    vessel_mj: Option<f64>,
     max_penetration_mm: f64,
     jumped: bool,
     left_through: Option<usize>,
     converged: bool,
     #[serde(default)]
     relaxations: u32,
-    // `None` in recordings of older versions, which lack these columns, as `field_mj` and `tail_mj`.
+    // `None` in recordings of older versions, which lack these columns, as `field_mj`, `tail_mj` and `vessel_mj`.
     imbalance: Option<f64>,
     wall_force_sum_n: Option<f64>,
     wall_force_largest_n: Option<f64>,
@@ -168,6 +169,7 @@ impl Row {
             wall_mj: report.energy.wall,
             field_mj: Some(report.energy.field),
             tail_mj: Some(report.energy.tail),
+            vessel_mj: Some(report.energy.vessel),
             max_penetration_mm: report.max_penetration_mm,
             jumped: report.jumped,
             left_through: report.left_through,
@@ -184,7 +186,7 @@ impl Row {
 
 impl Row {
     fn energy_mj(&self) -> f64 {
-        let others = [self.field_mj, self.tail_mj].into_iter().flatten();
+        let others = [self.field_mj, self.tail_mj, self.vessel_mj].into_iter().flatten();
         self.bend_mj + self.twist_mj + self.wall_mj + others.sum::<f64>()
     }
 }
@@ -301,6 +303,7 @@ mod tests {
             wall_mj: 0.0,
             field_mj: None,
             tail_mj: None,
+            vessel_mj: None,
             max_penetration_mm: 0.0,
             jumped: false,
             left_through: None,

@@ -134,6 +134,7 @@ fn results(rows: &[Row]) -> Vec<Column> {
         number("wall_mj", |o| Some(o.energy_mj.wall)),
         number("field_mj", |o| Some(o.energy_mj.field)),
         number("tail_mj", |o| Some(o.energy_mj.tail)),
+        number("vessel_mj", |o| Some(o.energy_mj.vessel)),
         number("max_penetration_mm", |o| Some(o.tally.max_penetration_mm)),
         number("wall_force_sum_n", |o| Some(o.wall_force.sum_n)),
         number("wall_force_largest_n", |o| Some(o.wall_force.largest_n)),

@@ -29,6 +29,10 @@
 //! The gradient is exact. In the Hessian f ∇∇s is that of a true distance, H g = 0 and so on, to a wall of constant
 //! curvature, and without ∂²u: the neglected terms are f times a strain times |∇κ|, and f κ |∂²u|, thousandths of H.
 //! Both are transformed into space by the chain rule ([`Local::in_space`]).
+//!
+//! Where the vessel's course yields, sections turn with it and are hardly strained, and gaps are those of the vessel at
+//! rest, d(x) = f(X(x)), with ∇d = F⁻ᵀ∇f: then the change of d with the unknowns of the course is exactly that of x, so that
+//! what device and vessel exert on each other is equal and opposite.
 
 use std::ops::Deref;
 
@@ -91,9 +95,14 @@ impl<'a> MovedWall<'a> {
         (direction + displacement.gradient(material) * direction).normalize()
     }
 
-    /// Upper bound of the ratio of lengths in space and in the reference, either way.
-    pub(super) fn stretch(&self) -> f64 {
+    /// Upper bound of the ratio of motions in space and in the reference, either way.
+    pub(super) fn motion_stretch(&self) -> f64 {
         self.displacement.map_or(1.0, Displacement::stretch)
+    }
+
+    /// Upper bound of the ratio of distances from the wall and lengths in the reference, either way.
+    pub(super) fn stretch(&self) -> f64 {
+        self.displacement.filter(|moved| !moved.has_course()).map_or(1.0, Displacement::stretch)
     }
 
     /// As [`ContactSurface::nearness`] of a material point, with the distance in space.
@@ -101,6 +110,12 @@ impl<'a> MovedWall<'a> {
         let Some(displacement) = self.displacement else {
             return self.surface.nearness(material, hint, limit_mm);
         };
+        if displacement.has_course() {
+            let near = self.surface.nearness(material, hint, limit_mm);
+            let Nearness::Within(Distance { value_mm, gradient, hessian }) = near else { return near };
+            let (gradient, hessian) = displacement.local(material).in_space(&gradient, &hessian);
+            return Nearness::Within(Distance { value_mm, gradient, hessian });
+        }
         // The value in space needs the gradient in the reference.
         let wanted_mm = limit_mm.max(self.surface.reach_mm) * displacement.stretch();
         match self.surface.nearness(material, hint, wanted_mm) {

@@ -108,7 +108,7 @@ impl WallContact<'_> {
     /// Upper bound of the motion of a material point of the vessel under a point of an element, mm.
     fn motion_mm(&self, from: &Nodes, to: &Nodes, length_mm: f64) -> f64 {
         let [x0, x1, t0, t1] = [0, 1, 2, 3].map(|k| (to[k] - from[k]).norm());
-        largest_motion(length_mm, [(x0, t0), (x1, t1)]) * self.surface.stretch()
+        largest_motion(length_mm, [(x0, t0), (x1, t1)]) * self.surface.motion_stretch()
     }
 
     /// The points of a span, unless none can touch the wall at a state; their positions at the base are known

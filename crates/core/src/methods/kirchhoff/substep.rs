@@ -220,9 +220,10 @@ impl<const C: usize> Tools<C> {
         let first = course.as_ref().map_or(environment.displacement, |course| Some(course.displacement()));
         let searched = self.search_from(&environment.displaced(first), (start, attempt), (course.as_ref(), may_snap), next);
         let elements = next.mesh.elements.len();
+        if std::env::var("YD").is_ok() { match &searched { Ok(s) => eprintln!("part {part_mm:.4} {effort:?} first it {} conv {} res {:.2e} off {:.3} wrong {:?}", s.taken.0, s.found.converged, s.found.residual, s.off, s.wrong), Err(e) => eprintln!("part {part_mm:.4} {effort:?} {e:?}") } }
         let searched = searched.and_then(|searched| match &mut course {
             None => Ok(searched),
-            Some(course) => self.follow_course(environment, (searched, limits, may_snap), course, next),
+            Some(course) => self.follow_course(environment, (searched, effort, limits, may_snap), course, next),
         });
         let searched = match searched {
             Ok(searched) => searched,

@@ -12,24 +12,25 @@
 //! factored, and Hᵢ = ∂gᵢ/∂yᵢ,
 //!
 //! ```text
-//! Z = −K⁻¹ Σ Nᵢᵀ Hᵢ Wᵢ,    dx = −Z da,    M = −dp/da = Σ Wᵢᵀ Hᵢ (Nᵢ Z + Wᵢ)
+//! Z = −K⁻¹ Σ Nᵢᵀ (Hᵢ Wᵢ + Qᵢ),    dx = −Z da,    Qᵢ = F⁻ᵀ Pᵢ
+//! M = −dp/da = Σ [Wᵢᵀ Hᵢ Wᵢ + Wᵢᵀ Qᵢ + Qᵢᵀ Wᵢ + (Hᵢ Wᵢ + Qᵢ)ᵀ Nᵢ Z]
 //! ```
 //!
-//! where Nᵢ is the motion of the place in that of the device. Friction has its share in Hᵢ, with the material angle as
+//! where Nᵢ is the motion of the place in that of the device, and Pᵢ da the gradient of gᵢ·Wᵢ da along the vessel: forces turn
+//! with its sections. Friction has its share in Hᵢ, with the material angle as
 //! a further unknown of the device. Only the unknowns T that a contact reaches have forces; the others follow, so that
 //!
 //! ```text
 //! ((A⁻¹)_TT⁻¹ + M) a_T⁺ = p + M a_T,    a⁺ = (A⁻¹)_T (A⁻¹)_TT⁻¹ a_T⁺
 //! ```
 //!
-//! This is block elimination of Newton's method for both; what is left out of M, the change of W along the vessel,
-//! makes it nearly quadratic. The matrix is symmetric, and positive definite where device and vessel together are
+//! This is block elimination of Newton's method for both. The matrix is symmetric, and positive definite where device and vessel together are
 //! stable; where it is not, M of a device that does not respond is.
 
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::Environment;
 use super::configuration::{Configuration, Start};
@@ -46,7 +47,12 @@ use crate::solve::StopReason;
 use crate::vessel::{Course, Displacement};
 
 /// Most times that the course follows in a part.
-const MOST_ROUNDS: usize = 40;
+const MOST_ROUNDS: usize = 80;
+/// If the energy rises at the end of a step by more than this of the slope by which it fell at its beginning, as where contacts
+/// change status, the next one is half as long.
+const RISES: f64 = 0.5;
+/// The least part of a step.
+const LEAST_PART: f64 = 0.03;
 /// The course follows by at most so many radii of the device at once, mm, …
 const MOST_RADII: f64 = 2.0;
 /// … and turns the device by at most so much, rad.
@@ -67,6 +73,8 @@ pub(super) struct Yielding<'a> {
 pub(super) struct Follows {
     amplitudes_mm: Vec<Vec3>,
     way: Vec<f64>,
+    /// Forces that are not balanced: the gradient of the energy in the amplitudes, N.
+    off_n: Vec<Vec3>,
 }
 
 impl<'a> Yielding<'a> {
@@ -125,14 +133,14 @@ impl<'a> Yielding<'a> {
     ) -> Result<Option<Follows>, StopReason> {
         // It was assembled last.
         let reactions = search.contact.reactions(search.state);
-        let touched = Touched::new(self.course, &reactions);
+        let touched = Touched::new(self.course, &self.displacement, &reactions);
         let forces = touched.forces(&reactions);
         let own = self.course.forces_n(&self.amplitudes_mm);
         let mut given = vec![Vec3::zeros(); own.len()];
         touched.unknowns.iter().zip(&forces).for_each(|(unknown, force)| given[*unknown] = *force);
         let largest_n = forces.iter().map(Vec3::amax).fold(search.contact.negligible_n(), f64::max);
-        let off_n = own.iter().zip(&given).map(|(own, given)| (own - given).amax()).fold(0.0, f64::max);
-        if off_n <= OF_TOLERANCE * search.tolerance * largest_n {
+        let off_n: Vec<Vec3> = own.iter().zip(&given).map(|(own, given)| own - given).collect();
+        if off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= OF_TOLERANCE * search.tolerance * largest_n {
             return Ok(None);
         }
         search.assemble(lagged, true);
@@ -149,7 +157,7 @@ impl<'a> Yielding<'a> {
                 way.iter_mut().zip(&responses[3 * k + axis]).for_each(|(way, z)| *way -= z * by[axis]);
             }
         }
-        Ok(Some(Follows { amplitudes_mm, way }))
+        Ok(Some(Follows { amplitudes_mm, way, off_n }))
     }
 
     /// The amplitudes of the next round, mm.
@@ -205,14 +213,19 @@ impl<'a> Yielding<'a> {
 struct Touched {
     /// In ascending order.
     unknowns: Vec<usize>,
-    /// Wᵢ: of each contact the numbers among these with their weights.
-    weights: Vec<Vec<(usize, f64)>>,
+    /// Of each contact the numbers among these with their blocks of Wᵢ and Qᵢ.
+    weights: Vec<Vec<(usize, [Matrix3<f64>; 2])>>,
 }
 
 impl Touched {
-    fn new(course: &Course, reactions: &[Reaction]) -> Self {
-        let mut weights: Vec<Vec<(usize, f64)>> =
-            reactions.iter().map(|reaction| course.weights(&reaction.material)).collect();
+    fn new(course: &Course, displacement: &Displacement, reactions: &[Reaction]) -> Self {
+        let of = |reaction: &Reaction| {
+            let back = displacement.local(&reaction.material).inverse.transpose();
+            let mut all = course.weights(&reaction.material, &reaction.force_n);
+            all.iter_mut().for_each(|(_, [_, by_place])| *by_place = back * *by_place);
+            all
+        };
+        let mut weights: Vec<_> = reactions.iter().map(of).collect();
         let mut unknowns: Vec<usize> = weights.iter().flatten().map(|(unknown, _)| *unknown).collect();
         unknowns.sort_unstable();
         unknowns.dedup();
@@ -226,7 +239,7 @@ impl Touched {
     fn forces(&self, reactions: &[Reaction]) -> Vec<Vec3> {
         let mut forces = vec![Vec3::zeros(); self.unknowns.len()];
         for (reaction, weights) in reactions.iter().zip(&self.weights) {
-            weights.iter().for_each(|(k, weight)| forces[*k] += reaction.force_n * *weight);
+            weights.iter().for_each(|(k, [weight, _])| forces[*k] += weight.tr_mul(&reaction.force_n));
         }
         forces
     }
@@ -241,12 +254,13 @@ impl Touched {
             let ways = point_columns::<C>(state, &elements[e], e, xi);
             let turns = angle_weights::<C>(reaction.place);
             let turns = if Layout::<C>::ANGLES > 0 { &turns[..] } else { &[] };
-            for (k, weight) in weights {
+            for (k, [weight, turning]) in weights {
                 for axis in 0..3 {
                     let column = &mut columns[3 * k + axis];
-                    let pull = reaction.stiffness.column(axis) * -*weight;
+                    let moved = weight.column(axis);
+                    let pull = -(reaction.stiffness * moved + turning.column(axis));
                     ways.iter().for_each(|(row, way)| column[*row] += way.dot(&pull));
-                    let turn = -weight * reaction.by_angle[axis];
+                    let turn = -reaction.by_angle.dot(&moved);
                     turns.iter().for_each(|(row, share)| column[*row] += share * turn);
                 }
             }
@@ -275,10 +289,9 @@ impl Touched {
                 let way = point_step::<C>(state, &elements[e], (e, xi), response);
                 let turn = point_turn::<C>(reaction.place, response);
                 let change = reaction.stiffness * way + reaction.by_angle * turn;
-                for (k, weight) in weights {
-                    for axis in 0..3 {
-                        matrix[(3 * k + axis, column)] += change[axis] * weight;
-                    }
+                for (k, [weight, turning]) in weights {
+                    let mut block = matrix.fixed_view_mut::<3, 1>(3 * k, column);
+                    block += weight.tr_mul(&change) + turning.tr_mul(&way);
                 }
             }
         }
@@ -290,10 +303,10 @@ impl Touched {
         let size = 3 * self.unknowns.len();
         let mut matrix = DMatrix::zeros(size, size);
         for (reaction, weights) in reactions.iter().zip(&self.weights) {
-            for (i, one) in weights {
-                for (j, other) in weights {
+            for (i, [one, turning]) in weights {
+                for (j, [other, turned]) in weights {
                     let mut block = matrix.fixed_view_mut::<3, 3>(3 * i, 3 * j);
-                    block += reaction.stiffness * (one * other);
+                    block += one.tr_mul(&(reaction.stiffness * other + turned)) + turning.tr_mul(other);
                 }
             }
         }
@@ -307,7 +320,7 @@ impl<const C: usize> Tools<C> {
     pub(super) fn follow_course(
         &mut self,
         environment: &Environment<'_>,
-        (first, limits, may_snap): (Searched, Limits, bool),
+        (first, effort, limits, may_snap): (Searched, Effort, Limits, bool),
         course: &mut Yielding<'_>,
         next: &mut Configuration,
     ) -> Result<Searched, (Lost, (usize, usize))> {
@@ -318,16 +331,26 @@ impl<const C: usize> Tools<C> {
         let KirchhoffState { rod, touches, .. } = after;
         let elements = &mesh.elements;
         let mut searched = first;
+        let is_flight = effort == Effort::Flight;
+        // How far the last step went, and how fast the energy fell at its beginning.
+        let (mut damped, mut step_mm, mut before_mj) = (1.0f64, Vec::new(), f64::INFINITY);
         for _ in 0..MOST_ROUNDS {
-            let Some(Follows { amplitudes_mm, mut way }) = searched.follows.take() else { return Ok(searched) };
+            let Some(Follows { amplitudes_mm, mut way, off_n }) = searched.follows.take() else {
+                return Ok(searched);
+            };
+            // The slope of the energy in equilibrium with the device.
+            let slope_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>();
+            let rises = slope_mj > RISES * before_mj;
+            damped = if rises { (0.5 * damped).max(LEAST_PART) } else { (2.0 * damped).min(1.0) };
             let before = rod.clone();
             let (turn, _) = RodState::largest_turn::<C>(elements, &before, &way);
-            let part = (MOST_TURN_RAD / turn).min(1.0);
+            let part = (MOST_TURN_RAD / turn).min(damped);
             let amplitudes_mm: Vec<Vec3> =
                 amplitudes_mm.iter().zip(&course.amplitudes_mm).map(|(to, from)| from + (to - from) * part).collect();
             way.iter_mut().for_each(|value| *value *= part);
-            let farthest = |(to, from): (&Vec3, &Vec3)| (to - from).norm();
-            let farthest_mm = amplitudes_mm.iter().zip(&course.amplitudes_mm).map(farthest).fold(0.0, f64::max);
+            step_mm = amplitudes_mm.iter().zip(&course.amplitudes_mm).map(|(to, from)| to - from).collect();
+            before_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>().abs();
+            let farthest_mm = step_mm.iter().map(|by: &Vec3| by.norm()).fold(0.0, f64::max);
             let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
                 return Ok(searched);
             };
@@ -335,10 +358,10 @@ impl<const C: usize> Tools<C> {
             let moved_mm = farthest_mm * moved.stretch();
             (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
             let there = environment.displaced(Some(&course.displacement));
-            let bounds = Bounds {
-                effort: Effort::Near,
-                most: limits.iterations.saturating_sub(searched.taken.0),
-                most_solves: limits.solves.saturating_sub(searched.taken.1),
+            let bounds = |effort: Effort, taken: (usize, usize)| Bounds {
+                effort,
+                most: limits.iterations.saturating_sub(taken.0),
+                most_solves: limits.solves.saturating_sub(taken.1),
                 resumed: None,
                 moved_mm: Some(moved_mm),
             };
@@ -352,11 +375,25 @@ impl<const C: usize> Tools<C> {
                 newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
                 Ok::<_, Infallible>(())
             };
-            let judged = Judged { course: Some((course, most_mm)), before: 0, may_snap };
-            let Ok(again) = self.with_search(&there, (mesh, stack, rod), bounds, begin, |search, lagged| {
-                search.searched(lagged, &judged, touches)
-            });
-            searched = searched.then(again);
+            let judged = Judged { course: Some((course, most_mm)), before: 0, may_snap: may_snap || is_flight };
+            let mut search = |effort: Effort, taken: (usize, usize)| {
+                let bounds = bounds(effort, taken);
+                let Ok(found) = self.with_search(&there, (mesh, stack, &mut *rod), bounds, begin, |search, lagged| {
+                    search.searched(lagged, &judged, touches)
+                });
+                found
+            };
+            // With friction that follows; a device in flight may snap once more.
+            let again = search(Effort::Near, searched.taken);
+            let is_lost = again.wrong.is_some_and(|wrong| wrong != Lost::UnderWay);
+            let taken = again.taken;
+            searched = if is_flight && is_lost {
+                let so_far = (searched.taken.0 + taken.0, searched.taken.1 + taken.1);
+                let flown = search(Effort::Flight, so_far);
+                Searched { taken: so_far, ..searched }.then(flown)
+            } else {
+                searched.then(again)
+            };
         }
         let wrong = Some(Lost::Unsolved(StopReason::Unsettled, searched.found.residual));
         Ok(Searched { wrong, ..searched })

@@ -19,15 +19,15 @@ a neck of 19 mm below the renal arteries and the aorta's end. Course drawn.";
 
 /// Named rows; the same with and without an aneurysm.
 pub(super) const TARGETS: [(usize, &str); 9] = [
-    (28, "aortic bifurcation"),
-    (37, "right renal ostium"),
-    (38, "left renal ostium"),
-    (40, "aorta"),
-    (43, "right renal"),
-    (46, "left renal"),
-    (49, "right internal iliac"),
-    (73, "left external iliac"),
-    (76, "left internal iliac"),
+    (27, "aortic bifurcation"),
+    (35, "right renal ostium"),
+    (36, "left renal ostium"),
+    (38, "aorta"),
+    (41, "right renal"),
+    (44, "left renal"),
+    (47, "right internal iliac"),
+    (70, "left external iliac"),
+    (73, "left internal iliac"),
 ];
 
 /// Where the external iliac arteries leave the pelvis, and the aorta divides.
@@ -37,8 +37,8 @@ const LEFT_GROIN: [f64; 3] = [70.0, -40.0, -150.0];
 const RIGHT_PIECES: usize = 28;
 const LEFT_PIECES: usize = 24;
 /// How far both wind across the straight line, mm, in so many half waves.
-const RIGHT_WINDS: [(f64, f64); 2] = [(22.0, 3.0), (14.0, 2.0)];
-const LEFT_WINDS: [(f64, f64); 2] = [(19.0, 2.0), (12.0, 2.0)];
+const RIGHT_WINDS: [(f64, f64); 2] = [(29.0, 3.0), (21.0, 2.0)];
+const LEFT_WINDS: [(f64, f64); 2] = [(25.5, 2.0), (15.0, 2.0)];
 /// Radii of aorta and arteries, mm.
 const AORTA_MM: f64 = 10.0;
 const COMMON_MM: f64 = 6.0;
@@ -54,7 +54,9 @@ fn iliac(groin: [f64; 3], winds: [(f64, f64); 2], part: f64) -> (Vec3, f64) {
     let along = -from.normalize();
     let across = along.cross(&Vec3::y()).normalize();
     let beside = along.cross(&across);
-    let [one, other] = winds.map(|(mm, half_waves)| mm * libm::sin(half_waves * PI * part));
+    // As it leaves and arrives straight, it winds most in the middle.
+    let most = libm::sin(PI * part);
+    let [one, other] = winds.map(|(mm, half_waves)| mm * most * libm::sin(half_waves * PI * part));
     // From external to common beside the internal iliac.
     let rise = ((part - INTERNAL_AT) / 0.12).clamp(0.0, 1.0);
     (from * (1.0 - part) + across * one + beside * other, EXTERNAL_MM + (COMMON_MM - EXTERNAL_MM) * rise)
@@ -75,14 +77,16 @@ pub(super) fn nodes(has_aneurysm: bool) -> Vec<CentrelineNode> {
     let left = |k: usize| iliac(LEFT_GROIN, LEFT_WINDS, k as f64 / LEFT_PIECES as f64);
     let (groin, radius_mm) = right(0);
     let mut course = Course::new().root(groin, radius_mm);
-    for k in 1..RIGHT_PIECES {
+    // Where the vessel is wide, at its fork, points are farther apart.
+    for k in 1..RIGHT_PIECES - 1 {
         let (place, radius_mm) = right(k);
         course = course.to(place, radius_mm);
     }
     course = course.to(Vec3::zeros(), 8.0);
     // The spine's curve pushes the aorta forward.
     let aorta = |z: f64| Vec3::new(0.0, -6.0 * libm::sin(PI * z / 130.0), z);
-    for z in [11.0, 22.0, 33.0, 44.0, 55.0, 66.0, 77.0, 87.0, 92.0, 97.0, 113.0, 130.0] {
+    let fork = course.nodes.len() - 1;
+    for z in [22.0, 33.0, 44.0, 55.0, 66.0, 77.0, 87.0, 92.0, 97.0, 113.0, 130.0] {
         course = course.to(aorta(z), aorta_mm(z, has_aneurysm));
     }
     let renal = |course: Course, row: usize, side: f64| {
@@ -90,8 +94,8 @@ pub(super) fn nodes(has_aneurysm: bool) -> Vec<CentrelineNode> {
         let steps = [[16.0, 3.0, -3.0], [30.0, 9.0, -7.0], [44.0, 14.0, -8.0]];
         steps.into_iter().fold(course.at(row), |course, [x, y, z]| course.to(from + Vec3::new(side * x, y, z), RENAL_MM))
     };
-    course = renal(course, 37, -1.0);
-    course = renal(course, 38, 1.0);
+    course = renal(course, 35, -1.0);
+    course = renal(course, 36, 1.0);
     let internal = |course: Course, row: usize, side: f64| {
         let from = course.nodes[row].position_mm;
         let steps = [[2.0, 13.0, -9.0], [0.0, 25.0, -24.0], [-6.0, 33.0, -42.0]];
@@ -100,8 +104,8 @@ pub(super) fn nodes(has_aneurysm: bool) -> Vec<CentrelineNode> {
             .fold(course.at(row), |course, [x, y, z]| course.to(from + Vec3::new(side * x, y, z), INTERNAL_MM))
     };
     course = internal(course, (INTERNAL_AT * RIGHT_PIECES as f64) as usize, -1.0);
-    course = course.at(RIGHT_PIECES);
-    for k in (0..LEFT_PIECES).rev() {
+    course = course.at(fork);
+    for k in (0..LEFT_PIECES - 1).rev() {
         let (place, radius_mm) = left(k);
         course = course.to(place, radius_mm);
     }

@@ -50,6 +50,11 @@ impl Displacement {
         Self { steepest: motion.steepest + course.steepest(), course: Some(course), ..motion }
     }
 
+    /// Whether the vessel's course yields.
+    pub(crate) fn has_course(&self) -> bool {
+        self.course.is_some()
+    }
+
     /// u, mm.
     pub(crate) fn displacement_mm(&self, material: &Vec3) -> Vec3 {
         let each = self.modes.iter().map(|mode| {

@@ -1,50 +1,83 @@
 //! A run of a centre line as a smooth curve, and the cross-section of it in which a point lies.
 //!
-//! Through the rows, no closer than a radius, goes the natural cubic spline c(s) over the polyline's arc length. The
-//! place s of a point X is where the curve's normal plane contains it,
+//! The curve c(s) is a quintic B-spline whose control points are points of the polyline at equal arc lengths: it goes
+//! near the line, not through it, which matters little, since it says which sections move together, not where the wall
+//! is. The place s of a point X is where the curve's normal plane contains it,
 //!
 //! ```text
 //! g(s) = c′(s)·(X − c(s)) = 0,    D = |c′|² − c″·(X − c),    ∇s = c′/D
 //! ∇∇s = (c″ c′ᵀ + c′ c″ᵀ)/D² − (3 c′·c″ − c‴·(X − c)) c′ c′ᵀ/D³
 //! ```
 //!
-//! which has one solution near the curve, within its radius of curvature. Where sections are displaced by w(s), that
-//! of a point x in space is at g(s) = c′·(x − w(s) − c(s)) = 0.
+//! which has one solution near the curve, within its radius of curvature. Forces on the wall depend on ∇∇s, which is why
+//! c‴ has to be continuous.
+//!
+//! Sections move by w(s) and turn with the curve, to first order: with ρ = X − c(s),
+//!
+//! ```text
+//! x = X + U,    U = w − c′ q,    q = w′·ρ
+//! ```
+//!
+//! The section of a point x in space is where ρ = v + c′ q is in the normal plane, with v = x − c − w:
+//!
+//! ```text
+//! g(s) = c′·v + |c′|² q = 0,    q = w′·v/(1 − w′·c′)
+//! ```
 
 use nalgebra::Matrix3;
 
 use crate::Vec3;
 use crate::products::outer;
 
-/// A cubic polynomial from a place on.
+/// A polynomial about a place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
     pub(super) from_mm: f64,
-    /// Of powers 0 to 3 of the distance from there.
-    pub(super) powers: [Vec3; 4],
+    /// Of powers 0 to 5 of the distance from there.
+    pub(super) powers: [Vec3; 6],
 }
 
 impl Piece {
     /// Value and derivatives, the third included.
     #[inline]
     pub(super) fn at(&self, s_mm: f64) -> [Vec3; 4] {
-        let t = s_mm - self.from_mm;
-        let [a, b, c, d] = &self.powers;
-        [
-            a + (b + (c + d * t) * t) * t,
-            b + (c * 2.0 + d * (3.0 * t)) * t,
-            c * 2.0 + d * (6.0 * t),
-            d * 6.0,
-        ]
+        polynomial(&self.powers, s_mm - self.from_mm)
     }
+}
+
+/// Value and first three derivatives of a polynomial.
+#[inline]
+fn polynomial([p0, p1, p2, p3, p4, p5]: &[Vec3; 6], t: f64) -> [Vec3; 4] {
+    [
+        p0 + (p1 + (p2 + (p3 + (p4 + p5 * t) * t) * t) * t) * t,
+        p1 + (p2 * 2.0 + (p3 * 3.0 + (p4 * 4.0 + p5 * (5.0 * t)) * t) * t) * t,
+        p2 * 2.0 + (p3 * 6.0 + (p4 * 12.0 + p5 * (20.0 * t)) * t) * t,
+        p3 * 6.0 + (p4 * 24.0 + p5 * (60.0 * t)) * t,
+    ]
 }
 
 /// A smooth curve; beyond its ends it goes on straight.
 #[derive(Debug, Clone)]
 pub(super) struct Curve {
-    pieces: Vec<Piece>,
+    from_mm: f64,
+    knot_mm: f64,
+    /// Of each piece the powers 0 to 5 of the distance from its beginning, in knots.
+    pieces: Vec<[Vec3; 6]>,
 }
 
+/// Longest distance of knots, radii.
+const KNOT_RADII: f64 = 1.5;
+/// Control points beyond each end, on its straight continuation: the outermost pieces are straight.
+const BEYOND: usize = 8;
+/// Powers 0 to 5 of the six quintic B-splines that are not zero on a piece, times 120.
+const QUINTIC: [[f64; 6]; 6] = [
+    [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
+    [26.0, -50.0, 20.0, 20.0, -20.0, 5.0],
+    [66.0, 0.0, -60.0, 0.0, 30.0, -10.0],
+    [26.0, 50.0, 20.0, -20.0, -20.0, 10.0],
+    [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+];
 /// Most steps of Newton's method on a place.
 const MOST: usize = 20;
 /// Steps below this, mm, are rounding.
@@ -53,68 +86,50 @@ const ROUNDING_MM: f64 = 1e-12;
 const LEAST_D: f64 = 0.1;
 
 impl Curve {
-    /// The curve through these points at these arc lengths, those closer than their radius left out.
+    /// The curve near these points at these arc lengths.
     pub(super) fn new(points: &[Vec3], arcs_mm: &[f64], radii_mm: &[f64]) -> Self {
+        let length_mm = arcs_mm[arcs_mm.len() - 1];
+        let least_mm = radii_mm.iter().copied().fold(f64::INFINITY, f64::min);
+        let count = (length_mm / (KNOT_RADII * least_mm)).ceil().max(1.0);
+        let knot_mm = length_mm / count;
         let last = points.len() - 1;
-        let mut kept = vec![0];
-        for k in 1..last {
-            let before = kept[kept.len() - 1];
-            if arcs_mm[k] - arcs_mm[before] >= radii_mm[k] && arcs_mm[last] - arcs_mm[k] >= radii_mm[k] {
-                kept.push(k);
-            }
-        }
-        kept.push(last);
-        let at: Vec<(f64, Vec3)> = kept.iter().map(|k| (arcs_mm[*k], points[*k])).collect();
-        let bends = natural(&at);
-        let mut pieces = Vec::with_capacity(at.len() + 1);
-        for (k, pair) in at.windows(2).enumerate() {
-            let h = pair[1].0 - pair[0].0;
-            let slope = (pair[1].1 - pair[0].1) / h - (bends[k] * 2.0 + bends[k + 1]) * (h / 6.0);
-            let powers = [pair[0].1, slope, bends[k] * 0.5, (bends[k + 1] - bends[k]) / (6.0 * h)];
-            pieces.push(Piece { from_mm: pair[0].0, powers });
-        }
-        // Straight on at both ends.
-        let first = pieces[0];
-        let (end_mm, end) = at[at.len() - 1];
-        let along = pieces[pieces.len() - 1].at(end_mm)[1];
-        let straight = |from_mm: f64, place: Vec3, along: Vec3| Piece {
-            from_mm,
-            powers: [place, along, Vec3::zeros(), Vec3::zeros()],
+        let on_line = |s_mm: f64| {
+            let after = arcs_mm.partition_point(|arc| *arc < s_mm).clamp(1, last);
+            let (from, to) = (points[after - 1], points[after]);
+            from + (to - from) * ((s_mm - arcs_mm[after - 1]) / (arcs_mm[after] - arcs_mm[after - 1]))
         };
-        pieces.push(straight(end_mm, end, along));
-        pieces.insert(0, straight(first.from_mm, first.powers[0], first.powers[1]));
-        Self { pieces }
+        let controls: Vec<Vec3> = (0..=count as usize + 2 * BEYOND)
+            .map(|k| on_line((k as f64 - BEYOND as f64) * knot_mm))
+            .collect();
+        let piece = |six: &[Vec3]| {
+            let power = |p: usize| (0..6).map(|k| six[k] * (QUINTIC[k][p] / 120.0)).sum::<Vec3>();
+            [power(0), power(1), power(2), power(3), power(4), power(5)]
+        };
+        // The piece between the third and the fourth of six control points.
+        let from_mm = (2.0 - BEYOND as f64) * knot_mm;
+        Self { from_mm, knot_mm, pieces: controls.windows(6).map(piece).collect() }
     }
 
-    /// The number of the piece at a place.
-    pub(super) fn piece(&self, s_mm: f64) -> u32 {
-        self.pieces[1..].partition_point(|piece| piece.from_mm <= s_mm) as u32
-    }
-
-    /// c and its derivatives, searched from a piece on, which then is that of the place.
+    /// c and its derivatives, the third included.
     #[inline]
-    pub(super) fn at(&self, s_mm: f64, piece: &mut u32) -> [Vec3; 4] {
-        let mut k = *piece as usize;
-        while k + 1 < self.pieces.len() && self.pieces[k + 1].from_mm <= s_mm {
-            k += 1;
-        }
-        while k > 0 && self.pieces[k].from_mm > s_mm {
-            k -= 1;
-        }
-        *piece = k as u32;
-        self.pieces[k].at(s_mm)
+    pub(super) fn at(&self, s_mm: f64) -> [Vec3; 4] {
+        let h = 1.0 / self.knot_mm;
+        let along = (s_mm - self.from_mm) * h;
+        // What is negative becomes zero.
+        let k = (along as usize).min(self.pieces.len() - 1);
+        let t = along - k as f64;
+        let [value, first, second, third] = polynomial(&self.pieces[k], t);
+        [value, first * h, second * (h * h), third * (h * h * h)]
     }
 
-    /// s of a point x in space, from a guess with its piece, where sections are displaced by `w`, given with its slope.
+    /// s of a point X, from a guess.
     #[inline]
-    pub(super) fn place(&self, x: &Vec3, guess: (f64, &mut u32), w: impl Fn(f64) -> (Vec3, Vec3)) -> f64 {
-        let (mut s, piece) = guess;
+    pub(super) fn place(&self, x: &Vec3, guess_mm: f64) -> f64 {
+        let mut s = guess_mm;
         for _ in 0..MOST {
-            let [c, c1, c2, _] = self.at(s, piece);
-            let (by, slope) = w(s);
-            let off = x - by - c;
-            let d = (c1.dot(&(c1 + slope)) - c2.dot(&off)).max(LEAST_D);
-            let step = c1.dot(&off) / d;
+            let [c, c1, c2, _] = self.at(s);
+            let off = x - c;
+            let step = c1.dot(&off) / (c1.norm_squared() - c2.dot(&off)).max(LEAST_D);
             s += step;
             if step.abs() <= ROUNDING_MM {
                 break;
@@ -123,37 +138,41 @@ impl Curve {
         s
     }
 
+    /// The material point at a point x in space, from a guess of its s, where sections are displaced by `w`, given with its
+    /// derivatives.
+    #[inline]
+    pub(super) fn material(&self, x: &Vec3, guess_mm: f64, w: impl Fn(f64) -> [Vec3; 4]) -> Vec3 {
+        let mut s = guess_mm;
+        for _ in 0..MOST {
+            let ([c, c1, c2, _], [by, w1, w2, _]) = (self.at(s), w(s));
+            let v = x - by - c;
+            let size = c1.norm_squared();
+            let (turned, left) = (w1.dot(&v), 1.0 - w1.dot(&c1));
+            let q = turned / left;
+            let q1 = (w2.dot(&v) - w1.dot(&(c1 + w1)) + q * (w2.dot(&c1) + w1.dot(&c2))) / left;
+            let g = c1.dot(&v) + size * q;
+            let g1 = c2.dot(&v) - c1.dot(&(c1 + w1)) + 2.0 * c1.dot(&c2) * q + size * q1;
+            let step = g / (-g1).max(LEAST_D);
+            s += step;
+            if step.abs() <= ROUNDING_MM {
+                break;
+            }
+        }
+        let ([c, c1, ..], [by, w1, ..]) = (self.at(s), w(s));
+        let v = x - by - c;
+        c + v + c1 * (w1.dot(&v) / (1.0 - w1.dot(&c1)))
+    }
+
     /// ∇s and ∇∇s at a point whose place is s.
     #[inline]
-    pub(super) fn derivatives(&self, x: &Vec3, s_mm: f64, mut piece: u32) -> (Vec3, Matrix3<f64>) {
-        let [c, c1, c2, c3] = self.at(s_mm, &mut piece);
+    pub(super) fn derivatives(&self, x: &Vec3, s_mm: f64) -> (Vec3, Matrix3<f64>) {
+        let [c, c1, c2, c3] = self.at(s_mm);
         let off = x - c;
-        let own = c1.norm_squared() - c2.dot(&off);
-        let d = own.max(LEAST_D);
+        let d = (c1.norm_squared() - c2.dot(&off)).max(LEAST_D);
         let mixed = outer(&c2, &c1);
         let third = 3.0 * c1.dot(&c2) - c3.dot(&off);
         (c1 / d, (mixed + mixed.transpose()) / (d * d) - outer(&c1, &c1) * (third / (d * d * d)))
     }
-}
-
-/// Second derivatives of the natural cubic spline through points at these places.
-fn natural(at: &[(f64, Vec3)]) -> Vec<Vec3> {
-    let n = at.len();
-    let mut bends = vec![Vec3::zeros(); n];
-    // Thomas's algorithm.
-    let mut upper = vec![0.0; n];
-    for k in 1..n - 1 {
-        let (before, after) = (at[k].0 - at[k - 1].0, at[k + 1].0 - at[k].0);
-        let right = ((at[k + 1].1 - at[k].1) / after - (at[k].1 - at[k - 1].1) / before) * 6.0;
-        let pivot = 2.0 * (before + after) - before * upper[k - 1];
-        upper[k] = after / pivot;
-        bends[k] = (right - bends[k - 1] * before) / pivot;
-    }
-    for k in (1..n - 1).rev() {
-        let next = bends[k + 1];
-        bends[k] -= next * upper[k];
-    }
-    bends
 }
 
 #[cfg(test)]
@@ -175,24 +194,32 @@ mod tests {
     #[test]
     fn a_place_has_its_own_derivatives_and_is_in_the_normal_plane() {
         let curve = helix();
-        let still = |_: f64| (Vec3::zeros(), Vec3::zeros());
         let h = 1e-5;
         for k in 0..30 {
             let s = 10.0 + 3.1 * f64::from(k);
-            let [c, c1, ..] = curve.at(s, &mut 0);
+            let [c, c1, ..] = curve.at(s);
+            assert!((c.xy().norm() - 20.0).abs() < 0.3, "{c}");
             let across = c1.cross(&Vec3::new(0.3, f64::from(k).sin(), 1.0)).normalize();
             let x = c + across * 3.0;
-            assert!((curve.place(&x, (s + 2.0, &mut 0), still) - s).abs() < 1e-10);
-            let (slope, bend) = curve.derivatives(&x, s, 0);
+            assert!((curve.place(&x, s + 2.0) - s).abs() < 1e-10);
+            let (slope, bend) = curve.derivatives(&x, s);
             for axis in 0..3 {
                 let [more, less] = [h, -h].map(|h| {
                     let there = x + Vec3::ith(axis, h);
-                    let s = curve.place(&there, (s, &mut 3), still);
-                    (s, curve.derivatives(&there, s, 9).0)
+                    let s = curve.place(&there, s);
+                    (s, curve.derivatives(&there, s).0)
                 });
                 assert!(((more.0 - less.0) / (2.0 * h) - slope[axis]).abs() < 1e-8);
                 let differs = (more.1 - less.1) / (2.0 * h) - bend.column(axis);
                 assert!(differs.norm() < 1e-6, "{differs}");
+            }
+        }
+        // The third derivative is continuous, at knots too.
+        for k in 1..30 {
+            let knot = curve.from_mm + f64::from(k) * curve.knot_mm;
+            let [before, after] = [-1e-9, 1e-9].map(|off| curve.at(knot + off));
+            for (a, b) in before.iter().zip(&after) {
+                assert!((a - b).norm() < 1e-7, "{k}");
             }
         }
     }
@@ -200,13 +227,19 @@ mod tests {
     #[test]
     fn beyond_its_ends_it_is_straight_and_sections_may_be_displaced() {
         let curve = helix();
-        let [end, along, ..] = curve.at(-5.0, &mut 7);
-        let [begin, slope, bend, _] = curve.at(-1e-9, &mut 1);
-        assert!((end - begin + slope * 5.0).norm() < 1e-6 && (along - slope).norm() < 1e-12 && bend.norm() == 0.0);
-        let moved = |s: f64| (Vec3::new(0.02 * s, 0.0, 0.1 * s), Vec3::new(0.02, 0.0, 0.1));
+        let [end, along, bend, _] = curve.at(-40.0);
+        let [begin, slope, ..] = curve.at(-20.0);
+        assert!((end - begin + slope * 20.0).norm() < 1e-8);
+        assert!((along - slope).norm() < 1e-9 && bend.norm() < 1e-9);
+        let moved = |s: f64| {
+            let [a, b] = [Vec3::new(0.02, 0.0, 0.1), Vec3::new(0.001, -0.002, 0.0)];
+            [a * s + b * (s * s), a + b * (2.0 * s), b * 2.0, Vec3::zeros()]
+        };
         let s = 40.0;
-        let [c, c1, ..] = curve.at(s, &mut 0);
-        let x = c + c1.cross(&Vec3::z()).normalize() + moved(s).0;
-        assert!((curve.place(&x, (43.0, &mut 0), moved) - s).abs() < 1e-9);
+        let [c, c1, ..] = curve.at(s);
+        let rho = c1.cross(&Vec3::z()).normalize() * 2.0;
+        let [w, w1, ..] = moved(s);
+        let x = c + rho + w - c1 * w1.dot(&rho);
+        assert!((curve.material(&x, 43.0, moved) - c - rho).norm() < 1e-9);
     }
 }

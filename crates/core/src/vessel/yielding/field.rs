@@ -1,10 +1,10 @@
 //! The displacement of the vessel about its centre line: every cross-section moves with the line's point in it.
 //!
-//! On one run of the line u(X) = w(s(X)), s being the section in which X lies ([`super::curve`]). Where runs meet, u is
-//! the mean of theirs,
+//! On one run of the line u(X) = U(s(X), X), s being the section in which X lies, which moves and turns
+//! ([`super::curve`]). Where runs meet, u is the mean of theirs,
 //!
 //! ```text
-//! u(X) = Σ M_c w_c(s_c(X)) / Σ M_c,    M_c = Σ Kᵢ over the samples i of run c
+//! u(X) = Σ M_c U_c(s_c(X), X) / Σ M_c,    M_c = Σ Kᵢ over the samples i of run c
 //! Kᵢ = aᵢ (1 − qᵢ²)³  for qᵢ < 1, else 0,    qᵢ = |X − cᵢ|/(ρ rᵢ),    aᵢ = (length of the sample)/rᵢ
 //! ```
 //!
@@ -16,6 +16,7 @@ use rustc_hash::FxHashMap;
 
 use super::chains::Chain;
 use super::curve::Piece;
+use super::spline::FELT;
 use crate::Vec3;
 use crate::products::outer;
 
@@ -33,8 +34,6 @@ const MOST_CELLS: f64 = 12.0;
 struct Sample {
     place: Vec3,
     arc_mm: f64,
-    /// The piece of its run's curve.
-    piece: u32,
     chain: u32,
     reach_mm: f64,
     size: f64,
@@ -65,7 +64,6 @@ struct OnChain {
     mass1: Vec3,
     mass2: Matrix3<f64>,
     arc_mm: f64,
-    piece: u32,
     arc1: Vec3,
     arc2: Matrix3<f64>,
 }
@@ -109,12 +107,11 @@ impl Samples {
     /// Calls `with` for each run near a point, in their order; the nearest sample's where none is near.
     #[inline]
     fn each_chain(&self, x: &Vec3, chains: &[Chain], order: Order, mut with: impl FnMut(&OnChain)) {
-        let still = |_: f64| (Vec3::zeros(), Vec3::zeros());
         let mut on = |mut sum: OnChain| {
             let curve = &chains[sum.chain].curve;
-            sum.arc_mm = curve.place(x, (sum.arc_mm, &mut sum.piece), still);
+            sum.arc_mm = curve.place(x, sum.arc_mm);
             if order > Order::Value {
-                (sum.arc1, sum.arc2) = curve.derivatives(x, sum.arc_mm, sum.piece);
+                (sum.arc1, sum.arc2) = curve.derivatives(x, sum.arc_mm);
             }
             with(&sum);
         };
@@ -161,13 +158,7 @@ impl Samples {
         let here = self.cells.get(&cell_of(nearby, self.cell_mm)).filter(|cell| cell.is_of_one)?;
         let one = &self.all[here.felt[here.felt.len() / 2] as usize];
         let chain = one.chain as usize;
-        let w = |s: f64| {
-            let [w, slope, ..] = of.at(chain, s);
-            (w, slope)
-        };
-        let mut piece = one.piece;
-        let s = of.chains[chain].curve.place(x, (one.arc_mm, &mut piece), w);
-        let material = x - w(s).0;
+        let material = of.chains[chain].curve.material(x, one.arc_mm, |s| of.at(chain, s));
         let there = self.cells.get(&cell_of(&material, self.cell_mm))?;
         let is_same = there.is_of_one && self.all[there.felt[0] as usize].chain == one.chain;
         is_same.then_some(material)
@@ -178,7 +169,7 @@ impl Samples {
         let (mut mass, mut sum) = (0.0, Vec3::zeros());
         self.each_chain(x, of.chains, Order::Value, |on| {
             mass += on.mass;
-            sum += of.at(on.chain, on.arc_mm)[0] * on.mass;
+            sum += of.moved(on, x).value * on.mass;
         });
         sum / mass
     }
@@ -188,11 +179,11 @@ impl Samples {
         let (mut mass, mut mass1) = (0.0, Vec3::zeros());
         let (mut sum, mut sum1) = (Vec3::zeros(), Matrix3::zeros());
         self.each_chain(x, of.chains, Order::First, |on| {
-            let [w, slope, ..] = of.at(on.chain, on.arc_mm);
+            let moved = of.moved(on, x);
             mass += on.mass;
             mass1 += on.mass1;
-            sum += w * on.mass;
-            sum1 += outer(&w, &on.mass1) + outer(&slope, &on.arc1) * on.mass;
+            sum += moved.value * on.mass;
+            sum1 += outer(&moved.value, &on.mass1) + moved.gradient(on) * on.mass;
         });
         (sum1 - outer(&(sum / mass), &mass1)) / mass
     }
@@ -203,17 +194,19 @@ impl Samples {
         let (mut sum, mut sum1) = (Vec3::zeros(), Matrix3::zeros());
         let mut sum2 = [Matrix3::zeros(); 3];
         self.each_chain(x, of.chains, Order::Second, |on| {
-            let [w, slope, bend, _] = of.at(on.chain, on.arc_mm);
+            let moved = of.moved(on, x);
+            let (w, w1) = (moved.value, moved.gradient(on));
             mass += on.mass;
             mass1 += on.mass1;
             mass2 += on.mass2;
             sum += w * on.mass;
-            sum1 += outer(&w, &on.mass1) + outer(&slope, &on.arc1) * on.mass;
-            let mixed = outer(&on.mass1, &on.arc1);
-            let mixed = mixed + mixed.transpose();
-            let along = outer(&on.arc1, &on.arc1) * on.mass;
+            sum1 += outer(&w, &on.mass1) + w1 * on.mass;
+            let along = outer(&on.arc1, &on.arc1);
             for (k, of) in sum2.iter_mut().enumerate() {
-                *of += on.mass2 * w[k] + mixed * slope[k] + along * bend[k] + on.arc2 * (on.mass * slope[k]);
+                let mixed = outer(&on.mass1, &w1.row(k).transpose());
+                let turned = outer(&(moved.w1 * -moved.c2[k] - moved.w2 * moved.c1[k]), &on.arc1);
+                let own = along * moved.by_arc2[k] + on.arc2 * moved.by_arc[k] + turned + turned.transpose();
+                *of += on.mass2 * w[k] + mixed + mixed.transpose() + own * on.mass;
             }
         });
         let u = sum / mass;
@@ -225,17 +218,44 @@ impl Samples {
         }
     }
 
-    /// How much each coefficient moves a material point, as (number, weight).
-    pub(super) fn weights(&self, x: &Vec3, (chains, firsts): (&[Chain], &[usize]), into: &mut Vec<(usize, f64)>) {
-        into.clear();
-        let mut mass = 0.0;
-        self.each_chain(x, chains, Order::Value, |on| {
-            let basis = chains[on.chain].spline.at(on.arc_mm);
-            let first = firsts[on.chain] + basis.first;
+    /// How each coefficient moves a material point: its number with W, and with the matrix P for which P δ is the gradient
+    /// of g·W δ in the point, g being this vector.
+    ///
+    /// On one run W = B I − B′ c′ ρᵀ, and
+    ///
+    /// ```text
+    /// P = ∇s [B′ g − (B″ c′ + B′ c″)·g ρ + B′ (c′·g) c′]ᵀ − B′ (c′·g) I
+    /// ```
+    pub(super) fn weights(
+        &self,
+        x: &Vec3,
+        g: &Vec3,
+        (chains, firsts): (&[Chain], &[usize]),
+    ) -> Vec<(usize, [Matrix3<f64>; 2])> {
+        let (mut mass, mut mass1, mut all) = (0.0, Vec3::zeros(), Vec::new());
+        self.each_chain(x, chains, Order::First, |on| {
+            let Chain { spline, curve, .. } = &chains[on.chain];
+            let basis = spline.at(on.arc_mm);
+            let [c, c1, c2, _] = curve.at(on.arc_mm);
+            let rho = x - c;
+            let (along, bent) = (c1.dot(g), c2.dot(g));
+            let turns = outer(&c1, &rho);
             mass += on.mass;
-            into.extend((0..4).map(|k| (first + k, basis.values[k] * on.mass)));
+            mass1 += on.mass1;
+            all.extend((0..FELT).map(|k| {
+                let [b, b1, b2, _] = [0, 1, 2, 3].map(|order| basis.derivatives[order][k]);
+                let weight = Matrix3::identity() * b - turns * b1;
+                let by_arc = g * b1 - rho * (b2 * along + b1 * bent) + c1 * (b1 * along);
+                let by_place = outer(&on.arc1, &by_arc) - Matrix3::identity() * (b1 * along);
+                let by_place = by_place * on.mass + outer(&on.mass1, &weight.tr_mul(g));
+                (firsts[on.chain] + basis.first + k, [weight * on.mass, by_place])
+            }));
         });
-        into.iter_mut().for_each(|(_, weight)| *weight /= mass);
+        for (_, [weight, by_place]) in &mut all {
+            *weight /= mass;
+            *by_place = (*by_place - outer(&mass1, &weight.tr_mul(g))) / mass;
+        }
+        all
     }
 }
 
@@ -255,6 +275,44 @@ impl Displaced<'_> {
         let span = self.chains[chain].spline.piece(s_mm);
         self.pieces[self.firsts[chain] + span].at(s_mm)
     }
+
+    /// How a run moves a point: U = w − c′ q with q = w′·ρ, q_s = w″·ρ − w′·c′, q_ss = w‴·ρ − 2 w″·c′ − w′·c″.
+    #[inline]
+    fn moved(&self, on: &OnChain, x: &Vec3) -> MovedBy {
+        let [c, c1, c2, c3] = self.chains[on.chain].curve.at(on.arc_mm);
+        let [w, w1, w2, w3] = self.at(on.chain, on.arc_mm);
+        let rho = x - c;
+        let (q, q1) = (w1.dot(&rho), w2.dot(&rho) - w1.dot(&c1));
+        let q2 = w3.dot(&rho) - 2.0 * w2.dot(&c1) - w1.dot(&c2);
+        MovedBy {
+            value: w - c1 * q,
+            by_arc: w1 - c2 * q - c1 * q1,
+            by_arc2: w2 - c3 * q - c2 * (2.0 * q1) - c1 * q2,
+            c1,
+            c2,
+            w1,
+            w2,
+        }
+    }
+}
+
+/// U of a run at a point, its derivatives in arc length, and what those in the point follow from.
+struct MovedBy {
+    value: Vec3,
+    by_arc: Vec3,
+    by_arc2: Vec3,
+    c1: Vec3,
+    c2: Vec3,
+    w1: Vec3,
+    w2: Vec3,
+}
+
+impl MovedBy {
+    /// ∂U/∂X, through s and beside it.
+    #[inline]
+    fn gradient(&self, on: &OnChain) -> Matrix3<f64> {
+        outer(&self.by_arc, &on.arc1) - outer(&self.c1, &self.w1)
+    }
 }
 
 impl OnChain {
@@ -262,7 +320,7 @@ impl OnChain {
     fn none(one: &Sample) -> Self {
         let (mass1, mass2) = (Vec3::zeros(), Matrix3::zeros());
         let (chain, arc_mm) = (one.chain as usize, one.arc_mm);
-        Self { chain, mass: 0.0, mass1, mass2, arc_mm, piece: one.piece, arc1: mass1, arc2: mass2 }
+        Self { chain, mass: 0.0, mass1, mass2, arc_mm, arc1: mass1, arc2: mass2 }
     }
 
     /// The only run near, that of a sample.
@@ -299,7 +357,6 @@ fn sample(chain: &Chain, index: u32, into: &mut Vec<Sample>) {
     let one = |place: Vec3, (arc_mm, piece_mm): (f64, f64), radius_mm: f64| Sample {
         place,
         arc_mm,
-        piece: chain.curve.piece(arc_mm),
         chain: index,
         reach_mm: REACH_RADII * radius_mm,
         size: piece_mm / radius_mm,

@@ -2,7 +2,7 @@
 //!
 //! The wall gives way locally, as an elastic foundation ([`crate::contact`]). In series with that the vessel's course
 //! gives way: its centre line is a beam of bending stiffness B(s) on the support k(s) of the tissue around it, and
-//! the points of the wall move with the cross-section in which they lie ([`field`]). With the displacement w of the
+//! the points of the wall move and turn with the cross-section in which they lie ([`field`]). With the displacement w of the
 //! centre line from its course at rest, the vessel stores
 //!
 //! ```text
@@ -14,7 +14,7 @@
 //!
 //! # Discrete
 //!
-//! w(s) = Σ B_k(s) w_k on each run, with cubic B-splines ([`spline`]). The first coefficient of a branch is the
+//! w(s) = Σ B_k(s) w_k on each run, with quintic B-splines ([`spline`]). The first coefficient of a branch is the
 //! displacement of the run from which it comes, at that place; those of held ends are zero. The rest are the unknowns
 //! a, three for each free coefficient, and
 //!
@@ -22,9 +22,9 @@
 //! V = ½ aᵀ A a,    ∂V/∂a = A a,    ∂²V/∂a² = A,    A = A₁ ⊗ I₃
 //! ```
 //!
-//! with a constant scalar matrix A₁ that is positive definite, since k > 0: Gauss's rule with four points integrates
+//! with a constant scalar matrix A₁ that is positive definite, since k > 0: Gauss's rule with six points integrates
 //! it exactly where B and k are constant. A force f on the wall at the material point X does the work f·Σ W_j(X) δa_j,
-//! so in equilibrium with forces fᵢ at Xᵢ
+//! so in equilibrium with forces fᵢ at Xᵢ, W_j being the matrices by which unknowns move it,
 //!
 //! ```text
 //! A a = Σ W(Xᵢ)ᵀ fᵢ
@@ -36,8 +36,8 @@
 //!
 //! V is quadratic: B and k do not depend on the displacement, and a vessel that is bent in its rest shape is as stiff
 //! as a straight one. It resists displacement along its axis by k alone, neither tension in life nor stretch
-//! count. Cross-sections move without turning: where the course turns by an angle α, the lumen across it narrows by
-//! 1 − cos α, 6 % at 20°. Sections stay round; muscle, and what lies between two vessels, are not modelled.
+//! count. Cross-sections turn with the course to first order: where that turns by an angle α they become longer in its plane, by
+//! 1/cos α, 6 % at 20°. Otherwise they keep their shape; muscle, and what lies between two vessels, are not modelled.
 //!
 //! A beam on a support: M. Hetényi, *Beams on Elastic Foundation*, 1946. Tissue around arteries as springs: P. Moireau
 //! et al., Biomech. Model. Mechanobiol. 11 (2012).
@@ -160,19 +160,20 @@ impl Course {
         (0..self.unknowns()).map(at).collect()
     }
 
-    /// W at a material point of the vessel at rest: unknowns in ascending order with their weights.
-    pub(crate) fn weights(&self, material: &Vec3) -> Vec<(usize, f64)> {
-        let mut of_all = Vec::new();
-        self.samples.weights(material, (&self.chains, &self.firsts), &mut of_all);
-        let each = of_all.iter().flat_map(|(number, weight)| {
-            self.of_unknowns[*number].iter().map(move |(unknown, share)| (*unknown, share * weight))
+    /// At a material point of the vessel at rest: unknowns in ascending order, each with the matrix W by which it moves the
+    /// point, and P, for which P δa is the gradient of `force`·W δa in the point.
+    pub(crate) fn weights(&self, material: &Vec3, force: &Vec3) -> Vec<(usize, [Matrix3<f64>; 2])> {
+        let of_all = self.samples.weights(material, force, (&self.chains, &self.firsts));
+        let each = of_all.iter().flat_map(|(number, both)| {
+            self.of_unknowns[*number].iter().map(move |(unknown, share)| (*unknown, both.map(|one| one * *share)))
         });
-        let mut all: Vec<(usize, f64)> = each.collect();
+        let mut all: Vec<(usize, [Matrix3<f64>; 2])> = each.collect();
         all.sort_unstable_by_key(|(unknown, _)| *unknown);
         all.dedup_by(|later, kept| {
             let same = later.0 == kept.0;
             if same {
-                kept.1 += later.1;
+                kept.1[0] += later.1[0];
+                kept.1[1] += later.1[1];
             }
             same
         });

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::super::CentrelineTree;
 use super::chains::Chain;
+use super::spline::FELT;
 use super::spec::{OfRow, YieldingEnds, YieldingSpec};
 use crate::{Error, Result};
 
@@ -44,8 +45,8 @@ pub(super) fn unknowns(chains: &[Chain], firsts: &[usize], held: &Held) -> (OfUn
             // The run from which it comes was begun before, so that its coefficients are known.
             if let (0, Some((from, arc_mm))) = (k, chain.off) {
                 let basis = chains[from].spline.at(arc_mm);
-                let all = (0..4).flat_map(|i| {
-                    let share = basis.values[i];
+                let all = (0..FELT).flat_map(|i| {
+                    let share = basis.derivatives[0][i];
                     of[firsts[from] + basis.first + i].iter().map(move |(unknown, part)| (*unknown, part * share))
                 });
                 let all = all.filter(|(_, share)| *share != 0.0).collect();
@@ -61,12 +62,14 @@ pub(super) fn unknowns(chains: &[Chain], firsts: &[usize], held: &Held) -> (OfUn
     (of, count)
 }
 
-/// Gauss's rule with four points on (0, 1): places and weights.
-const GAUSS: [(f64, f64); 4] = [
-    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
-    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
-    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+/// Gauss's rule with six points on (0, 1): places and weights.
+const GAUSS: [(f64, f64); 6] = [
+    (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
+    (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
+    (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
+    (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
+    (0.830_604_693_233_132_2, 0.180_380_786_524_069_3),
+    (0.966_234_757_101_576, 0.085_662_246_189_585_17),
 ];
 
 /// A₁.
@@ -95,10 +98,10 @@ pub(super) fn assemble(
                 let basis = chain.spline.at(arc_mm);
                 let bending = at(arc_mm, |row| row.bending_nmm2) * weight * h;
                 let support = at(arc_mm, |row| row.support_n_per_mm2) * weight * h;
-                for i in 0..4 {
-                    for j in 0..4 {
-                        let value = bending * basis.bends[i] * basis.bends[j]
-                            + support * basis.values[i] * basis.values[j];
+                let [values, _, bends, _] = &basis.derivatives;
+                for i in 0..FELT {
+                    for j in 0..FELT {
+                        let value = bending * bends[i] * bends[j] + support * values[i] * values[j];
                         add(first + basis.first + i, first + basis.first + j, value);
                     }
                 }
@@ -109,9 +112,10 @@ pub(super) fn assemble(
         for (row, stiffness_n_per_mm) in properties.tethers {
             let Some(k) = chain.rows.iter().skip(own).position(|own| own == row) else { continue };
             let basis = chain.spline.at(chain.arcs_mm[k + own]);
-            for i in 0..4 {
-                for j in 0..4 {
-                    let value = stiffness_n_per_mm * basis.values[i] * basis.values[j];
+            let values = &basis.derivatives[0];
+            for i in 0..FELT {
+                for j in 0..FELT {
+                    let value = stiffness_n_per_mm * values[i] * values[j];
                     add(first + basis.first + i, first + basis.first + j, value);
                 }
             }
