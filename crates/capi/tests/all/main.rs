@@ -1,0 +1,8 @@
+//! The interface as programs see it: as functions, as a header, and from C and C++.
+
+mod border;
+mod generate;
+// Programs are compiled as on Unix.
+#[cfg(unix)]
+mod from_c;
+mod header;
