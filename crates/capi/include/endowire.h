@@ -42,7 +42,7 @@
  * How a call ended. Unless it is `OK`, nothing has changed but what a function says of itself, and `endowire_last_error`
  * has the reason.
  */
-typedef enum EndowireStatus {
+typedef enum {
     /**
      * It is done.
      */
@@ -92,7 +92,7 @@ typedef struct EndowireSimulation EndowireSimulation;
 /**
  * Motion of one instrument.
  */
-typedef struct EndowireMove {
+typedef struct {
     /**
      * Which instrument: in the order of the scene, the innermost is 0.
      */
@@ -114,7 +114,7 @@ typedef struct EndowireMove {
 /**
  * What the last step led to. With several instruments, numbers without a name of their own are of all together.
  */
-typedef struct EndowireReport {
+typedef struct {
     /**
      * Set it to `sizeof(EndowireReport)`; the library sets it to how many bytes it has filled.
      */
@@ -252,7 +252,7 @@ typedef struct EndowireReport {
 /**
  * One instrument.
  */
-typedef struct EndowireInstrument {
+typedef struct {
     /**
      * Set it to `sizeof(EndowireInstrument)`; the library sets it to how many bytes it has filled.
      */
@@ -330,7 +330,7 @@ typedef struct EndowireInstrument {
 /**
  * A contact with the wall. Forces are of the wall on the instruments.
  */
-typedef struct EndowireContact {
+typedef struct {
     /**
      * Place on the axis, mm.
      */
@@ -380,38 +380,36 @@ const char *endowire_last_error(void);
 /**
  * Reads a scene file (TOML). `path` is UTF-8, as all texts here.
  */
-enum EndowireStatus endowire_scene_read(const char *path, struct EndowireScene **out);
+EndowireStatus endowire_scene_read(const char *path, EndowireScene **out);
 
 /**
  * Reads a scene from its text. Paths in it are relative to `folder`; NULL is the current folder.
  */
-enum EndowireStatus endowire_scene_from_text(const char *toml,
-                                             const char *folder,
-                                             struct EndowireScene **out);
+EndowireStatus endowire_scene_from_text(const char *toml, const char *folder, EndowireScene **out);
 
 /**
  * Frees a scene; its simulations stay. NULL is nothing.
  */
-void endowire_scene_free(struct EndowireScene *scene);
+void endowire_scene_free(EndowireScene *scene);
 
 /**
  * Makes the simulation of a scene, at its start: what instruments specify is inserted. Reading the vessel takes its time;
  * clones share it.
  */
-enum EndowireStatus endowire_simulation_new(const struct EndowireScene *scene,
-                                            struct EndowireSimulation **out);
+EndowireStatus endowire_simulation_new(const EndowireScene *scene,
+                                       EndowireSimulation **out);
 
 /**
  * Makes a second simulation in the same state, which goes on by itself, on any thread. It shares the vessel, and takes
  * microseconds.
  */
-enum EndowireStatus endowire_simulation_clone(const struct EndowireSimulation *simulation,
-                                              struct EndowireSimulation **out);
+EndowireStatus endowire_simulation_clone(const EndowireSimulation *simulation,
+                                         EndowireSimulation **out);
 
 /**
  * Frees a simulation. NULL is nothing.
  */
-void endowire_simulation_free(struct EndowireSimulation *simulation);
+void endowire_simulation_free(EndowireSimulation *simulation);
 
 /**
  * Moves instruments, all at the same time, to the next equilibrium; those without a move keep still. `moves` may be empty
@@ -420,180 +418,177 @@ void endowire_simulation_free(struct EndowireSimulation *simulation);
  * A step ends after a bounded number of linear solves. What is then left of the motion is behind (`under_way` in
  * `EndowireReport`), and the next step or tick goes on with it.
  */
-enum EndowireStatus endowire_step(struct EndowireSimulation *simulation,
-                                  const struct EndowireMove *moves,
-                                  size_t count);
+EndowireStatus endowire_step(EndowireSimulation *simulation,
+                             const EndowireMove *moves,
+                             size_t count);
 
 /**
  * As `endowire_step`, while time proceeds to `time_s` (s since the start), and with it a vessel that moves.
  */
-enum EndowireStatus endowire_step_until(struct EndowireSimulation *simulation,
-                                        const struct EndowireMove *moves,
-                                        size_t count,
-                                        double time_s);
+EndowireStatus endowire_step_until(EndowireSimulation *simulation,
+                                   const EndowireMove *moves,
+                                   size_t count,
+                                   double time_s);
 
 /**
  * As `endowire_step`, as a tick of bounded cost, for haptics and displays that need an answer in time: in about `solves`
  * linear solves (at least 1; 8 are enough to follow hands at 1 kHz), whether or not the instruments come to rest.
  */
-enum EndowireStatus endowire_tick(struct EndowireSimulation *simulation,
-                                  const struct EndowireMove *moves,
-                                  size_t count,
-                                  size_t solves);
+EndowireStatus endowire_tick(EndowireSimulation *simulation,
+                             const EndowireMove *moves,
+                             size_t count,
+                             size_t solves);
 
 /**
  * As `endowire_tick`, while time proceeds to `time_s` (s since the start), and with it a vessel that moves.
  */
-enum EndowireStatus endowire_tick_until(struct EndowireSimulation *simulation,
-                                        const struct EndowireMove *moves,
-                                        size_t count,
-                                        size_t solves,
-                                        double time_s);
+EndowireStatus endowire_tick_until(EndowireSimulation *simulation,
+                                   const EndowireMove *moves,
+                                   size_t count,
+                                   size_t solves,
+                                   double time_s);
 
 /**
  * Drops the motion that ticks and steps have left behind: the hands are then where the instruments are.
  */
-enum EndowireStatus endowire_forget(struct EndowireSimulation *simulation);
+EndowireStatus endowire_forget(EndowireSimulation *simulation);
 
 /**
  * Detaches the coil of an instrument, where it comes to rest, and withdraws its pusher. After an error the state is
  * unchanged.
  */
-enum EndowireStatus endowire_detach(struct EndowireSimulation *simulation,
-                                    size_t instrument);
+EndowireStatus endowire_detach(EndowireSimulation *simulation,
+                               size_t instrument);
 
 /**
  * Fills the report of the last step.
  */
-enum EndowireStatus endowire_report(const struct EndowireSimulation *simulation,
-                                    struct EndowireReport *report);
+EndowireStatus endowire_report(const EndowireSimulation *simulation, EndowireReport *report);
 
 /**
  * Fills what is known of one instrument; the innermost is 0.
  */
-enum EndowireStatus endowire_instrument(const struct EndowireSimulation *simulation,
-                                        size_t instrument,
-                                        struct EndowireInstrument *out);
+EndowireStatus endowire_instrument(const EndowireSimulation *simulation,
+                                   size_t instrument,
+                                   EndowireInstrument *out);
 
 /**
  * Copies the contacts with the wall: a list (see the top) with a capacity in contacts.
  */
-enum EndowireStatus endowire_contacts(const struct EndowireSimulation *simulation,
-                                      struct EndowireContact *contacts,
-                                      size_t capacity,
-                                      size_t *count);
+EndowireStatus endowire_contacts(const EndowireSimulation *simulation,
+                                 EndowireContact *contacts,
+                                 size_t capacity,
+                                 size_t *count);
 
 /**
  * Copies the centre line that all instruments share, from the mouth of the sheath to the tip: a list (see the top) of
  * points x, y, z in mm. `capacity` and `count` are in points: `positions_mm` has room for 3 * `capacity` numbers.
  */
-enum EndowireStatus endowire_positions_mm(const struct EndowireSimulation *simulation,
-                                          double *positions_mm,
-                                          size_t capacity,
-                                          size_t *count);
+EndowireStatus endowire_positions_mm(const EndowireSimulation *simulation,
+                                     double *positions_mm,
+                                     size_t capacity,
+                                     size_t *count);
 
 /**
  * Copies the outer radius of an instrument at each point of `endowire_positions_mm`, mm; 0 where it is not. A list (see the
  * top).
  */
-enum EndowireStatus endowire_radii_mm(const struct EndowireSimulation *simulation,
-                                      size_t instrument,
-                                      double *radii_mm,
-                                      size_t capacity,
-                                      size_t *count);
+EndowireStatus endowire_radii_mm(const EndowireSimulation *simulation,
+                                 size_t instrument,
+                                 double *radii_mm,
+                                 size_t capacity,
+                                 size_t *count);
 
 /**
  * Copies the line of a detached coil, from its detached end to its tip; coils are counted from 0 in the order in which they
  * were detached. A list of points, as of `endowire_positions_mm`.
  */
-enum EndowireStatus endowire_coil_positions_mm(const struct EndowireSimulation *simulation,
-                                               size_t coil,
-                                               double *positions_mm,
-                                               size_t capacity,
-                                               size_t *count);
+EndowireStatus endowire_coil_positions_mm(const EndowireSimulation *simulation,
+                                          size_t coil,
+                                          double *positions_mm,
+                                          size_t capacity,
+                                          size_t *count);
 
 /**
  * Copies the vertices of the vessel at rest, mm: a list of points, as of `endowire_positions_mm`. They never change.
  */
-enum EndowireStatus endowire_vessel_vertices_mm(const struct EndowireSimulation *simulation,
-                                                double *vertices_mm,
-                                                size_t capacity,
-                                                size_t *count);
+EndowireStatus endowire_vessel_vertices_mm(const EndowireSimulation *simulation,
+                                           double *vertices_mm,
+                                           size_t capacity,
+                                           size_t *count);
 
 /**
  * Copies the triangles of the vessel: a list (see the top) of three numbers of vertices each, counter-clockwise seen from
  * outside. `capacity` and `count` are in triangles: `triangles` has room for 3 * `capacity` numbers.
  */
-enum EndowireStatus endowire_vessel_triangles(const struct EndowireSimulation *simulation,
-                                              uint32_t *triangles,
-                                              size_t capacity,
-                                              size_t *count);
+EndowireStatus endowire_vessel_triangles(const EndowireSimulation *simulation,
+                                         uint32_t *triangles,
+                                         size_t capacity,
+                                         size_t *count);
 
 /**
  * Copies the state as bytes: all that the next step depends on besides the scene. A list (see the top); the number of bytes
  * changes from step to step. Programs in Python read them with `State.from_bytes`, and the other way round.
  */
-enum EndowireStatus endowire_state_save(const struct EndowireSimulation *simulation,
-                                        uint8_t *bytes,
-                                        size_t capacity,
-                                        size_t *count);
+EndowireStatus endowire_state_save(const EndowireSimulation *simulation,
+                                   uint8_t *bytes,
+                                   size_t capacity,
+                                   size_t *count);
 
 /**
  * Continues from a state of the same scene, to the bit. After an error nothing has changed.
  */
-enum EndowireStatus endowire_state_restore(struct EndowireSimulation *simulation,
-                                           const uint8_t *bytes,
-                                           size_t count);
+EndowireStatus endowire_state_restore(EndowireSimulation *simulation, const uint8_t *bytes, size_t count);
 
 /**
  * Makes a renderer of the fluoroscopic view of a simulation's scene, with the keys of its `[view]` but for the size: each
  * side 1 to 4096 pixels. Pixels are one byte each, 0 is black. The first picture takes longer than the others.
  */
-enum EndowireStatus endowire_fluoroscopy_new(const struct EndowireSimulation *simulation,
-                                             uint32_t width_px,
-                                             uint32_t height_px,
-                                             struct EndowireRenderer **out);
+EndowireStatus endowire_fluoroscopy_new(const EndowireSimulation *simulation,
+                                        uint32_t width_px,
+                                        uint32_t height_px,
+                                        EndowireRenderer **out);
 
 /**
  * As `endowire_fluoroscopy_new`, of the 3D view. Pixels are four bytes each: red, green, blue, alpha.
  */
-enum EndowireStatus endowire_view_3d_new(const struct EndowireSimulation *simulation,
-                                         uint32_t width_px,
-                                         uint32_t height_px,
-                                         struct EndowireRenderer **out);
+EndowireStatus endowire_view_3d_new(const EndowireSimulation *simulation,
+                                    uint32_t width_px,
+                                    uint32_t height_px,
+                                    EndowireRenderer **out);
 
 /**
  * Frees a renderer. NULL is nothing.
  */
-void endowire_renderer_free(struct EndowireRenderer *renderer);
+void endowire_renderer_free(EndowireRenderer *renderer);
 
 /**
  * Draws the next picture of a simulation: of the one that the renderer was made for, or another of the same scene. Pixels
  * are row by row from the top left; a list (see the top) with a capacity in bytes, and nothing is drawn where only the
  * length is asked for. Pictures are 1 / `view.frames_per_s` apart in time, whatever the simulation's is.
  */
-enum EndowireStatus endowire_picture(struct EndowireRenderer *renderer,
-                                     const struct EndowireSimulation *simulation,
-                                     uint8_t *pixels,
-                                     size_t capacity,
-                                     size_t *count);
+EndowireStatus endowire_picture(EndowireRenderer *renderer,
+                                const EndowireSimulation *simulation,
+                                uint8_t *pixels,
+                                size_t capacity,
+                                size_t *count);
 
 /**
  * Turns the C-arm of a fluoroscopic renderer: primary angle (LAO positive, -360 to 360 degrees) and secondary angle
  * (cranial positive, -90 to 90 degrees). The next picture is from there. After an error it stands where it stood.
  */
-enum EndowireStatus endowire_turn_c_arm(struct EndowireRenderer *renderer,
-                                        double primary_deg,
-                                        double secondary_deg);
+EndowireStatus endowire_turn_c_arm(EndowireRenderer *renderer,
+                                   double primary_deg,
+                                   double secondary_deg);
 
 /**
  * Injects contrast medium (370 mg iodine per ml), from the next fluoroscopic picture on, where the tip of the innermost
  * instrument with a lumen is now. `ml` and `ml_per_s` are 0.1 to 100.
  */
-enum EndowireStatus endowire_inject(struct EndowireRenderer *renderer,
-                                    const struct EndowireSimulation *simulation,
-                                    double ml,
-                                    double ml_per_s);
+EndowireStatus endowire_inject(EndowireRenderer *renderer,
+                               const EndowireSimulation *simulation,
+                               double ml,
+                               double ml_per_s);
 
 #ifdef __cplusplus
 }  // extern "C"
