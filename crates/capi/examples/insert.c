@@ -1,8 +1,8 @@
 /*
- * Pushes a wire 60 mm into the aortic arch, turns it, and prints its tip.
+ * Pushes a wire 60 mm towards the aortic arch, turns it, and prints its tip.
  *
  *   cc examples/insert.c $(pkg-config --cflags --libs endowire) -o insert
- *   ./insert assets/scenes/aortic_arch.toml
+ *   ./insert assets/scenes/arch_carotid.toml
  */
 #include <endowire.h>
 #include <stdio.h>
@@ -51,7 +51,7 @@ static int insert(EndowireSimulation *simulation)
 
 int main(int argc, char **argv)
 {
-    const char *path = argc > 1 ? argv[1] : "assets/scenes/aortic_arch.toml";
+    const char *path = argc > 1 ? argv[1] : "assets/scenes/arch_carotid.toml";
     EndowireScene *scene = NULL;
     EndowireSimulation *simulation = NULL;
 

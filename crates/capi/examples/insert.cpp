@@ -1,7 +1,7 @@
 // As insert.c, in C++: and a clone that goes another way, a state that is saved, and a fluoroscopic picture.
 //
 //   c++ -std=c++17 examples/insert.cpp $(pkg-config --cflags --libs endowire) -o insert
-//   ./insert assets/scenes/aortic_arch.toml picture.pgm
+//   ./insert assets/scenes/arch_carotid.toml picture.pgm
 #include "endowire.hpp"
 
 #include <cstdio>
@@ -10,7 +10,7 @@
 #include <string>
 
 int main(int argc, char **argv) try {
-    endowire::Simulation simulation(endowire::Scene(argc > 1 ? argv[1] : "assets/scenes/aortic_arch.toml"));
+    endowire::Simulation simulation(endowire::Scene(argc > 1 ? argv[1] : "assets/scenes/arch_carotid.toml"));
     const EndowireMove push{0, 2.0, 0.1, 0.0};
     for (int step = 0; step < 20; step++) simulation.step({push});
 

@@ -15,7 +15,7 @@ fn of_crate(name: &str) -> PathBuf {
 
 /// The scene that is run.
 fn scene() -> PathBuf {
-    of_crate("../../assets/scenes/aortic_arch.toml")
+    of_crate("../../assets/scenes/arch_carotid.toml")
 }
 
 /// The folder with the shared library: it was built beside this test.
@@ -46,7 +46,8 @@ fn run(compiler: &str, flags: &[&str], source: &str, arguments: &[&Path]) -> Str
         .output();
     let compiled = compiled.unwrap_or_else(|e| panic!("{compiler} is needed for this test, install it: {e}"));
     assert!(compiled.status.success(), "{source}: {}", String::from_utf8_lossy(&compiled.stderr));
-    let done = Command::new(&program).args(arguments).output().unwrap();
+    // In the folder from which the guide's programs read `assets`.
+    let done = Command::new(&program).args(arguments).current_dir(of_crate("../..")).output().unwrap();
     let (said, warned) = (String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
     assert!(done.status.success(), "{source}: {}\n{said}{warned}", done.status);
     said.into_owned()
@@ -72,10 +73,10 @@ fn expected() -> (f64, f64, Vec<f64>) {
 #[test]
 fn programs_in_c_and_cpp_arrive_where_the_library_does_to_the_bit() {
     let (inserted_mm, push_force_n, tip_mm) = expected();
-    assert!((inserted_mm - 60.0).abs() < 1e-9 && push_force_n != 0.0);
+    assert!((inserted_mm - 60.0).abs() < 1e-9 && push_force_n.abs() > 1e-4, "it touches the wall");
 
     let said = run("cc", &["-std=c99"], "examples/insert.c", &[&scene()]);
-    assert_eq!(numbers(&said, "tip_mm"), [tip_mm.clone()], "{said}");
+    assert_eq!(numbers(&said, "tip_mm"), std::slice::from_ref(&tip_mm), "{said}");
     assert_eq!(numbers(&said, "inserted_mm"), [[inserted_mm]]);
     assert_eq!(numbers(&said, "push_force_n"), [[push_force_n]]);
 
@@ -89,6 +90,18 @@ fn programs_in_c_and_cpp_arrive_where_the_library_does_to_the_bit() {
     assert_eq!(grey.len(), 128 * 128);
     let (least, most) = (grey.iter().min().unwrap(), grey.iter().max().unwrap());
     assert!(most - least > 50, "{least} to {most}: nothing is seen");
+}
+
+#[test]
+fn the_program_of_the_guide_works() {
+    let chapter = std::fs::read_to_string(of_crate("../../docs/guide/21-c.md")).unwrap();
+    let (_, program) = chapter.split_once("```c\n").unwrap();
+    let (program, _) = program.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("program.c");
+    std::fs::write(&source, program).unwrap();
+    let said = run("cc", &["-std=c99"], source.to_str().unwrap(), &[]);
+    assert!(said.starts_with("60.0 mm in, push ") && !said.contains("nan"), "{said}");
 }
 
 #[test]
