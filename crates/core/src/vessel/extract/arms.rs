@@ -64,11 +64,20 @@ pub(super) fn add(lumen: &Lumen<'_>, root: Sphere, wanted: Rings, tree: &mut Gro
         let ways = Ways::from(0, &spheres, &beside);
         let Some(classes) = Classes::new(&beside, &ways) else { break };
         let rings = classes.rings(&ways);
-        let is_enough = rings.len() >= wanted.least().max(1);
-        if best.as_ref().is_none_or(|best| rings.len() > best.3.len()) {
+        // Few spheres leave gaps that look like rings: then more of them tell. Beside bodies any number may be right.
+        let least = wanted.least().max(1);
+        let is_right = match wanted {
+            Rings::Handles(count) => rings.len() == count,
+            Rings::Beside(_) => rings.len() >= least,
+        };
+        let is_better = best.as_ref().is_none_or(|best| {
+            let (now, before) = (rings.len(), best.3.len());
+            if before < least { now > before } else { (least..before).contains(&now) }
+        });
+        if is_better {
             best = Some((spheres, ways, classes, rings));
         }
-        if is_enough {
+        if is_right {
             break;
         }
     }

@@ -10,6 +10,8 @@ const SAME_RADII: f64 = 1e-6;
 
 /// Largest distance of a joint from the end of a line, in radii.
 const REACH_RADII: f64 = 3.0;
+/// Least cosine of the angle between a line and the branch that it joins for it to come aslant.
+const ASLANT: f64 = 0.5;
 /// Weight of that distance beside the distance from the line's continuation.
 const NEARNESS: f64 = 0.35;
 
@@ -39,23 +41,31 @@ impl Growing {
         self.spheres.holding(x)
     }
 
-    /// The row that a line is joined to that ends at a point and comes there from another one: near its straight
-    /// continuation, and near the point. Ways cut the corners of forks, so where they leave the tree says less.
+    /// The row that a line is joined to that ends at a point and comes there from another one: the nearest, or, where
+    /// it comes aslant, one near its straight continuation. Ways cut the corners of forks, so where they leave the
+    /// tree says less.
     pub(super) fn joint(&self, lumen: &Lumen<'_>, from: &Sphere, end: &Sphere) -> Option<usize> {
-        let onwards = (end.centre_mm - from.centre_mm).try_normalize(0.0).unwrap_or_else(Vec3::zeros);
-        let off_mm = |row: usize| {
-            let offset = self.nodes[row].position_mm - end.centre_mm;
-            let aside = offset - onwards * offset.dot(&onwards).max(0.0);
-            aside.norm() + NEARNESS * offset.norm()
-        };
-        let mut rows: Vec<(f64, usize)> = (0..self.nodes.len()).map(|row| (off_mm(row), row)).collect();
+        let nearest = self.best_seen(lumen, end, |offset| offset.norm())?;
+        let onwards = (end.centre_mm - from.centre_mm).try_normalize(0.0)?;
+        let before = self.nodes[nearest].parent.unwrap_or(nearest);
+        let along = self.nodes[nearest].position_mm - self.nodes[before].position_mm;
+        if along.try_normalize(0.0).is_none_or(|along| along.dot(&onwards).abs() < ASLANT) {
+            return Some(nearest);
+        }
+        self.best_seen(lumen, end, |offset| {
+            (offset - onwards * offset.dot(&onwards).max(0.0)).norm() + NEARNESS * offset.norm()
+        })
+    }
+
+    /// The row near a point and seen from there for whose offset this is the least.
+    fn best_seen(&self, lumen: &Lumen<'_>, end: &Sphere, off_mm: impl Fn(Vec3) -> f64) -> Option<usize> {
+        let offset = |row: usize| self.nodes[row].position_mm - end.centre_mm;
+        let reach_mm = |row: usize| REACH_RADII * self.nodes[row].radius_mm.max(end.radius_mm);
+        let near = (0..self.nodes.len()).filter(|row| offset(*row).norm() <= reach_mm(*row));
+        let mut rows: Vec<(f64, usize)> = near.map(|row| (off_mm(offset(row)), row)).collect();
         rows.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let is_near = |row: usize| {
-            let node = &self.nodes[row];
-            (node.position_mm - end.centre_mm).norm() <= REACH_RADII * node.radius_mm.max(end.radius_mm)
-        };
-        let seen = |row: usize| lumen.sees(&end.centre_mm, &self.nodes[row].position_mm);
-        rows.into_iter().map(|(_, row)| row).find(|row| is_near(*row) && seen(*row))
+        let seen = |row: &usize| lumen.sees(&end.centre_mm, &self.nodes[*row].position_mm);
+        rows.into_iter().map(|(_, row)| row).find(seen)
     }
 
     /// Takes away the rows from this one on.

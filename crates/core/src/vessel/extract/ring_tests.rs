@@ -96,8 +96,8 @@ fn both_arms_of_a_ring_are_found_with_their_lengths_and_radii() {
         |node: &&CentrelineNode| forks.iter().all(|fork| (node.position_mm - fork).norm() > 2.0 * lumen_mm);
     let inner: Vec<&CentrelineNode> = tree.nodes().iter().filter(is_clear).collect();
     let radii = |exact: f64| inner.iter().map(|node| off(node.radius_mm, exact)).fold(0.0, f64::max);
-    println!("{:?} {:?} {}", ways(1.0), arms(1.0), radii(lumen_mm));
-    assert!(arms(1.0).iter().all(|off| *off < 0.01) && ways(1.0).iter().all(|off| *off < 0.015));
+    let told = format!("{:?} {:?} {}", ways(1.0), arms(1.0), radii(lumen_mm));
+    assert!(arms(1.0).iter().all(|off| *off < 0.01) && ways(1.0).iter().all(|off| *off < 0.015), "{told}");
     assert!(radii(lumen_mm) < 0.02 && inner.len() > 60);
     // The twins: lengths and radii that are 3 % off are told.
     assert!(ways(1.03).into_iter().chain(arms(1.03)).all(|off| off > 0.01) && radii(1.03 * lumen_mm) > 0.02);
@@ -151,7 +151,6 @@ fn two_rings_in_a_row_have_two_arms() {
         let exact_mm = by_row(&exact, exact.links()[arm].row).length_mm();
         // Which of the two is found first is a matter of their lengths.
         let found_mm = ["arm 1", "arm 2"].map(|name| by_arm(&found.tree, name, &end).length_mm());
-        println!("{found_mm:?} {exact_mm}");
         assert!(found_mm.iter().any(|mm| off(*mm, exact_mm) < 0.015), "{found_mm:?} {exact_mm}");
     }
 }
