@@ -8,9 +8,9 @@ use std::sync::OnceLock;
 use endowire_core::input::nearest;
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
-    CentrelineEnd, CentrelineLink, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, LabelOptions,
-    LabelSurface, Lumen, NoStore, Opening, Repair, RepairOptions, Resolution, SurfaceFrame, SurfaceMesh,
-    SweptVessel, Target, Wall, anatomy, check_with, wall_hints,
+    CentrelineEnd, CentrelineLink, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline,
+    LabelOptions, LabelSurface, Lumen, NoStore, Opening, Repair, RepairOptions, Resolution, SurfaceFrame,
+    SurfaceMesh, SweptVessel, Target, Wall, anatomy, check_with, wall_hints,
 };
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;

@@ -25,8 +25,8 @@ pub struct Rings {
 
 impl Rings {
     /// The rings that these links close: each from a point to another one. `upstream` has the point before each, towards
-    /// the inlet; points are before those that they lead to. A stretch is numbered as the point at its downstream end, links follow; `resistances` are those of
-    /// all of these, in any unit.
+    /// the inlet; points are before those that they lead to. A stretch is numbered as the point at its downstream end,
+    /// links follow; `resistances` are those of all of these, in any unit.
     pub fn new(upstream: &[Option<usize>], links: &[[usize; 2]], resistances: Vec<f64>) -> Self {
         let count = upstream.len();
         let ring = |(k, [from, to]): (usize, &[usize; 2])| {

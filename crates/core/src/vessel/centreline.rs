@@ -13,8 +13,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::point_lists::{self, Columns};
 use super::links::{JOINS, split_link};
+use super::point_lists::{self, Columns};
 use super::{CentrelineLink, line_files};
 use crate::error::nearest_name;
 use crate::file::{FileSystem, Files, foreign};

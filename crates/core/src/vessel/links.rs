@@ -24,8 +24,8 @@ impl CentrelineTree {
     /// The tree with its leaves joined to other points by these links, replacing earlier ones.
     ///
     /// # Errors
-    /// A row that does not exist, is not a leaf, is closed, or is joined twice; a joined row that does not exist, is the row's
-    /// parent or itself, or is as far away as no parent may be.
+    /// A row that does not exist, is not a leaf, is closed, or joins twice; a joined row that does not exist, is the
+    /// row's parent or itself, or is farther away than a parent may be.
     pub fn with_links(mut self, mut links: Vec<CentrelineLink>) -> Result<Self> {
         links.sort_unstable_by_key(|link| (link.row, link.joins));
         let children = self.children();
@@ -61,7 +61,9 @@ impl CentrelineTree {
         }
         let length_mm = (joined.position_mm - leaf.position_mm).norm();
         if length_mm <= COINCIDENT_MM {
-            return Err("lies on the row that joins it: remove that row, and let the one before it join".into());
+            return Err(
+                "lies on the row that joins it: remove that row, and let the one before it join".into()
+            );
         }
         if length_mm > LONGEST_SEGMENT_RADII * leaf.radius_mm.max(joined.radius_mm) {
             return Err(format!(

@@ -141,12 +141,7 @@ impl Flow {
         Ok(Self::of_network(network, mixing, spec, injections))
     }
 
-    fn of_network(
-        network: Network,
-        mixing: Mixing,
-        spec: &FlowSpec,
-        injections: &[InjectionSpec],
-    ) -> Self {
+    fn of_network(network: Network, mixing: Mixing, spec: &FlowSpec, injections: &[InjectionSpec]) -> Self {
         let Network { nodes, links, rings } = network;
         Self {
             nodes,

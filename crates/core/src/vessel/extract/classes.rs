@@ -124,7 +124,10 @@ impl Classes {
     /// independent ring, the cheapest.
     pub(super) fn rings(&self, ways: &Ways) -> Vec<[usize; 2]> {
         let pairs = self.beside.iter().enumerate().flat_map(|(a, beside)| {
-            beside.iter().filter(move |(b, class)| a < *b && *class != 0).map(move |(b, class)| (a, *b, *class))
+            beside
+                .iter()
+                .filter(move |(b, class)| a < *b && *class != 0)
+                .map(move |(b, class)| (a, *b, *class))
         });
         let mut pairs: Vec<(f64, usize, usize, Class)> =
             pairs.map(|(a, b, class)| (ways.cost(a) + ways.cost(b), a, b, class)).collect();
@@ -152,7 +155,6 @@ impl Classes {
             let found = self.beside[a].binary_search_by_key(&b, |(other, _)| *other).ok()?;
             Some(self.beside[a][found].1)
         };
-        step(a, b)
-            .or_else(|| self.beside[a].iter().find_map(|&(over, first)| Some(first ^ step(over, b)?)))
+        step(a, b).or_else(|| self.beside[a].iter().find_map(|&(over, first)| Some(first ^ step(over, b)?)))
     }
 }

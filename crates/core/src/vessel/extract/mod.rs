@@ -18,10 +18,10 @@ mod ring_tests;
 mod tests;
 mod ways;
 
+use self::arms::{Arms, Rings};
 pub(super) use self::growing::Growing;
 pub(super) use self::handles::handles;
 pub(super) use self::lumen::Sphere;
-use self::arms::{Arms, Rings};
 use self::lumen::{Lumen, Spheres};
 use self::ways::{Beside, Ways};
 use super::{CentrelineTree, Target, Wall};

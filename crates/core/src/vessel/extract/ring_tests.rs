@@ -5,9 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::classes::Classes;
 use super::ways::{Beside, Ways};
 use super::*;
-use crate::vessel::{
-    CentrelineLink, CentrelineNode, CentrelinePath, GeneratedWall, Resolution, SurfaceMesh,
-};
+use crate::vessel::{CentrelineLink, CentrelineNode, CentrelinePath, GeneratedWall, Resolution, SurfaceMesh};
 
 /// Points of a centre line as they are added.
 #[derive(Default)]
@@ -203,11 +201,10 @@ fn dissected() -> SurfaceMesh {
     for j in 0..down as u32 {
         for i in 0..across as u32 {
             let at = |i: u32, j: u32| first + j * (across as u32 + 1) + i;
-            triangles.extend([[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [
-                at(i, j),
-                at(i + 1, j + 1),
-                at(i, j + 1),
-            ]]);
+            triangles.extend([
+                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+            ]);
         }
     }
     SurfaceMesh { vertices_mm, triangles }

@@ -181,7 +181,9 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
             last = rows[rows.len() - 1];
         }
         let end = match tree.joined_by(last) {
-            _ if !children[last].is_empty() || tree.closed_ends().binary_search(&last).is_ok() => Ending::Round,
+            _ if !children[last].is_empty() || tree.closed_ends().binary_search(&last).is_ok() => {
+                Ending::Round
+            }
             // Another branch ends where this one does.
             None if tree.links().iter().any(|link| link.joins == last) => Ending::Round,
             // It ends round within the branch that it joins, as it begins within the one that it leaves.
