@@ -110,16 +110,28 @@ struct Adding<'a> {
 }
 
 impl Adding<'_> {
-    /// Adds the arm between the ends of two ways from the root; its first row, and the link at its end.
+    /// Adds the arm between the ends of two ways from the root; its first row, and the link at its end. The tree stays
+    /// as it is if there is none.
     fn add(&mut self, from: &[usize], to: &[usize]) -> Option<(usize, CentrelineLink)> {
+        let before = self.tree.nodes.len();
+        let added = self.added(from, to);
+        if added.is_none() {
+            self.tree.forget_after(before);
+            self.rows.truncate(before);
+        }
+        added
+    }
+
+    fn added(&mut self, from: &[usize], to: &[usize]) -> Option<(usize, CentrelineLink)> {
         self.know_rows();
         // A ring on a branch that the tree does not have: first the branch.
         let shared = from.iter().zip(to).take_while(|(a, b)| a == b).count();
         let (entry, left) = self.leaves(&from[..shared]);
+        let mut stem_end = None;
         if left < shared {
             let stem = self.of(&from[left..shared]);
             let stem = line::centred(self.lumen, &line::divided(&stem), [false; 2]);
-            self.tree.join(Some(entry), &stem);
+            stem_end = self.tree.join(Some(entry), &stem);
             self.know_rows();
         }
         let ((mut start, a), (mut end, b)) = (self.leaves(from), self.leaves(to));
@@ -143,10 +155,13 @@ impl Adding<'_> {
         let backwards: Vec<Sphere> = arm.iter().rev().copied().collect();
         start = self.tree.joint(self.lumen, line::behind(&arm)?, arm.first()?).unwrap_or(start);
         end = self.tree.joint(self.lumen, line::behind(&backwards)?, arm.last()?).unwrap_or(end);
+        if let Some(fork) = stem_end {
+            // The stem ends where the ways part: nothing of it may be left over as an end.
+            (start, end) = (fork, fork);
+        }
         let row = self.tree.join(Some(start), &arm).filter(|row| *row >= first)?;
         // A point that begins and ends at the same row is no arm.
         if self.tree.nodes[row].parent == Some(end) {
-            self.tree.forget_after(first);
             return None;
         }
         Some((first, CentrelineLink { row, joins: end }))
