@@ -63,16 +63,13 @@ impl Way {
         let path = tree.path_to_place(place_mm)?;
         let (row, end_mm) = tree.nearest(place_mm);
         let (nodes, children) = (tree.nodes(), tree.children());
-        let mut right = vec![false; nodes.len()];
-        let (mut at, mut first_fork) = (Some(row), None);
-        while let Some(of) = at {
-            right[of] = true;
-            let is_reached = of != row || end_mm == nodes[row].position_mm;
-            if children[of].len() > 1 && is_reached {
-                first_fork = Some(of);
-            }
-            at = nodes[of].parent;
-        }
+        // In a ring either arm leads there.
+        let mut right = tree.on_ways_to(row);
+        let is_fork = |of: &usize| {
+            let is_reached = *of != row || end_mm == nodes[row].position_mm;
+            children[*of].len() > 1 && is_reached
+        };
+        let first_fork = tree.rows_to(row)?.into_iter().find(is_fork);
         let mut beyond = children[row].clone();
         while let Some(of) = beyond.pop() {
             right[of] = true;

@@ -8,9 +8,9 @@ use std::sync::OnceLock;
 use endowire_core::input::nearest;
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
-    CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, LabelOptions,
-    LabelSurface, Lumen, NoStore, Opening, Repair, RepairOptions, Resolution, SurfaceFrame, SurfaceMesh,
-    SweptVessel, Target, Wall, anatomy, check_with, wall_hints,
+    CentrelineEnd, CentrelineLink, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline,
+    LabelOptions, LabelSurface, Lumen, NoStore, Opening, Repair, RepairOptions, Resolution, SurfaceFrame,
+    SurfaceMesh, SweptVessel, Target, Wall, anatomy, check_with, wall_hints,
 };
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
@@ -85,22 +85,25 @@ fn as_argument(error: Error) -> Error {
     }
 }
 
-/// The lumen of a vessel, its centre line, its inlet, and names with their rows.
-type Pickled<'py> =
-    (PickledLumen<'py>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>);
+/// Closing links of a centre line: pairs of rows.
+type Links = Vec<(usize, usize)>;
 
-/// The bytes of a wall; or a tree, its closed rows, and the resolution of its mesh.
+/// The lumen of a vessel, its centre line with its links, its inlet, and names with their rows.
+type Pickled<'py> =
+    (PickledLumen<'py>, Option<(Bound<'py, PyArray2<f64>>, Links)>, Option<usize>, Vec<(String, usize)>);
+
+/// The bytes of a wall; or a tree, its closed rows, the resolution of its mesh, and its links.
 #[derive(IntoPyObject)]
 enum PickledLumen<'py> {
     Wall(Bound<'py, PyBytes>),
-    Tree(Bound<'py, PyArray2<f64>>, Vec<usize>, Option<f64>, Option<usize>),
+    Tree(Bound<'py, PyArray2<f64>>, Vec<usize>, Option<f64>, Option<usize>, Links),
 }
 
 /// The same when read.
 #[derive(FromPyObject)]
 enum UnpickledLumen<'py> {
     Wall(Vec<u8>),
-    Tree(Numbers<'py>, Vec<usize>, Option<f64>, Option<usize>),
+    Tree(Numbers<'py>, Vec<usize>, Option<f64>, Option<usize>, Links),
 }
 
 /// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
@@ -329,11 +332,19 @@ impl Vessel {
     }
 
     /// The way along its centre line from the root to the target of this name, or to the point nearest to a place in
-    /// mm: shape (n, 4), x, y, z and radius in mm, as used by `Controller.follow_path` and `search_ahead`.
+    /// mm: shape (n, 4), x, y, z and radius in mm, as used by `Controller.follow_path` and `search_ahead`. Where
+    /// branches meet again it is the shortest; `via` is the name of a target or a place that it passes instead, such as
+    /// "arm 1" in a ring whose shorter arm it would take.
     ///
-    /// Raises InputError for an unknown name, for the root itself, and as `centreline`.
-    fn path<'py>(&self, py: Python<'py>, to: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let way = self.way(py, to)?;
+    /// Raises InputError for an unknown name, for the root itself, for `via` on no such way, and as `centreline`.
+    #[pyo3(signature = (to, via = None))]
+    fn path<'py>(
+        &self,
+        py: Python<'py>,
+        to: &Bound<'py, PyAny>,
+        via: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let way = self.way(py, to, via)?;
         let numbers: Vec<f64> =
             way.points().iter().flat_map(|(p, radius_mm)| [p.x, p.y, p.z, *radius_mm]).collect();
         array(py, numbers, [way.points().len(), 4])
@@ -372,8 +383,17 @@ impl Vessel {
         Ok(Self::of_line(self.lumen.clone(), Some(Line { tree: found.tree, inlet })))
     }
 
+    /// Closing links of its centre line, where branches meet again: pairs of a row of `centreline`, the last point of an
+    /// arm, and the row that it joins. Empty for a vessel without rings.
+    ///
+    /// Raises InputError as `centreline`.
+    #[getter]
+    fn links(&self, py: Python<'_>) -> PyResult<Links> {
+        Ok(links(&self.line(py)?.tree))
+    }
+
     /// Segments of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`),
-    /// length_mm and least_radius_mm.
+    /// length_mm, least_radius_mm and, of an arm that joins another branch, joins.
     ///
     /// Raises InputError as `centreline`.
     #[getter]
@@ -388,18 +408,19 @@ impl Vessel {
     /// cut_radius_mm (of the least bent path within the clearance), bears_radius_mm (that the instrument takes
     /// without force: bending that costs at most `force_n`); radii of straight stretches are None.
     ///
-    /// The way is that of `path`: `to` is the name of a target, or a place in mm.
+    /// The way is that of `path`: `to` and `via` are names of targets, or places in mm.
     ///
     /// Raises InputError as `path`, and for a force that is not positive.
-    #[pyo3(signature = (instrument, to, force_n = 0.1))]
+    #[pyo3(signature = (instrument, to, force_n = 0.1, via = None))]
     fn passable<'py>(
         &self,
         py: Python<'py>,
         instrument: &Instrument,
         to: &Bound<'py, PyAny>,
         force_n: f64,
+        via: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let way = self.way(py, to)?;
+        let way = self.way(py, to, via)?;
         let found = py.detach(|| passable(&way, &instrument.device, force_n)).map_err(exception)?;
         document::write(py, &found)
     }
@@ -447,13 +468,14 @@ impl Vessel {
                     Resolution::Triangles(count) => (None, Some(count)),
                 };
                 let tree = swept.tree();
-                PickledLumen::Tree(table(py, tree)?, tree.closed_ends().to_vec(), edge_mm, triangles)
+                let closed = tree.closed_ends().to_vec();
+                PickledLumen::Tree(table(py, tree)?, closed, edge_mm, triangles, links(tree))
             }
         };
         let given = vessel.given.as_ref();
         let targets = given.iter().flat_map(|line| line.tree.targets());
         let targets = targets.map(|target| (target.name.clone(), target.row)).collect();
-        let rows = given.map(|line| table(py, &line.tree)).transpose()?;
+        let rows = given.map(|line| PyResult::Ok((table(py, &line.tree)?, links(&line.tree)))).transpose()?;
         let parts = (lumen, rows, vessel.inlet(), targets);
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
@@ -461,7 +483,7 @@ impl Vessel {
     #[staticmethod]
     fn _unpickled(
         lumen: UnpickledLumen<'_>,
-        centreline: Option<Numbers<'_>>,
+        centreline: Option<(Numbers<'_>, Links)>,
         inlet: Option<usize>,
         targets: List<(String, usize)>,
     ) -> PyResult<Self> {
@@ -469,8 +491,9 @@ impl Vessel {
             UnpickledLumen::Wall(wall) => postcard::from_bytes::<Wall>(&wall)
                 .map(Lumen::from)
                 .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?,
-            UnpickledLumen::Tree(table, closed, edge_mm, triangles) => {
+            UnpickledLumen::Tree(table, closed, edge_mm, triangles, links) => {
                 let tree = Tree::Table(table).tree()?.with_closed_ends(closed).map_err(exception)?;
+                let tree = tree.with_links(linked(links)).map_err(exception)?;
                 let resolution = match (edge_mm, triangles) {
                     (Some(edge_mm), _) => Resolution::EdgeMm(edge_mm),
                     (None, count) => Resolution::Triangles(count.unwrap_or_default()),
@@ -479,7 +502,8 @@ impl Vessel {
             }
         };
         let targets: Vec<Target> = targets.0.into_iter().map(|(name, row)| Target { name, row }).collect();
-        let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
+        let read = |(table, links)| Tree::Table(table).tree()?.with_links(linked(links)).map_err(exception);
+        let tree = centreline.map(read).transpose()?;
         let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?;
         let line = tree.map(|tree| Line { tree, inlet });
         Ok(Self { begins: inlet.unwrap_or(0), ..Self::of_line(lumen, line) })
@@ -553,8 +577,22 @@ impl Vessel {
     }
 
     /// The way along its centre line.
-    fn way(&self, py: Python<'_>, to: &Bound<'_, PyAny>) -> PyResult<CentrelinePath> {
+    fn way(
+        &self,
+        py: Python<'_>,
+        to: &Bound<'_, PyAny>,
+        via: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<CentrelinePath> {
         let tree = self.tree(py)?;
+        if let Some(via) = via {
+            let place = |key: &str, goal: &Bound<'_, PyAny>| match Goal::of(key, goal)? {
+                Goal::Name(name) => {
+                    PyResult::Ok(tree.nodes()[tree.target(&name).map_err(exception)?.row].position_mm)
+                }
+                Goal::Place(place) => Ok(place.into()),
+            };
+            return tree.path_via(&place("via", via)?, &place("to", to)?).map_err(exception);
+        }
         let way = match Goal::of("to", to)? {
             Goal::Name(name) => tree.path_to(tree.target(&name).map_err(exception)?.row),
             Goal::Place(place) => tree.path_to_place(&place.into()),
@@ -564,6 +602,16 @@ impl Vessel {
             None => Err(refuse("to", to.repr()?, "is at the root of the centre line, where the way begins")),
         }
     }
+}
+
+/// The closing links of a tree.
+fn links(tree: &CentrelineTree) -> Links {
+    tree.links().iter().map(|link| (link.row, link.joins)).collect()
+}
+
+/// The same when read.
+fn linked(links: Links) -> Vec<CentrelineLink> {
+    links.into_iter().map(|(row, joins)| CentrelineLink { row, joins }).collect()
 }
 
 /// The rows of a tree; the parent of the root is -1.

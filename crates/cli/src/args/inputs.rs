@@ -205,6 +205,9 @@ pub(crate) struct PassableArgs {
     /// Where its tip goes: the number of an opening, a place x,y,z inside in mm, or with --centreline the name of a target
     #[arg(long, value_name = "END", allow_hyphen_values = true)]
     pub(crate) to: String,
+    /// What the path passes, where vessels meet again: a target, such as "arm 1", or a place x,y,z in mm; the shortest path if absent
+    #[arg(long, value_name = "PLACE", allow_hyphen_values = true)]
+    pub(crate) via: Option<String>,
     /// Where the device enters: the number of an opening, or a place x,y,z inside in mm; if absent, the inlet that `vessel check` reports
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true, conflicts_with = "centreline")]
     pub(crate) from: Option<CentrelineEnd>,

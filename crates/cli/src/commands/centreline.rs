@@ -1,7 +1,9 @@
 //! `endowire vessel centreline`: the centre line of a surface.
 
 use endowire_core::Error;
-use endowire_core::vessel::{CentrelineBranch, CentrelineEnd, ExtractedCentreline, SurfaceMesh, Wall};
+use endowire_core::vessel::{
+    CentrelineBranch, CentrelineEnd, CentrelineLink, ExtractedCentreline, SurfaceMesh, Wall,
+};
 use serde::Serialize;
 
 use crate::args::CentrelineArgs;
@@ -17,6 +19,9 @@ struct Document {
     out: Option<String>,
     rows: usize,
     branches: Vec<CentrelineBranch>,
+    links: Vec<CentrelineLink>,
+    /// Number of rings by the handles of the surface; `None` where it does not close.
+    rings: Option<usize>,
     targets: Vec<NamedRow>,
     unreached_openings: Vec<usize>,
 }
@@ -43,6 +48,8 @@ pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
         out: args.out.as_ref().map(|out| out.display().to_string()),
         rows: found.tree.nodes().len(),
         branches: found.tree.branches(),
+        links: found.tree.links().to_vec(),
+        rings: found.rings,
         targets: targets.map(|target| NamedRow { name: target.name.clone(), row: target.row }).collect(),
         unreached_openings: found.unreached,
     };
@@ -52,8 +59,14 @@ pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
 /// Replaces the core's names `from`, `to` and target in an error by the flags of the command line.
 pub(super) fn as_flag(error: Error) -> Failure {
     Failure::from(match error {
-        Error::Parameter { name, value, remedy } if ["from", "to", "target"].contains(&name.as_str()) => {
-            let flag = if name == "from" { "--from" } else { "--to" };
+        Error::Parameter { name, value, remedy }
+            if ["from", "to", "target", "via"].contains(&name.as_str()) =>
+        {
+            let flag = match name.as_str() {
+                "from" => "--from",
+                "via" => "--via",
+                _ => "--to",
+            };
             Error::Parameter { name: flag.to_owned(), value, remedy }
         }
         other => other,
@@ -75,6 +88,28 @@ pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
     }
 }
 
+/// How many rings there are, and how many of their arms are in the centre line; nothing for a vessel without any.
+fn rings(expected: Option<usize>, found: usize) -> Option<String> {
+    let of_surface = |count: usize| match count {
+        1 => "1 ring".to_owned(),
+        count => format!("{count} rings"),
+    };
+    match expected {
+        Some(0) => None,
+        Some(count) if count == found => {
+            Some(format!("{} by the surface's handles, closed by as many links", of_surface(count)))
+        }
+        Some(count) => Some(format!(
+            "{} by the surface's handles, but only {found} of their arms are found: the others are as thin as faults of the mesh, or              need smaller triangles",
+            of_surface(count)
+        )),
+        None => Some(
+            "the surface does not close, so that its rings are not known: branches that meet again are followed by one arm"
+                .to_owned(),
+        ),
+    }
+}
+
 /// The branches as text.
 fn text(document: &Document) -> String {
     let mut lines = vec![
@@ -83,10 +118,14 @@ fn text(document: &Document) -> String {
     ];
     lines.extend(document.branches.iter().map(|branch| {
         let end = document.targets.iter().find(|target| target.row == branch.to);
-        let end = end.map_or("fork", |target| target.name.as_str());
+        let end = match branch.joins {
+            Some(row) => format!("joins {row}"),
+            None => end.map_or("fork", |target| target.name.as_str()).to_owned(),
+        };
         let (length_mm, radius_mm) = (branch.length_mm, branch.least_radius_mm);
         format!("{:>8}{:>8}{length_mm:>12.1}{radius_mm:>18.3}   {end}", branch.from, branch.to)
     }));
+    lines.extend(rings(document.rings, document.links.len()));
     if !document.unreached_openings.is_empty() {
         let numbers: Vec<String> = document.unreached_openings.iter().map(usize::to_string).collect();
         lines.push(format!(

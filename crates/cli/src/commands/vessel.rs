@@ -174,6 +174,11 @@ pub(super) fn text(document: &Document) -> String {
     }
     let inside_out = if r.inside_out { " (the surface is inside out)" } else { "" };
     let at_least = if r.self_intersections_capped { "at least " } else { "" };
+    match r.rings {
+        Some(0) => {}
+        Some(count) => lines.push(format!("  rings                {count}: vessels meet again")),
+        None => lines.push("  rings                not known: the wall does not close".to_owned()),
+    }
     lines.extend([
         format!("  stray open edges     {}", r.stray_edges),
         format!("  non-manifold edges   {}", r.non_manifold_edges),

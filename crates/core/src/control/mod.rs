@@ -7,6 +7,8 @@
 //! make the same moves, to the bit.
 
 mod follow;
+#[cfg(test)]
+mod ring_tests;
 mod search;
 mod team;
 #[cfg(test)]

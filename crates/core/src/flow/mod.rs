@@ -1,7 +1,7 @@
 //! Blood flow, and its drag on devices.
 //!
 //! The flow is steady, laminar and developed: Poiseuille flow in a tube of the local radius R, with the local share
-//! of the inflow ([`flow_nodes`]),
+//! of the inflow ([`FlowGraph`]),
 //!
 //! ```text
 //! G = 8 μ Q / π R⁴
@@ -30,11 +30,13 @@
 //! axis.
 
 mod drag;
+mod rings;
 mod tree;
 
 #[cfg(test)]
 pub(crate) use drag::drag_n_per_mm;
-pub use tree::{FlowNode, check_place, flow_nodes};
+pub use rings::Rings;
+pub use tree::{FlowGraph, FlowLink, FlowNode, check_place, flow_nodes};
 
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
@@ -123,7 +125,9 @@ impl BloodFlow {
             let remedy = "must be finite, in mm";
             return Err(Error::parameter("vessel.flow.inlet_mm", error::vector(&inlet), remedy));
         }
-        let nodes = flow_nodes(tree, inlet_mm, flow.split_exponent, ["vessel.flow", "vessel.flow.inlet_mm"])?;
+        let keys = ["vessel.flow", "vessel.flow.inlet_mm"];
+        // The last stretch of an arm, by its link, lies within the branch that it joins.
+        let nodes = FlowGraph::new(tree, inlet_mm, flow.split_exponent, keys)?.nodes;
         let mut stretches = Vec::new();
         let mut downstream = Vec::new();
         for (index, node) in nodes.iter().enumerate() {
@@ -173,11 +177,13 @@ impl BloodFlow {
         let from = &self.nodes[node.upstream?];
         let [_, part] = place.barycentric_coordinates();
         let radius_mm = node.from_radius_mm + (node.radius_mm - node.from_radius_mm) * part;
-        let direction = (node.position_mm - from.position_mm).normalize();
+        let onwards = (node.position_mm - from.position_mm).normalize();
+        // In a ring blood may flow against the order of points.
+        let direction = if node.share < 0.0 { -onwards } else { onwards };
         // Beyond an end of the centre line the tube continues straight.
         let away = x - Vec3::new(near.point.x, near.point.y, near.point.z);
         let offset_mm = (away - direction * away.dot(&direction)).norm();
-        let flow = node.share * self.inflow_mm3_per_s;
+        let flow = node.share.abs() * self.inflow_mm3_per_s;
         (away.norm() < OUTSIDE_RADII * radius_mm).then(|| FlowAt {
             direction,
             radius_mm,

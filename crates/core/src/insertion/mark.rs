@@ -26,7 +26,9 @@ pub(super) fn of(scene: &Environment) -> u64 {
                 [x, y, z, node.radius_mm.to_bits(), node.parent.map_or(u64::MAX, |row| row as u64)]
             };
             let nodes = vessel.tree().nodes().iter().flat_map(of_node);
-            mixed(known, nodes.chain(vessel.tree().closed_ends().iter().map(|row| *row as u64)))
+            let closed = vessel.tree().closed_ends().iter().map(|row| *row as u64);
+            let links = vessel.tree().links().iter().flat_map(|link| [link.row as u64, link.joins as u64]);
+            mixed(known, nodes.chain(closed).chain(links))
         }
     };
     vessel.max(1)

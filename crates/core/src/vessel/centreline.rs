@@ -4,7 +4,8 @@
 //! millimetres; `parent` is the row (counted from 0, without comments and header) of an earlier point, −1 for the
 //! root. Words after it name the point as a target; the word `closed` alone, or after a name, closes the vessel there
 //! with a dome, like the sac of an aneurysm. `#` starts a comment, and the first line that is not a comment may be a
-//! header of words. Lists of points without parents can be read too if the header names their columns
+//! header of words. The words `joins 17` there join the last point of a branch to row 17, where two branches meet again
+//! ([`super::CentrelineLink`]). Lists of points without parents can be read too if the header names their columns
 //! ([`super::point_lists`]).
 
 use std::fmt::Write;
@@ -12,8 +13,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::links::{JOINS, split_link};
 use super::point_lists::{self, Columns};
-use super::{CentrelinePath, line_files};
+use super::{CentrelineLink, line_files};
 use crate::error::nearest_name;
 use crate::file::{FileSystem, Files, foreign};
 use crate::{Error, Result, Vec3, text};
@@ -36,6 +38,9 @@ pub struct CentrelineTree {
     /// Leaves where the vessel is closed by a dome, ascending.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     closed: Vec<usize>,
+    /// Leaves that go on to other points, ascending.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) links: Vec<CentrelineLink>,
     /// Not part of the vessel's shape: the wall does not depend on names.
     #[serde(skip)]
     targets: Vec<Target>,
@@ -70,7 +75,7 @@ impl CentrelineTree {
         if nodes.len() < 2 {
             return Err(Error::parameter("centreline rows", nodes.len(), "a vessel needs at least 2 points"));
         }
-        Ok(Self { nodes, closed: Vec::new(), targets: Vec::new() })
+        Ok(Self { nodes, closed: Vec::new(), links: Vec::new(), targets: Vec::new() })
     }
 
     /// The tree with these rows named, replacing earlier names.
@@ -103,6 +108,10 @@ impl CentrelineTree {
         if let Some(row) =
             rows.iter().find(|row| **row == 0 || !children.get(**row).is_some_and(Vec::is_empty))
         {
+            let remedy = "must be the last point of a branch: elsewhere the vessel goes on";
+            return Err(Error::parameter("closed end, row", row, remedy));
+        }
+        if let Some(row) = rows.iter().find(|row| self.joined_by(**row).is_some()) {
             let remedy = "must be the last point of a branch: elsewhere the vessel goes on";
             return Err(Error::parameter("closed end, row", row, remedy));
         }
@@ -159,50 +168,19 @@ impl CentrelineTree {
     }
 
     /// The row nearest to a position, or the one behind it: the row at the end of the segment on which the nearest
-    /// point of the line is, and that point.
+    /// point of the line is, and that point; on the segment of a link, the row that joins another.
     pub fn nearest(&self, place_mm: &Vec3) -> (usize, Vec3) {
-        let on_segment = |row: usize| {
-            let (to, from) = (self.nodes[row].position_mm, self.nodes[self.nodes[row].parent?].position_mm);
+        let on_segment = |(row, to, from): (usize, Vec3, Vec3)| {
             let piece = to - from;
             let part = ((place_mm - from).dot(&piece) / piece.norm_squared()).clamp(0.0, 1.0);
             let on = if part == 1.0 { to } else { from + piece * part };
-            Some((row, on, (on - place_mm).norm()))
+            (row, on, (on - place_mm).norm())
         };
-        let each = (1..self.nodes.len()).filter_map(on_segment);
-        let nearest = each.min_by(|a, b| a.2.total_cmp(&b.2));
+        let at = |row: usize| self.nodes[row].position_mm;
+        let sides = (1..self.nodes.len()).filter_map(|row| Some((row, at(row), at(self.nodes[row].parent?))));
+        let links = self.links.iter().map(|link| (link.row, at(link.joins), at(link.row)));
+        let nearest = sides.chain(links).map(on_segment).min_by(|a, b| a.2.total_cmp(&b.2));
         nearest.map_or((0, self.nodes[0].position_mm), |(row, on, _)| (row, on))
-    }
-
-    /// The path from the root to a row; `None` if the row does not exist or is the root.
-    pub fn path_to(&self, row: usize) -> Option<CentrelinePath> {
-        CentrelinePath::new(self.points_to((row > 0).then_some(row)?)?)
-    }
-
-    /// The path from the root to the point of the line nearest to a position; `None` if that is the root.
-    pub fn path_to_place(&self, place_mm: &Vec3) -> Option<CentrelinePath> {
-        let (row, end_mm) = self.nearest(place_mm);
-        let mut points = self.points_to(row)?;
-        let (to_mm, to_radius_mm) = points.pop()?;
-        let (from_mm, from_radius_mm) = *points.last()?;
-        let [along_mm, length_mm] = [end_mm, to_mm].map(|place| (place - from_mm).norm());
-        if along_mm > COINCIDENT_MM {
-            let part = along_mm / length_mm;
-            points.push((end_mm, from_radius_mm + (to_radius_mm - from_radius_mm) * part));
-        }
-        CentrelinePath::new(points)
-    }
-
-    /// The points from the root to a row, with their radii; `None` if it does not exist.
-    fn points_to(&self, row: usize) -> Option<Vec<(Vec3, f64)>> {
-        let mut points = Vec::new();
-        let mut at = Some(row);
-        while let Some(row) = at {
-            let node = self.nodes.get(row)?;
-            points.push((node.position_mm, node.radius_mm));
-            at = node.parent;
-        }
-        points.reverse();
-        Some(points)
     }
 
     /// Reads a table.
@@ -259,6 +237,8 @@ impl CentrelineTree {
         let mut targets: Vec<Target> = Vec::new();
         // Closed rows, and their lines.
         let mut closed: Vec<(usize, usize)> = Vec::new();
+        // Links, and their lines.
+        let mut links: Vec<(CentrelineLink, usize)> = Vec::new();
         let mut may_be_header = true;
         let mut columns: Option<Columns> = None;
         for (index, line) in text.lines().enumerate() {
@@ -299,6 +279,8 @@ impl CentrelineTree {
             }
             let (row, name) = words.split_at(words.len().min(COLUMNS));
             nodes.push(parse_row(row).map_err(|reason| format!("line {}: {reason}", index + 1))?);
+            let (name, joins) = split_link(name);
+            links.extend(joins.map(|joins| (CentrelineLink { row: nodes.len() - 1, joins }, index + 1)));
             let is_closed = name.last() == Some(&CLOSED);
             closed.extend(is_closed.then(|| (nodes.len() - 1, index + 1)));
             let name = &name[..name.len() - usize::from(is_closed)];
@@ -325,7 +307,21 @@ impl CentrelineTree {
             ));
         }
         let closed = closed.into_iter().map(|(row, _)| row).collect();
-        Ok(Self { nodes, closed, targets })
+        let tree = Self { nodes, closed, links: Vec::new(), targets };
+        let line_of = |row: &str| {
+            let found = links.iter().find(|(link, _)| row == link.row.to_string());
+            found.map_or(0, |(_, line)| *line)
+        };
+        let given = links.iter().map(|(link, _)| *link).collect();
+        tree.with_links(given).map_err(|error| match error {
+            // The first of several of this value.
+            Error::Parameter { name, value, remedy } if name == "link, joins" => {
+                let of = links.iter().find(|(link, _)| value == link.joins.to_string());
+                format!("line {}: joins = {value}: {remedy}", of.map_or(0, |(_, line)| *line))
+            }
+            Error::Parameter { value, remedy, .. } => format!("line {}: joins: {remedy}", line_of(&value)),
+            other => other.to_string(),
+        })
     }
 
     /// Writes the table below `comment`. Reading it back gives the same bits.
@@ -340,13 +336,15 @@ impl CentrelineTree {
     pub fn table(&self, comment: &str) -> String {
         let mut out: String = comment.lines().map(|line| format!("# {line}\n")).collect();
         out.push_str("x,y,z,radius,parent");
-        let is_plain = self.targets.is_empty() && self.closed.is_empty();
+        let is_plain = self.targets.is_empty() && self.closed.is_empty() && self.links.is_empty();
         out.push_str(if is_plain { "\n" } else { ",target\n" });
         for (row, node) in self.nodes.iter().enumerate() {
             let (p, parent) = (node.position_mm, node.parent.map_or(-1, |row| row as i64));
             let name = self.targets.iter().find(|target| target.row == row);
             let closed = self.closed.binary_search(&row).is_ok().then_some(CLOSED);
-            let words = name.map(|target| target.name.as_str()).into_iter().chain(closed).collect::<Vec<_>>();
+            let joined = self.joined_by(row).map(|row| format!("{JOINS} {row}"));
+            let words = name.map(|target| target.name.as_str()).into_iter().chain(closed);
+            let words = words.chain(joined.as_deref()).collect::<Vec<_>>();
             let name = if words.is_empty() { String::new() } else { format!(",{}", words.join(" ")) };
             // Writing to a string cannot fail.
             let _ = writeln!(out, "{},{},{},{},{parent}{name}", p.x, p.y, p.z, node.radius_mm);
@@ -385,6 +383,9 @@ fn check_name(name: &str, others: &[Target]) -> std::result::Result<(), String> 
     if name.split(' ').next_back() == Some(CLOSED) {
         return Err("ends in the word that closes a vessel in a table: call it otherwise".into());
     }
+    if split_link(&name.split(' ').collect::<Vec<_>>()).1.is_some() {
+        return Err("ends in the words that join a row to another in a table: call it otherwise".into());
+    }
     if name.split(' ').all(|word| word.parse::<f64>().is_ok()) {
         return Err("is a number: a row is x y z radius parent, and a name if the point has one".into());
     }
@@ -422,12 +423,12 @@ const SIZE_LIMIT: u64 = 64 << 20;
 /// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
 const LARGEST_MM: f64 = 1e6;
 /// Distance up to which two points are the same, mm.
-const COINCIDENT_MM: f64 = 1e-9;
+pub(super) const COINCIDENT_MM: f64 = 1e-9;
 /// Longest distance from a point to its parent, mm, the length of a body; and in radii of the wider of the two, since
 /// no vessel is straight for longer. Otherwise a single wrong number would create a vessel that takes minutes, or
 /// that intersects itself.
 const LONGEST_SEGMENT_MM: f64 = 2000.0;
-const LONGEST_SEGMENT_RADII: f64 = 250.0;
+pub(super) const LONGEST_SEGMENT_RADII: f64 = 250.0;
 
 /// Smallest radius, mm: its powers, as used for flow, stay finite, and no vessel is thinner than a molecule.
 const LEAST_RADIUS_MM: f64 = 1e-6;

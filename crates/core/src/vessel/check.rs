@@ -1,6 +1,7 @@
 //! Properties and faults of a surface as given.
 
 use super::crossings::crossings;
+use super::extract::handles;
 use super::hints::{opening_hints, unit_hint};
 use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
@@ -59,6 +60,9 @@ pub struct CheckReport {
     /// Closed pieces of the repaired wall beside a vessel with openings, among its eight largest: nothing can get into them, as
     /// into a sac that is not joined to its artery.
     pub separate_pieces: usize,
+    /// Rings of the repaired wall, in which vessels meet again: its handles, with each opening closed. Absent where it does not
+    /// close.
+    pub rings: Option<usize>,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
     /// Triangles wound against their neighbours or inwards.
@@ -231,6 +235,7 @@ pub fn check_repaired(
         facing_openings: opening::facing(wall.openings()),
         nested_pieces,
         separate_pieces,
+        rings: handles(&wall, &[]),
         non_manifold_edges,
         flipped_triangles: report.triangles_flipped,
         inside_out: report.inside_out,

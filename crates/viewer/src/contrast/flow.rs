@@ -1,12 +1,12 @@
 //! The vessel tree that transports contrast medium, directed from its inlet.
 //!
-//! Blood enters the centre-line tree at its inlet and divides at bifurcations ([`flow_nodes`]). The inflow is
-//! pulsatile: a fraction of it, the pulsatility, in systole, the rest steadily.
+//! Blood enters the centre-line tree at its inlet, divides at bifurcations, and where branches meet again takes both arms
+//! ([`FlowGraph`]). The inflow is pulsatile: a fraction of it, the pulsatility, in systole, the rest steadily.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use endowire_core::flow::{FlowNode, flow_nodes};
+use endowire_core::flow::{FlowGraph, FlowNode, Rings};
 use endowire_core::vessel::{CentrelineTree, SurfaceMesh};
 use endowire_core::{Error, Result, Vec3};
 
@@ -32,7 +32,7 @@ pub(super) struct Node {
     pub(super) radius_mm: f64,
     /// The point before it, towards the inlet.
     pub(super) upstream: Option<usize>,
-    /// Local share of the inflow.
+    /// Local share of the inflow; negative where blood flows towards the point before.
     pub(super) share: f64,
     /// Volume of lumen of this point, mm³.
     pub(super) volume_mm3: f64,
@@ -42,10 +42,30 @@ pub(super) struct Node {
     pub(super) is_end: bool,
 }
 
+/// A face between the last cell of an arm and the cell that it joins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Link {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    /// Share of the inflow through it; negative from the joined cell into the arm.
+    pub(super) share: f64,
+}
+
+/// The points of a vessel, and how arms of rings join them.
+#[derive(Debug, Clone)]
+pub(super) struct Network {
+    pub(super) nodes: Vec<Node>,
+    pub(super) links: Vec<Link>,
+    /// Faces of cells, then of links.
+    rings: Rings,
+}
+
 /// The tree directed from its inlet, with its injections.
 #[derive(Debug)]
 pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
+    pub(super) links: Vec<Link>,
+    rings: Rings,
     /// Mixing of blood in the lumen.
     pub(super) mixing: Arc<Mixing>,
     largest: OnceLock<Vec<f32>>,
@@ -112,18 +132,21 @@ impl Flow {
         spec: &FlowSpec,
         injections: &[InjectionSpec],
     ) -> Result<Self> {
-        let mut nodes = directed(tree, spec)?;
-        let mut mixing = Mixing::new(&nodes);
-        let volumes = volumes_mm3(&mut mixing, nodes.len(), filled);
-        for (node, volume) in nodes.iter_mut().zip(volumes) {
+        let mut network = directed(tree, spec)?;
+        let mut mixing = Mixing::new(&network.nodes, &network.links);
+        let volumes = volumes_mm3(&mut mixing, network.nodes.len(), filled);
+        for (node, volume) in network.nodes.iter_mut().zip(volumes) {
             node.volume_mm3 = volume.max(LEAST_PART * node.volume_mm3);
         }
-        Ok(Self::of_nodes(nodes, mixing, spec, injections))
+        Ok(Self::of_network(network, mixing, spec, injections))
     }
 
-    fn of_nodes(nodes: Vec<Node>, mixing: Mixing, spec: &FlowSpec, injections: &[InjectionSpec]) -> Self {
+    fn of_network(network: Network, mixing: Mixing, spec: &FlowSpec, injections: &[InjectionSpec]) -> Self {
+        let Network { nodes, links, rings } = network;
         Self {
             nodes,
+            links,
+            rings,
             mixing: Arc::new(mixing),
             largest: OnceLock::new(),
             carried: OnceLock::new(),
@@ -144,9 +167,9 @@ impl Flow {
         spec: &FlowSpec,
         injections: &[InjectionSpec],
     ) -> Result<Self> {
-        let nodes = directed(tree, spec)?;
-        let mixing = Mixing::new(&nodes);
-        Ok(Self::of_nodes(nodes, mixing, spec, injections))
+        let network = directed(tree, spec)?;
+        let mixing = Mixing::new(&network.nodes, &network.links);
+        Ok(Self::of_network(network, mixing, spec, injections))
     }
 
     /// The point nearest to a position.
@@ -160,6 +183,8 @@ impl Flow {
     pub(crate) fn injected(&self, injections: &[InjectionSpec]) -> Self {
         Self {
             nodes: self.nodes.clone(),
+            links: self.links.clone(),
+            rings: self.rings.clone(),
             mixing: Arc::clone(&self.mixing),
             largest: OnceLock::new(),
             carried: OnceLock::new(),
@@ -220,6 +245,11 @@ impl Flow {
         1.0 - self.pulsatility + self.pulsatility * 2.0 / SYSTOLE
     }
 
+    /// Divides flows through the faces of cells and links among the arms of rings, mm³/s.
+    pub(super) fn settle(&self, faces_mm3_per_s: &mut [f64]) {
+        self.rings.settle(faces_mm3_per_s);
+    }
+
     /// Volume exchanged by diffusion across the face upstream of a cell at a flow through it, mm³/s: the wanted
     /// spreading of a bolus, minus the numerical one of cells of this length.
     pub(super) fn exchange_mm3_per_s(&self, cell: usize, flow_mm3_per_s: f64) -> f64 {
@@ -249,24 +279,28 @@ pub(crate) fn read_tree(path: &Path) -> Result<CentrelineTree> {
 
 /// The tree's points with intermediate ones, and the volumes of cones from the point before. A branch starts where it
 /// leaves its trunk: before that its blood is the trunk's.
-fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
-    let found = flow_nodes(
+fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Network> {
+    let graph = FlowGraph::new(
         tree,
         spec.inlet_mm.map(Vec3::from),
         spec.split_exponent,
         ["view.flow.tree", "view.flow.inlet_mm"],
     )?;
+    let found = &graph.nodes;
     let mut goes_on = vec![false; found.len()];
+    graph.links.iter().for_each(|link| goes_on[link.from] = true);
     found.iter().filter_map(|node| node.upstream).for_each(|up| goes_on[up] = true);
     let mut nodes: Vec<Node> = Vec::with_capacity(found.len());
     // New index of each.
     let mut becomes: Vec<usize> = Vec::with_capacity(found.len());
+    let mut resistances: Vec<f64> = Vec::with_capacity(found.len());
     for (node, goes_on) in found.iter().zip(goes_on) {
         let upstream = node.upstream.map(|up| becomes[up]);
         match upstream {
             Some(trunk) if node.within_trunk && goes_on => becomes.push(trunk),
             _ => {
                 becomes.push(nodes.len());
+                resistances.push(node.resistance_per_mm3());
                 nodes.push(Node { upstream, is_end: !goes_on, ..Node::from(node) });
             }
         }
@@ -275,7 +309,14 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     if let Some(first) = nodes.get(1).map(|node| node.volume_mm3) {
         nodes[0].volume_mm3 = first;
     }
-    Ok(nodes)
+    let links: Vec<Link> = (graph.links.iter())
+        .map(|link| Link { from: becomes[link.from], to: becomes[link.to], share: link.share })
+        .collect();
+    resistances.extend(graph.links.iter().map(|link| link.resistance_per_mm3));
+    let upstream: Vec<Option<usize>> = nodes.iter().map(|node| node.upstream).collect();
+    let pairs: Vec<[usize; 2]> = links.iter().map(|link| [link.from, link.to]).collect();
+    let rings = Rings::new(&upstream, &pairs, resistances);
+    Ok(Network { nodes, links, rings })
 }
 
 impl From<&FlowNode> for Node {

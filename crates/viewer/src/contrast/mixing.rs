@@ -9,7 +9,7 @@
 use endowire_core::Vec3;
 use rustc_hash::FxHashMap;
 
-use super::flow::Node;
+use super::flow::{Link, Node};
 use crate::tails::{fade_mm, left};
 
 /// Difference of p over which shares decrease to zero, mm: medium released at a position is mixed with the blood of a
@@ -60,13 +60,12 @@ impl Point {
 }
 
 impl Mixing {
-    pub(super) fn new(nodes: &[Node]) -> Self {
+    pub(super) fn new(nodes: &[Node], links: &[Link]) -> Self {
         let mut neighbours: Vec<Vec<usize>> = vec![vec![]; nodes.len()];
-        for (i, node) in nodes.iter().enumerate() {
-            if let Some(up) = node.upstream {
-                neighbours[i].push(up);
-                neighbours[up].push(i);
-            }
+        let sides = nodes.iter().enumerate().filter_map(|(i, node)| Some((i, node.upstream?)));
+        for (i, other) in sides.chain(links.iter().map(|link| (link.from, link.to))) {
+            neighbours[i].push(other);
+            neighbours[other].push(i);
         }
         let point = |i: usize| {
             let outward = match neighbours[i][..] {
@@ -150,7 +149,8 @@ fn about(nodes: &[Node], neighbours: &[Vec<usize>], from: usize) -> Vec<u32> {
     while let Some((at, before, way_mm)) = open.pop() {
         for &next in neighbours[at].iter().filter(|&&next| next != before) {
             let way_mm = way_mm + (nodes[next].position_mm - nodes[at].position_mm).norm();
-            if way_mm <= reach(next) {
+            // By the two arms of a small ring a point may be reached twice.
+            if way_mm <= reach(next) && !found.contains(&(next as u32)) {
                 found.push(next as u32);
                 open.push((next, at, way_mm));
             }

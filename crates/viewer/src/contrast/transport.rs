@@ -9,6 +9,9 @@
 //! F = s (Q + Σ q) − Σ q over injections at or below the face
 //! ```
 //!
+//! Where branches meet again, a link is one more face, and the flows so found are divided among the arms of the ring by
+//! their resistances.
+//!
 //! F < 0 is reflux: medium injected faster than blood arrives flows upstream to where a branch carries it away. Every
 //! cell is mixed, faces carry the fraction of the upstream cell, so the medium is conserved to rounding. That spreads
 //! fronts like a dispersion of v Δx/2; the excess of the wanted one, k² v²/2, is added as diffusion.
@@ -44,7 +47,7 @@ pub(super) struct Transport {
     tissue_mm3: Vec<f64>,
     /// Total medium that has left through the ends and tissues, mm³.
     left_mm3: f64,
-    /// Flows through the faces upstream of cells, mm³/s.
+    /// Flows through the faces upstream of cells, and then through those of links, mm³/s.
     faces: Vec<f64>,
     /// The cells of each injection, with their parts of it.
     places: Vec<Vec<(usize, f64)>>,
@@ -66,7 +69,7 @@ impl Transport {
             before: vec![0.0; cells],
             tissue_mm3: vec![0.0; cells],
             left_mm3: 0.0,
-            faces: vec![0.0; cells],
+            faces: vec![0.0; cells + flow.links.len()],
             places: flow.injections.iter().map(|i| parts(flow, i.at_mm.map(Vec3::from))).collect(),
             marks: vec![],
             apart: 1,
@@ -200,8 +203,10 @@ impl Transport {
             }
         }
         let all = blood + rates.iter().sum::<f64>();
-        for (face, node) in self.faces.iter_mut().zip(&flow.nodes) {
-            *face = node.share * all;
+        let shares = flow.nodes.iter().map(|node| node.share);
+        let shares = shares.chain(flow.links.iter().map(|link| link.share));
+        for (face, share) in self.faces.iter_mut().zip(shares) {
+            *face = share * all;
         }
         let places = self.places.iter().zip(&rates).filter(|(_, rate)| **rate > 0.0);
         let injected = || {
@@ -216,6 +221,7 @@ impl Transport {
                 cell = flow.nodes[at].upstream;
             }
         }
+        flow.settle(&mut self.faces);
         std::mem::swap(&mut self.before, &mut self.fractions);
         let before = &self.before;
         // Change of the medium in each cell, mm³.
@@ -237,6 +243,11 @@ impl Transport {
                 self.tissue_mm3[i] -= washed;
                 self.left_mm3 += washed;
             }
+        }
+        for (link, &face) in flow.links.iter().zip(&self.faces[flow.nodes.len()..]) {
+            let moved = face * before[if face > 0.0 { link.from } else { link.to }] * self.step_s;
+            change[link.to] += moved;
+            change[link.from] -= moved;
         }
         injected().for_each(|(cell, rate)| change[cell] += rate * self.step_s);
         for (((now, before), change), node) in
@@ -264,9 +275,17 @@ fn parts(flow: &Flow, point_mm: Option<Vec3>) -> Vec<(usize, f64)> {
 fn step_s(flow: &Flow) -> f64 {
     let most: f64 = flow.injections.iter().map(|i| 1000.0 * i.rate_ml_per_s).sum();
     let all = flow.mean_inflow_mm3_per_s * flow.highest_pulse() + most;
-    let mut given: Vec<f64> = flow.nodes.iter().map(|node| node.share * all + most).collect();
+    let mut given: Vec<f64> = flow.nodes.iter().map(|node| node.share.abs() * all + most).collect();
+    // In a ring blood also comes in by links, and from points behind.
+    for link in &flow.links {
+        given[link.to] += link.share.abs() * all + most;
+        given[link.from] += link.share.abs() * all + most;
+    }
+    for node in flow.nodes.iter().filter(|node| node.share < 0.0) {
+        node.upstream.into_iter().for_each(|up| given[up] -= node.share * all);
+    }
     for (i, node) in flow.nodes.iter().enumerate() {
-        let exchanged = flow.exchange_mm3_per_s(i, node.share * all + most);
+        let exchanged = flow.exchange_mm3_per_s(i, node.share.abs() * all + most);
         given[i] += exchanged;
         if let Some(up) = node.upstream {
             given[up] += exchanged;
@@ -313,6 +332,58 @@ mod tests {
             pulsatility: 0.0,
             tissue_s: 2.0,
             ..FlowSpec::default()
+        }
+    }
+
+    /// An inlet and an outlet of 50 mm and radius 4, and a ring of arms of radius 3 between them, of 60 and 120 mm.
+    fn ring(injection: InjectionSpec) -> Flow {
+        let places = [
+            ([0.0, 0.0], 4.0, None),
+            ([50.0, 0.0], 4.0, Some(0)),
+            ([52.0, 0.0], 3.0, Some(1)),
+            ([108.0, 0.0], 3.0, Some(2)),
+            ([110.0, 0.0], 4.0, Some(3)),
+            ([160.0, 0.0], 4.0, Some(4)),
+            ([50.0, 30.0], 3.0, Some(1)),
+            ([110.0, 30.0], 3.0, Some(6)),
+        ];
+        let node = |&([x, y], radius_mm, parent): &([f64; 2], f64, Option<usize>)| CentrelineNode {
+            position_mm: Vec3::new(x, y, 0.0),
+            radius_mm,
+            parent,
+        };
+        let tree = CentrelineTree::new(places.iter().map(node).collect()).unwrap();
+        let links = vec![endowire_core::vessel::CentrelineLink { row: 7, joins: 4 }];
+        let spec = FlowSpec { inlet_mm: Some([0.0; 3]), dispersion: 0.0, ..steady() };
+        Flow::in_cones(&tree.with_links(links).unwrap(), &spec, &[injection]).unwrap()
+    }
+
+    #[test]
+    fn medium_takes_both_arms_of_a_ring_and_is_kept() {
+        let injection =
+            |at_mm| InjectionSpec { start_s: 0.5, duration_s: 0.5, rate_ml_per_s: 4.0, at_mm, at_tip: false };
+        for at_mm in [None, Some([80.0, 30.0, 0.0])] {
+            let flow = ring(injection(at_mm));
+            let mut transport = Transport::new(&flow);
+            let mut most = [0.0_f32; 3];
+            for time in (1..400).map(|k| 0.02 * f64::from(k)) {
+                transport.advance(&flow, time, &nowhere());
+                let now = transport.at(time);
+                let at = |x: f64, y: f64| now[flow.nearest(&Vec3::new(x, y, 0.0))];
+                let here = [at(80.0, 0.0), at(95.0, 30.0), at(140.0, 0.0)];
+                most.iter_mut().zip(here).for_each(|(most, here)| *most = most.max(here));
+                let until = transport.steps as f64 * transport.step_s;
+                let injected = 4000.0 * (until - 0.5).clamp(0.0, 0.5);
+                let found = transport.inside_mm3(&flow)
+                    + transport.tissue_mm3.iter().sum::<f64>()
+                    + transport.left_mm3;
+                assert!((found - injected).abs() < 1e-9 * injected.max(1.0), "{time}: {found} {injected}");
+                assert!(transport.fractions.iter().all(|f| (-1e-12..=1.0 + 1e-9).contains(f)));
+            }
+            // From the inlet by both arms; into the long arm alone, not by the short one.
+            let expected = [if at_mm.is_none() { 0.15 } else { -1.0 }, 0.15, 0.1];
+            assert!(most.iter().zip(expected).all(|(most, least)| *most > least), "{most:?}");
+            assert!(at_mm.is_none() || most[0] < 1e-6, "{most:?}");
         }
     }
 

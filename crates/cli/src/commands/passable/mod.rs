@@ -10,6 +10,7 @@ use endowire_core::passable::{Passable, Passage, WayPoint, passable};
 use endowire_core::vessel::{
     CentrelineEnd, CentrelinePath, CentrelineTree, ExtractedCentreline, SurfaceMesh, Wall,
 };
+use endowire_core::{Error, Vec3};
 use serde::Serialize;
 
 use super::centreline::{as_flag, parse_end};
@@ -45,7 +46,7 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
     let (way, wall) = match &args.centreline {
         // Without a picture the surface is not needed, so it is not repaired.
         Some(table) => {
-            let way = way_in_table(&CentrelineTree::read(table)?, &args.to)?;
+            let way = way_in_table(&CentrelineTree::read(table)?, args)?;
             (way, args.picture.as_ref().map(|_| wall()).transpose()?)
         }
         None => {
@@ -80,8 +81,29 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
     answer(&document, args.json, || text(&document))
 }
 
+/// The place of a target by name, or a place itself; `flag` gave it.
+fn place(tree: &CentrelineTree, flag: &str, name: &str) -> Result<Vec3, Failure> {
+    let of_flag = |error| match error {
+        Error::Parameter { value, remedy, .. } => Error::Parameter { name: flag.to_owned(), value, remedy },
+        other => other,
+    };
+    match parse_end(name) {
+        Ok(CentrelineEnd::Place(place_mm)) => Ok(place_mm),
+        _ => Ok(tree.nodes()[tree.target(name).map_err(of_flag)?.row].position_mm),
+    }
+}
+
+/// The way over a place to another.
+fn way_via(tree: &CentrelineTree, via: &str, to_mm: &Vec3) -> Result<CentrelinePath, Failure> {
+    tree.path_via(&place(tree, "--via", via)?, to_mm).map_err(as_flag)
+}
+
 /// The way to a named row of a table, or to the point of its line nearest to a place.
-fn way_in_table(tree: &CentrelineTree, to: &str) -> Result<CentrelinePath, Failure> {
+fn way_in_table(tree: &CentrelineTree, args: &PassableArgs) -> Result<CentrelinePath, Failure> {
+    let to = args.to.as_str();
+    if let Some(via) = &args.via {
+        return way_via(tree, via, &place(tree, "--to", to)?);
+    }
     let way = match parse_end(to) {
         Ok(CentrelineEnd::Place(place)) => tree.path_to_place(&place),
         _ => tree.path_to(tree.target(to).map_err(as_flag)?.row),
@@ -114,6 +136,9 @@ fn way_in_surface(args: &PassableArgs, wall: &Wall) -> Result<CentrelinePath, Fa
     let found = ExtractedCentreline::of(wall, args.from, &[to])
         .map_err(|error| as_flag(error).at(args.file.display()))?;
     let row = found.tree.targets().first().map_or(0, |target| target.row);
+    if let Some(via) = &args.via {
+        return way_via(&found.tree, via, &found.tree.nodes()[row].position_mm);
+    }
     found.tree.path_to(row).ok_or_else(|| Failure::Input("--to: is where the way begins".into()))
 }
 

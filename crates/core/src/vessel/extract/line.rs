@@ -28,8 +28,8 @@ const MOST_STEPS: usize = 4;
 /// Angle between the directions of steps of successive lengths.
 const TURN: f64 = 0.4;
 
-/// The centre line along a path. Its last point is fixed, and its first if `is_fixed`.
-pub(super) fn centred(lumen: &Lumen<'_>, way: &[Sphere], is_fixed: bool) -> Vec<Sphere> {
+/// The centre line along a path, whose first and last points may be fixed.
+pub(super) fn centred(lumen: &Lumen<'_>, way: &[Sphere], is_fixed: [bool; 2]) -> Vec<Sphere> {
     let mut line = divided(way);
     for _ in 0..ROUNDS {
         for _ in 0..PASSES {
@@ -81,6 +81,13 @@ pub(super) fn divided(line: &[Sphere]) -> Vec<Sphere> {
     points
 }
 
+/// The first point of a line at least a radius away from its first one, or the last: where it comes from, seen from there.
+pub(super) fn behind(line: &[Sphere]) -> Option<&Sphere> {
+    let first = line.first()?;
+    let is_away = |point: &&Sphere| (point.centre_mm - first.centre_mm).norm() >= first.radius_mm;
+    line.iter().find(is_away).or(line.last())
+}
+
 /// Moves all points except the ends by a fraction of the way to the middle of their neighbours.
 fn smooth(line: &mut [Sphere], part: f64) {
     let mut before = line.first().map_or_else(Vec3::zeros, |point| point.centre_mm);
@@ -92,12 +99,12 @@ fn smooth(line: &mut [Sphere], part: f64) {
 }
 
 /// The line with each point moved to the largest sphere in its cross-section.
-fn in_the_middle(lumen: &Lumen<'_>, line: &[Sphere], is_fixed: bool) -> Vec<Sphere> {
+fn in_the_middle(lumen: &Lumen<'_>, line: &[Sphere], is_fixed: [bool; 2]) -> Vec<Sphere> {
     let last = line.len() - 1;
     parallel::map(line.len(), |k| {
         let (before, after) = (k.saturating_sub(TANGENT_POINTS), (k + TANGENT_POINTS).min(last));
         let along = (line[after].centre_mm - line[before].centre_mm).try_normalize(0.0);
-        match along.filter(|_| k < last && (k > 0 || !is_fixed)) {
+        match along.filter(|_| (k < last || !is_fixed[1]) && (k > 0 || !is_fixed[0])) {
             Some(along) => largest_across(lumen, &line[k], &along),
             None => {
                 Sphere { radius_mm: lumen.clearance_mm(&line[k].centre_mm).max(line[k].radius_mm), ..line[k] }
@@ -111,6 +118,10 @@ fn largest_across(lumen: &Lumen<'_>, sphere: &Sphere, along: &Vec3) -> Sphere {
     let e = along.cross(&Vec3::ith(along.iamin(), 1.0)).normalize();
     let f = along.cross(&e);
     let mut best = Sphere { radius_mm: lumen.clearance_mm(&sphere.centre_mm), ..*sphere };
+    let worth_mm = |of: &Sphere| match lumen.stray_cost {
+        0.0 => of.radius_mm,
+        cost => of.radius_mm - cost * (of.centre_mm - sphere.centre_mm).norm(),
+    };
     let mut step_mm = FIRST_STEP_RADII * sphere.radius_mm;
     for halving in 0..HALVINGS {
         for _ in 0..MOST_STEPS {
@@ -118,9 +129,9 @@ fn largest_across(lumen: &Lumen<'_>, sphere: &Sphere, along: &Vec3) -> Sphere {
             for direction in 0..DIRECTIONS {
                 let angle = TAU * direction as f64 / DIRECTIONS as f64 + TURN * halving as f64;
                 let centre_mm = here.centre_mm + (e * libm::cos(angle) + f * libm::sin(angle)) * step_mm;
-                let radius_mm = lumen.clearance_mm(&centre_mm);
-                if radius_mm > best.radius_mm {
-                    best = Sphere { centre_mm, radius_mm };
+                let tried = Sphere { centre_mm, radius_mm: lumen.clearance_mm(&centre_mm) };
+                if worth_mm(&tried) > worth_mm(&best) {
+                    best = tried;
                 }
             }
             if best == here {

@@ -34,6 +34,10 @@ pub(super) struct Lumen<'a> {
     /// The triangle across each side of each triangle.
     across: Vec<[u32; 3]>,
     size_mm: f64,
+    /// How much larger a sphere must be, mm, for each millimetre by which a line is moved to it in its cross-section. At
+    /// a fork that section runs along a branch, in which all spheres are about as large. 0 for a tree, whose lines are
+    /// always found so.
+    pub(super) stray_cost: f64,
 }
 
 impl<'a> Lumen<'a> {
@@ -43,7 +47,7 @@ impl<'a> Lumen<'a> {
         let rims = wall.openings().iter().enumerate();
         let opening_of = rims.flat_map(|(k, o)| o.boundary.iter().map(move |v| (*v, k))).collect();
         let size_mm = wall.mesh().used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
-        Ok(Self { wall, query, opening_of, across: wall.neighbours(), size_mm })
+        Ok(Self { wall, query, opening_of, across: wall.neighbours(), size_mm, stray_cost: 0.0 })
     }
 
     /// Distance of a position from the wall, mm; not positive outside the lumen, past an opening, and for NaN.
@@ -249,9 +253,9 @@ impl Spheres {
             .copied()
     }
 
-    /// Spheres at least about as large as this one that it connects to: a path between their centres stays well
-    /// inside the two.
-    pub(super) fn overlapping(&self, sphere: &Sphere) -> impl Iterator<Item = usize> + '_ {
+    /// Spheres at least about as large as this one that it connects to, not farther apart than the larger radius and
+    /// this part of the smaller: a path between their centres stays inside the two.
+    pub(super) fn overlapping(&self, sphere: &Sphere, part: f64) -> impl Iterator<Item = usize> + '_ {
         let sphere = *sphere;
         let (_, high) = self.levels.unwrap_or_default();
         (level(sphere.radius_mm)..=high)
@@ -259,15 +263,25 @@ impl Spheres {
                 self.about(
                     sphere.centre_mm,
                     level,
-                    largest_mm(level) + 0.5 * largest_mm(level).min(2.0 * sphere.radius_mm),
+                    largest_mm(level) + part * largest_mm(level).min(2.0 * sphere.radius_mm),
                 )
             })
             .filter(move |&other| {
                 let other = self.all[other];
                 let (small, large) =
                     (sphere.radius_mm.min(other.radius_mm), sphere.radius_mm.max(other.radius_mm));
-                (other.centre_mm - sphere.centre_mm).norm() < large + 0.5 * small
+                (other.centre_mm - sphere.centre_mm).norm() < large + part * small
             })
+    }
+
+    /// Of the spheres that contain a position, the one whose surface is the farthest from it.
+    pub(super) fn deepest(&self, x: &Vec3) -> Option<usize> {
+        let (low, high) = self.levels?;
+        let depth_mm = |k: usize| self.all[k].radius_mm - (self.all[k].centre_mm - x).norm();
+        (low..=high)
+            .flat_map(|level| self.about(*x, level, largest_mm(level)))
+            .filter(|&k| depth_mm(k) > 0.0)
+            .max_by(|&a, &b| depth_mm(a).total_cmp(&depth_mm(b)).then(b.cmp(&a)))
     }
 
     /// Of the spheres that contain a position, the one with the nearest centre.

@@ -2,16 +2,25 @@
 //!
 //! The lumen is filled with spheres about chords across it ([`lumen`]); the cheapest paths through them, length being
 //! expensive where spheres are small, lead from one end to all others ([`ways`]); each is moved to the middle of the
-//! lumen and smoothed ([`line`]). Where a path enters the spheres of another it is joined to it ([`growing`]).
+//! lumen and smoothed ([`line`]). Where a path enters the spheres of another it is joined to it ([`growing`]). If the
+//! surface has handles ([`handles`]), branches meet again: ways that close a ring ([`classes`]) lead to the arms that
+//! the tree lacks ([`arms`]).
 
+mod arms;
+mod classes;
 mod growing;
+mod handles;
 mod line;
 mod lumen;
+#[cfg(test)]
+mod ring_tests;
 #[cfg(test)]
 mod tests;
 mod ways;
 
+use self::arms::{Arms, Rings};
 pub(super) use self::growing::Growing;
+pub(super) use self::handles::handles;
 pub(super) use self::lumen::Sphere;
 use self::lumen::{Lumen, Spheres};
 use self::ways::{Beside, Ways};
@@ -20,6 +29,12 @@ use crate::{Error, Result, Vec3};
 
 /// Largest pieces of a triangle, in radii of the local lumen; if an end is not reached, the next value is used.
 const SPACINGS: [f64; 3] = [0.5, 0.25, 0.125];
+
+/// By how much of the smaller radius spheres that a way leads through may be farther apart than the larger radius: it
+/// stays well inside the two.
+const OVERLAP: f64 = 0.5;
+/// How much larger spheres must be for each millimetre by which the points of a line with rings are moved to them, mm.
+const STRAY_COST: f64 = 0.05;
 
 /// An end of a centre line.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -33,8 +48,12 @@ pub enum CentrelineEnd {
 /// A centre line computed from a wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtractedCentreline {
-    /// The tree, from the first end on. Its ends are targets: `opening 3`, `place 1` (counted from 1, as given).
+    /// The tree, from the first end on, with a link for each arm of a ring. Its ends are targets: `opening 3`, `place 1`
+    /// (counted from 1, as given); so is the middle of each such arm, `arm 1`.
     pub tree: CentrelineTree,
+    /// Number of rings that the surface has by its handles, and so of links that there should be; `None` where the
+    /// surface does not close, so that it is not known.
+    pub rings: Option<usize>,
     /// Openings without a path: of another piece of the surface.
     pub unreached: Vec<usize>,
 }
@@ -46,7 +65,10 @@ pub struct CentrelineBranch {
     pub from: usize,
     /// Row of the end or bifurcation where it ends.
     pub to: usize,
-    /// Its length, mm.
+    /// Row that its end joins, if it is the arm of a ring.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joins: Option<usize>,
+    /// Its length, mm, up to the point that it joins.
     pub length_mm: f64,
     /// The smallest radius of its points, except the bifurcation where it starts, mm.
     pub least_radius_mm: f64,
@@ -64,7 +86,11 @@ impl ExtractedCentreline {
     /// [`Error::Parameter`] naming `from` or `to` for a nonexistent opening, a position outside the lumen, or one
     /// without a path, and for a surface without the openings needed.
     pub fn of(wall: &Wall, from: Option<CentrelineEnd>, to: &[CentrelineEnd]) -> Result<Self> {
-        let lumen = Lumen::new(wall)?;
+        let mut lumen = Lumen::new(wall)?;
+        let contents = wall.report().bodies_in_lumen + wall.report().sheets_in_lumen;
+        let has_rings = contents > 0 || handles(wall, &[]).is_some_and(|count| count > 0);
+        // Where there is no ring, the line is the same to the bit as ever.
+        lumen.stray_cost = if has_rings { STRAY_COST } else { 0.0 };
         let first = from.or_else(|| wall.inlet().map(|inlet| CentrelineEnd::Opening(inlet.index)));
         let first = first.ok_or_else(|| {
             Error::parameter("from", "none", "the surface has no opening: give a place inside to begin at")
@@ -100,28 +126,55 @@ impl ExtractedCentreline {
         order.sort_by(|&a, &b| ends[b].radius_mm.total_cmp(&ends[a].radius_mm).then(a.cmp(&b)));
         let (mut growing, mut targets) = (Growing::default(), Vec::new());
         for k in order {
-            let (entry, own) = growing.own_part(ways[k].as_deref().unwrap_or_default());
-            let row = growing.join(entry, &line::centred(&lumen, &own, entry.is_none()));
+            let (mut entry, own) = growing.own_part(ways[k].as_deref().unwrap_or_default());
+            let line = line::centred(&lumen, &own, [entry.is_none(), true]);
+            if let [first, ..] = line[..]
+                && has_rings
+                && entry.is_some()
+            {
+                let joint = line::behind(&line).and_then(|from| growing.joint(&lumen, from, &first));
+                entry = joint.or(entry);
+            }
+            let row = growing.join(entry, &line);
             targets.extend(row.map(|row| Target { name: name(&all[k], k), row }));
         }
         if growing.nodes.is_empty() {
             let remedy = "no way leads from there to any other opening: choose another with `from`";
             return Err(Error::parameter("from", name(&first, 0), remedy));
         }
-        Ok(Self { tree: CentrelineTree::new(growing.nodes)?.with_targets(targets)?, unreached })
+        let mut rings = handles(wall, &unreached);
+        let arms = match rings {
+            Some(count) if contents > 0 => arms::add(&lumen, root, Rings::Beside(count), &mut growing),
+            Some(count) if count > 0 => arms::add(&lumen, root, Rings::Handles(count), &mut growing),
+            _ => Arms::default(),
+        };
+        // Beside a flap that stops short of the wall there is one without a handle.
+        rings = rings.map(|count| count.max(arms.links.len()));
+        targets.extend(arms.targets);
+        let tree = CentrelineTree::new(growing.nodes)?.with_links(arms.links)?.with_targets(targets)?;
+        Ok(Self { tree, rings, unreached })
     }
 }
 
 impl CentrelineTree {
-    /// The stretches of the tree between its root, bifurcations and ends, in the order of their last rows.
+    /// The stretches of the tree between its root, bifurcations and ends, in the order of their last rows. Where a
+    /// link joins a row, branches meet, and one ends.
     pub fn branches(&self) -> Vec<CentrelineBranch> {
         let (nodes, children) = (self.nodes(), self.children());
-        let is_end = |row: usize| children[row].len() != 1;
+        let is_joined = |row: usize| self.links().iter().any(|link| link.joins == row);
+        let is_end = |row: usize| children[row].len() != 1 || is_joined(row);
         (1..nodes.len())
             .filter(|&row| is_end(row))
             .map(|to| {
-                let mut branch =
-                    CentrelineBranch { from: to, to, length_mm: 0.0, least_radius_mm: nodes[to].radius_mm };
+                let joins = self.joined_by(to);
+                let apart_mm = |row: usize| (nodes[row].position_mm - nodes[to].position_mm).norm();
+                let mut branch = CentrelineBranch {
+                    from: to,
+                    to,
+                    joins,
+                    length_mm: joins.map_or(0.0, apart_mm),
+                    least_radius_mm: nodes[to].radius_mm,
+                };
                 while let Some(parent) = nodes[branch.from].parent {
                     branch.least_radius_mm = branch.least_radius_mm.min(nodes[branch.from].radius_mm);
                     branch.length_mm += (nodes[parent].position_mm - nodes[branch.from].position_mm).norm();
@@ -183,7 +236,7 @@ fn found_ways(lumen: &Lumen<'_>, root: Sphere, ends: &[Sphere]) -> Vec<Option<Ve
         for sphere in [root].iter().chain(ends).copied().chain(lumen.spheres(spacing)) {
             spheres.push(sphere);
         }
-        let mut beside = Beside::new(&spheres, lumen);
+        let mut beside = Beside::new(&spheres, lumen, OVERLAP);
         let mut take = |beside: &Beside| {
             let ways = Ways::from(0, &spheres, beside);
             for (k, way) in found.iter_mut().enumerate().filter(|(_, way)| way.is_none()) {

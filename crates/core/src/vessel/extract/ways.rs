@@ -13,6 +13,9 @@ use super::lumen::{Lumen, Sphere, Spheres};
 pub(super) struct Ways {
     /// The sphere before each on its path; its own index for the first, `None` if not reached.
     before: Vec<Option<usize>>,
+    cost: Vec<f64>,
+    /// The spheres that are reached, the cheapest first.
+    order: Vec<usize>,
 }
 
 /// The end of a path, cheapest first.
@@ -42,16 +45,17 @@ const MANY: usize = 200;
 const MOST_JOINTS: usize = 32;
 
 /// The spheres beside each sphere, with which it overlaps.
-pub(super) struct Beside(Vec<Vec<usize>>);
+pub(super) struct Beside(pub(super) Vec<Vec<usize>>);
 
 impl Beside {
-    pub(super) fn new(spheres: &Spheres, lumen: &Lumen<'_>) -> Self {
+    /// Those that are not farther apart than the larger radius and this part of the smaller.
+    pub(super) fn new(spheres: &Spheres, lumen: &Lumen<'_>, overlap: f64) -> Self {
         let all = &spheres.all;
         let mut beside: Vec<Vec<usize>> = vec![Vec::new(); all.len()];
         for (k, sphere) in all.iter().enumerate() {
             let is_beside =
                 |other: &usize| *other != k && !lumen.leaves(&sphere.centre_mm, &all[*other].centre_mm);
-            for other in spheres.overlapping(sphere).filter(is_beside) {
+            for other in spheres.overlapping(sphere, overlap).filter(is_beside) {
                 beside[k].push(other);
                 beside[other].push(k);
             }
@@ -125,7 +129,24 @@ impl Ways {
                 }
             }
         }
-        Self { before }
+        let mut order: Vec<usize> = (0..all.len()).filter(|k| before[*k].is_some()).collect();
+        order.sort_by(|a, b| cost[*a].total_cmp(&cost[*b]).then(a.cmp(b)));
+        Self { before, cost, order }
+    }
+
+    /// The spheres that are reached, the cheapest first.
+    pub(super) fn order(&self) -> &[usize] {
+        &self.order
+    }
+
+    /// The sphere before one on its path; its own index for the first.
+    pub(super) fn before(&self, sphere: usize) -> Option<usize> {
+        self.before[sphere]
+    }
+
+    /// The integral of 1/radius up to a sphere.
+    pub(super) fn cost(&self, sphere: usize) -> f64 {
+        self.cost[sphere]
     }
 
     /// The spheres from the first to this one; `None` without a path.

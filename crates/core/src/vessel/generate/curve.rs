@@ -180,8 +180,20 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
             }
             last = rows[rows.len() - 1];
         }
-        let is_open = children[last].is_empty() && tree.closed_ends().binary_search(&last).is_err();
-        found.push(fit(tree, &rows, leaves_parent, is_open)?);
+        let end = match tree.joined_by(last) {
+            _ if !children[last].is_empty() || tree.closed_ends().binary_search(&last).is_ok() => {
+                Ending::Round
+            }
+            // Another branch ends where this one does.
+            None if tree.links().iter().any(|link| link.joins == last) => Ending::Round,
+            // It ends round within the branch that it joins, as it begins within the one that it leaves.
+            Some(joined) => {
+                rows.push(joined);
+                Ending::Within
+            }
+            None => Ending::Open,
+        };
+        found.push(fit(tree, &rows, leaves_parent, end)?);
         samples += found[found.len() - 1].samples.len();
         if found.len() > MOST_BRANCHES || samples > MOST_SAMPLES_IN_ALL {
             let remedy = format!(
@@ -193,6 +205,17 @@ pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> 
         }
     }
     Ok(found)
+}
+
+/// How a branch ends.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    /// By an opening.
+    Open,
+    /// By a dome.
+    Round,
+    /// On the axis of another branch.
+    Within,
 }
 
 /// The child that continues a branch with this direction.
@@ -210,7 +233,7 @@ fn continuation(tree: &CentrelineTree, children: &[usize], direction: Option<Vec
 }
 
 /// Fits and resamples the curve through `rows`.
-fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_open: bool) -> Result<Branch> {
+fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ending: Ending) -> Result<Branch> {
     let nodes = tree.nodes();
     let points: Vec<Vec3> = rows.iter().map(|&r| nodes[r].position_mm).collect();
     let mut radii: Vec<f64> = rows.iter().map(|&r| nodes[r].radius_mm).collect();
@@ -218,6 +241,9 @@ fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_open: bo
         // The branch is as wide at the parent's axis as at its own first point, but never protrudes from the parent's
         // far side.
         radii[0] = radii[0].min(radii[1]);
+    }
+    if let (Ending::Within, [.., before, end]) = (ending, radii.as_mut_slice()) {
+        *end = end.min(*before);
     }
     let spline = Spline::new(&points, &radii);
     let (length, smallest) = (spline.length(), radii.iter().copied().fold(f64::INFINITY, f64::min));
@@ -258,7 +284,7 @@ fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_open: bo
         samples,
         step,
         root_row: (!leaves_parent).then_some(rows[0]),
-        leaf_row: ends_open.then_some(rows[rows.len() - 1]),
+        leaf_row: (ending == Ending::Open).then_some(rows[rows.len() - 1]),
         at_samples: Vec::new(),
         thickest: 0.0,
     };
