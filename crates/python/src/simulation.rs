@@ -167,6 +167,7 @@ impl Simulation {
     /// `direction`. By default it is at the inlet of the vessel's centre line, or without one at the lowest of the
     /// wide openings. A positive first rest curvature bends instruments towards `bends_towards` at rotation zero, by
     /// default towards the coordinate axis least aligned with the sheath. `wall` has the keys of `[vessel.wall]` of a scene file (modulus_n_per_mm2, friction, region),
+    /// `yielding` those of `[vessel.yielding]` (preset, …), by which the vessel yields as a whole,
     /// `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the friction of the sheath's valve,
     /// N, and `sheath_friction` the friction coefficient in its mouth.
     ///
@@ -176,7 +177,7 @@ impl Simulation {
     ///
     /// Raises InputError for values that are out of range or inconsistent.
     #[new]
-    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, bends_towards=None, wall=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
+    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, bends_towards=None, wall=None, yielding=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn py_new(
         py: Python<'_>,
@@ -188,6 +189,7 @@ impl Simulation {
         direction: Option<&Bound<'_, PyAny>>,
         bends_towards: Option<&Bound<'_, PyAny>>,
         wall: Option<&Bound<'_, PyAny>>,
+        yielding: Option<&Bound<'_, PyAny>>,
         method: Option<&Bound<'_, PyAny>>,
         sheath_friction_n: f64,
         sheath_friction: f64,
@@ -212,6 +214,7 @@ impl Simulation {
             direction,
             bends_towards,
             wall: wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default(),
+            yielding: yielding.map(|table| document::read("yielding", table)).transpose()?,
             method: method.map(read_method).transpose()?.unwrap_or_default(),
             sheath_friction_n,
             sheath_friction,

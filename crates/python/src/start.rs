@@ -7,7 +7,7 @@ use endowire_core::device::{self, Stack};
 use endowire_core::insertion::{self, WallProperties};
 use endowire_core::methods::Parameter;
 use endowire_core::scene::SheathSpec;
-use endowire_core::vessel::NoStore;
+use endowire_core::vessel::{Course, NoStore, YieldingSpec};
 use endowire_methods::AnyMethod;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,9 @@ pub(crate) struct Arguments {
     #[serde(default)]
     pub(crate) bends_towards: Option<[f64; 3]>,
     pub(crate) wall: WallProperties,
+    /// How the vessel yields as a whole.
+    #[serde(default)]
+    pub(crate) yielding: Option<YieldingSpec>,
     pub(crate) method: AnyMethod,
     pub(crate) sheath_friction_n: f64,
     pub(crate) sheath_friction: f64,
@@ -66,10 +69,13 @@ impl Start {
         let sheath =
             SheathSpec { opening, depth_mm, position_mm, direction, bends_towards, friction_n, friction };
         let (properties, method) = (arguments.wall.clone(), arguments.method.clone());
+        let tree = arguments.yielding.as_ref().map(|_| vessel.get().tree(py).cloned()).transpose()?;
+        let yielding = arguments.yielding.clone();
         let built = interruptible(py, move || {
             let sheath = sheath.place(&lumen)?;
             let builder = insertion::Simulation::builder(lumen, stack, sheath);
-            builder.properties(properties).method(&method).store(&NoStore).build()
+            let course = tree.zip(yielding).map(|(tree, spec)| Course::new(&tree, &spec)).transpose()?;
+            builder.properties(properties).course(course).method(&method).store(&NoStore).build()
         })?;
         let simulation = Mutex::new(built.map_err(exception)?);
         Ok(Self { instruments, simulation, made_of: MadeOf::Arguments(vessel, Box::new(arguments)) })

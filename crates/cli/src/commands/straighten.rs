@@ -81,7 +81,8 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
     let bar = progress::bar(script.len(), "step");
     let (mut run, mut steps, mut largest_n) = (script.begin(), 0, 0.0f64);
     while let Some(step) = run.next(&simulation).map_err(in_scene)?.map(Step::into_owned) {
-        let failed = |e: Error| Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), steps + 1));
+        let failed =
+            |e: Error| Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), steps + 1));
         step.carry_out(&mut simulation).map_err(failed)?;
         run.carried_out();
         steps += 1;
@@ -101,7 +102,9 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
         scene: scene.name.clone(),
         steps,
         inserted_mm: simulation.report().lengths_mm(),
-        largest_displacement_mm: simulation.course().map_or(0.0, |course| course.largest_mm(simulation.course_mm())),
+        largest_displacement_mm: simulation
+            .course()
+            .map_or(0.0, |course| course.largest_mm(simulation.course_mm())),
         largest_push_force_n: largest_n,
         vessel_mj: simulation.report().energy.vessel,
         places: measured.places(),
@@ -114,7 +117,9 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
 /// Named places of a centre line by row, its beginning first.
 fn named(tree: &CentrelineTree) -> Vec<(usize, String)> {
     let targets = tree.targets().iter().filter(|target| target.row > 0);
-    std::iter::once((0, INLET.to_owned())).chain(targets.map(|target| (target.row, target.name.clone()))).collect()
+    std::iter::once((0, INLET.to_owned()))
+        .chain(targets.map(|target| (target.row, target.name.clone())))
+        .collect()
 }
 
 /// A centre line before and after.
@@ -149,7 +154,9 @@ impl Measured<'_> {
             let (rows, before) = self.back(*row)?;
             let change = |of: &dyn Fn(usize) -> f64| Change { before: of(0), after: of(1) };
             let length = |when: usize| {
-                rows.windows(2).map(|pair| (self.place(pair[0])[when] - self.place(pair[1])[when]).norm()).sum::<f64>()
+                rows.windows(2)
+                    .map(|pair| (self.place(pair[0])[when] - self.place(pair[1])[when]).norm())
+                    .sum::<f64>()
             };
             let (first, last) = (rows[rows.len() - 1], rows[0]);
             let straight = |when: usize| (self.place(first)[when] - self.place(last)[when]).norm();
@@ -166,7 +173,8 @@ impl Measured<'_> {
 
     fn places(&self) -> Vec<Place> {
         let behind = |of: usize| -> Vec<usize> {
-            let each = self.named.iter().filter(|(row, _)| self.back(*row).is_some_and(|(_, before)| before == of));
+            let each =
+                self.named.iter().filter(|(row, _)| self.back(*row).is_some_and(|(_, before)| before == of));
             each.map(|(row, _)| *row).collect()
         };
         let each = self.named.iter().enumerate().map(|(index, (row, name))| {
@@ -239,18 +247,25 @@ fn told(document: &Document) -> String {
         "{}: {} steps, largest push {:.2} N, the vessel moved by up to {:.1} mm\n\n",
         document.scene, document.steps, document.largest_push_force_n, document.largest_displacement_mm
     );
-    text += &format!("{:<46} {:>17} {:>17} {:>15}\n", "centre line", "length mm", "straight mm", "tortuosity");
+    text +=
+        &format!("{:<46} {:>17} {:>17} {:>15}\n", "centre line", "length mm", "straight mm", "tortuosity");
     for stretch in &document.stretches {
         let Stretch { from, to, length_mm, straight_mm, tortuosity } = stretch;
         let way = format!("{from} – {to}");
         text += &format!(
             "{way:<46} {:>7.1} → {:>7.1} {:>7.1} → {:>7.1} {:>6.3} → {:>6.3}\n",
-            length_mm.before, length_mm.after, straight_mm.before, straight_mm.after, tortuosity.before, tortuosity.after
+            length_mm.before,
+            length_mm.after,
+            straight_mm.before,
+            straight_mm.after,
+            tortuosity.before,
+            tortuosity.after
         );
     }
     text += &format!("\n{:<46} {:>12} {:>19}\n", "place", "moved by mm", "angle °");
     for Place { name, displacement_mm, angle_deg, .. } in &document.places {
-        let angle = angle_deg.map_or(String::new(), |angle| format!("{:>7.1} → {:>7.1}", angle.before, angle.after));
+        let angle =
+            angle_deg.map_or(String::new(), |angle| format!("{:>7.1} → {:>7.1}", angle.before, angle.after));
         text += &format!("{name:<46} {displacement_mm:>12.2} {angle:>19}\n");
     }
     for file in &document.pictures {

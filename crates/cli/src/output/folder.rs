@@ -7,11 +7,11 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::coils::COILS;
-use super::vessel::{PLACES, VESSEL};
 use super::film::FILMS;
 use super::injections::INJECTIONS;
 use super::instruments::INSTRUMENTS;
 use super::packing::PACKING;
+use super::vessel::{PLACES, VESSEL};
 use super::{SUMMARY, arrays, tell, whole};
 use crate::failure::Failure;
 

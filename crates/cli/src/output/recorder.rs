@@ -14,7 +14,6 @@ use endowire_sweep::RunOutcome;
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
-use super::vessel::VesselTables;
 use super::coils::CoilTable;
 use super::folder::{self, Claim};
 use super::frames::PlaneTold;
@@ -22,6 +21,7 @@ use super::instruments::InstrumentTable;
 use super::packing::{Packed, PackingTable};
 use super::provenance::Provenance;
 use super::recording::{RecordedSummary, Recording};
+use super::vessel::VesselTables;
 use super::{SUMMARY, to_json, whole};
 use crate::failure::Failure;
 

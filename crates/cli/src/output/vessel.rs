@@ -67,7 +67,14 @@ impl VesselTables {
             for (place, at_rest) in course.places() {
                 let now = displacement.place(at_rest);
                 let displacement_mm = (now - at_rest).norm();
-                self.places.push(PlaceRow { step, place, x_mm: now.x, y_mm: now.y, z_mm: now.z, displacement_mm })?;
+                self.places.push(PlaceRow {
+                    step,
+                    place,
+                    x_mm: now.x,
+                    y_mm: now.y,
+                    z_mm: now.z,
+                    displacement_mm,
+                })?;
             }
         }
         self.unknowns.flush()?;

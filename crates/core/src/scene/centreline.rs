@@ -32,7 +32,9 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// Whether the centre line must be, or was, computed from the surface: something needs one, and none is given.
     pub fn finds_centreline(&self) -> bool {
         let vessel = &self.vessel;
-        let is_needed = vessel.flow.is_some() || vessel.yielding.is_some() || self.script.iter().any(ScriptLine::has_target);
+        let is_needed = vessel.flow.is_some()
+            || vessel.yielding.is_some()
+            || self.script.iter().any(ScriptLine::has_target);
         !self.gives_centreline() && (is_needed || self.centreline.get().is_some())
     }
 

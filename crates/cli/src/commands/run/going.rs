@@ -86,7 +86,12 @@ impl SoFar<'_> {
         let lengths_mm = self.simulation.report().lengths_mm();
         let displacement = self.simulation.displacement();
         let (shape, inserted_mm) = (self.simulation.shape(), &lengths_mm[..]);
-        self.frames.step(now, last, Drawn { shape, inserted_mm, displacement: displacement.as_ref() }, recorder)
+        self.frames.step(
+            now,
+            last,
+            Drawn { shape, inserted_mm, displacement: displacement.as_ref() },
+            recorder,
+        )
     }
 }
 

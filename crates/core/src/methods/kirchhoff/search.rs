@@ -25,13 +25,13 @@ use super::mesh::Mesh;
 use super::part::{Effort, Lost};
 use super::workspace::Tools;
 use super::yielding::{Follows, Yielding};
+use crate::Vec3;
 use crate::contact::{SelfContact, Touch, WallContact};
 use crate::device::Stack;
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, StopReason, Together};
 use crate::tuning::Tuning;
-use crate::Vec3;
 
 /// What the lagged forces follow from, besides the state.
 pub(super) struct Lagged<'a> {
@@ -224,7 +224,8 @@ impl<const C: usize> Search<'_, '_, C> {
         let (elements, tuning, effort) = (self.elements, self.tuning, self.bounds.effort);
         let unsettled = self.unsettled().max(lagging);
         let neighbourhood = &self.newton.neighbourhood;
-        let (off, farthest_mm) = (neighbourhood.off(self.state, &tuning.newton), neighbourhood.farthest(self.state));
+        let (off, farthest_mm) =
+            (neighbourhood.off(self.state, &tuning.newton), neighbourhood.farthest(self.state));
         let too_far = off > neighbourhood.most_off(&tuning.newton) && !judged.may_snap;
         let used_up = found.reason == StopReason::MaxIterations && self.solves >= self.bounds.most_solves;
         // A device that slides or relaxes when the solves are used up is seen on its way.

@@ -215,15 +215,31 @@ impl<const C: usize> Tools<C> {
         let tuning = &options.tuning;
         let Attempt { part: Part { effort, part_mm, .. }, limits, left, .. } = attempt;
         self.transport_to(environment, start, attempt, next);
-        let mut course = Yielding::begin(environment, (start, attempt), &mut self.friction, &self.guess.motions);
+        let mut course =
+            Yielding::begin(environment, (start, attempt), &mut self.friction, &self.guess.motions);
         let may_snap = part_mm <= tuning.steps.snap_radii * environment.surroundings.device.min_radius_mm();
         let first = course.as_ref().map_or(environment.displacement, |course| Some(course.displacement()));
-        let searched = self.search_from(&environment.displaced(first), (start, attempt), (course.as_ref(), may_snap), next);
+        let searched = self.search_from(
+            &environment.displaced(first),
+            (start, attempt),
+            (course.as_ref(), may_snap),
+            next,
+        );
         let elements = next.mesh.elements.len();
-        if std::env::var("YD").is_ok() { match &searched { Ok(s) => eprintln!("part {part_mm:.4} {effort:?} first it {} conv {} res {:.2e} off {:.3} wrong {:?}", s.taken.0, s.found.converged, s.found.residual, s.off, s.wrong), Err(e) => eprintln!("part {part_mm:.4} {effort:?} {e:?}") } }
+        if std::env::var("YD").is_ok() {
+            match &searched {
+                Ok(s) => eprintln!(
+                    "part {part_mm:.4} {effort:?} first it {} conv {} res {:.2e} off {:.3} wrong {:?}",
+                    s.taken.0, s.found.converged, s.found.residual, s.off, s.wrong
+                ),
+                Err(e) => eprintln!("part {part_mm:.4} {effort:?} {e:?}"),
+            }
+        }
         let searched = searched.and_then(|searched| match &mut course {
             None => Ok(searched),
-            Some(course) => self.follow_course(environment, (searched, effort, limits, may_snap), course, next),
+            Some(course) => {
+                self.follow_course(environment, (searched, effort, limits, may_snap), course, next)
+            }
         });
         let searched = match searched {
             Ok(searched) => searched,
@@ -322,7 +338,8 @@ impl<const C: usize> Tools<C> {
             moved_mm: None,
         };
         let before = resumed.map_or(0, |resumed| resumed.iterations);
-        let judged = Judged { course: course.map(|course| (course, course.most_mm(environment))), before, may_snap };
+        let judged =
+            Judged { course: course.map(|course| (course, course.most_mm(environment))), before, may_snap };
         let stack = environment.surroundings.stack;
         self.with_search(environment, (mesh, stack, rod), bounds, begin, |search, lagged| {
             search.searched(lagged, &judged, touches)

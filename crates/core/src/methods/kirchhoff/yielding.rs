@@ -112,7 +112,9 @@ impl<'a> Yielding<'a> {
     /// Stores the course in the state after the part.
     pub(super) fn keep(self, was: &KirchhoffState, after: &mut KirchhoffState) {
         after.course_change_mm.clear();
-        after.course_change_mm.extend(self.amplitudes_mm.iter().zip(&was.course_mm).map(|(to, from)| to - from));
+        after
+            .course_change_mm
+            .extend(self.amplitudes_mm.iter().zip(&was.course_mm).map(|(to, from)| to - from));
         after.course_mm = self.amplitudes_mm;
     }
 
@@ -174,9 +176,13 @@ impl<'a> Yielding<'a> {
         let condensed = DMatrix::from_fn(count, count, among).cholesky()?.inverse();
         let was = DVector::from_iterator(
             3 * count,
-            touched.unknowns.iter().flat_map(|unknown| self.amplitudes_mm[*unknown].iter().copied().collect::<Vec<_>>()),
+            touched
+                .unknowns
+                .iter()
+                .flat_map(|unknown| self.amplitudes_mm[*unknown].iter().copied().collect::<Vec<_>>()),
         );
-        let given = DVector::from_iterator(3 * count, forces.iter().flat_map(|force| [force.x, force.y, force.z]));
+        let given =
+            DVector::from_iterator(3 * count, forces.iter().flat_map(|force| [force.x, force.y, force.z]));
         let solved = |stiffness: DMatrix<f64>| {
             let mut matrix = (&stiffness + stiffness.transpose()) * 0.5;
             let right = &given + &matrix * &was;
@@ -194,12 +200,14 @@ impl<'a> Yielding<'a> {
         // What the touched unknowns are pulled by, and all of them then.
         let pulled: Vec<(usize, Vec3)> = (0..count)
             .map(|i| {
-                let force = (0..count).map(|j| Vec3::from_column_slice(&next.as_slice()[3 * j..3 * j + 3]) * condensed[(i, j)]);
+                let force = (0..count)
+                    .map(|j| Vec3::from_column_slice(&next.as_slice()[3 * j..3 * j + 3]) * condensed[(i, j)]);
                 (touched.unknowns[i], force.sum())
             })
             .collect();
         let all = self.course.yields_mm(&pulled);
-        let farthest_mm = all.iter().zip(&self.amplitudes_mm).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let farthest_mm =
+            all.iter().zip(&self.amplitudes_mm).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         if !farthest_mm.is_finite() {
             return None;
         }
@@ -345,8 +353,11 @@ impl<const C: usize> Tools<C> {
             let before = rod.clone();
             let (turn, _) = RodState::largest_turn::<C>(elements, &before, &way);
             let part = (MOST_TURN_RAD / turn).min(damped);
-            let amplitudes_mm: Vec<Vec3> =
-                amplitudes_mm.iter().zip(&course.amplitudes_mm).map(|(to, from)| from + (to - from) * part).collect();
+            let amplitudes_mm: Vec<Vec3> = amplitudes_mm
+                .iter()
+                .zip(&course.amplitudes_mm)
+                .map(|(to, from)| from + (to - from) * part)
+                .collect();
             way.iter_mut().for_each(|value| *value *= part);
             step_mm = amplitudes_mm.iter().zip(&course.amplitudes_mm).map(|(to, from)| to - from).collect();
             before_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>().abs();
@@ -375,12 +386,14 @@ impl<const C: usize> Tools<C> {
                 newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
                 Ok::<_, Infallible>(())
             };
-            let judged = Judged { course: Some((course, most_mm)), before: 0, may_snap: may_snap || is_flight };
+            let judged =
+                Judged { course: Some((course, most_mm)), before: 0, may_snap: may_snap || is_flight };
             let mut search = |effort: Effort, taken: (usize, usize)| {
                 let bounds = bounds(effort, taken);
-                let Ok(found) = self.with_search(&there, (mesh, stack, &mut *rod), bounds, begin, |search, lagged| {
-                    search.searched(lagged, &judged, touches)
-                });
+                let Ok(found) =
+                    self.with_search(&there, (mesh, stack, &mut *rod), bounds, begin, |search, lagged| {
+                        search.searched(lagged, &judged, touches)
+                    });
                 found
             };
             // With friction that follows; a device in flight may snap once more.

@@ -92,16 +92,18 @@ pub(super) fn nodes(has_aneurysm: bool) -> Vec<CentrelineNode> {
     let renal = |course: Course, row: usize, side: f64| {
         let from = course.nodes[row].position_mm;
         let steps = [[16.0, 3.0, -3.0], [30.0, 9.0, -7.0], [44.0, 14.0, -8.0]];
-        steps.into_iter().fold(course.at(row), |course, [x, y, z]| course.to(from + Vec3::new(side * x, y, z), RENAL_MM))
+        steps
+            .into_iter()
+            .fold(course.at(row), |course, [x, y, z]| course.to(from + Vec3::new(side * x, y, z), RENAL_MM))
     };
     course = renal(course, 35, -1.0);
     course = renal(course, 36, 1.0);
     let internal = |course: Course, row: usize, side: f64| {
         let from = course.nodes[row].position_mm;
         let steps = [[2.0, 13.0, -9.0], [0.0, 25.0, -24.0], [-6.0, 33.0, -42.0]];
-        steps
-            .into_iter()
-            .fold(course.at(row), |course, [x, y, z]| course.to(from + Vec3::new(side * x, y, z), INTERNAL_MM))
+        steps.into_iter().fold(course.at(row), |course, [x, y, z]| {
+            course.to(from + Vec3::new(side * x, y, z), INTERNAL_MM)
+        })
     };
     course = internal(course, (INTERNAL_AT * RIGHT_PIECES as f64) as usize, -1.0);
     course = course.at(fork);
@@ -130,10 +132,14 @@ mod tests {
             let tortuosity = left / tree.nodes()[end].position_mm.norm();
             assert!((tortuosity - 1.16).abs() < 0.02, "{tortuosity}");
             let children = tree.children();
-            for (ostium, artery) in [("right renal ostium", "right renal"), ("left renal ostium", "left renal")] {
+            for (ostium, artery) in
+                [("right renal ostium", "right renal"), ("left renal ostium", "left renal")]
+            {
                 assert_eq!(children[at(ostium)].len(), 2);
                 assert!(children[at(artery)].is_empty());
-                assert!(tree.nodes()[at(artery)].position_mm.x * tree.nodes()[at(artery)].position_mm.x > 1600.0);
+                assert!(
+                    tree.nodes()[at(artery)].position_mm.x * tree.nodes()[at(artery)].position_mm.x > 1600.0
+                );
             }
             assert!(tree.nodes()[at("left renal")].position_mm.x > 0.0);
             assert!(children[at("aorta")].is_empty() && children[at("right internal iliac")].is_empty());

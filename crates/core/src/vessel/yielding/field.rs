@@ -88,7 +88,8 @@ impl Samples {
         let cell_mm = least_mm.max(2.0 * most_mm / MOST_CELLS);
         let mut cells: FxHashMap<[i32; 3], Cell> = FxHashMap::default();
         for (index, one) in all.iter().enumerate() {
-            let [low, high] = [-1.0, 1.0].map(|sign| cell_of(&one.place.add_scalar(sign * one.reach_mm), cell_mm));
+            let [low, high] =
+                [-1.0, 1.0].map(|sign| cell_of(&one.place.add_scalar(sign * one.reach_mm), cell_mm));
             for x in low[0]..=high[0] {
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
@@ -189,7 +190,13 @@ impl Samples {
     }
 
     /// ∂u/∂X and ∂²uₖ/∂X², added to those of a field: F and its bends.
-    pub(super) fn add_local(&self, x: &Vec3, of: Displaced<'_>, f: &mut Matrix3<f64>, second: &mut [Matrix3<f64>; 3]) {
+    pub(super) fn add_local(
+        &self,
+        x: &Vec3,
+        of: Displaced<'_>,
+        f: &mut Matrix3<f64>,
+        second: &mut [Matrix3<f64>; 3],
+    ) {
         let (mut mass, mut mass1, mut mass2) = (0.0, Vec3::zeros(), Matrix3::zeros());
         let (mut sum, mut sum1) = (Vec3::zeros(), Matrix3::zeros());
         let mut sum2 = [Matrix3::zeros(); 3];

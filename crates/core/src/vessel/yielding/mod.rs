@@ -104,7 +104,8 @@ impl Course {
         let samples = Samples::new(&chains);
         let spec = spec.clone();
         let places = tree.targets().iter();
-        let places = places.map(|target| (target.name.clone(), tree.nodes()[target.row].position_mm)).collect();
+        let places =
+            places.map(|target| (target.name.clone(), tree.nodes()[target.row].position_mm)).collect();
         Ok(Self { spec, places, chains, firsts, of_unknowns, samples, stiffness, compliance })
     }
 
@@ -165,7 +166,9 @@ impl Course {
     pub(crate) fn weights(&self, material: &Vec3, force: &Vec3) -> Vec<(usize, [Matrix3<f64>; 2])> {
         let of_all = self.samples.weights(material, force, (&self.chains, &self.firsts));
         let each = of_all.iter().flat_map(|(number, both)| {
-            self.of_unknowns[*number].iter().map(move |(unknown, share)| (*unknown, both.map(|one| one * *share)))
+            self.of_unknowns[*number]
+                .iter()
+                .map(move |(unknown, share)| (*unknown, both.map(|one| one * *share)))
         });
         let mut all: Vec<(usize, [Matrix3<f64>; 2])> = each.collect();
         all.sort_unstable_by_key(|(unknown, _)| *unknown);

@@ -282,8 +282,14 @@ impl YieldingSpec {
         if count <= MOST {
             return Ok(());
         }
-        let remedy = format!("makes {count} unknowns of the vessel, and at most {MOST} are solved for: give longer ones");
-        Err(Error::parameter("vessel.yielding.span_mm", self.span_mm.map_or("default".into(), number), remedy))
+        let remedy = format!(
+            "makes {count} unknowns of the vessel, and at most {MOST} are solved for: give longer ones"
+        );
+        Err(Error::parameter(
+            "vessel.yielding.span_mm",
+            self.span_mm.map_or("default".into(), number),
+            remedy,
+        ))
     }
 
     /// Rows that are held, with the stiffness of the tether, N/mm.

@@ -86,8 +86,14 @@ impl Spline {
             let [less3, here3, more3] = [&less, &here, &more].map(|basis| sum(basis, 3));
             let fourth = (more3 - less3) / (0.5 * h);
             let fifth = (more3 - here3 * 2.0 + less3) / (0.0625 * h * h);
-            let powers =
-                [sum(&here, 0), sum(&here, 1), sum(&here, 2) / 2.0, here3 / 6.0, fourth / 24.0, fifth / 120.0];
+            let powers = [
+                sum(&here, 0),
+                sum(&here, 1),
+                sum(&here, 2) / 2.0,
+                here3 / 6.0,
+                fourth / 24.0,
+                fifth / 120.0,
+            ];
             into.push(Piece { from_mm: middle_mm, powers });
         }
         into.push(straight(self.length_mm));
@@ -113,9 +119,11 @@ impl Spline {
         for degree in 1..FELT {
             for k in DEGREE - degree..FELT {
                 let i = first + k;
-                let share = |from: f64, to: f64, below: f64| if to > from { below / (to - from) } else { 0.0 };
+                let share =
+                    |from: f64, to: f64, below: f64| if to > from { below / (to - from) } else { 0.0 };
                 let (rising, falling) = (by_degree[degree - 1][k], by_degree[degree - 1][k + 1]);
-                by_degree[degree][k] = (s_mm - self.knot(i)) * share(self.knot(i), self.knot(i + degree), rising)
+                by_degree[degree][k] = (s_mm - self.knot(i))
+                    * share(self.knot(i), self.knot(i + degree), rising)
                     + (self.knot(i + degree + 1) - s_mm)
                         * share(self.knot(i + 1), self.knot(i + degree + 1), falling);
             }

@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 use super::super::CentrelineTree;
 use super::chains::Chain;
-use super::spline::FELT;
 use super::spec::{OfRow, YieldingEnds, YieldingSpec};
+use super::spline::FELT;
 use crate::{Error, Result};
 
 /// What holds a course: rows of held ends, and tethers by row with their stiffness, N/mm.
@@ -47,7 +47,9 @@ pub(super) fn unknowns(chains: &[Chain], firsts: &[usize], held: &Held) -> (OfUn
                 let basis = chains[from].spline.at(arc_mm);
                 let all = (0..FELT).flat_map(|i| {
                     let share = basis.derivatives[0][i];
-                    of[firsts[from] + basis.first + i].iter().map(move |(unknown, part)| (*unknown, part * share))
+                    of[firsts[from] + basis.first + i]
+                        .iter()
+                        .map(move |(unknown, part)| (*unknown, part * share))
                 });
                 let all = all.filter(|(_, share)| *share != 0.0).collect();
                 of.push(all);

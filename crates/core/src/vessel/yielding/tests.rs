@@ -28,7 +28,8 @@ fn made_of(bending: f64, support: f64, span_mm: f64) -> YieldingSpec {
 /// Unknowns under a force on the material point on the axis at this height.
 fn under(course: &Course, z_mm: f64, force: Vec3) -> Vec<Vec3> {
     let shares = course.weights(&Vec3::new(0.0, 0.0, z_mm), &force);
-    let forces: Vec<(usize, Vec3)> = shares.iter().map(|(unknown, share)| (*unknown, share[0].tr_mul(&force))).collect();
+    let forces: Vec<(usize, Vec3)> =
+        shares.iter().map(|(unknown, share)| (*unknown, share[0].tr_mul(&force))).collect();
     course.yields_mm(&forces)
 }
 
@@ -39,7 +40,8 @@ fn a_long_vessel_yields_to_one_force_as_a_beam_on_a_support() {
     let beta = (support / (4.0 * bending) as f64).powf(0.25);
     let exact = force.x * beta / (2.0 * support);
     let off = |span_mm: f64| {
-        let course = Arc::new(Course::new(&straight(240.0, 2.0), &made_of(bending, support, span_mm)).unwrap());
+        let course =
+            Arc::new(Course::new(&straight(240.0, 2.0), &made_of(bending, support, span_mm)).unwrap());
         let amplitudes = under(&course, 120.0, force);
         let bent = Bent::new(&course, &amplitudes);
         // Stored energy is half the work of the force.
@@ -141,8 +143,11 @@ fn the_field_has_its_own_derivatives_and_an_inverse() {
         };
         assert!((field.place(&x) - x - sum(&x)).norm() < 1e-12);
         // And how these change with the place.
-        let by_place: Vec3 =
-            course.weights(&x, &g).iter().map(|(unknown, [_, by_place])| by_place * amplitudes[*unknown]).sum();
+        let by_place: Vec3 = course
+            .weights(&x, &g)
+            .iter()
+            .map(|(unknown, [_, by_place])| by_place * amplitudes[*unknown])
+            .sum();
         for axis in 0..3 {
             let [more, less] = [h, -h].map(|h| sum(&(x + Vec3::ith(axis, h))).dot(&g));
             assert!(((more - less) / (2.0 * h) - by_place[axis]).abs() < 1e-6, "{by_place}");
@@ -158,9 +163,15 @@ fn values_that_contradict_each_other_are_refused_by_name() {
     let good = made_of(400.0, 0.05, 5.0);
     for (spec, expected) in [
         (YieldingSpec::default(), "vessel.yielding.wall_modulus_n_per_mm2 = missing"),
-        (YieldingSpec { thickness_per_radius: Some(0.1), ..good.clone() }, "vessel.yielding.bending_stiffness_nmm2"),
+        (
+            YieldingSpec { thickness_per_radius: Some(0.1), ..good.clone() },
+            "vessel.yielding.bending_stiffness_nmm2",
+        ),
         (YieldingSpec { tissue_n_per_mm3: Some(0.1), ..good.clone() }, "vessel.yielding.support_n_per_mm2"),
-        (YieldingSpec { support_n_per_mm2: Some(0.0), ..good.clone() }, "vessel.yielding.support_n_per_mm2 = 0"),
+        (
+            YieldingSpec { support_n_per_mm2: Some(0.0), ..good.clone() },
+            "vessel.yielding.support_n_per_mm2 = 0",
+        ),
         (YieldingSpec { span_mm: Some(f64::NAN), ..good.clone() }, "vessel.yielding.span_mm = NaN"),
         (YieldingSpec { span_mm: Some(0.01), ..good.clone() }, "vessel.yielding.span_mm = 0.01: makes 10005"),
     ] {
