@@ -152,7 +152,7 @@ impl<'a> Yielding<'a> {
         let next = self.next(&touched, &forces, (&reactions, &responses), most_mm, search);
         let amplitudes_mm = next.ok_or(StopReason::Singular)?;
         let moved = |unknown: usize| amplitudes_mm[unknown] - self.amplitudes_mm[unknown];
-        let mut way = vec![0.0; responses.first().map_or(0, Vec::len)];
+        let mut way = vec![0.0; Layout::<C>::dimension(search.elements.len())];
         for (k, unknown) in touched.unknowns.iter().enumerate() {
             let by = moved(*unknown);
             for axis in 0..3 {
@@ -172,6 +172,9 @@ impl<'a> Yielding<'a> {
         search: &Search<'_, '_, C>,
     ) -> Option<Vec<Vec3>> {
         let count = touched.unknowns.len();
+        if count == 0 {
+            return Some(vec![Vec3::zeros(); self.course.unknowns()]);
+        }
         let among = |i: usize, j: usize| self.course.compliance(touched.unknowns[i], touched.unknowns[j]);
         let condensed = DMatrix::from_fn(count, count, among).cholesky()?.inverse();
         let was = DVector::from_iterator(

@@ -69,7 +69,7 @@ fn amplitude_mm(simulation: &Simulation, [crest, trough]: [f64; 2]) -> f64 {
 #[test]
 fn a_stiff_wire_straightens_a_winding_vessel_as_a_composite_beam() {
     let (high_mm, wave_mm) = (0.2, 60.0);
-    let tree = winding((high_mm, wave_mm), 360.0, 0.401);
+    let tree = winding((high_mm, wave_mm), 360.0, 0.4001);
     let (bending, support, of_wire) = (300.0, 0.02, 2000.0);
     let q4 = (2.0 * PI / wave_mm).powi(4);
     for modulus in [2.0, 0.05] {
@@ -81,8 +81,7 @@ fn a_stiff_wire_straightens_a_winding_vessel_as_a_composite_beam() {
         let of_vessel = bending * q4 + support;
         let left = 1.0 / (1.0 + of_wire * q4 * (1.0 / modulus + 1.0 / of_vessel));
         let found = amplitude_mm(&simulation, [195.0, 225.0]) / high_mm;
-        println!("{modulus}: {found} {left}");
-        assert!((found / left - 1.0).abs() < 0.02, "{modulus}: {found} {left}");
+        assert!((found / left - 1.0).abs() < 5e-3, "{modulus}: {found} {left}");
     }
 }
 
@@ -102,7 +101,6 @@ fn what_the_hand_does_is_stored_or_rubbed_off() {
             most_mj = most_mj.max(report.energy.total());
             assert!(report.energy.vessel >= 0.0 && report.converged);
         }
-        println!("{friction}: {work_mj} {lost_mj} {most_mj}");
         ((work_mj - lost_mj).abs() / most_mj, lost_mj / most_mj)
     };
     let (off, lost) = closes(0.0);
@@ -126,7 +124,6 @@ fn steps_of_any_size_end_at_the_same_place_and_states_go_on_to_the_bit() {
         |a: &Simulation, b: &Simulation| (a.shape().tip_mm().unwrap() - b.shape().tip_mm().unwrap()).norm();
     for friction in [0.0, 0.1] {
         let [small, large] = [2.0, 20.0].map(|step_mm| at(step_mm, friction));
-        println!("{friction}: {}", off(&small, &large));
         assert!(off(&small, &large) < 0.05, "{friction}: {}", off(&small, &large));
     }
     let mut first = at(20.0, 0.1);
