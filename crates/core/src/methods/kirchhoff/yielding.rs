@@ -25,7 +25,7 @@
 //! ```
 //!
 //! This is block elimination of Newton's method for both. The matrix is symmetric, and positive definite where device and vessel together are
-//! stable; where it is not, M of a device that does not respond is.
+//! stable; where it is not, they snap together, and the step descends by the magnitudes of the curvatures.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -53,6 +53,9 @@ const MOST_ROUNDS: usize = 80;
 const RISES: f64 = 0.5;
 /// The least part of a step.
 const LEAST_PART: f64 = 0.03;
+/// Most sweeps for the eigenvalues of a stiffness, and the least magnitude that they are taken as, relative to the largest.
+const MOST_SWEEPS: usize = 1000;
+const LEAST_CURVATURE: f64 = 1e-7;
 /// The course follows by at most so many radii of the device at once, mm, …
 const MOST_RADII: f64 = 2.0;
 /// … and turns the device by at most so much, rad.
@@ -186,20 +189,19 @@ impl<'a> Yielding<'a> {
         );
         let given =
             DVector::from_iterator(3 * count, forces.iter().flat_map(|force| [force.x, force.y, force.z]));
-        let solved = |stiffness: DMatrix<f64>| {
-            let mut matrix = (&stiffness + stiffness.transpose()) * 0.5;
-            let right = &given + &matrix * &was;
-            for i in 0..count {
-                for j in 0..count {
-                    for axis in 0..3 {
-                        matrix[(3 * i + axis, 3 * j + axis)] += condensed[(i, j)];
-                    }
+        let mut matrix = touched.stiffness(search, reactions, responses);
+        matrix = (&matrix + matrix.transpose()) * 0.5;
+        // What is not balanced, less what the untouched unknowns take of it.
+        let mut right = given;
+        for i in 0..count {
+            for j in 0..count {
+                for axis in 0..3 {
+                    matrix[(3 * i + axis, 3 * j + axis)] += condensed[(i, j)];
+                    right[3 * i + axis] -= condensed[(i, j)] * was[3 * j + axis];
                 }
             }
-            matrix.cholesky().map(|factors| factors.solve(&right))
-        };
-        let next = solved(touched.stiffness(search, reactions, responses))
-            .or_else(|| solved(touched.held_stiffness(reactions)))?;
+        }
+        let next = was + descent(matrix, &right)?;
         // What the touched unknowns are pulled by, and all of them then.
         let pulled: Vec<(usize, Vec3)> = (0..count)
             .map(|i| {
@@ -218,6 +220,20 @@ impl<'a> Yielding<'a> {
         let between = |(to, from): (&Vec3, &Vec3)| from + (to - from) * part;
         Some(all.iter().zip(&self.amplitudes_mm).map(between).collect())
     }
+}
+
+/// Newton's step for a symmetric matrix, with curvatures taken as positive where some are not: then it descends, and goes
+/// far where device and vessel snap together.
+fn descent(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    if let Some(factors) = matrix.clone().cholesky() {
+        return Some(factors.solve(right));
+    }
+    let modes = matrix.try_symmetric_eigen(f64::EPSILON, MOST_SWEEPS)?;
+    let largest = modes.eigenvalues.amax();
+    let mut along = modes.eigenvectors.tr_mul(right);
+    let sizes = modes.eigenvalues.iter().map(|curvature| curvature.abs().max(LEAST_CURVATURE * largest));
+    along.iter_mut().zip(sizes).for_each(|(part, size)| *part /= size);
+    Some(modes.eigenvectors * along)
 }
 
 /// The unknowns that contacts reach.
