@@ -142,12 +142,8 @@ impl<const C: usize> Workspace<C> {
             let lost = match tried {
                 Ok(found) if course.shortens(&part, &found) => continue,
                 Ok(found) => {
-                    // A course has yielded further.
-                    let now_displaced = match surroundings.course {
-                        Some(_) => surroundings.displacement(part.to, &next.state.course_mm),
-                        None => then.clone(),
-                    };
-                    let there = there.displaced(now_displaced.as_ref());
+                    let reached = surroundings.displacement(part.to, &next.state.course_mm);
+                    let there = there.displaced(reached.as_ref());
                     let line = next.state.material_line(there.wall());
                     let openings = surroundings.lumen.openings();
                     let goes_on = check_inside(openings, line, 0.0).and_then(|()| {
@@ -165,7 +161,7 @@ impl<const C: usize> Workspace<C> {
                     course.accept(&part, &found, lies, iterations);
                     std::mem::swap(now, next);
                     way.go_on_from(hands);
-                    displaced = now_displaced;
+                    displaced = reached;
                     continue;
                 }
                 Err(lost) => lost,

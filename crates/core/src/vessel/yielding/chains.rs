@@ -35,13 +35,15 @@ impl Chain {
     }
 }
 
+/// The first rows of a run, and the run on which it begins with the arc length there, mm.
+type Begun = (Vec<usize>, Option<(usize, f64)>);
+
 /// Divides a tree into runs: at a junction the vessel goes on in the widest branch, of equal ones in the straightest,
 /// and the others begin there. `span_mm` says the length of a spline's spans, from the rows of a run.
 pub(super) fn chains(tree: &CentrelineTree, span_mm: impl Fn(&[usize]) -> f64) -> Vec<Chain> {
     let (nodes, children) = (tree.nodes(), tree.children());
     // First row, and the run with the place in it where that is.
-    let mut begun: Vec<(Vec<usize>, Option<(usize, f64)>)> =
-        children[0].iter().map(|child| (vec![0, *child], None)).collect();
+    let mut begun: Vec<Begun> = children[0].iter().map(|child| (vec![0, *child], None)).collect();
     // Several branches at the root: one run goes on from it, and the others begin on that.
     for other in begun.iter_mut().skip(1) {
         other.1 = Some((0, 0.0));

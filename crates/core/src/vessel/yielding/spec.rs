@@ -272,7 +272,7 @@ impl YieldingSpec {
     /// Length of the spans of a run with these rows, mm.
     pub(super) fn span_mm<'a>(&self, rows: impl Iterator<Item = &'a OfRow>) -> f64 {
         let of_row = |row: &OfRow| {
-            let length_mm = (4.0 * row.bending_nmm2 / row.support_n_per_mm2).powf(0.25);
+            let length_mm = (4.0 * row.bending_nmm2 / row.support_n_per_mm2).sqrt().sqrt();
             (SPAN_OF_LENGTH * length_mm).max(LEAST_SPAN_RADII * row.radius_mm)
         };
         self.span_mm.unwrap_or_else(|| rows.map(of_row).fold(f64::INFINITY, f64::min))
