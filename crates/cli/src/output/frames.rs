@@ -182,11 +182,11 @@ impl FrameWriter {
         if self.planes.is_empty() {
             return Ok(());
         }
-        if self.spec.injects_at_tip() {
-            if let Some(tip_mm) = self.pushed.tip_at_rest_mm(shape, inserted_mm, displacement) {
-                self.tips.push((time_s, tip_mm));
-                self.planes.iter_mut().try_for_each(|plane| plane.follow_tip(time_s, tip_mm))?;
-            }
+        if self.spec.injects_at_tip()
+            && let Some(tip_mm) = self.pushed.tip_at_rest_mm(shape, inserted_mm, displacement)
+        {
+            self.tips.push((time_s, tip_mm));
+            self.planes.iter_mut().try_for_each(|plane| plane.follow_tip(time_s, tip_mm))?;
         }
         if self.spec.xray.pulse_ms > 0.0 {
             self.before = Some(Before { shape: shape.clone(), inserted_mm: inserted_mm.to_vec(), time_s });

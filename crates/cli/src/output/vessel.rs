@@ -88,10 +88,13 @@ impl VesselTables {
     }
 }
 
+/// Displacements of the unknowns after steps, mm.
+type BySteps = BTreeMap<usize, Vec<Vec3>>;
+
 /// Where the vessel of a recording is after its steps.
 pub(crate) struct Recorded {
     motion: Option<VesselMotion>,
-    course: Option<(Arc<Course>, BTreeMap<usize, Vec<Vec3>>)>,
+    course: Option<(Arc<Course>, BySteps)>,
 }
 
 impl Recorded {
@@ -100,7 +103,7 @@ impl Recorded {
         let motion = VesselMotion::new(&scene.vessel.motion)?;
         let Some(course) = scene.course(lumen, store)? else { return Ok(Self { motion, course: None }) };
         let path = folder.join(VESSEL);
-        let mut steps: BTreeMap<usize, Vec<Vec3>> = BTreeMap::new();
+        let mut steps = BySteps::new();
         for row in rows::read::<UnknownRow>(&path)? {
             steps.entry(row.step).or_default().push(Vec3::new(row.x_mm, row.y_mm, row.z_mm));
         }
