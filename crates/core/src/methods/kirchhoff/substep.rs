@@ -226,15 +226,6 @@ impl<const C: usize> Tools<C> {
             next,
         );
         let elements = next.mesh.elements.len();
-        if std::env::var("YD").is_ok() {
-            match &searched {
-                Ok(s) => eprintln!(
-                    "part {part_mm:.4} {effort:?} first it {} conv {} res {:.2e} off {:.3} wrong {:?}",
-                    s.taken.0, s.found.converged, s.found.residual, s.off, s.wrong
-                ),
-                Err(e) => eprintln!("part {part_mm:.4} {effort:?} {e:?}"),
-            }
-        }
         let searched = searched.and_then(|searched| match &mut course {
             None => Ok(searched),
             Some(course) => {
