@@ -111,7 +111,7 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
         stretches: measured.stretches(),
         pictures,
     };
-    answer(&document, args.json, || told(&document))
+    answer(&document, args.json, || in_words(&document))
 }
 
 /// Named places of a centre line by row, its beginning first.
@@ -242,7 +242,7 @@ fn draw(
 }
 
 /// The document for people.
-fn told(document: &Document) -> String {
+fn in_words(document: &Document) -> String {
     let mut text = format!(
         "{}: {} steps, largest push {:.2} N, the vessel moved by up to {:.1} mm\n\n",
         document.scene, document.steps, document.largest_push_force_n, document.largest_displacement_mm

@@ -30,7 +30,7 @@
 //! curvature, and without ∂²u: the neglected terms are f times a strain times |∇κ|, and f κ |∂²u|, thousandths of H.
 //! Both are transformed into space by the chain rule ([`Local::in_space`]).
 //!
-//! Where the vessel's course yields, sections turn with it and are hardly strained, and gaps are those of the vessel at
+//! Where the vessel's course yields, sections turn with it with little strain, and gaps are those of the vessel at
 //! rest, d(x) = f(X(x)), with ∇d = F⁻ᵀ∇f: then the change of d with the unknowns of the course is exactly that of x, so that
 //! what device and vessel exert on each other is equal and opposite.
 

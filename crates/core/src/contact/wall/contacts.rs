@@ -6,13 +6,13 @@ use nalgebra::Matrix3;
 
 use super::{Reading, WallContact};
 use crate::Vec3;
-use crate::contact::ROUNDING;
 use crate::contact::friction::{Coulomb, unsettled};
 use crate::contact::regions;
 use crate::contact::set::{
     ContactSet, Geometry, LinearContact, Motion, Nearby, Slipping, Stencil, Stiffness, System, Wrench, merit,
     penalty_n_per_mm,
 };
+use crate::contact::{Distance, ROUNDING};
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
@@ -51,14 +51,25 @@ fn straighten(
     }
 }
 
-/// A contact at its base: κ, N/mm, its stored energy, mJ, gradient and Hessian of that in its position, N and N/mm, and
-/// how far the gradient is from its force unknown, N.
+/// What the wall's elasticity does at a contact at its base.
 pub(super) struct Pressed {
+    /// κ, N/mm.
     kappa: f64,
+    /// Its energy, mJ, and the gradient of that in its position, N.
     stored_mj: f64,
     pub(super) gradient: Vec3,
-    excess: Vec3,
-    pub(super) hessian: Matrix3<f64>,
+    /// The part of the gradient along that of the distance.
+    pressing: Vec3,
+    /// The part of the Hessian by the slope of the modulus, N/mm.
+    graded: Matrix3<f64>,
+}
+
+impl Pressed {
+    /// The Hessian of its energy, N/mm, at this distance, with the curvature under its force unknown, N.
+    pub(super) fn hessian(&self, d: &Distance, force_n: f64) -> Matrix3<f64> {
+        let plane = d.gradient * d.gradient.transpose();
+        plane * self.kappa - d.hessian * force_n + self.graded
+    }
 }
 
 impl Geometry for WallContact<'_> {
@@ -180,27 +191,22 @@ impl WallContact<'_> {
             sum.add(point.xi, &pressed.gradient, None);
             return;
         }
-        straighten((point.element, point.xi), &elements[point.element], state, &pressed.excess, into);
-        sum.add(point.xi, &pressed.gradient, Some(&pressed.hessian));
+        let Some(d) = self.cache.pressed(index) else { return };
+        let excess = pressed.pressing + d.gradient * known.force_n;
+        straighten((point.element, point.xi), &elements[point.element], state, &excess, into);
+        sum.add(point.xi, &pressed.gradient, Some(&pressed.hessian(d, known.force_n)));
     }
 
     /// What the wall's elasticity does at a contact at its base; none where nothing presses.
     pub(super) fn pressed(&self, index: usize) -> Option<Pressed> {
         let d = self.cache.pressed(index)?;
-        let (point, known) = (&self.points[index], &self.cache.points[index]);
+        let point = &self.points[index];
         let stiffness = self.stiffness_at_base(index);
         let kappa = self.spring_with(index, &stiffness);
         let stored_mj = stiffness.factor * point.weight_mm * point.potential.value(d.value_mm);
         let pressing = d.gradient * (kappa * (d.value_mm - point.potential.radius_mm));
         let (along, graded) = stiffness.graded(stored_mj, &pressing);
-        let plane = d.gradient * d.gradient.transpose();
-        Some(Pressed {
-            kappa,
-            stored_mj,
-            gradient: pressing + along,
-            excess: pressing + d.gradient * known.force_n,
-            hessian: plane * kappa - d.hessian * known.force_n + graded,
-        })
+        Some(Pressed { kappa, stored_mj, gradient: pressing + along, pressing, graded })
     }
 
     /// Merit of a point at a state, or the wall's energy there if forces have no target, mJ. Points are visited in

@@ -27,17 +27,18 @@ impl WallContact<'_> {
         let mut all = Vec::new();
         for span in self.cache.spans.iter().filter(|span| span.at_base) {
             for index in span.points.clone() {
-                let (point, material) = (&self.points[index], self.cache.points[index].base);
-                let none = Reaction {
+                let (point, known) = (&self.points[index], &self.cache.points[index]);
+                let material = known.base;
+                let mut reaction = Reaction {
                     place: point.place(),
                     material,
                     force_n: Vec3::zeros(),
                     stiffness: Matrix3::zeros(),
                     by_angle: Vec3::zeros(),
                 };
-                let mut reaction = none;
-                if let Some(pressed) = self.pressed(index) {
-                    (reaction.force_n, reaction.stiffness) = (pressed.gradient, pressed.hessian);
+                if let (Some(pressed), Some(d)) = (self.pressed(index), self.cache.pressed(index)) {
+                    reaction.force_n = pressed.gradient;
+                    reaction.stiffness = pressed.hessian(d, known.force_n);
                 }
                 let place = self.surface.place(&material);
                 if let Some(friction) = self.friction.derivatives(index, &place, point.angle(state)) {

@@ -219,27 +219,12 @@ impl<const C: usize> Tools<C> {
             Yielding::begin(environment, (start, attempt), &mut self.friction, &self.guess.motions);
         let may_snap = part_mm <= tuning.steps.snap_radii * environment.surroundings.device.min_radius_mm();
         let first = course.as_ref().map_or(environment.displacement, |course| Some(course.displacement()));
-        let searched = self.search_from(
-            &environment.displaced(first),
-            (start, attempt),
-            (course.as_ref(), may_snap),
-            next,
-        );
-        let elements = next.mesh.elements.len();
-        let searched = searched.and_then(|searched| match &mut course {
-            None => Ok(searched),
-            Some(course) => {
-                self.follow_course(environment, (searched, effort, limits, may_snap), course, next)
-            }
-        });
-        let searched = match searched {
-            Ok(searched) => searched,
-            Err((wrong, taken)) => {
-                self.work.add(taken, elements);
-                return Err(wrong);
-            }
-        };
-        self.work.add(searched.taken, elements);
+        let there = environment.displaced(first);
+        let mut searched = self.search_from(&there, (start, attempt), (course.as_ref(), may_snap), next)?;
+        if let Some(course) = &mut course {
+            searched = self.follow_course(environment, (searched, effort, limits, may_snap), course, next);
+        }
+        self.work.add(searched.taken, next.mesh.elements.len());
         let (mesh, after) = next.parts();
         if let Some(course) = course {
             course.keep(start.state, after);
@@ -283,15 +268,14 @@ impl<const C: usize> Tools<C> {
         })
     }
 
-    /// Searches from the prediction of a part, or goes on where earlier commands have left it. An error says what was
-    /// taken.
+    /// Searches from the prediction of a part, or goes on where earlier commands have left it.
     fn search_from(
         &mut self,
         environment: &Environment<'_>,
         (start, attempt): (Start<'_>, Attempt<'_>),
         (course, may_snap): (Option<&Yielding<'_>>, bool),
         next: &mut Configuration,
-    ) -> std::result::Result<Searched, (Lost, (usize, usize))> {
+    ) -> std::result::Result<Searched, Lost> {
         let options = environment.options;
         let tuning = &options.tuning;
         let Attempt { part: Part { effort, resumed, .. }, limits, .. } = attempt;
@@ -309,7 +293,7 @@ impl<const C: usize> Tools<C> {
                 let guessed = guess.choose(contact, loops, (start, mesh, state), tuning.steps.repeats);
                 let inside = guessed && !in_its_own_way;
                 if in_its_own_way || (effort != Effort::Flight && !inside) {
-                    return Err((Lost::Beyond, (0, 0)));
+                    return Err(Lost::Beyond);
                 }
                 contact.rooms(&mesh.elements, state, &mut guess.room_mm);
                 newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);

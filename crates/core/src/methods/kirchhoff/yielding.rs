@@ -60,8 +60,6 @@ const LEAST_CURVATURE: f64 = 1e-7;
 const MOST_RADII: f64 = 2.0;
 /// … and turns the device by at most so much, rad.
 const MOST_TURN_RAD: f64 = 0.3;
-/// Forces on the course are balanced to this times the tolerance of equilibria.
-const OF_TOLERANCE: f64 = 1.0;
 
 /// The course in a part.
 pub(super) struct Yielding<'a> {
@@ -145,7 +143,7 @@ impl<'a> Yielding<'a> {
         touched.unknowns.iter().zip(&forces).for_each(|(unknown, force)| given[*unknown] = *force);
         let largest_n = forces.iter().map(Vec3::amax).fold(search.contact.negligible_n(), f64::max);
         let off_n: Vec<Vec3> = own.iter().zip(&given).map(|(own, given)| own - given).collect();
-        if off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= OF_TOLERANCE * search.tolerance * largest_n {
+        if off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= search.tolerance * largest_n {
             return Ok(None);
         }
         search.assemble(lagged, true);
@@ -342,15 +340,14 @@ impl Touched {
 }
 
 impl<const C: usize> Tools<C> {
-    /// Lets the course follow an equilibrium of the device, and the device the course, until both are in equilibrium. An
-    /// error says what was taken.
+    /// Lets the course follow an equilibrium of the device, and the device the course, until both are in equilibrium.
     pub(super) fn follow_course(
         &mut self,
         environment: &Environment<'_>,
         (first, effort, limits, may_snap): (Searched, Effort, Limits, bool),
         course: &mut Yielding<'_>,
         next: &mut Configuration,
-    ) -> Result<Searched, (Lost, (usize, usize))> {
+    ) -> Searched {
         let tuning = &environment.options.tuning;
         let stack = environment.surroundings.stack;
         let most_mm = course.most_mm(environment);
@@ -363,7 +360,7 @@ impl<const C: usize> Tools<C> {
         let (mut damped, mut step_mm, mut before_mj) = (1.0f64, Vec::new(), f64::INFINITY);
         for _ in 0..MOST_ROUNDS {
             let Some(Follows { amplitudes_mm, mut way, off_n }) = searched.follows.take() else {
-                return Ok(searched);
+                return searched;
             };
             // The slope of the energy in equilibrium with the device.
             let slope_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>();
@@ -382,7 +379,7 @@ impl<const C: usize> Tools<C> {
             before_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>().abs();
             let farthest_mm = step_mm.iter().map(|by: &Vec3| by.norm()).fold(0.0, f64::max);
             let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
-                return Ok(searched);
+                return searched;
             };
             self.friction.carry((&course.displacement, &moved), &self.guess.motions);
             let moved_mm = farthest_mm * moved.stretch();
@@ -428,6 +425,6 @@ impl<const C: usize> Tools<C> {
             };
         }
         let wrong = Some(Lost::Unsolved(StopReason::Unsettled, searched.found.residual));
-        Ok(Searched { wrong, ..searched })
+        Searched { wrong, ..searched }
     }
 }

@@ -123,7 +123,6 @@ impl Samples {
             return on(OnChain::alone(&self.all[here.felt[here.felt.len() / 2] as usize]));
         }
         let mut sum: Option<OnChain> = None;
-        let mut felt = false;
         for index in &here.felt {
             let one = &self.all[*index as usize];
             let off = x - one.place;
@@ -131,7 +130,6 @@ impl Samples {
             if square >= 1.0 {
                 continue;
             }
-            felt = true;
             if let Some(done) = sum.take_if(|sum| sum.chain != one.chain as usize) {
                 on(done);
             }
@@ -139,8 +137,7 @@ impl Samples {
         }
         match sum {
             Some(done) => on(done),
-            None if !felt => on(OnChain::alone(self.nearest(x))),
-            None => {}
+            None => on(OnChain::alone(self.nearest(x))),
         }
     }
 
