@@ -51,6 +51,12 @@ pub(super) struct KnownPoint {
     pub(super) force_n: f64,
 }
 
+/// No place, since nothing is equal to NaN.
+const NOWHERE: (Vec3, Vec3) = {
+    let nan = Vec3::new(f64::NAN, f64::NAN, f64::NAN);
+    (nan, nan)
+};
+
 const NOTHING: KnownPoint = KnownPoint {
     looked_at: Vec3::new(0.0, 0.0, 0.0),
     from_tip_mm: 0.0,
@@ -97,6 +103,8 @@ pub struct ContactCache {
     /// The last reading of each point near the wall. Stored apart from `points` for speed: most points are free, and
     /// all of them are visited many times per step.
     pub(super) readings: Vec<TakenReading>,
+    /// Where each point was last, and the material point of the displaced vessel there.
+    pub(super) places: Vec<(Vec3, Vec3)>,
     pub(super) proximity: ProximityCache,
     /// Contacts in the step from a base.
     pub(super) set: ContactSet<PointPlace>,
@@ -163,6 +171,7 @@ impl ContactCache {
             points: Vec::new(),
             spans: Vec::new(),
             readings: Vec::new(),
+            places: Vec::new(),
             proximity: ProximityCache::of(surface),
             set: ContactSet::default(),
             tuning: surface.tuning,
@@ -175,12 +184,15 @@ impl ContactCache {
         self.spans.reserve(points.saturating_sub(self.spans.len()));
         self.set.reserve(points);
         self.readings.reserve(points.saturating_sub(self.readings.len()));
+        self.places.reserve(points.saturating_sub(self.places.len()));
     }
 
     /// Resets to these points, without knowledge of their clearance.
     pub(super) fn look_at(&mut self, points: &[ContactPoint]) {
         self.points.resize(points.len(), NOTHING);
         self.readings.resize(points.len(), TakenReading::NONE);
+        self.places.clear();
+        self.places.resize(points.len(), NOWHERE);
         self.spans.clear();
         self.spans.extend(Span::all(points));
         self.set.clear();
@@ -189,6 +201,7 @@ impl ContactCache {
     /// Goes on with the same points where material points have moved under them by at most so much, mm.
     pub(super) fn look_again(&mut self, moved_mm: f64) {
         self.readings.fill(TakenReading::NONE);
+        self.places.fill(NOWHERE);
         self.spans.iter_mut().for_each(|span| span.narrow(moved_mm));
         self.set.clear();
     }

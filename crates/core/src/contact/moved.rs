@@ -73,6 +73,11 @@ impl<'a> MovedWall<'a> {
         Self { surface, displacement }
     }
 
+    /// Whether material points are elsewhere than at rest.
+    pub(super) fn is_displaced(&self) -> bool {
+        self.displacement.is_some()
+    }
+
     /// The material point at position `x`.
     pub(crate) fn material(&self, x: &Vec3) -> Vec3 {
         self.displacement.map_or(*x, |displacement| displacement.material(x))

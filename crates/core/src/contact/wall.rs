@@ -100,9 +100,30 @@ impl<'a> WallContact<'a> {
     }
 
     /// The material point of the vessel where point `index` is at a state; knowledge of the wall refers to these.
-    fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
+    fn material(&mut self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
         let x = self.points[index].position(elements, state);
-        self.surface.material_near(&x, &self.cache.points[index].base)
+        self.material_at(index, &x)
+    }
+
+    /// The material point of the vessel where point `index` is at position `x`.
+    fn material_at(&mut self, index: usize, x: &Vec3) -> Vec3 {
+        if !self.surface.is_displaced() {
+            return *x;
+        }
+        let (place, material) = self.cache.places[index];
+        if place == *x {
+            return material;
+        }
+        let material = self.surface.material_near(x, &self.cache.points[index].base);
+        self.cache.places[index] = (*x, material);
+        material
+    }
+
+    /// Position of point `index` at the base.
+    fn base_place(&self, index: usize) -> Vec3 {
+        let base = &self.cache.points[index].base;
+        let (place, material) = &self.cache.places[index];
+        if material == base { *place } else { self.surface.place(base) }
     }
 
     /// Distance from the wall within which a point of this radius is tracked, mm.
@@ -185,7 +206,7 @@ impl<'a> WallContact<'a> {
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
-        let material = self.surface.material_near(&x, &self.cache.points[index].base);
+        let material = self.material_at(index, &x);
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
         let stiffness = self.surface.stiffness(&material, self.cache.points[index].piece);

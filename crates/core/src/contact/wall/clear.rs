@@ -154,7 +154,7 @@ impl WallContact<'_> {
         if !std::mem::replace(&mut known.at_base, true) {
             for index in points.clone() {
                 let x = self.points[index].between(&base, length_mm);
-                let material = self.surface.material_near(&x, &self.cache.points[index].base);
+                let material = self.material_at(index, &x);
                 self.read_base(index, elements, &material);
             }
         }

@@ -114,10 +114,10 @@ impl Geometry for WallContact<'_> {
     }
 
     fn find_slipping(&self, base: &RodState, into: &mut Vec<Slipping<PointPlace>>) {
-        let all = self.friction.sliders.iter().zip(self.points).zip(&self.cache.points);
-        let held = all.filter(|((slider, _), _)| slider.holds());
-        into.extend(held.filter_map(|((slider, point), known)| {
-            let at = (self.surface.place(&known.base), point.angle(base));
+        let all = self.friction.sliders.iter().zip(self.points).enumerate();
+        let held = all.filter(|(_, (slider, _))| slider.holds());
+        into.extend(held.filter_map(|(index, (slider, point))| {
+            let at = (self.base_place(index), point.angle(base));
             Slipping::new(point.place(), slider, at, &self.friction.law)
         }));
     }

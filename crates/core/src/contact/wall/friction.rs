@@ -71,7 +71,10 @@ impl WallContact<'_> {
         sum: &mut PointSum,
         index: usize,
     ) {
-        let (point, x) = (&self.points[index], &self.surface.place(&self.cache.points[index].base));
+        if self.friction.holding(index).is_none() {
+            return;
+        }
+        let (point, x) = (&self.points[index], &self.base_place(index));
         let angle = point.angle(state);
         let Some(f) = self.friction.derivatives(index, x, angle) else { return };
         into.add_value(self.friction.value(index, x, angle));

@@ -40,7 +40,7 @@ impl WallContact<'_> {
                     reaction.force_n = pressed.gradient;
                     reaction.stiffness = pressed.hessian(d, known.force_n);
                 }
-                let place = self.surface.place(&material);
+                let place = self.base_place(index);
                 if let Some(friction) = self.friction.derivatives(index, &place, point.angle(state)) {
                     reaction.force_n += friction.gradient;
                     reaction.stiffness += friction.hessian;

@@ -38,6 +38,8 @@ const MOST: usize = 60;
 const STEEPEST: f64 = 0.9;
 /// Residual, relative to a coordinate, that counts as rounding.
 const ROUNDING: f64 = f64::EPSILON;
+/// What is left after a step of Newton's method is its square by the field's curvature: after one below this, mm, rounding.
+const LAST_MM: f64 = 1e-7;
 
 impl Displacement {
     pub(super) fn new(modes: Vec<Affine>, steepest: f64) -> Self {
@@ -57,12 +59,17 @@ impl Displacement {
 
     /// u, mm.
     pub(crate) fn displacement_mm(&self, material: &Vec3) -> Vec3 {
+        let moved = self.by_modes_mm(material);
+        self.course.as_ref().map_or(moved, |course| moved + course.displacement_mm(material))
+    }
+
+    /// u of the motion alone, mm.
+    fn by_modes_mm(&self, material: &Vec3) -> Vec3 {
         let each = self.modes.iter().map(|mode| {
             let v = mode.matrix * material + mode.offset;
             mode.fade.map_or(v, |fade| v * fade.at_mm((material - fade.centre()).norm()))
         });
-        let moved: Vec3 = each.sum();
-        self.course.as_ref().map_or(moved, |course| moved + course.displacement_mm(material))
+        each.sum()
     }
 
     /// x = X + u(X): position of a material point, mm.
@@ -72,8 +79,15 @@ impl Displacement {
 
     /// F = I + ∂u/∂X.
     pub(crate) fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
-        let gradient = self.of_modes(material);
-        self.course.as_ref().map_or(gradient, |course| gradient + course.gradient(material))
+        self.with_gradient(material).1
+    }
+
+    /// u, mm, and F = I + ∂u/∂X.
+    fn with_gradient(&self, material: &Vec3) -> (Vec3, Matrix3<f64>) {
+        let (moved, gradient) = (self.by_modes_mm(material), self.of_modes(material));
+        let Some(course) = &self.course else { return (moved, gradient) };
+        let (by_course, own) = course.with_gradient(material);
+        (moved + by_course, gradient + own)
     }
 
     /// F of the motion alone.
@@ -111,38 +125,43 @@ impl Displacement {
         Local { inverse: inverse(&gradient), second }
     }
 
-    /// X with X + u(X) = x: the material point there. By Newton's method, one step for a rigid motion; if it does not
-    /// halve the distance, X = x − u(X) does, where |∂u/∂X| is less than half.
+    /// X with X + u(X) = x: the material point there.
     pub fn material(&self, place: &Vec3) -> Vec3 {
-        self.material_near(place, place)
+        self.inverse(place, place - self.displacement_mm(place))
     }
 
-    /// As [`Self::material`], given a material point nearby.
+    /// As [`Self::material`], given a material point nearby; NaN where none is known.
     #[inline]
     pub(crate) fn material_near(&self, place: &Vec3, nearby: &Vec3) -> Vec3 {
-        if let (Some(course), []) = (&self.course, &self.modes[..])
-            && let Some(material) = course.material(place, nearby)
-        {
-            return material;
+        let Some(course) = &self.course else { return self.material(place) };
+        if nearby.x.is_nan() {
+            return self.material(place);
         }
-        self.inverse(place)
+        let of_one = if self.modes.is_empty() { course.material(place, nearby) } else { None };
+        of_one.unwrap_or_else(|| self.inverse(place, *nearby))
     }
 
-    fn inverse(&self, place: &Vec3) -> Vec3 {
-        let off = |x: &Vec3| place - self.place(x);
-        let mut x = place - self.displacement_mm(place);
-        let mut left = off(&x);
+    /// X with X + u(X) = x, from an estimate. By Newton's method, one step for a rigid motion; if it does not halve the
+    /// distance, X = x − u(X) does, where |∂u/∂X| is less than half.
+    fn inverse(&self, place: &Vec3, estimate: Vec3) -> Vec3 {
+        let off = |x: &Vec3| {
+            let (moved, gradient) = self.with_gradient(x);
+            (place - x - moved, gradient)
+        };
+        let mut x = estimate;
+        let (mut left, mut gradient) = off(&x);
         for _ in 0..MOST {
             let size = left.norm();
             if size.is_nan() || size <= ROUNDING * place.amax() {
                 break;
             }
-            let steps = [inverse(&self.gradient(&x)) * left, left];
-            let nearer = steps.map(|step| x + step).map(|next| (next, off(&next)));
-            let Some((next, rest)) = nearer.into_iter().find(|(_, rest)| rest.norm() < 0.5 * size) else {
-                break;
-            };
-            (x, left) = (next, rest);
+            let step = inverse(&gradient) * left;
+            if step.norm() <= LAST_MM {
+                return x + step;
+            }
+            let nearer = |step: Vec3| Some((x + step, off(&(x + step)))).filter(|at| at.1.0.norm() < 0.5 * size);
+            let Some(next) = nearer(step).or_else(|| nearer(left)) else { break };
+            (x, (left, gradient)) = next;
         }
         x
     }

@@ -80,8 +80,8 @@ const QUINTIC: [[f64; 6]; 6] = [
 ];
 /// Most steps of Newton's method on a place.
 const MOST: usize = 20;
-/// Steps below this, mm, are rounding.
-const ROUNDING_MM: f64 = 1e-12;
+/// What is left after a step of Newton's method is its square over a radius of curvature: after one below this, mm, rounding.
+const LAST_MM: f64 = 1e-7;
 /// The least of D: farther inside a bend than its centre sections have crossed.
 const LEAST_D: f64 = 0.1;
 
@@ -122,20 +122,22 @@ impl Curve {
         [value, first * h, second * (h * h), third * (h * h * h)]
     }
 
-    /// s of a point X, from a guess.
+    /// s of a point X, from a guess, and the curve there as by [`Self::at`].
     #[inline]
-    pub(super) fn place(&self, x: &Vec3, guess_mm: f64) -> f64 {
+    pub(super) fn place(&self, x: &Vec3, guess_mm: f64) -> (f64, [Vec3; 4]) {
         let mut s = guess_mm;
+        let mut there = self.at(s);
         for _ in 0..MOST {
-            let [c, c1, c2, _] = self.at(s);
+            let [c, c1, c2, _] = there;
             let off = x - c;
             let step = c1.dot(&off) / (c1.norm_squared() - c2.dot(&off)).max(LEAST_D);
             s += step;
-            if step.abs() <= ROUNDING_MM {
+            there = self.at(s);
+            if step.abs() <= LAST_MM {
                 break;
             }
         }
-        s
+        (s, there)
     }
 
     /// The material point at a point x in space, from a guess of its s, where sections are displaced by `w`, given with its
@@ -154,7 +156,7 @@ impl Curve {
             let g1 = c2.dot(&v) - c1.dot(&(c1 + w1)) + 2.0 * c1.dot(&c2) * q + size * q1;
             let step = g / (-g1).max(LEAST_D);
             s += step;
-            if step.abs() <= ROUNDING_MM {
+            if step.abs() <= LAST_MM {
                 break;
             }
         }
@@ -163,16 +165,28 @@ impl Curve {
         c + v + c1 * (w1.dot(&v) / (1.0 - w1.dot(&c1)))
     }
 
-    /// ∇s and ∇∇s at a point whose place is s.
-    #[inline]
-    pub(super) fn derivatives(&self, x: &Vec3, s_mm: f64) -> (Vec3, Matrix3<f64>) {
-        let [c, c1, c2, c3] = self.at(s_mm);
-        let off = x - c;
-        let d = (c1.norm_squared() - c2.dot(&off)).max(LEAST_D);
-        let mixed = outer(&c2, &c1);
-        let third = 3.0 * c1.dot(&c2) - c3.dot(&off);
-        (c1 / d, (mixed + mixed.transpose()) / (d * d) - outer(&c1, &c1) * (third / (d * d * d)))
-    }
+}
+
+/// D of a point, with the curve at its place.
+#[inline]
+fn least_d(x: &Vec3, [c, c1, c2, _]: &[Vec3; 4]) -> f64 {
+    (c1.norm_squared() - c2.dot(&(x - c))).max(LEAST_D)
+}
+
+/// ∇s at a point, with the curve at its place.
+#[inline]
+pub(super) fn slope(x: &Vec3, there: &[Vec3; 4]) -> Vec3 {
+    there[1] / least_d(x, there)
+}
+
+/// ∇∇s at a point, with the curve at its place.
+#[inline]
+pub(super) fn bend(x: &Vec3, there: &[Vec3; 4]) -> Matrix3<f64> {
+    let [c, c1, c2, c3] = there;
+    let d = least_d(x, there);
+    let mixed = outer(c2, c1);
+    let third = 3.0 * c1.dot(c2) - c3.dot(&(x - c));
+    (mixed + mixed.transpose()) / (d * d) - outer(c1, c1) * (third / (d * d * d))
 }
 
 #[cfg(test)]
@@ -201,16 +215,16 @@ mod tests {
             assert!((c.xy().norm() - 20.0).abs() < 0.3, "{c}");
             let across = c1.cross(&Vec3::new(0.3, f64::from(k).sin(), 1.0)).normalize();
             let x = c + across * 3.0;
-            assert!((curve.place(&x, s + 2.0) - s).abs() < 1e-10);
-            let (slope, bend) = curve.derivatives(&x, s);
+            assert!((curve.place(&x, s + 2.0).0 - s).abs() < 1e-10);
+            let (own, bends) = (slope(&x, &curve.at(s)), bend(&x, &curve.at(s)));
             for axis in 0..3 {
                 let [more, less] = [h, -h].map(|h| {
                     let there = x + Vec3::ith(axis, h);
-                    let s = curve.place(&there, s);
-                    (s, curve.derivatives(&there, s).0)
+                    let (s, here) = curve.place(&there, s);
+                    (s, slope(&there, &here))
                 });
-                assert!(((more.0 - less.0) / (2.0 * h) - slope[axis]).abs() < 1e-8);
-                let differs = (more.1 - less.1) / (2.0 * h) - bend.column(axis);
+                assert!(((more.0 - less.0) / (2.0 * h) - own[axis]).abs() < 1e-8);
+                let differs = (more.1 - less.1) / (2.0 * h) - bends.column(axis);
                 assert!(differs.norm() < 1e-6, "{differs}");
             }
         }
@@ -228,9 +242,9 @@ mod tests {
     fn beyond_its_ends_it_is_straight_and_sections_may_be_displaced() {
         let curve = helix();
         let [end, along, bend, _] = curve.at(-40.0);
-        let [begin, slope, ..] = curve.at(-20.0);
-        assert!((end - begin + slope * 20.0).norm() < 1e-8);
-        assert!((along - slope).norm() < 1e-9 && bend.norm() < 1e-9);
+        let [begin, straight, ..] = curve.at(-20.0);
+        assert!((end - begin + straight * 20.0).norm() < 1e-8);
+        assert!((along - straight).norm() < 1e-9 && bend.norm() < 1e-9);
         let moved = |s: f64| {
             let [a, b] = [Vec3::new(0.02, 0.0, 0.1), Vec3::new(0.001, -0.002, 0.0)];
             [a * s + b * (s * s), a + b * (2.0 * s), b * 2.0, Vec3::zeros()]

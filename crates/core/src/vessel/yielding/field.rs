@@ -15,7 +15,7 @@ use nalgebra::Matrix3;
 use rustc_hash::FxHashMap;
 
 use super::chains::Chain;
-use super::curve::Piece;
+use super::curve::{self, Piece};
 use super::spline::FELT;
 use crate::Vec3;
 use crate::products::outer;
@@ -33,6 +33,8 @@ const MOST_CELLS: f64 = 12.0;
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     place: Vec3,
+    /// The run's direction there.
+    along: Vec3,
     arc_mm: f64,
     chain: u32,
     reach_mm: f64,
@@ -56,7 +58,7 @@ struct Cell {
     is_of_one: bool,
 }
 
-/// Of a point on one run: M, s and their derivatives, as far as they are wanted.
+/// Of a point on one run: M, s, their derivatives, as far as they are wanted, and the run's curve there.
 #[derive(Debug, Clone, Copy)]
 struct OnChain {
     chain: usize,
@@ -66,6 +68,7 @@ struct OnChain {
     arc_mm: f64,
     arc1: Vec3,
     arc2: Matrix3<f64>,
+    curve: [Vec3; 4],
 }
 
 /// How many derivatives are wanted.
@@ -109,18 +112,21 @@ impl Samples {
     #[inline]
     fn each_chain(&self, x: &Vec3, chains: &[Chain], order: Order, mut with: impl FnMut(&OnChain)) {
         let mut on = |mut sum: OnChain| {
-            let curve = &chains[sum.chain].curve;
-            sum.arc_mm = curve.place(x, sum.arc_mm);
+            // The mean of what its samples say.
+            (sum.arc_mm, sum.curve) = chains[sum.chain].curve.place(x, sum.arc_mm / sum.mass);
             if order > Order::Value {
-                (sum.arc1, sum.arc2) = curve.derivatives(x, sum.arc_mm);
+                sum.arc1 = curve::slope(x, &sum.curve);
+            }
+            if order > Order::First {
+                sum.arc2 = curve::bend(x, &sum.curve);
             }
             with(&sum);
         };
         let Some(here) = self.cells.get(&cell_of(x, self.cell_mm)) else {
-            return on(OnChain::alone(self.nearest(x)));
+            return on(OnChain::alone(self.nearest(x), x));
         };
         if here.is_of_one {
-            return on(OnChain::alone(&self.all[here.felt[here.felt.len() / 2] as usize]));
+            return on(OnChain::alone(&self.all[here.felt[here.felt.len() / 2] as usize], x));
         }
         let mut sum: Option<OnChain> = None;
         for index in &here.felt {
@@ -137,7 +143,7 @@ impl Samples {
         }
         match sum {
             Some(done) => on(done),
-            None => on(OnChain::alone(self.nearest(x))),
+            None => on(OnChain::alone(self.nearest(x), x)),
         }
     }
 
@@ -150,13 +156,10 @@ impl Samples {
     /// The material point at x, if one run alone is felt at it, given one nearby.
     #[inline]
     pub(super) fn material(&self, x: &Vec3, nearby: &Vec3, of: Displaced<'_>) -> Option<Vec3> {
-        if nearby.x.is_nan() {
-            return None;
-        }
         let here = self.cells.get(&cell_of(nearby, self.cell_mm)).filter(|cell| cell.is_of_one)?;
         let one = &self.all[here.felt[here.felt.len() / 2] as usize];
         let chain = one.chain as usize;
-        let material = of.chains[chain].curve.material(x, one.arc_mm, |s| of.at(chain, s));
+        let material = of.chains[chain].curve.material(x, one.arc_near(nearby), |s| of.at(chain, s));
         let there = self.cells.get(&cell_of(&material, self.cell_mm))?;
         let is_same = there.is_of_one && self.all[there.felt[0] as usize].chain == one.chain;
         is_same.then_some(material)
@@ -172,8 +175,8 @@ impl Samples {
         sum / mass
     }
 
-    /// ∂u/∂X.
-    pub(super) fn gradient(&self, x: &Vec3, of: Displaced<'_>) -> Matrix3<f64> {
+    /// u, mm, and ∂u/∂X.
+    pub(super) fn with_gradient(&self, x: &Vec3, of: Displaced<'_>) -> (Vec3, Matrix3<f64>) {
         let (mut mass, mut mass1) = (0.0, Vec3::zeros());
         let (mut sum, mut sum1) = (Vec3::zeros(), Matrix3::zeros());
         self.each_chain(x, of.chains, Order::First, |on| {
@@ -183,7 +186,8 @@ impl Samples {
             sum += moved.value * on.mass;
             sum1 += outer(&moved.value, &on.mass1) + moved.gradient(on) * on.mass;
         });
-        (sum1 - outer(&(sum / mass), &mass1)) / mass
+        let u = sum / mass;
+        (u, (sum1 - outer(&u, &mass1)) / mass)
     }
 
     /// ∂u/∂X and ∂²uₖ/∂X², added to those of a field: F and its bends.
@@ -238,9 +242,8 @@ impl Samples {
     ) -> Vec<(usize, [Matrix3<f64>; 2])> {
         let (mut mass, mut mass1, mut all) = (0.0, Vec3::zeros(), Vec::new());
         self.each_chain(x, chains, Order::First, |on| {
-            let Chain { spline, curve, .. } = &chains[on.chain];
-            let basis = spline.at(on.arc_mm);
-            let [c, c1, c2, _] = curve.at(on.arc_mm);
+            let basis = chains[on.chain].spline.at(on.arc_mm);
+            let [c, c1, c2, _] = on.curve;
             let rho = x - c;
             let (along, bent) = (c1.dot(g), c2.dot(g));
             let turns = outer(&c1, &rho);
@@ -283,7 +286,7 @@ impl Displaced<'_> {
     /// How a run moves a point: U = w − c′ q with q = w′·ρ, q_s = w″·ρ − w′·c′, q_ss = w‴·ρ − 2 w″·c′ − w′·c″.
     #[inline]
     fn moved(&self, on: &OnChain, x: &Vec3) -> MovedBy {
-        let [c, c1, c2, c3] = self.chains[on.chain].curve.at(on.arc_mm);
+        let [c, c1, c2, c3] = on.curve;
         let [w, w1, w2, w3] = self.at(on.chain, on.arc_mm);
         let rho = x - c;
         let (q, q1) = (w1.dot(&rho), w2.dot(&rho) - w1.dot(&c1));
@@ -319,24 +322,41 @@ impl MovedBy {
     }
 }
 
+impl Sample {
+    /// Estimate of s at a point.
+    fn arc_near(&self, x: &Vec3) -> f64 {
+        self.arc_mm + self.along.dot(&(x - self.place))
+    }
+}
+
 impl OnChain {
     /// Nothing yet of the run of a sample.
     fn none(one: &Sample) -> Self {
-        let (mass1, mass2) = (Vec3::zeros(), Matrix3::zeros());
-        let (chain, arc_mm) = (one.chain as usize, one.arc_mm);
-        Self { chain, mass: 0.0, mass1, mass2, arc_mm, arc1: mass1, arc2: mass2 }
+        let (zero, zeros) = (Vec3::zeros(), Matrix3::zeros());
+        Self {
+            chain: one.chain as usize,
+            mass: 0.0,
+            mass1: zero,
+            mass2: zeros,
+            arc_mm: 0.0,
+            arc1: zero,
+            arc2: zeros,
+            curve: [zero; 4],
+        }
     }
 
-    /// The only run near, that of a sample.
-    fn alone(one: &Sample) -> Self {
-        Self { mass: 1.0, ..Self::none(one) }
+    /// The only run near a point, that of a sample.
+    fn alone(one: &Sample, x: &Vec3) -> Self {
+        Self { mass: 1.0, arc_mm: one.arc_near(x), ..Self::none(one) }
     }
 
     /// Adds a sample at q².
     #[inline]
     fn add(&mut self, one: &Sample, off: &Vec3, square: f64, order: Order) {
         let left = 1.0 - square;
-        self.mass += one.size * left * left * left;
+        let mass = one.size * left * left * left;
+        self.mass += mass;
+        self.arc_mm += mass * (one.arc_mm + one.along.dot(off));
         if order == Order::Value {
             return;
         }
@@ -358,8 +378,9 @@ fn cell_of(x: &Vec3, cell_mm: f64) -> [i32; 3] {
 /// Adds the samples of a run, and those beyond its ends that are the vessel's.
 fn sample(chain: &Chain, index: u32, into: &mut Vec<Sample>) {
     let length_mm = chain.length_mm();
-    let one = |place: Vec3, (arc_mm, piece_mm): (f64, f64), radius_mm: f64| Sample {
+    let one = |place: Vec3, along: Vec3, (arc_mm, piece_mm): (f64, f64), radius_mm: f64| Sample {
         place,
+        along,
         arc_mm,
         chain: index,
         reach_mm: REACH_RADII * radius_mm,
@@ -372,7 +393,8 @@ fn sample(chain: &Chain, index: u32, into: &mut Vec<Sample>) {
         let count = (BEYOND_RADII / SAMPLE_RADII) as usize;
         into.extend((0..count).map(|k| {
             let off_mm = (k as f64 + 0.5) * piece_mm;
-            one(chain.points[end] + out * off_mm, (arc_mm + sign * off_mm, piece_mm), radius_mm)
+            let place = chain.points[end] + out * off_mm;
+            one(place, out * sign, (arc_mm + sign * off_mm, piece_mm), radius_mm)
         }));
     };
     let last = chain.points.len() - 1;
@@ -389,7 +411,7 @@ fn sample(chain: &Chain, index: u32, into: &mut Vec<Sample>) {
             let part = (i as f64 + 0.5) / count;
             let arc_mm = chain.arcs_mm[k] + part * piece_mm;
             let radius_mm = radius_mm + part * (next_mm - radius_mm);
-            one(from + (to - from) * part, (arc_mm, piece_mm / count), radius_mm)
+            one(from + (to - from) * part, (to - from).normalize(), (arc_mm, piece_mm / count), radius_mm)
         }));
     }
 }

@@ -245,9 +245,9 @@ impl Bent {
         self.course.samples.displacement_mm(material, self.displaced())
     }
 
-    /// ∂u/∂X.
-    pub(crate) fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
-        self.course.samples.gradient(material, self.displaced())
+    /// u, mm, and ∂u/∂X.
+    pub(crate) fn with_gradient(&self, material: &Vec3) -> (Vec3, Matrix3<f64>) {
+        self.course.samples.with_gradient(material, self.displaced())
     }
 
     /// Adds ∂u/∂X and ∂²uₖ/∂X².
