@@ -114,7 +114,10 @@ impl<'a> WallContact<'a> {
         if place == *x {
             return material;
         }
-        let material = self.surface.material_near(x, &self.cache.points[index].base);
+        // It has moved with the point, if it was known elsewhere.
+        let base = &self.cache.points[index].base;
+        let nearby = if place.x.is_nan() { *base } else { material + (x - place) };
+        let material = self.surface.material_near(x, &nearby);
         self.cache.places[index] = (*x, material);
         material
     }

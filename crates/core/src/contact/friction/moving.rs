@@ -17,10 +17,9 @@ use crate::vessel::Displacement;
 impl Slider {
     /// Moves the reference with the wall; returns how far, mm.
     pub(super) fn carry(&mut self, before: &Displacement, after: &Displacement) -> f64 {
-        let material = before.material(&self.from_mm);
-        let local = before.local(&material);
-        let turned = after.gradient(&material) * local.inverse;
-        let there = after.place(&material);
+        let material = self.material.unwrap_or_else(|| before.material(&self.from_mm));
+        self.material = Some(material);
+        let (there, turned) = after.since(before, &material);
         let way_mm = (there - self.from_mm).norm();
         self.from_mm = there;
         let axial =

@@ -10,6 +10,8 @@ use crate::Vec3;
 pub(in crate::contact) struct Slider {
     /// a: where it slips from.
     pub(in crate::contact) from_mm: Vec3,
+    /// The material point of the vessel there, if it has been carried along.
+    pub(super) material: Option<Vec3>,
     /// θₐ: its material angle before the step.
     pub(super) from_rad: f64,
     /// Direction of the device; zero where spin causes no slip.
@@ -47,6 +49,7 @@ impl Slider {
         let none = (Vec3::zeros(), 0.0);
         Self {
             from_mm: place_mm - along * advance_mm,
+            material: None,
             from_rad,
             along,
             radius_mm,
@@ -87,7 +90,7 @@ impl Slider {
 
     /// Slips from there, with the normal force of the last base.
     pub(super) fn anchor(&mut self, from_mm: Vec3, from_rad: f64) {
-        (self.from_mm, self.from_rad) = (from_mm, from_rad);
+        (self.from_mm, self.material, self.from_rad) = (from_mm, None, from_rad);
         self.force_n = self.seen.1;
         if self.seen.1 > 0.0 {
             self.normal = self.seen.0;

@@ -28,6 +28,7 @@
 //! stable; where it is not, they snap together, and the step descends by the magnitudes of the curvatures.
 
 use std::convert::Infallible;
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -41,7 +42,7 @@ use super::substep::Attempt;
 use super::workspace::Tools;
 use crate::Vec3;
 use crate::contact::{Friction, HandMotion, Reaction};
-use crate::rod::scatter::{angle_weights, point_columns, point_step, point_turn};
+use crate::rod::scatter::{angle_weights, point_columns};
 use crate::rod::{Layout, RodState};
 use crate::solve::StopReason;
 use crate::vessel::{Course, Displacement};
@@ -143,14 +144,20 @@ impl<'a> Yielding<'a> {
         touched.unknowns.iter().zip(&forces).for_each(|(unknown, force)| given[*unknown] = *force);
         let largest_n = forces.iter().map(Vec3::amax).fold(search.contact.negligible_n(), f64::max);
         let off_n: Vec<Vec3> = own.iter().zip(&given).map(|(own, given)| own - given).collect();
-        if off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= search.tolerance * largest_n {
+        // No nearer than friction is settled: its normal forces follow from an equilibrium and move the next one.
+        let friction = search.tuning.friction.settled;
+        let tolerance = if search.has_friction { search.tolerance.max(friction) } else { search.tolerance };
+        if off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= tolerance * largest_n {
             return Ok(None);
         }
         search.assemble(lagged, true);
         let factored = search.newton.factor(search.elements, search.supports);
         factored.ok_or(StopReason::Singular)?;
-        let responses = touched.responses(search, &reactions);
-        let next = self.next(&touched, &forces, (&reactions, &responses), most_mm, search);
+        let pulls = touched.pulls(search, &reactions);
+        let responses = pulls.responses(search);
+        let mut stiffness = touched.held_stiffness(&reactions);
+        pulls.soften(&responses, &mut stiffness);
+        let next = self.next(&touched, &forces, stiffness, most_mm);
         let amplitudes_mm = next.ok_or(StopReason::Singular)?;
         let moved = |unknown: usize| amplitudes_mm[unknown] - self.amplitudes_mm[unknown];
         let mut way = vec![0.0; Layout::<C>::dimension(search.elements.len())];
@@ -164,13 +171,12 @@ impl<'a> Yielding<'a> {
     }
 
     /// The amplitudes of the next round, mm.
-    fn next<const C: usize>(
+    fn next(
         &self,
         touched: &Touched,
         forces: &[Vec3],
-        (reactions, responses): (&[Reaction], &[Vec<f64>]),
+        stiffness: DMatrix<f64>,
         most_mm: f64,
-        search: &Search<'_, '_, C>,
     ) -> Option<Vec<Vec3>> {
         let count = touched.unknowns.len();
         if count == 0 {
@@ -187,8 +193,7 @@ impl<'a> Yielding<'a> {
         );
         let given =
             DVector::from_iterator(3 * count, forces.iter().flat_map(|force| [force.x, force.y, force.z]));
-        let mut matrix = touched.stiffness(search, reactions, responses);
-        matrix = (&matrix + matrix.transpose()) * 0.5;
+        let mut matrix = stiffness;
         // What is not balanced, less what the untouched unknowns take of it.
         let mut right = given;
         for i in 0..count {
@@ -269,17 +274,22 @@ impl Touched {
         forces
     }
 
-    /// The columns of Z, three for each unknown.
-    fn responses<const C: usize>(&self, search: &Search<'_, '_, C>, reactions: &[Reaction]) -> Vec<Vec<f64>> {
+    /// What each of the unknowns does to the device.
+    fn pulls<const C: usize>(&self, search: &Search<'_, '_, C>, reactions: &[Reaction]) -> Pulls {
         let (elements, state) = (search.elements, &*search.state);
         let rows = Layout::<C>::dimension(elements.len());
         let mut columns = vec![vec![0.0; rows]; 3 * self.unknowns.len()];
+        let mut reached = vec![rows..0; self.unknowns.len()];
         for (reaction, weights) in reactions.iter().zip(&self.weights) {
             let (e, xi, _) = reaction.place;
             let ways = point_columns::<C>(state, &elements[e], e, xi);
             let turns = angle_weights::<C>(reaction.place);
             let turns = if Layout::<C>::ANGLES > 0 { &turns[..] } else { &[] };
             for (k, [weight, turning]) in weights {
+                let all = ways.iter().map(|(row, _)| *row).chain(turns.iter().map(|(row, _)| *row));
+                reached[*k] = all.fold(reached[*k].clone(), |reached, row| {
+                    reached.start.min(row)..reached.end.max(row + 1)
+                });
                 for axis in 0..3 {
                     let column = &mut columns[3 * k + axis];
                     let moved = weight.column(axis);
@@ -290,37 +300,10 @@ impl Touched {
                 }
             }
         }
-        for column in &mut columns {
-            for row in search.supports.held::<C>().into_iter().flatten() {
-                column[row] = 0.0;
-            }
-            search.newton.apply_inverse(elements, column);
+        for row in search.supports.held::<C>().into_iter().flatten() {
+            columns.iter_mut().for_each(|column| column[row] = 0.0);
         }
-        columns
-    }
-
-    /// M.
-    fn stiffness<const C: usize>(
-        &self,
-        search: &Search<'_, '_, C>,
-        reactions: &[Reaction],
-        responses: &[Vec<f64>],
-    ) -> DMatrix<f64> {
-        let (elements, state) = (search.elements, &*search.state);
-        let mut matrix = self.held_stiffness(reactions);
-        for (column, response) in responses.iter().enumerate() {
-            for (reaction, weights) in reactions.iter().zip(&self.weights) {
-                let (e, xi, _) = reaction.place;
-                let way = point_step::<C>(state, &elements[e], (e, xi), response);
-                let turn = point_turn::<C>(reaction.place, response);
-                let change = reaction.stiffness * way + reaction.by_angle * turn;
-                for (k, [weight, turning]) in weights {
-                    let mut block = matrix.fixed_view_mut::<3, 1>(3 * k, column);
-                    block += weight.tr_mul(&change) + turning.tr_mul(&way);
-                }
-            }
-        }
-        matrix
+        Pulls { columns, reached }
     }
 
     /// M of a device that does not respond.
@@ -336,6 +319,38 @@ impl Touched {
             }
         }
         matrix
+    }
+}
+
+/// Forces on the device where unknowns are displaced: −Σ Nᵢᵀ (Hᵢ Wᵢ + Qᵢ).
+struct Pulls {
+    /// Three for each unknown.
+    columns: Vec<Vec<f64>>,
+    /// Of each unknown the rows outside of which its columns are zero.
+    reached: Vec<Range<usize>>,
+}
+
+impl Pulls {
+    /// The columns of Z.
+    fn responses<const C: usize>(&self, search: &Search<'_, '_, C>) -> Vec<Vec<f64>> {
+        let mut responses = self.columns.clone();
+        responses.iter_mut().for_each(|column| search.newton.apply_inverse(search.elements, column));
+        responses
+    }
+
+    /// Adds to M of a device that does not respond what its response does.
+    fn soften(&self, responses: &[Vec<f64>], matrix: &mut DMatrix<f64>) {
+        for (i, pull) in self.columns.iter().enumerate() {
+            let rows = self.reached[i / 3].clone();
+            for (j, response) in responses.iter().enumerate().skip(i) {
+                let softer: f64 =
+                    pull[rows.clone()].iter().zip(&response[rows.clone()]).map(|(a, b)| a * b).sum();
+                matrix[(i, j)] -= softer;
+                if i != j {
+                    matrix[(j, i)] -= softer;
+                }
+            }
+        }
     }
 }
 

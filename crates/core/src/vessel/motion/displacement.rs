@@ -77,17 +77,23 @@ impl Displacement {
         material + self.displacement_mm(material)
     }
 
-    /// F = I + ∂u/∂X.
-    pub(crate) fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
-        self.with_gradient(material).1
+    /// x = X + u(X), mm, and F = I + ∂u/∂X.
+    fn place_and_gradient(&self, material: &Vec3) -> (Vec3, Matrix3<f64>) {
+        let (moved, gradient) = (self.by_modes_mm(material), self.of_modes(material));
+        let Some(course) = &self.course else { return (material + moved, gradient) };
+        let (by_course, own) = course.with_gradient(material);
+        (material + moved + by_course, gradient + own)
     }
 
-    /// u, mm, and F = I + ∂u/∂X.
-    fn with_gradient(&self, material: &Vec3) -> (Vec3, Matrix3<f64>) {
-        let (moved, gradient) = (self.by_modes_mm(material), self.of_modes(material));
-        let Some(course) = &self.course else { return (moved, gradient) };
-        let (by_course, own) = course.with_gradient(material);
-        (moved + by_course, gradient + own)
+    /// F = I + ∂u/∂X.
+    pub(crate) fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
+        self.place_and_gradient(material).1
+    }
+
+    /// Position of a material point, mm, and G = ∂χ/∂x there, χ being the motion of the vessel from its displacement `before`.
+    pub(crate) fn since(&self, before: &Self, material: &Vec3) -> (Vec3, Matrix3<f64>) {
+        let (there, gradient) = self.place_and_gradient(material);
+        (there, gradient * inverse(&before.gradient(material)))
     }
 
     /// F of the motion alone.
@@ -145,8 +151,8 @@ impl Displacement {
     /// distance, X = x − u(X) does, where |∂u/∂X| is less than half.
     fn inverse(&self, place: &Vec3, estimate: Vec3) -> Vec3 {
         let off = |x: &Vec3| {
-            let (moved, gradient) = self.with_gradient(x);
-            (place - x - moved, gradient)
+            let (there, gradient) = self.place_and_gradient(x);
+            (place - there, gradient)
         };
         let mut x = estimate;
         let (mut left, mut gradient) = off(&x);

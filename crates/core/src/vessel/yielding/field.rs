@@ -96,7 +96,9 @@ impl Samples {
             for x in low[0]..=high[0] {
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
-                        cells.entry([x, y, z]).or_default().felt.push(index as u32);
+                        if one.reaches([x, y, z], cell_mm) {
+                            cells.entry([x, y, z]).or_default().felt.push(index as u32);
+                        }
                     }
                 }
             }
@@ -323,6 +325,13 @@ impl MovedBy {
 }
 
 impl Sample {
+    /// Whether it is felt anywhere in a cell.
+    fn reaches(&self, cell: [i32; 3], cell_mm: f64) -> bool {
+        let low = Vec3::from(cell.map(|part| f64::from(part) * cell_mm));
+        let nearest = self.place.zip_map(&low, |part, low| part.clamp(low, low + cell_mm));
+        (nearest - self.place).norm() <= self.reach_mm
+    }
+
     /// Estimate of s at a point.
     fn arc_near(&self, x: &Vec3) -> f64 {
         self.arc_mm + self.along.dot(&(x - self.place))

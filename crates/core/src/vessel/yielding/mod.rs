@@ -171,6 +171,9 @@ impl Course {
                 .map(move |(unknown, share)| (*unknown, both.map(|one| one * *share)))
         });
         let mut all: Vec<(usize, [Matrix3<f64>; 2])> = each.collect();
+        if all.is_sorted_by(|one, next| one.0 < next.0) {
+            return all;
+        }
         all.sort_unstable_by_key(|(unknown, _)| *unknown);
         all.dedup_by(|later, kept| {
             let same = later.0 == kept.0;
