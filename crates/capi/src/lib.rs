@@ -31,7 +31,7 @@ pub use report::{
 pub use scene::{EndowireScene, endowire_scene_free, endowire_scene_from_text, endowire_scene_read};
 pub use shape::{
     endowire_coil_positions_mm, endowire_positions_mm, endowire_radii_mm, endowire_vessel_triangles,
-    endowire_vessel_vertices_mm,
+    endowire_vessel_vertices_mm, endowire_vessel_vertices_now_mm,
 };
 pub use simulation::{
     EndowireMove, EndowireSimulation, endowire_detach, endowire_forget, endowire_simulation_clone,

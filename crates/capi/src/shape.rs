@@ -114,6 +114,27 @@ pub unsafe extern "C" fn endowire_vessel_vertices_mm(
     })
 }
 
+/// Copies the vertices of the vessel where they are now, mm, as many and in the same order as those at rest: where the vessel
+/// moves (`[[vessel.motion]]`) or its course yields (`[vessel.yielding]`) they change with every step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn endowire_vessel_vertices_now_mm(
+    simulation: *const EndowireSimulation,
+    vertices_mm: *mut f64,
+    capacity: usize,
+    count: *mut usize,
+) -> EndowireStatus {
+    call(|| {
+        // SAFETY: the caller's promise of a handle.
+        let simulation = unsafe { handle("simulation", simulation) }?.lock()?;
+        let displacement = simulation.displacement();
+        let wall = simulation.lumen().wall(&NoStore)?;
+        let now = |at: &Vec3| displacement.as_ref().map_or(*at, |now| now.place(at)).into();
+        let list: Vec<[f64; 3]> = wall.mesh().vertices_mm.iter().map(now).collect();
+        // SAFETY: the caller's promise of room for as many points as the capacity says, and of a place for a count.
+        unsafe { Room { name: "vertices_mm", out: vertices_mm.cast(), capacity, count }.take(&list) }
+    })
+}
+
 /// Copies the triangles of the vessel: a list (see the top) of three numbers of vertices each, counter-clockwise seen from
 /// outside. `capacity` and `count` are in triangles: `triangles` has room for 3 * `capacity` numbers.
 #[unsafe(no_mangle)]

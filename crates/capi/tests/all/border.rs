@@ -198,6 +198,30 @@ fn lists_and_reports_are_those_of_the_library() {
 }
 
 #[test]
+fn a_vessel_that_yields_is_where_it_is_now() {
+    let text = std::fs::read_to_string(scenes().join("aorto_iliac_stiff.toml")).unwrap();
+    let simulation = simulation(&text, &scenes());
+    let vertices = |now: bool| -> Vec<f64> {
+        // SAFETY: a handle, and room for as many points as the capacity says.
+        list(3, |out, capacity, count| unsafe {
+            if now {
+                endowire_vessel_vertices_now_mm(simulation.0, out, capacity, count)
+            } else {
+                endowire_vessel_vertices_mm(simulation.0, out, capacity, count)
+            }
+        })
+    };
+    let rest = vertices(false);
+    assert_eq!(vertices(true), rest);
+    let push = EndowireMove { instrument: 0, advance_mm: 60.0, rotate_rad: 0.0, steer: 0.0 };
+    // SAFETY: a handle and one move.
+    good(unsafe { endowire_step(simulation.0, &raw const push, 1) });
+    assert_eq!(vertices(false), rest);
+    let farthest = vertices(true).iter().zip(&rest).map(|(now, rest)| (now - rest).abs()).fold(0.0, f64::max);
+    assert!((0.01..5.0).contains(&farthest), "{farthest}");
+}
+
+#[test]
 fn states_continue_to_the_bit_and_clones_on_other_threads_too() {
     let simulation = of_two();
     (0..3).for_each(|_| step(&simulation));

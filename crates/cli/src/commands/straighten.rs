@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_core::Error;
 use endowire_core::insertion::{Simulation, Step};
-use endowire_core::vessel::{CentrelineTree, Displacement};
-use endowire_core::{Error, Vec3};
+use endowire_core::vessel::{Displacement, Landmark, Straightening, Stretch};
 use endowire_methods::Scene;
 use endowire_viewer::{FrameTime, Moment, Pushed, Renderer, View, ViewSpec};
 use serde::Serialize;
@@ -16,39 +16,6 @@ use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
 use crate::scenes;
 
-/// Name of the centre line's beginning.
-const INLET: &str = "inlet";
-
-/// A measure before the devices went in, and after.
-#[derive(Clone, Copy, Serialize)]
-struct Change {
-    before: f64,
-    after: f64,
-}
-
-/// The centre line between two named places that follow each other.
-#[derive(Serialize)]
-struct Stretch {
-    from: String,
-    to: String,
-    length_mm: Change,
-    straight_mm: Change,
-    tortuosity: Change,
-}
-
-/// A named place.
-#[derive(Serialize)]
-struct Place {
-    name: String,
-    before_mm: Vec3,
-    after_mm: Vec3,
-    displacement_mm: f64,
-    /// The angle there between the straight lines to the places before and behind it; absent at ends, and where several are
-    /// behind it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    angle_deg: Option<Change>,
-}
-
 #[derive(Serialize)]
 struct Document {
     #[serde(flatten)]
@@ -59,8 +26,8 @@ struct Document {
     largest_displacement_mm: f64,
     largest_push_force_n: f64,
     vessel_mj: f64,
-    places: Vec<Place>,
-    stretches: Vec<Stretch>,
+    #[serde(flatten)]
+    straightening: Straightening,
     /// The pictures before and after, if they were asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pictures: Vec<PathBuf>,
@@ -92,7 +59,6 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
     bar.finish_and_clear();
     let tree = scene.centreline(&cache).map_err(in_scene)?;
     let displacement = simulation.displacement();
-    let measured = Measured { tree, displacement: displacement.as_ref(), named: named(tree) };
     let pictures = match &args.out {
         Some(folder) => draw(&args.scene, &scene, (&simulation, displacement.as_ref()), folder, &cache)?,
         None => Vec::new(),
@@ -102,100 +68,13 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
         scene: scene.name.clone(),
         steps,
         inserted_mm: simulation.report().lengths_mm(),
-        largest_displacement_mm: simulation
-            .course()
-            .map_or(0.0, |course| course.largest_mm(simulation.course_mm())),
+        largest_displacement_mm: simulation.yielded_mm(),
         largest_push_force_n: largest_n,
         vessel_mj: simulation.report().energy.vessel,
-        places: measured.places(),
-        stretches: measured.stretches(),
+        straightening: Straightening::of(tree, displacement.as_ref()),
         pictures,
     };
     answer(&document, args.json, || in_words(&document))
-}
-
-/// Named places of a centre line by row, its beginning first.
-fn named(tree: &CentrelineTree) -> Vec<(usize, String)> {
-    let targets = tree.targets().iter().filter(|target| target.row > 0);
-    std::iter::once((0, INLET.to_owned()))
-        .chain(targets.map(|target| (target.row, target.name.clone())))
-        .collect()
-}
-
-/// A centre line before and after.
-struct Measured<'a> {
-    tree: &'a CentrelineTree,
-    displacement: Option<&'a Displacement>,
-    named: Vec<(usize, String)>,
-}
-
-impl Measured<'_> {
-    fn place(&self, row: usize) -> [Vec3; 2] {
-        let before = self.tree.nodes()[row].position_mm;
-        [before, self.displacement.map_or(before, |displacement| displacement.place(&before))]
-    }
-
-    /// The rows from a named place back to the one before it, and that; none for the beginning.
-    fn back(&self, row: usize) -> Option<(Vec<usize>, usize)> {
-        let mut rows = vec![row];
-        let mut at = row;
-        while let Some(parent) = self.tree.nodes()[at].parent {
-            rows.push(parent);
-            if let Some(before) = self.named.iter().position(|(named, _)| *named == parent) {
-                return Some((rows, before));
-            }
-            at = parent;
-        }
-        None
-    }
-
-    fn stretches(&self) -> Vec<Stretch> {
-        let each = self.named.iter().filter_map(|(row, name)| {
-            let (rows, before) = self.back(*row)?;
-            let change = |of: &dyn Fn(usize) -> f64| Change { before: of(0), after: of(1) };
-            let length = |when: usize| {
-                rows.windows(2)
-                    .map(|pair| (self.place(pair[0])[when] - self.place(pair[1])[when]).norm())
-                    .sum::<f64>()
-            };
-            let (first, last) = (rows[rows.len() - 1], rows[0]);
-            let straight = |when: usize| (self.place(first)[when] - self.place(last)[when]).norm();
-            Some(Stretch {
-                from: self.named[before].1.clone(),
-                to: name.clone(),
-                length_mm: change(&length),
-                straight_mm: change(&straight),
-                tortuosity: change(&|when| length(when) / straight(when)),
-            })
-        });
-        each.collect()
-    }
-
-    fn places(&self) -> Vec<Place> {
-        let behind = |of: usize| -> Vec<usize> {
-            let each =
-                self.named.iter().filter(|(row, _)| self.back(*row).is_some_and(|(_, before)| before == of));
-            each.map(|(row, _)| *row).collect()
-        };
-        let each = self.named.iter().enumerate().map(|(index, (row, name))| {
-            let [before_mm, after_mm] = self.place(*row);
-            let ends = self.back(*row).map(|(rows, _)| rows[rows.len() - 1]);
-            let angle_deg = match (ends, &behind(index)[..]) {
-                (Some(first), [next]) => {
-                    let angle = |when: usize| {
-                        let here = self.place(*row)[when];
-                        let [a, b] = [first, *next].map(|end| self.place(end)[when] - here);
-                        a.angle(&b).to_degrees()
-                    };
-                    Some(Change { before: angle(0), after: angle(1) })
-                }
-                _ => None,
-            };
-            let displacement_mm = (after_mm - before_mm).norm();
-            Place { name: name.clone(), before_mm, after_mm, displacement_mm, angle_deg }
-        });
-        each.collect()
-    }
 }
 
 /// Draws the vessel without devices as it was, and with them as it is, as the scene's `[view]` says; returns the files.
@@ -249,7 +128,7 @@ fn in_words(document: &Document) -> String {
     );
     text +=
         &format!("{:<46} {:>17} {:>17} {:>15}\n", "centre line", "length mm", "straight mm", "tortuosity");
-    for stretch in &document.stretches {
+    for stretch in &document.straightening.stretches {
         let Stretch { from, to, length_mm, straight_mm, tortuosity } = stretch;
         let way = format!("{from} – {to}");
         text += &format!(
@@ -263,7 +142,7 @@ fn in_words(document: &Document) -> String {
         );
     }
     text += &format!("\n{:<46} {:>12} {:>19}\n", "place", "moved by mm", "angle °");
-    for Place { name, displacement_mm, angle_deg, .. } in &document.places {
+    for Landmark { name, displacement_mm, angle_deg, .. } in &document.straightening.places {
         let angle =
             angle_deg.map_or(String::new(), |angle| format!("{:>7.1} → {:>7.1}", angle.before, angle.after));
         text += &format!("{name:<46} {displacement_mm:>12.2} {angle:>19}\n");

@@ -287,9 +287,7 @@ impl Recorder {
             wall_force_largest_n: force.largest_n,
             wall_force_tip_n: force.tip_n,
             drag_n: report.drag_n.norm(),
-            vessel_displacement_mm: simulation
-                .course()
-                .map_or(0.0, |course| course.largest_mm(simulation.course_mm())),
+            vessel_displacement_mm: simulation.yielded_mm(),
             time_s,
         };
         // Written last, so that every step of the table is also in the arrays.

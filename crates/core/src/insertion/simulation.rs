@@ -509,6 +509,11 @@ impl Simulation {
         self.method.course_mm()
     }
 
+    /// A bound of how far any point of the vessel is displaced because its course yields, mm.
+    pub fn yielded_mm(&self) -> f64 {
+        self.course().map_or(0.0, |course| course.largest_mm(self.course_mm()))
+    }
+
     /// The vessel at rest.
     pub fn lumen(&self) -> &Lumen {
         &self.scene.lumen

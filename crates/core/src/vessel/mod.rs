@@ -64,4 +64,7 @@ pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use swept::SweptVessel;
 pub(crate) use swept::{ClosestFrom, InTube, SweptField, Tube};
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};
-pub use yielding::{Course, YieldingBranch, YieldingEnds, YieldingPreset, YieldingSpec, YieldingTether};
+pub use yielding::{
+    BeforeAfter, Course, Landmark, Straightening, Stretch, YieldingBranch, YieldingEnds, YieldingPreset,
+    YieldingSpec, YieldingTether,
+};

@@ -402,7 +402,10 @@ impl<const C: usize> Tools<C> {
             let there = environment.displaced(Some(&course.displacement));
             let bounds = |effort: Effort, taken: (usize, usize)| Bounds {
                 effort,
-                most: limits.iterations.saturating_sub(taken.0),
+                most: match effort {
+                    Effort::Flight => limits.iterations.saturating_sub(taken.0),
+                    _ => limits.iterations.saturating_sub(taken.0).min(tuning.steps.following),
+                },
                 most_solves: limits.solves.saturating_sub(taken.1),
                 resumed: None,
                 moved_mm: Some(moved_mm),

@@ -165,7 +165,8 @@ impl Displacement {
             if step.norm() <= LAST_MM {
                 return x + step;
             }
-            let nearer = |step: Vec3| Some((x + step, off(&(x + step)))).filter(|at| at.1.0.norm() < 0.5 * size);
+            let nearer =
+                |step: Vec3| Some((x + step, off(&(x + step)))).filter(|at| at.1.0.norm() < 0.5 * size);
             let Some(next) = nearer(step).or_else(|| nearer(left)) else { break };
             (x, (left, gradient)) = next;
         }

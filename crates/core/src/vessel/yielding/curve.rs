@@ -164,7 +164,6 @@ impl Curve {
         let v = x - by - c;
         c + v + c1 * (w1.dot(&v) / (1.0 - w1.dot(&c1)))
     }
-
 }
 
 /// D of a point, with the curve at its place.

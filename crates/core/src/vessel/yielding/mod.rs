@@ -48,10 +48,12 @@ mod field;
 mod spec;
 mod spline;
 mod stiffness;
+mod straightening;
 #[cfg(test)]
 mod tests;
 
 pub use spec::{YieldingBranch, YieldingEnds, YieldingPreset, YieldingSpec, YieldingTether};
+pub use straightening::{BeforeAfter, Landmark, Straightening, Stretch};
 
 use std::sync::Arc;
 
@@ -125,7 +127,7 @@ impl Course {
     }
 
     /// Bound of the displacement of any point of the vessel at these unknowns, mm.
-    pub fn largest_mm(&self, course_mm: &[Vec3]) -> f64 {
+    pub(crate) fn largest_mm(&self, course_mm: &[Vec3]) -> f64 {
         // Splines are means of their coefficients, and these of the unknowns.
         course_mm.iter().map(|by| by.norm()).fold(0.0, f64::max)
     }
