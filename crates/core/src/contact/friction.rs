@@ -205,11 +205,8 @@ impl Friction {
 
     /// The wall has moved since the step began; the reference points of slip move with its material points: see
     /// [`moving`].
-    pub(crate) fn carry(&mut self, (before, after): (&Displacement, &Displacement), hands: &[HandMotion]) {
-        let mut farthest_mm = 0.0f64;
-        for slider in &mut self.sliders {
-            farthest_mm = farthest_mm.max(slider.carry(before, after));
-        }
+    pub(crate) fn carry(&mut self, passage: (&Displacement, &Displacement), hands: &[HandMotion]) {
+        let farthest_mm = self.go_with(passage);
         // If the hands rest, the motion of the wall sets ε.
         let moves = hands.iter().any(|hand| hand.parts() != [0.0; 2]);
         let tuning = self.law.tuning;
@@ -218,6 +215,11 @@ impl Friction {
             let stick_mm = if moves { self.law.stick_mm.max(stick_mm) } else { stick_mm };
             self.law.stick_within(sticking_mm(stick_mm, &tuning));
         }
+    }
+
+    /// The vessel yields further: the reference points of slip move with its material points. Returns how far at most, mm.
+    pub(crate) fn go_with(&mut self, (before, after): (&Displacement, &Displacement)) -> f64 {
+        self.sliders.iter_mut().map(|slider| slider.carry(before, after)).fold(0.0, f64::max)
     }
 
     /// Stores the normal forces at the end of a step.

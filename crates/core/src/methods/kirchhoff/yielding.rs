@@ -102,7 +102,7 @@ impl<'a> Yielding<'a> {
         let displacement = environment.surroundings.displacement(attempt.part.to, &amplitudes_mm)?;
         if amplitudes_mm != was.course_mm {
             let was = environment.surroundings.displacement(attempt.part.to, &start.state.course_mm)?;
-            friction.carry((&was, &displacement), motions);
+            friction.go_with((&was, &displacement));
         }
         Some(Self { course, to: attempt.part.to, amplitudes_mm, displacement })
     }
@@ -396,7 +396,7 @@ impl<const C: usize> Tools<C> {
             let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
                 return searched;
             };
-            self.friction.carry((&course.displacement, &moved), &self.guess.motions);
+            self.friction.go_with((&course.displacement, &moved));
             let moved_mm = farthest_mm * moved.stretch();
             (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
             let there = environment.displaced(Some(&course.displacement));
