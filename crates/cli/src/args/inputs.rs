@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use endowire_core::Vec3;
 use endowire_core::passable::NO_FORCE_N;
-use endowire_core::vessel::{CentrelineEnd, Ends, RepairMode, Parts, PatientAxes, SurfaceFrame};
+use endowire_core::vessel::{CentrelineEnd, Ends, Parts, PatientAxes, RepairMode, SurfaceFrame};
 
 use super::{CacheArgs, SetArgs};
 use crate::commands::parse_end;

@@ -117,14 +117,18 @@ fn where_branches_meet_again_a_way_takes_the_arm_that_via_names() {
     reported(&vessel(&["generate", &table, "--out", &surface, "--edge-mm", "1.5", "--json"]));
     let wire = wire();
     let passage = |more: &[&str]| {
-        let given = ["passable", &surface, "--device", &wire, "--json"].into_iter().chain(more.iter().copied());
+        let given =
+            ["passable", &surface, "--device", &wire, "--json"].into_iter().chain(more.iter().copied());
         vessel(&given.collect::<Vec<_>>())
     };
     let length_mm = |more: &[&str]| reported(&passage(more))["length_mm"].as_f64().unwrap();
     let in_table = ["--centreline", &table, "--to", "end"];
     let straight_mm = length_mm(&in_table);
     let around_mm = length_mm(&[&in_table[..], &["--via", "far arm"]].concat());
-    assert!((straight_mm - 130.0).abs() < 1e-6 && around_mm > straight_mm + 15.0, "{straight_mm} {around_mm}");
+    assert!(
+        (straight_mm - 130.0).abs() < 1e-6 && around_mm > straight_mm + 15.0,
+        "{straight_mm} {around_mm}"
+    );
     // In the surface alone the arm has a name of its own, and a place does as well.
     let ends = reported(&vessel(&["check", &surface, "--json"]));
     assert_eq!(ends["rings"], 1, "{ends}");

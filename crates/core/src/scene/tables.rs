@@ -9,7 +9,7 @@ use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
 use crate::vessel::{
-    CentrelineTree, RepairMode, MotionMode, Opening, PatientAxes, RepairOptions, Resolution, SurfaceFrame,
+    CentrelineTree, MotionMode, Opening, PatientAxes, RepairMode, RepairOptions, Resolution, SurfaceFrame,
     YieldingSpec,
 };
 use crate::{Error, Result, Vec3};

@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::in_front::Ends;
 use super::mesh::retain_numbered;
 use super::opening::{self, Boundary, Opening};
-use super::repairs::{RepairMode, Repair, RepairKind, RepairOptions, named};
+use super::repairs::{Repair, RepairKind, RepairMode, RepairOptions, named};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;

@@ -53,8 +53,12 @@ pub struct CoilKind {
 
 impl CoilKind {
     /// Frames a sac.
-    pub const FRAMING: Self =
-        Self { outer_diameter_mm: 0.3175, wire_diameter_mm: 0.0508, loops_to_sac: 0.9, loops: Loops::Complex };
+    pub const FRAMING: Self = Self {
+        outer_diameter_mm: 0.3175,
+        wire_diameter_mm: 0.0508,
+        loops_to_sac: 0.9,
+        loops: Loops::Complex,
+    };
     /// Fills the framed sac.
     pub const FILLING: Self =
         Self { outer_diameter_mm: 0.254, wire_diameter_mm: 0.04445, loops_to_sac: 0.7, loops: Loops::Helix };

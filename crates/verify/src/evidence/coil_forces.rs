@@ -72,8 +72,7 @@ fn deploy(kind: CoilKind, tip_height: f64) -> Result<Forces> {
 }
 
 /// Computes the forces of several deployments, each by its index.
-pub type Parallel<'a> =
-    dyn Fn(usize, &(dyn Fn(usize) -> Result<Forces> + Sync)) -> Vec<Result<Forces>> + 'a;
+pub type Parallel<'a> = dyn Fn(usize, &(dyn Fn(usize) -> Result<Forces> + Sync)) -> Vec<Result<Forces>> + 'a;
 
 /// A row that passes if forces fall from one to the next.
 fn ordered(of: &str, named: &[(&str, f64)]) -> Row {
@@ -117,8 +116,10 @@ pub fn study(parallel: &Parallel<'_>) -> Result<Compared> {
     let (wall, wall_lines) = factors("force on the wall", Kind::Law, grid(|f| f.wall_n));
     let [three_d, standard, soft, small] = [9, 10, 11, 12].map(|k| forces[k].hand_n);
     let of = "force of the hand";
-    let changes =
-        [("a soft wire changes it by", (standard - soft).abs()), ("smaller loops by", (standard - small).abs())];
+    let changes = [
+        ("a soft wire changes it by", (standard - soft).abs()),
+        ("smaller loops by", (standard - small).abs()),
+    ];
     let compared = [
         ordered(of, &[("standard", standard), ("soft", soft)]),
         ordered(of, &[("3D", three_d), ("soft", soft)]),
@@ -145,7 +146,8 @@ mod tests {
 
     #[test]
     fn a_framing_coil_needs_more_than_a_finishing_one_and_more_near_the_dome() {
-        let [low, high] = [HEIGHTS[1].1, HEIGHTS[2].1].map(|height| deploy(CoilKind::FRAMING, height).unwrap());
+        let [low, high] =
+            [HEIGHTS[1].1, HEIGHTS[2].1].map(|height| deploy(CoilKind::FRAMING, height).unwrap());
         let soft = deploy(CoilKind::FINISHING, HEIGHTS[2].1).unwrap();
         assert!(high.hand_n > low.hand_n && high.wall_n > low.wall_n, "{low:?} {high:?}");
         assert!(high.hand_n > soft.hand_n && high.wall_n > soft.wall_n, "{soft:?} {high:?}");

@@ -4,7 +4,7 @@ use super::shapes::{add, ball, disc, tube, turned_over};
 use crate::Vec3;
 use crate::device::Device;
 use crate::insertion::{Command, Sheath, Simulation};
-use crate::vessel::{RepairMode, Repair, RepairKind, RepairOptions, SurfaceMesh, Wall, WallQuery};
+use crate::vessel::{Repair, RepairKind, RepairMode, RepairOptions, SurfaceMesh, Wall, WallQuery};
 
 /// A tube of radius 10 mm from z = 0 to 100 mm.
 fn vessel() -> SurfaceMesh {
@@ -139,7 +139,10 @@ fn what_lies_outside_is_dropped_by_name() {
     assert_eq!((report.bodies_in_lumen, report.pieces_dropped), (0, 1));
     let dropped = only(&wall, RepairKind::PieceDropped);
     assert!((Vec3::from(dropped.at_mm) - outside).norm() < 1e-9);
-    assert_eq!(report.repair_notes(), ["1 small or flat pieces dropped: 2 × 2 × 2 mm at [30.00, 0.00, 50.00]"]);
+    assert_eq!(
+        report.repair_notes(),
+        ["1 small or flat pieces dropped: 2 × 2 × 2 mm at [30.00, 0.00, 50.00]"]
+    );
     // A hole is named by the size of its rim and by its place, and stays open where it is meant.
     let mut holed = vessel();
     let hole = Vec3::new(10.0, 0.0, 50.0);

@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 
 use super::shapes::{add, ball, tube};
 use crate::Vec3;
-use crate::vessel::{ExtractedCentreline, RepairMode, RepairKind, RepairOptions, Sac, SurfaceMesh, Wall, check};
+use crate::vessel::{
+    ExtractedCentreline, RepairKind, RepairMode, RepairOptions, Sac, SurfaceMesh, Wall, check,
+};
 
 /// A trunk of radius 5 mm from z = 0 to 80 mm, with these parts.
 fn trunk_with(parts: &[SurfaceMesh]) -> SurfaceMesh {

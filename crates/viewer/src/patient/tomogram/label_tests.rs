@@ -170,7 +170,8 @@ fn a_label_map_of_the_second_format_is_that_of_the_first() {
         assert_ne!(read(&moved, "moved.nii").unwrap(), expected);
     }
     // What is no label map is named in this format as well.
-    let decimals = nifti(SIZE, &labels().iter().map(|x| 0.3 * x).collect::<Vec<_>>(), Kind::F64, [0.0; 2], &plain());
+    let decimals =
+        nifti(SIZE, &labels().iter().map(|x| 0.3 * x).collect::<Vec<_>>(), Kind::F64, [0.0; 2], &plain());
     let refused = read(&second(&decimals), "second.nii").unwrap_err();
     assert!(refused.contains("a value that is not whole"), "{refused}");
 }
@@ -215,6 +216,10 @@ fn a_header_that_promises_what_the_file_lacks_takes_no_memory() {
         let message = read(&file, "short.nii.gz").unwrap_err();
         assert!(message.starts_with("short.nii.gz: ") && !message.contains('\n'), "{message}");
     }
+    // Cut in the middle of its compressed voxels.
+    let whole = parts(&nifti(SIZE, &labels(), Kind::F64, [0.0, 0.0], &plain()), 1);
+    let message = read(&whole[..whole.len() - whole.len() / 8], "cut.nii.gz").unwrap_err();
+    assert!(message.starts_with("cut.nii.gz: is cut off: it holds fewer voxels"), "{message}");
     bytes[42..44].copy_from_slice(&32_000_i16.to_le_bytes());
     let message = read(&bytes, "huge.nii").unwrap_err();
     assert!(message.contains("at most 268435456 are read"), "{message}");
