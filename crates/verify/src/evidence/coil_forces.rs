@@ -88,13 +88,13 @@ fn mean(of: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// Forces of the coils of [`PURPOSES`] at the [`HEIGHTS`]: orders of their means, and curves.
-fn factors(part: &str, kind: Kind, forces_n: [[f64; 3]; 3]) -> ([Row; 2], [Line; 3]) {
+fn factors(part: &str, forces_n: [[f64; 3]; 3]) -> ([Row; 2], [Line; 3]) {
     let by_coil = [0, 1, 2].map(|coil| (PURPOSES[coil].0, mean(forces_n[coil].iter().copied())));
     let by_height =
         [2, 1, 0].map(|height| (HEIGHTS[height].0, mean(forces_n.iter().map(|coil| coil[height]))));
     let lines = [0, 1, 2].map(|coil| Line {
         name: format!("{}, {part}", PURPOSES[coil].0),
-        kind,
+        kind: Kind::Computed,
         points: (0..3).map(|height| [HEIGHTS[height].1, 1e3 * forces_n[coil][height]]).collect(),
     });
     ([ordered(part, &by_coil), ordered(part, &by_height)], lines)
@@ -112,8 +112,8 @@ pub fn study(parallel: &Parallel<'_>) -> Result<Compared> {
     let found = parallel(runs.len(), &|index| deploy(runs[index].0, runs[index].1));
     let forces = found.into_iter().collect::<Result<Vec<_>>>()?;
     let grid = |of: fn(&Forces) -> f64| [0, 1, 2].map(|coil| [0, 1, 2].map(|k| of(&forces[3 * coil + k])));
-    let (hand, hand_lines) = factors("force of the hand", Kind::Computed, grid(|f| f.hand_n));
-    let (wall, wall_lines) = factors("force on the wall", Kind::Law, grid(|f| f.wall_n));
+    let (hand, hand_lines) = factors("force of the hand", grid(|f| f.hand_n));
+    let (wall, wall_lines) = factors("force on the wall", grid(|f| f.wall_n));
     let [three_d, standard, soft, small] = [9, 10, 11, 12].map(|k| forces[k].hand_n);
     let of = "force of the hand";
     let changes = [
