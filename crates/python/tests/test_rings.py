@@ -17,7 +17,7 @@ def ring(tmp_path_factory):
     rows[-1] += " end"
     parent = ENTRY
     for k in range(1, 10):
-        x = 0.8 * k * (10 - k)
+        x = 1.6 * k * (10 - k)
         rows.append(f"{x} 0 {20 + 8 * k} 3 {parent}")
         parent = TRUNK + k - 1
     rows[TRUNK + 4] += " far arm"
@@ -35,7 +35,7 @@ def test_a_way_takes_the_arm_that_it_is_told(ring, wire):
     assert ring.links == [(len(ring.centreline) - 1, EXIT)]
     straight, around = ring.path("end"), ring.path("end", via="far arm")
     assert length_mm(straight) == pytest.approx(130.0) and straight[:, 0].max() == 0.0
-    assert length_mm(around) > 145.0 and around[:, 0].max() > 19.0
+    assert length_mm(around) > 160.0 and around[:, 0].max() > 39.0
     assert np.array_equal(ring.path("end", via=ring.targets["far arm"]), around)
     told = [ring.passable(wire, "end", via=via) for via in (None, "far arm")]
     assert told[0]["length_mm"] == pytest.approx(130.0) and told[1]["length_mm"] == pytest.approx(length_mm(around))
@@ -83,7 +83,7 @@ def test_an_environment_measures_by_either_arm(ring, wire):
         rewards=[rewards.Approach()],
         ends=[ends.TargetReached(), ends.StepLimit(5)],
     )
-    env = InsertionVectorEnv(1, task)
+    env = InsertionVectorEnv(task, 1)
     env.reset(seed=1)
     episodes = env._episodes
     whole_mm = length_mm(ring.path("last"))

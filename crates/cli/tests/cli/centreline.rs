@@ -104,7 +104,7 @@ fn where_branches_meet_again_a_way_takes_the_arm_that_via_names() {
     let mut rows: Vec<String> = (0..27).map(|k| format!("0 0 {} 4 {}", 5 * k, k - 1)).collect();
     rows[26] += " end";
     for k in 1..10 {
-        let x = 0.8 * f64::from(k * (10 - k));
+        let x = 1.6 * f64::from(k * (10 - k));
         let parent = if k == 1 { 4 } else { 25 + k };
         let name = match k {
             5 => " far arm",
@@ -135,7 +135,7 @@ fn where_branches_meet_again_a_way_takes_the_arm_that_via_names() {
     let [from, to] = if ends["inlet"] == 0 { ["0", "1"] } else { ["1", "0"] };
     let found = ["--from", from, "--to", to];
     assert!((length_mm(&found) / straight_mm - 1.0).abs() < 0.03);
-    for via in ["arm 1", "20,0,60"] {
+    for via in ["arm 1", "40,0,60"] {
         let found_mm = length_mm(&[&found[..], &["--via", via]].concat());
         assert!((found_mm / around_mm - 1.0).abs() < 0.03, "{via}: {found_mm} {around_mm}");
     }

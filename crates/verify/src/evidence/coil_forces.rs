@@ -95,7 +95,11 @@ fn factors(part: &str, forces_n: [[f64; 3]; 3]) -> ([Row; 2], [Line; 3]) {
     let lines = [0, 1, 2].map(|coil| Line {
         name: format!("{}, {part}", PURPOSES[coil].0),
         kind: Kind::Computed,
-        points: (0..3).map(|height| [HEIGHTS[height].1, 1e3 * forces_n[coil][height]]).collect(),
+        // Where the hand holds the coil back throughout, no force is there to be drawn.
+        points: (0..3)
+            .map(|height| [HEIGHTS[height].1, 1e3 * forces_n[coil][height]])
+            .filter(|[_, mn]| *mn > 0.0)
+            .collect(),
     });
     ([ordered(part, &by_coil), ordered(part, &by_height)], lines)
 }
