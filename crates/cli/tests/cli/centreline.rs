@@ -141,7 +141,7 @@ fn where_branches_meet_again_a_way_takes_the_arm_that_via_names() {
     }
     let refused = passage(&[&in_table[..], &["--via", "nowhere"]].concat());
     assert_eq!(refused.status.code(), Some(2));
-    assert!(said(&refused).contains("--via = nowhere"), "{}", said(&refused));
+    assert!(said(&refused).contains("--via = \"nowhere\""), "{}", said(&refused));
 }
 
 #[test]
