@@ -327,9 +327,9 @@ mod tests {
     #[test]
     fn a_setting_out_of_range_is_named() {
         let coils = [("one".to_owned(), CoilKind::FILLING)];
-        let refused = CoilTest { tip_height: Some(0.95), ..TEST }.begin(&coils).unwrap_err();
+        let refused = CoilTest { tip_height: Some(0.95), ..TEST }.begin(&coils).err().unwrap();
         assert!(refused.to_string().contains("tip_height"), "{refused}");
-        let refused = TEST.begin(&[]).unwrap_err();
+        let refused = TEST.begin(&[]).err().unwrap();
         assert!(refused.to_string().contains("number of coils"), "{refused}");
     }
 }
