@@ -137,8 +137,8 @@ pub(crate) fn let_medium_flow(
 /// Reports what was repaired on the surface, and that the centre line was extracted from it, if one was needed and the
 /// scene names none.
 pub(crate) fn tell_found(path: &Path, scene: &Scene) {
-    for mended in scene.mended() {
-        tell(format_args!("{}: {mended}", path.display()));
+    for note in scene.repair_notes() {
+        tell(format_args!("{}: {note}", path.display()));
     }
     let Some(tree) = scene.found_centreline() else { return };
     let targets: Vec<&str> = tree.targets().iter().map(|target| target.name.as_str()).collect();

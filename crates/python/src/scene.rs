@@ -159,8 +159,8 @@ impl Scene {
     pub(crate) fn built(&self, py: Python<'_>) -> PyResult<(insertion::Simulation, Vec<Instrument>)> {
         let scene = Arc::clone(&self.scene);
         let built = interruptible(py, move || scene.simulation(&NoStore))?.map_err(exception)?;
-        for mended in self.scene.mended() {
-            warn(py, &format!("{}: {mended}", self.path.display()))?;
+        for note in self.scene.repair_notes() {
+            warn(py, &format!("{}: {note}", self.path.display()))?;
         }
         let files = self.scene.device_files().map_err(exception)?;
         let instruments = files.into_iter().zip(built.stack().devices()).map(|(file, device)| match file {

@@ -10,7 +10,7 @@ use endowire_core::passable::passable;
 use endowire_core::vessel::{
     CentrelineEnd, CentrelineLink, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline,
     LabelOptions, LabelSurface, Lumen, NoStore, Opening, Repair, RepairOptions, Resolution, SurfaceFrame,
-    SurfaceMesh, SweptVessel, Target, Wall, anatomy, check_with, wall_hints,
+    SurfaceMesh, SweptVessel, Target, Wall, anatomy, check_repaired, wall_hints,
 };
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
@@ -149,7 +149,7 @@ impl Vessel {
             wall_hints(&wall, frame.unit_mm).map(|hints| (wall, hints))
         })?;
         let (wall, hints) = made.map_err(exception)?;
-        for hint in wall.report().mended().into_iter().chain(hints) {
+        for hint in wall.report().repair_notes().into_iter().chain(hints) {
             warn(py, &format!("{reported}: {hint}"))?;
         }
         Ok(Self::of_wall(wall))
@@ -187,8 +187,8 @@ impl Vessel {
         let surface = SurfaceMesh { vertices_mm, triangles };
         let made = interruptible(py, move || Wall::repaired(&surface, &options))?;
         let wall = made.map_err(exception)?;
-        for mended in wall.report().mended() {
-            warn(py, &mended)?;
+        for note in wall.report().repair_notes() {
+            warn(py, &note)?;
         }
         Ok(Self::of_wall(wall))
     }
@@ -221,7 +221,7 @@ impl Vessel {
             Wall::from_surface(&surface.mesh).map(|wall| (wall, surface.report.notes()))
         })?;
         let (wall, notes) = made.map_err(exception)?;
-        for note in notes.into_iter().chain(wall.report().mended()) {
+        for note in notes.into_iter().chain(wall.report().repair_notes()) {
             warn(py, &format!("{reported}: {note}"))?;
         }
         Ok(Self::of_wall(wall))
@@ -687,9 +687,9 @@ pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
 
 /// Units and axes of a surface file.
 fn repair_options(repair: &str, keep_open_mm: Option<&Numbers<'_>>) -> PyResult<RepairOptions> {
-    let mending = repair.parse().map_err(exception)?;
+    let mode = repair.parse().map_err(exception)?;
     let places = keep_open_mm.map(|places| rows("keep_open_mm", places)).transpose()?.unwrap_or_default();
-    Ok(RepairOptions { mending, keep_open_mm: places.into_iter().map(Vec3::from).collect() })
+    Ok(RepairOptions { mode, keep_open_mm: places.into_iter().map(Vec3::from).collect() })
 }
 
 fn frame(unit_mm: f64, axes: Option<&str>) -> PyResult<SurfaceFrame> {
@@ -698,20 +698,27 @@ fn frame(unit_mm: f64, axes: Option<&str>) -> PyResult<SurfaceFrame> {
 }
 
 /// Checks a surface file as `endowire vessel check` does; returns a dictionary of the findings, and `sound`.
-/// Arguments are as in `Vessel.read`; septa thinner than `septum_mm` are counted.
+/// Arguments are as in `Vessel.read`: with `repair="none"` the surface is taken as it is, and `keep_open_mm` are places
+/// of holes that are meant. Septa thinner than `septum_mm` are counted.
+///
+/// Raises InputError for a file that cannot be read or is not usable as a wall.
 #[pyfunction]
-#[pyo3(signature = (path, unit_mm = 1.0, septum_mm = 1.0, axes = None))]
+#[pyo3(signature = (path, unit_mm = 1.0, septum_mm = 1.0, axes = None, repair = "all", keep_open_mm = None))]
 pub(crate) fn check_vessel<'py>(
     py: Python<'py>,
     path: PathBuf,
     unit_mm: f64,
     septum_mm: f64,
     axes: Option<&str>,
+    repair: &str,
+    keep_open_mm: Option<Numbers<'_>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let frame = frame(unit_mm, axes)?;
-    let report =
-        interruptible(py, move || check_with(&SurfaceMesh::read(&path, frame)?, unit_mm, septum_mm))?
-            .map_err(exception)?;
+    let options = repair_options(repair, keep_open_mm.as_ref())?;
+    let report = interruptible(py, move || {
+        check_repaired(&SurfaceMesh::read(&path, frame)?, unit_mm, septum_mm, &options)
+    })?
+    .map_err(exception)?;
     let reported = document::write(py, &report)?;
     reported.set_item("sound", report.is_sound())?;
     Ok(reported)

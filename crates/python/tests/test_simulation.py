@@ -204,6 +204,24 @@ def test_vessels_are_made_checked_and_written(vessel, tmp_path):
     assert len(endowire.Vessel.generate(table, triangles=800).openings) == 2
 
 
+def test_a_surface_is_checked_as_it_is_or_with_holes_that_are_meant(vessel, tmp_path):
+    # A hole in the wall's side: closed, meant, or left as it is.
+    middle = vessel.centreline[len(vessel.centreline) // 2, :3]
+    centres = vessel.vertices_mm[vessel.triangles].mean(axis=1)
+    side = centres[np.argmin(np.linalg.norm(centres - middle, axis=1))]
+    path = tmp_path / "hole.obj"
+    kept = vessel.triangles[np.linalg.norm(centres - side, axis=1) > 2.5]
+    lines = [f"v {x} {y} {z}" for x, y, z in vessel.vertices_mm] + [f"f {a} {b} {c}" for a, b, c in kept + 1]
+    path.write_text("\n".join(lines) + "\n")
+    openings = [
+        len(endowire.check_vessel(path, **options)["openings"])
+        for options in ({}, {"keep_open_mm": [side]}, {"repair": "none"})
+    ]
+    assert openings == [2, 3, 3]
+    with pytest.raises(endowire.InputError, match='repair = "some": must be "all" or "none"'):
+        endowire.check_vessel(path, repair="some")
+
+
 def test_a_centre_line_is_found_in_a_surface_and_devices_are_held_against_it(vessel, wire):
     surface = endowire.Vessel.from_arrays(vessel.vertices_mm, vessel.triangles)
     end = f"opening {1 - vessel.inlet}"

@@ -154,9 +154,9 @@ pub(super) fn falling(name: &str, quantity: &str, errors: &[f64], ratio: f64) ->
 }
 
 /// Rod of C6: EI in N·mm², radius in mm, foundation modulus in N/mm².
-const BENDING: f64 = 10.0;
+pub(crate) const BENDING: f64 = 10.0;
 const WIRE_RADIUS: f64 = 0.45;
-const MODULUS: f64 = 1.0;
+pub(crate) const MODULUS: f64 = 1.0;
 /// Initial penetration of the rod of C6 into the floor, mm: so the floor also holds it where it would lift off.
 const PRESSED: f64 = 0.02;
 
@@ -177,7 +177,7 @@ fn sunk(elements: usize, force: f64) -> Result<f64> {
 }
 
 /// Axial load at which a rod of six half-waves, pinned at both ends, buckles on the floor, N.
-fn buckling_load(elements: usize) -> Result<f64> {
+pub(crate) fn buckling_load(elements: usize) -> Result<f64> {
     let length = 6.0 * PI * (BENDING / MODULUS).powf(0.25);
     let mut channel = pressed(elements, length)?;
     channel.supports.start_tangent = false;

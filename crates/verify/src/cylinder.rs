@@ -170,13 +170,29 @@ pub(super) fn helix() -> Result<Vec<Row>> {
 
 /// Foundation modulus of the cylinder under the rod lying in it.
 const FLOOR: f64 = 1e3;
+/// Elements per half-wave of a rod that snakes.
+const PER_HALF_WAVE: f64 = 8.0;
 
-/// Load at which a rod of weight 1 per length at the bottom of the cylinder, pinned at both ends, starts to snake.
-fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
-    let elements = (8.0 * length / PI) as usize;
-    let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus: FLOOR };
+/// A rod that lies at the bottom of the cylinder, pinned at both ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lying {
+    /// Half-waves of length π in it.
+    pub(crate) half_waves: f64,
+    /// Vertices around the cylinder.
+    pub(crate) around: u32,
+    /// Weight per length.
+    pub(crate) weight: f64,
+    /// Foundation modulus of the cylinder.
+    pub(crate) modulus: f64,
+}
+
+/// Load at which a rod in the cylinder starts to snake.
+pub(crate) fn snaking(rod: Lying) -> Result<f64> {
+    let Lying { half_waves, around, weight, modulus } = rod;
+    let (length, elements) = (half_waves * PI, (PER_HALF_WAVE * half_waves) as usize);
+    let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus };
     // As deep as its weight presses it.
-    let start = Vec3::y() * -(1.0 + weight / FLOOR);
+    let start = Vec3::y() * -(1.0 + weight / modulus);
     let along = Frame::new(Vec3::x(), None);
     let mut rod = TestRod::new(&cylinder(length, around)?, &setup, start, |_| along)?;
     rod.loads.distributed = vec![(0, elements, Vec3::y() * -weight)];
@@ -209,7 +225,7 @@ pub(super) fn weight() -> Result<Vec<Row>> {
         let half_waves = |n: i32| (f64::from(n) / waves).powi(2) + (waves / f64::from(n)).powi(2);
         let expected = (1..20).map(half_waves).fold(f64::MAX, f64::min);
         let name = format!("C1 snaking, {waves} half-waves of length");
-        let at = |around: u32| snaking(waves * PI, around, 1.0);
+        let at = |around: u32| snaking(Lying { half_waves: waves, around, weight: 1.0, modulus: FLOOR });
         let loads = [at(16)?, at(32)?, at(64)?];
         rows.push(Row::relative(&name, "load", loads[2], expected, bound));
         let errors = loads.map(|load| (load / expected - 1.0).abs());
@@ -281,7 +297,8 @@ mod tests {
         let soft = helix_rows("", Fineness { hardness: 100.0, around: 64, ..fine }, 0.5).unwrap();
         assert!(soft.iter().all(|row| !row.pass), "{soft:?}");
         // Heavier by 5 %: the load is 2.5 % higher.
-        let heavy = snaking(6.0 * PI, 48, 1.05).unwrap();
+        let rod = Lying { half_waves: 6.0, around: 48, weight: 1.05, modulus: FLOOR };
+        let heavy = snaking(rod).unwrap();
         assert!(!Row::relative("", "", heavy, 2.0, 1e-2).pass, "{heavy}");
         let [ratio, _] = Pushed::new(0.15, 0.06).unwrap().along_axis();
         let [_, expected] = Pushed::new(0.15, 0.05).unwrap().along_axis();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct EvidenceArgs {
-    /// Study: three-tubes, reversal, whip, capstan or bending; if absent, they are listed
+    /// Study: three-tubes, coil-forces, reversal, whip, capstan, tube-buckling or bending; if absent, they are listed
     #[arg(value_name = "NAME")]
     pub(crate) study: Option<String>,
     /// The measurements, for three-tubes: they are not part of this program, and the study says where to get them

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use endowire_core::Vec3;
 use endowire_core::passable::NO_FORCE_N;
-use endowire_core::vessel::{CentrelineEnd, Ends, Mending, Parts, PatientAxes, SurfaceFrame};
+use endowire_core::vessel::{CentrelineEnd, Ends, Parts, PatientAxes, RepairMode, SurfaceFrame};
 
 use super::{CacheArgs, SetArgs};
 use crate::commands::parse_end;
@@ -94,7 +94,7 @@ impl From<CoordinateArgs> for SurfaceFrame {
 pub(crate) struct RepairArgs {
     /// all: faults are mended; none: the surface is taken as it is, or refused
     #[arg(long, value_name = "all|none", default_value = "all")]
-    pub(crate) repair: Mending,
+    pub(crate) repair: RepairMode,
     /// A place x,y,z in mm: the hole nearest to it is meant, and is not closed (repeatable)
     #[arg(long = "keep-open", value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
     pub(crate) keep_open_mm: Vec<Vec3>,

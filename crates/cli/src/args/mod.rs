@@ -28,7 +28,7 @@ pub(crate) use inputs::{
 };
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{
-    CoilArgs, CoilKind, CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
+    CoilArgs, CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
 };
 pub(crate) use subjects::{SubjectCommand, SubjectRunArgs};
 

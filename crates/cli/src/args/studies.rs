@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
+use endowire_verify::bench::coil;
 
 use crate::studies::{CANDIDATES, CASES, targets};
 
@@ -75,6 +76,15 @@ impl CoilKind {
             Self::Framing => "framing",
             Self::Filling => "filling",
             Self::Finishing => "finishing",
+        }
+    }
+
+    /// How it is made.
+    pub(crate) fn wound(self) -> coil::CoilKind {
+        match self {
+            Self::Framing => coil::CoilKind::FRAMING,
+            Self::Filling => coil::CoilKind::FILLING,
+            Self::Finishing => coil::CoilKind::FINISHING,
         }
     }
 }

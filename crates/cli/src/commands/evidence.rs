@@ -5,7 +5,9 @@ use std::path::Path;
 use endowire_core::Vec3;
 use endowire_verify::Row;
 use endowire_verify::evidence::three_tubes::{self, ThreeTubes};
-use endowire_verify::evidence::{Compared, Kind, STUDIES, Study, bending, capstan, reversal, whip};
+use endowire_verify::evidence::{
+    Compared, Kind, STUDIES, Study, bending, capstan, coil_forces, reversal, tube_buckling, whip,
+};
 use serde::Serialize;
 
 use super::device::table::{columns, digits};
@@ -58,9 +60,11 @@ pub(crate) fn evidence(args: &EvidenceArgs) -> Result<(), Failure> {
         return Err(Failure::Input(format!("{}: {name} takes no file: leave it out", file.display())));
     }
     let (compared, provenance) = match study.name {
+        "coil-forces" => (deployed()?, Provenance::of_program("evidence coil-forces")),
         "reversal" => (reversal::study()?, Provenance::of_program("evidence reversal")),
         "whip" => (whip::study()?, Provenance::of_program("evidence whip")),
         "capstan" => (capstan::study()?, Provenance::of_program("evidence capstan")),
+        "tube-buckling" => (tube_buckling::study()?, Provenance::of_program("evidence tube-buckling")),
         _ => bent()?,
     };
     compare(args, study, &compared, &provenance)
@@ -69,6 +73,14 @@ pub(crate) fn evidence(args: &EvidenceArgs) -> Result<(), Failure> {
 /// Names of all studies.
 fn names() -> String {
     STUDIES.map(|study| study.name).join(", ")
+}
+
+/// Coils, deployed side by side.
+fn deployed() -> Result<Compared, Failure> {
+    let sign = progress::waiting("coils are deployed");
+    let compared = coil_forces::study(&|count, of| in_parallel(count, None, of));
+    sign.finish_and_clear();
+    Ok(compared?)
 }
 
 /// The wires of the catalogue, bent.

@@ -106,7 +106,7 @@ pub(super) fn checked(
     provenance: Provenance,
 ) -> Result<Document, Failure> {
     let surface = SurfaceMesh::read(file, frame)?;
-    let options = RepairOptions { mending: repair.repair, keep_open_mm: repair.keep_open_mm.clone() };
+    let options = RepairOptions { mode: repair.repair, keep_open_mm: repair.keep_open_mm.clone() };
     let report =
         check_repaired(&surface, frame.unit_mm, septum_mm, &options).map_err(|error| match error {
             Error::Parameter { name, value, remedy } if name == "septum_mm" || name == "keep_open_mm" => {

@@ -96,6 +96,55 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
 }
 
 #[test]
+fn where_branches_meet_again_a_way_takes_the_arm_that_via_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = text(&folder.path().join("ring.csv")).to_owned();
+    let surface = text(&folder.path().join("ring.stl")).to_owned();
+    // Straight along z, and a longer arm beside it from 20 to 100 mm.
+    let mut rows: Vec<String> = (0..27).map(|k| format!("0 0 {} 4 {}", 5 * k, k - 1)).collect();
+    rows[26] += " end";
+    for k in 1..10 {
+        let x = 1.6 * f64::from(k * (10 - k));
+        let parent = if k == 1 { 4 } else { 25 + k };
+        let name = match k {
+            5 => " far arm",
+            9 => " joins 20",
+            _ => "",
+        };
+        rows.push(format!("{x} 0 {} 3 {parent}{name}", 20 + 8 * k));
+    }
+    std::fs::write(&table, rows.join("\n")).unwrap();
+    reported(&vessel(&["generate", &table, "--out", &surface, "--edge-mm", "1.5", "--json"]));
+    let wire = wire();
+    let passage = |more: &[&str]| {
+        let given =
+            ["passable", &surface, "--device", &wire, "--json"].into_iter().chain(more.iter().copied());
+        vessel(&given.collect::<Vec<_>>())
+    };
+    let length_mm = |more: &[&str]| reported(&passage(more))["length_mm"].as_f64().unwrap();
+    let in_table = ["--centreline", &table, "--to", "end"];
+    let straight_mm = length_mm(&in_table);
+    let around_mm = length_mm(&[&in_table[..], &["--via", "far arm"]].concat());
+    assert!(
+        (straight_mm - 130.0).abs() < 1e-6 && around_mm > straight_mm + 15.0,
+        "{straight_mm} {around_mm}"
+    );
+    // In the surface alone the arm has a name of its own, and a place does as well.
+    let ends = reported(&vessel(&["check", &surface, "--json"]));
+    assert_eq!(ends["rings"], 1, "{ends}");
+    let [from, to] = if ends["inlet"] == 0 { ["0", "1"] } else { ["1", "0"] };
+    let found = ["--from", from, "--to", to];
+    assert!((length_mm(&found) / straight_mm - 1.0).abs() < 0.03);
+    for via in ["arm 1", "40,0,60"] {
+        let found_mm = length_mm(&[&found[..], &["--via", via]].concat());
+        assert!((found_mm / around_mm - 1.0).abs() < 0.03, "{via}: {found_mm} {around_mm}");
+    }
+    let refused = passage(&[&in_table[..], &["--via", "nowhere"]].concat());
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("--via = \"nowhere\""), "{}", said(&refused));
+}
+
+#[test]
 fn ends_that_are_none_are_refused_by_their_flag() {
     let folder = tempfile::tempdir().unwrap();
     let (table, _) = found(folder.path());

@@ -71,7 +71,7 @@ pub struct SceneOf<M> {
     pub(super) centreline: OnceLock<CentrelineTree>,
     /// What was repaired on its surface, once read.
     #[serde(skip)]
-    mended: OnceLock<Vec<String>>,
+    repair_notes: OnceLock<Vec<String>>,
 }
 
 fn of_file_system() -> Arc<dyn Files> {
@@ -260,8 +260,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 return Err(Error::parameter("vessel.axes", axes.name(), remedy));
             }
             let remedy = "only with vessel.file: a tree is not repaired";
-            if let Some(mending) = spec.repair {
-                return Err(Error::parameter("vessel.repair", format!("{mending:?}").to_lowercase(), remedy));
+            if let Some(mode) = spec.repair {
+                return Err(Error::parameter("vessel.repair", format!("{mode:?}").to_lowercase(), remedy));
             }
             if let Some(place) = spec.keep_open_mm.first() {
                 return Err(Error::parameter("vessel.keep_open_mm", format!("{place:?}"), remedy));
@@ -294,14 +294,14 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             }
             other => Error::content(&path, other.to_string()),
         })?;
-        let _ = self.mended.set(wall.report().mended());
+        let _ = self.repair_notes.set(wall.report().repair_notes());
         Ok(wall.into())
     }
 
     /// What was repaired on its surface and what in its lumen was taken as a wall, a sentence each, once the surface was
     /// read; none for a vessel from a tree.
-    pub fn mended(&self) -> &[String] {
-        self.mended.get().map_or(&[], Vec::as_slice)
+    pub fn repair_notes(&self) -> &[String] {
+        self.repair_notes.get().map_or(&[], Vec::as_slice)
     }
 
     /// Attributes an error of a vessel from a tree to the tree's file.

@@ -9,7 +9,7 @@ use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
 use crate::vessel::{
-    CentrelineTree, Mending, MotionMode, Opening, PatientAxes, RepairOptions, Resolution, SurfaceFrame,
+    CentrelineTree, MotionMode, Opening, PatientAxes, RepairMode, RepairOptions, Resolution, SurfaceFrame,
     YieldingSpec,
 };
 use crate::{Error, Result, Vec3};
@@ -25,7 +25,7 @@ pub struct VesselSpec {
     /// Axes of the surface file, overriding those of its header.
     pub axes: Option<PatientAxes>,
     /// What of the surface file is repaired; all if absent.
-    pub repair: Option<Mending>,
+    pub repair: Option<RepairMode>,
     /// Places of holes in it that are meant and stay open, such as fenestrations, mm.
     #[serde(default)]
     pub keep_open_mm: Vec<[f64; 3]>,
@@ -60,7 +60,7 @@ impl VesselSpec {
     /// The repair of `file`.
     pub(super) fn repair_options(&self) -> RepairOptions {
         RepairOptions {
-            mending: self.repair.unwrap_or_default(),
+            mode: self.repair.unwrap_or_default(),
             keep_open_mm: self.keep_open_mm.iter().map(|place| Vec3::from(*place)).collect(),
         }
     }

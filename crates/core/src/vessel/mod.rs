@@ -58,7 +58,7 @@ pub use opening::Opening;
 pub use path::{CentrelinePath, OnPath};
 pub use query::{Nearest, WallQuery};
 pub use recipe::{CentrelineRecipe, NoStore, WallRecipe, WallStore};
-pub use repairs::{Mending, Repair, RepairKind, RepairOptions};
+pub use repairs::{Repair, RepairKind, RepairMode, RepairOptions};
 pub use sac::Sac;
 pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use swept::SweptVessel;

@@ -105,7 +105,7 @@ impl WallStore for NoStore {
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::vessel::{Mending, anatomy};
+    use crate::vessel::{RepairMode, anatomy};
 
     fn tube() -> Wall {
         let tree = anatomy::tree("curved_tube").unwrap();
@@ -127,7 +127,7 @@ mod tests {
         let repaired = |surface, options| WallRecipe::Repaired { surface, options };
         let options = [
             RepairOptions::default(),
-            RepairOptions { mending: Mending::None, ..RepairOptions::default() },
+            RepairOptions { mode: RepairMode::None, ..RepairOptions::default() },
             RepairOptions { keep_open_mm: vec![Vec3::x()], ..RepairOptions::default() },
         ];
         let recipes = [

@@ -14,16 +14,16 @@ const NAMED: usize = 5;
 /// What is repaired on a surface that is read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Mending {
+pub enum RepairMode {
     /// All faults of [`RepairReport`](super::RepairReport).
     #[default]
     All,
     /// None: vertices are welded and triangles turned, holes stay open, nothing is dropped, cut or united. A surface that
-    /// cannot be a wall without mending is refused.
+    /// cannot be a wall without repair is refused.
     None,
 }
 
-impl std::str::FromStr for Mending {
+impl std::str::FromStr for RepairMode {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
@@ -39,7 +39,7 @@ impl std::str::FromStr for Mending {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RepairOptions {
     /// What is repaired.
-    pub mending: Mending,
+    pub mode: RepairMode,
     /// Places of holes that are meant, such as fenestrations, mm: the hole nearest to each is not closed.
     pub keep_open_mm: Vec<Vec3>,
 }

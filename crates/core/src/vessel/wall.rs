@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::in_front::Ends;
 use super::mesh::retain_numbered;
 use super::opening::{self, Boundary, Opening};
-use super::repairs::{Mending, Repair, RepairKind, RepairOptions, named};
+use super::repairs::{Repair, RepairKind, RepairMode, RepairOptions, named};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;
@@ -121,7 +121,7 @@ impl RepairReport {
 
     /// One line for each kind of what was repaired on the surface, and of what in its lumen was taken as a wall, with
     /// sizes and places of the largest; empty for a surface that is taken as it was given.
-    pub fn mended(&self) -> Vec<String> {
+    pub fn repair_notes(&self) -> Vec<String> {
         let at_least = if self.intersections_capped { "or more " } else { "" };
         let still = format!("{at_least}pairs of triangles still intersect: mend the surface there");
         let kept = self.repairs.iter().filter(|repair| repair.kind == RepairKind::HoleKept).count();
@@ -176,7 +176,7 @@ impl RepairReport {
         notes.extend(counted(self.degenerate_removed, "degenerate triangles removed"));
         notes.extend(counted(self.duplicates_removed, "duplicate triangles removed"));
         notes.extend(counted(self.triangles_flipped, "triangles turned over"));
-        notes.extend(self.mended());
+        notes.extend(self.repair_notes());
         notes.extend(counted(self.stray_edges, "open edges form no loop"));
         notes.extend(counted(self.non_manifold_edges, "edges belong to more than two triangles"));
         notes.extend(counted(self.one_sided_edges, "edges make the surface one-sided"));
@@ -208,16 +208,16 @@ impl Wall {
     ///
     /// # Errors
     /// As [`Wall::from_surface`]; [`Error::Parameter`] naming `keep_open_mm` for a place without a hole; with
-    /// [`Mending::None`] [`Error::Mesh`] for a surface that cannot be a wall as it is.
+    /// [`RepairMode::None`] [`Error::Mesh`] for a surface that cannot be a wall as it is.
     pub fn repaired(surface: &SurfaceMesh, options: &RepairOptions) -> Result<Self> {
         Self::repaired_from(Welding::of(surface)?, options)
     }
 
     /// [`Wall::repaired`] of a surface whose vertices are merged.
     pub(super) fn repaired_from(welding: Welding, options: &RepairOptions) -> Result<Self> {
-        match options.mending {
-            Mending::All => Self::mended(welding, Some(&options.keep_open_mm)),
-            Mending::None => {
+        match options.mode {
+            RepairMode::All => Self::mended(welding, Some(&options.keep_open_mm)),
+            RepairMode::None => {
                 if let Some(place) = options.keep_open_mm.first() {
                     let remedy = "nothing is closed with repair = \"none\": leave it out";
                     return Err(Error::parameter("keep_open_mm", crate::error::vector(place), remedy));

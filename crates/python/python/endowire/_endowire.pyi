@@ -417,7 +417,12 @@ class Scene:
     def __deepcopy__(self, memo: Any, /) -> Scene: ...
 
 def check_vessel(
-    path: str | PathLike[str], unit_mm: float = 1.0, septum_mm: float = 1.0, axes: str | None = None
+    path: str | PathLike[str],
+    unit_mm: float = 1.0,
+    septum_mm: float = 1.0,
+    axes: str | None = None,
+    repair: str = "all",
+    keep_open_mm: ArrayLike | None = None,
 ) -> dict[str, Any]: ...
 def _check_view(view: Mapping[str, Any]) -> None: ...
 def solve_rod(case: str | PathLike[str] | Mapping[str, Any]) -> dict[str, Any]: ...

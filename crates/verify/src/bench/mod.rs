@@ -1,9 +1,10 @@
 //! Bench tests of a device, as its engineers carry them out: [torque response](torque), [push] along a tortuous
-//! [track], [tip load](tip_load) and [three-point bending](bend).
+//! [track], [tip load](tip_load) and [three-point bending](bend), and the deployment of a [coil] in a sac.
 //!
 //! Every test is a sequence of equilibria of the exact rod: no speed, no damping, no time.
 
 pub mod bend;
+pub mod coil;
 pub mod push;
 pub mod tip_load;
 pub mod torque;

@@ -2,8 +2,10 @@
 
 pub mod bending;
 pub mod capstan;
+pub mod coil_forces;
 pub mod reversal;
 pub mod three_tubes;
+pub mod tube_buckling;
 pub mod whip;
 
 use crate::Row;
@@ -26,8 +28,15 @@ pub struct Study {
 }
 
 /// All studies, those with measurements first.
-pub const STUDIES: [Study; 5] =
-    [three_tubes::STUDY, reversal::STUDY, whip::STUDY, capstan::STUDY, bending::STUDY];
+pub const STUDIES: [Study; 7] = [
+    three_tubes::STUDY,
+    coil_forces::STUDY,
+    reversal::STUDY,
+    whip::STUDY,
+    capstan::STUDY,
+    tube_buckling::STUDY,
+    bending::STUDY,
+];
 
 /// What a curve is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

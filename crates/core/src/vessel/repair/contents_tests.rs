@@ -4,7 +4,7 @@ use super::shapes::{add, ball, disc, tube, turned_over};
 use crate::Vec3;
 use crate::device::Device;
 use crate::insertion::{Command, Sheath, Simulation};
-use crate::vessel::{Mending, Repair, RepairKind, RepairOptions, SurfaceMesh, Wall, WallQuery};
+use crate::vessel::{Repair, RepairKind, RepairMode, RepairOptions, SurfaceMesh, Wall, WallQuery};
 
 /// A tube of radius 10 mm from z = 0 to 100 mm.
 fn vessel() -> SurfaceMesh {
@@ -55,7 +55,7 @@ fn closed_bodies_are_walls_whatever_their_size() {
         let repair = only(&wall, RepairKind::BodyInLumen);
         let longest = repair.size_mm.into_iter().fold(0.0, f64::max);
         assert!((longest / size_mm - 1.0).abs() < 0.05, "{longest} {size_mm}");
-        let told = report.mended();
+        let told = report.repair_notes();
         assert!(
             told.len() == 1 && told[0].starts_with("1 closed bodies in the lumen taken as walls: "),
             "{told:?}"
@@ -63,7 +63,7 @@ fn closed_bodies_are_walls_whatever_their_size() {
         // Meshed evenly, it is still there.
         assert!(!Wall::welded(wall.mesh()).unwrap().contains(&inside).unwrap());
         let kept =
-            Wall::repaired(&with(&body), &RepairOptions { mending: Mending::None, ..Default::default() });
+            Wall::repaired(&with(&body), &RepairOptions { mode: RepairMode::None, ..Default::default() });
         assert!(!kept.unwrap().contains(&inside).unwrap());
     }
 }
@@ -98,7 +98,7 @@ fn sheets_are_walls_with_two_sides() {
             assert!(near.normal.dot(&across) * side > 0.9, "{name}: {near:?}");
         }
         let refused =
-            Wall::repaired(&with(&sheet), &RepairOptions { mending: Mending::None, ..Default::default() });
+            Wall::repaired(&with(&sheet), &RepairOptions { mode: RepairMode::None, ..Default::default() });
         let refused = refused.unwrap_err().to_string();
         assert!(refused.contains("1 sheets in the lumen, which have no inside: "), "{name}: {refused}");
     }
@@ -139,7 +139,10 @@ fn what_lies_outside_is_dropped_by_name() {
     assert_eq!((report.bodies_in_lumen, report.pieces_dropped), (0, 1));
     let dropped = only(&wall, RepairKind::PieceDropped);
     assert!((Vec3::from(dropped.at_mm) - outside).norm() < 1e-9);
-    assert_eq!(report.mended(), ["1 small or flat pieces dropped: 2 × 2 × 2 mm at [30.00, 0.00, 50.00]"]);
+    assert_eq!(
+        report.repair_notes(),
+        ["1 small or flat pieces dropped: 2 × 2 × 2 mm at [30.00, 0.00, 50.00]"]
+    );
     // A hole is named by the size of its rim and by its place, and stays open where it is meant.
     let mut holed = vessel();
     let hole = Vec3::new(10.0, 0.0, 50.0);

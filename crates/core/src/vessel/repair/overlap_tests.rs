@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 
 use super::shapes::{add, ball, tube};
 use crate::Vec3;
-use crate::vessel::{ExtractedCentreline, Mending, RepairKind, RepairOptions, Sac, SurfaceMesh, Wall, check};
+use crate::vessel::{
+    ExtractedCentreline, RepairKind, RepairMode, RepairOptions, Sac, SurfaceMesh, Wall, check,
+};
 
 /// A trunk of radius 5 mm from z = 0 to 80 mm, with these parts.
 fn trunk_with(parts: &[SurfaceMesh]) -> SurfaceMesh {
@@ -56,7 +58,7 @@ fn branches_are_united_with_their_trunk() {
         // All radii of the rims are as drawn.
         let widest = wall.openings()[0].radius_mm;
         assert!((widest - 5.0).abs() < 1e-9, "{widest}");
-        let apart = Wall::repaired(&mesh, &RepairOptions { mending: Mending::None, ..Default::default() });
+        let apart = Wall::repaired(&mesh, &RepairOptions { mode: RepairMode::None, ..Default::default() });
         assert_eq!(apart.unwrap().report().components, parts.len() + 1);
     }
 }

@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
+import heapq
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 
 class Centreline:
-    """A tree of points, each connected to its parent.
+    """A tree of points, each connected to its parent, whose branches may meet again.
 
     ``table`` has the shape (n, 5): x, y, z and radius in mm, and the row of the parent, which precedes its children;
-    -1 for the root.
+    -1 for the root. ``links`` are pairs of rows that are connected as well, as in `endowire.Vessel.links`: an arm's last
+    row and the row that it joins. Lengths to a point are those of the shortest way, by whichever arm.
     """
 
-    def __init__(self, table: NDArray[np.float64]) -> None:
+    def __init__(self, table: NDArray[np.float64], links: Sequence[tuple[int, int]] = ()) -> None:
         self.positions_mm = np.ascontiguousarray(table[:, :3])
         self.radii_mm = table[:, 3].copy()
         self.parents = table[:, 4].astype(int)
-        # Segment k connects row k + 1 to its parent.
-        self.begin_mm = self.positions_mm[self.parents[1:]]
-        self.along_mm = self.positions_mm[1:] - self.begin_mm
+        self.links = [(int(row), int(joins)) for row, joins in links]
+        #: The rows at which each segment begins and ends: segment k < n - 1 leads from the parent of row k + 1 to that
+        #: row, and those behind are the links.
+        joined = np.array(self.links, dtype=int).reshape(-1, 2)
+        self.begin_rows = np.append(self.parents[1:], joined[:, 0])
+        self.end_rows = np.append(np.arange(1, len(self.parents)), joined[:, 1])
+        self.begin_mm = self.positions_mm[self.begin_rows]
+        self.along_mm = self.positions_mm[self.end_rows] - self.begin_mm
         self.lengths_mm = np.linalg.norm(self.along_mm, axis=1)
         self._squares = self.lengths_mm**2
+        # Where branches meet again: the way from the root to each row, mm, and the row before it.
+        self._from_root = self._shortest() if self.links else None
 
     def nearest(self, point_mm: NDArray[np.float64]) -> tuple[int, float, float]:
-        """The point on the tree nearest to a point: segment, position on it (0 at the parent, 1 at the row), distance
-        in mm.
+        """The point on the line nearest to a point: segment, position on it (0 where it begins, 1 where it ends),
+        distance in mm.
         """
         to_point = point_mm - self.begin_mm
         part = np.clip(np.einsum("ij,ij->i", to_point, self.along_mm) / self._squares, 0.0, 1.0)
@@ -35,31 +46,73 @@ class Centreline:
         return segment, float(part[segment]), float(np.sqrt(squared[segment]))
 
     def point_mm(self, segment: int, part: float) -> NDArray[np.float64]:
-        """A point on the tree."""
+        """A point on the line."""
         point: NDArray[np.float64] = self.begin_mm[segment] + part * self.along_mm[segment]
         return point
 
     def ways_mm(self, point_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Path length along the tree from each row to the point nearest to ``point_mm``, mm, shape (n,)."""
+        """Path length along the line from each row to the point nearest to ``point_mm``, mm, shape (n,)."""
         segment, part, _ = self.nearest(point_mm)
         ways = np.full(len(self.parents), np.inf)
-        ways[segment + 1] = (1.0 - part) * self.lengths_mm[segment]
-        ways[self.parents[segment + 1]] = part * self.lengths_mm[segment]
+        ways[self.end_rows[segment]] = (1.0 - part) * self.lengths_mm[segment]
+        ways[self.begin_rows[segment]] = part * self.lengths_mm[segment]
+        self._along_tree(ways)
+        # Each link may shorten ways on its other side, and by them those over another link.
+        for _ in self.links:
+            before = ways.copy()
+            for (row, joins), length_mm in zip(self.links, self._link_lengths_mm(), strict=True):
+                ways[row] = min(ways[row], ways[joins] + length_mm)
+                ways[joins] = min(ways[joins], ways[row] + length_mm)
+            self._along_tree(ways)
+            if np.array_equal(ways, before):
+                break
+        return ways
+
+    def _along_tree(self, ways: NDArray[np.float64]) -> None:
+        """Shortens ways by those of parents and children."""
         # First towards the root, then away from it: parents precede their children.
         for row in range(len(ways) - 1, 0, -1):
             parent = self.parents[row]
             ways[parent] = min(ways[parent], ways[row] + self.lengths_mm[row - 1])
         for row in range(1, len(ways)):
             ways[row] = min(ways[row], ways[self.parents[row]] + self.lengths_mm[row - 1])
-        return ways
+
+    def _link_lengths_mm(self) -> NDArray[np.float64]:
+        return self.lengths_mm[len(self.parents) - 1 :]
+
+    def _shortest(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The shortest way from the root to each row, mm, and the row before it on that way."""
+        near: list[list[tuple[int, float]]] = [[] for _ in self.parents]
+        for begin, end, length_mm in zip(self.begin_rows, self.end_rows, self.lengths_mm, strict=True):
+            near[begin].append((int(end), float(length_mm)))
+            near[end].append((int(begin), float(length_mm)))
+        ways, before = np.full(len(self.parents), np.inf), np.full(len(self.parents), -1)
+        ways[0] = 0.0
+        queue = [(0.0, 0)]
+        while queue:
+            way_mm, row = heapq.heappop(queue)
+            if way_mm > ways[row]:
+                continue
+            for other, length_mm in near[row]:
+                if way_mm + length_mm < ways[other]:
+                    ways[other], before[other] = way_mm + length_mm, row
+                    heapq.heappush(queue, (way_mm + length_mm, other))
+        return ways, before
 
     def path(self, point_mm: NDArray[np.float64]) -> Path:
-        """The path along the tree from its root to the point nearest to ``point_mm``."""
+        """The shortest path along the line from its root to the point nearest to ``point_mm``."""
         segment, part, _ = self.nearest(point_mm)
-        rows = [int(self.parents[segment + 1])]
-        while self.parents[rows[-1]] >= 0:
-            rows.append(int(self.parents[rows[-1]]))
-        table = np.column_stack([self.positions_mm, self.radii_mm])[[*rows[::-1], segment + 1]]
+        near, far = int(self.begin_rows[segment]), int(self.end_rows[segment])
+        before = self.parents
+        if self._from_root is not None:
+            ways, before = self._from_root
+            length_mm = self.lengths_mm[segment]
+            if ways[far] + (1.0 - part) * length_mm < ways[near] + part * length_mm:
+                near, far, part = far, near, 1.0 - part
+        rows = [near]
+        while before[rows[-1]] >= 0:
+            rows.append(int(before[rows[-1]]))
+        table = np.column_stack([self.positions_mm, self.radii_mm])[[*rows[::-1], far]]
         if part > 0.0 or len(table) == 2:
             # The last segment ends at this point, but at least at a hundredth of its length, so that no path has
             # length zero.
@@ -103,13 +156,13 @@ class Ways:
         # The coordinate axis comes first; rows of environments are padded with segments far away.
         self._begin_mm, self._along_mm = np.zeros((3, n, 0)), np.zeros((3, n, 0))
         self._squares, self._lengths_mm = np.zeros((n, 0)), np.zeros((n, 0))
-        self._from_parent_mm, self._from_child_mm = np.zeros((n, 0)), np.zeros((n, 0))
+        self._from_begin_mm, self._from_end_mm = np.zeros((n, 0)), np.zeros((n, 0))
         # The target's segment, and the place on it.
         self._segment, self._part = np.zeros(n, dtype=int), np.zeros(n)
         self._rows = np.arange(n)
 
     def put(self, k: int, line: Centreline, target_mm: NDArray[np.float64]) -> None:
-        """Sets the tree and the target of environment k."""
+        """Sets the line and the target of environment k."""
         ways_mm = line.ways_mm(target_mm)
         self._segment[k], self._part[k], _ = line.nearest(target_mm)
         more = len(line.lengths_mm) - self._squares.shape[1]
@@ -119,8 +172,8 @@ class Ways:
                 ("_along_mm", 1.0),
                 ("_squares", 3.0),
                 ("_lengths_mm", 0.0),
-                ("_from_parent_mm", 0.0),
-                ("_from_child_mm", 0.0),
+                ("_from_begin_mm", 0.0),
+                ("_from_end_mm", 0.0),
             ):
                 old = getattr(self, name)
                 setattr(
@@ -132,11 +185,11 @@ class Ways:
         self._along_mm[:, k, :count] = line.along_mm.T
         self._squares[k, :count] = line.lengths_mm**2
         self._lengths_mm[k, :count] = line.lengths_mm
-        self._from_parent_mm[k, :count] = ways_mm[line.parents[1:]]
-        self._from_child_mm[k, :count] = ways_mm[1:]
+        self._from_begin_mm[k, :count] = ways_mm[line.begin_rows]
+        self._from_end_mm[k, :count] = ways_mm[line.end_rows]
 
     def left_mm(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Path length from the point on the tree nearest to each given point to the target, mm: shape (n, 3) to (n,)."""
+        """Path length from the point on the line nearest to each given point to the target, mm: shape (n, 3) to (n,)."""
         x, y, z = points_mm.T[:, :, None] - self._begin_mm
         u, v, w = self._along_mm
         part = np.clip((x * u + y * v + z * w) / self._squares, 0.0, 1.0)
@@ -144,6 +197,6 @@ class Ways:
         at = self._rows, np.argmin(squared, axis=1)
         length, part = self._lengths_mm[at], part[at]
         near: NDArray[np.float64] = np.minimum(
-            self._from_child_mm[at] + (1.0 - part) * length, self._from_parent_mm[at] + part * length
+            self._from_end_mm[at] + (1.0 - part) * length, self._from_begin_mm[at] + part * length
         )
         return np.where(at[1] == self._segment, np.abs(part - self._part) * length, near)

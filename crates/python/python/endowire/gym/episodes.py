@@ -106,7 +106,8 @@ class Episodes:
         target_mm = checks.place_mm("target", sampled)
         segment, _, off_mm = site.centreline.nearest(target_mm)
         # The centre line may be off the axis, so only far from it it is asked whether the target is in the vessel.
-        radius_mm = site.centreline.radii_mm[[segment + 1, site.centreline.parents[segment + 1]]].max()
+        line = site.centreline
+        radius_mm = line.radii_mm[[line.begin_rows[segment], line.end_rows[segment]]].max()
         near_mm = radius_mm + self.task.threshold_mm
         if off_mm > near_mm and not site.vessel.contains(target_mm[None])[0]:
             raise InputError(

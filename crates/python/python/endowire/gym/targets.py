@@ -33,7 +33,7 @@ class CentrelineTarget:
     def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
         line = site.centreline
         ways_mm = line.ways_mm(start.tip_mm)
-        far = np.minimum(ways_mm[1:], ways_mm[line.parents[1:]]) >= self.least_mm
+        far = np.minimum(ways_mm[line.begin_rows], ways_mm[line.end_rows]) >= self.least_mm
         if site.targets is not None:
             far &= site.targets
         if not far.any():

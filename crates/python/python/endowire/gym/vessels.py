@@ -69,7 +69,8 @@ class FixedVessel:
     """The same vessel in every episode."""
 
     def __init__(self, vessel: Vessel, centreline: NDArray[np.float64] | None = None, **sheath: Any) -> None:
-        """A vessel with the centre line it was made from, or another one (x, y, z, radius, parent; shape (n, 5)). If
+        """A vessel with the centre line it was made from, or another one (x, y, z, radius, parent; shape (n, 5)), which
+        is a tree. Where branches of the vessel's own meet again, ways to a target are the shortest, by either arm. If
         the vessel is only a surface, the centre line is extracted from its lumen, starting at the sheath's
         ``opening`` if given.
 
@@ -78,7 +79,8 @@ class FixedVessel:
         if centreline is None and vessel.centreline_found and "opening" in sheath:
             vessel = vessel.with_centreline(sheath["opening"])
         table = vessel.centreline if centreline is None else checks.real("centreline", centreline)
-        self.site = Site(vessel, Centreline(table), sheath)
+        links = vessel.links if centreline is None else []
+        self.site = Site(vessel, Centreline(table, links), sheath)
         low, high = vessel.vertices_mm.min(axis=0), vessel.vertices_mm.max(axis=0)
         # Instruments may leave through an opening.
         self.bounds_mm = np.stack([low, high]) + np.outer([-0.1, 0.1], high - low)

@@ -71,6 +71,31 @@ fn nifti(size: [usize; 3], values: &[f64], kind: Kind, scaling: [f32; 2], rows: 
     bytes
 }
 
+/// A file of [`nifti`] with a header of NIfTI-2, <https://nifti.nimh.nih.gov/pub/dist/doc/nifti2.h>.
+fn second(first: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0; 544];
+    let mut put = |at: usize, own: &[u8]| bytes[at..at + own.len()].copy_from_slice(own);
+    let float = |at: usize| f64::from(f32::from_le_bytes(first[at..at + 4].try_into().unwrap()));
+    put(0, &540_i32.to_le_bytes());
+    put(4, b"n+2\0\r\n\x1a\n");
+    put(12, &first[70..74]);
+    for k in 0..8 {
+        let side = i16::from_le_bytes(first[40 + 2 * k..42 + 2 * k].try_into().unwrap());
+        put(16 + 8 * k, &i64::from(side).to_le_bytes());
+        put(104 + 8 * k, &float(76 + 4 * k).to_le_bytes());
+    }
+    put(168, &544_i64.to_le_bytes());
+    put(176, &float(112).to_le_bytes());
+    put(184, &float(116).to_le_bytes());
+    put(348, &1_i32.to_le_bytes());
+    for k in 0..12 {
+        put(400 + 8 * k, &float(280 + 4 * k).to_le_bytes());
+    }
+    put(500, &2_i32.to_le_bytes());
+    bytes.extend(&first[352..]);
+    bytes
+}
+
 /// The rows of an affine in RAS of voxels that lie so in LPS.
 fn rows(axes: &Matrix3<f64>, origin_mm: &Vec3) -> [[f64; 4]; 3] {
     let sign = [-1.0, -1.0, 1.0];
@@ -133,6 +158,25 @@ fn labels_are_the_same_in_every_type_of_number_bare_or_in_several_members() {
 }
 
 #[test]
+fn a_label_map_of_the_second_format_is_that_of_the_first() {
+    for (kind, scaling) in [(Kind::U8, [1.0, 0.0]), (Kind::I16, [0.5, 0.0]), (Kind::F64, [0.0, 0.0])] {
+        let first = nifti(SIZE, &labels(), kind, scaling, &plain());
+        let expected = read(&first, "first.nii").unwrap();
+        assert_eq!(read(&second(&first), "second.nii").unwrap(), expected);
+        assert_eq!(read(&parts(&second(&first), 3), "second.nii.gz").unwrap(), expected);
+        // The twin: another origin in its header is another map.
+        let mut moved = second(&first);
+        moved[424..432].copy_from_slice(&1.5_f64.to_le_bytes());
+        assert_ne!(read(&moved, "moved.nii").unwrap(), expected);
+    }
+    // What is no label map is named in this format as well.
+    let decimals =
+        nifti(SIZE, &labels().iter().map(|x| 0.3 * x).collect::<Vec<_>>(), Kind::F64, [0.0; 2], &plain());
+    let refused = read(&second(&decimals), "second.nii").unwrap_err();
+    assert!(refused.contains("a value that is not whole"), "{refused}");
+}
+
+#[test]
 fn what_is_no_label_map_is_named() {
     let with = |kind: Kind, change: &dyn Fn(usize, f64) -> f64| {
         let values: Vec<f64> = labels().into_iter().enumerate().map(|(k, value)| change(k, value)).collect();
@@ -172,6 +216,10 @@ fn a_header_that_promises_what_the_file_lacks_takes_no_memory() {
         let message = read(&file, "short.nii.gz").unwrap_err();
         assert!(message.starts_with("short.nii.gz: ") && !message.contains('\n'), "{message}");
     }
+    // Cut in the middle of its compressed voxels.
+    let whole = parts(&nifti(SIZE, &labels(), Kind::F64, [0.0, 0.0], &plain()), 1);
+    let message = read(&whole[..whole.len() - whole.len() / 8], "cut.nii.gz").unwrap_err();
+    assert!(message.starts_with("cut.nii.gz: is cut off: it holds fewer voxels"), "{message}");
     bytes[42..44].copy_from_slice(&32_000_i16.to_le_bytes());
     let message = read(&bytes, "huge.nii").unwrap_err();
     assert!(message.contains("at most 268435456 are read"), "{message}");

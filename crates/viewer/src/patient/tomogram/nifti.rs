@@ -51,6 +51,28 @@ pub(super) struct Stored {
     volume: InMemNiftiVolume,
 }
 
+/// Why the library cannot read a file, in words.
+fn reason(error: &NiftiError) -> String {
+    match error {
+        NiftiError::Io(error) => format!("is no NIfTI volume: {error}"),
+        other => format!("is no NIfTI volume: {other}"),
+    }
+}
+
+/// The same behind its header.
+fn reason_of_voxels(error: &NiftiError) -> String {
+    // No more bytes are read than the header says.
+    let is_cut = match error {
+        NiftiError::Io(error) => error.kind() == io::ErrorKind::UnexpectedEof,
+        other => matches!(other, NiftiError::IncompatibleLength(..)),
+    };
+    if is_cut {
+        return "is cut off: it holds fewer voxels than its header says; copy or download it again"
+            .to_owned();
+    }
+    reason(error)
+}
+
 impl Stored {
     /// Reads a file of either format.
     ///
@@ -58,7 +80,8 @@ impl Stored {
     /// [`Error::Content`] for an unusable volume.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let bad = |reason: String| Error::content(path, reason);
-        let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
+        let unreadable = |error: NiftiError| bad(reason(&error));
+        let cut = |error: NiftiError| bad(reason_of_voxels(&error));
         named(path).map_err(bad)?;
         let header = second(path).map_err(bad)?;
         let (header, placed, volume) = match header {
@@ -66,9 +89,8 @@ impl Stored {
                 check_size(&header).map_err(bad)?;
                 scaled(&mut header).map_err(bad)?;
                 let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
-                io::copy(&mut (&mut voxels).take(offset), &mut io::sink())
-                    .map_err(|e| unreadable(e.into()))?;
-                let volume = loaded(voxels, &header).map_err(unreadable)?;
+                io::copy(&mut (&mut voxels).take(offset), &mut io::sink()).map_err(|e| cut(e.into()))?;
+                let volume = loaded(voxels, &header).map_err(cut)?;
                 (header, placed, volume)
             }
             None => {
@@ -80,9 +102,8 @@ impl Stored {
                 let placed = Placed::first(&header);
                 if &header.magic != FIRST_OF_PAIR {
                     let offset = (header.vox_offset as u64).saturating_sub(FIRST_BYTES);
-                    io::copy(&mut (&mut voxels).take(offset), &mut io::sink())
-                        .map_err(|e| unreadable(e.into()))?;
-                    let volume = loaded(voxels, &header).map_err(unreadable)?;
+                    io::copy(&mut (&mut voxels).take(offset), &mut io::sink()).map_err(|e| cut(e.into()))?;
+                    let volume = loaded(voxels, &header).map_err(cut)?;
                     return Self::new(volume, &placed, &header).map_err(bad);
                 }
                 let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
