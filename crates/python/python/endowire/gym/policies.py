@@ -1,8 +1,8 @@
-"""Policies without learning, as baselines."""
+"""Policies without learning, as baselines and experts, and what any policy does in any environment of Gymnasium."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,29 @@ class Policy(Protocol):
         the start of an episode.
         """
         ...
+
+
+def action(policy: Policy, env: Any) -> NDArray[np.float32]:
+    """What a policy does next in an environment of Gymnasium, in the unit and the shape of its action space: that of
+    `gymnasium.make` or `make_vec`, with or without wrappers (`LeRobotLog` is one).
+
+    Raises InputError for an environment of another package, or a vector that is not endowire's own, whose simulations
+    cannot be seen, and where a wrapper changes actions; Gymnasium's ResetNeeded before the first `reset`.
+    """
+    from .environment import InsertionEnv
+    from .vector import InsertionVectorEnv
+
+    inner = getattr(env, "unwrapped", env)
+    if not isinstance(inner, (InsertionEnv, InsertionVectorEnv)):
+        raise InputError(f"env = {env}: give an environment of endowire, from gymnasium.make or make_vec")
+    if env.action_space != inner.action_space:
+        raise InputError(f"env = {env}: a wrapper changes its actions: take the policy's from inside it")
+    inner.episodes.check_begun("action")
+    velocities = policy.act(inner.episodes)
+    space = inner.action_space
+    assert space.shape is not None
+    actions = np.asarray(velocities / inner.task.action_unit(), dtype=np.float32)
+    return actions.reshape(space.shape)
 
 
 class Straight:
