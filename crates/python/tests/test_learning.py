@@ -209,7 +209,7 @@ def test_what_cannot_be_evaluated_is_refused(task):
         (lambda: evaluation.table([]), "episodes = 0: must be 1 or more"),
         (lambda: evaluation.interval(0, 0), "episodes = 0: must be 1 or more"),
         (lambda: evaluation.interval(4, 3), "successes = 4: must be 0 to 3"),
-        (lambda: policies.Steered("next"), "kind = 'next': give follow_path or search_ahead"),
+        (lambda: policies.Steered("next"), "kind = 'next': give follow_path, search_ahead, plan"),
     ):
         with pytest.raises(endowire.InputError, match=words):
             wrong()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import Controller, InputError
+from .. import Controller, InputError, Planner
 from . import checks
 
 if TYPE_CHECKING:
@@ -70,18 +71,22 @@ class Uniform:
 
 class Steered:
     """The library's controllers, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of
-    `Controller`, on copies of the simulations. If a controller gives up, its instruments stay.
+    `Controller`, or ``plan``, a `Planner`; on copies of the simulations. If a controller gives up, its instruments stay.
 
-    Their commands of at most 2 mm and 0.35 rad are within a step's limits at 7.5 Hz and 35 mm/s. Raises InputError
-    for another ``kind``.
+    Their commands of at most 4 mm and 0.35 rad are within a step's limits at 7.5 Hz and 35 mm/s; where limits cut them
+    a plan is made anew, from where the tip is. Raises InputError for another ``kind``.
     """
 
     def __init__(self, kind: str = "search_ahead") -> None:
-        hands = {"follow_path": Controller.follow_path, "search_ahead": Controller.search_ahead}
+        hands: dict[str, Callable[..., Controller | Planner]] = {
+            "follow_path": Controller.follow_path,
+            "search_ahead": Controller.search_ahead,
+            "plan": Planner,
+        }
         if kind not in hands:
-            raise InputError(f"kind = {kind!r}: give {' or '.join(hands)}")
+            raise InputError(f"kind = {kind!r}: give {', '.join(hands)}")
         self.make = hands[kind]
-        self._hands: dict[int, Controller] = {}
+        self._hands: dict[int, Controller | Planner] = {}
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         action = np.zeros_like(episodes.action)
