@@ -2,7 +2,6 @@
 
     RAYON_NUM_THREADS=1 python crates/python/benches/plans.py compare                # sixteen arches, some minutes
     RAYON_NUM_THREADS=1 python crates/python/benches/plans.py gradients              # turns at places where a push came no farther
-    RAYON_NUM_THREADS=1 python crates/python/benches/plans.py ceiling --most-s inf   # search_ahead without its limit of time
 
 Arches are those of evaluation (`endowire/ArchVariety-v0`, seeds 900000 and on), ways those to their targets. Times are processor time of
 one thread.
@@ -14,7 +13,7 @@ import time
 import numpy as np
 
 import endowire
-from endowire.gym import arches, environment, evaluation, policies, tasks
+from endowire.gym import arches, environment, tasks
 from endowire.planning import Planner
 
 FIRST = 900_000
@@ -43,18 +42,23 @@ def drive(controller, simulation, most_s):
 
 
 def compare(seeds, most_s):
-    both = []
+    both, found_s = [], []
     for seed, simulation, path_mm in places(seeds):
+        began = time.process_time()
+        endowire.plan(simulation, path_mm)
+        found_s.append(time.process_time() - began)
         told = [drive(of(path_mm), simulation.copy(), most_s) for of in (Planner, endowire.Controller.search_ahead)]
-        print(seed, *(f"{'arrived' if there else 'lost':8}{n:5} commands {s:7.2f} s" for there, n, s in told), sep="   ", flush=True)
+        rows = [f"{'arrived' if there else 'lost':8}{n:5} commands {s:7.2f} s" for there, n, s in told]
+        print(seed, f"found in {found_s[-1]:.2f} s", *rows, sep="   ", flush=True)
         both.append(told)
     for name, rows in zip(("plan", "search_ahead"), zip(*both, strict=True), strict=True):
         there = [row for row in rows if row[0]]
         print(f"{name}: {len(there)} of {len(rows)}, {np.median([n for _, n, _ in there]):.0f} commands")
-    shared = [told for told in both if all(there for there, *_ in told)]
-    ratios = [ahead[2] / plan[2] for plan, ahead in shared]
-    sums = [sum(told[k][2] for told in shared) for k in (0, 1)]
-    print(f"both arrive in {len(shared)}: {sums[0]:.1f} s and {sums[1]:.1f} s, ratio of times {np.median(ratios):.1f} (median)")
+    shared = [(alone_s, *told) for alone_s, told in zip(found_s, both, strict=True) if all(there for there, *_ in told)]
+    for name, times_s in (("found", [one[0] for one in shared]), ("found and carried out", [one[1][2] for one in shared])):
+        ratios = [one[2][2] / time_s for one, time_s in zip(shared, times_s, strict=True)]
+        print(f"where both arrive, {len(shared)}: {name} in {sum(times_s):.1f} s, 1/{np.median(ratios):.1f} of the time of search_ahead (median)")
+    print(f"search_ahead there: {sum(one[2][2] for one in shared):.1f} s")
 
 
 def gradients(seeds):
@@ -103,47 +107,16 @@ def best_mm(base, moves, worth_mm):
     return max(worths)
 
 
-class Within:
-    """A policy whose instruments stay when its episode has taken so many seconds of processor time."""
-
-    def __init__(self, policy, most_s):
-        self.policy, self.most_s, self.began_s = policy, most_s, time.process_time()
-
-    def act(self, episodes):
-        if time.process_time() - self.began_s > self.most_s:
-            return np.zeros_like(episodes.action)
-        return self.policy.act(episodes)
-
-
-def ceiling(seeds, most_s, names):
-    """How many episodes of the strict task and of the one as its authors evaluate it arrive, whatever they take."""
-    for task_of in (tasks.arch_variety, tasks.arch_variety_as_evaluated):
-        for name in names:
-            arrived = 0
-            for seed in seeds:
-                task = task_of(vessels=arches.ArchVariety(count=None))
-                began = time.process_time()
-                (outcome,) = evaluation.evaluate(task, Within(policies.Steered(name), most_s), [FIRST + seed])
-                arrived += outcome.reached
-                took_s = time.process_time() - began
-                print(task_of.__name__, name, seed, outcome.reached, f"{outcome.steps} steps, {took_s:.1f} s", flush=True)
-            low, high = evaluation.interval(arrived, len(seeds))
-            print(f"{task_of.__name__}, {name}: {arrived} of {len(seeds)}, 95 % {low:.0%} to {high:.0%}", flush=True)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["compare", "gradients", "ceiling"])
+    parser.add_argument("what", choices=["compare", "gradients"])
     parser.add_argument("--seeds", type=int, nargs="*", default=range(16), help=f"beyond {FIRST}")
     parser.add_argument("--most-s", type=float, default=40.0, help="processor time of a run, s; inf for none")
-    parser.add_argument("--policies", nargs="*", default=["search_ahead"], help="of the ceiling: search_ahead, plan, follow_path")
     args = parser.parse_args()
     if args.what == "compare":
         compare(args.seeds, args.most_s)
-    elif args.what == "gradients":
-        gradients(args.seeds)
     else:
-        ceiling(args.seeds, args.most_s, args.policies)
+        gradients(args.seeds)
 
 
 if __name__ == "__main__":
