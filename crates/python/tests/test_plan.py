@@ -49,8 +49,24 @@ def test_a_plan_takes_fewer_commands_than_looking_ahead_at_each(branch, found):
     assert found.steps < 3 * len(found.moves)
 
 
+def test_where_no_turn_helps_the_way_is_followed(branch, monkeypatch):
+    monkeypatch.setattr(planning, "TURNS_RAD", ())
+    monkeypatch.setattr(planning, "FOLLOWED_MM", (np.inf,))
+    simulation, path_mm = branch
+    followed = endowire.plan(simulation, path_mm)
+    # As far as the hand itself comes before it pulls back, or farther by the push at the end.
+    hand, alone = endowire.Controller.follow_path(path_mm), simulation.copy()
+    planner, farthest_mm = endowire.Planner(path_mm), 0.0
+    while (move := hand.next(alone)) is not None and not hand.retries:
+        alone.step(*move[0])
+        farthest_mm = max(farthest_mm, planner.on_path(alone.tip_mm)[0])
+    assert followed.reached == (hand.ended == "arrived")
+    assert followed.trials >= 1 and planner.on_path(followed.simulation.tip_mm)[0] >= farthest_mm - 2.0
+
+
 def test_without_turns_it_does_not_arrive(branch, monkeypatch):
     monkeypatch.setattr(planning, "TURNS_RAD", ())
+    monkeypatch.setattr(planning, "FOLLOWED_MM", ())
     straight = endowire.plan(*branch)
     assert not straight.reached and straight.left_mm > 5.0 and straight.trials == 0
     hand = endowire.Planner(branch[1])

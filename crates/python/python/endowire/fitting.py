@@ -9,7 +9,7 @@ step that does not lower the sum of squares is halved. At the end (JᵀJ + P)⁻
 linear within it and the residuals are independent with the given sigma.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,7 +36,7 @@ def numbers(state: Gradient | Simulation, of: str) -> NDArray[np.float64]:
     Raises InputError for another kind.
     """
     report = state.report
-    values = {
+    values: dict[str, Callable[[], Any]] = {
         "tip": lambda: state.positions_mm[-1],
         "shape": lambda: state.positions_mm.ravel(),
         "push_force": lambda: report.push_force_n,

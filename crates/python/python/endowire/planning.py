@@ -2,8 +2,9 @@
 
 A plan pushes straight on as long as the tip comes farther along the way. Where it does not, it goes back to states that it has kept
 from before – copies cost microseconds, where pulling back costs steps – turns the instrument there and pushes again. The first turn
-that brings the tip clearly farther is taken, or the best of all turns at that place; then the plan pushes on from there. A plan contains
-neither what failed nor any pull.
+that brings the tip clearly farther is taken, or the best of all turns at that place; then the plan pushes on from there. Where no turn
+helps, the hand of `Controller.follow_path`, which turns at every push, is tried from the beginning and from states on the way, until it
+would pull back. A plan contains neither what failed nor any pull.
 
 Turns are tried, not computed by gradients: at a branch, which is where a plan has to choose, most trials pass a jump, across which there
 is no derivative (`crates/python/benches/plans.py gradients` counts them).
@@ -32,6 +33,8 @@ TURN_RAD = 0.35
 TURNS_RAD: tuple[float, ...] = (pi / 3, -pi / 3, 2 * pi / 3, -2 * pi / 3, pi)
 #: They are tried so far before the place where a push came no farther, mm.
 BACKS_MM = (12.0, 24.0, 0.0, 48.0, 80.0)
+#: So far before it the hand that follows the way begins; first of all at the beginning.
+FOLLOWED_MM = (inf, 80.0, 24.0)
 #: Largest distance of a kept state from such a place, mm.
 OFF_MM = 6.0
 #: Length pushed without coming farther before a push ends, and beyond the place of the last failure, mm.
@@ -54,7 +57,7 @@ class Plan:
     reached: bool
     #: Length of the way that is left at their end, mm.
     left_mm: float
-    #: Turns that were tried, and commands that were carried out on copies.
+    #: Turns and hands that were tried, and commands that were carried out on copies.
     trials: int
     steps: int
     #: Where the tip is after each command, mm, shape (n, 3).
@@ -153,6 +156,22 @@ class _Search:
                 best = end
         return best
 
+    def follow(self, begin: _Mark) -> _Mark:
+        """Follows the way from a state, turning at every push, until the hand would pull back: the best state that it comes to."""
+        planner, best, last = self.planner, begin, begin
+        hand = Controller.follow_path(planner.path_mm, arrived_mm=planner.arrived_mm, lead=planner.lead)
+        while not planner.has_arrived(best.tip_mm):
+            move = hand.next(last.simulation)
+            if move is None or hand.retries > 0:
+                break
+            following = self.command(last, *move[planner.lead].tolist())
+            if following is None:
+                break
+            last = following
+            if last.worth_mm > best.worth_mm or planner.has_arrived(last.tip_mm):
+                best = last
+        return best
+
     def run(self) -> Plan:
         self.best = self.push(self.best, inf)
         while not self.planner.has_arrived(self.best.tip_mm):
@@ -184,6 +203,12 @@ class _Search:
             found = self.try_turns(base, top_mm - base.inserted_mm + BEYOND_MM)
             if found is not None:
                 return found
+        for back_mm in FOLLOWED_MM:
+            self.trials += 1
+            base = min(self.best.back(), key=lambda mark: abs(mark.inserted_mm - max(0.0, top_mm - back_mm)))
+            found = self.follow(base)
+            if self.planner.has_arrived(found.tip_mm) or found.worth_mm > self.best.worth_mm + LEAST_MM:
+                return found
         return None
 
 
@@ -201,7 +226,7 @@ class Planner:
     def __init__(self, path_mm: ArrayLike, *, arrived_mm: float = 5.0, lead: int = 0) -> None:
         # It checks what all controllers check, with the same messages.
         Controller.search_ahead(path_mm, arrived_mm=arrived_mm, lead=lead)
-        table = np.asarray(path_mm, dtype=float)
+        self.path_mm = table = np.array(path_mm, dtype=float)
         self.lead, self.arrived_mm = int(lead), float(arrived_mm)
         self._begin_mm, self._along_mm = table[:-1, :3], np.diff(table[:, :3], axis=0)
         self._lengths_mm = np.linalg.norm(self._along_mm, axis=1)

@@ -34,7 +34,7 @@ class _Respond(torch.autograd.Function):
         return tuple(torch.tensor(one, **like) for one in found)
 
     @staticmethod
-    @once_differentiable  # type: ignore[misc]
+    @once_differentiable
     def backward(ctx: Any, *weights: Any) -> tuple[Any, None]:
         return sum(one @ slope for one, slope in zip(weights, ctx.saved_tensors, strict=True)), None
 
