@@ -53,8 +53,11 @@ def compare(seeds, most_s):
         both.append(told)
     for name, rows in zip(("plan", "search_ahead"), zip(*both, strict=True), strict=True):
         there = [row for row in rows if row[0]]
-        print(f"{name}: {len(there)} of {len(rows)}, {np.median([n for _, n, _ in there]):.0f} commands")
+        commands = f", {np.median([n for _, n, _ in there]):.0f} commands (median)" if there else ""
+        print(f"{name}: {len(there)} of {len(rows)}{commands}")
     shared = [(alone_s, *told) for alone_s, told in zip(found_s, both, strict=True) if all(there for there, *_ in told)]
+    if not shared:
+        return
     for name, times_s in (("found", [one[0] for one in shared]), ("found and carried out", [one[1][2] for one in shared])):
         ratios = [one[2][2] / time_s for one, time_s in zip(shared, times_s, strict=True)]
         print(f"where both arrive, {len(shared)}: {name} in {sum(times_s):.1f} s, 1/{np.median(ratios):.1f} of the time of search_ahead (median)")
