@@ -3,12 +3,14 @@
     python crates/python/examples/learn_arch.py train out/learn          # begins, or goes on where it was stopped
     python crates/python/examples/learn_arch.py evaluate out/learn       # what has been learnt, and what does not learn, on unseen arches
     python crates/python/examples/learn_arch.py plot out/learn           # the curve
+    python crates/python/examples/learn_arch.py evaluate out/ceiling --policies look-ahead plan --most-s inf    # hours: what can be reached
 
 Of several folders, `out/learn-1 out/learn-2 …`, each is learnt in its turn from a seed of its own, and `evaluate` and `plot` cover all of them.
 
 What is learnt: SAC, whose memory begins with episodes of a hand of the library that follows the centre line and with random ones. The policy sees a
 roadmap of the way ahead from the tip, and its last action; nothing of the wall. Each episode is in a new arch. Rewards of learning are its own;
-evaluation is the task's own in all but what is observed. `learnt` draws its actions as in learning, `learnt-mean` takes their mean.
+evaluation is the task's own in all but what is observed: `--task strict`, where an episode is lost when the tip leaves the vessel, or
+`--task as-evaluated`, where it is not, as its authors evaluate it. `learnt` draws its actions as in learning, `learnt-mean` takes their mean.
 """
 
 import argparse
@@ -33,6 +35,7 @@ ENVIRONMENTS = 16
 FIRST = {"follow": 150, "random": 60}
 SEEN = {"roadmap": observations.Roadmap(), "last_action": observations.LastAction()}
 EVALUATION = (
+    "task",
     "policy",
     "seed",
     "reached",
@@ -65,9 +68,13 @@ def learning_task():
     )
 
 
-def unseen_task():
+#: The task by what loses an episode.
+TASKS = {"strict": tasks.arch_variety, "as-evaluated": tasks.arch_variety_as_evaluated}
+
+
+def unseen_task(kind="strict"):
     """The task with a new arch in each episode."""
-    return tasks.arch_variety(vessels=arches.ArchVariety(count=None), observations=SEEN)
+    return TASKS[kind](vessels=arches.ArchVariety(count=None), observations=SEEN)
 
 
 def remember(model, normalize, policy, steps):
@@ -178,34 +185,38 @@ def known_policy(out, name, seed):
         return policies.Uniform(seed)
     if name == "straight":
         return policies.Straight()
-    if name in ("follow", "look-ahead"):
-        return policies.Steered({"follow": "follow_path", "look-ahead": "search_ahead"}[name])
+    steered = {"follow": "follow_path", "look-ahead": "search_ahead", "plan": "plan"}
+    if name in steered:
+        return policies.Steered(steered[name])
     normalize = VecNormalize.load(out / "normalize.pkl", SB3VecEnv(unseen_task(), 1))
     model = SAC.load(out / "model.zip", device="cpu")
     return Learned(model, normalize, seed=None if name == "learnt-mean" else seed)
 
 
-def evaluate(out, episodes, names, most_s):
+def evaluate(out, episodes, names, most_s, kind):
     """A row for each episode; those that are there already are not run again. Returns how many have arrived of each policy."""
     out.mkdir(parents=True, exist_ok=True)
     file = out / "evaluation.csv"
     rows = list(csv.DictReader(file.open())) if file.exists() else []
+    if rows and "task" not in rows[0]:
+        raise SystemExit(f"{file} does not say of which task it is, as earlier versions: take another folder")
+    own = [row for row in rows if row["task"] == kind]
     arrived = {}
     with file.open("a", newline="") as appended:
         writer = csv.DictWriter(appended, EVALUATION)
         if not rows:
             writer.writeheader()
         for name in names:
-            there = {int(row["seed"]) for row in rows if row["policy"] == name}
+            there = {int(row["seed"]) for row in own if row["policy"] == name}
             for seed in [seed for seed in EVALUATED[:episodes] if seed not in there]:
                 policy = Patient(known_policy(out, name, seed), most_s)
                 began = time.process_time()
-                (outcome,) = evaluation.evaluate(unseen_task(), policy, [seed])
-                row = {"policy": name, **vars(outcome), "out_of_time": policy.given_up}
-                rows.append({**row, "processor_s": round(time.process_time() - began, 2)})
-                writer.writerow(rows[-1])
+                (outcome,) = evaluation.evaluate(unseen_task(kind), policy, [seed])
+                row = {"task": kind, "policy": name, **vars(outcome), "out_of_time": policy.given_up}
+                own.append({**row, "processor_s": round(time.process_time() - began, 2)})
+                writer.writerow(own[-1])
                 appended.flush()
-            arrived[name] = summarise(name, [row for row in rows if row["policy"] == name])
+            arrived[name] = summarise(f"{kind} {name}", [row for row in own if row["policy"] == name])
     return arrived
 
 
@@ -217,7 +228,7 @@ def summarise(name, rows):
     lost = sum(str(row["out_of_time"]) == "True" for row in rows)
     spent = np.median([float(row["processor_s"]) for row in rows])
     print(
-        f"{name:11}{len(reached):4} of {len(rows)}, {len(reached) / len(rows):5.1%}, 95 % {low:.1%} to {high:.1%}, safe {safe}; "
+        f"{name:24}{len(reached):4} of {len(rows)}, {len(reached) / len(rows):5.1%}, 95 % {low:.1%} to {high:.1%}, safe {safe}; "
         f"median of those that arrived {steps:.0f} steps; out of time {lost}; {spent:.1f} s an episode",
         flush=True,
     )
@@ -253,7 +264,8 @@ def main():
     parser.add_argument(
         "--policies", nargs="*", default=["random", "straight", "follow", "look-ahead", "learnt"]
     )
-    parser.add_argument("--most-s", type=float, default=30.0, help="processor time of an episode")
+    parser.add_argument("--most-s", type=float, default=30.0, help="processor time of an episode; inf for no limit")
+    parser.add_argument("--task", choices=TASKS, default="strict", help="what loses an episode of evaluation")
     parser.add_argument("--picture", type=Path)
     args = parser.parse_args()
     torch.set_num_threads(1)
@@ -263,7 +275,7 @@ def main():
     elif args.what == "evaluate":
         # What does not learn is the same for all seeds.
         arrived = [
-            evaluate(out, args.episodes, ["learnt"] if k else args.policies, args.most_s)
+            evaluate(out, args.episodes, ["learnt"] if k else args.policies, args.most_s, args.task)
             for k, out in enumerate(args.out)
         ]
         if len(arrived) > 1:

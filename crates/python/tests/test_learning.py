@@ -157,7 +157,7 @@ def alone(task, policy, seed):
     env, k = InsertionEnv(task), 0
     env.reset(seed=seed)
     while True:
-        *_, terminated, truncated, info = env.step(policy.act(env._episodes)[0])
+        *_, terminated, truncated, info = env.step(policy.act(env.episodes)[0])
         k += 1
         if terminated or truncated:
             return seed, bool(info["reached"]), k, float(info["way_mm"])
@@ -209,7 +209,7 @@ def test_what_cannot_be_evaluated_is_refused(task):
         (lambda: evaluation.table([]), "episodes = 0: must be 1 or more"),
         (lambda: evaluation.interval(0, 0), "episodes = 0: must be 1 or more"),
         (lambda: evaluation.interval(4, 3), "successes = 4: must be 0 to 3"),
-        (lambda: policies.Steered("next"), "kind = 'next': give follow_path or search_ahead"),
+        (lambda: policies.Steered("next"), "kind = 'next': give follow_path, search_ahead, plan"),
     ):
         with pytest.raises(endowire.InputError, match=words):
             wrong()
@@ -220,7 +220,7 @@ def test_an_episode_ends_where_steps_take_too_much(task):
         env = InsertionEnv(Task(task.instruments, task.vessels, ends=[ends.Laborious(most)], wall=task.wall))
         env.reset(seed=1)
         *_, terminated, truncated, _ = env.step(np.array([[30.0, 1.0]]))
-        batch = env._episodes.batch
+        batch = env.episodes.batch
         assert batch.iterations[0] == batch.simulation(0).report.iterations > 1
         assert truncated == over and not terminated
 

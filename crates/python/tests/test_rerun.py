@@ -32,13 +32,13 @@ def test_an_episode_is_a_recording(vessel, wire, tmp_path):
         first, _ = env.reset(seed=episode)
         again, info = twin.reset(seed=episode)
         assert np.array_equal(first["tip"], again["tip"])
-        rewards, ways, tips = [], [info["way_mm"]], [twin._episodes.tip_mm[0].copy()]
+        rewards, ways, tips = [], [info["way_mm"]], [twin.episodes.tip_mm[0].copy()]
         for _ in range(4):
             *_, truncated, _ = env.step(np.array([[30.0, 1.0]]))
             _, reward, _, _, info = twin.step(np.array([[30.0, 1.0]]))
             rewards.append(reward)
             ways.append(info["way_mm"])
-            tips.append(twin._episodes.tip_mm[0].copy())
+            tips.append(twin.episodes.tip_mm[0].copy())
         assert truncated
     env.close()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["episode_000000.rrd", "episode_000001.rrd"]

@@ -217,16 +217,16 @@ def test_environments_move_each_instrument(vessel):
         actions="physical",
     )
     env = gym.InsertionEnv(task)
-    assert env.action_space.shape == (2, 2)
+    assert env.action_space.shape == (4,)
     check_env(env, skip_render_check=True)
     env.reset(seed=1)
     for _ in range(10):
         *_, info = env.step(np.array([[30.0, 0.5], [15.0, 0.0]]))
-    assert info["failure"] == "" and env.unwrapped._episodes.batch.inserted_mm[0].tolist() == pytest.approx(
+    assert info["failure"] == "" and env.unwrapped.episodes.batch.inserted_mm[0].tolist() == pytest.approx(
         [40.0, 20.0]
     )
     vector = gym.InsertionVectorEnv(task, 2)
     vector.reset(seed=[1, 2])
     for _ in range(10):
         vector.step(np.tile([[30.0, 0.5], [15.0, 0.0]], (2, 1, 1)))
-    assert np.array_equal(vector._episodes.tip_mm[0], env._episodes.tip_mm[0])
+    assert np.array_equal(vector.episodes.tip_mm[0], env.episodes.tip_mm[0])

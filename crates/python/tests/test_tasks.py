@@ -31,7 +31,7 @@ def test_registered_ids_pass_the_checker(name):
         check_env(env)
     env.reset(seed=3)
     for _ in range(8):
-        *_, info = env.step(env.action_space.high * np.array([0.5, 0.2], dtype=np.float32))
+        *_, info = env.step(env.action_space.high.reshape(-1, 2) * np.array([0.5, 0.2], dtype=np.float32))
     assert info["failure"] == ""
     assert info.get("stand_in", "").startswith("aortic_arch in place of") == (name != "Navigation")
 
@@ -55,7 +55,7 @@ def pushed_to_the_wall(env):
 def test_a_navigation_ends_where_it_is_not_safe():
     env = gymnasium.make("endowire/Navigation-v0", target="innominate", force_limit_n=0.0).unwrapped
     env.reset(seed=1)
-    assert np.allclose(env._episodes.target_mm[0], env.task.vessels.site.vessel.targets["innominate"])
+    assert np.allclose(env.episodes.target_mm[0], env.task.vessels.site.vessel.targets["innominate"])
     touched = pushed_to_the_wall(env)
     assert touched["safety"] < 1.0 and not touched["terminated"]
     env = gymnasium.make("endowire/Navigation-v0", ends=[endowire.gym.ends.ForceLimit(0.0)]).unwrapped

@@ -29,6 +29,7 @@ from ._endowire import (
     sweep,
 )
 from .fitting import Fit, Observed, fit
+from .planning import Plan, Planner, plan
 from .errors import ComputationError, EndOfWay, EndowireError, InputError
 
 __all__ = [
@@ -43,6 +44,8 @@ __all__ = [
     "InputError",
     "Instrument",
     "Observed",
+    "Plan",
+    "Planner",
     "Record",
     "Renderer",
     "Scene",
@@ -57,6 +60,7 @@ __all__ = [
     "course",
     "fit",
     "merge_sweeps",
+    "plan",
     "score",
     "solve_rod",
     "sweep",

@@ -9,7 +9,7 @@ step that does not lower the sum of squares is halved. At the end (JᵀJ + P)⁻
 linear within it and the residuals are independent with the given sigma.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,14 +26,34 @@ HALVINGS = 12
 #: A direction in which the data say less than this fraction of what they say in the clearest one, each parameter in units of its own
 #: value, is not shown by them.
 SHOWN = 1e-6
-ENERGIES = ("bend", "twist", "wall", "field", "tail")
+ENERGIES = ("bend", "twist", "wall", "field", "tail", "vessel")
+
+
+def numbers(state: Gradient | Simulation, of: str) -> NDArray[np.float64]:
+    """What a gradient or a simulation has of a kind that ``Gradient.of`` knows, as one row of numbers: the values that have these
+    derivatives.
+
+    Raises InputError for another kind.
+    """
+    report = state.report
+    values: dict[str, Callable[[], Any]] = {
+        "tip": lambda: state.positions_mm[-1],
+        "shape": lambda: state.positions_mm.ravel(),
+        "push_force": lambda: report.push_force_n,
+        "torque": lambda: report.torque_nmm,
+        "energy": lambda: np.array([sum(getattr(report, f"{part}_energy_mj") for part in ENERGIES)]),
+        "wall_force": lambda: report.contact_normal_forces_n,
+    }
+    if of not in values:
+        raise InputError(f"of = {of!r}: must be one of {', '.join(repr(one) for one in values)}")
+    return np.asarray(values[of](), dtype=float)
 
 
 @dataclass
 class Observed:
     """What was seen after a command.
 
-    ``of`` is "tip", "push_force", "torque", "energy" or "wall_force", as in ``Gradient.of``; "points", places on the wire at
+    ``of`` is "tip", "shape", "push_force", "torque", "energy" or "wall_force", as in ``Gradient.of``; "points", places on the wire at
     ``from_tip_mm``; or "pixels", those places in a picture whose 3 × 4 projection matrix ``camera`` takes (x, y, z, 1) mm to homogeneous
     pixels.
     """
@@ -56,23 +76,15 @@ class Observed:
         return (computed - value) / self.sigma, slopes / self.sigma
 
     def _computed(self, gradient: Gradient) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        report = gradient.report
         if self.of in ("points", "pixels"):
             places, slopes = self._places(gradient)
             if self.of == "points":
                 return places.ravel(), slopes.reshape(-1, slopes.shape[-1])
             return self._seen(places, slopes)
-        values = {
-            "tip": lambda: gradient.positions_mm[-1],
-            "push_force": lambda: report.push_force_n,
-            "torque": lambda: report.torque_nmm,
-            "energy": lambda: np.array([sum(getattr(report, f"{part}_energy_mj") for part in ENERGIES)]),
-            "wall_force": lambda: report.contact_normal_forces_n,
-        }
-        if self.of not in values:
-            wanted = ", ".join(repr(of) for of in [*values, "points", "pixels"])
-            raise InputError(f"observed.of = {self.of!r}: must be one of {wanted}")
-        return np.asarray(values[self.of](), dtype=float), gradient.of(self.of)
+        try:
+            return numbers(gradient, self.of), gradient.of(self.of)
+        except InputError as error:
+            raise InputError(f"observed.{error}, 'points' or 'pixels'") from None
 
     def _places(self, gradient: Gradient) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if self.from_tip_mm is None:

@@ -49,11 +49,9 @@ use crate::vessel::{Course, Displacement};
 
 /// Most times that the course follows in a part.
 const MOST_ROUNDS: usize = 80;
-/// If the energy rises at the end of a step by more than this of the slope by which it fell at its beginning, as where contacts
-/// change status, the next one is half as long.
+/// A step goes back where the energy rises at its end by more than this of the slope by which it fell at its beginning, as where
+/// contacts change status.
 const RISES: f64 = 0.5;
-/// The least part of a step.
-const LEAST_PART: f64 = 0.03;
 /// Most sweeps for the eigenvalues of a stiffness, and the least magnitude that they are taken as, relative to the largest.
 const MOST_SWEEPS: usize = 1000;
 const LEAST_CURVATURE: f64 = 1e-7;
@@ -239,6 +237,42 @@ fn descent(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     Some(modes.eigenvectors * along)
 }
 
+/// A step of the course, along which the energy in equilibrium with the device falls no more at its end.
+struct Line {
+    /// Newton's step, mm, and the motion of the device with it.
+    step_mm: Vec<Vec3>,
+    way: Vec<f64>,
+    /// The slope by which the energy falls at its beginning, mJ.
+    falls_mj: f64,
+    /// How much of it has been gone.
+    gone: f64,
+}
+
+impl Line {
+    /// A new step, of which this part is gone.
+    fn of(Follows { amplitudes_mm, way, off_n }: Follows, from_mm: &[Vec3], part: f64) -> Self {
+        let step_mm: Vec<Vec3> = amplitudes_mm.iter().zip(from_mm).map(|(to, from)| to - from).collect();
+        Self { falls_mj: slope_mj(&off_n, &step_mm).abs(), step_mm, way, gone: part }
+    }
+
+    /// The part by which to go back, negative, where the energy rises at its end: to where it neither falls nor rises, its slope
+    /// taken as linear.
+    fn back(&mut self, end: &Follows) -> Option<f64> {
+        let rises_mj = slope_mj(&end.off_n, &self.step_mm);
+        if rises_mj <= RISES * self.falls_mj {
+            return None;
+        }
+        let back = -self.gone * rises_mj / (self.falls_mj + rises_mj);
+        self.gone += back;
+        Some(back)
+    }
+}
+
+/// The slope of the energy along a step of the course, mJ.
+fn slope_mj(off_n: &[Vec3], step_mm: &[Vec3]) -> f64 {
+    off_n.iter().zip(step_mm).map(|(force, step)| force.dot(step)).sum()
+}
+
 /// The unknowns that contacts reach.
 struct Touched {
     /// In ascending order.
@@ -371,28 +405,21 @@ impl<const C: usize> Tools<C> {
         let elements = &mesh.elements;
         let mut searched = first;
         let is_flight = effort == Effort::Flight;
-        // How far the last step went, and how fast the energy fell at its beginning.
-        let (mut damped, mut step_mm, mut before_mj) = (1.0f64, Vec::new(), f64::INFINITY);
+        let mut line: Option<Line> = None;
         for _ in 0..MOST_ROUNDS {
-            let Some(Follows { amplitudes_mm, mut way, off_n }) = searched.follows.take() else {
-                return searched;
-            };
-            // The slope of the energy in equilibrium with the device.
-            let slope_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>();
-            let rises = slope_mj > RISES * before_mj;
-            damped = if rises { (0.5 * damped).max(LEAST_PART) } else { (2.0 * damped).min(1.0) };
+            let Some(follows) = searched.follows.take() else { return searched };
             let before = rod.clone();
-            let (turn, _) = RodState::largest_turn::<C>(elements, &before, &way);
-            let part = (MOST_TURN_RAD / turn).min(damped);
-            let amplitudes_mm: Vec<Vec3> = amplitudes_mm
-                .iter()
-                .zip(&course.amplitudes_mm)
-                .map(|(to, from)| from + (to - from) * part)
-                .collect();
-            way.iter_mut().for_each(|value| *value *= part);
-            step_mm = amplitudes_mm.iter().zip(&course.amplitudes_mm).map(|(to, from)| to - from).collect();
-            before_mj = off_n.iter().zip(&step_mm).map(|(force, by)| force.dot(by)).sum::<f64>().abs();
-            let farthest_mm = step_mm.iter().map(|by: &Vec3| by.norm()).fold(0.0, f64::max);
+            let back = line.as_mut().and_then(|line| line.back(&follows));
+            let part = back.unwrap_or_else(|| {
+                let (turn, _) = RodState::largest_turn::<C>(elements, &before, &follows.way);
+                let part = (MOST_TURN_RAD / turn).min(1.0);
+                line = Some(Line::of(follows, &course.amplitudes_mm, part));
+                part
+            });
+            let Some(Line { step_mm, way, .. }) = &line else { return searched };
+            let amplitudes_mm: Vec<Vec3> =
+                course.amplitudes_mm.iter().zip(step_mm).map(|(from, step)| from + step * part).collect();
+            let farthest_mm = part.abs() * step_mm.iter().map(Vec3::norm).fold(0.0, f64::max);
             let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
                 return searched;
             };
@@ -411,8 +438,10 @@ impl<const C: usize> Tools<C> {
                 moved_mm: Some(moved_mm),
             };
             let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
-                state.advance::<C>(elements, &before, &way, 1.0);
-                state.take_tensions::<C>(elements, &before, &way);
+                state.advance::<C>(elements, &before, way, part);
+                if part == 1.0 {
+                    state.take_tensions::<C>(elements, &before, way);
+                }
                 if contact.is_outside(elements, state) {
                     state.copy_from(&before);
                 }

@@ -1,7 +1,7 @@
 """Environments for Gymnasium 1.0 and later, composed of replaceable parts.
 
-``import endowire.gym`` registers ``endowire/CurvedTube-v0``, ``AorticArch``, ``ArchVariety``, ``BasicWireNav``,
-``DualDeviceNav``, ``CathSim`` and ``Navigation``; ``gymnasium.make`` and ``gymnasium.make_vec`` accept every part of
+``import endowire.gym`` registers ``endowire/CurvedTube-v0``, ``AorticArch``, ``ArchVariety``,
+``ArchVarietyAsEvaluated``, ``BasicWireNav``, ``DualDeviceNav``, ``CathSim`` and ``Navigation``; ``gymnasium.make`` and ``gymnasium.make_vec`` accept every part of
 a `Task` as a keyword.
 """
 

@@ -58,6 +58,15 @@ def lengths_mm(name: str, values: Any, least: float) -> NDArray[np.float64]:
     return np.array([at_least(f"{name}[{k}]", value, least) for k, value in enumerate(values)])
 
 
+def hands(name: str, values: Any, n_instruments: int, *several: int) -> NDArray[np.float64]:
+    """Two real numbers for each instrument, push and turn, as a vector or in rows: to shape (*several, n_instruments, 2)."""
+    array = real(name, values)
+    shape = (*several, 2 * n_instruments)
+    if array.shape not in (shape, (*several, n_instruments, 2)):
+        raise InputError(f"{name} = an array of shape {array.shape}: must have the shape {shape}")
+    return array.reshape(*several, n_instruments, 2)
+
+
 def place_mm(name: str, values: Any) -> NDArray[np.float64]:
     """A place: three finite numbers."""
     place = numbers(name, values, (3,))

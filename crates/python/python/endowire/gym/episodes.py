@@ -10,13 +10,16 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from .. import Batch, EndOfWay, EndowireError, InputError, Record
+from .. import Batch, EndOfWay, EndowireError, InputError, Record, Simulation
 from . import checks
 from .centreline import Path, Ways
+from .reach import why_not
 from .scaling import shown
 from .task import Task
 from .vessels import Site
 
+#: So many targets are drawn for an episode until one is not within the threshold of the tip.
+_DRAWS = 100
 #: Largest number of frames of an episode; each frame has its own noise.
 _FRAMES = 1 << 20
 
@@ -87,7 +90,7 @@ class Episodes:
             simulation.step(rotate_rad=[rng.uniform(0.0, 2.0 * np.pi) for _ in self.task.instruments])
             self.batch.replace(k, simulation)
             self.sites[k] = site
-            self.target_mm[k] = self._target_mm(self.task.target.sample(rng, site, starts[k]), site)
+            self.target_mm[k] = self._target_mm(rng, site, starts[k])
             self.paths[k] = site.centreline.path(self.target_mm[k])
             self._ways.put(k, site.centreline, self.target_mm[k])
             self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
@@ -101,9 +104,25 @@ class Episodes:
         for k in generators:
             self.way_before_mm[k] = self.way_begun_mm[k] = self.way_mm[k]
 
-    def _target_mm(self, sampled: Any, site: Site) -> NDArray[np.float64]:
-        """The target of an episode, which the tip must be able to reach."""
-        target_mm = checks.place_mm("target", sampled)
+    def _target_mm(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
+        """The target of an episode, which the tip must be able to reach and has not reached at the beginning."""
+        for _ in range(_DRAWS):
+            target_mm = checks.place_mm("target", self.task.target.sample(rng, site, start))
+            self._check_inside(target_mm, site)
+            off_mm = float(np.linalg.norm(target_mm - start.tip_mm))
+            if off_mm < self.task.threshold_mm:
+                continue
+            why = why_not(site, start, target_mm, self.task.threshold_mm)
+            if why:
+                raise InputError(f"target = {target_mm.tolist()}: cannot be reached: {why}")
+            return target_mm
+        raise InputError(
+            f"threshold_mm = {self.task.threshold_mm}: the target, {off_mm:.1f} mm from the tip in the sheath, is reached before "
+            "the first step: give a smaller threshold, or a target that is farther away"
+        )
+
+    def _check_inside(self, target_mm: NDArray[np.float64], site: Site) -> None:
+        """Refuses a target outside the vessel, by more than the threshold."""
         segment, _, off_mm = site.centreline.nearest(target_mm)
         # The centre line may be off the axis, so only far from it it is asked whether the target is in the vessel.
         line = site.centreline
@@ -114,7 +133,6 @@ class Episodes:
                 f"target = {target_mm.tolist()}: is outside the vessel, {off_mm:.1f} mm from its centre line: "
                 "give a place inside, mm"
             )
-        return target_mm
 
     def step(self, velocities: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
         """Moves the selected environments by velocities, mm/s and rad/s, shape (n, n_instruments, 2), clipped to the

@@ -116,7 +116,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             self._told = True
         result = self.env.step(action)
         observed, reward, terminated, truncated, info = result
-        row: dict[str, Any] = {"action": self._inner._episodes.action[0].ravel().astype(np.float32)}
+        row: dict[str, Any] = {"action": self._inner.episodes.action[0].ravel().astype(np.float32)}
         if self._vectors:
             parts = [np.ravel(self._observed[name]) for name in self._vectors]
             row["observation.state"] = np.concatenate(parts).astype(np.float32)

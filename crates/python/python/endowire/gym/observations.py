@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from .. import InputError
 from .._endowire import _check_view
 from . import checks
+from .vessels import FRONT
 
 if TYPE_CHECKING:
     from .centreline import Path
     from .episodes import Episodes
     from .task import Task
-
 
 #: Shortest length ahead of a roadmap, mm: positions are relative to it.
 _LEAST_AHEAD_MM = 0.001
@@ -195,7 +195,8 @@ class LastAction:
     """The previous action, clipped to its limits and in the task's unit of actions, shape (n_instruments, 2)."""
 
     def space(self, task: Task) -> spaces.Box:
-        return task.action_space()
+        high = (task.limits() / task.action_unit()).astype(np.float32)
+        return spaces.Box(-high, high, dtype=np.float32)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         return episodes.action / episodes.task.action_unit()
@@ -204,39 +205,45 @@ class LastAction:
 class Fluoroscopy:
     """The fluoroscopic picture of one or more planes, 8 bits, shape (planes, height, width).
 
-    ``planes`` are the primary and secondary angles of the C-arm in degrees; ``view`` has further keys of `[view]` of
-    a scene file. The detector has no lag, because environments share it.
+    ``planes`` are the primary and secondary angles of the C-arm in degrees. By default it is one from the front (0, 0),
+    and from the side (90, 0) for a vessel whose long axis is within 30° of the line of sight from the front, which
+    would hide its course. ``view`` has further keys of `[view]` of a scene file. The detector has no lag, because
+    environments share it.
     """
 
     def __init__(
         self,
-        planes: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
+        planes: tuple[tuple[float, float], ...] | None = None,
         size_px: tuple[int, int] = (128, 128),
         view: dict[str, Any] | None = None,
     ) -> None:
-        angles = checks.an_array("planes", planes)
-        if angles.ndim != 2 or angles.shape[1] != 2 or not len(angles):
-            raise InputError(f"planes = {planes!r}: give primary and secondary angle of one plane or more, deg")
-        self.planes = tuple((float(primary), float(secondary)) for primary, secondary in angles)
+        #: The given planes, or None where each vessel has its own.
+        self.planes = None if planes is None else self._checked(planes)
         checks.numbers("size_px", size_px, (2,))
         width, height = (checks.whole(f"size_px[{k}]", side, 1) for k, side in enumerate(size_px))
         self.size_px = (width, height)
         self.view = dict(view or {})
-        for plane in self.planes:
+        for plane in self.planes or (FRONT,):
             _check_view(self._view(*plane))
+
+    @staticmethod
+    def _checked(planes: Any) -> tuple[tuple[float, float], ...]:
+        angles = checks.an_array("planes", planes)
+        if angles.ndim != 2 or angles.shape[1] != 2 or not len(angles):
+            raise InputError(f"planes = {planes!r}: give primary and secondary angle of one plane or more, deg")
+        return tuple((float(primary), float(secondary)) for primary, secondary in angles)
 
     def space(self, task: Task) -> spaces.Box:
         width, height = self.size_px
-        return spaces.Box(0, 255, (len(self.planes), height, width), dtype=np.uint8)
+        return spaces.Box(0, 255, (len(self.planes or (FRONT,)), height, width), dtype=np.uint8)
 
     def observe(self, episodes: Episodes) -> NDArray[np.uint8]:
         width, height = self.size_px
-        pictures = np.empty((len(episodes.sites), len(self.planes), height, width), dtype=np.uint8)
-        views = [self._view(*angles) for angles in self.planes]
+        pictures = np.empty((len(episodes.sites), len(self.planes or (FRONT,)), height, width), dtype=np.uint8)
         for k, site in enumerate(episodes.sites):
             simulation, frame = episodes.batch.simulation(k), int(episodes.frame[k])
-            for p, view in enumerate(views):
-                picture = site.renderer(view).render(simulation, frame).fluoro
+            for p, angles in enumerate(self.planes or (site.side,)):
+                picture = site.renderer(self._view(*angles)).render(simulation, frame).fluoro
                 assert picture is not None
                 pictures[k, p] = picture
         return pictures

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .. import InputError
 from .episodes import Episodes
+from .task import Task
 
 
 def check_mode(render_mode: str | None) -> None:
@@ -14,6 +15,11 @@ def check_mode(render_mode: str | None) -> None:
     if render_mode not in (None, "rgb_array"):
         window = "; gymnasium.wrappers.HumanRendering shows its pictures in a window" * (render_mode == "human")
         raise InputError(f"render_mode = {render_mode!r}: give rgb_array, or none{window}")
+
+
+def per_second(task: Task) -> int:
+    """Pictures in a second of a film of a task: one for each step."""
+    return max(1, round(1.0 / task.control_period_s))
 
 
 def picture(episodes: Episodes, k: int) -> NDArray[np.uint8]:

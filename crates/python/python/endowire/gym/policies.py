@@ -1,13 +1,14 @@
-"""Policies without learning, as baselines."""
+"""Policies without learning, as baselines and experts, and what any policy does in any environment of Gymnasium."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import Controller, InputError
+from .. import Controller, InputError, Planner
 from . import checks
 
 if TYPE_CHECKING:
@@ -22,6 +23,29 @@ class Policy(Protocol):
         the start of an episode.
         """
         ...
+
+
+def action(policy: Policy, env: Any) -> NDArray[np.float32]:
+    """What a policy does next in an environment of Gymnasium, in the unit and the shape of its action space: that of
+    `gymnasium.make` or `make_vec`, with or without wrappers (`LeRobotLog` is one).
+
+    Raises InputError for an environment of another package, or a vector that is not endowire's own, whose simulations
+    cannot be seen, and where a wrapper changes actions; Gymnasium's ResetNeeded before the first `reset`.
+    """
+    from .environment import InsertionEnv
+    from .vector import InsertionVectorEnv
+
+    inner = getattr(env, "unwrapped", env)
+    if not isinstance(inner, (InsertionEnv, InsertionVectorEnv)):
+        raise InputError(f"env = {env}: give an environment of endowire, from gymnasium.make or make_vec")
+    if env.action_space != inner.action_space:
+        raise InputError(f"env = {env}: a wrapper changes its actions: take the policy's from inside it")
+    inner.episodes.check_begun("action")
+    velocities = policy.act(inner.episodes)
+    space = inner.action_space
+    assert space.shape is not None
+    actions = np.asarray(velocities / inner.task.action_unit(), dtype=np.float32)
+    return actions.reshape(space.shape)
 
 
 class Straight:
@@ -47,18 +71,22 @@ class Uniform:
 
 class Steered:
     """The library's controllers, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of
-    `Controller`, on copies of the simulations. If a controller gives up, its instruments stay.
+    `Controller`, or ``plan``, a `Planner`; on copies of the simulations. If a controller gives up, its instruments stay.
 
-    Their commands of at most 2 mm and 0.35 rad are within a step's limits at 7.5 Hz and 35 mm/s. Raises InputError
-    for another ``kind``.
+    Their commands of at most 4 mm and 0.35 rad are within a step's limits at 7.5 Hz and 35 mm/s; where limits cut them
+    a plan is made anew, from where the tip is. Raises InputError for another ``kind``.
     """
 
     def __init__(self, kind: str = "search_ahead") -> None:
-        hands = {"follow_path": Controller.follow_path, "search_ahead": Controller.search_ahead}
+        hands: dict[str, Callable[..., Controller | Planner]] = {
+            "follow_path": Controller.follow_path,
+            "search_ahead": Controller.search_ahead,
+            "plan": Planner,
+        }
         if kind not in hands:
-            raise InputError(f"kind = {kind!r}: give {' or '.join(hands)}")
+            raise InputError(f"kind = {kind!r}: give {', '.join(hands)}")
         self.make = hands[kind]
-        self._hands: dict[int, Controller] = {}
+        self._hands: dict[int, Controller | Planner] = {}
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         action = np.zeros_like(episodes.action)

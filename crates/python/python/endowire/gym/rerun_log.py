@@ -41,7 +41,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         recording = rerun.RecordingStream("endowire", recording_id=f"episode {self._number}")
         recording.save(self.folder / f"episode_{self._number:06}.rrd")
         self._recording = recording
-        episodes = self._inner._episodes
+        episodes = self._inner.episodes
         vessel = episodes.sites[0].vessel
         wall = rerun.Mesh3D(
             vertex_positions=vessel.vertices_mm,
@@ -57,7 +57,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
     def step(self, action: NDArray[Any]) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         result = self.env.step(action)
         _, reward, _, _, info = result
-        episodes = self._inner._episodes
+        episodes = self._inner.episodes
         numbers = {"reward": float(reward), "way_mm": info["way_mm"]}
         numbers["largest_contact_force_n"] = episodes.batch.largest_contact_force_n[0]
         for k, (push, turn) in enumerate(episodes.action[0]):
@@ -78,7 +78,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             self._recording = None
 
     def _log(self, numbers: dict[str, float]) -> None:
-        recording, episodes = self._recording, self._inner._episodes
+        recording, episodes = self._recording, self._inner.episodes
         assert recording is not None, "reset comes before step"
         task, step = self._inner.task, int(episodes.steps[0])
         recording.set_time("step", sequence=step)

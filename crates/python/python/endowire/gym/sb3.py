@@ -17,26 +17,37 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
+from .. import InputError
+from . import checks
 from .episodes import Episodes
+from .pictures import check_mode, per_second, picture
 from .task import Task
 
 
 class SB3VecEnv(VecEnv):
     """``num_envs`` environments of a task, stepped in one call.
 
-    Actions are fractions of the task's limits, from -1 to 1, shape (num_envs, n_instruments, 2). As stable-baselines3
-    requires, an environment whose episode ends is reset at once: it returns the first observation of the new episode,
-    and the last one of the old episode is ``infos[k]["terminal_observation"]``. Environment k has the seed ``seed +
-    k``, with the same episodes as `InsertionEnv`.
+    Actions are fractions of the task's limits, from -1 to 1, shape (num_envs, 2 n_instruments), or in rows (num_envs,
+    n_instruments, 2). As stable-baselines3 requires, an environment whose episode ends is reset at once: it returns the
+    first observation of the new episode, and the last one of the old episode is ``infos[k]["terminal_observation"]``.
+    Environment k has the seed ``seed + k``, with the same episodes as `InsertionEnv`. Pictures are drawn when they are
+    asked for, as by VecVideoRecorder; with ``render_mode=None`` there are none.
     """
 
-    def __init__(self, task: Task, num_envs: int, seed: int | None = None) -> None:
+    #: Environments have no registered id.
+    spec = None
+
+    def __init__(
+        self, task: Task, num_envs: int, seed: int | None = None, render_mode: str | None = "rgb_array"
+    ) -> None:
+        check_mode(render_mode)
         self.task = task
         #: The episodes, for parts of a task and policies.
         self.episodes = Episodes(task, num_envs)
         self._limits = task.limits()
-        self.render_mode = None
-        actions = spaces.Box(-1.0, 1.0, self._limits.shape, dtype=np.float32)
+        self.render_mode = render_mode
+        self.metadata = {"render_modes": ["rgb_array"], "render_fps": per_second(task)}
+        actions = spaces.Box(-1.0, 1.0, (self._limits.size,), dtype=np.float32)
         super().__init__(num_envs, self.episodes.observation_space, actions)
         self._generators = [seeding.np_random(None if seed is None else seed + k)[0] for k in range(num_envs)]
         self._velocities = np.zeros((num_envs, *self._limits.shape))
@@ -53,8 +64,11 @@ class SB3VecEnv(VecEnv):
         return self.episodes.observe()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Stores the actions for the next `step_wait`."""
-        self._velocities = np.asarray(actions, dtype=float) * self._limits
+        """Stores the actions for the next `step_wait`.
+
+        Raises InputError for actions of another shape, or that are not real.
+        """
+        self._velocities = checks.hands("actions", actions, len(self._limits), self.num_envs) * self._limits
 
     def step_wait(
         self,
@@ -82,13 +96,29 @@ class SB3VecEnv(VecEnv):
         """The attribute, the same for all environments."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
+        """The pictures of all environments, each of shape (height, width, 3), with ``render_mode="rgb_array"``."""
+        if self.render_mode is None:
+            return [None] * self.num_envs
+        return [picture(self.episodes, k) for k in range(self.num_envs)]
+
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """There are no options for `reset`: raises InputError for any."""
+        if options and (isinstance(options, dict) or any(options)):
+            raise InputError(f"options = {options!r}: there are none for reset: leave them out")
+
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        raise NotImplementedError(f"{attr_name}: replace the task's part instead")
+        """Raises InputError: what environments share is their task."""
+        raise InputError(f"attr_name = {attr_name!r}: environments have none that is set: replace the task's part instead")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        raise NotImplementedError(f"{method_name}: environments have no methods of their own")
+        """What `get_images` has for ``render``; raises InputError for any other, since environments have no methods."""
+        if method_name == "render" and not method_args and not method_kwargs:
+            images = self.get_images()
+            return [images[k] for k in self._get_indices(indices)]
+        raise InputError(f"method_name = {method_name!r}: environments have no methods of their own but render()")
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
         """False for all environments."""
@@ -118,7 +148,8 @@ class Learned:
         observed: Any = episodes.observe()
         if self.normalize is not None:
             observed = self.normalize.normalize_obs(observed)
-        return self._actions(observed) / self._high * episodes.task.limits()
+        parts = self._actions(observed) / self._high
+        return parts.reshape(len(parts), -1, 2) * episodes.task.limits()
 
     def _actions(self, observed: Any) -> NDArray[np.float64]:
         if self._drawn is None:

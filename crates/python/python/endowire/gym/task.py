@@ -21,7 +21,7 @@ from .vessels import Site, VesselSource
 def _observations() -> dict[str, observations.Observation]:
     return {
         "tip_mm": observations.Tip(),
-        "shape_mm": observations.Shape(),
+        "points_mm": observations.Shape(),
         "target_mm": observations.Target(),
         "forces": observations.Forces(),
     }
@@ -122,15 +122,15 @@ class Task:
         return np.tile(np.asarray(self.speed_limits, dtype=float), (len(self.instruments), 1))
 
     def action_unit(self) -> NDArray[np.float64]:
-        """The velocities that an action of 1 stands for, mm/s and rad/s, shape (n_instruments, 2)."""
+        """The velocities that a number of 1 in an action stands for, mm/s and rad/s, shape (n_instruments, 2)."""
         limits = self.limits()
         return limits if self.actions == "scaled" else np.ones_like(limits)
 
     def action_space(self) -> spaces.Box:
-        """The space of actions: advance and rotation of each instrument, shape (n_instruments, 2), in the unit of
-        `actions`.
+        """The space of actions: advance and rotation of the first instrument, then those of the next, shape (2
+        n_instruments,), in the unit of `actions`. One vector is what policies of most libraries give.
         """
-        high = (self.limits() / self.action_unit()).astype(np.float32)
+        high = (self.limits() / self.action_unit()).ravel().astype(np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
     def observation_spaces(self) -> dict[str, spaces.Box]:

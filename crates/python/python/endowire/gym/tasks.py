@@ -11,6 +11,7 @@ import numpy as np
 from .. import InputError, Instrument, Vessel
 from . import ends, observations, originals, rewards, targets
 from .arches import ArchVariety
+from .autoreset import AutoresetMode
 from .environment import InsertionEnv
 from .targets import CentrelineTarget
 from .task import Task
@@ -75,7 +76,7 @@ def arch_variety(**parts: Any) -> Task:
         "target": CentrelineTarget(least_mm=0.0),
         "observations": {
             "tip_mm": observations.Tip(),
-            "shape_mm": observations.Shape((0.0, 2.0, 4.0)),
+            "points_mm": observations.Shape((0.0, 2.0, 4.0)),
             "target_mm": observations.Target(),
             "last_action": observations.LastAction(),
         },
@@ -85,6 +86,15 @@ def arch_variety(**parts: Any) -> Task:
         "method": {"name": "kirchhoff", "accuracy": "fast"},
     }
     return Task(**{**defaults, **parts})
+
+
+def arch_variety_as_evaluated(**parts: Any) -> Task:
+    """`arch_variety` with the ends of its authors' evaluation: only at the target, or after 1000 steps.
+
+    Leaving the vessel is no end: where its way ends the wire stays, until it is pulled back. Shares of arrivals here are
+    not those of `arch_variety`, where an episode is lost as soon as the tip is outside.
+    """
+    return arch_variety(**{"ends": [ends.TargetReached(), ends.StepLimit(1000)], **parts})
 
 
 def basic_wire_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
@@ -205,6 +215,7 @@ TASKS = {
     "CurvedTube": curved_tube,
     "AorticArch": aortic_arch,
     "ArchVariety": arch_variety,
+    "ArchVarietyAsEvaluated": arch_variety_as_evaluated,
     "BasicWireNav": basic_wire_nav,
     "DualDeviceNav": dual_device_nav,
     "CathSim": cath_sim,
@@ -228,6 +239,7 @@ def make_vector_env(
     num_envs: int = 1,
     render_mode: str | None = None,
     max_episode_steps: int | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     **parts: Any,
 ) -> InsertionVectorEnv:
     """The vector environment of a task of `TASKS`; keywords replace its parts. An episode is truncated after
@@ -236,4 +248,4 @@ def make_vector_env(
     made = _named(task, parts)
     if max_episode_steps is not None:
         made.ends = [*made.ends, ends.StepLimit(max_episode_steps)]
-    return InsertionVectorEnv(made, num_envs, render_mode)
+    return InsertionVectorEnv(made, num_envs, render_mode, autoreset_mode)

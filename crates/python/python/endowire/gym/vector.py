@@ -7,37 +7,51 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from .. import InputError
 from . import checks
+from .autoreset import AutoresetMode, autoreset
 from .episodes import Episodes
-from .pictures import check_mode, picture
+from .pictures import check_mode, per_second, picture
 from .task import Task
 
 
 class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32], NDArray[Any]]):
     """``num_envs`` environments of a task. Environment k has the same bits as `InsertionEnv` with the same seed.
 
-    An environment whose episode has ended begins a new one in the next step and ignores the action
-    (AutoresetMode.NEXT_STEP). A failure of one environment is reported in ``info["failure"]`` and truncates its
-    episode; the others continue.
+    What becomes of an environment whose episode has ended is ``autoreset_mode``, as Gymnasium defines it, one of its
+    AutoresetMode or the name: with NEXT_STEP it begins a new one in the next step and ignores the action; with
+    SAME_STEP at once, and ``info["final_obs"]`` and ``info["final_info"]`` are of its end; with DISABLED it waits for
+    ``reset(options={"reset_mask": …})``. A failure of one environment is reported in ``info["failure"]`` and truncates
+    its episode; the others continue.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 8, "autoreset_mode": AutoresetMode.NEXT_STEP}
 
-    def __init__(self, task: Task, num_envs: int = 1, render_mode: str | None = None) -> None:
+    def __init__(
+        self,
+        task: Task,
+        num_envs: int = 1,
+        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    ) -> None:
         super().__init__()
         check_mode(render_mode)
+        #: What becomes of an environment whose episode has ended; other libraries ask for it here, or in `metadata`.
+        self.autoreset_mode = autoreset(autoreset_mode)
+        self.metadata = {**self.metadata, "render_fps": per_second(task), "autoreset_mode": self.autoreset_mode}
         num_envs = checks.whole("num_envs", num_envs, 1)
         self.task, self.num_envs, self.render_mode = task, num_envs, render_mode
-        self._episodes = Episodes(task, num_envs)
+        #: The episodes: what policies and parts of a task read.
+        self.episodes = Episodes(task, num_envs)
         self._unit = task.action_unit()
-        self.single_action_space = self._episodes.action_space
-        self.single_observation_space = self._episodes.observation_space
+        self.single_action_space = self.episodes.action_space
+        self.single_observation_space = self.episodes.observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
@@ -68,9 +82,9 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
                 if own is not None and mask[k]:
                     self._generators[k] = seeding.np_random(int(own))[0]
             super().reset(seed=seeds[0])
-        self._episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(mask)})
+        self.episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(mask)})
         self._over[mask] = False
-        return self._episodes.observe(), self._info()
+        return self.episodes.observe(), self._info()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
         """The environments that `reset` is to reset."""
@@ -86,7 +100,7 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
         if not mask.any():
             raise InputError("reset_mask = all False: name an environment that is to be reset")
         if not mask.all():
-            self._episodes.check_begun("reset_mask")
+            self.episodes.check_begun("reset_mask")
         return mask
 
     def step(
@@ -94,29 +108,50 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     ) -> tuple[
         dict[str, NDArray[Any]], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Steps all environments like `InsertionEnv.step`; the action has shape (num_envs, n_instruments, 2).
+        """Steps all environments like `InsertionEnv.step`; the actions have the shape (num_envs, 2 n_instruments), or in
+        rows (num_envs, n_instruments, 2).
 
         Raises InputError for actions of another shape or that are not real, and Gymnasium's ResetNeeded before the first
-        `reset`; then nothing has moved.
+        `reset`, and with DISABLED where an episode is over; then nothing has moved.
         """
-        moved = checks.numbers("actions", actions, self.action_space.shape)
+        moved = checks.hands("actions", actions, len(self.task.instruments), self.num_envs)
         over = self._over
-        self._episodes.step(moved * self._unit, ~over)
-        rewards = np.where(over, 0.0, self._episodes.rewards())
-        terminated, truncated = (ended & ~over for ended in self._episodes.ended())
+        if self.autoreset_mode == AutoresetMode.DISABLED and over.any():
+            ended = np.flatnonzero(over).tolist()
+            raise ResetNeeded(f"the episodes of environments {ended} are over: reset them, with the option reset_mask")
+        self.episodes.step(moved * self._unit, ~over)
+        rewards = np.where(over, 0.0, self.episodes.rewards())
+        terminated, truncated = (ended & ~over for ended in self.episodes.ended())
         if over.any():
-            self._episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(over)})
+            self.episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(over)})
         self._over = terminated | truncated
-        return self._episodes.observe(), rewards, terminated, truncated, self._info()
+        observed, info = self.episodes.observe(), self._info()
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
+            observed, info = self._begin_at_once(observed, info)
+        return observed, rewards, terminated, truncated, info
+
+    def _begin_at_once(
+        self, observed: dict[str, NDArray[Any]], info: dict[str, Any]
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Begins new episodes where they are over: observation and information, with the last ones of the old."""
+        over = self._over.copy()
+        last = np.full(self.num_envs, None, dtype=object)
+        for k in np.flatnonzero(over):
+            last[k] = {name: values[k] for name, values in observed.items()}
+        told = {name: over if name.startswith("_") else values for name, values in info.items()}
+        self.episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(over)})
+        self._over[:] = False
+        final = {"final_obs": last, "_final_obs": over, "final_info": told, "_final_info": over}
+        return self.episodes.observe(), self._info() | final
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """The pictures of all environments, if ``render_mode="rgb_array"``."""
         if self.render_mode != "rgb_array":
             return None
-        return tuple(picture(self._episodes, k) for k in range(self.num_envs))
+        return tuple(picture(self.episodes, k) for k in range(self.num_envs))
 
     def _info(self) -> dict[str, Any]:
         info: dict[str, Any] = {}
-        for name, values in self._episodes.info().items():
+        for name, values in self.episodes.info().items():
             info[name], info[f"_{name}"] = values, np.ones(self.num_envs, dtype=bool)
         return info

@@ -17,6 +17,11 @@ from .centreline import Centreline
 if TYPE_CHECKING:
     from .task import Task
 
+#: Primary and secondary angle of the C-arm, degrees: a picture from the front, and from the side.
+FRONT, SIDE = (0.0, 0.0), (90.0, 0.0)
+#: Largest angle between a vessel's long axis and the line of sight at which the vessel is seen end on, rad.
+_END_ON = np.pi / 6.0
+
 
 class Site:
     """A vessel with its centre line and the sheath: the keywords ``opening``, ``depth_mm``, ``position_mm`` and
@@ -38,6 +43,9 @@ class Site:
         #: Cached simulations with nothing inserted, by task, to be copied for each episode.
         self.starts: WeakKeyDictionary[Task, Simulation] = WeakKeyDictionary()
         self._renderers: dict[str, Renderer] = {}
+        self._side: tuple[float, float] | None = None
+        #: The last place asked for, and the ways to it.
+        self._ways: tuple[bytes, NDArray[np.float64]] | None = None
 
     def renderer(self, view: Mapping[str, Any]) -> Renderer:
         """The cached renderer of the vessel for a `[view]` table."""
@@ -46,6 +54,25 @@ class Site:
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.vessel, dict(view))
         return self._renderers[key]
+
+    def ways_mm(self, place_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Length of the way along the centre line from each row to a place, mm, shape (n,); that of the last place is
+        cached, since each episode asks for that of the sheath.
+        """
+        key = place_mm.tobytes()
+        if self._ways is None or self._ways[0] != key:
+            self._ways = key, self.centreline.ways_mm(place_mm)
+        return self._ways[1]
+
+    @property
+    def side(self) -> tuple[float, float]:
+        """Angles of the C-arm at which a picture shows the vessel: `FRONT`, or `SIDE` where that would look along it."""
+        if self._side is None:
+            places_mm = self.vessel.vertices_mm
+            # The long axis is the first of the principal ones; from the front one looks along y.
+            axis = np.linalg.eigh(np.cov(places_mm.T))[1][:, -1]
+            self._side = SIDE if abs(axis[1]) > np.cos(_END_ON) else FRONT
+        return self._side
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Site:
         return self
