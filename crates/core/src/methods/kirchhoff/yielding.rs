@@ -419,6 +419,7 @@ impl<const C: usize> Tools<C> {
             let Some(Line { step_mm, way, .. }) = &line else { return searched };
             let amplitudes_mm: Vec<Vec3> =
                 course.amplitudes_mm.iter().zip(step_mm).map(|(from, step)| from + step * part).collect();
+            let way: Vec<f64> = way.iter().map(|value| value * part).collect();
             let farthest_mm = part.abs() * step_mm.iter().map(Vec3::norm).fold(0.0, f64::max);
             let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
                 return searched;
@@ -438,10 +439,8 @@ impl<const C: usize> Tools<C> {
                 moved_mm: Some(moved_mm),
             };
             let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
-                state.advance::<C>(elements, &before, way, part);
-                if part == 1.0 {
-                    state.take_tensions::<C>(elements, &before, way);
-                }
+                state.advance::<C>(elements, &before, &way, 1.0);
+                state.take_tensions::<C>(elements, &before, &way);
                 if contact.is_outside(elements, state) {
                     state.copy_from(&before);
                 }

@@ -55,7 +55,7 @@ def why_not(site: Site, start: Simulation, target_mm: NDArray[np.float64], near_
     """
     line, ways_mm, instruments = site.centreline, site.ways_mm(start.tip_mm), start.instruments
     segment, part, _ = line.nearest(target_mm)
-    rows = [segment + 1, int(line.parents[segment + 1])]
+    rows = [int(line.end_rows[segment]), int(line.begin_rows[segment])]
     if reached(line, ways_mm, instruments)[rows].all():
         return ""
     off_mm = np.array([1.0 - part, part]) * line.lengths_mm[segment]
