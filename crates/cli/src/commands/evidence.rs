@@ -54,6 +54,10 @@ pub(crate) fn evidence(args: &EvidenceArgs) -> Result<(), Failure> {
     if study.name == three_tubes::STUDY.name {
         return tubes(args, study);
     }
+    if args.play || args.friction {
+        let option = if args.play { "--play" } else { "--friction" };
+        return Err(Failure::Input(format!("{option}: {name} has no instruments with play or a path: leave it out")));
+    }
     if let Some(file) = &args.file {
         return Err(Failure::Input(format!("{}: {name} takes no file: leave it out", file.display())));
     }
@@ -148,7 +152,8 @@ fn tubes(args: &EvidenceArgs, study: &Study) -> Result<(), Failure> {
     let rows = three_tubes::read(&String::from_utf8_lossy(&input), file)?;
     let bar = progress::bar(three_tubes::MOST_STEPS, "fit");
     let parallel = |count: usize, of: &(dyn Fn(usize) -> Option<Vec3> + Sync)| in_parallel(count, None, of);
-    let found = three_tubes::study(&rows, &parallel, &|done| bar.set_position(done as u64));
+    let also = three_tubes::Also { play: args.play, friction: args.friction };
+    let found = three_tubes::study(&rows, also, &parallel, &|done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let (table, curves) = distances(&found, file);
     show(args, study, &Provenance::new(&[&input], 0), (&found, &table, &curves))
@@ -168,7 +173,13 @@ fn distances(found: &ThreeTubes, file: &Path) -> (Table, Curves) {
     let fitted = format!("fitted to {} rows, judged on others", found.fitted.rows_fitted);
     let table = Table {
         columns: vec!["numbers", "rows", "unsolved", "mean mm", "mean % of length", "95 % within mm"],
-        rows: vec![row("as published", &found.nominal), row(&fitted, &found.fitted.misfit)],
+        rows: [row("as published", &found.nominal), row(&fitted, &found.fitted.misfit)]
+            .into_iter()
+            .chain(found.with_play.iter().map(|fitted| row("fitted with play", &fitted.misfit)))
+            .chain(found.driven.iter().map(|driven| {
+                row(&format!("driven with play and friction {}", driven.friction), &driven.misfit)
+            }))
+            .collect(),
     };
     let names = ["as published", "fitted"];
     let share = |all: &Vec<f64>| -> Vec<[f64; 2]> {

@@ -24,7 +24,7 @@
 //! ```
 //!
 //! in the two directions across. Rest curvatures add −φ·D, D = EIᵣ∫Δκ⁰ u″ ds/φ: with u″ = 2φ(L − x)/L² at x behind the end that is
-//! a mean of Δκ⁰ with those weights. It is taken over a fixed length, [`window`], 60 δ (L where the tilt is a tenth of a radian), so
+//! a mean of Δκ⁰ with those weights. It is taken over a fixed length, [`window`], √(12δ/κ) with the largest rest curvature κ of both, so
 //! that D is linear in φ and nothing jumps where a bend is pushed through the end.
 //!
 //! What goes on is the line beyond the end, which is turned there by ψ = c φ against the line behind it: a kink. In terms of ψ, and of the
@@ -44,7 +44,7 @@ use super::element::Material;
 use super::layout::MAX_ANGLES;
 use super::quadrature::GAUSS;
 
-/// Length over which rest curvatures and stiffness behind an end are averaged, in clearances.
+/// Length over which stiffness behind an end is averaged where nothing is curved at rest, in clearances: L at a tilt of a tenth of a radian.
 const WINDOW: f64 = 60.0;
 
 /// Bending stiffness and moment EI κ⁰ of several instruments together.
@@ -80,9 +80,10 @@ pub(super) struct KinkEnergy {
     pub(super) angles: [([f64; 2], [f64; 2]); MAX_ANGLES],
 }
 
-/// Length behind an end that matters to the tilt there, given how much of both is in.
-pub(crate) fn window(clearance: f64, held: f64) -> f64 {
-    (WINDOW * clearance).min(held)
+/// Length behind an end that matters to the tilt there, given how much of both is in and the largest rest curvature of the two.
+pub(crate) fn window(clearance: f64, held: f64, curvature: f64) -> f64 {
+    let length = if curvature > 0.0 { (12.0 * clearance / curvature).sqrt() } else { WINDOW * clearance };
+    length.min(held)
 }
 
 impl Side {

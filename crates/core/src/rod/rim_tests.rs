@@ -35,7 +35,7 @@ fn an_element_with_play_has_these_derivatives() {
         }
         // The twin: a spoilt entry is found.
         let (gradient, hessian) = errors::<24>(&data, &s, 1e-2);
-        assert!(gradient > 1e-5 && hessian > 1e-4, "{gradient:e} {hessian:e}");
+        assert!(gradient > 1e-5 && hessian > 3e-5, "{gradient:e} {hessian:e}");
     }
 }
 

@@ -149,7 +149,8 @@ impl Stack {
             (None, None) => return None,
         };
         let clearance: f64 = self.instruments[between].iter().map(|one| one.clearance).sum();
-        let from = node - window(clearance, node);
+        let curvature = each.clone().filter(|k| *k == ends || goes_on(k)).map(|k| self.instruments[k].most_curved());
+        let from = node - window(clearance, node, curvature.fold(0.0, f64::max));
         let side = |of: &mut dyn Iterator<Item = usize>| {
             let mut side = Side::default();
             of.filter(|_| from < node)
@@ -260,6 +261,12 @@ impl Instrument {
             begin = section.until;
         }
         sum
+    }
+
+    /// Largest rest curvature.
+    fn most_curved(&self) -> f64 {
+        let each = self.section.iter().flat_map(|s| [Some(s.rest_curvature), s.rest_curvature_end]);
+        each.flatten().map(|[u, v]| libm::hypot(u, v)).fold(0.0, f64::max)
     }
 
     /// Energy per length released by the sheath as the instrument is pushed: ½ EI |κ⁰|² at the start.

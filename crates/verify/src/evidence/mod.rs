@@ -2,6 +2,7 @@
 
 pub mod bending;
 pub mod capstan;
+mod driven_tubes;
 pub mod reversal;
 pub mod three_tubes;
 pub mod whip;

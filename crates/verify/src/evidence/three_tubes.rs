@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::Study;
+use super::driven_tubes::{Driven, driven};
 
 /// The study in words.
 pub const STUDY: Study = Study {
@@ -29,7 +30,7 @@ pub const STUDY: Study = Study {
 
 /// Straight length, curved length, mm, curvature, 1/mm, and EI relative to that of the first, of each tube, the outermost
 /// first, as published with the measurements.
-const TUBES: [Tube; 3] = [
+pub(super) const TUBES: [Tube; 3] = [
     Tube { straight_mm: 0.0, curved_mm: 150.0, curvature_per_mm: 1.0 / 265.0, stiffness: 1.0 },
     Tube { straight_mm: 17.0, curved_mm: 150.0, curvature_per_mm: 1.0 / 265.0, stiffness: 1.0 },
     Tube { straight_mm: 184.0, curved_mm: 86.394, curvature_per_mm: 1.0 / 55.0, stiffness: 2.0 / 7.0 },
@@ -41,7 +42,7 @@ const GUIDE_STIFFNESS: f64 = 1e5;
 /// EI of what would be behind a tube's base: nothing against the tubes.
 const LIMP: f64 = 1e-4;
 /// Length of an element, mm.
-const ELEMENT_MM: f64 = 8.0;
+pub(super) const ELEMENT_MM: f64 = 8.0;
 /// Shortest length that a tube may stick out of the plate, mm.
 const LEAST_OUT_MM: f64 = 1.0;
 /// The parameters are fitted to every so-many-th row.
@@ -57,11 +58,11 @@ const FAR_MM: f64 = 4.0;
 
 /// A pre-curved tube.
 #[derive(Debug, Clone, Copy)]
-struct Tube {
-    straight_mm: f64,
-    curved_mm: f64,
-    curvature_per_mm: f64,
-    stiffness: f64,
+pub(super) struct Tube {
+    pub(super) straight_mm: f64,
+    pub(super) curved_mm: f64,
+    pub(super) curvature_per_mm: f64,
+    pub(super) stiffness: f64,
 }
 
 /// A measured row.
@@ -75,12 +76,19 @@ pub struct Row {
     pub tip_mm: Vec3,
 }
 
-/// Number of parameters.
-const PARAMETERS: usize = 17;
+/// Number of parameters, and of those without play.
+const PARAMETERS: usize = 19;
+const WITHOUT_PLAY: usize = 17;
+/// Play that a fit begins with, mm.
+const PLAY_MM: f64 = 0.1;
 
 /// What is not known exactly, as differences from the nominal values, each in its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameters([f64; PARAMETERS]);
+pub struct Parameters {
+    values: [f64; PARAMETERS],
+    /// Whether the tubes have play in one another.
+    plays: bool,
+}
 
 /// Names of the parameters, with units, and the step by which their influence is measured.
 pub const NAMES: [(&str, f64); PARAMETERS] = [
@@ -101,12 +109,14 @@ pub const NAMES: [(&str, f64); PARAMETERS] = [
     ("plate, z, mm", 1e-1),
     ("tilt of the plate about x, rad", 1e-3),
     ("tilt of the plate about y, rad", 1e-3),
+    ("play of tube 2 in tube 1 over 0.1 mm, logarithm", 1e-1),
+    ("play of tube 3 in tube 2 over 0.1 mm, logarithm", 1e-1),
 ];
 
 impl Default for Parameters {
-    /// The published values.
+    /// The published values, without play.
     fn default() -> Self {
-        Self([0.0; PARAMETERS])
+        Self { values: [0.0; PARAMETERS], plays: false }
     }
 }
 
@@ -146,9 +156,24 @@ pub struct ThreeTubes {
     pub nominal: Misfit,
     /// With fitted numbers.
     pub fitted: Fitted,
+    /// With play, and numbers that are fitted with it, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with_play: Option<Fitted>,
+    /// With those numbers along the driven path, for each coefficient of friction, on the tested rows; if asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub driven: Vec<Driven>,
     /// Distances on the tested rows with the published and with fitted numbers, mm, in ascending order.
     #[serde(skip)]
     pub distances_mm: [Vec<f64>; 2],
+}
+
+/// What a study computes beside the tubes without friction and play.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Also {
+    /// With play.
+    pub play: bool,
+    /// With play, and friction along the driven path.
+    pub friction: bool,
 }
 
 /// Reads the table of measurements; `name` is its name in errors.
@@ -191,15 +216,31 @@ pub fn read(text: &str, name: &std::path::Path) -> Result<Vec<Row>> {
 }
 
 impl Parameters {
-    fn tube(&self, index: usize) -> Tube {
+    /// GJ of a tube over its EI.
+    pub(super) fn torsion(&self) -> f64 {
+        libm::exp(self.values[5]) / BEND_TO_TWIST
+    }
+
+    pub(super) fn tube(&self, index: usize) -> Tube {
         let tube = TUBES[index];
-        let stiffer = if index == 0 { 0.0 } else { self.0[2 + index] };
+        let stiffer = if index == 0 { 0.0 } else { self.values[2 + index] };
         Tube {
-            curvature_per_mm: tube.curvature_per_mm * (1.0 + self.0[index]),
+            curvature_per_mm: tube.curvature_per_mm * (1.0 + self.values[index]),
             straight_mm: tube.straight_mm,
-            curved_mm: tube.curved_mm + self.0[9 + index],
+            curved_mm: tube.curved_mm + self.values[9 + index],
             stiffness: tube.stiffness * libm::exp(stiffer),
         }
+    }
+
+    /// Play of a tube in the next one outside, mm.
+    pub(super) fn play_mm(&self, index: usize) -> f64 {
+        let is_inside = self.plays && index > 0;
+        if is_inside { PLAY_MM * libm::exp(self.values[WITHOUT_PLAY + index - 1]) } else { 0.0 }
+    }
+
+    /// Angle of a tube's base, rad.
+    pub(super) fn hand_rad(&self, row: &Row, index: usize) -> f64 {
+        row.turns_rad[index] + self.values[6 + index]
     }
 
     /// The static case of a row: the line begins behind all bases and goes through the plate.
@@ -210,10 +251,12 @@ impl Parameters {
             rest_curvature: [curvature_per_mm, 0.0],
             ..crate::section(until, ei)
         };
+        // From the innermost outwards.
         let mut instrument: Vec<Instrument> = (0..TUBES.len())
+            .rev()
             .map(|index| {
                 let tube = self.tube(index);
-                let (ei, gj) = (tube.stiffness, tube.stiffness / BEND_TO_TWIST * libm::exp(self.0[5]));
+                let (ei, gj) = (tube.stiffness, tube.stiffness / BEND_TO_TWIST * libm::exp(self.values[5]));
                 let length_mm = tube.straight_mm + tube.curved_mm;
                 // A base is where the hand is: what the line has behind it neither bends nor twists.
                 let inserted = length_mm + row.bases_mm[index] + behind_mm;
@@ -226,7 +269,8 @@ impl Parameters {
                 Instrument {
                     name: format!("tube {}", index + 1),
                     inserted,
-                    hand: row.turns_rad[index] + self.0[6 + index],
+                    hand: self.hand_rad(row, index),
+                    clearance: self.play_mm(index),
                     section: sections,
                 }
             })
@@ -235,6 +279,7 @@ impl Parameters {
             name: "guide".to_owned(),
             inserted: behind_mm,
             hand: 0.0,
+            clearance: 0.0,
             section: vec![section(behind_mm + 1.0, GUIDE_STIFFNESS, GUIDE_STIFFNESS, 0.0)],
         });
         let line_mm = instrument.iter().map(|one| one.inserted).fold(0.0, f64::max);
@@ -258,10 +303,13 @@ impl Parameters {
     /// The computed tip of a row, mm; `None` without an equilibrium.
     fn tip_mm(&self, row: &Row) -> Option<Vec3> {
         let solution = self.case(row).solve().ok().filter(|solution| solution.converged)?;
-        let [.., x, y, z, about_x, about_y] = self.0;
-        let tip_mm = Vec3::from(solution.tip);
-        let turned = tip_mm + Vec3::new(about_x, about_y, 0.0).cross(&tip_mm);
-        Some(turned + Vec3::new(x, y, z))
+        Some(self.from_plate_mm(Vec3::from(solution.tip)))
+    }
+
+    /// A place before the plate in the axes of the measurements, mm.
+    pub(super) fn from_plate_mm(&self, place_mm: Vec3) -> Vec3 {
+        let [_, _, _, _, _, _, _, _, _, _, _, _, x, y, z, about_x, about_y, ..] = self.values;
+        place_mm + Vec3::new(about_x, about_y, 0.0).cross(&place_mm) + Vec3::new(x, y, z)
     }
 
     /// Vectors from measured to computed tips.
@@ -286,7 +334,7 @@ fn distances(rows: &[Row], errors_mm: &[Option<Vec3>]) -> Vec<(f64, f64)> {
 }
 
 impl Misfit {
-    fn of(rows: &[Row], errors_mm: &[Option<Vec3>]) -> Self {
+    pub(super) fn of(rows: &[Row], errors_mm: &[Option<Vec3>]) -> Self {
         let mut all = distances(rows, errors_mm);
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let count = all.len().max(1) as f64;
@@ -314,17 +362,18 @@ fn cost(errors_mm: &[Option<Vec3>]) -> f64 {
 
 /// Fits the parameters to rows by Levenberg's and Marquardt's method with derivatives by differences; `told` hears of
 /// every iteration.
-fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameters {
-    let mut best = Parameters::default();
+fn fit(start: Parameters, rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameters {
+    let count = if start.plays { PARAMETERS } else { WITHOUT_PLAY };
+    let mut best = start;
     let mut errors = best.errors_mm(rows, parallel);
     let mut damping = 1e-3;
     for iteration in 0..ITERATIONS {
         let (mut normal, mut gradient) =
-            (DMatrix::<f64>::zeros(PARAMETERS, PARAMETERS), DVector::<f64>::zeros(PARAMETERS));
-        let columns: Vec<Vec<Option<Vec3>>> = (0..PARAMETERS)
+            (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
+        let columns: Vec<Vec<Option<Vec3>>> = (0..count)
             .map(|k| {
                 let mut moved = best;
-                moved.0[k] += NAMES[k].1;
+                moved.values[k] += NAMES[k].1;
                 moved.errors_mm(rows, parallel)
             })
             .collect();
@@ -332,15 +381,15 @@ fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameter
             let Some(error) = error else { continue };
             // A row that another branch of equilibria is near to says nothing about slopes.
             let slope = |k: usize| columns[k][row].map(|moved| (moved - error) / NAMES[k].1);
-            let Some(slopes) = (0..PARAMETERS).map(slope).collect::<Option<Vec<Vec3>>>() else { continue };
+            let Some(slopes) = (0..count).map(slope).collect::<Option<Vec<Vec3>>>() else { continue };
             let is_smooth = slopes.iter().zip(NAMES).all(|(slope, (_, step))| slope.norm() * step < FAR_MM);
             if !is_smooth {
                 continue;
             }
             let weight = weight(error);
-            for i in 0..PARAMETERS {
+            for i in 0..count {
                 gradient[i] += weight * slopes[i].dot(error);
-                for j in 0..PARAMETERS {
+                for j in 0..count {
                     normal[(i, j)] += weight * slopes[i].dot(&slopes[j]);
                 }
             }
@@ -349,10 +398,10 @@ fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameter
         let mut improved = false;
         for _ in 0..6 {
             let mut damped = normal.clone();
-            (0..PARAMETERS).for_each(|k| damped[(k, k)] *= 1.0 + damping);
+            (0..count).for_each(|k| damped[(k, k)] *= 1.0 + damping);
             let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else { break };
             let mut next = best;
-            (0..PARAMETERS).for_each(|k| next.0[k] -= step[k]);
+            (0..count).for_each(|k| next.values[k] -= step[k]);
             let found = next.errors_mm(rows, parallel);
             // A row without an equilibrium must not count as one without an error.
             let lost = found.iter().flatten().count() < errors.iter().flatten().count();
@@ -371,8 +420,12 @@ fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameter
 }
 
 /// Compares the measured tips with the computed ones: with the published numbers on all rows, and with numbers that were
-/// fitted to every eighth row on the others. `told` hears of every iteration of the fit, of at most [`MOST_STEPS`].
-pub fn study(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> ThreeTubes {
+/// fitted to every eighth row on the others, and what is asked for beside that. `told` hears of every iteration of a fit, of at most
+/// [`MOST_STEPS`].
+///
+/// # Errors
+/// Tubes that cannot be driven along the path.
+pub fn study(rows: &[Row], also: Also, parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Result<ThreeTubes> {
     let nominal = Parameters::default();
     let errors = nominal.errors_mm(rows, parallel);
     let is_fitted = |index: &usize| index.is_multiple_of(FITTED_EVERY);
@@ -380,8 +433,27 @@ pub fn study(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Thr
         (0..rows.len()).filter(|index| is_fitted(index) == wanted).map(|index| rows[index]).collect()
     };
     let (seen, unseen) = (of(true), of(false));
-    let fitted = fit(&seen, parallel, told);
-    let fitted_errors = fitted.errors_mm(&unseen, parallel);
+    let judged = |parameters: &Parameters| {
+        let errors = parameters.errors_mm(&unseen, parallel);
+        let count = if parameters.plays { PARAMETERS } else { WITHOUT_PLAY };
+        let fitted = Fitted {
+            rows_fitted: seen.len(),
+            rows_tested: unseen.len(),
+            misfit: Misfit::of(&unseen, &errors),
+            parameters: NAMES.iter().map(|(name, _)| *name).zip(parameters.values).take(count).collect(),
+        };
+        (fitted, errors)
+    };
+    let without = fit(nominal, &seen, parallel, told);
+    let (fitted, fitted_errors) = judged(&without);
+    // Ends that share a node are apart with fitted lengths: play is fitted from those.
+    let begin = Parameters { plays: true, ..without };
+    let playing = (also.play || also.friction).then(|| fit(begin, &seen, parallel, told));
+    let with_play = playing.as_ref().map(judged).map(|(fitted, _)| fitted);
+    let driven = match playing.filter(|_| also.friction) {
+        Some(parameters) => driven(&parameters, rows, &|index| !is_fitted(&index), parallel)?,
+        None => Vec::new(),
+    };
     let before = (0..rows.len()).filter(|index| !is_fitted(index)).map(|index| errors[index]);
     let before: Vec<Option<Vec3>> = before.collect();
     let distances_mm = [&before, &fitted_errors].map(|errors| {
@@ -389,16 +461,7 @@ pub fn study(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Thr
         all.sort_by(f64::total_cmp);
         all
     });
-    ThreeTubes {
-        nominal: Misfit::of(rows, &errors),
-        fitted: Fitted {
-            rows_fitted: seen.len(),
-            rows_tested: unseen.len(),
-            misfit: Misfit::of(&unseen, &fitted_errors),
-            parameters: NAMES.iter().map(|(name, _)| *name).zip(fitted.0).collect(),
-        },
-        distances_mm,
-    }
+    Ok(ThreeTubes { nominal: Misfit::of(rows, &errors), fitted, with_play, driven, distances_mm })
 }
 
 /// Largest number of iterations of the fit.
@@ -411,7 +474,7 @@ pub const MOST_STEPS: usize = ITERATIONS;
 /// A row without an equilibrium.
 pub fn invented(count: usize, changed: f64) -> Result<Vec<Row>> {
     let mut parameters = Parameters::default();
-    parameters.0[2] = changed;
+    parameters.values[2] = changed;
     let row = |index: usize| {
         // Joints that no two rows share, from multiples of irrational numbers.
         let part = |k: f64| (index as f64 * k).fract();
@@ -441,7 +504,7 @@ mod tests {
     #[test]
     fn a_changed_curvature_is_found_and_unseen_rows_follow() {
         let rows = invented(48, 0.05).unwrap();
-        let found = study(&rows, &in_turn, &|_| ());
+        let found = study(&rows, Also::default(), &in_turn, &|_| ()).unwrap();
         assert!(found.nominal.mean_mm > 0.5, "{:?}", found.nominal);
         assert!(found.fitted.misfit.mean_mm < 0.05 * found.nominal.mean_mm, "{:?}", found.fitted);
         assert_eq!((found.fitted.rows_fitted, found.fitted.rows_tested), (6, 42));

@@ -68,7 +68,12 @@ pub(super) fn tilt(
     let held = inserted_mm[ends];
     // Radii over the longest length that the clearance at the rim leads to.
     let at_rim = clearance_mm((devices[inside], near - behind(inside)), (devices[around], near - behind(around)))?;
-    let length = window(at_rim, held);
+    let curved = (0..inserted_mm.len()).filter(|k| *k == ends || goes_on(k)).flat_map(|k| devices[k].sections());
+    let curvature = curved.map(|section| {
+        let [u, v] = section.rest_curvature_per_mm;
+        libm::hypot(u, v)
+    });
+    let length = window(at_rim, held, curvature.fold(0.0, f64::max));
     let clearance = mean((devices[inside], near - behind(inside)), (devices[around], near - behind(around)), length)?;
     let side = |of: &mut dyn Iterator<Item = usize>| {
         let mut side = Side::default();

@@ -25,11 +25,11 @@ fn tip_mm(simulation: &Simulation) -> Vec3 {
 fn a_hook_tilts_as_it_comes_out_and_without_play_it_does_not() {
     let [mut with, mut without] = [true, false].map(both_in);
     for simulation in [&mut with, &mut without] {
-        push(simulation, &[(WIRE, 9.0)]).unwrap();
+        push(simulation, &[(WIRE, 5.0)]).unwrap();
     }
     let off_mm = (tip_mm(&with) - tip_mm(&without)).norm();
-    // √(3 δ Δκ) with Δκ = 0.06 − 0.02, of which the catheter takes a quarter, over 10 mm.
-    let expected_mm = (3.0f64 * 0.3 * 0.04).sqrt() * 60.0 / 80.0 * 10.0;
+    // √(3 δ Δκ) with Δκ = 0.06 − 0.02, of which the catheter takes a quarter, over 6 mm.
+    let expected_mm = (3.0f64 * 0.3 * 0.04).sqrt() * 60.0 / 80.0 * 6.0;
     assert!((off_mm / expected_mm - 1.0).abs() < 0.15, "{off_mm} {expected_mm}");
 }
 
@@ -66,7 +66,8 @@ fn hands_put_in_what_is_stored_with_play_and_get_it_back() {
     }
     let stored = simulation.report().energy.total() - start;
     assert!(stored.abs() < 1e-6 * most, "a cycle ends where it began: {stored} of {most}");
-    assert!(halfway < 2e-3 * most && (work - stored).abs() < 2e-3 * most, "{halfway}, {work} of {most} mJ");
+    // Way back the nodes that come and go meet another turn: what each change of them leaves does not cancel.
+    assert!(halfway < 1e-3 * most && (work - stored).abs() < 1e-2 * most, "{halfway}, {work} of {most} mJ");
 }
 
 #[test]
