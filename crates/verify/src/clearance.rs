@@ -17,7 +17,9 @@
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use super::{Row, section};
-use endowire_core::statics::{End, EndKind, Instrument, Load, LoadKind, Rod, Solver, Start, StartKind, StaticCase};
+use endowire_core::statics::{
+    End, EndKind, Instrument, Load, LoadKind, Rod, Solver, Start, StartKind, StaticCase,
+};
 use endowire_core::{Error, Result};
 
 /// Length of the catheter, and of the wire beyond it, mm.
@@ -139,13 +141,8 @@ fn tilt_of_line(clearance_mm: f64, curvature_per_mm: f64, force_n: f64) -> Resul
     };
     let wire = one("wire", LENGTH_MM + BEYOND_MM, WIRE_NMM2, SMALL * curvature_per_mm, SMALL * clearance_mm);
     let instrument = vec![wire, one("catheter", LENGTH_MM, CATHETER_NMM2, 0.0, 0.0)];
-    let load = Load {
-        kind: LoadKind::Force,
-        at: None,
-        from: None,
-        to: None,
-        value: [0.0, SMALL * force_n, 0.0],
-    };
+    let load =
+        Load { kind: LoadKind::Force, at: None, from: None, to: None, value: [0.0, SMALL * force_n, 0.0] };
     let elements = ((LENGTH_MM + BEYOND_MM) / ELEMENT_MM).round() as usize;
     let case = StaticCase {
         rod: Rod { length: 0.0, elements, section: vec![], instrument },
@@ -182,7 +179,13 @@ pub(super) fn clearance() -> Result<Vec<Row>> {
             let expected = (3.0 * clearance_mm * difference).sqrt();
             rows.push(Row::relative(&name, &quantity, with.tilt_rad, expected, 2e-2));
             let line_rad = tilt_of_line(clearance_mm, curvature_per_mm, force_n)?;
-            rows.push(Row::relative(&name, "tilt of the shared line with play, rad", line_rad, with.tilt_rad, 3e-2));
+            rows.push(Row::relative(
+                &name,
+                "tilt of the shared line with play, rad",
+                line_rad,
+                with.tilt_rad,
+                3e-2,
+            ));
         }
     }
     Ok(rows)

@@ -56,7 +56,9 @@ pub(crate) fn evidence(args: &EvidenceArgs) -> Result<(), Failure> {
     }
     if args.play || args.friction {
         let option = if args.play { "--play" } else { "--friction" };
-        return Err(Failure::Input(format!("{option}: {name} has no instruments with play or a path: leave it out")));
+        return Err(Failure::Input(format!(
+            "{option}: {name} has no instruments with play or a path: leave it out"
+        )));
     }
     if let Some(file) = &args.file {
         return Err(Failure::Input(format!("{}: {name} takes no file: leave it out", file.display())));

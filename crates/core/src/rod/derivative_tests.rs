@@ -60,7 +60,13 @@ pub(super) fn data(seed: &mut u64) -> ElementData {
     let materials = [material(seed), material(seed), material(seed)];
     let bending =
         [0, 1, 2].map(|k| materials.iter().map(|m| m.bending[k]).sum::<f64>() + 0.5 * positive(seed));
-    ElementData { length: 0.4 * positive(seed), bending, flexibility: 0.3 * positive(seed), materials, tilt: None }
+    ElementData {
+        length: 0.4 * positive(seed),
+        bending,
+        flexibility: 0.3 * positive(seed),
+        materials,
+        tilt: None,
+    }
 }
 
 /// The Lagrangian after the unknowns have moved by `d`; entries of b and N of the first node are empty, the last one is N.

@@ -81,7 +81,10 @@ impl Kinked {
             let mut part = 1.0;
             let mut next = Self::at(&data, &tilt, s, at.beyond.transported(step[0], step[1]));
             // Near the minimum values do not differ by more than their rounding.
-            while next.value() > before + 1e-4 * part * slope + 1e-12 * before.abs() && part > 1e-6 && size > 1e-5 {
+            while next.value() > before + 1e-4 * part * slope + 1e-12 * before.abs()
+                && part > 1e-6
+                && size > 1e-5
+            {
                 part *= 0.5;
                 let turned = at.beyond.transported(part * step[0], part * step[1]);
                 next = Self::at(&data, &tilt, s, turned);
@@ -115,9 +118,8 @@ impl Kinked {
     fn derivatives(&self, s: &ElementState) -> ([f64; 2], [[f64; 2]; 2]) {
         let (ways, held, l) = (self.ways(s), &self.held, Layout::<PLAIN>);
         let at = |a: usize| l.tangent(0) + a;
-        let gradient = [0, 1].map(|a| {
-            self.bent.gradient[at(a)] + held.first[0] * ways[0][a] + held.first[1] * ways[1][a]
-        });
+        let gradient = [0, 1]
+            .map(|a| self.bent.gradient[at(a)] + held.first[0] * ways[0][a] + held.first[1] * ways[1][a]);
         let back = held.first[0] * self.kink[0] + held.first[1] * self.kink[1];
         let mut hessian = [[0.0; 2]; 2];
         for a in 0..2 {

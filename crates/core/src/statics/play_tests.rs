@@ -123,7 +123,10 @@ fn play_of_the_last_and_negative_play_are_refused() {
         case.solve().unwrap_err().to_string()
     };
     let error = refused(1, 0.1);
-    assert!(error.starts_with("rod.instrument[1].clearance = 0.1: the last instrument lies in none"), "{error}");
+    assert!(
+        error.starts_with("rod.instrument[1].clearance = 0.1: the last instrument lies in none"),
+        "{error}"
+    );
     let error = refused(0, -0.1);
     assert!(error.contains("rod.instrument[0].clearance = -0.1"), "{error}");
 }

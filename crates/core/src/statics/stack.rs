@@ -149,7 +149,8 @@ impl Stack {
             (None, None) => return None,
         };
         let clearance: f64 = self.instruments[between].iter().map(|one| one.clearance).sum();
-        let curvature = each.clone().filter(|k| *k == ends || goes_on(k)).map(|k| self.instruments[k].most_curved());
+        let curvature =
+            each.clone().filter(|k| *k == ends || goes_on(k)).map(|k| self.instruments[k].most_curved());
         let from = node - window(clearance, node, curvature.fold(0.0, f64::max));
         let side = |of: &mut dyn Iterator<Item = usize>| {
             let mut side = Side::default();

@@ -71,7 +71,9 @@ fn tubes(parameters: &Parameters, friction: f64) -> Result<Simulation> {
     let sheath = Sheath::new(Vec3::z() * MOUTH_MM, Vec3::z())?.bending_towards(Vec3::x())?;
     let stack = Stack::new(instruments)?.with_friction(vec![friction, friction, 0.0])?;
     let options = KirchhoffOptions { element_mm: ELEMENT_MM, ..KirchhoffOptions::default() };
-    Simulation::builder(space.wall, stack.with_clearance(vec![true, true, false])?, sheath).method(&options).build()
+    Simulation::builder(space.wall, stack.with_clearance(vec![true, true, false])?, sheath)
+        .method(&options)
+        .build()
 }
 
 /// Moves all tubes towards a row, by this part of the way.

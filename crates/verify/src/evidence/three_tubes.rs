@@ -368,8 +368,7 @@ fn fit(start: Parameters, rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(u
     let mut errors = best.errors_mm(rows, parallel);
     let mut damping = 1e-3;
     for iteration in 0..ITERATIONS {
-        let (mut normal, mut gradient) =
-            (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
+        let (mut normal, mut gradient) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
         let columns: Vec<Vec<Option<Vec3>>> = (0..count)
             .map(|k| {
                 let mut moved = best;

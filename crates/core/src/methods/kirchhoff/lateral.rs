@@ -28,8 +28,8 @@ use crate::Vec3;
 use crate::contact::InnerFriction;
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
-use crate::rod::quadrature::{Point, hermite};
 use crate::rod::element::{ElementState, ElementSystem};
+use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, Layout, Material, RodState, beyond, element_gradients, element_system};
 
 /// A force at a node, and that in the rotation of its tangent.
@@ -88,7 +88,9 @@ impl Line<'_> {
     /// between them.
     fn pressed<const C: usize>(&self, at: (usize, usize)) -> Pressed {
         let pair = pair(self.mesh, at).filter(|(inner, _)| self.stack.friction(*inner) > 0.0);
-        pair.map_or_else(Pressed::default, |pair| Pressed::at::<C>(self.stack, (self.mesh, self.rod), at.0, pair))
+        pair.map_or_else(Pressed::default, |pair| {
+            Pressed::at::<C>(self.stack, (self.mesh, self.rod), at.0, pair)
+        })
     }
 }
 
@@ -146,7 +148,8 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
             let length_mm = 0.5 * (mesh.elements[i - 1].length + after);
             let pressing_n = pressed.sum_n(&force_n);
             let [friction_n, friction_nmm] = [drag, couple_mm].map(|part| part * pressing_n);
-            reported[i] = LateralForce { force_n, pressing_n, length_mm, tension_n: tension, friction_n, friction_nmm };
+            reported[i] =
+                LateralForce { force_n, pressing_n, length_mm, tension_n: tension, friction_n, friction_nmm };
         }
         beyond = near.plus(&near_pull, tension);
     }

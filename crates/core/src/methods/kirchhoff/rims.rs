@@ -46,9 +46,8 @@ fn end(stack: &Stack, inserted_mm: &[f64], (near, far): (f64, f64), near_mm: f64
     let mut ending = each.filter(|k| is_in(k) && !goes_on(k) && (behind(*k) - near).abs() <= near_mm);
     // Around what goes on, or inside it.
     let outer = ending.clone().find(|k| *k > last).map(|k| End { ends: k, inside: last, around: k });
-    let end = outer.or_else(|| {
-        ending.rfind(|k| *k < first).map(|k| End { ends: k, inside: k, around: first })
-    })?;
+    let end =
+        outer.or_else(|| ending.rfind(|k| *k < first).map(|k| End { ends: k, inside: k, around: first }))?;
     (end.inside..end.around).all(|k| inserted_mm[k] == 0.0 || stack.has_clearance(k)).then_some(end)
 }
 
@@ -67,14 +66,17 @@ pub(super) fn tilt(
     let devices: Vec<&Device> = stack.devices().collect();
     let held = inserted_mm[ends];
     // Radii over the longest length that the clearance at the rim leads to.
-    let at_rim = clearance_mm((devices[inside], near - behind(inside)), (devices[around], near - behind(around)))?;
-    let curved = (0..inserted_mm.len()).filter(|k| *k == ends || goes_on(k)).flat_map(|k| devices[k].sections());
+    let at_rim =
+        clearance_mm((devices[inside], near - behind(inside)), (devices[around], near - behind(around)))?;
+    let curved =
+        (0..inserted_mm.len()).filter(|k| *k == ends || goes_on(k)).flat_map(|k| devices[k].sections());
     let curvature = curved.map(|section| {
         let [u, v] = section.rest_curvature_per_mm;
         libm::hypot(u, v)
     });
     let length = window(at_rim, held, curvature.fold(0.0, f64::max));
-    let clearance = mean((devices[inside], near - behind(inside)), (devices[around], near - behind(around)), length)?;
+    let clearance =
+        mean((devices[inside], near - behind(inside)), (devices[around], near - behind(around)), length)?;
     let side = |of: &mut dyn Iterator<Item = usize>| {
         let mut side = Side::default();
         of.for_each(|k| {
@@ -184,12 +186,18 @@ fn steps_n(stack: &Stack, mesh: &Mesh, node: usize, (inner, outer): (usize, usiz
                 continue;
             }
             let moment = |side: &Section, a: usize| side.softest_nmm2() * side.rest_curvature_per_mm[a];
-            let step_nmm = libm::hypot(moment(&pair[1], 0) - moment(&pair[0], 0), moment(&pair[1], 1) - moment(&pair[0], 1));
+            let step_nmm = libm::hypot(
+                moment(&pair[1], 0) - moment(&pair[0], 0),
+                moment(&pair[1], 1) - moment(&pair[0], 1),
+            );
             let (inside, around) = (stiff(0..inner + 1, place), stiff(outer..devices.len(), place));
             let own = if k == inner { inside } else { around };
             let relative = inside * around / (inside + around);
             let moment_nmm = relative * step_nmm / own;
-            let room = clearance_mm((devices[inner], place - behind(inner)), (devices[outer], place - behind(outer)));
+            let room = clearance_mm(
+                (devices[inner], place - behind(inner)),
+                (devices[outer], place - behind(outer)),
+            );
             if let Some(room) = room.filter(|room| *room > 0.0 && moment_nmm > 0.0) {
                 let tilt = 0.5 * (3.0 * room * moment_nmm / relative).sqrt();
                 sum_n += 2.0 * moment_nmm * tilt / (6.0 * room);

@@ -2,6 +2,7 @@
 
 use super::coaxial_tests::{CATHETER, WIRE, push, rubbing_along, wire_in_catheter};
 use crate::Vec3;
+use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Move, Simulation};
 use crate::methods::State;
 
@@ -98,4 +99,39 @@ fn play_of_the_outermost_and_too_few_entries_are_refused() {
     let refused = |plays: Vec<bool>| wire_in_catheter().with_clearance(plays).unwrap_err().to_string();
     assert!(refused(vec![false, true]).starts_with("instrument[1].clearance = true: the last instrument"));
     assert!(refused(vec![true]).starts_with("instrument.clearance = 1: there are 2"));
+}
+
+/// Torque that turns a straight wire in a catheter whose last 30 mm are bent.
+fn torque_nmm(plays: bool) -> f64 {
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(250.0, 0.8, 60.0) };
+    let bent = Section { length_mm: 30.0, rest_curvature_per_mm: [0.02, 0.0], ..catheter };
+    let one = |name: &str, sections: Vec<Section>| Instrument {
+        name: name.to_owned(),
+        device: Device::new(sections).unwrap(),
+        may_lead: true,
+    };
+    let wire = one("wire", vec![Section::straight(330.0, 0.2, 20.0)]);
+    let stack = Stack::new(vec![wire, one("catheter", vec![bent, catheter])]).unwrap();
+    let stack = stack.with_friction(vec![0.2, 0.0]).unwrap().with_clearance(vec![plays, false]).unwrap();
+    let axis = (0..16).map(|i| Vec3::z() * (20.0 * f64::from(i)));
+    let mut simulation = rubbing_along(axis, 120.0, stack, 0.0);
+    push(&mut simulation, &[(WIRE, 10.0)]).unwrap();
+    for _ in 0..20 {
+        push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
+    }
+    for _ in 0..12 {
+        let turn = Move { instrument: WIRE, command: Command::rotate(0.1) };
+        simulation.step_together(&[turn]).unwrap();
+        assert!(simulation.report().converged);
+    }
+    simulation.report().instruments[WIRE].torque_nmm
+}
+
+#[test]
+fn a_wire_rubs_where_it_leans_on_the_rim_and_at_a_step_of_curvature() {
+    let more_nmm = torque_nmm(true) - torque_nmm(false);
+    // M = EIᵣ Δκ at the end and at the step, Δκ = 0.02; half the tilt at the step.
+    let (moment, tilt): (f64, f64) = (15.0 * 0.02, f64::sqrt(3.0 * 0.3 * 0.02));
+    let pressing_n = 2.0 * moment * tilt / (6.0 * 0.3) * 1.5;
+    assert!((more_nmm / (0.2 * 0.2 * pressing_n) - 1.0).abs() < 0.15, "{more_nmm} {pressing_n}");
 }
