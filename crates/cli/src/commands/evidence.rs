@@ -178,6 +178,9 @@ fn distances(found: &ThreeTubes, file: &Path) -> (Table, Curves) {
         rows: [row("as published", &found.nominal), row(&fitted, &found.fitted.misfit)]
             .into_iter()
             .chain(found.with_play.iter().map(|fitted| row("fitted with play", &fitted.misfit)))
+            .chain(
+                found.with_friction.iter().map(|fitted| row("fitted with play and friction", &fitted.misfit)),
+            )
             .chain(found.driven.iter().map(|driven| {
                 row(&format!("driven with play and friction {}", driven.friction), &driven.misfit)
             }))

@@ -59,7 +59,7 @@ fn a_wire_tilts_at_the_end_of_a_catheter_as_two_beams_do_at_any_length_of_elemen
             // What goes on is 10 mm, of which the catheter takes a thirteenth.
             let off_mm = expected * 60.0 / 65.0 * 10.0;
             // Pushed aside, the line there is inclined by 0.2 rad against the force, and takes a smaller moment.
-            let within = if bends[1] > 0.0 { 0.07 } else { 0.05 };
+            let within = if bends[1] > 0.0 { 0.09 } else { 0.05 };
             assert!((tips_mm[3] / off_mm - 1.0).abs() < within, "{tips_mm:?} {off_mm}");
             for (k, within) in [3e-2, 1e-2, 3e-3].into_iter().enumerate() {
                 assert!((tips_mm[k] / tips_mm[3] - 1.0).abs() < within, "{clearance}: {tips_mm:?}");

@@ -112,6 +112,34 @@ fn errors_mm(parameters: &Parameters, rows: &[Row], friction: f64) -> Result<Vec
     Ok(each.collect())
 }
 
+/// Vectors from measured to computed tips along the whole path, for each of several sets of parameters.
+pub(super) fn along(
+    sets: &[Parameters],
+    rows: &[Row],
+    parallel: &Parallel<'_>,
+) -> Result<Vec<Vec<Option<Vec3>>>> {
+    each(sets.len(), &|index| errors_mm(&sets[index], rows, sets[index].friction()), parallel)
+}
+
+/// Computes so many paths side by side.
+fn each(
+    count: usize,
+    of: &(dyn Fn(usize) -> Result<Vec<Option<Vec3>>> + Sync),
+    parallel: &Parallel<'_>,
+) -> Result<Vec<Vec<Option<Vec3>>>> {
+    let found: Mutex<Vec<(usize, Result<Vec<Option<Vec3>>>)>> = Mutex::default();
+    parallel(count, &|index| {
+        let errors = of(index);
+        if let Ok(mut found) = found.lock() {
+            found.push((index, errors));
+        }
+        None
+    });
+    let mut found = found.into_inner().unwrap_or_default();
+    found.sort_by_key(|(index, _)| *index);
+    found.into_iter().map(|(_, errors)| errors).collect()
+}
+
 /// The misfit along the path for every coefficient, on the rows that `is_tested` and on the others.
 pub(super) fn driven(
     parameters: &Parameters,
@@ -119,18 +147,8 @@ pub(super) fn driven(
     is_tested: &dyn Fn(usize) -> bool,
     parallel: &Parallel<'_>,
 ) -> Result<Vec<Driven>> {
-    let found: Mutex<Vec<Option<Result<Vec<Option<Vec3>>>>>> = Mutex::new(FRICTIONS.map(|_| None).into());
-    parallel(FRICTIONS.len(), &|index| {
-        let errors = errors_mm(parameters, rows, FRICTIONS[index]);
-        if let Ok(mut found) = found.lock() {
-            found[index] = Some(errors);
-        }
-        None
-    });
-    let found = found.into_inner().unwrap_or_default();
-    let each = found.into_iter().zip(FRICTIONS).filter_map(|(errors, friction)| Some((errors?, friction)));
-    each.map(|(errors, friction)| {
-        let errors = errors?;
+    let paths = each(FRICTIONS.len(), &|index| errors_mm(parameters, rows, FRICTIONS[index]), parallel)?;
+    let each = paths.into_iter().zip(FRICTIONS).map(|(errors, friction)| {
         let misfit = |tested: bool| {
             let of = (0..rows.len()).filter(|index| is_tested(*index) == tested);
             let (rows, errors): (Vec<Row>, Vec<Option<Vec3>>) =
@@ -138,7 +156,7 @@ pub(super) fn driven(
             Misfit::of(&rows, &errors)
         };
         let fitted_rows_percent_of_length = misfit(false).mean_percent_of_length;
-        Ok(Driven { friction, misfit: misfit(true), fitted_rows_percent_of_length })
-    })
-    .collect()
+        Driven { friction, misfit: misfit(true), fitted_rows_percent_of_length }
+    });
+    Ok(each.collect())
 }

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::Study;
-use super::driven_tubes::{Driven, driven};
+use super::driven_tubes::{self, Driven};
 
 /// The study in words.
 pub const STUDY: Study = Study {
@@ -76,18 +76,39 @@ pub struct Row {
     pub tip_mm: Vec3,
 }
 
-/// Number of parameters, and of those without play.
-const PARAMETERS: usize = 19;
+/// Number of parameters, of those without friction, and of those without play.
+const PARAMETERS: usize = 20;
+const WITHOUT_FRICTION: usize = 19;
 const WITHOUT_PLAY: usize = 17;
-/// Play that a fit begins with, mm.
+/// Play and coefficient of friction that a fit begins with, mm.
 const PLAY_MM: f64 = 0.1;
+const FRICTION: f64 = 0.1;
 
 /// What is not known exactly, as differences from the nominal values, each in its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
     values: [f64; PARAMETERS],
-    /// Whether the tubes have play in one another.
-    plays: bool,
+    between: Between,
+}
+
+/// What there is between the tubes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Between {
+    Nothing,
+    Play,
+    /// Play, and friction with the path that it remembers.
+    PlayAndFriction,
+}
+
+impl Between {
+    /// Number of parameters that are fitted.
+    fn parameters(self) -> usize {
+        match self {
+            Self::Nothing => WITHOUT_PLAY,
+            Self::Play => WITHOUT_FRICTION,
+            Self::PlayAndFriction => PARAMETERS,
+        }
+    }
 }
 
 /// Names of the parameters, with units, and the step by which their influence is measured.
@@ -111,12 +132,13 @@ pub const NAMES: [(&str, f64); PARAMETERS] = [
     ("tilt of the plate about y, rad", 1e-3),
     ("play of tube 2 in tube 1 over 0.1 mm, logarithm", 1e-1),
     ("play of tube 3 in tube 2 over 0.1 mm, logarithm", 1e-1),
+    ("coefficient of friction over 0.1, logarithm", 1e-1),
 ];
 
 impl Default for Parameters {
     /// The published values, without play.
     fn default() -> Self {
-        Self { values: [0.0; PARAMETERS], plays: false }
+        Self { values: [0.0; PARAMETERS], between: Between::Nothing }
     }
 }
 
@@ -159,7 +181,10 @@ pub struct ThreeTubes {
     /// With play, and numbers that are fitted with it, if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub with_play: Option<Fitted>,
-    /// With those numbers along the driven path, for each coefficient of friction, on the tested rows; if asked for.
+    /// With these and friction along the driven path, fitted; if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with_friction: Option<Fitted>,
+    /// With the numbers that were fitted with play along the driven path, for each coefficient of friction; if asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub driven: Vec<Driven>,
     /// Distances on the tested rows with the published and with fitted numbers, mm, in ascending order.
@@ -234,8 +259,16 @@ impl Parameters {
 
     /// Play of a tube in the next one outside, mm.
     pub(super) fn play_mm(&self, index: usize) -> f64 {
-        let is_inside = self.plays && index > 0;
+        let is_inside = self.between != Between::Nothing && index > 0;
         if is_inside { PLAY_MM * libm::exp(self.values[WITHOUT_PLAY + index - 1]) } else { 0.0 }
+    }
+
+    /// Coefficient of friction between tubes.
+    pub(super) fn friction(&self) -> f64 {
+        match self.between {
+            Between::PlayAndFriction => FRICTION * libm::exp(self.values[WITHOUT_FRICTION]),
+            _ => 0.0,
+        }
     }
 
     /// Angle of a tube's base, rad.
@@ -360,22 +393,26 @@ fn cost(errors_mm: &[Option<Vec3>]) -> f64 {
     each.map(|mm| if mm <= FAR_MM { 0.5 * mm * mm } else { FAR_MM * (mm - 0.5 * FAR_MM) }).sum()
 }
 
-/// Fits the parameters to rows by Levenberg's and Marquardt's method with derivatives by differences; `told` hears of
-/// every iteration.
-fn fit(start: Parameters, rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameters {
-    let count = if start.plays { PARAMETERS } else { WITHOUT_PLAY };
+/// Vectors from measured to computed tips of the rows that are fitted, for each of several sets of parameters.
+type Errors<'a> = dyn Fn(&[Parameters]) -> Result<Vec<Vec<Option<Vec3>>>> + 'a;
+
+/// Fits the parameters by Levenberg's and Marquardt's method with derivatives by differences; `told` hears of every iteration.
+///
+/// # Errors
+/// As `of`.
+fn fit(start: Parameters, of: &Errors<'_>, told: &dyn Fn(usize)) -> Result<Parameters> {
+    let count = start.between.parameters();
     let mut best = start;
-    let mut errors = best.errors_mm(rows, parallel);
+    let mut errors = of(&[best])?.remove(0);
     let mut damping = 1e-3;
     for iteration in 0..ITERATIONS {
         let (mut normal, mut gradient) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
-        let columns: Vec<Vec<Option<Vec3>>> = (0..count)
-            .map(|k| {
-                let mut moved = best;
-                moved.values[k] += NAMES[k].1;
-                moved.errors_mm(rows, parallel)
-            })
-            .collect();
+        let moved = |k: usize| {
+            let mut moved = best;
+            moved.values[k] += NAMES[k].1;
+            moved
+        };
+        let columns = of(&(0..count).map(moved).collect::<Vec<_>>())?;
         for (row, error) in errors.iter().enumerate() {
             let Some(error) = error else { continue };
             // A row that another branch of equilibria is near to says nothing about slopes.
@@ -401,7 +438,7 @@ fn fit(start: Parameters, rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(u
             let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else { break };
             let mut next = best;
             (0..count).for_each(|k| next.values[k] -= step[k]);
-            let found = next.errors_mm(rows, parallel);
+            let found = of(&[next])?.remove(0);
             // A row without an equilibrium must not count as one without an error.
             let lost = found.iter().flatten().count() < errors.iter().flatten().count();
             if !lost && cost(&found) < before {
@@ -415,7 +452,7 @@ fn fit(start: Parameters, rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(u
             break;
         }
     }
-    best
+    Ok(best)
 }
 
 /// Compares the measured tips with the computed ones: with the published numbers on all rows, and with numbers that were
@@ -432,27 +469,43 @@ pub fn study(rows: &[Row], also: Also, parallel: &Parallel<'_>, told: &dyn Fn(us
         (0..rows.len()).filter(|index| is_fitted(index) == wanted).map(|index| rows[index]).collect()
     };
     let (seen, unseen) = (of(true), of(false));
-    let judged = |parameters: &Parameters| {
-        let errors = parameters.errors_mm(&unseen, parallel);
-        let count = if parameters.plays { PARAMETERS } else { WITHOUT_PLAY };
-        let fitted = Fitted {
-            rows_fitted: seen.len(),
-            rows_tested: unseen.len(),
-            misfit: Misfit::of(&unseen, &errors),
-            parameters: NAMES.iter().map(|(name, _)| *name).zip(parameters.values).take(count).collect(),
-        };
-        (fitted, errors)
+    let judged = |parameters: &Parameters, errors: &[Option<Vec3>]| Fitted {
+        rows_fitted: seen.len(),
+        rows_tested: unseen.len(),
+        misfit: Misfit::of(&unseen, errors),
+        parameters: (NAMES.iter().map(|(name, _)| *name).zip(parameters.values))
+            .take(parameters.between.parameters())
+            .collect(),
     };
-    let without = fit(nominal, &seen, parallel, told);
-    let (fitted, fitted_errors) = judged(&without);
-    // Ends that share a node are apart with fitted lengths: play is fitted from those.
-    let begin = Parameters { plays: true, ..without };
-    let playing = (also.play || also.friction).then(|| fit(begin, &seen, parallel, told));
-    let with_play = playing.as_ref().map(judged).map(|(fitted, _)| fitted);
-    let driven = match playing.filter(|_| also.friction) {
-        Some(parameters) => driven(&parameters, rows, &|index| !is_fitted(&index), parallel)?,
-        None => Vec::new(),
+    let each_row = |sets: &[Parameters]| -> Result<Vec<Vec<Option<Vec3>>>> {
+        Ok(sets.iter().map(|parameters| parameters.errors_mm(&seen, parallel)).collect())
     };
+    let without = fit(nominal, &each_row, told)?;
+    let fitted_errors = without.errors_mm(&unseen, parallel);
+    let fitted = judged(&without, &fitted_errors);
+    let (mut with_play, mut with_friction, mut driven) = (None, None, Vec::new());
+    if also.play || also.friction {
+        // Ends that share a node are apart with fitted lengths: play is fitted from those.
+        let playing = fit(Parameters { between: Between::Play, ..without }, &each_row, told)?;
+        with_play = Some(judged(&playing, &playing.errors_mm(&unseen, parallel)));
+        if also.friction {
+            driven = driven_tubes::driven(&playing, rows, &|index| !is_fitted(&index), parallel)?;
+            let on = |errors: Vec<Option<Vec3>>, wanted: bool| -> Vec<Option<Vec3>> {
+                let each = errors.into_iter().enumerate();
+                each.filter(|(index, _)| is_fitted(index) == wanted).map(|(_, error)| error).collect()
+            };
+            let along = |sets: &[Parameters]| -> Result<Vec<Vec<Option<Vec3>>>> {
+                let each = driven_tubes::along(sets, rows, parallel)?;
+                Ok(each.into_iter().map(|errors| on(errors, true)).collect())
+            };
+            // Without play all press without bound where they are turned against each other.
+            let mut begin = Parameters { between: Between::PlayAndFriction, ..playing };
+            begin.values[WITHOUT_PLAY..].fill(0.0);
+            let rubbing = fit(begin, &along, told)?;
+            let errors = driven_tubes::along(&[rubbing], rows, parallel)?.remove(0);
+            with_friction = Some(judged(&rubbing, &on(errors, false)));
+        }
+    }
     let before = (0..rows.len()).filter(|index| !is_fitted(index)).map(|index| errors[index]);
     let before: Vec<Option<Vec3>> = before.collect();
     let distances_mm = [&before, &fitted_errors].map(|errors| {
@@ -460,7 +513,8 @@ pub fn study(rows: &[Row], also: Also, parallel: &Parallel<'_>, told: &dyn Fn(us
         all.sort_by(f64::total_cmp);
         all
     });
-    Ok(ThreeTubes { nominal: Misfit::of(rows, &errors), fitted, with_play, driven, distances_mm })
+    let nominal = Misfit::of(rows, &errors);
+    Ok(ThreeTubes { nominal, fitted, with_play, with_friction, driven, distances_mm })
 }
 
 /// Largest number of iterations of the fit.
