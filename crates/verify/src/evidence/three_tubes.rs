@@ -23,8 +23,8 @@ pub const STUDY: Study = Study {
            plate), the tip x y z in mm, and three axes of the tip.",
     computed: "The static equilibrium of every row, without friction and play, the bases of the tubes behind a plate, so that their straight ends twist. First with the \
                published numbers; then with 17 numbers (curvatures, stiffness ratios, lengths, zeros of the turns, pose of the plate) fitted to every eighth row, and \
-               judged on the others.",
-    not_shown: "Friction and play: the same joints reached from elsewhere differ by 0.25 mm in the median and by millimetres in one pair of ten. The fitted numbers also \
+               judged on the others. On request with play as well, and with friction along the path in the order of the rows.",
+    not_shown: "Without --friction, what depends on the path: the same joints reached from elsewhere differ by 0.25 mm in the median and by millimetres in one pair of ten. The fitted numbers also \
                 take up what is not modelled, and are not measurements of the tubes. One robot, free space: no vessel, no wall.",
 };
 
