@@ -172,12 +172,13 @@ impl Simulation {
     /// N, and `sheath_friction` the friction coefficient in its mouth.
     ///
     /// Several instruments lie inside each other, innermost first. Optional lists with one entry per instrument are
-    /// `names`, for messages; `friction` against the enclosing instruments; and `may_lead`, whether its tip may be
-    /// inserted farther than that of the instrument inside it.
+    /// `names`, for messages; `friction` against the enclosing instruments; `may_lead`, whether its tip may be
+    /// inserted farther than that of the instrument inside it; and `clearance`, whether it has the play in the enclosing
+    /// instruments that the radii leave, and tilts where one of the two ends.
     ///
     /// Raises InputError for values that are out of range or inconsistent.
     #[new]
-    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, bends_towards=None, wall=None, yielding=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
+    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, bends_towards=None, wall=None, yielding=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None, clearance=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn py_new(
         py: Python<'_>,
@@ -196,6 +197,7 @@ impl Simulation {
         names: Option<List<String>>,
         friction: Option<List<Real>>,
         may_lead: Option<List<bool>>,
+        clearance: Option<List<bool>>,
     ) -> PyResult<Self> {
         let instruments = self::instruments(instruments)?;
         let position_mm = position_mm.map(|at| place("position_mm", at)).transpose()?;
@@ -221,6 +223,7 @@ impl Simulation {
             names: names.map(|list| list.0),
             friction: friction.map(|list| list.0.into_iter().map(|one| one.0).collect()),
             may_lead: may_lead.map(|list| list.0),
+            clearance: clearance.map(|list| list.0),
         };
         Self::begin(py, Start::of_arguments(py, vessel, instruments, arguments)?)
     }

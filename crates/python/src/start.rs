@@ -53,6 +53,9 @@ pub(crate) struct Arguments {
     pub(crate) names: Option<Vec<String>>,
     pub(crate) friction: Option<Vec<f64>>,
     pub(crate) may_lead: Option<Vec<bool>>,
+    /// Absent in states that were written before it existed.
+    #[serde(default)]
+    pub(crate) clearance: Option<Vec<bool>>,
 }
 
 impl Start {
@@ -175,6 +178,7 @@ impl Arguments {
             ("names", self.names.as_ref().map(Vec::len)),
             ("friction", self.friction.as_ref().map(Vec::len)),
             ("may_lead", self.may_lead.as_ref().map(Vec::len)),
+            ("clearance", self.clearance.as_ref().map(Vec::len)),
         ];
         for (name, given) in reported {
             if let Some(given) = given.filter(|given| *given != count) {
@@ -195,8 +199,12 @@ impl Arguments {
             [only] => Stack::from(only.device.clone()),
             _ => Stack::new(each.collect()).map_err(exception)?,
         };
-        match &self.friction {
-            Some(friction) => stack.with_friction(friction.clone()).map_err(exception),
+        let stack = match &self.friction {
+            Some(friction) => stack.with_friction(friction.clone()).map_err(exception)?,
+            None => stack,
+        };
+        match &self.clearance {
+            Some(plays) => stack.with_clearance(plays.clone()).map_err(exception),
             None => Ok(stack),
         }
     }

@@ -108,7 +108,7 @@ def test_a_part_names_its_wrong_parameter(part, words):
         ({"ends": ["a"]}, r"ends\[0\] = 'a': has no method ended"),
         ({"observations": {"a": 1}}, r"observations\['a'\] = 1: has no method observe"),
         ({"observations": [observations.Tip()]}, "observations = .*: give a dictionary of names and parts"),
-        ({"coupling": {"foo": 1}}, "coupling = 'foo': is no key of it: names, friction, may_lead"),
+        ({"coupling": {"foo": 1}}, "coupling = 'foo': is no key of it: names, friction, may_lead, clearance"),
     ],
 )
 def test_a_task_names_its_wrong_part(make, parts, words):

@@ -57,7 +57,7 @@ def test_what_has_no_end_is_refused(call, given, simulation):
 
 
 def test_keywords_of_several_are_refused(vessel, wire):
-    for key in ("names", "friction", "may_lead"):
+    for key in ("names", "friction", "may_lead", "clearance"):
         with pytest.raises(endowire.InputError, match="10000000 are taken"):
             endowire.Simulation(vessel, [wire, wire], **{key: range(10**12)})
     with pytest.raises(endowire.InputError, match="10000000 are taken"):

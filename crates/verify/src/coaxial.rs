@@ -12,13 +12,13 @@ use endowire_core::{Error, Result, Vec3};
 
 /// A straight instrument.
 fn straight(name: &str, inserted: f64, ei: f64) -> Instrument {
-    Instrument { name: name.to_owned(), inserted, hand: 0.0, section: vec![section(2.0, ei)] }
+    Instrument { name: name.to_owned(), inserted, hand: 0.0, clearance: 0.0, section: vec![section(2.0, ei)] }
 }
 
 /// A pre-curved one.
 fn curved(name: &str, inserted: f64, [ei, gj, curvature]: [f64; 3]) -> Instrument {
     let section = Section { gj: Some(gj), rest_curvature: [curvature, 0.0], ..section(2.0, ei) };
-    Instrument { name: name.to_owned(), inserted, hand: 0.0, section: vec![section] }
+    Instrument { name: name.to_owned(), inserted, hand: 0.0, clearance: 0.0, section: vec![section] }
 }
 
 /// Instruments that come out of a sheath at the origin along x.

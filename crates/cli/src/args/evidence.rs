@@ -10,6 +10,12 @@ pub(crate) struct EvidenceArgs {
     /// The measurements, for three-tubes: they are not part of this program, and the study says where to get them
     #[arg(value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
+    /// With three-tubes: also fit with play between the tubes; some minutes
+    #[arg(long)]
+    pub(crate) play: bool,
+    /// With three-tubes: also drive the tubes, with play and friction, along the path of the measurements; some minutes
+    #[arg(long)]
+    pub(crate) friction: bool,
     /// Print the study as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -6,20 +6,24 @@ use endowire_core::Vec3;
 use endowire_verify::Row;
 use endowire_verify::evidence::three_tubes::{self, ThreeTubes};
 use endowire_verify::evidence::{
-    Compared, Kind, STUDIES, Study, bending, capstan, coil_forces, reversal, tube_buckling, whip,
+    Compared, Kind, STUDIES, Study, bending, capstan, coil_forces, reversal, straightening, tube_buckling,
+    whip,
 };
 use serde::Serialize;
 
 use super::device::table::{columns, digits};
 use super::parallel::in_parallel;
-use crate::args::EvidenceArgs;
+use crate::args::{EvidenceArgs, Setting};
 use crate::devices;
 use crate::failure::Failure;
 use crate::output::curves::{Curve, Curves, Entry, Panel, Scale, Stroke, colour};
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::study::{self, Page, Table};
 use crate::output::{answer, chart, progress, tell};
+use crate::scenes;
 
+/// Folder of the scenes that studies use.
+const SCENES: &str = "assets/scenes";
 /// Points of a curve of distances.
 const SHARES: usize = 200;
 
@@ -56,11 +60,18 @@ pub(crate) fn evidence(args: &EvidenceArgs) -> Result<(), Failure> {
     if study.name == three_tubes::STUDY.name {
         return tubes(args, study);
     }
+    if args.play || args.friction {
+        let option = if args.play { "--play" } else { "--friction" };
+        return Err(Failure::Input(format!(
+            "{option}: {name} has no instruments with play or a path: leave it out"
+        )));
+    }
     if let Some(file) = &args.file {
         return Err(Failure::Input(format!("{}: {name} takes no file: leave it out", file.display())));
     }
     let (compared, provenance) = match study.name {
         "coil-forces" => (deployed()?, Provenance::of_program("evidence coil-forces")),
+        "straightening" => straightened()?,
         "reversal" => (reversal::study()?, Provenance::of_program("evidence reversal")),
         "whip" => (whip::study()?, Provenance::of_program("evidence whip")),
         "capstan" => (capstan::study()?, Provenance::of_program("evidence capstan")),
@@ -90,6 +101,23 @@ fn bent() -> Result<(Compared, Provenance), Failure> {
     let provenance = Provenance::new(&inputs, 0);
     let wires: Vec<_> = named.iter().map(|one| (one.file.name.clone(), one.file.device.clone())).collect();
     Ok((bending::study(&wires)?, provenance))
+}
+
+/// The wires of the catalogue in an artery that yields.
+fn straightened() -> Result<(Compared, Provenance), Failure> {
+    let path = scenes::named(straightening::SCENE.as_ref(), SCENES, "scene")?;
+    let file = |wire: &str| format!("device.file=\"../devices/{wire}.toml\"");
+    let read = |wire: &str| {
+        let set = straightening::SET.map(str::to_owned).into_iter().chain([file(wire)]);
+        let set: Vec<Setting> =
+            set.map(|set| set.parse()).collect::<Result<_, _>>().map_err(Failure::Input)?;
+        Ok((wire.to_owned(), scenes::read(&path, &set)?))
+    };
+    let wires = straightening::WIRES.iter().map(|wire| read(wire)).collect::<Result<Vec<_>, Failure>>()?;
+    let sign = progress::waiting("wires are pushed up");
+    let compared = straightening::study(&wires);
+    sign.finish_and_clear();
+    Ok((compared?, Provenance::new(&[&read_input(&path)?], 0)))
 }
 
 /// Shows a study that compares numbers.
@@ -160,7 +188,8 @@ fn tubes(args: &EvidenceArgs, study: &Study) -> Result<(), Failure> {
     let rows = three_tubes::read(&String::from_utf8_lossy(&input), file)?;
     let bar = progress::bar(three_tubes::MOST_STEPS, "fit");
     let parallel = |count: usize, of: &(dyn Fn(usize) -> Option<Vec3> + Sync)| in_parallel(count, None, of);
-    let found = three_tubes::study(&rows, &parallel, &|done| bar.set_position(done as u64));
+    let also = three_tubes::Also { play: args.play, friction: args.friction };
+    let found = three_tubes::study(&rows, also, &parallel, &|done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let (table, curves) = distances(&found, file);
     show(args, study, &Provenance::new(&[&input], 0), (&found, &table, &curves))
@@ -180,7 +209,16 @@ fn distances(found: &ThreeTubes, file: &Path) -> (Table, Curves) {
     let fitted = format!("fitted to {} rows, judged on others", found.fitted.rows_fitted);
     let table = Table {
         columns: vec!["numbers", "rows", "unsolved", "mean mm", "mean % of length", "95 % within mm"],
-        rows: vec![row("as published", &found.nominal), row(&fitted, &found.fitted.misfit)],
+        rows: [row("as published", &found.nominal), row(&fitted, &found.fitted.misfit)]
+            .into_iter()
+            .chain(found.with_play.iter().map(|fitted| row("fitted with play", &fitted.misfit)))
+            .chain(
+                found.with_friction.iter().map(|fitted| row("fitted with play and friction", &fitted.misfit)),
+            )
+            .chain(found.driven.iter().map(|driven| {
+                row(&format!("driven with play and friction {}", driven.friction), &driven.misfit)
+            }))
+            .collect(),
     };
     let names = ["as published", "fitted"];
     let share = |all: &Vec<f64>| -> Vec<[f64; 2]> {

@@ -98,7 +98,10 @@ fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>>
     let each = stack.instruments().iter().zip(start_mm).enumerate();
     let each = each
         .map(|(i, (one, mm))| (&one.name, one.device.sections(), stack.friction(i), stack.valve_n(i), mm));
-    serde_json::to_vec(&each.collect::<Vec<_>>())
+    let mut bytes = serde_json::to_vec(&each.collect::<Vec<_>>())?;
+    // Nothing without play, so that what was written before there was any still fits.
+    bytes.extend((0..stack.instruments().len()).filter(|i| stack.has_clearance(*i)).map(|i| i as u8));
+    Ok(bytes)
 }
 
 /// Replays a script up to where a course says. Returns it and a hash of the steps so far; `seen` is called with each

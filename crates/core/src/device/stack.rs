@@ -30,6 +30,8 @@ pub struct Stack {
     frictions: Vec<f64>,
     /// Friction force, N, of the valve on the hub of each, which seals the instruments inside it.
     valves_n: Vec<f64>,
+    /// Whether each has play in those outside it.
+    plays: Vec<bool>,
 }
 
 /// Largest number of instruments of a stack.
@@ -64,7 +66,7 @@ impl From<Device> for Stack {
     fn from(device: Device) -> Self {
         let sets = vec![device.is_shaped().then_some(0)];
         let instruments = vec![Instrument { name: "device".to_owned(), device, may_lead: true }];
-        Self { instruments, sets, frictions: vec![0.0], valves_n: vec![0.0] }
+        Self { instruments, sets, frictions: vec![0.0], valves_n: vec![0.0], plays: vec![false] }
     }
 }
 
@@ -103,7 +105,8 @@ impl Stack {
             ));
         }
         let (frictions, valves_n) = (vec![0.0; instruments.len()], vec![0.0; instruments.len()]);
-        Ok(Self { instruments, sets, frictions, valves_n })
+        let plays = vec![false; instruments.len()];
+        Ok(Self { instruments, sets, frictions, valves_n, plays })
     }
 
     /// The same instruments with these Coulomb coefficients of friction, each between one and those outside it.
@@ -150,6 +153,39 @@ impl Stack {
         }
         self.valves_n = valves_n;
         Ok(self)
+    }
+
+    /// The same instruments, those with play in the next one outside them that is in: as much as their radii leave.
+    ///
+    /// # Errors
+    /// A number of entries other than that of instruments, play of the outermost, and play with sections that bend more easily in one
+    /// plane.
+    pub fn with_clearance(mut self, plays: Vec<bool>) -> Result<Self> {
+        if plays.len() != self.instruments.len() {
+            let remedy = format!("there are {} instruments: give one for each", self.instruments.len());
+            return Err(Error::parameter("instrument.clearance", plays.len(), remedy));
+        }
+        let last = plays.len() - 1;
+        if plays[last] {
+            let remedy = "the last instrument has none outside it: its play in the vessel is always modelled";
+            return Err(Error::parameter(format!("instrument[{last}].clearance"), true, remedy));
+        }
+        if let Some(first) = plays.iter().position(|plays| *plays).filter(|_| self.has_soft_plane()) {
+            let remedy = "play is modelled for instruments that are as stiff in all planes: leave it or soft_plane out";
+            return Err(Error::parameter(format!("instrument[{first}].clearance"), true, remedy));
+        }
+        self.plays = plays;
+        Ok(self)
+    }
+
+    /// Whether an instrument has play in those outside it.
+    pub fn has_clearance(&self, instrument: usize) -> bool {
+        self.plays[instrument]
+    }
+
+    /// Whether any of them has.
+    pub(crate) fn has_play(&self) -> bool {
+        self.plays.contains(&true)
     }
 
     /// Friction of the valve on the hub of an instrument, N.

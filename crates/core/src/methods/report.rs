@@ -148,6 +148,9 @@ pub struct WallForce {
 pub struct LateralForce {
     /// Force on the inner instrument, N.
     pub force_n: Vec3,
+    /// Sum of the magnitudes with which the two press on each other there, N: more than that force where they have play and
+    /// lean on a rim, or on both sides of the lumen.
+    pub pressing_n: f64,
     /// Length that the node represents, mm; 0 without a force. Where an instrument ends the force is not distributed
     /// over it but concentrated there.
     pub length_mm: f64,

@@ -15,13 +15,13 @@
 
 use super::batch::MOST;
 use super::element::{ElementData, ElementSystem, Energy};
-use super::lagrangian::{beside, system};
+use super::lagrangian::{beside, element_system, system};
 use super::lanes::Lanes;
 use super::layout::Layout;
 use super::state::RodState;
 use crate::banded::{BandMatrix, Shift};
 use crate::coupled::Couplings;
-use pulp::{Arch, Simd, WithSimd, bytemuck};
+use pulp::{Arch, Scalar, Simd, WithSimd, bytemuck};
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -205,6 +205,8 @@ impl<const C: usize, const HESSIAN: bool> WithSimd for AddElements<'_, C, HESSIA
             for lane in 0..count {
                 if elements[first + lane].is_break() {
                     to.add_break::<HESSIAN>(first + lane);
+                } else if elements[first + lane].tilt.is_some() {
+                    to.add_rim::<HESSIAN>(first + lane, &elements[first + lane], state, gammas[lane]);
                 } else {
                     to.add_lane::<S, HESSIAN>(first + lane, lane, gammas[lane], &all);
                 }
@@ -221,6 +223,14 @@ impl<const C: usize> Assembly<C> {
             let at = Layout::<C>::BLOCK * e;
             self.matrix.lay_blocks(at, |i, j| f64::from(u8::from(i == j && i == C - 1)));
         }
+    }
+
+    /// Adds element `e`, in which there is play: it is computed alone.
+    #[inline(never)]
+    fn add_rim<const HESSIAN: bool>(&mut self, e: usize, data: &ElementData, state: &RodState, gamma: f64) {
+        let mut own = ElementSystem::<C>::zeros();
+        element_system::<C, HESSIAN>(data, &state.element::<C>(e), gamma, &mut own);
+        self.add_lane::<Scalar, HESSIAN>(e, 0, gamma, &own);
     }
 
     /// Adds element `e`, which is in this lane of `all`.

@@ -16,7 +16,7 @@ fn vector(seed: &mut u64) -> Vec3 {
 }
 
 /// A state whose end tangent is turned by about `angle` against the first and whose chord is off by about `spread`.
-fn state(seed: &mut u64, angle: f64, spread: f64) -> ElementState {
+pub(super) fn state(seed: &mut u64, angle: f64, spread: f64) -> ElementState {
     let first = Frame::new(vector(seed), Some(vector(seed)));
     let way = noise(seed) * 3.0;
     let second = first
@@ -35,7 +35,7 @@ fn positive(seed: &mut u64) -> f64 {
     1.5 + noise(seed)
 }
 
-fn material(s: &mut u64) -> Material {
+pub(super) fn material(s: &mut u64) -> Material {
     Material {
         bending: [positive(s), positive(s), positive(s)],
         torsion: [positive(s), positive(s), positive(s)],
@@ -60,11 +60,17 @@ pub(super) fn data(seed: &mut u64) -> ElementData {
     let materials = [material(seed), material(seed), material(seed)];
     let bending =
         [0, 1, 2].map(|k| materials.iter().map(|m| m.bending[k]).sum::<f64>() + 0.5 * positive(seed));
-    ElementData { length: 0.4 * positive(seed), bending, flexibility: 0.3 * positive(seed), materials }
+    ElementData {
+        length: 0.4 * positive(seed),
+        bending,
+        flexibility: 0.3 * positive(seed),
+        materials,
+        tilt: None,
+    }
 }
 
 /// The Lagrangian after the unknowns have moved by `d`; entries of b and N of the first node are empty, the last one is N.
-fn lagrangian<const C: usize>(data: &ElementData, s: &ElementState, d: &[f64; C]) -> f64 {
+pub(super) fn lagrangian<const C: usize>(data: &ElementData, s: &ElementState, d: &[f64; C]) -> f64 {
     let l = Layout::<C>;
     let three = |at: usize| Vec3::new(d[at], d[at + 1], d[at + 2]);
     let (t0, t1) = (l.tangent(0), l.tangent(1));
@@ -87,7 +93,7 @@ fn lagrangian<const C: usize>(data: &ElementData, s: &ElementState, d: &[f64; C]
 }
 
 /// Largest errors of gradient and Hessian, relative to their largest entries.
-fn errors<const C: usize>(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
+pub(super) fn errors<const C: usize>(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
     let l = Layout::<C>;
     let mut out = ElementSystem::<C>::zeros();
     element_system::<_, true>(data, s, 0.0, &mut out);

@@ -3,6 +3,7 @@
 use super::frame::Frame;
 use super::lanes::{Lanes, Vector};
 use super::layout::MAX_ANGLES;
+use super::play::Tilt;
 use super::quadrature::Point;
 use crate::Vec3;
 use pulp::Simd;
@@ -51,12 +52,19 @@ pub struct ElementData {
     pub flexibility: f64,
     /// The instruments that have material angles, one per set of angles.
     pub materials: [Material; MAX_ANGLES],
+    /// Play of all of it in an instrument that ends at its first node, if there is any.
+    pub tilt: Option<Tilt>,
 }
 
 impl ElementData {
     /// No instrument and no length.
-    pub(crate) const EMPTY: Self =
-        Self { length: 0.0, bending: [0.0; 3], flexibility: 0.0, materials: [Material::NONE; MAX_ANGLES] };
+    pub(crate) const EMPTY: Self = Self {
+        length: 0.0,
+        bending: [0.0; 3],
+        flexibility: 0.0,
+        materials: [Material::NONE; MAX_ANGLES],
+        tilt: None,
+    };
 
     /// The gap between two rods that are solved together, from the end of one to the start of the next. It has no
     /// stiffness, so neither side acts on the other. Its length is only the unit of its chord.

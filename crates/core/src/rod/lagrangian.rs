@@ -17,12 +17,16 @@ use super::invariants::{Derivatives, Factors};
 use super::lanes::{Lanes, Vector};
 use super::layout::Layout;
 use super::quadrature::GAUSS;
+use super::rim::{rim_energy, rim_system};
 use super::state::RodState;
 use super::torsion::TwistValue;
 use pulp::{Arch, Scalar, Simd, WithSimd, bytemuck};
 
 /// The element's energy alone, where two neighbouring nodes have `C` unknowns.
 pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> Energy {
+    if let Some(energy) = rim_energy::<C>(data, s) {
+        return energy;
+    }
     energy::<_, C>(&Batch::new::<C>(Scalar, &[Lane::of(data, s)]))
 }
 
@@ -34,6 +38,9 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     gamma: f64,
     out: &mut ElementSystem<C>,
 ) {
+    if data.tilt.is_some() {
+        return rim_system::<C, HESSIAN>(data, s, gamma, out);
+    }
     let batch = Batch::new::<C>(Scalar, &[Lane::of(data, s)]);
     system::<_, C, HESSIAN>(&batch, Lanes::splat(Scalar, gamma), out);
 }
@@ -61,6 +68,11 @@ impl<const C: usize> WithSimd for Stored<'_, C> {
             let energies = [bend, twist, axial];
             let [bend, twist, axial] = [0, 1, 2].map(|k| bytemuck::cast_slice(&energies[k..k + 1]));
             for lane in (0..count).filter(|lane| !self.elements[first + lane].is_break()) {
+                let data = &self.elements[first + lane];
+                if let Some(energy) = rim_energy::<C>(data, &self.state.element::<C>(first + lane)) {
+                    sum += energy.total();
+                    continue;
+                }
                 sum += Energy::<f64> { bend: bend[lane], twist: twist[lane], axial: axial[lane] }.total();
             }
         }

@@ -12,7 +12,7 @@
 //!
 //! where coaxial instruments i share the centre line, EI is the sum of their stiffnesses, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂)
 //! turns with the angle of each: Σ ½EIᵢ|t′ − κᵢ⁰|² (Dupont, Lock, Itkowitz and Butler, IEEE Trans. Robotics 26(2),
-//! 2010). A single rod is one instrument.
+//! 2010). A single rod is one instrument. With play, what goes on tilts where another one ends (`play`, `rim`).
 //!
 //! c = ⅔h(|r′(½)| − 1) is Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
 //! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for
@@ -36,8 +36,10 @@ mod invariants;
 pub mod lagrangian;
 mod lanes;
 pub mod layout;
+mod play;
 pub mod points;
 pub mod quadrature;
+mod rim;
 pub(crate) mod scatter;
 mod several;
 mod share;
@@ -55,7 +57,10 @@ pub use lagrangian::{element_energy, element_system};
 pub(crate) use lagrangian::{element_gradients, stored_energy};
 pub(crate) use layout::MAX_ANGLES;
 pub use layout::{Layout, PLAIN, TWISTED};
+pub use play::Tilt;
+pub(crate) use play::{Side, window};
 pub use points::PointSum;
+pub(crate) use rim::beyond;
 pub use share::{shares, times};
 pub use state::RodState;
 pub use stencils::{Stencils, Triple};
@@ -65,3 +70,5 @@ pub use supports::{EndAngle, Supports};
 mod derivative_tests;
 #[cfg(test)]
 mod lane_tests;
+#[cfg(test)]
+mod rim_tests;

@@ -39,6 +39,7 @@
 //! name = "catheter"
 //! file = "../devices/catheter_4f_vertebral.toml"
 //! may_lead = false                      # never farther in than the wire in it; it may if absent
+//!                                       # `clearance = true` of the wire: it tilts where it comes out
 //!
 //! [[script]]
 //! instrument = "wire"

@@ -333,8 +333,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// The single device, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, `may_lead` of the first, and as [`Stack::new`], [`Stack::with_friction`] and
-    /// [`Stack::sealed`].
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, `may_lead` of the first, and as [`Stack::new`], [`Stack::with_friction`],
+    /// [`Stack::sealed`] and [`Stack::with_clearance`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => {
@@ -356,7 +356,9 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 });
                 let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
                 let valves_n = self.instrument.iter().map(|spec| spec.valve_n).collect();
-                Stack::new(each.collect::<Result<_>>()?)?.with_friction(frictions)?.sealed(valves_n)
+                let plays = self.instrument.iter().map(|spec| spec.clearance).collect();
+                let stack = Stack::new(each.collect::<Result<_>>()?)?.with_friction(frictions)?;
+                stack.sealed(valves_n)?.with_clearance(plays)
             }
             (None, true) => {
                 let remedy = "give [device], or an [[instrument]] for each of several, the innermost first";

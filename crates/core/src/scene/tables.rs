@@ -141,6 +141,9 @@ pub struct InstrumentSpec {
     /// disables it.
     #[serde(default)]
     pub friction: f64,
+    /// Whether it has the play in the instruments outside it that the radii leave, and tilts where one of the two ends.
+    #[serde(default)]
+    pub clearance: bool,
     /// Friction of the valve on its hub, which seals what is inside, N; 0 disables it.
     #[serde(default)]
     pub valve_n: f64,

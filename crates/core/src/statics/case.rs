@@ -61,9 +61,19 @@ pub struct Instrument {
     /// Angle in radians by which the hand has turned its d₁ about the tangent, against the start's.
     #[serde(default)]
     pub hand: f64,
+    /// Play to either side in the next instrument of the list, which then goes from the innermost outwards; 0 for none.
+    /// See [`crate::rod::Tilt`].
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub clearance: f64,
     /// Sections in order from its tip, with `until` measured from the tip; the last one ends no nearer than
     /// `inserted`.
     pub section: Vec<Section>,
+}
+
+/// Whether there is none.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+pub(super) fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// A section of the rod, or of an instrument. Values with an `_end` vary linearly from the start to the end of the

@@ -36,6 +36,8 @@ pub use problem::{Solved, StaticProblem};
 pub use solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
 
 #[cfg(test)]
+mod play_tests;
+#[cfg(test)]
 mod stack_tests;
 #[cfg(test)]
 mod touching_tests;

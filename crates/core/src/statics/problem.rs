@@ -10,7 +10,7 @@ use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticS
 use super::stack::Stack;
 use crate::contact::{Capsule, SelfContact, Touching};
 use crate::field::{Field, FieldLoad};
-use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports};
+use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports, beyond};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 use crate::{Error, Result, Vec3};
 
@@ -301,8 +301,9 @@ impl StaticProblem {
     /// The solution of each of several instruments.
     fn instruments(&self, solved: &Solved) -> Vec<InstrumentSolution> {
         let Some(stack) = &self.stack else { return Vec::new() };
-        let each = stack.instruments().zip(&solved.instruments).enumerate();
-        let reported = each.map(|(index, ((instrument, set), (push_force, torque)))| {
+        let tilts = by_angles!(self.angles, self.tilts(stack, &solved.state));
+        let each = stack.instruments().zip(&solved.instruments).zip(tilts).enumerate();
+        let reported = each.map(|(index, (((instrument, set), (push_force, torque)), tilt))| {
             let tip = stack.tip_node(index);
             InstrumentSolution {
                 name: instrument.name.clone(),
@@ -311,9 +312,20 @@ impl StaticProblem {
                 twist: set.map_or(0.0, |set| solved.state.twist_to(tip, set)),
                 push_force: *push_force,
                 torque: *torque,
+                tilt,
             }
         });
         reported.collect()
+    }
+
+    /// Tilt at the end of each instrument, rad.
+    fn tilts<const C: usize>(&self, stack: &Stack, state: &RodState) -> Vec<f64> {
+        let at_end = |index: usize| {
+            let e = stack.tip_node(index);
+            let data = self.elements.get(e)?;
+            beyond(data, &state.element::<C>(e)).map(|(_, tilt)| tilt)
+        };
+        (0..stack.instruments().count()).map(|index| at_end(index).unwrap_or(0.0)).collect()
     }
 
     /// The solution of a solved state.

@@ -1,5 +1,6 @@
 //! Results of a static problem.
 
+use super::case::is_zero;
 use crate::contact::Touching;
 use serde::Serialize;
 
@@ -55,6 +56,9 @@ pub struct InstrumentSolution {
     pub push_force: Option<f64>,
     /// Torque of its hand: the derivative of the energy in its angle.
     pub torque: f64,
+    /// Angle, rad, by which what goes on at its end tilts in its play; omitted where it has none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tilt: f64,
 }
 
 /// A self-contact of the rod.

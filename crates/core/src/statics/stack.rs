@@ -13,6 +13,8 @@
 //! 26(2), 2010). The last sum is the energy released by the sheath, which straightens the part inside. Angles are
 //! unknowns for instruments with a rest shape; on the others no torque acts.
 //!
+//! With play (`clearance`), what goes on tilts where another one ends ([`crate::rod::Tilt`]).
+//!
 //! An instrument is pushed with Fᵢ = ∂U/∂lᵢ. By the envelope theorem that is the derivative of the discrete energy in
 //! the mesh alone, at fixed tangents, chords per length and angles: the ends of the instrument and of its sections
 //! move with their nodes. It needs no second solution, holds for any load with a potential, and is exact for the
@@ -21,7 +23,9 @@
 use super::case::{Instrument, StaticCase};
 use super::mesh::{material, nodes, section_at, spread};
 use crate::rod::quadrature::GAUSS;
-use crate::rod::{ElementData, Frame, MAX_ANGLES, Material, RodState, Supports, element_energy, shares};
+use crate::rod::{
+    ElementData, Frame, MAX_ANGLES, Material, RodState, Side, Supports, Tilt, element_energy, shares, window,
+};
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
@@ -104,7 +108,13 @@ impl Stack {
         let places: Vec<f64> = self.breaks.iter().map(|b| b.at + along(b)).collect();
         let nodes = nodes(&places, &self.counts);
         let tips: Vec<f64> = self.instruments.iter().enumerate().map(|(k, i)| i.inserted + by(k)).collect();
-        let elements = nodes.windows(2).map(|w| self.element(w[0], w[1], &tips)).collect();
+        let mut elements: Vec<ElementData> =
+            nodes.windows(2).map(|w| self.element(w[0], w[1], &tips)).collect();
+        if self.instruments.iter().any(|instrument| instrument.clearance > 0.0) {
+            for e in 1..elements.len() {
+                elements[e].tilt = self.tilt([nodes[e - 1], nodes[e], nodes[e + 1]], &elements[e], &tips);
+            }
+        }
         (nodes, elements)
     }
 
@@ -122,6 +132,34 @@ impl Stack {
             }
         }
         data
+    }
+
+    /// The play of what is in an element between the last two of three nodes, in an instrument that ends between the first
+    /// two, at the second.
+    fn tilt(&self, [before, node, after]: [f64; 3], data: &ElementData, tips: &[f64]) -> Option<Tilt> {
+        let is_in = |k: &usize, from: f64, to: f64| 0.5 * (from + to) < tips[*k];
+        let goes_on = |k: &usize| is_in(k, node, after);
+        let each = 0..self.instruments.len();
+        let (first, last) = (each.clone().find(goes_on)?, each.clone().rfind(goes_on)?);
+        let mut ending = each.clone().filter(|k| is_in(k, before, node) && !goes_on(k));
+        // Inside it, or around it; next to what goes on.
+        let (ends, between) = match (ending.clone().find(|k| *k > last), ending.rfind(|k| *k < first)) {
+            (Some(outer), _) => (outer, last..outer),
+            (None, Some(inner)) => (inner, inner..first),
+            (None, None) => return None,
+        };
+        let clearance: f64 = self.instruments[between].iter().map(|one| one.clearance).sum();
+        let curvature =
+            each.clone().filter(|k| *k == ends || goes_on(k)).map(|k| self.instruments[k].most_curved());
+        let from = node - window(clearance, node, curvature.fold(0.0, f64::max));
+        let side = |of: &mut dyn Iterator<Item = usize>| {
+            let mut side = Side::default();
+            of.filter(|_| from < node)
+                .for_each(|k| side.add(&self.instruments[k].between(from, node, tips[k]), self.sets[k]));
+            side
+        };
+        let (own, others) = (side(&mut std::iter::once(ends)), side(&mut each.filter(goes_on)));
+        Tilt::new((clearance, node), &own, &others, &data.materials)
     }
 
     /// The shape of untwisted instruments: everywhere the mean of their rest curvatures, weighted by stiffness.
@@ -224,6 +262,12 @@ impl Instrument {
             begin = section.until;
         }
         sum
+    }
+
+    /// Largest rest curvature.
+    fn most_curved(&self) -> f64 {
+        let each = self.section.iter().flat_map(|s| [Some(s.rest_curvature), s.rest_curvature_end]);
+        each.flatten().map(|[u, v]| libm::hypot(u, v)).fold(0.0, f64::max)
     }
 
     /// Energy per length released by the sheath as the instrument is pushed: ½ EI |κ⁰|² at the start.

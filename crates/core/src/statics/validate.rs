@@ -304,6 +304,7 @@ impl StaticCase {
             let name = |key| Key { list: "rod.instrument", index, key };
             positive(name("inserted"), instrument.inserted)?;
             finite(name("hand"), &[instrument.hand])?;
+            self.check_clearance(index)?;
             let list = format!("rod.instrument[{index}].section");
             check_sections(&list, &instrument.section)?;
             let length = instrument.section[instrument.section.len() - 1].until;
@@ -326,6 +327,21 @@ impl StaticCase {
                     return Err(Error::parameter(key("GJ"), "missing", remedy));
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Checks the play of an instrument in the next one.
+    fn check_clearance(&self, index: usize) -> Result<()> {
+        let name = || Key { list: "rod.instrument", index, key: "clearance" };
+        let clearance = self.rod.instrument[index].clearance;
+        if clearance == 0.0 {
+            return Ok(());
+        }
+        positive(name(), clearance)?;
+        if index + 1 == self.rod.instrument.len() {
+            let remedy = "the last instrument lies in none: list instruments from the innermost outwards, or leave it out";
+            return Err(Error::parameter(name(), clearance, remedy));
         }
         Ok(())
     }

@@ -196,6 +196,7 @@ class Simulation:
         names: Sequence[str] | None = None,
         friction: ArrayLike | None = None,
         may_lead: ArrayLike | None = None,
+        clearance: ArrayLike | None = None,
     ) -> Simulation: ...
     def step(
         self,

@@ -3,7 +3,9 @@
 pub mod bending;
 pub mod capstan;
 pub mod coil_forces;
+mod driven_tubes;
 pub mod reversal;
+pub mod straightening;
 pub mod three_tubes;
 pub mod tube_buckling;
 pub mod whip;
@@ -28,8 +30,9 @@ pub struct Study {
 }
 
 /// All studies, those with measurements first.
-pub const STUDIES: [Study; 7] = [
+pub const STUDIES: [Study; 8] = [
     three_tubes::STUDY,
+    straightening::STUDY,
     coil_forces::STUDY,
     reversal::STUDY,
     whip::STUDY,

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::Study;
+use super::driven_tubes::{self, Driven};
 
 /// The study in words.
 pub const STUDY: Study = Study {
@@ -22,14 +23,14 @@ pub const STUDY: Study = Study {
            plate), the tip x y z in mm, and three axes of the tip.",
     computed: "The static equilibrium of every row, without friction and play, the bases of the tubes behind a plate, so that their straight ends twist. First with the \
                published numbers; then with 17 numbers (curvatures, stiffness ratios, lengths, zeros of the turns, pose of the plate) fitted to every eighth row, and \
-               judged on the others.",
-    not_shown: "Friction and play: the same joints reached from elsewhere differ by 0.25 mm in the median and by millimetres in one pair of ten. The fitted numbers also \
+               judged on the others. On request with play as well, and with friction along the path in the order of the rows.",
+    not_shown: "Without --friction, what depends on the path: the same joints reached from elsewhere differ by 0.25 mm in the median and by millimetres in one pair of ten. The fitted numbers also \
                 take up what is not modelled, and are not measurements of the tubes. One robot, free space: no vessel, no wall.",
 };
 
 /// Straight length, curved length, mm, curvature, 1/mm, and EI relative to that of the first, of each tube, the outermost
 /// first, as published with the measurements.
-const TUBES: [Tube; 3] = [
+pub(super) const TUBES: [Tube; 3] = [
     Tube { straight_mm: 0.0, curved_mm: 150.0, curvature_per_mm: 1.0 / 265.0, stiffness: 1.0 },
     Tube { straight_mm: 17.0, curved_mm: 150.0, curvature_per_mm: 1.0 / 265.0, stiffness: 1.0 },
     Tube { straight_mm: 184.0, curved_mm: 86.394, curvature_per_mm: 1.0 / 55.0, stiffness: 2.0 / 7.0 },
@@ -41,7 +42,7 @@ const GUIDE_STIFFNESS: f64 = 1e5;
 /// EI of what would be behind a tube's base: nothing against the tubes.
 const LIMP: f64 = 1e-4;
 /// Length of an element, mm.
-const ELEMENT_MM: f64 = 8.0;
+pub(super) const ELEMENT_MM: f64 = 8.0;
 /// Shortest length that a tube may stick out of the plate, mm.
 const LEAST_OUT_MM: f64 = 1.0;
 /// The parameters are fitted to every so-many-th row.
@@ -57,11 +58,11 @@ const FAR_MM: f64 = 4.0;
 
 /// A pre-curved tube.
 #[derive(Debug, Clone, Copy)]
-struct Tube {
-    straight_mm: f64,
-    curved_mm: f64,
-    curvature_per_mm: f64,
-    stiffness: f64,
+pub(super) struct Tube {
+    pub(super) straight_mm: f64,
+    pub(super) curved_mm: f64,
+    pub(super) curvature_per_mm: f64,
+    pub(super) stiffness: f64,
 }
 
 /// A measured row.
@@ -75,12 +76,40 @@ pub struct Row {
     pub tip_mm: Vec3,
 }
 
-/// Number of parameters.
-const PARAMETERS: usize = 17;
+/// Number of parameters, of those without friction, and of those without play.
+const PARAMETERS: usize = 20;
+const WITHOUT_FRICTION: usize = 19;
+const WITHOUT_PLAY: usize = 17;
+/// Play and coefficient of friction that a fit begins with, mm.
+const PLAY_MM: f64 = 0.1;
+const FRICTION: f64 = 0.1;
 
 /// What is not known exactly, as differences from the nominal values, each in its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameters([f64; PARAMETERS]);
+pub struct Parameters {
+    values: [f64; PARAMETERS],
+    between: Between,
+}
+
+/// What there is between the tubes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Between {
+    Nothing,
+    Play,
+    /// Play, and friction with the path that it remembers.
+    PlayAndFriction,
+}
+
+impl Between {
+    /// Number of parameters that are fitted.
+    fn parameters(self) -> usize {
+        match self {
+            Self::Nothing => WITHOUT_PLAY,
+            Self::Play => WITHOUT_FRICTION,
+            Self::PlayAndFriction => PARAMETERS,
+        }
+    }
+}
 
 /// Names of the parameters, with units, and the step by which their influence is measured.
 pub const NAMES: [(&str, f64); PARAMETERS] = [
@@ -101,12 +130,15 @@ pub const NAMES: [(&str, f64); PARAMETERS] = [
     ("plate, z, mm", 1e-1),
     ("tilt of the plate about x, rad", 1e-3),
     ("tilt of the plate about y, rad", 1e-3),
+    ("play of tube 2 in tube 1 over 0.1 mm, logarithm", 1e-1),
+    ("play of tube 3 in tube 2 over 0.1 mm, logarithm", 1e-1),
+    ("coefficient of friction over 0.1, logarithm", 1e-1),
 ];
 
 impl Default for Parameters {
-    /// The published values.
+    /// The published values, without play.
     fn default() -> Self {
-        Self([0.0; PARAMETERS])
+        Self { values: [0.0; PARAMETERS], between: Between::Nothing }
     }
 }
 
@@ -146,9 +178,27 @@ pub struct ThreeTubes {
     pub nominal: Misfit,
     /// With fitted numbers.
     pub fitted: Fitted,
+    /// With play, and numbers that are fitted with it, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with_play: Option<Fitted>,
+    /// With these and friction along the driven path, fitted; if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with_friction: Option<Fitted>,
+    /// With the numbers that were fitted with play along the driven path, for each coefficient of friction; if asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub driven: Vec<Driven>,
     /// Distances on the tested rows with the published and with fitted numbers, mm, in ascending order.
     #[serde(skip)]
     pub distances_mm: [Vec<f64>; 2],
+}
+
+/// What a study computes beside the tubes without friction and play.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Also {
+    /// With play.
+    pub play: bool,
+    /// With play, and friction along the driven path.
+    pub friction: bool,
 }
 
 /// Reads the table of measurements; `name` is its name in errors.
@@ -191,15 +241,39 @@ pub fn read(text: &str, name: &std::path::Path) -> Result<Vec<Row>> {
 }
 
 impl Parameters {
-    fn tube(&self, index: usize) -> Tube {
+    /// GJ of a tube over its EI.
+    pub(super) fn torsion(&self) -> f64 {
+        libm::exp(self.values[5]) / BEND_TO_TWIST
+    }
+
+    pub(super) fn tube(&self, index: usize) -> Tube {
         let tube = TUBES[index];
-        let stiffer = if index == 0 { 0.0 } else { self.0[2 + index] };
+        let stiffer = if index == 0 { 0.0 } else { self.values[2 + index] };
         Tube {
-            curvature_per_mm: tube.curvature_per_mm * (1.0 + self.0[index]),
+            curvature_per_mm: tube.curvature_per_mm * (1.0 + self.values[index]),
             straight_mm: tube.straight_mm,
-            curved_mm: tube.curved_mm + self.0[9 + index],
+            curved_mm: tube.curved_mm + self.values[9 + index],
             stiffness: tube.stiffness * libm::exp(stiffer),
         }
+    }
+
+    /// Play of a tube in the next one outside, mm.
+    pub(super) fn play_mm(&self, index: usize) -> f64 {
+        let is_inside = self.between != Between::Nothing && index > 0;
+        if is_inside { PLAY_MM * libm::exp(self.values[WITHOUT_PLAY + index - 1]) } else { 0.0 }
+    }
+
+    /// Coefficient of friction between tubes.
+    pub(super) fn friction(&self) -> f64 {
+        match self.between {
+            Between::PlayAndFriction => FRICTION * libm::exp(self.values[WITHOUT_FRICTION]),
+            _ => 0.0,
+        }
+    }
+
+    /// Angle of a tube's base, rad.
+    pub(super) fn hand_rad(&self, row: &Row, index: usize) -> f64 {
+        row.turns_rad[index] + self.values[6 + index]
     }
 
     /// The static case of a row: the line begins behind all bases and goes through the plate.
@@ -210,10 +284,12 @@ impl Parameters {
             rest_curvature: [curvature_per_mm, 0.0],
             ..crate::section(until, ei)
         };
+        // From the innermost outwards.
         let mut instrument: Vec<Instrument> = (0..TUBES.len())
+            .rev()
             .map(|index| {
                 let tube = self.tube(index);
-                let (ei, gj) = (tube.stiffness, tube.stiffness / BEND_TO_TWIST * libm::exp(self.0[5]));
+                let (ei, gj) = (tube.stiffness, tube.stiffness / BEND_TO_TWIST * libm::exp(self.values[5]));
                 let length_mm = tube.straight_mm + tube.curved_mm;
                 // A base is where the hand is: what the line has behind it neither bends nor twists.
                 let inserted = length_mm + row.bases_mm[index] + behind_mm;
@@ -226,7 +302,8 @@ impl Parameters {
                 Instrument {
                     name: format!("tube {}", index + 1),
                     inserted,
-                    hand: row.turns_rad[index] + self.0[6 + index],
+                    hand: self.hand_rad(row, index),
+                    clearance: self.play_mm(index),
                     section: sections,
                 }
             })
@@ -235,6 +312,7 @@ impl Parameters {
             name: "guide".to_owned(),
             inserted: behind_mm,
             hand: 0.0,
+            clearance: 0.0,
             section: vec![section(behind_mm + 1.0, GUIDE_STIFFNESS, GUIDE_STIFFNESS, 0.0)],
         });
         let line_mm = instrument.iter().map(|one| one.inserted).fold(0.0, f64::max);
@@ -258,10 +336,13 @@ impl Parameters {
     /// The computed tip of a row, mm; `None` without an equilibrium.
     fn tip_mm(&self, row: &Row) -> Option<Vec3> {
         let solution = self.case(row).solve().ok().filter(|solution| solution.converged)?;
-        let [.., x, y, z, about_x, about_y] = self.0;
-        let tip_mm = Vec3::from(solution.tip);
-        let turned = tip_mm + Vec3::new(about_x, about_y, 0.0).cross(&tip_mm);
-        Some(turned + Vec3::new(x, y, z))
+        Some(self.from_plate_mm(Vec3::from(solution.tip)))
+    }
+
+    /// A place before the plate in the axes of the measurements, mm.
+    pub(super) fn from_plate_mm(&self, place_mm: Vec3) -> Vec3 {
+        let [_, _, _, _, _, _, _, _, _, _, _, _, x, y, z, about_x, about_y, ..] = self.values;
+        place_mm + Vec3::new(about_x, about_y, 0.0).cross(&place_mm) + Vec3::new(x, y, z)
     }
 
     /// Vectors from measured to computed tips.
@@ -286,7 +367,7 @@ fn distances(rows: &[Row], errors_mm: &[Option<Vec3>]) -> Vec<(f64, f64)> {
 }
 
 impl Misfit {
-    fn of(rows: &[Row], errors_mm: &[Option<Vec3>]) -> Self {
+    pub(super) fn of(rows: &[Row], errors_mm: &[Option<Vec3>]) -> Self {
         let mut all = distances(rows, errors_mm);
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let count = all.len().max(1) as f64;
@@ -312,35 +393,39 @@ fn cost(errors_mm: &[Option<Vec3>]) -> f64 {
     each.map(|mm| if mm <= FAR_MM { 0.5 * mm * mm } else { FAR_MM * (mm - 0.5 * FAR_MM) }).sum()
 }
 
-/// Fits the parameters to rows by Levenberg's and Marquardt's method with derivatives by differences; `told` hears of
-/// every iteration.
-fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameters {
-    let mut best = Parameters::default();
-    let mut errors = best.errors_mm(rows, parallel);
+/// Vectors from measured to computed tips of the rows that are fitted, for each of several sets of parameters.
+type Errors<'a> = dyn Fn(&[Parameters]) -> Result<Vec<Vec<Option<Vec3>>>> + 'a;
+
+/// Fits the parameters by Levenberg's and Marquardt's method with derivatives by differences; `told` hears of every iteration.
+///
+/// # Errors
+/// As `of`.
+fn fit(start: Parameters, of: &Errors<'_>, told: &dyn Fn(usize)) -> Result<Parameters> {
+    let count = start.between.parameters();
+    let mut best = start;
+    let mut errors = of(&[best])?.remove(0);
     let mut damping = 1e-3;
     for iteration in 0..ITERATIONS {
-        let (mut normal, mut gradient) =
-            (DMatrix::<f64>::zeros(PARAMETERS, PARAMETERS), DVector::<f64>::zeros(PARAMETERS));
-        let columns: Vec<Vec<Option<Vec3>>> = (0..PARAMETERS)
-            .map(|k| {
-                let mut moved = best;
-                moved.0[k] += NAMES[k].1;
-                moved.errors_mm(rows, parallel)
-            })
-            .collect();
+        let (mut normal, mut gradient) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
+        let moved = |k: usize| {
+            let mut moved = best;
+            moved.values[k] += NAMES[k].1;
+            moved
+        };
+        let columns = of(&(0..count).map(moved).collect::<Vec<_>>())?;
         for (row, error) in errors.iter().enumerate() {
             let Some(error) = error else { continue };
             // A row that another branch of equilibria is near to says nothing about slopes.
             let slope = |k: usize| columns[k][row].map(|moved| (moved - error) / NAMES[k].1);
-            let Some(slopes) = (0..PARAMETERS).map(slope).collect::<Option<Vec<Vec3>>>() else { continue };
+            let Some(slopes) = (0..count).map(slope).collect::<Option<Vec<Vec3>>>() else { continue };
             let is_smooth = slopes.iter().zip(NAMES).all(|(slope, (_, step))| slope.norm() * step < FAR_MM);
             if !is_smooth {
                 continue;
             }
             let weight = weight(error);
-            for i in 0..PARAMETERS {
+            for i in 0..count {
                 gradient[i] += weight * slopes[i].dot(error);
-                for j in 0..PARAMETERS {
+                for j in 0..count {
                     normal[(i, j)] += weight * slopes[i].dot(&slopes[j]);
                 }
             }
@@ -349,11 +434,11 @@ fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameter
         let mut improved = false;
         for _ in 0..6 {
             let mut damped = normal.clone();
-            (0..PARAMETERS).for_each(|k| damped[(k, k)] *= 1.0 + damping);
+            (0..count).for_each(|k| damped[(k, k)] *= 1.0 + damping);
             let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else { break };
             let mut next = best;
-            (0..PARAMETERS).for_each(|k| next.0[k] -= step[k]);
-            let found = next.errors_mm(rows, parallel);
+            (0..count).for_each(|k| next.values[k] -= step[k]);
+            let found = of(&[next])?.remove(0);
             // A row without an equilibrium must not count as one without an error.
             let lost = found.iter().flatten().count() < errors.iter().flatten().count();
             if !lost && cost(&found) < before {
@@ -367,12 +452,16 @@ fn fit(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Parameter
             break;
         }
     }
-    best
+    Ok(best)
 }
 
 /// Compares the measured tips with the computed ones: with the published numbers on all rows, and with numbers that were
-/// fitted to every eighth row on the others. `told` hears of every iteration of the fit, of at most [`MOST_STEPS`].
-pub fn study(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> ThreeTubes {
+/// fitted to every eighth row on the others, and what is asked for beside that. `told` hears of every iteration of a fit, of at most
+/// [`MOST_STEPS`].
+///
+/// # Errors
+/// Tubes that cannot be driven along the path.
+pub fn study(rows: &[Row], also: Also, parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Result<ThreeTubes> {
     let nominal = Parameters::default();
     let errors = nominal.errors_mm(rows, parallel);
     let is_fitted = |index: &usize| index.is_multiple_of(FITTED_EVERY);
@@ -380,8 +469,43 @@ pub fn study(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Thr
         (0..rows.len()).filter(|index| is_fitted(index) == wanted).map(|index| rows[index]).collect()
     };
     let (seen, unseen) = (of(true), of(false));
-    let fitted = fit(&seen, parallel, told);
-    let fitted_errors = fitted.errors_mm(&unseen, parallel);
+    let judged = |parameters: &Parameters, errors: &[Option<Vec3>]| Fitted {
+        rows_fitted: seen.len(),
+        rows_tested: unseen.len(),
+        misfit: Misfit::of(&unseen, errors),
+        parameters: (NAMES.iter().map(|(name, _)| *name).zip(parameters.values))
+            .take(parameters.between.parameters())
+            .collect(),
+    };
+    let each_row = |sets: &[Parameters]| -> Result<Vec<Vec<Option<Vec3>>>> {
+        Ok(sets.iter().map(|parameters| parameters.errors_mm(&seen, parallel)).collect())
+    };
+    let without = fit(nominal, &each_row, told)?;
+    let fitted_errors = without.errors_mm(&unseen, parallel);
+    let fitted = judged(&without, &fitted_errors);
+    let (mut with_play, mut with_friction, mut driven) = (None, None, Vec::new());
+    if also.play || also.friction {
+        // Ends that share a node are apart with fitted lengths: play is fitted from those.
+        let playing = fit(Parameters { between: Between::Play, ..without }, &each_row, told)?;
+        with_play = Some(judged(&playing, &playing.errors_mm(&unseen, parallel)));
+        if also.friction {
+            driven = driven_tubes::driven(&playing, rows, &|index| !is_fitted(&index), parallel)?;
+            let on = |errors: Vec<Option<Vec3>>, wanted: bool| -> Vec<Option<Vec3>> {
+                let each = errors.into_iter().enumerate();
+                each.filter(|(index, _)| is_fitted(index) == wanted).map(|(_, error)| error).collect()
+            };
+            let along = |sets: &[Parameters]| -> Result<Vec<Vec<Option<Vec3>>>> {
+                let each = driven_tubes::along(sets, rows, parallel)?;
+                Ok(each.into_iter().map(|errors| on(errors, true)).collect())
+            };
+            // Without play all press without bound where they are turned against each other.
+            let mut begin = Parameters { between: Between::PlayAndFriction, ..playing };
+            begin.values[WITHOUT_PLAY..].fill(0.0);
+            let rubbing = fit(begin, &along, told)?;
+            let errors = driven_tubes::along(&[rubbing], rows, parallel)?.remove(0);
+            with_friction = Some(judged(&rubbing, &on(errors, false)));
+        }
+    }
     let before = (0..rows.len()).filter(|index| !is_fitted(index)).map(|index| errors[index]);
     let before: Vec<Option<Vec3>> = before.collect();
     let distances_mm = [&before, &fitted_errors].map(|errors| {
@@ -389,16 +513,8 @@ pub fn study(rows: &[Row], parallel: &Parallel<'_>, told: &dyn Fn(usize)) -> Thr
         all.sort_by(f64::total_cmp);
         all
     });
-    ThreeTubes {
-        nominal: Misfit::of(rows, &errors),
-        fitted: Fitted {
-            rows_fitted: seen.len(),
-            rows_tested: unseen.len(),
-            misfit: Misfit::of(&unseen, &fitted_errors),
-            parameters: NAMES.iter().map(|(name, _)| *name).zip(fitted.0).collect(),
-        },
-        distances_mm,
-    }
+    let nominal = Misfit::of(rows, &errors);
+    Ok(ThreeTubes { nominal, fitted, with_play, with_friction, driven, distances_mm })
 }
 
 /// Largest number of iterations of the fit.
@@ -411,7 +527,7 @@ pub const MOST_STEPS: usize = ITERATIONS;
 /// A row without an equilibrium.
 pub fn invented(count: usize, changed: f64) -> Result<Vec<Row>> {
     let mut parameters = Parameters::default();
-    parameters.0[2] = changed;
+    parameters.values[2] = changed;
     let row = |index: usize| {
         // Joints that no two rows share, from multiples of irrational numbers.
         let part = |k: f64| (index as f64 * k).fract();
@@ -441,7 +557,7 @@ mod tests {
     #[test]
     fn a_changed_curvature_is_found_and_unseen_rows_follow() {
         let rows = invented(48, 0.05).unwrap();
-        let found = study(&rows, &in_turn, &|_| ());
+        let found = study(&rows, Also::default(), &in_turn, &|_| ()).unwrap();
         assert!(found.nominal.mean_mm > 0.5, "{:?}", found.nominal);
         assert!(found.fitted.misfit.mean_mm < 0.05 * found.nominal.mean_mm, "{:?}", found.fitted);
         assert_eq!((found.fitted.rows_fitted, found.fitted.rows_tested), (6, 42));

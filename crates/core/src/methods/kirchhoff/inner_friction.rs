@@ -119,7 +119,7 @@ impl<const C: usize> Search<'_, '_, C> {
             .collect();
         let force = |place: &Place| {
             let at = &reported[place.inner][place.node];
-            (at.force_n.norm(), at.length_mm)
+            (at.pressing_n, at.length_mm)
         };
         self.contact.between().renew(state, force)
     }

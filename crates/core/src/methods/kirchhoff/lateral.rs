@@ -14,6 +14,8 @@
 //! instruments, where stiffness jumps, the others also exert a couple, since there is no clearance, and forces there
 //! represent a smaller length than elsewhere.
 //!
+//! With play ([`super::rims`]) there is no couple at an end: the two press on each other at two places, which rub more.
+//!
 //! Friction along the line ([`crate::contact::Between`]) is internal to the line, and does not bend it. Both hands
 //! feel it, and it changes the axial force: around a bend by e^{μφ}, the capstan equation, where everything slips.
 //! Normal forces at a node are found together with it, from the tip on.
@@ -21,12 +23,14 @@
 use super::inner_friction::{pair, radius_mm};
 use super::material::element;
 use super::mesh::Mesh;
+use super::rims::Pressed;
 use crate::Vec3;
 use crate::contact::InnerFriction;
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
+use crate::rod::element::{ElementState, ElementSystem};
 use crate::rod::quadrature::{Point, hermite};
-use crate::rod::{ElementData, Layout, Material, RodState, element_gradients};
+use crate::rod::{ElementData, Layout, Material, RodState, beyond, element_gradients, element_system};
 
 /// A force at a node, and that in the rotation of its tangent.
 #[derive(Debug, Clone, Copy, Default)]
@@ -79,6 +83,17 @@ impl Line<'_> {
     }
 }
 
+impl Line<'_> {
+    /// What presses at places near a node between an instrument, or the next one inside it, and those outside it, if there is friction
+    /// between them.
+    fn pressed<const C: usize>(&self, at: (usize, usize)) -> Pressed {
+        let pair = pair(self.mesh, at).filter(|(inner, _)| self.stack.friction(*inner) > 0.0);
+        pair.map_or_else(Pressed::default, |pair| {
+            Pressed::at::<C>(self.stack, (self.mesh, self.rod), at.0, pair)
+        })
+    }
+}
+
 /// The node where an instrument, or one inside it, comes out of those outside it; `None` if none does.
 pub(super) fn comes_out(mesh: &Mesh, instrument: usize) -> Option<usize> {
     let (own, outside) = mesh.inserted_mm.split_at_checked(instrument + 1)?;
@@ -118,9 +133,10 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
             let force = known.plus(&far_pull, tension).force;
             force - t * t.dot(&force)
         };
+        let pressed = line.pressed::<C>((i, instrument));
         // The normal force depends on the axial force behind the node, through the angle of the line there.
         for _ in 0..if drag == 0.0 { 0 } else { line.rounds } {
-            let next = (drag * across(tension).norm() - along) / rate;
+            let next = (drag * pressed.sum_n(&across(tension)) - along) / rate;
             if next == tension {
                 break;
             }
@@ -130,8 +146,10 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
             let force_n = across(tension);
             let after = mesh.elements.get(i).filter(|_| i < last).map_or(0.0, |data| data.length);
             let length_mm = 0.5 * (mesh.elements[i - 1].length + after);
-            let [friction_n, friction_nmm] = [drag, couple_mm].map(|part| part * force_n.norm());
-            reported[i] = LateralForce { force_n, length_mm, tension_n: tension, friction_n, friction_nmm };
+            let pressing_n = pressed.sum_n(&force_n);
+            let [friction_n, friction_nmm] = [drag, couple_mm].map(|part| part * pressing_n);
+            reported[i] =
+                LateralForce { force_n, pressing_n, length_mm, tension_n: tension, friction_n, friction_nmm };
         }
         beyond = near.plus(&near_pull, tension);
     }
@@ -150,10 +168,18 @@ fn parts<const C: usize>(
     let both = |of: &[f64; C]| [0, 1].map(|i| NodeForce::of(of, l.position(i), l.tangent(i)));
     let mut all = Vec::with_capacity(count);
     let data = |e: usize| inside(stack, mesh, (e, instrument));
-    element_gradients::<C>(count, data, rod, |_, gradient, stretch| {
+    element_gradients::<C>(count, &data, rod, |_, gradient, stretch| {
         let ([near, far], [near_pull, far_pull]) = (both(gradient), both(stretch));
         all.push([near, far, near_pull, far_pull]);
     });
+    // What tilts at the end of another one has a tangent of its own there.
+    for e in (0..count).filter(|e| mesh.elements[*e].tilt.is_some()) {
+        let Some((state, _)) = beyond(&mesh.elements[e], &rod.element::<C>(e)) else { continue };
+        let mut own = ElementSystem::<C>::zeros();
+        element_system::<C, false>(&data(e), &ElementState { tension: 0.0, ..state }, 0.0, &mut own);
+        let ([near, far], [near_pull, far_pull]) = (both(&own.gradient), both(&own.stretch));
+        all[e] = [near, far, near_pull, far_pull];
+    }
     all
 }
 

@@ -3,6 +3,8 @@
 //! An end that has no node because it is near another one counts as at that one: as a share of its own, a stiff section
 //! of a micrometre would be bent as much as the soft one beside it.
 
+use super::mesh::Fineness;
+use super::rims;
 use crate::device::{Device, Section, Stack, line_mm};
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material, shares};
@@ -29,6 +31,9 @@ pub(super) fn element(
         if let Some(set) = set {
             data.materials[*set] = part;
         }
+    }
+    if stack.has_play() && inner == inserted_mm.len() {
+        data.tilt = rims::tilt((stack, inserted_mm), (near, far), Fineness::near_of(flush_mm), &data);
     }
     data
 }

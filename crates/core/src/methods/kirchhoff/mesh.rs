@@ -46,6 +46,11 @@ impl Fineness {
         NEAR * self.element_mm
     }
 
+    /// As [`Self::near_mm`], from [`Self::flush_mm`].
+    pub(super) fn near_of(flush_mm: f64) -> f64 {
+        flush_mm / FLUSH
+    }
+
     /// An end of a section counts as at a node that is nearer than this, mm.
     pub(super) fn flush_mm(&self) -> f64 {
         FLUSH * self.near_mm()

@@ -69,6 +69,9 @@ mod options;
 mod part;
 mod readout;
 mod report;
+mod rims;
+#[cfg(test)]
+mod rims_tests;
 mod search;
 mod slopes;
 mod state;

@@ -36,7 +36,7 @@ def _ends() -> list[ends.End]:
 
 
 #: Keywords of `endowire.Simulation` for several instruments.
-_COUPLING = ("names", "friction", "may_lead")
+_COUPLING = ("names", "friction", "may_lead", "clearance")
 
 
 @dataclass(eq=False)
@@ -71,7 +71,7 @@ class Task:
     wall: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[method]` of a scene file.
     method: Mapping[str, Any] = field(default_factory=lambda: {"name": "kirchhoff", "element_mm": 5.0})
-    #: Keywords of `endowire.Simulation` for several instruments: names, friction, may_lead.
+    #: Keywords of `endowire.Simulation` for several instruments: names, friction, may_lead, clearance.
     coupling: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[view]` of a scene file for `render()`.
     view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
