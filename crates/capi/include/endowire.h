@@ -518,6 +518,15 @@ EndowireStatus endowire_vessel_vertices_mm(const EndowireSimulation *simulation,
                                            size_t *count);
 
 /**
+ * Copies the vertices of the vessel where they are now, mm, as many and in the same order as those at rest: where the vessel
+ * moves (`[[vessel.motion]]`) or its course yields (`[vessel.yielding]`) they change with every step.
+ */
+EndowireStatus endowire_vessel_vertices_now_mm(const EndowireSimulation *simulation,
+                                               double *vertices_mm,
+                                               size_t capacity,
+                                               size_t *count);
+
+/**
  * Copies the triangles of the vessel: a list (see the top) of three numbers of vertices each, counter-clockwise seen from
  * outside. `capacity` and `count` are in triangles: `triangles` has room for 3 * `capacity` numbers.
  */

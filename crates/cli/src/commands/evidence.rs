@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use endowire_core::Vec3;
+use endowire_methods::Setting;
 use endowire_verify::Row;
 use endowire_verify::evidence::three_tubes::{self, ThreeTubes};
 use endowire_verify::evidence::{
@@ -13,7 +14,7 @@ use serde::Serialize;
 
 use super::device::table::{columns, digits};
 use super::parallel::in_parallel;
-use crate::args::{EvidenceArgs, Setting};
+use crate::args::EvidenceArgs;
 use crate::devices;
 use crate::failure::Failure;
 use crate::output::curves::{Curve, Curves, Entry, Panel, Scale, Stroke, colour};
@@ -109,8 +110,7 @@ fn straightened() -> Result<(Compared, Provenance), Failure> {
     let file = |wire: &str| format!("device.file=\"../devices/{wire}.toml\"");
     let read = |wire: &str| {
         let set = straightening::SET.map(str::to_owned).into_iter().chain([file(wire)]);
-        let set: Vec<Setting> =
-            set.map(|set| set.parse()).collect::<Result<_, _>>().map_err(Failure::Input)?;
+        let set = set.map(|set| set.parse()).collect::<Result<Vec<Setting>, endowire_core::Error>>()?;
         Ok((wire.to_owned(), scenes::read(&path, &set)?))
     };
     let wires = straightening::WIRES.iter().map(|wire| read(wire)).collect::<Result<Vec<_>, Failure>>()?;

@@ -107,7 +107,7 @@ fn errors_mm(parameters: &Parameters, rows: &[Row], friction: f64) -> Result<Vec
     let each = rows.iter().map(|row| {
         let went = towards(&mut simulation, parameters, row, 1.0);
         let tip_mm = simulation.tip_of_mm(0).filter(|_| went.is_ok() && simulation.report().converged)?;
-        Some(parameters.from_plate_mm(tip_mm - Vec3::z() * MOUTH_MM) - row.tip_mm)
+        Some(parameters.off_plate_mm(tip_mm - Vec3::z() * MOUTH_MM) - row.tip_mm)
     });
     Ok(each.collect())
 }
@@ -121,13 +121,16 @@ pub(super) fn along(
     each(sets.len(), &|index| errors_mm(&sets[index], rows, sets[index].friction()), parallel)
 }
 
+/// The errors along a path; none where no equilibrium was found.
+type Errors = Vec<Option<Vec3>>;
+
 /// Computes so many paths side by side.
 fn each(
     count: usize,
-    of: &(dyn Fn(usize) -> Result<Vec<Option<Vec3>>> + Sync),
+    of: &(dyn Fn(usize) -> Result<Errors> + Sync),
     parallel: &Parallel<'_>,
-) -> Result<Vec<Vec<Option<Vec3>>>> {
-    let found: Mutex<Vec<(usize, Result<Vec<Option<Vec3>>>)>> = Mutex::default();
+) -> Result<Vec<Errors>> {
+    let found: Mutex<Vec<(usize, Result<Errors>)>> = Mutex::default();
     parallel(count, &|index| {
         let errors = of(index);
         if let Ok(mut found) = found.lock() {

@@ -336,11 +336,11 @@ impl Parameters {
     /// The computed tip of a row, mm; `None` without an equilibrium.
     fn tip_mm(&self, row: &Row) -> Option<Vec3> {
         let solution = self.case(row).solve().ok().filter(|solution| solution.converged)?;
-        Some(self.from_plate_mm(Vec3::from(solution.tip)))
+        Some(self.off_plate_mm(Vec3::from(solution.tip)))
     }
 
     /// A place before the plate in the axes of the measurements, mm.
-    pub(super) fn from_plate_mm(&self, place_mm: Vec3) -> Vec3 {
+    pub(super) fn off_plate_mm(&self, place_mm: Vec3) -> Vec3 {
         let [_, _, _, _, _, _, _, _, _, _, _, _, x, y, z, about_x, about_y, ..] = self.values;
         place_mm + Vec3::new(about_x, about_y, 0.0).cross(&place_mm) + Vec3::new(x, y, z)
     }

@@ -63,7 +63,7 @@ struct Document {
 }
 
 impl Row {
-    fn new(coil: String, reading: CoilReading, time_s: f64) -> Self {
+    fn new(coil: String, reading: &CoilReading, time_s: f64) -> Self {
         let CoilReading { packing, .. } = reading;
         Self {
             coil,
@@ -97,7 +97,7 @@ pub(super) fn coil(args: &CoilArgs) -> Result<(), Failure> {
     let started = Instant::now();
     for number in 0..args.coils.len() {
         let mut read = |reading| {
-            rows.push(Row::new(name(args, number), reading, started.elapsed().as_secs_f64()));
+            rows.push(Row::new(name(args, number), &reading, started.elapsed().as_secs_f64()));
             bar.inc(1);
         };
         let pushed = deployment.push(number, args.length_mm + BEYOND_MM, &mut read);

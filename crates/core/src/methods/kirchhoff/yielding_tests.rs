@@ -6,6 +6,7 @@ use crate::Vec3;
 use crate::device::Device;
 use crate::insertion::{Command, Sheath, Simulation, WallProperties};
 use crate::methods::kirchhoff::{Accuracy, KirchhoffOptions};
+use crate::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use crate::vessel::{
     CentrelineNode, CentrelineTree, Course, Lumen, Resolution, SweptVessel, YieldingEnds, YieldingSpec,
 };
@@ -35,7 +36,18 @@ fn wire(
     tree: &CentrelineTree,
     yields: Option<&YieldingSpec>,
     bending_nmm2: f64,
+    how: (WallProperties, Accuracy),
+) -> Simulation {
+    wire_in_moving(tree, yields, bending_nmm2, how, &[])
+}
+
+/// The same in a vessel that moves.
+fn wire_in_moving(
+    tree: &CentrelineTree,
+    yields: Option<&YieldingSpec>,
+    bending_nmm2: f64,
     (properties, accuracy): (WallProperties, Accuracy),
+    motion: &[MotionMode],
 ) -> Simulation {
     let edge_mm = 0.5 * tree.nodes()[0].radius_mm.min(1.0);
     let lumen = Lumen::from(SweptVessel::new(tree.clone(), Resolution::EdgeMm(edge_mm)).unwrap());
@@ -46,7 +58,7 @@ fn wire(
     let options = KirchhoffOptions::of(accuracy);
     let course = yields.map(|spec| Course::new(tree, spec).unwrap());
     let builder = Simulation::builder(lumen, device, sheath).properties(properties);
-    builder.course(course).method(&options).build().unwrap()
+    builder.course(course).motion(VesselMotion::new(motion).unwrap()).method(&options).build().unwrap()
 }
 
 fn wall(modulus_n_per_mm2: f64, friction: f64) -> (WallProperties, Accuracy) {
@@ -168,4 +180,35 @@ fn a_vessel_that_hardly_yields_is_one_whose_wall_alone_does() {
     let still = tip(None);
     assert!((tip(Some(&made_of(1e6, 1e5))) - still).norm() < 1e-4);
     assert!((tip(Some(&made_of(1.0, 1e-4))) - still).norm() > 0.1);
+}
+
+#[test]
+fn a_wire_lies_still_with_friction_in_an_artery_that_breathes_and_yields() {
+    let tree = winding((2.0, 120.0), 240.0, 1.5);
+    let spec = made_of(300.0, 0.005);
+    let breath = MotionMode {
+        waveform: Waveform::Breathing,
+        period_s: Some(4.0),
+        phase: 0.0,
+        displacement_mm: [0.0, 1.5, 3.0],
+        turn: None,
+        still: None,
+        within: Some(Around { centre_mm: [0.0, 0.0, 170.0], radius_mm: 20.0, fade_mm: 120.0 }),
+    };
+    let mut simulation = wire_in_moving(&tree, Some(&spec), 5000.0, wall(1.0, 0.1), &[breath]);
+    for _ in 0..20 {
+        simulation.step(Command::advance(8.0)).unwrap();
+    }
+    let mut tips = Vec::new();
+    for k in 1..=24 {
+        let report = simulation.step_until(&[], Some(0.5 * f64::from(k))).unwrap();
+        assert!(report.converged, "{k}");
+        tips.push(simulation.shape().tip_mm().unwrap());
+    }
+    // Friction lets it move with the breath, and back.
+    for k in 8..16 {
+        assert!((tips[k + 8] - tips[k]).norm() < 0.05, "{k}: {} {}", tips[k + 8], tips[k]);
+    }
+    let farthest = tips[8..16].iter().map(|tip| (tip - tips[8]).norm()).fold(0.0, f64::max);
+    assert!(farthest > 0.2, "{farthest}");
 }
