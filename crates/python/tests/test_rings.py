@@ -85,7 +85,7 @@ def test_an_environment_measures_by_either_arm(ring, wire):
     )
     env = InsertionVectorEnv(task, 1)
     env.reset(seed=1)
-    episodes = env._episodes
+    episodes = env.episodes
     whole_mm = length_mm(ring.path("last"))
     assert episodes.paths[0].length_mm == pytest.approx(whole_mm)
     # The sheath reaches a little way in.
