@@ -4,7 +4,10 @@ Units everywhere: millimetre, newton, second, radian; they are part of the names
 for Gymnasium.
 """
 
+from importlib import import_module as _import_module
 from pathlib import Path as _Path
+from typing import TYPE_CHECKING
+from typing import Any as _Any
 
 from ._endowire import (
     Batch,
@@ -28,9 +31,11 @@ from ._endowire import (
     solve_rod,
     sweep,
 )
-from .fitting import Fit, Observed, fit
-from .planning import Plan, Planner, plan
 from .errors import ComputationError, EndOfWay, EndowireError, InputError
+
+if TYPE_CHECKING:
+    from .fitting import Fit, Observed, fit
+    from .planning import Plan, Planner, plan
 
 __all__ = [
     "Batch",
@@ -65,6 +70,21 @@ __all__ = [
     "solve_rod",
     "sweep",
 ]
+
+#: Loaded when they are first used: with them comes NumPy, which takes most of the time of an import.
+_LATER = {"Fit": "fitting", "Observed": "fitting", "fit": "fitting", "Plan": "planning", "Planner": "planning", "plan": "planning"}
+
+
+def __getattr__(name: str) -> _Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(_import_module(f".{_LATER[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATER})
 
 
 def assets_path() -> _Path:
