@@ -32,7 +32,10 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             args.dir.display()
         )));
     }
-    let steps = wanted(args, &recording)?;
+    let times_s = step_times(&args.dir)?;
+    // A run that was resumed in a folder of its own begins after the steps before it.
+    let earlier = times_s.first().map_or(0, |(first, _)| first.saturating_sub(1));
+    let steps = wanted(args, &recording, earlier)?;
     let frames = match (steps.len(), args.count.map(|count| count as usize)) {
         (1, count) => count.unwrap_or(1),
         (several, None) if args.frames.deg_per_s.is_none() => several,
@@ -51,7 +54,6 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let seen = (path.as_path(), &scene);
     let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
-    let times_s = step_times(&args.dir)?;
     let ended_s = |step: usize| time_s(&times_s, step, frame_s);
     // Either all frames show one step, or each frame shows its own step.
     let one = steps.len() == 1 && frames > 1;
@@ -68,25 +70,25 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let lengths = Lengths::read(&args.dir, &stack)?;
     let left = coils::read(&args.dir, &stack)?;
     let bar = progress::bar(frames, "frame");
-    // Number of steps whose tips were passed on.
-    let mut reported = 0;
+    // The last step whose tip was passed on.
+    let mut reported = earlier;
     for k in 0..frames {
         let step = if one { steps[0] } else { steps[k] };
         while studio.follows_tip() && reported < step {
             reported += 1;
-            let (shape, time_s) = (recording.shape(reported), ended_s(reported));
+            let (shape, time_s) = (recording.shape(reported - earlier), ended_s(reported));
             let inserted_mm = &lengths.after(reported, &shape)?;
             let displacement = vessel.at(reported, time_s);
             studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
         }
         let ending = if one { format!("_frame_{k:06}") } else { String::new() };
-        let contacts = recording.contacts(step);
-        let shape = recording.shape(step);
+        let contacts = recording.contacts(step - earlier);
+        let shape = recording.shape(step - earlier);
         let inserted_mm = lengths.after(step, &shape)?;
         // The device rests in a step that is drawn several times.
-        let before = match step.checked_sub(1).filter(|before| *before > 0 && !one) {
+        let before = match step.checked_sub(1).filter(|before| *before > earlier && !one) {
             Some(before) => {
-                let shape = recording.shape(before);
+                let shape = recording.shape(before - earlier);
                 Some((lengths.after(before, &shape)?, shape, ended_s(before)))
             }
             None => None,
@@ -138,13 +140,16 @@ fn tell_of(args: &RenderArgs, recording: &Recording, path: &Path) -> Result<(), 
 }
 
 /// The recorded steps to draw, always including the last one requested. A run that goes on may be asked for steps that
-/// it has not reached.
-fn wanted(args: &RenderArgs, recording: &Recording) -> Result<Vec<usize>, Failure> {
-    let recorded = recording.steps();
+/// it has not reached. So many steps were `earlier` than those recorded.
+fn wanted(args: &RenderArgs, recording: &Recording, earlier: usize) -> Result<Vec<usize>, Failure> {
+    let recorded = earlier + recording.steps();
+    let first = earlier + 1;
+    // What is not asked for otherwise begins with the first that was recorded.
+    let from = if args.from == 1 { first } else { args.from };
     let to = args.to.unwrap_or(recorded);
     let last = to.min(recorded);
     let beyond = to > recorded && recording.summary.complete;
-    if args.to.is_some_and(|to| args.from > to) {
+    if args.to.is_some_and(|to| from > to) {
         return Err(Failure::Input(format!(
             "--from {} --to {to}: the last step to draw comes before the first: give --to a step from {0} on",
             args.from
@@ -153,15 +158,15 @@ fn wanted(args: &RenderArgs, recording: &Recording) -> Result<Vec<usize>, Failur
     if args.every == 0 {
         return Err(Failure::Input("--every 0: must be 1 or more: every so many steps are drawn".to_owned()));
     }
-    if args.from == 0 || args.from > last || beyond {
+    if from < first || from > last || beyond {
         return Err(Failure::Input(format!(
-            "--from {} --to {to}: {} has steps 1 to {}",
+            "--from {} --to {to}: {} has steps {first} to {}",
             args.from,
             args.dir.display(),
             recorded
         )));
     }
-    let mut steps: Vec<usize> = (args.from..=last).step_by(args.every).collect();
+    let mut steps: Vec<usize> = (from..=last).step_by(args.every).collect();
     if steps.last() != Some(&last) {
         steps.push(last);
     }

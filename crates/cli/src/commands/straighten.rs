@@ -23,7 +23,6 @@ struct Document {
     scene: String,
     steps: usize,
     inserted_mm: Vec<f64>,
-    largest_displacement_mm: f64,
     largest_push_force_n: f64,
     vessel_mj: f64,
     #[serde(flatten)]
@@ -68,7 +67,6 @@ pub(crate) fn straighten(args: &StraightenArgs) -> Result<(), Failure> {
         scene: scene.name.clone(),
         steps,
         inserted_mm: simulation.report().lengths_mm(),
-        largest_displacement_mm: simulation.yielded_mm(),
         largest_push_force_n: largest_n,
         vessel_mj: simulation.report().energy.vessel,
         straightening: Straightening::of(tree, displacement.as_ref()),
@@ -123,8 +121,11 @@ fn draw(
 /// The document for people.
 fn in_words(document: &Document) -> String {
     let mut text = format!(
-        "{}: {} steps, largest push {:.2} N, the vessel moved by up to {:.1} mm\n\n",
-        document.scene, document.steps, document.largest_push_force_n, document.largest_displacement_mm
+        "{}: {} steps, largest push {:.2} N, the centre line moved by up to {:.1} mm\n\n",
+        document.scene,
+        document.steps,
+        document.largest_push_force_n,
+        document.straightening.largest_displacement_mm
     );
     text +=
         &format!("{:<46} {:>17} {:>17} {:>15}\n", "centre line", "length mm", "straight mm", "tortuosity");
@@ -140,6 +141,9 @@ fn in_words(document: &Document) -> String {
             tortuosity.before,
             tortuosity.after
         );
+    }
+    if document.straightening.stretches.is_empty() {
+        text += "(none: the centre line has no named places; name some by targets)\n";
     }
     text += &format!("\n{:<46} {:>12} {:>19}\n", "place", "moved by mm", "angle °");
     for Landmark { name, displacement_mm, angle_deg, .. } in &document.straightening.places {

@@ -109,7 +109,7 @@ pub(super) struct OfRow {
 }
 
 /// Given values, some of them missing.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Given {
     preset: Option<YieldingPreset>,
     modulus: Option<f64>,
@@ -146,6 +146,8 @@ const LONGEST_SPAN_MM: f64 = 1e4;
 const SPAN_OF_LENGTH: f64 = 0.75;
 /// Spans are no shorter than so many radii, below which sections of the vessel are no sections of a beam.
 const LEAST_SPAN_RADII: f64 = 3.0;
+/// A tether holds the vessel at most so many radii from its centre line: bones lie beside it.
+const FARTHEST_TETHER_RADII: f64 = 10.0;
 /// Most coefficients: the matrix is dense.
 const MOST: usize = 2000;
 
@@ -261,6 +263,14 @@ impl YieldingSpec {
             let table = format!("{table}.branch[{index}]");
             let own = branch.given();
             own.check(&table)?;
+            if own == Given::default() {
+                let remedy = "has no values: give a preset, or what differs from the rest of the vessel";
+                return Err(Error::parameter(format!("{table}.to"), &branch.to, remedy));
+            }
+            if let Some(other) = self.branch[..index].iter().position(|other| other.to == branch.to) {
+                let remedy = format!("is that of branch[{other}] too: give each branch once");
+                return Err(Error::parameter(format!("{table}.to"), &branch.to, remedy));
+            }
             let row = tree.target(&branch.to).map_err(|error| renamed(error, &format!("{table}.to")))?.row;
             for row in branch_of(tree, row) {
                 of[row] = (own.or(given), table.clone());
@@ -302,15 +312,28 @@ impl YieldingSpec {
                     tree.target(name).map_err(|error| renamed(error, &format!("{table}.at")))?.row
                 }
                 (None, Some(place)) if place.iter().all(|part| part.is_finite()) => {
-                    tree.nearest(&Vec3::from(*place)).0
+                    let (row, on_line) = tree.nearest(&Vec3::from(*place));
+                    let away_mm = (on_line - Vec3::from(*place)).norm();
+                    let most_mm = FARTHEST_TETHER_RADII * tree.nodes()[row].radius_mm;
+                    if away_mm > most_mm {
+                        let remedy = format!(
+                            "the centre line is {away_mm:.1} mm away, and a tether holds at most {most_mm:.1} mm from it there: give a place on the vessel"
+                        );
+                        return Err(Error::parameter(format!("{table}.at_mm"), format!("{place:?}"), remedy));
+                    }
+                    row
                 }
                 (None, Some(place)) => {
                     let name = format!("{table}.at_mm");
                     return Err(Error::parameter(name, format!("{place:?}"), "must be finite"));
                 }
-                _ => {
-                    let remedy = "give either at, a target, or at_mm, a place";
-                    return Err(Error::parameter(format!("{table}.at"), "given", remedy));
+                (None, None) => {
+                    let remedy = "give at, a target, or at_mm, a place";
+                    return Err(Error::parameter(format!("{table}.at"), "missing", remedy));
+                }
+                (Some(name), Some(_)) => {
+                    let remedy = "at_mm is given too: keep one of the two";
+                    return Err(Error::parameter(format!("{table}.at"), name, remedy));
                 }
             };
             Ok((row, tether.stiffness_n_per_mm))

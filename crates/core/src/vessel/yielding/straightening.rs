@@ -52,6 +52,8 @@ pub struct Landmark {
 /// A vessel's course at rest and displaced.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Straightening {
+    /// How far the point of the centre line is displaced that is displaced most, mm.
+    pub largest_displacement_mm: f64,
     /// The named places, the beginning of the centre line first.
     pub places: Vec<Landmark>,
     /// What lies between them.
@@ -66,7 +68,12 @@ impl Straightening {
             .chain(targets.map(|target| (target.row, target.name.clone())))
             .collect();
         let measured = Measured { tree, displacement, named };
-        Self { places: measured.places(), stretches: measured.stretches() }
+        let moved = |row: usize| {
+            let [before, after] = measured.place(row);
+            (after - before).norm()
+        };
+        let largest_displacement_mm = (0..tree.nodes().len()).map(moved).fold(0.0, f64::max);
+        Self { largest_displacement_mm, places: measured.places(), stretches: measured.stretches() }
     }
 }
 
