@@ -313,6 +313,34 @@ fn medium_from_a_tip_is_where_the_tip_was_whichever_frames_are_drawn() {
 }
 
 #[test]
+fn a_run_that_was_resumed_in_another_folder_is_drawn_with_the_numbers_of_its_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let line = "[[script]]\nadvance_mm = 12.0\nstep_mm = 4.0\n";
+    let scene = |name: &str, lines: usize| {
+        let head = scene_text("curved_tube.toml", &[]);
+        let head = head.split_once("[[script]]").unwrap().0;
+        let path = folder.path().join(name);
+        std::fs::write(&path, format!("{head}{}", line.repeat(lines))).unwrap();
+        text(&path)
+    };
+    let [state, first, second, drawn] =
+        ["state", "first", "second", "drawn"].map(|name| text(&folder.path().join(name)));
+    let good = |args: &[&str]| {
+        let output = endowire(args);
+        assert!(output.status.success(), "{}", said(&output));
+    };
+    good(&["run", &scene("one.toml", 1), "--out", &first, "--save-state", &state]);
+    good(&["run", &scene("two.toml", 2), "--out", &second, "--resume", &state]);
+    good(&["render", &second, "--size", "32", "--view", "3d", "--every", "2", "--out", &drawn]);
+    for step in [4, 6] {
+        assert!(Path::new(&drawn).join(format!("step_{step:06}_3d.png")).is_file(), "{step}");
+    }
+    let refused = endowire(&["render", &second, "--from", "2", "--to", "3", "--out", &drawn]);
+    assert!(said(&refused).contains("has steps 4 to 6"), "{}", said(&refused));
+}
+
+#[test]
 fn frames_leave_the_files_of_others() {
     let folder = tempfile::tempdir().unwrap();
     let (_, run) = recorded(folder.path());
