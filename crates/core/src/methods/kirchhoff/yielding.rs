@@ -168,12 +168,12 @@ impl<'a> Yielding<'a> {
         Ok(Some(Follows { amplitudes_mm, way, off_n }))
     }
 
-    /// The amplitudes of the next round, mm.
+    /// The amplitudes of the next round, mm, with M, to which the vessel's own stiffness is added.
     fn next(
         &self,
         touched: &Touched,
         forces: &[Vec3],
-        stiffness: DMatrix<f64>,
+        mut matrix: DMatrix<f64>,
         most_mm: f64,
     ) -> Option<Vec<Vec3>> {
         let count = touched.unknowns.len();
@@ -191,7 +191,6 @@ impl<'a> Yielding<'a> {
         );
         let given =
             DVector::from_iterator(3 * count, forces.iter().flat_map(|force| [force.x, force.y, force.z]));
-        let mut matrix = stiffness;
         // What is not balanced, less what the untouched unknowns take of it.
         let mut right = given;
         for i in 0..count {
@@ -237,7 +236,7 @@ fn descent(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     Some(modes.eigenvectors * along)
 }
 
-/// A step of the course, along which the energy in equilibrium with the device falls no more at its end.
+/// A step of the course, gone as far as the energy in equilibrium with the device falls along it.
 struct Line {
     /// Newton's step, mm, and the motion of the device with it.
     step_mm: Vec<Vec3>,

@@ -128,9 +128,7 @@ impl Curve {
         let mut s = guess_mm;
         let mut there = self.at(s);
         for _ in 0..MOST {
-            let [c, c1, c2, _] = there;
-            let off = x - c;
-            let step = c1.dot(&off) / (c1.norm_squared() - c2.dot(&off)).max(LEAST_D);
+            let step = there[1].dot(&(x - there[0])) / d(x, &there);
             s += step;
             there = self.at(s);
             if step.abs() <= LAST_MM {
@@ -166,23 +164,23 @@ impl Curve {
     }
 }
 
-/// D of a point, with the curve at its place.
+/// D of a point, not below its least, with the curve at a place.
 #[inline]
-fn least_d(x: &Vec3, [c, c1, c2, _]: &[Vec3; 4]) -> f64 {
+fn d(x: &Vec3, [c, c1, c2, _]: &[Vec3; 4]) -> f64 {
     (c1.norm_squared() - c2.dot(&(x - c))).max(LEAST_D)
 }
 
 /// ∇s at a point, with the curve at its place.
 #[inline]
 pub(super) fn slope(x: &Vec3, there: &[Vec3; 4]) -> Vec3 {
-    there[1] / least_d(x, there)
+    there[1] / d(x, there)
 }
 
 /// ∇∇s at a point, with the curve at its place.
 #[inline]
 pub(super) fn bend(x: &Vec3, there: &[Vec3; 4]) -> Matrix3<f64> {
     let [c, c1, c2, c3] = there;
-    let d = least_d(x, there);
+    let d = d(x, there);
     let mixed = outer(c2, c1);
     let third = 3.0 * c1.dot(c2) - c3.dot(&(x - c));
     (mixed + mixed.transpose()) / (d * d) - outer(c1, c1) * (third / (d * d * d))
