@@ -16,10 +16,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
-use super::{Row, section};
-use endowire_core::statics::{
-    End, EndKind, Instrument, Load, LoadKind, Rod, Solver, Start, StartKind, StaticCase,
-};
+use super::{Row, section, unit_rod};
+use endowire_core::statics::{Instrument, Load, LoadKind, Rod, StaticCase};
 use endowire_core::{Error, Result};
 
 /// Length of the catheter, and of the wire beyond it, mm.
@@ -146,17 +144,8 @@ fn tilt_of_line(clearance_mm: f64, curvature_per_mm: f64, force_n: f64) -> Resul
     let elements = ((LENGTH_MM + BEYOND_MM) / ELEMENT_MM).round() as usize;
     let case = StaticCase {
         rod: Rod { length: 0.0, elements, section: vec![], instrument },
-        start: Start {
-            kind: StartKind::Clamped,
-            position: [0.0; 3],
-            tangent: [1.0, 0.0, 0.0],
-            normal: Some([0.0, 1.0, 0.0]),
-        },
-        end: End { kind: EndKind::Free, ..End::default() },
         load: vec![load],
-        self_contact: None,
-        initial: None,
-        solver: Solver::default(),
+        ..unit_rod(elements)
     };
     let solution = case.solve()?.checked()?;
     Ok(solution.instruments[1].tilt / SMALL)
