@@ -111,6 +111,11 @@ impl Friction {
         if self.acts() { self.law.stick_mm } else { f64::INFINITY }
     }
 
+    /// Sets ε, mm.
+    pub(crate) fn stick_at(&mut self, stick_mm: f64) {
+        self.law.stick_mm = stick_mm;
+    }
+
     /// The same friction with another coefficient.
     pub(crate) fn set_coefficient(&mut self, coefficient: f64) {
         self.law.coefficient = coefficient;

@@ -23,6 +23,8 @@ pub(crate) struct FrictionDerivatives {
     pub turn2: f64,
     /// Mixed derivative, N.
     pub mixed: Vec3,
+    /// Slip, mm.
+    pub slip_mm: Vec3,
 }
 
 /// The law of friction in one step.
@@ -107,6 +109,7 @@ impl Coulomb {
             turn: gradient.dot(&spin),
             turn2: mixed.dot(&spin),
             mixed,
+            slip_mm: slip,
         })
     }
 

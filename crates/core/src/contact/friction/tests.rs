@@ -46,6 +46,24 @@ fn derivatives_are_those_of_the_value() {
 }
 
 #[test]
+fn what_sticks_is_held_by_more_where_it_sticks_within_less() {
+    for (slip, sticks) in [(Vec3::new(0.003, -0.002, 0.001), true), (Vec3::new(0.3, 0.2, -0.1), false)] {
+        let (mut friction, x) = friction(slip);
+        let (angle, h, stick_mm) = (0.705, 1e-6, 0.01);
+        let here = friction.derivatives(0, &x, angle).unwrap();
+        let mut at = |smaller: f64| {
+            friction.stick_at(stick_mm * (1.0 - smaller));
+            friction.derivatives(0, &x, angle).unwrap()
+        };
+        let (plus, minus) = (at(h), at(-h));
+        let force = (plus.gradient - minus.gradient) / (2.0 * h);
+        assert!((force - here.hessian * here.slip_mm).norm() < 1e-8, "{force} {here:?}");
+        assert!(((plus.turn - minus.turn) / (2.0 * h) - here.mixed.dot(&here.slip_mm)).abs() < 1e-8);
+        assert_eq!(force.norm() > 1e-3, sticks, "{force}");
+    }
+}
+
+#[test]
 fn a_slipping_point_is_held_by_mu_times_its_normal_force_and_a_stuck_one_by_less() {
     let (sliding, x) = friction(Vec3::new(0.3, 0.2, -0.1));
     let force = sliding.derivatives(0, &x, 0.7).unwrap().gradient;

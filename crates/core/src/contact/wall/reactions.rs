@@ -19,6 +19,8 @@ pub(crate) struct Reaction {
     /// Derivatives of that in the position relative to the wall, N/mm, and in the material angle, N.
     pub(crate) stiffness: Matrix3<f64>,
     pub(crate) by_angle: Vec3,
+    /// Derivatives of friction's force, N, and of its couple about the device, N·mm, where ε gets smaller in proportion.
+    pub(crate) by_stick: (Vec3, f64),
 }
 
 impl WallContact<'_> {
@@ -35,6 +37,7 @@ impl WallContact<'_> {
                     force_n: Vec3::zeros(),
                     stiffness: Matrix3::zeros(),
                     by_angle: Vec3::zeros(),
+                    by_stick: (Vec3::zeros(), 0.0),
                 };
                 if let (Some(pressed), Some(d)) = (self.pressed(index), self.cache.pressed(index)) {
                     reaction.force_n = pressed.gradient;
@@ -45,6 +48,8 @@ impl WallContact<'_> {
                     reaction.force_n += friction.gradient;
                     reaction.stiffness += friction.hessian;
                     reaction.by_angle = friction.mixed;
+                    let slip_mm = friction.slip_mm;
+                    reaction.by_stick = (friction.hessian * slip_mm, friction.mixed.dot(&slip_mm));
                 }
                 if reaction.force_n != Vec3::zeros() || reaction.stiffness != Matrix3::zeros() {
                     all.push(reaction);
@@ -52,6 +57,11 @@ impl WallContact<'_> {
             }
         }
         all
+    }
+
+    /// ε of friction on the wall, mm; infinite without friction.
+    pub(crate) fn stick_mm(&self) -> f64 {
+        self.friction.stick_mm()
     }
 
     /// A negligible force, N.

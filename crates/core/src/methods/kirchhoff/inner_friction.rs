@@ -30,12 +30,13 @@ pub(super) fn radius_mm(stack: &Stack, mesh: &Mesh, (i, instrument): (usize, usi
 }
 
 /// Sets the places with friction between instruments in a step from `start` to the mesh `mesh`, on which `slid` is
-/// the line slid along its curve.
+/// the line slid along its curve. What moves in it, the hands by `motions` and the device with its vessel by `carried_mm`, is
+/// what the slip that sticks is a part of.
 pub(super) fn begin(
     stack: &Stack,
     start: Start<'_>,
     (mesh, slid): (&Mesh, &RodState),
-    motions: &[HandMotion],
+    (motions, carried_mm): (&[HandMotion], f64),
     between: &mut Between,
 ) {
     between.clear();
@@ -66,7 +67,7 @@ pub(super) fn begin(
             place.length_mm = 0.5 * (mesh.from_tip_mm[i - 1] - after);
             place.force_n = place.length_mm * pressure(start, line - mesh.from_tip_mm[i], inner, &mut known);
             let way_mm = |k: &HandMotion| k.advance_mm().abs() + radius_mm * k.turn_rad.abs();
-            between.push(place, motions.iter().map(way_mm).fold(0.0, f64::max));
+            between.push(place, motions.iter().map(way_mm).fold(carried_mm, f64::max));
         }
     }
 }

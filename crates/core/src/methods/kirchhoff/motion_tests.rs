@@ -4,7 +4,7 @@ use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use crate::methods::kirchhoff::{Accuracy, KirchhoffOptions};
 use crate::vessel::motion::{Around, Displacement, MotionMode, Turn, VesselMotion, Waveform};
-use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+use crate::vessel::{GeneratedWall, Lumen, Resolution, SweptVessel, Wall, anatomy};
 use crate::{Result, Vec3};
 use nalgebra::{Rotation3, Unit};
 
@@ -316,6 +316,50 @@ fn a_state_holds_the_time_and_goes_on_to_the_bit() {
     let refused = simulation.step_until(&[], Some(1.0)).unwrap_err().to_string();
     assert!(refused.contains("time_s = 1"), "{refused}");
     assert!(simulation.step_until(&[], Some(f64::NAN)).is_err());
+}
+
+/// What sticks between instruments may creep by a part of what moves, as on the wall: with hands at rest that is the vessel.
+#[test]
+fn instruments_that_rub_each_other_rest_in_a_vessel_that_breathes() {
+    let each = [("wire", 800.0, 0.445, 5000.0), ("catheter", 600.0, 0.665, 60.0)];
+    let each = each.map(|(name, length_mm, radius_mm, stiffness)| {
+        let inner_radius_mm = (radius_mm > 0.5).then_some(0.5);
+        let section = Section { inner_radius_mm, ..Section::straight(length_mm, radius_mm, stiffness) };
+        let tip = Section { bending_stiffness_nmm2: 5.0, length_mm: 60.0, ..section };
+        let device = Device::new(vec![tip, section]).unwrap();
+        Instrument { name: name.to_owned(), device, may_lead: true }
+    });
+    let stack = Stack::new(each.into()).unwrap().with_friction(vec![0.1, 0.0]).unwrap();
+    let tree = anatomy::tree("aorto_iliac").unwrap();
+    let lumen = Lumen::from(SweptVessel::new(tree, Resolution::EdgeMm(2.0)).unwrap());
+    let around = Around { centre_mm: [40.0, 0.0, 150.0], radius_mm: 20.0, fade_mm: 100.0 };
+    let breath = MotionMode {
+        displacement_mm: [0.0, 2.0, 6.0],
+        turn: None,
+        within: Some(around),
+        ..displaced(Waveform::Breathing)
+    };
+    let mut simulation =
+        Simulation::builder(lumen, stack, Sheath::new(Vec3::zeros(), Vec3::new(0.41, 0.235, 0.88)).unwrap())
+            .properties(WallProperties { modulus_n_per_mm2: 0.5, friction: 0.1, ..WallProperties::default() })
+            .motion(VesselMotion::new(&[breath]).unwrap())
+            .method(&KirchhoffOptions::of(Accuracy::Fine))
+            .build()
+            .unwrap();
+    for (instrument, length_mm) in [(0, 200.0), (1, 190.0)] {
+        for _ in 0..(0.1 * length_mm) as usize {
+            let moves = [Move { instrument, command: Command::advance(10.0) }];
+            simulation.step_together(&moves).unwrap();
+        }
+    }
+    let mut most = 0;
+    for k in 1..=20 {
+        let report = simulation.step_until(&[], Some(0.2 * f64::from(k))).unwrap();
+        assert!(report.converged);
+        most = most.max(report.iterations);
+    }
+    // As if they stuck at once: 80 and more.
+    assert!(most <= 20, "{most}");
 }
 
 #[test]

@@ -26,6 +26,17 @@
 //!
 //! This is block elimination of Newton's method for both. The matrix is symmetric, and positive definite where device and vessel together are
 //! stable; where it is not, they snap together, and the step descends by the magnitudes of the curvatures.
+//!
+//! A step within which many contacts begin or cease to slip goes too far: Newton's method knows friction within ε alone, and would find
+//! its way from one contact to the next. Friction then sticks within as much as the step moves, and ε is halved from solution to
+//! solution until it is that of the part. With the derivative of friction's forces f and couples in −ln ε, ∂f = f′(u) u, a halving by δ
+//! moves both by
+//!
+//! ```text
+//! dx = −Z da − K⁻¹ r,    r = δ Σ Nᵢᵀ ∂fᵢ,    (A + M) da = p − A a + δ Σ Wᵢᵀ ∂fᵢ + Pᵀ K⁻¹ r
+//! ```
+//!
+//! where P are the pulls on the device, Z = K⁻¹ P.
 
 use std::convert::Infallible;
 use std::ops::Range;
@@ -52,6 +63,11 @@ const MOST_ROUNDS: usize = 80;
 /// A step goes back where the energy rises at its end by more than this of the slope by which it fell at its beginning, as where
 /// contacts change status.
 const RISES: f64 = 0.5;
+/// Friction is widened where so many steps have gone too far: one may be for the shape of the vessel alone.
+const WIDENS_AT: usize = 2;
+/// A wider ε shrinks by this factor, from a solution that is this near, relative to the largest force.
+const NARROWS: f64 = 0.5;
+const NEAR_ENOUGH: f64 = 0.1;
 /// Most sweeps for the eigenvalues of a stiffness, and the least magnitude that they are taken as, relative to the largest.
 const MOST_SWEEPS: usize = 1000;
 const LEAST_CURVATURE: f64 = 1e-7;
@@ -67,6 +83,8 @@ pub(super) struct Yielding<'a> {
     to: f64,
     amplitudes_mm: Vec<Vec3>,
     displacement: Displacement,
+    /// ε of the part, mm.
+    stick_mm: f64,
 }
 
 /// How the course follows: its new amplitudes, mm, and the motion of the device with it.
@@ -75,6 +93,8 @@ pub(super) struct Follows {
     way: Vec<f64>,
     /// Forces that are not balanced: the gradient of the energy in the amplitudes, N.
     off_n: Vec<Vec3>,
+    /// ε that belongs to them, mm.
+    stick_mm: f64,
 }
 
 impl<'a> Yielding<'a> {
@@ -102,7 +122,8 @@ impl<'a> Yielding<'a> {
             let was = environment.surroundings.displacement(attempt.part.to, &start.state.course_mm)?;
             friction.go_with((&was, &displacement));
         }
-        Some(Self { course, to: attempt.part.to, amplitudes_mm, displacement })
+        let stick_mm = friction.stick_mm();
+        Some(Self { course, to: attempt.part.to, amplitudes_mm, displacement, stick_mm })
     }
 
     pub(super) fn displacement(&self) -> &Displacement {
@@ -145,9 +166,14 @@ impl<'a> Yielding<'a> {
         // No nearer than friction is settled: its normal forces follow from an equilibrium and move the next one.
         let friction = search.tuning.friction.settled;
         let tolerance = if search.has_friction { search.tolerance.max(friction) } else { search.tolerance };
-        if off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= tolerance * largest_n {
+        let is_within =
+            |tolerance: f64| off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= tolerance * largest_n;
+        let is_wide = search.contact.stick_mm() > self.stick_mm;
+        if !is_wide && is_within(tolerance) {
             return Ok(None);
         }
+        let narrows = is_wide && is_within(NEAR_ENOUGH);
+        let mut stick_mm = search.contact.stick_mm();
         search.assemble(lagged, true);
         let factored = search.newton.factor(search.elements, search.supports);
         factored.ok_or(StopReason::Singular)?;
@@ -155,17 +181,28 @@ impl<'a> Yielding<'a> {
         let responses = pulls.responses(search);
         let mut stiffness = touched.held_stiffness(&reactions);
         pulls.soften(&responses, &mut stiffness);
+        let mut way = vec![0.0; Layout::<C>::dimension(search.elements.len())];
+        let mut forces = forces;
+        if narrows {
+            let narrower_mm = (NARROWS * stick_mm).max(self.stick_mm);
+            let by = 1.0 - narrower_mm / stick_mm;
+            stick_mm = narrower_mm;
+            touched.narrow(search, &reactions, by, &mut way);
+            search.newton.apply_inverse(search.elements, &mut way);
+            touched.narrowed(&reactions, by, &mut forces);
+            pulls.by_device(&way, &mut forces);
+            way.iter_mut().for_each(|value| *value = -*value);
+        }
         let next = self.next(&touched, &forces, stiffness, most_mm);
         let amplitudes_mm = next.ok_or(StopReason::Singular)?;
         let moved = |unknown: usize| amplitudes_mm[unknown] - self.amplitudes_mm[unknown];
-        let mut way = vec![0.0; Layout::<C>::dimension(search.elements.len())];
         for (k, unknown) in touched.unknowns.iter().enumerate() {
             let by = moved(*unknown);
             for axis in 0..3 {
                 way.iter_mut().zip(&responses[3 * k + axis]).for_each(|(way, z)| *way -= z * by[axis]);
             }
         }
-        Ok(Some(Follows { amplitudes_mm, way, off_n }))
+        Ok(Some(Follows { amplitudes_mm, way, off_n, stick_mm }))
     }
 
     /// The amplitudes of the next round, mm, with M, to which the vessel's own stiffness is added.
@@ -249,7 +286,7 @@ struct Line {
 
 impl Line {
     /// A new step, of which this part is gone.
-    fn of(Follows { amplitudes_mm, way, off_n }: Follows, from_mm: &[Vec3], part: f64) -> Self {
+    fn of(Follows { amplitudes_mm, way, off_n, .. }: Follows, from_mm: &[Vec3], part: f64) -> Self {
         let step_mm: Vec<Vec3> = amplitudes_mm.iter().zip(from_mm).map(|(to, from)| to - from).collect();
         Self { falls_mj: slope_mj(&off_n, &step_mm).abs(), step_mm, way, gone: part }
     }
@@ -305,6 +342,37 @@ impl Touched {
             weights.iter().for_each(|(k, [weight, _])| forces[*k] += weight.tr_mul(&reaction.force_n));
         }
         forces
+    }
+
+    /// r, what a narrower friction does to the device: its gradient where ε is smaller by this part.
+    fn narrow<const C: usize>(
+        &self,
+        search: &Search<'_, '_, C>,
+        reactions: &[Reaction],
+        by: f64,
+        gradient: &mut [f64],
+    ) {
+        for reaction in reactions {
+            let (e, xi, _) = reaction.place;
+            let (force_n, couple) = reaction.by_stick;
+            let ways = point_columns::<C>(search.state, &search.elements[e], e, xi);
+            ways.iter().for_each(|(row, way)| gradient[*row] += by * way.dot(&force_n));
+            if Layout::<C>::ANGLES > 0 {
+                let turns = angle_weights::<C>(reaction.place);
+                turns.iter().for_each(|(row, share)| gradient[*row] += by * share * couple);
+            }
+        }
+        for row in search.supports.held::<C>().into_iter().flatten() {
+            gradient[row] = 0.0;
+        }
+    }
+
+    /// Adds to p what a narrower friction adds.
+    fn narrowed(&self, reactions: &[Reaction], by: f64, forces: &mut [Vec3]) {
+        for (reaction, weights) in reactions.iter().zip(&self.weights) {
+            let force_n = reaction.by_stick.0 * by;
+            weights.iter().for_each(|(k, [weight, _])| forces[*k] += weight.tr_mul(&force_n));
+        }
     }
 
     /// What each of the unknowns does to the device.
@@ -371,6 +439,15 @@ impl Pulls {
         responses
     }
 
+    /// Adds to p what a motion of the device takes from it, of which this is the opposite.
+    fn by_device(&self, opposite: &[f64], forces: &mut [Vec3]) {
+        for (column, pull) in self.columns.iter().enumerate() {
+            let rows = self.reached[column / 3].clone();
+            let work: f64 = pull[rows.clone()].iter().zip(&opposite[rows]).map(|(a, b)| a * b).sum();
+            forces[column / 3][column % 3] += work;
+        }
+    }
+
     /// Adds to M of a device that does not respond what its response does.
     fn soften(&self, responses: &[Vec<f64>], matrix: &mut DMatrix<f64>) {
         for (i, pull) in self.columns.iter().enumerate() {
@@ -405,9 +482,16 @@ impl<const C: usize> Tools<C> {
         let mut searched = first;
         let is_flight = effort == Effort::Flight;
         let mut line: Option<Line> = None;
+        let mut overshoots = 0;
         for _ in 0..MOST_ROUNDS {
             let Some(follows) = searched.follows.take() else { return searched };
             let before = rod.clone();
+            let stick_mm = self.friction.stick_mm();
+            if follows.stick_mm < stick_mm {
+                // The energy along the last step was that of another friction.
+                line = None;
+                self.friction.stick_at(follows.stick_mm);
+            }
             let back = line.as_mut().and_then(|line| line.back(&follows));
             let part = back.unwrap_or_else(|| {
                 let (turn, _) = RodState::largest_turn::<C>(elements, &before, &follows.way);
@@ -426,6 +510,12 @@ impl<const C: usize> Tools<C> {
             self.friction.go_with((&course.displacement, &moved));
             let moved_mm = farthest_mm * moved.stretch();
             (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
+            overshoots += usize::from(back.is_some());
+            if overshoots == WIDENS_AT && back.is_some() && stick_mm.is_finite() {
+                course.stick_mm = stick_mm;
+                self.friction.stick_at(step_mm.iter().map(Vec3::norm).fold(stick_mm, f64::max));
+                line = None;
+            }
             let there = environment.displaced(Some(&course.displacement));
             let bounds = |effort: Effort, taken: (usize, usize)| Bounds {
                 effort,
