@@ -47,7 +47,7 @@ DATASET = f"""
 seed = 7
 scenes = ["{ROOT}/assets/scenes/curved_tube_exact.toml"]
 devices = ["{ROOT}/assets/devices/wire_035_soft.toml"]
-poses = 4
+poses = 24
 moments = 4
 [view]
 size_px = [96, 96]
@@ -192,7 +192,7 @@ def main() -> None:
         check("sweeps", sweep, folder, args.tries, draw, whole)
 
         folder = place("session")
-        lines = [{"do": "move", "mm_per_s": 8.0, "deg_per_s": 0.0}] + [{"do": "wait", "ticks": 30}] * 30
+        lines = [{"do": "move", "mm_per_s": 8.0, "deg_per_s": 0.0}] + [{"do": "wait", "ticks": 60}] * 300
         (outer / "inputs.jsonl").write_text("\n".join(json.dumps(line) for line in lines) + "\n")
         play = [program, "play", "../../session.toml", "--headless", "--inputs", "../../inputs.jsonl", "--record", "out/played.toml", "--size", "64"]
         check("sessions", play, folder, max(1, args.tries // 3), draw, whole)
