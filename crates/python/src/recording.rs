@@ -111,8 +111,8 @@ impl Recording {
     }
 
     /// Arc lengths of these nodes from the tip.
-    #[pyo3(signature = (step=None))]
-    fn from_tip_mm<'py>(
+    #[pyo3(name = "from_tip_mm", signature = (step=None))]
+    fn lengths_mm<'py>(
         &self,
         py: Python<'py>,
         step: Option<&Bound<'py, PyAny>>,
@@ -123,11 +123,7 @@ impl Recording {
     /// Places of the contacts after a step, and the forces of the wall on the device there, N: two arrays of shape
     /// (n, 3).
     #[pyo3(signature = (step=None))]
-    fn contacts<'py>(
-        &self,
-        py: Python<'py>,
-        step: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn contacts<'py>(&self, py: Python<'py>, step: Option<&Bound<'py, PyAny>>) -> PyResult<Contacts<'py>> {
         let contacts = self.inner.contacts(self.row(step)?);
         let places = points(py, contacts.iter().map(|one| one.position_mm))?;
         Ok((places, points(py, contacts.iter().map(|one| one.force_n))?))
@@ -156,6 +152,9 @@ impl Recording {
         Err(refuse("step", given, &format!("must be from {} to {}", -steps, steps - 1)))
     }
 }
+
+/// Places and forces of contacts.
+type Contacts<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// The columns of a table.
 fn columns<'py, T: DeserializeOwned + Serialize + Send + 'static>(

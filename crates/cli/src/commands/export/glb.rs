@@ -137,7 +137,7 @@ impl Glb {
     }
 
     /// The file of a scene with these nodes.
-    pub(super) fn file(self, scene: &[usize], extras: Value) -> Vec<u8> {
+    pub(super) fn file(self, scene: &[usize], extras: &Value) -> Vec<u8> {
         let mut document = json!({
             "asset": {"version": "2.0", "generator": concat!("endowire ", env!("CARGO_PKG_VERSION")), "extras": extras},
             "scene": 0,

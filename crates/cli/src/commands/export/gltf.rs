@@ -60,7 +60,7 @@ fn document(run: &Run, keys: &[(usize, f64)]) -> Result<Vec<u8>, Failure> {
     }
     let (arrows, n_per_m) = forces(run, &mut glb, &rows, times);
     scene.extend(arrows);
-    Ok(glb.file(&scene, json!({"arrows_n_per_m": n_per_m})))
+    Ok(glb.file(&scene, &json!({"arrows_n_per_m": n_per_m})))
 }
 
 fn flat(points: impl Iterator<Item = Vec3>) -> Vec<f32> {
