@@ -48,14 +48,15 @@ mod way;
 mod words;
 
 pub use course::{Attempt, Course, Line, MetricLine, Trend};
+pub use endowire_recording::Outlet;
 pub use exam::{Ended, EndedBy, Exam, Standing, Used};
 pub use goal::{Goal, PackingGoal, PlaceGoal};
 pub use groups::assess;
-pub use injection::{Injection, Outlet};
+pub use injection::Injection;
 pub use metric::{Better, Group, Metric};
 pub use noticed::{Noticed, NoticedKind, noticed};
 pub use reach::{Site, thinnest_mm};
-pub use record::{BEAM, BeamMode, BeamState, Hand, Packed, Record, Sample, start_mm};
+pub use record::{BEAM, BeamMode, BeamState, Hand, Packed, Record, Sample};
 pub use score::{Band, SCHEMA, Score, Scored, Verdict};
 pub use session::SessionFile;
 pub use subject::{Limits, Subject, Threshold};

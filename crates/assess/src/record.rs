@@ -5,6 +5,7 @@ use std::path::Path;
 use endowire_core::device::Stack;
 use endowire_core::insertion::Simulation;
 use endowire_core::{Result, Vec3};
+use endowire_recording::start_mm;
 use serde::{Deserialize, Serialize};
 
 use crate::injection::Injection;
@@ -200,11 +201,6 @@ pub struct Record {
     pub beam: Option<Vec<BeamState>>,
 }
 
-/// Where the way of the foremost tip begins: at the tip, or in the sheath's mouth, as long as nothing is inserted.
-pub fn start_mm(simulation: &Simulation) -> Vec3 {
-    simulation.shape().tip_mm().unwrap_or(simulation.sheath().position_mm)
-}
-
 impl Record {
     /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv and, if they exist,
     /// instruments.csv, injections.csv, packing.csv and beam.csv. Hands rest after the last step of a run until all
@@ -214,7 +210,7 @@ impl Record {
     /// [`Error::Content`](endowire_core::Error::Content) naming a file that is missing or invalid, with the key and value
     /// that are impossible, and a session in which nothing was done.
     pub fn read(path: &Path) -> Result<Self> {
-        if path.is_file() { SessionFile::read(path)?.done(path) } else { folder::read(path) }
+        if path.is_file() { SessionFile::read(path)?.done(path) } else { folder::read_record(path) }
     }
 
     /// Reads a session from the bytes of its file; `path` is for messages.

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use endowire_core::error::nearest_name;
 use endowire_core::insertion::Tally;
 use endowire_methods::{Scene, Setting, scene_with};
+use endowire_recording::{About, Recording};
 use endowire_viewer::ViewSpec;
 
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::recording::RecordedSummary;
 use crate::output::tell;
 
 /// Reads a scene with overridden keys.
@@ -39,16 +39,25 @@ pub(crate) fn with_any_device(path: &Path, settings: &[Setting]) -> Result<Scene
 /// Reads the scene of a recording again, from `scene` if given, with the settings of the run and `more`; also returns
 /// its path.
 pub(crate) fn of_recording(
-    summary: &RecordedSummary,
+    about: &About,
     scene: Option<&Path>,
     more: &[Setting],
 ) -> Result<(PathBuf, Scene), Failure> {
-    let path = scene.unwrap_or(&summary.scene_file).to_path_buf();
-    let recorded = summary.set.iter().map(|text| text.parse::<Setting>());
+    let Some(path) = scene.or(about.scene_file.as_deref()) else {
+        let text = "the recording names no scene: give it by --scene, a scene with the vessel and the devices of the recording";
+        return Err(Failure::Input(text.to_owned()));
+    };
+    let path = path.to_path_buf();
+    let recorded = about.set.iter().map(|text| text.parse::<Setting>());
     let mut settings = recorded.collect::<Result<Vec<_>, _>>()?;
     settings.extend_from_slice(more);
     let scene = read(&path, &settings)?;
     Ok((path, scene))
+}
+
+/// Reads a recording; with its scene given, its summary may be damaged or missing.
+pub(crate) fn recording(folder: &Path, scene: Option<&Path>) -> Result<Recording, Failure> {
+    Ok(scene.map_or_else(|| Recording::read(folder), |scene| Recording::read_in(folder, scene))?)
 }
 
 /// Tables of a scene that decide how a run goes.
@@ -69,15 +78,15 @@ pub(crate) fn check_recorded(settings: &[Setting]) -> Result<(), Failure> {
 /// How the scene file `path` in which a recording is shown differs from that of its run in `dir`; `given` is that file if
 /// it was named. Nothing is said of a scene or a script that cannot be read any more.
 pub(crate) fn other_than_recorded(
-    summary: &RecordedSummary,
+    about: &About,
     dir: &Path,
     given: Option<&Path>,
     path: &Path,
 ) -> Result<Option<String>, Failure> {
-    let Some(recorded) = &summary.scene_hash else { return Ok(None) };
+    let Some(recorded) = &about.scene_hash else { return Ok(None) };
     // Without the settings of now, which are meant to differ, and with the script of the run.
-    let Ok((_, mut as_it_was)) = of_recording(summary, given, &[]) else { return Ok(None) };
-    if let Some(script) = &summary.script_file
+    let Ok((_, mut as_it_was)) = of_recording(about, given, &[]) else { return Ok(None) };
+    if let Some(script) = &about.script_file
         && as_it_was.take_script(script).is_err()
     {
         return Ok(None);
@@ -85,7 +94,7 @@ pub(crate) fn other_than_recorded(
     if Provenance::of_scene(&as_it_was, &[])?.scene_hash() == recorded {
         return Ok(None);
     }
-    let name = summary.scene.as_ref().filter(|name| **name != as_it_was.name);
+    let name = about.scene.as_ref().filter(|name| **name != as_it_was.name);
     let (path, dir) = (path.display(), dir.display());
     Ok(Some(match (given, name) {
         (Some(_), Some(name)) => format!(

@@ -18,6 +18,7 @@ mod instrument;
 mod interrupt;
 mod moves;
 mod record;
+mod recording;
 mod report;
 mod rod;
 mod scene;
@@ -48,6 +49,8 @@ mod _endowire {
     use super::instrument::Instrument;
     #[pymodule_export]
     use super::record::Record;
+    #[pymodule_export]
+    use super::recording::{Recorder, Recording};
     #[pymodule_export]
     use super::report::StepReport;
     #[pymodule_export]

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use endowire_assess::Way;
-use endowire_core::insertion::{Command, Move};
+use endowire_core::insertion::Move;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -11,6 +11,7 @@ use crate::assess::check_within;
 use crate::document;
 use crate::error::{InputError, exception, refuse};
 use crate::interrupt::interruptible;
+use crate::moves::check_finite;
 use crate::simulation::Simulation;
 use crate::vessel::{Goal, Vessel};
 
@@ -134,15 +135,7 @@ impl Record {
 impl Record {
     /// Refuses a time before that of the last step, and moves that are no numbers.
     pub(crate) fn check(&self, time_s: f64, moves: &[Move]) -> PyResult<()> {
-        for Move { command: Command { advance_mm, rotate_rad, steer }, .. } in moves {
-            for (name, number) in
-                [("advance_mm", *advance_mm), ("rotate_rad", *rotate_rad), ("steer", *steer)]
-            {
-                if !number.is_finite() {
-                    return Err(refuse(name, number, "must be a finite number"));
-                }
-            }
-        }
+        check_finite(moves)?;
         let last_s = self.lock().samples.last().map_or(0.0, |last| last.time_s);
         if time_s >= last_s && time_s.is_finite() {
             return Ok(());

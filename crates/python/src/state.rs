@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use endowire_core::field::{Field, FieldSpec};
+use endowire_core::file::whole;
 use endowire_core::insertion;
 use endowire_core::{Error, Result};
-use endowire_sweep::{seal, whole};
+use endowire_recording::seal;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

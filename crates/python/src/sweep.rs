@@ -5,16 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use endowire_core::vessel::NoStore;
-use endowire_sweep::{Order, Program, Shard, Sweep, merge};
+use endowire_sweep::{Order, Shard, Sweep, merge};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{List, natural};
 use crate::error::{exception, refuse};
 use crate::interrupt::{interruptible, stoppable};
-
-const PROGRAM: Program =
-    Program { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION") };
+use crate::recording::PROGRAM;
 
 /// Carries out the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (by default
 /// the number of cores), and writes runs.parquet there when all have one, as `endowire sweep` does. `shard` is the

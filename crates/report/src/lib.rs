@@ -12,7 +12,7 @@ mod vessel;
 
 pub use base64::base64;
 pub use recorder::Recorder;
-pub use run::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, events, setup};
+pub use run::{Event, Frame, MOST_NODES, Moment, Run, Series, events, setup};
 use serde::Serialize;
 pub use vessel::Vessel;
 

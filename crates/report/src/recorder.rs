@@ -1,13 +1,14 @@
 //! Follows a running simulation in memory.
 
 use endowire_core::insertion::Simulation;
+use endowire_recording::StepRow;
 
-use crate::run::{MOST_NODES, Moment, Row};
+use crate::run::{MOST_NODES, Moment};
 
 /// Data of a page about the steps so far: one row per step, and as many shapes as fit.
 #[derive(Debug, Default)]
 pub struct Recorder {
-    rows: Vec<Row>,
+    rows: Vec<StepRow>,
     moments: Vec<Moment>,
 }
 
@@ -20,7 +21,7 @@ impl Recorder {
         if step == 0 {
             return;
         }
-        self.rows.push(Row::of(step, simulation));
+        self.rows.push(StepRow::of(step, &[], simulation.time_s(), simulation));
         let report = simulation.report();
         let contacts = report.contacts.iter().map(|contact| (contact.position_mm, contact.total_n()));
         let line_mm = &simulation.shape().positions_mm;
@@ -43,7 +44,7 @@ impl Recorder {
     }
 
     /// Rows of the steps so far.
-    pub fn rows(&self) -> &[Row] {
+    pub fn rows(&self) -> &[StepRow] {
         &self.rows
     }
 

@@ -1,12 +1,12 @@
 //! Data of the page of a run.
 
 use endowire_core::device::{Device, Stack};
-use endowire_core::insertion::Simulation;
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::{Result, Vec3};
+use endowire_recording::StepRow;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::vessel::Vessel;
@@ -124,91 +124,21 @@ pub(crate) fn scaled(point_mm: &Vec3, per_mm: f64) -> [i32; 3] {
     [point_mm.x, point_mm.y, point_mm.z].map(|x| (x * per_mm).round() as i32)
 }
 
-/// The columns of steps.csv that are shown.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Row {
-    pub(crate) step: usize,
-    inserted_mm: f64,
-    rotation_rad: f64,
-    tip_rotation_rad: f64,
-    push_force_n: f64,
-    torque_nmm: f64,
-    bend_mj: f64,
-    twist_mj: f64,
-    wall_mj: f64,
-    field_mj: Option<f64>,
-    tail_mj: Option<f64>,
-    vessel_mj: Option<f64>,
-    max_penetration_mm: f64,
-    vessel_displacement_mm: Option<f64>,
-    jumped: bool,
-    left_through: Option<usize>,
-    converged: bool,
-    #[serde(default)]
-    relaxations: u32,
-    // `None` in recordings of older versions, which lack these columns, as `field_mj`, `tail_mj`, `vessel_mj` and
-    // `vessel_displacement_mm`.
-    imbalance: Option<f64>,
-    wall_force_sum_n: Option<f64>,
-    wall_force_largest_n: Option<f64>,
-    wall_force_tip_n: Option<f64>,
-    time_s: Option<f64>,
-}
-
-impl Row {
-    /// The row of a simulation after a step.
-    pub fn of(step: usize, simulation: &Simulation) -> Self {
-        let (report, force) = (simulation.report(), simulation.wall_force());
-        Self {
-            step,
-            inserted_mm: report.inserted_mm,
-            rotation_rad: report.rotation_rad,
-            tip_rotation_rad: report.tip_rotation_rad,
-            push_force_n: report.push_force_n,
-            torque_nmm: report.torque_nmm,
-            bend_mj: report.energy.bend,
-            twist_mj: report.energy.twist,
-            wall_mj: report.energy.wall,
-            field_mj: Some(report.energy.field),
-            tail_mj: Some(report.energy.tail),
-            vessel_mj: Some(report.energy.vessel),
-            max_penetration_mm: report.max_penetration_mm,
-            vessel_displacement_mm: Some(simulation.yielded_mm()),
-            jumped: report.jumped,
-            left_through: report.left_through,
-            converged: !report.has_failed(),
-            relaxations: report.relaxations,
-            imbalance: Some(report.imbalance),
-            wall_force_sum_n: Some(force.sum_n),
-            wall_force_largest_n: Some(force.largest_n),
-            wall_force_tip_n: Some(force.tip_n),
-            time_s: Some(simulation.time_s()),
-        }
-    }
-}
-
-impl Row {
-    fn energy_mj(&self) -> f64 {
-        let others = [self.field_mj, self.tail_mj, self.vessel_mj].into_iter().flatten();
-        self.bend_mj + self.twist_mj + self.wall_mj + others.sum::<f64>()
-    }
-}
-
 /// The columns; each is drawn as a curve.
 #[derive(Debug, Serialize)]
 pub struct Series {
     step: Vec<usize>,
     time_s: Vec<Option<f64>>,
     inserted_mm: Vec<f64>,
-    rotation_deg: Vec<f64>,
+    rotation_deg: Vec<Option<f64>>,
     /// Angle by which the tip is behind the hand.
-    tip_lag_deg: Vec<f64>,
+    tip_lag_deg: Vec<Option<f64>>,
     push_force_n: Vec<f64>,
     torque_nmm: Vec<f64>,
-    energy_mj: Vec<f64>,
-    wall_mj: Vec<f64>,
+    energy_mj: Vec<Option<f64>>,
+    wall_mj: Vec<Option<f64>>,
     vessel_mj: Vec<Option<f64>>,
-    max_penetration_mm: Vec<f64>,
+    max_penetration_mm: Vec<Option<f64>>,
     vessel_displacement_mm: Vec<Option<f64>>,
     wall_force_sum_n: Vec<Option<f64>>,
     wall_force_largest_n: Vec<Option<f64>>,
@@ -218,19 +148,19 @@ pub struct Series {
 
 impl Series {
     /// The columns of rows, in order of steps.
-    pub fn of(rows: &[Row]) -> Self {
+    pub fn of(rows: &[StepRow]) -> Self {
         Self {
             step: rows.iter().map(|row| row.step).collect(),
             time_s: rows.iter().map(|row| row.time_s).collect(),
             inserted_mm: rows.iter().map(|row| row.inserted_mm).collect(),
-            rotation_deg: rows.iter().map(|row| row.rotation_rad.to_degrees()).collect(),
+            rotation_deg: rows.iter().map(|row| row.rotation_rad.map(f64::to_degrees)).collect(),
             tip_lag_deg: rows
                 .iter()
-                .map(|row| (row.rotation_rad - row.tip_rotation_rad).to_degrees())
+                .map(|row| Some((row.rotation_rad? - row.tip_rotation_rad?).to_degrees()))
                 .collect(),
             push_force_n: rows.iter().map(|row| row.push_force_n).collect(),
             torque_nmm: rows.iter().map(|row| row.torque_nmm).collect(),
-            energy_mj: rows.iter().map(Row::energy_mj).collect(),
+            energy_mj: rows.iter().map(StepRow::energy_mj).collect(),
             wall_mj: rows.iter().map(|row| row.wall_mj).collect(),
             vessel_mj: rows.iter().map(|row| row.vessel_mj).collect(),
             max_penetration_mm: rows.iter().map(|row| row.max_penetration_mm).collect(),
@@ -255,7 +185,7 @@ pub struct Event {
 }
 
 /// The events that follow from rows.
-pub fn events(rows: &[Row]) -> Vec<Event> {
+pub fn events(rows: &[StepRow]) -> Vec<Event> {
     let mut events = Vec::new();
     let mut out = None;
     for row in rows {
@@ -267,10 +197,10 @@ pub fn events(rows: &[Row]) -> Vec<Event> {
         if let (Some(opening), None) = (row.left_through, out) {
             happened("left", format!("at {:.1} mm: the tip is out of opening {opening}", row.inserted_mm));
         }
-        if !row.converged {
+        if row.converged == Some(false) {
             happened("not converged", format!("at {:.1} mm: the step found no equilibrium", row.inserted_mm));
         }
-        if row.relaxations > 0 {
+        if row.relaxations.is_some_and(|count| count > 0) {
             // What is not recorded, or is nothing, gets no number.
             let left = row.imbalance.filter(|left| *left > 0.0);
             let left = left.map_or_else(String::new, |left| format!(", {left:.1e} out of balance"));
@@ -298,31 +228,14 @@ mod tests {
 
     #[test]
     fn a_step_that_came_to_rest_in_balance_is_reported_without_a_number() {
-        let row = |imbalance: Option<f64>| Row {
-            step: 3,
-            inserted_mm: 12.0,
-            rotation_rad: 0.0,
-            tip_rotation_rad: 0.0,
-            push_force_n: 0.0,
-            torque_nmm: 0.0,
-            bend_mj: 0.0,
-            twist_mj: 0.0,
-            wall_mj: 0.0,
-            field_mj: None,
-            tail_mj: None,
-            vessel_mj: None,
-            max_penetration_mm: 0.0,
-            vessel_displacement_mm: None,
-            jumped: false,
-            left_through: None,
-            converged: true,
-            relaxations: 1,
-            imbalance,
-            wall_force_sum_n: None,
-            wall_force_largest_n: None,
-            wall_force_tip_n: None,
-            time_s: None,
-        };
+        let text = "step,advance_mm,rotate_rad,inserted_mm,nodes,tip_x_mm,tip_y_mm,tip_z_mm,push_force_n,torque_nmm,jumped,relaxations,imbalance
+                    3,0,0,12,0,0,0,0,0,0,false,1,
+";
+        let file = std::env::temp_dir().join(format!("endowire-report-{}.csv", std::process::id()));
+        std::fs::write(&file, text.replace("                    ", "")).unwrap();
+        let rows: Vec<StepRow> = endowire_recording::table::read(&file).unwrap();
+        std::fs::remove_file(&file).unwrap();
+        let row = |imbalance: Option<f64>| StepRow { imbalance, ..rows[0].clone() };
         for imbalance in [None, Some(0.0)] {
             assert_eq!(events(&[row(imbalance)])[0].text, "at 12.0 mm: left to come to rest");
         }

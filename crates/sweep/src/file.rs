@@ -8,11 +8,11 @@ use endowire_core::file::FileSystem;
 use endowire_core::input::{from_toml, parse_toml};
 use endowire_core::{Error, Result};
 use endowire_methods::{Key, Scene, SceneTables, Setting};
+use endowire_recording::hash_inputs;
 use serde::Deserialize;
 use toml::Value;
 
 use crate::axis::{Axis, AxisSpec, RUN_LIMIT};
-use crate::provenance::hash_inputs;
 use crate::row::{Columns, ParameterKind};
 
 /// A sweep file as it is written.

@@ -1,10 +1,9 @@
 //! Rows: the results that are kept of each run.
 
+use endowire_recording::RunOutcome;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 use toml::Value;
-
-use crate::outcome::RunOutcome;
 
 /// The results of a run: its parameters, its outcome and its provenance. A row contains no times, so that a repeated
 /// run gives the same bytes.

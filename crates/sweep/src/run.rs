@@ -6,11 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use endowire_core::Result;
 use endowire_core::insertion::{Move, Script, Simulation, Tally};
 use endowire_core::vessel::WallStore;
+use endowire_recording::{Program, RunOutcome, StepFailure, hash_inputs};
 use toml::Value;
 
 use crate::file::Sweep;
-use crate::outcome::{RunOutcome, StepFailure};
-use crate::provenance::{Program, hash_inputs};
 use crate::row::{Row, json};
 use crate::shared::Shared;
 

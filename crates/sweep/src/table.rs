@@ -4,7 +4,9 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use endowire_core::file::whole;
 use endowire_core::{Error, Result};
+use endowire_recording::{InstrumentOutcome, RunOutcome};
 use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::Result as ParquetResult;
@@ -12,9 +14,7 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{Type, TypePtr};
 use serde_json::Value as Json;
 
-use crate::outcome::{InstrumentOutcome, RunOutcome};
 use crate::row::{Columns, ParameterKind, Row};
-use crate::whole;
 
 /// The values of a column, one per row.
 enum Cells {

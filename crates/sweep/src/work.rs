@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use endowire_core::vessel::WallStore;
 use endowire_core::{Error, Result};
+use endowire_recording::Program;
 
 use crate::file::Sweep;
 use crate::journal::{Header, Journal};
-use crate::provenance::Program;
 use crate::row::Row;
 use crate::run::{Interrupted, Record, Workshop};
 use crate::shard::Shard;

@@ -155,8 +155,15 @@ pub(crate) struct ExportArgs {
     pub(crate) dir: PathBuf,
     /// Folder for run.pvd, which lists the steps with their times, step_*.vtp (instruments as lines, contacts as points with their forces)
     /// and vessel.vtp; files of these names are replaced
-    #[arg(long, value_name = "DIR")]
-    pub(crate) vtk: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["gltf", "usd"])]
+    pub(crate) vtk: Option<PathBuf>,
+    /// File .glb (glTF 2.0) with the run as an animation: instruments as tubes, the vessel, and the largest contact forces of each step as
+    /// arrows; of more than 500 steps as many as that, evenly spaced
+    #[arg(long, value_name = "FILE")]
+    pub(crate) gltf: Option<PathBuf>,
+    /// File .usda (USD) with the run as curves, the vessel as a mesh and contacts as points with their forces, with time samples
+    #[arg(long, value_name = "FILE")]
+    pub(crate) usd: Option<PathBuf>,
     /// Scene file of the run, if it is no longer where it was
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,

@@ -7,10 +7,9 @@ use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use endowire_core::vessel::{CentrelineRecipe, CentrelineTree, Wall, WallRecipe};
+use endowire_recording::seal;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-
-use endowire_sweep::seal;
 
 /// The first line.
 const FORMAT: &str = "endowire wall 1\n";

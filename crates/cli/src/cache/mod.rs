@@ -14,11 +14,12 @@ use std::time::{Duration, Instant};
 use std::{io, io::Write};
 
 use endowire_core::Result;
+use endowire_core::file::whole::Part;
 use endowire_core::vessel::{CentrelineRecipe, CentrelineTree, Wall, WallRecipe, WallStore};
+use endowire_recording::seal;
 
 use crate::args::CacheArgs;
 use crate::output::tell;
-use endowire_sweep::seal;
 use entry::{EXTENSION, Kept, Key, Recipe};
 
 /// Shortest computation that is worth caching: reading back a faster one would save little.
@@ -92,10 +93,10 @@ fn write(folder: &Path, key: &Key, made: &impl Kept) -> io::Result<()> {
     let bytes = entry::bytes(key, made).map_err(io::Error::other)?;
     std::fs::create_dir_all(folder)?;
     room::make(folder, bytes.len() as u64)?;
-    let mut part = tempfile::Builder::new().suffix(entry::UNFINISHED).tempfile_in(folder)?;
-    part.write_all(&bytes)?;
-    part.persist(path(folder, key))?;
-    Ok(())
+    // A wall that is lost when the power fails is made again.
+    let mut part = Part::new(&path(folder, key))?;
+    part.file().write_all(&bytes)?;
+    part.finish()
 }
 
 #[cfg(test)]

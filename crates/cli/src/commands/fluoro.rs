@@ -5,15 +5,15 @@ use std::path::Path;
 use endowire_core::insertion::{Contact, DetachedCoil, Script, Simulation, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, VesselMotion};
+use endowire_recording::InjectionRow;
 use endowire_viewer::{ContactView, FrameTime, Moment, Seen};
 
 use super::studio::{Plan, Still, Studio, Went};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::folder::refuse_recording;
-use crate::output::injections::Injected;
-use crate::output::progress;
+use crate::output::frames::flowing;
+use crate::output::{progress, refuse_recording};
 use crate::scenes;
 
 /// Carries out the script, then draws.
@@ -52,7 +52,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         None => Now::default(),
     };
     let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
-    let injections = now.injections.iter().map(Injected::spec);
+    let injections = now.injections.iter().map(flowing);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
     scenes::tell_found(&args.scene, &scene);
     for k in 0..frames {
@@ -100,7 +100,7 @@ struct Now {
     inserted_mm: Vec<f64>,
     coils: Vec<DetachedCoil>,
     contacts: Vec<ContactView>,
-    injections: Vec<Injected>,
+    injections: Vec<InjectionRow>,
     /// Displacement of the vessel.
     displacement: Option<Displacement>,
     /// Number of steps carried out, and their statistics.
@@ -150,7 +150,7 @@ fn after(
     let (mut injections, mut taken, mut tally) = (Vec::new(), 0, Tally::default());
     for index in 0..=steps {
         let step = run.next(simulation)?.map(Step::into_owned);
-        injections.extend(Injected::begun(&run, injections.len(), frames_per_s, simulation));
+        injections.extend(InjectionRow::begun(&run, injections.len(), frames_per_s, simulation));
         // A condition may have ended the script earlier.
         let Some(step) = step.filter(|_| index < steps) else { break };
         step.carry_out(simulation).map_err(|e| {

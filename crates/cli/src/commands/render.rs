@@ -3,28 +3,26 @@
 use std::path::Path;
 
 use endowire_core::vessel::Lumen;
-use endowire_viewer::{FrameTime, Moment, Seen};
+use endowire_recording::{
+    InjectionRow, Lengths, RecordedVessel, Recording, coils_after, read_coils, step_times,
+};
+use endowire_viewer::{ContactView, FrameTime, Moment, Seen};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::coils;
-use crate::output::folder::{refuse_recording, step_times};
-use crate::output::injections::{self, Injected};
-use crate::output::instruments::Lengths;
-use crate::output::recording::Recording;
-use crate::output::vessel::Recorded;
-use crate::output::{progress, tell};
+use crate::output::frames::flowing;
+use crate::output::{progress, refuse_recording, tell};
 use crate::scenes;
 
 /// Draws the requested steps.
 pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
-    let recording = Recording::read(&args.dir, args.scene.as_deref())?;
+    let recording = scenes::recording(&args.dir, args.scene.as_deref())?;
     args.out.as_deref().map_or(Ok(()), refuse_recording)?;
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
     scenes::check_recorded(&settings)?;
-    let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &settings)?;
+    let (path, scene) = scenes::of_recording(recording.about(), args.scene.as_deref(), &settings)?;
     tell_of(args, &recording, &path)?;
     if recording.steps() == 0 {
         return Err(Failure::Input(format!(
@@ -50,7 +48,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let cache = Cache::new(&args.frames.cache);
     let wall = scene.wall(&cache).map_err(|e| Failure::from(e).at(path.display()))?;
     let lumen = Lumen::from(wall.clone());
-    let vessel = Recorded::read(&args.dir, &scene, &lumen, &cache)?;
+    let vessel = RecordedVessel::read(&args.dir, &scene, &lumen, &cache)?;
     let seen = (path.as_path(), &scene);
     let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
@@ -62,13 +60,13 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         FrameTime { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s }
     };
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
-    let injections = injections::read(&args.dir)?;
-    let injections = injections.iter().map(Injected::spec);
+    let injections = InjectionRow::read(&args.dir)?;
+    let injections = injections.iter().map(flowing);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
     scenes::tell_found(&path, &scene);
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
-    let left = coils::read(&args.dir, &stack)?;
+    let left = read_coils(&args.dir, &stack)?;
     let bar = progress::bar(frames, "frame");
     // The last step whose tip was passed on.
     let mut reported = earlier;
@@ -82,7 +80,9 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
         }
         let ending = if one { format!("_frame_{k:06}") } else { String::new() };
-        let contacts = recording.contacts(step - earlier);
+        let contacts = recording.contacts(step - earlier).into_iter();
+        let contacts: Vec<_> =
+            contacts.map(|one| ContactView { position_mm: one.position_mm, force_n: one.force_n }).collect();
         let shape = recording.shape(step - earlier);
         let inserted_mm = lengths.after(step, &shape)?;
         // The device rests in a step that is drawn several times.
@@ -102,7 +102,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
                 frame: moment(k),
                 shape: &shape,
                 inserted_mm: &inserted_mm,
-                coils: &coils::after(&left, step),
+                coils: &coils_after(&left, step),
                 contacts: &contacts,
                 displacement: displacement.as_ref(),
                 before: before.map(|(inserted_mm, shape, time_s)| Seen {
@@ -120,20 +120,20 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Warns about a recording that is drawn in this scene.
 fn tell_of(args: &RenderArgs, recording: &Recording, path: &Path) -> Result<(), Failure> {
-    let (summary, dir, steps) = (&recording.summary, args.dir.display(), recording.steps());
+    let (about, dir, steps) = (recording.about(), args.dir.display(), recording.steps());
     let given = args.scene.as_deref();
-    if let Some(other) = scenes::other_than_recorded(summary, &args.dir, given, path)? {
+    if let Some(other) = scenes::other_than_recorded(about, &args.dir, given, path)? {
         tell(format_args!("endowire: {other}"));
     }
-    if !summary.complete {
+    if !about.is_complete() {
         tell(format_args!(
             "endowire: the run in {dir} goes on or was ended from outside: {steps} steps of it are recorded"
         ));
     }
-    if summary.unconverged_steps > 0 {
+    if about.unconverged_steps > 0 {
         tell(format_args!(
             "endowire: {} of the {steps} steps in {dir} are no equilibria: steps.csv says which (converged)",
-            summary.unconverged_steps
+            about.unconverged_steps
         ));
     }
     Ok(())
@@ -148,7 +148,7 @@ fn wanted(args: &RenderArgs, recording: &Recording, earlier: usize) -> Result<Ve
     let from = if args.from == 1 { first } else { args.from };
     let to = args.to.unwrap_or(recorded);
     let last = to.min(recorded);
-    let beyond = to > recorded && recording.summary.complete;
+    let beyond = to > recorded && recording.about().is_complete();
     if args.to.is_some_and(|to| from > to) {
         return Err(Failure::Input(format!(
             "--from {} --to {to}: the last step to draw comes before the first: give --to a step from {0} on",

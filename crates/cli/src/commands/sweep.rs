@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use endowire_core::insertion::{Move, Simulation};
 use endowire_core::methods::MethodChoice;
 use endowire_methods::Scene;
-use endowire_sweep::{Order, Progress, Record, Recorded, Run, RunOutcome, Sweep, merge};
+use endowire_recording::{Recorder, RunOutcome, Summary, VERSION};
+use endowire_sweep::{Order, Progress, Record, Recorded, Run, Sweep, merge};
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -16,8 +17,7 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::frames::{Drawn, FrameWriter};
 use crate::output::provenance::{PROGRAM, Provenance};
-use crate::output::recorder::{Recorder, Summary};
-use crate::output::{print_json, progress, tell, whole};
+use crate::output::{in_folder, print_json, progress, record_anew, tell, whole};
 
 /// Document printed with `--json`.
 #[derive(Serialize)]
@@ -56,6 +56,10 @@ fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure
     let store = &Cache::new(&args.cache);
     let recordings =
         sweep.recorded().map(|what| Recordings { folder: folder.join("recordings"), store, what });
+    // What a call that was killed was writing.
+    for place in [folder.to_path_buf(), folder.join("recordings")] {
+        whole::remove_unfinished_in(&place, |_| true).map_err(|e| Failure::write(&place, &e))?;
+    }
     let stop = interrupts();
     let bar = progress::bar(sweep.len(), "run");
     let order = Order {
@@ -142,11 +146,11 @@ impl Recordings<'_> {
     fn recording(&self, run: &Run<'_>, simulation: &Simulation) -> Result<Recording, Failure> {
         let name = format!("{:06}", run.number());
         let (folder, scene_file) = (self.folder.join(&name), self.folder.join(name + ".toml"));
-        let mut recorder = Recorder::new(&folder, false, simulation)?;
+        let mut recorder = record_anew(&folder, false, simulation)?;
         let text = run.standalone()?;
         whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
         let scene = Scene::read(&scene_file)?;
-        recorder.pack(scene.sac(simulation.lumen(), self.store)?, simulation)?;
+        recorder.pack(scene.sac(simulation.lumen(), self.store)?, simulation).map_err(in_folder)?;
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
         let frames = FrameWriter::new(&scene_file, &scene, drawn, self.store)?;
         frames.check_angiogram(None)?;
@@ -177,7 +181,7 @@ impl endowire_sweep::Recorder for Recording {
         let lengths_mm = simulation.report().lengths_mm();
         let (inserted_mm, displacement) = (lengths_mm.as_slice(), simulation.displacement());
         let seen = Drawn { shape: simulation.shape(), inserted_mm, displacement: displacement.as_ref() };
-        let recorded = self.recorder.record(moves, time_s, simulation);
+        let recorded = self.recorder.record(moves, time_s, simulation).map_err(in_folder);
         let drawn = recorded.and_then(|()| self.frames.step((step, time_s), last, seen, &mut self.recorder));
         self.recorded = Instant::now();
         drawn.map_err(|failure| failure.to_string())
@@ -186,23 +190,24 @@ impl endowire_sweep::Recorder for Recording {
     fn end(self: Box<Self>, outcome: &RunOutcome) -> Result<(), String> {
         let film = self.frames.film(&self.recorder).map_err(|failure| failure.to_string())?;
         let mut summary = Summary {
-            provenance: self.provenance,
+            schema: VERSION,
+            provenance: self.provenance.recorded(),
             complete: false,
             scene: self.scene.name.clone(),
-            scene_file: std::path::absolute(&self.scene_file).unwrap_or(self.scene_file),
+            scene_file: Some(std::path::absolute(&self.scene_file).unwrap_or(self.scene_file)),
             script_file: None,
-            method: self.scene.method.name(),
+            method: self.scene.method.name().to_owned(),
             centreline_found: self.scene.finds_centreline(),
-            start_mm: self.recorder.start_mm,
+            start_mm: self.recorder.start_mm(),
             outcome: outcome.clone(),
             packing: self.recorder.packed(),
             step_time_s: self.steps.as_secs_f64(),
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),
             planes: self.frames.planes(),
-            frames: self.recorder.frames.clone(),
+            frames: self.recorder.frames().to_vec(),
             film,
         };
-        self.recorder.finish(&mut summary).map_err(|failure| failure.to_string())
+        self.recorder.finish(&mut summary).map_err(|error| in_folder(error).to_string())
     }
 }

@@ -5,11 +5,8 @@ use std::path::{Path, PathBuf};
 
 use endowire_viewer::{Animation, Image, Pace};
 
-use super::{tell, whole};
+use super::tell;
 use crate::failure::Failure;
-
-/// File names of films, one for each format.
-pub(crate) const FILMS: [&str; 4] = ["film.gif", "film.png", "film.apng", "film.mp4"];
 
 /// Writes FOLDER/film.KIND from `frames`, whose paths are relative to the folder, with the views of a step side by
 /// side. Returns its name; `None` without frames.
@@ -25,26 +22,12 @@ pub(crate) fn write(
         tell(format_args!("endowire: no {name} in {}: no frame was drawn", folder.display()));
         return Ok(None);
     };
-    let path = folder.join(&name);
-    let made = |part: &Path| -> endowire_core::Result<()> {
-        let first = side_by_side(folder, first)?;
-        let mut film = Animation::new(part, &first, steps.len() as u32, Pace::even(frames_per_s))?;
-        film.push(&first)?;
-        steps[1..].iter().try_for_each(|step| film.push(&side_by_side(folder, step)?))?;
-        film.finish()
-    };
-    let mut failed = None;
-    let written = whole::write_in_format(&path, |part| {
-        made(part).map_err(|error| {
-            let text = error.to_string();
-            failed = Some(error);
-            std::io::Error::other(text)
-        })
-    });
-    match (failed, written) {
-        (Some(error), _) => Err(error.into()),
-        (None, written) => written.map(|()| Some(name)).map_err(|e| Failure::write(&path, &e)),
-    }
+    let first = side_by_side(folder, first)?;
+    let mut film = Animation::new(folder.join(&name), &first, steps.len() as u32, Pace::even(frames_per_s))?;
+    film.push(&first)?;
+    steps[1..].iter().try_for_each(|step| film.push(&side_by_side(folder, step)?))?;
+    film.finish()?;
+    Ok(Some(name))
 }
 
 /// The step number in the name of a frame, step_NUMBER_VIEW.png.

@@ -1,6 +1,5 @@
 //! Frames: the scene's `[view]` table, its renderers, and the files.
 
-use std::io;
 use std::path::Path;
 
 use endowire_core::insertion::{Script, Simulation};
@@ -8,26 +7,15 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
-use endowire_viewer::{Exposure, FrameTime, Mode, Moment, Pushed, Renderer, Seen, View, ViewSpec};
-use serde::Serialize;
+use endowire_recording::{InjectionRow, Plane, Recorder};
+use endowire_viewer::{
+    Exposure, FrameTime, InjectionSpec, Mode, Moment, Pushed, Renderer, Seen, View, ViewSpec,
+};
 
-use super::film;
-use super::injections::Injected;
-use super::recorder::Recorder;
+use super::{film, in_folder};
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::scenes;
-
-/// Geometry of a plane of fluoroscopy.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct PlaneTold {
-    primary_deg: f64,
-    secondary_deg: f64,
-    /// Maps (x, y, z, 1), in mm, to pixel coordinates times the depth.
-    camera_matrix: [[f64; 4]; 3],
-    /// Exposure of its frames; `None` before the first frame.
-    exposure: Option<Exposure>,
-}
 
 /// Draws the frames of a run that the scene requests.
 pub(crate) struct FrameWriter {
@@ -58,6 +46,17 @@ struct Before {
     shape: Shape,
     inserted_mm: Vec<f64>,
     time_s: f64,
+}
+
+/// A recorded injection in the pictures.
+pub(crate) fn flowing(injected: &InjectionRow) -> InjectionSpec {
+    InjectionSpec {
+        start_s: injected.time_s,
+        duration_s: injected.volume_ml / injected.rate_ml_per_s,
+        rate_ml_per_s: injected.rate_ml_per_s,
+        at_mm: Some([injected.tip_x_mm, injected.tip_y_mm, injected.tip_z_mm]),
+        at_tip: false,
+    }
 }
 
 /// One renderer for each plane.
@@ -128,18 +127,18 @@ impl FrameWriter {
     }
 
     /// Geometry of each plane of fluoroscopy, for the summary.
-    pub(crate) fn planes(&self) -> Vec<PlaneTold> {
+    pub(crate) fn planes(&self) -> Vec<Plane<Exposure>> {
         let arms = self.planes.iter().filter_map(|plane| Some((plane.c_arm()?, plane.exposure())));
         let reported = arms.map(|(arm, exposure)| {
             let [primary_deg, secondary_deg] = arm.angles_deg();
-            PlaneTold { primary_deg, secondary_deg, camera_matrix: arm.matrix(), exposure }
+            Plane { primary_deg, secondary_deg, camera_matrix: arm.matrix(), exposure }
         });
         reported.collect()
     }
 
     /// Adds an injection, from the next frame on.
-    pub(crate) fn inject(&mut self, injected: &Injected) {
-        self.spec.injection.push(injected.spec());
+    pub(crate) fn inject(&mut self, injected: &InjectionRow) {
+        self.spec.injection.push(flowing(injected));
         self.injected = true;
     }
 
@@ -169,7 +168,7 @@ impl FrameWriter {
     /// Combines all frames to a film, if the scene requests one; returns its name in the folder.
     pub(crate) fn film(&self, recorder: &Recorder) -> Result<Option<String>, Failure> {
         let Some(kind) = &self.spec.film else { return Ok(None) };
-        film::write(recorder.folder(), kind, &recorder.frames, self.spec.frames_per_s)
+        film::write(recorder.folder(), kind, recorder.frames(), self.spec.frames_per_s)
     }
 
     /// Stores the state at a time: a pulse of the next step shows the motion since then, and injections at the tip
@@ -224,18 +223,10 @@ impl FrameWriter {
             let frames = plane.draw(&mut self.pushed, &moment)?;
             for (name, image) in names.into_iter().zip([&frames.three_d, &frames.fluoro]) {
                 if let Some(image) = image {
-                    recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;
+                    recorder.frame(step, name, |path| image.write_png(path)).map_err(in_folder)?;
                 }
             }
         }
         Ok(())
-    }
-}
-
-/// The system's error, without the path.
-fn bare(error: Error) -> io::Error {
-    match error {
-        Error::File { source, .. } => source,
-        other => io::Error::other(other.to_string()),
     }
 }

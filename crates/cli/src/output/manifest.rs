@@ -2,11 +2,12 @@
 //! replaces these files and no others.
 
 use std::collections::BTreeSet;
-use std::fs::File;
+use std::ffi::OsString;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
-use super::whole::remove;
+use super::whole::{remove, remove_unfinished_in};
 
 /// The list of a running call.
 pub(crate) struct Manifest {
@@ -27,7 +28,13 @@ impl Manifest {
                 removed += 1;
             }
         }
-        let file = File::create(&path)?;
+        // What a call that was killed was writing.
+        let names: BTreeSet<OsString> =
+            listed(&path, folder).iter().filter_map(|file| Some(file.file_name()?.to_owned())).collect();
+        remove_unfinished_in(folder, |name| names.contains(name))?;
+        remove(&path)?;
+        // A new file: no link is followed.
+        let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
         Ok((Self { folder: folder.to_owned(), path, file, names: BTreeSet::new() }, removed))
     }
 

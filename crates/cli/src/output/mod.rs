@@ -1,40 +1,27 @@
 //! All output of the program: recordings, arrays, provenance, progress.
 
-mod arrays;
 pub(crate) mod chart;
-pub(crate) mod coils;
 pub(crate) mod curves;
 pub(crate) mod film;
-pub(crate) mod folder;
 pub(crate) mod frames;
-pub(crate) mod injections;
-pub(crate) mod instruments;
 pub(crate) mod manifest;
-pub(crate) mod npz;
-pub(crate) mod packing;
 pub(crate) mod progress;
 pub(crate) mod provenance;
-pub(crate) mod recorder;
-pub(crate) mod recording;
-mod rows;
+mod recorder;
 pub(crate) mod saved;
 pub(crate) mod session;
-mod step_table;
 pub(crate) mod study;
-pub(crate) mod vessel;
 pub(crate) mod vtk;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
 use std::path::Path;
 
-pub(crate) use endowire_sweep::whole;
+pub(crate) use endowire_core::file::whole;
+pub(crate) use recorder::{in_folder, record_anew, refuse_recording};
 use serde::Serialize;
 
 use crate::failure::Failure;
-
-/// File with the summary of a recording.
-pub(crate) const SUMMARY: &str = "summary.json";
 
 /// Prints a document and a line break on stdout. A closed pipe (`| head`) is not an error.
 pub(crate) fn print(document: impl Display) -> Result<(), Failure> {
@@ -83,17 +70,6 @@ pub(crate) fn answer(
 /// A path in a document. Where it is no text, as in a folder named in Latin-1, it has replacement characters.
 pub(crate) fn path_text<S: serde::Serializer>(path: impl AsRef<Path>, into: S) -> Result<S::Ok, S::Error> {
     into.serialize_str(&path.as_ref().to_string_lossy())
-}
-
-/// As [`path_text`], for a path that may be absent.
-pub(crate) fn path_text_if_any<S: serde::Serializer>(
-    path: &Option<impl AsRef<Path>>,
-    into: S,
-) -> Result<S::Ok, S::Error> {
-    match path {
-        Some(path) => path_text(path, into),
-        None => into.serialize_none(),
-    }
 }
 
 /// A document as indented JSON.

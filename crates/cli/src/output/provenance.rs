@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_methods::{Scene, Setting};
-use endowire_sweep::{Program, hash_inputs};
+use endowire_recording::Program;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -12,59 +12,45 @@ use crate::failure::Failure;
 pub(crate) const PROGRAM: Program =
     Program { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION") };
 
-/// Version, revision, input and seed of a result.
+/// Version and revision of this program, input and seed of a result.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Provenance {
-    version: &'static str,
-    git_revision: &'static str,
-    /// SHA-256 of the scene's text and of the files it names; of nothing if there is no scene.
-    scene_hash: String,
-    seed: u64,
-    /// Keys of the scene that were set on the command line, `KEY=VALUE`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    set: Vec<String>,
-}
+#[serde(transparent)]
+pub(crate) struct Provenance(endowire_recording::Provenance);
 
 impl Provenance {
     /// For a result of `inputs`: file contents, in order.
     pub(crate) fn new(inputs: &[impl AsRef<[u8]>], seed: u64) -> Self {
-        Self {
-            version: PROGRAM.version,
-            git_revision: PROGRAM.git_revision,
-            scene_hash: hash_inputs(inputs),
-            seed,
-            set: Vec::new(),
-        }
+        Self(endowire_recording::Provenance::new(PROGRAM, inputs, seed))
     }
 
     /// For a result of a scene with these settings, and of the files that the scene names.
     pub(crate) fn of_scene(scene: &Scene, settings: &[Setting]) -> Result<Self, Failure> {
-        let mut inputs = vec![scene.text().as_bytes().to_vec()];
-        for path in scene.input_paths() {
-            inputs.push(read_input(&path)?);
-        }
-        Ok(Self::new(&inputs, scene.seed).with(settings))
+        Ok(Self(endowire_recording::Provenance::of_scene(PROGRAM, scene)?.with(settings)))
     }
 
     /// The same with the settings of the command line.
     pub(crate) fn with(self, settings: &[Setting]) -> Self {
-        Self { set: settings.iter().map(Setting::to_string).collect(), ..self }
+        Self(self.0.with(settings))
     }
 
     /// In words, for the foot of a page.
     pub(crate) fn words(&self) -> String {
-        let Self { version, git_revision, scene_hash, seed, .. } = self;
-        format!("endowire {version}, revision {git_revision}, inputs {scene_hash}, seed {seed}")
+        self.0.words()
     }
 
     /// SHA-256 of the inputs.
     pub(crate) fn scene_hash(&self) -> &str {
-        &self.scene_hash
+        &self.0.scene_hash
     }
 
     /// For a result that depends only on the program and its arguments.
     pub(crate) fn of_program(arguments: &str) -> Self {
         Self::new(&[arguments.as_bytes()], 0)
+    }
+
+    /// For a recording.
+    pub(crate) fn recorded(&self) -> endowire_recording::Provenance {
+        self.0.clone()
     }
 }
 

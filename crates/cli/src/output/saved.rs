@@ -10,11 +10,10 @@ use std::time::{Duration, Instant};
 use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step, Tally};
 use endowire_core::vessel::{Lumen, NoStore, Sac, Wall};
 use endowire_methods::Scene;
-use endowire_sweep::seal;
+use endowire_recording::{InjectionRow, seal};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::injections::Injected;
 use super::whole;
 use crate::failure::Failure;
 
@@ -155,7 +154,7 @@ pub(crate) struct Course {
     pub(crate) tally: Tally,
     /// Injections so far.
     #[serde(default)]
-    pub(crate) injected: Vec<Injected>,
+    pub(crate) injected: Vec<InjectionRow>,
 }
 
 impl Course {

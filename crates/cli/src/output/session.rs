@@ -2,21 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use super::recording::RecordedSummary;
 use super::whole;
 use crate::failure::Failure;
 use endowire_assess::SessionFile;
+use endowire_recording::About;
 
 /// Path of the session file that belongs to this script.
 pub(crate) fn beside(script: &Path) -> PathBuf {
     script.with_extension("session.json")
 }
 
-impl RecordedSummary {
-    /// The scene of a session.
-    pub(crate) fn of_session(session: &SessionFile) -> Self {
-        Self { set: session.set.clone(), ..Self::in_scene(&session.scene_file) }
-    }
+/// The scene of a session.
+pub(crate) fn about(session: &SessionFile) -> About {
+    About { set: session.set.clone(), ..About::in_scene(&session.scene_file) }
 }
 
 /// Writes a session file.

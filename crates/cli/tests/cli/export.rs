@@ -1,6 +1,6 @@
 //! A recorded run as files of VTK, read back.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::common::{assets, endowire, said};
 use npyz::NpyFile;
@@ -140,4 +140,106 @@ fn a_vessel_that_moves_is_exported_where_it_is_at_the_end_of_each_step() {
     assert!(high[0] > 80.0 && high[1] > high[0] && (high[3] - 86.0).abs() < 1e-9, "{high:?}");
     let series = std::fs::read_to_string(out.join("run.pvd")).unwrap();
     assert!(series.contains("timestep=\"2\" part=\"1\" file=\"vessel_000004.vtp\""), "{series}");
+}
+
+/// A run of the scene in a folder, exported to a file.
+fn exported(folder: &Path, flag: &str, name: &str) -> (PathBuf, PathBuf) {
+    let vessel = assets().join("vessels/curved_tube.stl");
+    let scene = folder.join("scene.toml");
+    std::fs::write(&scene, SCENE.replace("VESSEL", vessel.to_str().unwrap())).unwrap();
+    let (run, out) = (folder.join("run"), folder.join(name));
+    for arguments in [
+        ["run".as_ref(), scene.as_os_str(), "--out".as_ref(), run.as_ref()],
+        ["export".as_ref(), run.as_os_str(), flag.as_ref(), out.as_ref()],
+    ] {
+        let output = endowire().args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    (run, out)
+}
+
+/// Places of the foremost tip after each step, mm.
+fn tips(run: &Path) -> Vec<[f64; 3]> {
+    let mut table = csv::Reader::from_path(run.join("steps.csv")).unwrap();
+    let columns = table.headers().unwrap().clone();
+    let at = |name: &str| columns.iter().position(|column| column == name).unwrap();
+    let places = ["tip_x_mm", "tip_y_mm", "tip_z_mm"].map(at);
+    table.records().map(|row| places.map(|k| row.as_ref().unwrap()[k].parse().unwrap())).collect()
+}
+
+#[test]
+fn a_run_is_an_animation_that_another_reader_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (run, out) = exported(folder.path(), "--gltf", "run.glb");
+    // Read and validated by a crate that knows nothing of ours.
+    let bytes = std::fs::read(&out).unwrap();
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(&bytes).unwrap();
+    let blob = blob.unwrap();
+    let data = |_: gltf::Buffer<'_>| Some(&blob[..]);
+    let names: Vec<&str> = document.meshes().filter_map(|mesh| mesh.name()).collect();
+    assert_eq!(names, ["vessel", "wire", "catheter", "force"]);
+
+    // The first joint of the wire is its tip, in every key; metres, y up.
+    let tips = tips(&run);
+    let skin = document.skins().find(|skin| skin.name() == Some("wire")).unwrap();
+    let tip = skin.joints().next().unwrap().index();
+    let animation = document.animations().next().unwrap();
+    let channel = animation.channels().find(|channel| {
+        let of = channel.target();
+        of.node().index() == tip && of.property() == gltf::animation::Property::Translation
+    });
+    let reader = channel.unwrap().reader(data);
+    let times: Vec<f32> = reader.read_inputs().unwrap().collect();
+    assert!(times.len() == 15 && (times[0] - 0.5).abs() < 1e-6 && times.is_sorted());
+    let Some(gltf::animation::util::ReadOutputs::Translations(places)) = reader.read_outputs() else {
+        panic!("no places")
+    };
+    let places: Vec<[f32; 3]> = places.collect();
+    let off_m = |place: &[f32; 3], tip: &[f64; 3]| {
+        let there = [tip[0] * 1e-3, tip[2] * 1e-3, -tip[1] * 1e-3];
+        place.iter().zip(there).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max)
+    };
+    let worst_m = places.iter().zip(&tips).map(|(place, tip)| off_m(place, tip)).fold(0.0, f64::max);
+    assert!(worst_m < 1e-6, "{worst_m}");
+    let twin_m = places.iter().zip(&tips[1..]).map(|(place, tip)| off_m(place, tip)).fold(0.0, f64::max);
+    assert!(twin_m > 1e-3, "the next step is elsewhere: {twin_m}");
+
+    // Where the joints are at the end, the skin is as it was modelled: a tube of the wire's radius around them.
+    let joints: Vec<[f32; 3]> = skin.joints().map(|joint| joint.transform().decomposed().0).collect();
+    let wire = document.meshes().find(|mesh| mesh.name() == Some("wire")).unwrap();
+    let tube = wire.primitives().next().unwrap();
+    let reader = tube.reader(data);
+    let own: Vec<[u16; 4]> = reader.read_joints(0).unwrap().into_u16().collect();
+    let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+    assert_eq!(skin.reader(data).read_inverse_bind_matrices().unwrap().count(), joints.len());
+    for (position, joint) in positions.iter().zip(&own).take(positions.len() - 1) {
+        let centre = joints[usize::from(joint[0])];
+        let away = position.iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt();
+        assert!((away - 0.2e-3).abs() < 1e-6, "{away}");
+    }
+}
+
+#[test]
+fn a_run_is_curves_with_time_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let (run, out) = exported(folder.path(), "--usd", "run.usda");
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(text.starts_with("#usda 1.0\n") && text.matches('{').count() == text.matches('}').count());
+    let wire = text.split_once("def BasisCurves \"_wire_0\"").unwrap().1;
+    let places = wire.split_once("points.timeSamples = {").unwrap().1.split_once("        }\n").unwrap().0;
+    let last = places.trim_end().lines().last().unwrap();
+    assert_eq!(places.trim().lines().count(), 15);
+    let numbers: Vec<f32> = last
+        .split_once(": ")
+        .unwrap()
+        .1
+        .split(|c: char| !"0123456789.-e".contains(c))
+        .filter_map(|number| number.parse().ok())
+        .collect();
+    let positions: Vec<f32> = recorded(&run, "positions_mm").iter().map(|mm| *mm as f32).collect();
+    assert!(positions.ends_with(&numbers) && numbers.len() > 30);
+    assert!(text.contains("vector3f[] primvars:force_n.timeSamples"));
+    let arguments = ["export".as_ref(), run.as_os_str(), "--usd".as_ref(), "a.txt".as_ref()];
+    let said = said(&endowire().args(arguments).output().unwrap());
+    assert!(said.contains("--usd a.txt: name a file .usda"), "{said}");
 }

@@ -19,5 +19,5 @@ fn every_crate_has_the_licences_and_the_compiler_of_the_workspace() {
         }
         count += 1;
     }
-    assert_eq!(count, 12);
+    assert_eq!(count, 13);
 }

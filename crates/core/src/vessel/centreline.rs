@@ -329,7 +329,8 @@ impl CentrelineTree {
     /// # Errors
     /// [`Error::File`] if writing fails.
     pub fn write(&self, path: &Path, comment: &str) -> Result<()> {
-        std::fs::write(path, self.table(comment)).map_err(|e| Error::file(path, e))
+        crate::file::whole::write_bytes(path, self.table(comment).as_bytes())
+            .map_err(|e| Error::file(path, e))
     }
 
     /// The table as text.

@@ -6,6 +6,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use color_quant::NeuQuant;
+use endowire_core::file::whole::Part;
 use endowire_core::{Error, Result};
 
 #[cfg(feature = "mp4")]
@@ -21,6 +22,8 @@ const BITS: u32 = 6;
 /// Writes frames into an animation as they come.
 pub struct Animation {
     path: PathBuf,
+    /// Under a temporary name until it is complete.
+    part: Part,
     writer: Writer,
     like: Image,
     pace: Pace,
@@ -69,16 +72,19 @@ impl Animation {
         if frames == 0 {
             return Err(Error::parameter("frames", frames, "an animation needs at least one frame"));
         }
-        let writer = match kind(path)? {
+        let kind = kind(path)?;
+        let in_file = |source| Error::file(path, source);
+        let mut part = Part::new(path).map_err(in_file)?;
+        let file = part.file().try_clone().map_err(in_file)?;
+        let writer = match kind {
             Kind::Png => {
                 let failed = |error: png::EncodingError| Error::file(path, std::io::Error::other(error));
-                let mut encoder = like.png_encoder(path)?;
+                let mut encoder = like.png_encoder(file);
                 encoder.set_animated(frames, 0).map_err(failed)?;
                 Writer::Png(encoder.write_header().map_err(failed)?)
             }
             Kind::Gif => {
                 let (width, height) = (like.width() as u16, like.height() as u16);
-                let file = File::create(path).map_err(|source| Error::file(path, source))?;
                 let failed = |error: gif::EncodingError| Error::file(path, std::io::Error::other(error));
                 let mut encoder =
                     gif::Encoder::new(BufWriter::new(file), width, height, &[]).map_err(failed)?;
@@ -86,11 +92,11 @@ impl Animation {
                 Writer::Gif(encoder)
             }
             #[cfg(feature = "mp4")]
-            Kind::Film => Writer::Film(Box::new(
-                Film::new(path, like, 1.0 / pace.mean_s()).map_err(|source| Error::file(path, source))?,
-            )),
+            Kind::Film => {
+                Writer::Film(Box::new(Film::new(file, like, 1.0 / pace.mean_s()).map_err(in_file)?))
+            }
         };
-        Ok(Self { path: path.to_path_buf(), writer, like: like.clone(), pace, pushed: 0 })
+        Ok(Self { path: path.to_path_buf(), part, writer, like: like.clone(), pace, pushed: 0 })
     }
 
     /// Adds a frame.
@@ -128,7 +134,7 @@ impl Animation {
     /// # Errors
     /// [`Error::File`] if that fails.
     pub fn finish(self) -> Result<()> {
-        let Self { path, writer, .. } = self;
+        let Self { path, part, writer, .. } = self;
         let finished = match writer {
             Writer::Png(writer) => writer.finish().map_err(std::io::Error::other),
             Writer::Gif(encoder) => match encoder.into_inner() {
@@ -138,7 +144,7 @@ impl Animation {
             #[cfg(feature = "mp4")]
             Writer::Film(film) => film.finish(),
         };
-        finished.map_err(|error| Error::file(&path, error))
+        finished.and_then(|()| part.finish()).map_err(|error| Error::file(&path, error))
     }
 }
 

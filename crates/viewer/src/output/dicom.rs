@@ -5,12 +5,14 @@
 //! Identifiers are hashes of pixels and geometry, so equal frames give equal files and different ones different
 //! identifiers; a simulation has no study date.
 
+use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 use dicom_core::value::DataSetSequence;
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR, smallvec::SmallVec};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
+use endowire_core::file::whole::Part;
 use endowire_core::{Error, Result};
 
 use super::{Image, Pace, PixelFormat};
@@ -83,7 +85,13 @@ impl Angiogram<'_> {
             .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
             .media_storage_sop_class_uid(uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);
         let file = object.with_meta(meta).map_err(|e| failed(&e))?;
-        file.write_to_file(path).map_err(|e| failed(&e))
+        let in_file = |error| Error::file(path, error);
+        let mut part = Part::new(path).map_err(in_file)?;
+        let mut bytes = BufWriter::new(part.file());
+        file.write_all(&mut bytes).map_err(|e| failed(&e))?;
+        bytes.flush().map_err(in_file)?;
+        drop(bytes);
+        part.finish().map_err(in_file)
     }
 
     /// A hash of pixels, geometry and other data.

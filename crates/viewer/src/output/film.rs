@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Error, Result, Seek, SeekFrom, Write};
-use std::path::Path;
 
 use openh264::OpenH264API;
 use openh264::encoder::{Encoder, EncoderConfig, FrameRate, FrameType, RateControlMode};
@@ -39,7 +38,7 @@ struct Sample {
 }
 
 impl Film {
-    pub(super) fn new(path: &Path, like: &Image, frames_per_s: f64) -> Result<Self> {
+    pub(super) fn new(file: File, like: &Image, frames_per_s: f64) -> Result<Self> {
         // Colours are coded for two by two pixels.
         let size = [like.width(), like.height()].map(|side| side.next_multiple_of(2) as usize);
         let config = EncoderConfig::new()
@@ -50,7 +49,7 @@ impl Film {
             // The same film on every machine.
             .num_threads(1);
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config).map_err(Error::other)?;
-        let mut file = BufWriter::new(File::create(path)?);
+        let mut file = BufWriter::new(file);
         file.write_all(&boxed(b"ftyp", &[&b"isom\0\0\x02\0isomiso2avc1mp41"[..]]))?;
         file.write_all(&[0, 0, 0, 0])?;
         file.write_all(b"mdat")?;

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter};
 use std::path::Path;
 
+use endowire_core::file::whole::Part;
 use endowire_core::{Error, Result};
 
 /// How a pixel of an [`Image`] is stored.
@@ -115,7 +116,7 @@ impl Image {
         Self { width, height, format: PixelFormat::Rgba8, data }
     }
 
-    /// Writes the image as a PNG file.
+    /// Writes the image as a PNG file, completely or not at all.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a name that ends like that of another kind of picture; [`Error::File`] naming `path` if
@@ -124,9 +125,13 @@ impl Image {
         let path = path.as_ref();
         check_png_name(path)?;
         let failed = |error| Error::file(path, std::io::Error::other(error));
-        let mut writer = self.png_encoder(path)?.write_header().map_err(failed)?;
+        let in_file = |error| Error::file(path, error);
+        let mut part = Part::new(path).map_err(in_file)?;
+        let mut writer =
+            self.png_encoder(part.file().try_clone().map_err(in_file)?).write_header().map_err(failed)?;
         writer.write_image_data(&self.data).map_err(failed)?;
-        writer.finish().map_err(failed)
+        writer.finish().map_err(failed)?;
+        part.finish().map_err(in_file)
     }
 
     /// Reads a file written by [`Image::write_png`].
@@ -152,8 +157,7 @@ impl Image {
     }
 
     /// An encoder for images of this format.
-    pub(super) fn png_encoder(&self, path: &Path) -> Result<png::Encoder<'static, BufWriter<File>>> {
-        let file = File::create(path).map_err(|source| Error::file(path, source))?;
+    pub(super) fn png_encoder(&self, file: File) -> png::Encoder<'static, BufWriter<File>> {
         let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
         let (colour, depth) = match self.format {
             PixelFormat::Gray8 => (png::ColorType::Grayscale, png::BitDepth::Eight),
@@ -164,7 +168,7 @@ impl Image {
         encoder.set_compression(png::Compression::Fast);
         encoder.set_color(colour);
         encoder.set_depth(depth);
-        Ok(encoder)
+        encoder
     }
 }
 

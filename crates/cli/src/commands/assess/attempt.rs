@@ -6,14 +6,14 @@ use std::sync::Arc;
 use endowire_assess::{Metric, Record, Score, SessionFile, Subject, Way};
 use endowire_core::device::Stack;
 use endowire_methods::Scene;
+use endowire_recording::About;
 
 use super::verified;
 use crate::args::AssessArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::recording::RecordedSummary;
-use crate::output::tell;
+use crate::output::{session as session_file, tell};
 use crate::{scenes, subjects};
 
 /// Why a session is left out.
@@ -63,14 +63,14 @@ impl<'a> Places<'a> {
     }
 
     /// Index of the scene of a session; the scene is read if necessary.
-    fn find(&mut self, summary: &RecordedSummary) -> Result<usize, Failure> {
-        let path = self.given.unwrap_or(&summary.scene_file);
-        let known = self.all.iter().position(|one| one.path == path && one.set == summary.set);
+    fn find(&mut self, about: &About) -> Result<usize, Failure> {
+        let path = self.given.or(about.scene_file.as_deref());
+        let known = self.all.iter().position(|one| Some(&*one.path) == path && one.set == about.set);
         if let Some(known) = known {
             return Ok(known);
         }
-        let (path, scene) = scenes::of_recording(summary, self.given, &[])?;
-        Ok(self.add(Place { path, set: summary.set.clone(), scene }))
+        let (path, scene) = scenes::of_recording(about, self.given, &[])?;
+        Ok(self.add(Place { path, set: about.set.clone(), scene }))
     }
 
     /// The instruments of a scene.
@@ -116,8 +116,8 @@ pub(super) fn measured(
     (session, of_file): Given<'_>,
     places: &mut Places<'_>,
 ) -> Result<Attempt, Failure> {
-    let (summary, recorded_unix_s) = (RecordedSummary::of_session(&of_file), of_file.recorded_unix_s);
-    let place = places.find(&summary)?;
+    let (about, recorded_unix_s) = (session_file::about(&of_file), of_file.recorded_unix_s);
+    let place = places.find(&about)?;
     let record = of_file.record;
     let refused = |error| Failure::from(error).at(session.display());
     record.check_in(&places.stack(place)?).map_err(refused)?;

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use endowire_recording::STEPS;
+
 use crate::failure::Failure;
 
-/// A file in every folder of a run.
-const STEPS: &str = "steps.csv";
 /// Ending of session files.
 const ENDING: &str = ".session.json";
 

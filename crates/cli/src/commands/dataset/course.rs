@@ -8,6 +8,7 @@ use endowire_core::insertion::{DetachedCoil, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::{Key, Scene, Setting};
+use endowire_recording::InjectionRow;
 use endowire_viewer::{ContactView, Mode, Pushed, Renderer, View, ViewSpec};
 use serde_json::{Map, Value};
 
@@ -15,7 +16,7 @@ use super::shot;
 use super::spec::Spec;
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::injections::Injected;
+use crate::output::frames::flowing;
 use crate::output::tell;
 use crate::scenes;
 
@@ -89,7 +90,7 @@ impl Course {
                 displacement: simulation.displacement(),
             });
             let step = run.next(&simulation)?.map(Step::into_owned);
-            injected.extend(Injected::begun(&run, injected.len(), view.frames_per_s, &simulation));
+            injected.extend(InjectionRow::begun(&run, injected.len(), view.frames_per_s, &simulation));
             let Some(next) = step else { break };
             if let Err(error) = next.carry_out(&mut simulation) {
                 let step = moments.len();
@@ -107,7 +108,7 @@ impl Course {
             tell(format_args!("endowire: {}: {remarks}", file.display()));
         }
         scenes::let_medium_flow(&mut view, &scene, cache).map_err(failed)?;
-        view.injection.extend(injected.iter().map(Injected::spec));
+        view.injection.extend(injected.iter().map(flowing));
         scenes::tell_found(file, &scene);
         view.validate().map_err(failed)?;
         let views = shot::planes(spec, &view, first);

@@ -13,6 +13,7 @@ mod spec;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use endowire_recording::{Claim, lock_folder};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
@@ -20,9 +21,8 @@ use serde_json::Value;
 use crate::args::DatasetArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::folder::{Claim, claim_dataset, refuse_recording};
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::{print_json, progress, tell, to_json, whole};
+use crate::output::{in_folder, print_json, progress, refuse_recording, tell, to_json, whole};
 use crate::scenes;
 use coco::{Annotation, Category, ImageRow, categories};
 use course::Course;
@@ -165,6 +165,12 @@ fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
 /// Folders of a dataset, and the file of all annotations.
 const FOLDERS: [&str; 3] = ["images", "arrays", "parts"];
 const ANNOTATIONS: &str = "annotations.json";
+/// The file that tells whose folder it is.
+const MARK: &str = "dataset.json";
+
+/// Why a folder is not free.
+const TAKEN: &str =
+    "another endowire dataset is drawing into this folder: wait until it has ended, or give another folder";
 
 /// Claims a folder for a dataset until the claim is dropped; it is refused while another call draws into it.
 fn claim(provenance: &Provenance, folder: &Path) -> Result<Claim, Failure> {
@@ -172,14 +178,16 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<Claim, Failure> {
     check(provenance, folder)?;
     let made = FOLDERS.iter().try_for_each(|name| std::fs::create_dir_all(folder.join(name)));
     made.map_err(|e| Failure::write(folder, &e))?;
-    let claim = claim_dataset(folder)?;
+    let claim = lock_folder(folder, TAKEN).map_err(in_folder)?;
     // What a call that was killed has left unfinished.
-    let tidied =
-        FOLDERS.iter().try_for_each(|name| whole::remove_unfinished_in(&folder.join(name), |_| true));
+    let tidied = FOLDERS
+        .iter()
+        .try_for_each(|name| whole::remove_unfinished_in(&folder.join(name), |_| true))
+        .and_then(|()| whole::remove_unfinished_in(folder, |name| name == ANNOTATIONS || name == MARK));
     tidied.map_err(|e| Failure::write(folder, &e))?;
     // Another call may have been faster.
     check(provenance, folder)?;
-    let (path, reported) = (folder.join("dataset.json"), to_json(provenance)?);
+    let (path, reported) = (folder.join(MARK), to_json(provenance)?);
     if !path.exists() {
         whole::write_bytes(&path, reported.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
     }
@@ -189,7 +197,7 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<Claim, Failure> {
 /// Refuses a folder that contains another dataset, or foreign files with names of a dataset.
 fn check(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     refuse_recording(folder)?;
-    if let Ok(text) = std::fs::read_to_string(folder.join("dataset.json")) {
+    if let Ok(text) = std::fs::read_to_string(folder.join(MARK)) {
         let there: Value = serde_json::from_str(&text).unwrap_or_default();
         if there["scene_hash"] != provenance.scene_hash() {
             return Err(Failure::Input(format!(
@@ -209,7 +217,7 @@ fn check(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
 
 /// The first path of a dataset that already exists in a folder which is not a dataset.
 fn taken(folder: &Path) -> Option<PathBuf> {
-    let mut places = FOLDERS.iter().chain([&ANNOTATIONS, &"dataset.json"]).map(|name| folder.join(name));
+    let mut places = FOLDERS.iter().chain([&ANNOTATIONS, &MARK]).map(|name| folder.join(name));
     let is_taken = |path: &PathBuf| match std::fs::read_dir(path) {
         Ok(mut entries) => entries.next().is_some(),
         Err(_) => path.symlink_metadata().is_ok(),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
+use endowire_recording::npz::{Array, write_arrays};
 use endowire_viewer::{FrameTime, Labels, Moment, Seen, ViewSpec};
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +12,6 @@ use super::course::Course;
 use super::draw::{Draw, What};
 use super::spec::Spec;
 use crate::failure::Failure;
-use crate::output::npz::{Array, write_arrays};
 use crate::output::whole;
 
 /// The list of a shot's files, kept until the dataset is complete.

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use endowire_assess::{SCHEMA, SessionFile};
 use endowire_methods::Setting;
 use endowire_play::{Session, Went, script_head};
+use endowire_recording::{Claim, lock_file};
 
 use crate::failure::Failure;
-use crate::output::folder::{self, Claim};
 use crate::output::provenance::Provenance;
 use crate::output::{session as session_file, tell, to_json, whole};
 use crate::subjects::ScoreDocument;
@@ -37,6 +37,16 @@ pub(crate) struct Record {
     _claim: Claim,
 }
 
+/// Why a file is not free.
+const TAKEN: &str = "another session is being recorded there: wait until it has ended, or give another file";
+
+fn taken(error: endowire_core::Error) -> Failure {
+    match error {
+        endowire_core::Error::File { path, source } => Failure::write(&path, &source),
+        other => Failure::Input(format!("--record {other}")),
+    }
+}
+
 impl Record {
     /// A record at `path` of a session in a scene with these settings. Its folder is created, and no other session can
     /// record there meanwhile.
@@ -52,7 +62,7 @@ impl Record {
             saved: Instant::now(),
             saving: None,
             cleared: false,
-            _claim: folder::claim_file(&path)?,
+            _claim: lock_file(&path, TAKEN).map_err(taken)?,
             path,
         })
     }
@@ -91,6 +101,10 @@ impl Record {
         if !std::mem::replace(&mut self.cleared, true) {
             for file in [session_file::beside(&self.path), self.score_file()] {
                 whole::remove(&file).map_err(|e| Failure::write(&file, &e))?;
+            }
+            // What a session that was killed was writing.
+            for file in [&self.path, &session_file::beside(&self.path), &self.score_file()] {
+                whole::remove_unfinished(file).map_err(|e| Failure::write(file, &e))?;
             }
         }
         let text = format!("{}{}", self.head, session.script());

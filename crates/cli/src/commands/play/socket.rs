@@ -2,13 +2,15 @@
 //! can send requests to any port of the machine on which they are shown, and so can its other users; they do not know
 //! the token.
 
+use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::io::{self, BufRead, BufReader, Read, Write};
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::{IpAddr, Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::path::{Component, Path, PathBuf};
 use std::str::FromStr;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::lines::{self, Line, Order};
@@ -20,7 +22,7 @@ use crate::output::tell;
 const TOKEN_BYTES: usize = 16;
 /// Length limit of the first line, bytes: the token as hexadecimal digits and a line break.
 const LONGEST_TOKEN: u64 = 2 * TOKEN_BYTES as u64 + 2;
-/// Largest number of simultaneous connections.
+/// Largest number of simultaneous connections that have sent the token, and of those that have not yet.
 const MOST: usize = 64;
 /// Time limit for sending the token. Each connection occupies a thread.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -64,17 +66,64 @@ pub(super) fn listen(address: SocketAddr, folder: &Path, to: &Sender<Message>) -
     tell(format_args!("endowire: listens at {}", listener.local_addr().map_err(failed)?));
     tell(format_args!("endowire: the first line of a connection is {token}"));
     let (token, folder, to): (Arc<str>, Arc<Path>, _) = (token.into(), folder.into(), to.clone());
+    let silent = Arc::new(Silent::default());
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let (token, folder, to) = (Arc::clone(&token), Arc::clone(&folder), to.clone());
-            // Each connection has a clone of the token beside that of this thread. Connections beyond the limit, or
-            // without a thread, are closed.
-            if Arc::strong_count(&token) <= MOST + 1 {
-                let _ = std::thread::Builder::new().spawn(move || serve(stream, &token, &folder, &to));
-            }
+            let waiting = silent.add(&stream);
+            // A connection without a thread is closed.
+            let _ = std::thread::Builder::new()
+                .spawn(move || waiting.map(|waiting| serve(stream, waiting, &token, &folder, &to)));
         }
     });
     Ok(())
+}
+
+/// Connections that have not sent the token yet, oldest first. Beyond the limit the oldest is closed, so that clients
+/// who say nothing keep nobody out.
+#[derive(Default)]
+struct Silent {
+    streams: Mutex<VecDeque<(u64, TcpStream)>>,
+    /// Number of all connections so far.
+    count: AtomicU64,
+    /// Those that have sent it, each with a clone.
+    open: Arc<()>,
+}
+
+/// A connection among the silent ones.
+struct Waiting {
+    silent: Arc<Silent>,
+    number: u64,
+}
+
+impl Silent {
+    fn add(self: &Arc<Self>, stream: &TcpStream) -> io::Result<Waiting> {
+        let mut streams = self.streams.lock().unwrap_or_else(PoisonError::into_inner);
+        if streams.len() >= MOST
+            && let Some((_, oldest)) = streams.pop_front()
+        {
+            let _ = oldest.shutdown(Shutdown::Both);
+        }
+        let number = self.count.fetch_add(1, Ordering::Relaxed);
+        streams.push_back((number, stream.try_clone()?));
+        Ok(Waiting { silent: Arc::clone(self), number })
+    }
+}
+
+impl Waiting {
+    /// It has sent the token: a place among those who have, if one is free.
+    fn opens(self) -> Option<Arc<()>> {
+        let place = Arc::clone(&self.silent.open);
+        // One is that of the list.
+        (Arc::strong_count(&place) <= MOST + 1).then_some(place)
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        let mut streams = self.silent.streams.lock().unwrap_or_else(PoisonError::into_inner);
+        streams.retain(|(number, _)| *number != self.number);
+    }
 }
 
 fn token() -> io::Result<String> {
@@ -88,13 +137,19 @@ fn token() -> io::Result<String> {
 }
 
 /// Answers one client until it disconnects; the session continues.
-fn serve(stream: TcpStream, token: &str, folder: &Path, to: &Sender<Message>) {
+fn serve(stream: TcpStream, waiting: Waiting, token: &str, folder: &Path, to: &Sender<Message>) {
     let Ok(mut back) = stream.try_clone() else { return };
     let mut lines = BufReader::new(stream);
     // One packet per line: several small writes would be delayed by about 0.05 s.
     let mut answer = |line: &str| back.write_all(format!("{line}\n").as_bytes()).is_ok();
     match opened(&mut lines, token) {
-        Ok(true) => lines::read(lines, to, |line| confined(line, folder), answer),
+        Ok(true) => match waiting.opens() {
+            Some(_place) => lines::read(lines, to, |line| confined(line, folder), answer),
+            None => {
+                let error = format!("{MOST} clients are connected: close one of them");
+                answer(&serde_json::json!({ "ok": false, "error": error }).to_string());
+            }
+        },
         Ok(false) => {
             let error =
                 "the first line must be the token that endowire play has printed on its standard error";
@@ -164,6 +219,27 @@ mod tests {
             std::os::unix::fs::symlink("/tmp/elsewhere.png", folder.path().join("link.png")).unwrap();
             assert!(place("link.png").is_err());
         }
+    }
+
+    #[test]
+    fn who_says_nothing_keeps_nobody_out() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let silent = Arc::new(Silent::default());
+        let mut ends: Vec<(TcpStream, TcpStream, Waiting)> = Vec::new();
+        for _ in 0..MOST + 1 {
+            let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+            let (stream, _) = listener.accept().unwrap();
+            let waiting = silent.add(&stream).unwrap();
+            ends.push((client, stream, waiting));
+        }
+        // The oldest is closed, the newest waits and gets a place.
+        assert_eq!(ends[0].0.read(&mut [0]).unwrap(), 0);
+        ends[1].0.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+        assert!(ends[1].0.read(&mut [0]).is_err(), "the twin");
+        assert_eq!(silent.streams.lock().unwrap().len(), MOST);
+        let places: Vec<_> = ends.into_iter().map(|(.., waiting)| waiting.opens()).collect();
+        assert!(places[..MOST].iter().all(Option::is_some) && places[MOST].is_none());
+        assert!(silent.streams.lock().unwrap().is_empty());
     }
 
     #[test]

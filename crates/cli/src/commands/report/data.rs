@@ -5,13 +5,11 @@ use std::path::Path;
 use endowire_core::device::Stack;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
-use endowire_report::{Event, Frame, MOST_NODES, Moment, Row, Run, Series, Vessel, base64, setup};
-use endowire_sweep::{EndedBy, UntilOutcome};
+use endowire_recording::{EndedBy, Lengths, Recording, SUMMARY, StepRow, UntilOutcome};
+use endowire_report::{Event, Frame, MOST_NODES, Moment, Run, Series, Vessel, base64, setup};
 use serde_json::Value;
 
 use crate::failure::Failure;
-use crate::output::instruments::Lengths;
-use crate::output::recording::Recording;
 
 /// Largest total size of all frames in bytes, and largest number of frames.
 const MOST_FRAME_BYTES: usize = 2_000_000;
@@ -25,11 +23,11 @@ pub(super) fn collect(
     stack: &Stack,
     vessel: &SurfaceMesh,
 ) -> Result<Run, Failure> {
-    let path = folder.join("summary.json");
+    let path = folder.join(SUMMARY);
     // Without a valid summary, the rest is still shown.
     let summary = std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let summary: Value = summary.unwrap_or(Value::Null);
-    let rows = rows(folder)?;
+    let rows = recording.rows()?;
     Ok(Run {
         instruments: stack.instruments().iter().map(|one| one.name.clone()).collect(),
         vessel: Vessel::of(vessel),
@@ -41,14 +39,6 @@ pub(super) fn collect(
         others: vec![],
         summary,
     })
-}
-
-fn rows(folder: &Path) -> Result<Vec<Row>, Failure> {
-    let path = folder.join("steps.csv");
-    let unreadable = |e: csv::Error| Failure::Input(format!("{}: {e}", path.display()));
-    let mut reader = csv::Reader::from_path(&path).map_err(unreadable)?;
-    // The last row of a killed run may be incomplete.
-    Ok(reader.deserialize().map_while(Result::ok).collect())
 }
 
 /// Shapes of all steps, or of as many as fit, including the last.
@@ -69,7 +59,7 @@ fn steps(folder: &Path, recording: &Recording, stack: &Stack) -> Result<Vec<Mome
         .collect()
 }
 
-fn events(rows: &[Row], summary: &Value) -> Vec<Event> {
+fn events(rows: &[StepRow], summary: &Value) -> Vec<Event> {
     let mut events = endowire_report::events(rows);
     if let (Some(step), Some(reason)) =
         (summary["failure"]["step"].as_u64(), summary["failure"]["reason"].as_str())

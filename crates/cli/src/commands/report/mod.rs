@@ -6,12 +6,12 @@ mod tables;
 
 use std::path::Path;
 
+use endowire_recording::STEPS;
 use endowire_report::{Run, run_page, tables_page};
 
 use crate::args::ReportArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::recording::Recording;
 use crate::output::{tell, whole};
 use crate::scenes;
 
@@ -28,7 +28,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
         }
         // An experiment leaves tables and no shapes.
         Err(failure) => match tables::collect(first)? {
-            Some(tables) if !first.join("steps.csv").exists() && others.is_empty() => tables_page(&tables),
+            Some(tables) if !first.join(STEPS).exists() && others.is_empty() => tables_page(&tables),
             _ => return Err(failure),
         },
     };
@@ -42,15 +42,15 @@ pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
 
 /// The page data of a recorded run.
 fn run(args: &ReportArgs, dir: &Path) -> Result<Run, Failure> {
-    let recording = Recording::read(dir, args.scene.as_deref())?;
+    let recording = scenes::recording(dir, args.scene.as_deref())?;
     if recording.steps() == 0 {
         let text = "the run has recorded no step; run its scene again (endowire run)";
         return Err(Failure::Input(text.to_owned()).at(dir.display()));
     }
     scenes::check_recorded(&args.set)?;
     let given = args.scene.as_deref();
-    let (path, scene) = scenes::of_recording(&recording.summary, given, &args.set)?;
-    let other = scenes::other_than_recorded(&recording.summary, dir, given, &path)?;
+    let (path, scene) = scenes::of_recording(recording.about(), given, &args.set)?;
+    let other = scenes::other_than_recorded(recording.about(), dir, given, &path)?;
     if let Some(other) = &other {
         tell(format_args!("endowire: {other}"));
     }

@@ -7,16 +7,19 @@ use std::time::Instant;
 use endowire_core::insertion::{Move, Script, ScriptRun, Simulation, Step};
 use endowire_core::methods::MethodChoice;
 use endowire_methods::Scene;
-use endowire_sweep::{EndedBy, RunOutcome, StepFailure};
+use endowire_recording::{EndedBy, InjectionRow, Recorder, RunOutcome, StepFailure, VERSION};
+use endowire_viewer::Exposure;
 use indicatif::ProgressBar;
 
 use super::reported::live;
 use crate::failure::Failure;
 use crate::output::frames::{Drawn, FrameWriter};
-use crate::output::injections::{self, Injected};
+use crate::output::in_folder;
 use crate::output::provenance::Provenance;
-use crate::output::recorder::{Recorder, Summary};
 use crate::output::saved::{Course, Saver};
+
+/// The summary of a run with pictures.
+pub(super) type Summary = endowire_recording::Summary<Exposure>;
 
 /// The state of a run.
 pub(super) struct SoFar<'a> {
@@ -40,21 +43,22 @@ impl SoFar<'_> {
         let steps = (recorder.steps(), self.script.len());
         let failure = self.failure.clone();
         Summary {
-            provenance: self.provenance.clone(),
+            schema: VERSION,
+            provenance: self.provenance.recorded(),
             complete: false,
             scene: self.scene.name.clone(),
-            scene_file: anywhere(self.scene_file),
+            scene_file: Some(anywhere(self.scene_file)),
             script_file: self.script_file.map(anywhere),
-            method: self.scene.method.name(),
+            method: self.scene.method.name().to_owned(),
             centreline_found: self.scene.finds_centreline(),
-            start_mm: recorder.start_mm,
+            start_mm: recorder.start_mm(),
             outcome: RunOutcome::new(&self.simulation, &self.hand, steps, tally, failure),
             packing: recorder.packed(),
             step_time_s,
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),
             planes: self.frames.planes(),
-            frames: recorder.frames.clone(),
+            frames: recorder.frames().to_vec(),
             film: None,
         }
     }
@@ -123,7 +127,7 @@ impl Going<'_> {
     /// Records the state before the first step.
     pub(super) fn begin(&mut self) -> Result<(), Failure> {
         self.inject();
-        injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
+        InjectionRow::write(self.recorder.folder(), &self.so_far.course.injected).map_err(in_folder)?;
         self.checkpoint()?;
         self.save()
     }
@@ -178,11 +182,11 @@ impl Going<'_> {
     }
 
     fn record(&mut self, moves: &[Move], time_s: f64, last: bool) -> Result<(), Failure> {
-        self.recorder.record(moves, time_s, &self.so_far.simulation)?;
+        self.recorder.record(moves, time_s, &self.so_far.simulation).map_err(in_folder)?;
         self.so_far.course.steps += 1;
         self.so_far.draw((self.so_far.course.steps, time_s), last, &mut self.recorder)?;
         if self.inject() {
-            injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
+            InjectionRow::write(self.recorder.folder(), &self.so_far.course.injected).map_err(in_folder)?;
         }
         self.checkpoint()?;
         if self.saver.as_ref().is_some_and(Saver::is_due) { self.save() } else { Ok(()) }
@@ -191,7 +195,7 @@ impl Going<'_> {
     /// Adds the injections that begin at the end of the last step; returns whether there are any.
     fn inject(&mut self) -> bool {
         let SoFar { hand, simulation, frames, course, .. } = &mut self.so_far;
-        let begun = Injected::begun(hand, course.injected.len(), frames.frames_per_s(), simulation);
+        let begun = InjectionRow::begun(hand, course.injected.len(), frames.frames_per_s(), simulation);
         begun.iter().for_each(|one| frames.inject(one));
         let any = !begun.is_empty();
         course.injected.extend(begun);
@@ -200,13 +204,13 @@ impl Going<'_> {
 
     fn checkpoint(&mut self) -> Result<(), Failure> {
         let so_far = &self.so_far;
-        self.recorder.checkpoint(|recorder| so_far.summary(recorder))
+        self.recorder.checkpoint(|recorder| so_far.summary(recorder)).map_err(in_folder)
     }
 
     fn save(&mut self) -> Result<(), Failure> {
         let Some(saver) = &mut self.saver else { return Ok(()) };
         let SoFar { simulation, script, hand, course, .. } = &self.so_far;
-        saver.save(simulation, (script, hand.course()), course, || self.recorder.sync())
+        saver.save(simulation, (script, hand.course()), course, || self.recorder.sync().map_err(in_folder))
     }
 
     /// Writes the remaining data.
@@ -219,8 +223,13 @@ impl Going<'_> {
         }
         let mut summary = self.so_far.summary(&self.recorder);
         let film = self.so_far.frames.film(&self.recorder).map(|film| summary.film = film);
-        let written =
-            self.recorder.finish(&mut summary).and(saved).and(film).map_err(Failure::into_computation);
+        let written = self
+            .recorder
+            .finish(&mut summary)
+            .map_err(in_folder)
+            .and(saved)
+            .and(film)
+            .map_err(Failure::into_computation);
         Ended { summary, simulation: self.so_far.simulation, written }
     }
 }

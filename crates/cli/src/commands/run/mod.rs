@@ -10,19 +10,16 @@ use std::time::Instant;
 
 use endowire_core::insertion::{Simulation, Step};
 
+use endowire_methods::Scene;
+use endowire_recording::{Among, InjectionRow, Lengths, RecordedVessel, Recorder, Recording};
+
 use crate::args::RunArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::injections::Injected;
-use crate::output::instruments::Lengths;
-use crate::output::provenance::Provenance;
-use crate::output::recorder::Recorder;
-use crate::output::recording::Recording;
-use crate::output::saved::{Course, Saved, Saver};
-use endowire_methods::Scene;
-
 use crate::output::frames::{Drawn, FrameWriter};
-use crate::output::{progress, tell, vessel, whole};
+use crate::output::provenance::Provenance;
+use crate::output::saved::{Course, Saved, Saver};
+use crate::output::{in_folder, progress, record_anew, tell, whole};
 use crate::scenes;
 use going::{Going, SoFar};
 
@@ -71,19 +68,21 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let course = saved.map_or_else(Course::begin, |saved| saved.course());
     let mut recorder = if resume.is_some() {
-        let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
+        let among = if args.force { Among::OtherFiles } else { Among::Nothing };
+        let (mut recorder, earlier) =
+            Recorder::go_on(&folder, among, course.steps, &simulation).map_err(in_folder)?;
         let times = (times_s.as_slice(), next.is_none());
         let seen = (earlier.as_ref(), course.injected.as_slice());
         draw_again(&mut frames, (&scene, &cache), seen, (&folder, &simulation), times, &mut recorder)?;
         recorder
     } else {
-        let recorder = Recorder::new(&folder, args.force, &simulation)?;
+        let recorder = record_anew(&folder, args.force, &simulation)?;
         if let Some(path) = &args.save_state {
             forget_state(path)?;
         }
         recorder
     };
-    recorder.pack(sac, &simulation)?;
+    recorder.pack(sac, &simulation).map_err(in_folder)?;
 
     // From here on data are recorded and must be kept, whatever happens.
     let so_far = SoFar {
@@ -133,7 +132,7 @@ fn forget_state(path: &Path) -> Result<(), Failure> {
 fn draw_again(
     frames: &mut FrameWriter,
     (scene, cache): (&Scene, &Cache),
-    (earlier, injected): (Option<&Recording>, &[Injected]),
+    (earlier, injected): (Option<&Recording>, &[InjectionRow]),
     (folder, simulation): (&Path, &Simulation),
     (times_s, ended): (&[f64], bool),
     recorder: &mut Recorder,
@@ -150,7 +149,7 @@ fn draw_again(
     };
     let before = recorder.steps() - earlier.steps();
     let lengths = Lengths::read(folder, simulation.stack())?;
-    let vessel = vessel::Recorded::read(folder, scene, simulation.lumen(), cache)?;
+    let vessel = RecordedVessel::read(folder, scene, simulation.lumen(), cache)?;
     for row in 1..=earlier.steps() {
         let step = before + row;
         let shape = earlier.shape(row);

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use endowire_core::insertion::{Met, Simulation, StepReport, Tally};
-use endowire_sweep::{EndedBy, RunOutcome, StepFailure};
+use endowire_recording::{EndedBy, RunOutcome, StepFailure};
 
-use super::going::Ended;
+use super::going::{Ended, Summary};
 use crate::args::RunArgs;
 use crate::failure::Failure;
-use crate::output::recorder::Summary;
 use crate::output::{print_json, tell};
 use crate::scenes::check_converged;
 

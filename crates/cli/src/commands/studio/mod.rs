@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use endowire_core::insertion::Tally;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
+use endowire_recording::npz::write_map;
 use endowire_viewer::{
     Animation, DeviceView, Frames, InjectionSpec, Labels, Mask, Mode, Moment, Pace, PathLengths, Pushed,
     Renderer, Seen, View, ViewSpec,
@@ -19,7 +20,6 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::frames::tomogram_holds;
 use crate::output::manifest::Manifest;
-use crate::output::npz::write_map;
 use crate::output::{print_json, tell, to_json, whole};
 use crate::scenes;
 use plane::{Plane, write_dicom};

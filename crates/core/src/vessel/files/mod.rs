@@ -155,7 +155,7 @@ impl SurfaceMesh {
                 return Err(Error::content(path, format!("this format is read, not written; {WRITTEN}")));
             }
         };
-        std::fs::write(path, bytes).map_err(|e| Error::file(path, e))
+        crate::file::whole::write_bytes(path, &bytes).map_err(|e| Error::file(path, e))
     }
 }
 

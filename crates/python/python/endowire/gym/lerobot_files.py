@@ -24,9 +24,15 @@ INFO, STATS, TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet"
 
 
 def part(path: Path) -> Path:
-    """The name of a file until it is finished; its folder is created."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """The name of a file until it is finished."""
     return path.with_name(f"{_HIDDEN}{path.name}{_PART}")
+
+
+def begin(path: Path) -> Path:
+    """The name of a file that begins; its folder is created, and what has this name is removed: no link is followed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part(path).unlink(missing_ok=True)
+    return part(path)
 
 
 def finish(path: Path) -> None:
@@ -38,13 +44,13 @@ def finish(path: Path) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Writes a JSON file."""
-    part(path).write_text(json.dumps(value, indent=4), encoding="utf-8")
+    begin(path).write_text(json.dumps(value, indent=4), encoding="utf-8")
     finish(path)
 
 
 def write_table(path: Path, table: pyarrow.Table) -> None:
     """Writes a Parquet file."""
-    pyarrow.parquet.write_table(table, part(path))
+    pyarrow.parquet.write_table(table, begin(path))
     finish(path)
 
 

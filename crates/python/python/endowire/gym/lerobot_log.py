@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from .. import InputError
 from .lerobot_files import CHUNK, FILE, INFO, STATS, TASKS
-from .lerobot_files import drop_unfinished, finish, known, part, write_json, write_table
+from .lerobot_files import begin, drop_unfinished, finish, known, write_json, write_table
 from .lerobot_numbers import LEVELS, Numbers, from_lists, of_levels, of_rows, together
 from .logs import watched
 
@@ -180,7 +180,7 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Adds a picture to a film."""
         if key not in self._writers:
             path = self._file(f"videos/{{video_key}}/{FILE}.mp4", video_key=key)
-            film = av.open(part(path), "w", format="mp4")
+            film = av.open(begin(path), "w", format="mp4")
             stream = film.add_stream(_CODEC, rate=self._fps, options=_OPTIONS)
             stream.height, stream.width = picture.shape
             stream.pix_fmt = "yuv420p"

@@ -1,4 +1,7 @@
-//! Input files: regular files of bounded size, or data in memory for programs without a file system.
+//! Files. Input files are regular files of bounded size, or data in memory for programs without a file system; files are
+//! written by [`whole`], completely or not at all.
+
+pub mod whole;
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;

@@ -7,41 +7,53 @@ use std::path::{Path, PathBuf};
 use endowire_core::device::Stack;
 use endowire_core::insertion::{Move, Simulation};
 use endowire_core::shape::Shape;
-use serde::{Deserialize, Serialize};
+use endowire_core::{Error, Result};
 
-use super::step_table::StepTable;
-use crate::failure::Failure;
+use crate::columns::columns;
+use crate::table::{self, StepTable};
 
 /// The table.
-pub(crate) const INSTRUMENTS: &str = "instruments.csv";
+pub const INSTRUMENTS: &str = "instruments.csv";
 
-/// A row of the table.
-#[derive(Debug, Serialize, Deserialize)]
-struct Row {
-    step: usize,
-    instrument: String,
-    advance_mm: f64,
-    rotate_rad: f64,
-    inserted_mm: f64,
-    rotation_rad: f64,
-    #[serde(default)]
-    mouth_rotation_rad: f64,
-    tip_rotation_rad: f64,
-    /// Value to which it is steered.
-    #[serde(default)]
-    steer: f64,
-    tip_x_mm: Option<f64>,
-    tip_y_mm: Option<f64>,
-    tip_z_mm: Option<f64>,
-    push_force_n: Option<f64>,
-    torque_nmm: f64,
-    /// Length beyond the enclosing instruments, where it touches the wall itself.
-    felt_mm: f64,
-    /// Its largest radius there.
-    felt_radius_mm: f64,
-    /// Sum of the forces across the line between it and the instruments around and inside it.
-    #[serde(default)]
-    lateral_n: f64,
+columns! {
+    /// A row of instruments.csv: an instrument in a step. Columns that earlier versions did not write, and those that a
+    /// table written by hand may leave out, are `None` there.
+    pub struct InstrumentRow {
+        /// Number of the step.
+        pub step: usize,
+        /// Name of the instrument.
+        pub instrument: String,
+        /// Advance of its hand in the step; negative when pulled back.
+        pub advance_mm: f64,
+        /// Rotation of its hand in the step.
+        pub rotate_rad: f64,
+        /// Its length beyond the sheath's mouth.
+        pub inserted_mm: f64,
+        /// Rotation of its hand since the start.
+        pub rotation_rad: Option<f64>,
+        /// Its rotation at the sheath's mouth.
+        pub mouth_rotation_rad: Option<f64>,
+        /// Rotation of its tip.
+        pub tip_rotation_rad: Option<f64>,
+        /// Value to which it is steered.
+        pub steer: Option<f64>,
+        /// Place of its tip; empty if it is not inserted.
+        pub tip_x_mm: Option<f64>,
+        /// As `tip_x_mm`.
+        pub tip_y_mm: Option<f64>,
+        /// As `tip_x_mm`.
+        pub tip_z_mm: Option<f64>,
+        /// Force with which its hand must push; empty where it jumps.
+        pub push_force_n: Option<f64>,
+        /// Torque of its hand.
+        pub torque_nmm: f64,
+        /// Length beyond the enclosing instruments, where it touches the wall itself.
+        pub felt_mm: Option<f64>,
+        /// Its largest radius there.
+        pub felt_radius_mm: Option<f64>,
+        /// Sum of the forces across the line between it and the instruments around and inside it.
+        pub lateral_n: Option<f64>,
+    }
 }
 
 /// Writes the table of a run.
@@ -70,24 +82,24 @@ impl InstrumentTable {
             let outside = hands[index + 1..].iter().map(|other| other.inserted_mm);
             let felt_mm = (reported.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
             let lateral = simulation.lateral_forces(index).into_iter().map(|at| at.force_n.norm());
-            self.table.push(Row {
+            self.table.push(InstrumentRow {
                 step,
                 instrument: instrument.name.clone(),
                 advance_mm: command.advance_mm,
                 rotate_rad: command.rotate_rad,
                 inserted_mm: reported.inserted_mm,
-                rotation_rad: reported.rotation_rad,
-                mouth_rotation_rad: reported.mouth_rotation_rad,
-                tip_rotation_rad: reported.tip_rotation_rad,
-                steer: reported.steer,
+                rotation_rad: Some(reported.rotation_rad),
+                mouth_rotation_rad: Some(reported.mouth_rotation_rad),
+                tip_rotation_rad: Some(reported.tip_rotation_rad),
+                steer: Some(reported.steer),
                 tip_x_mm: tip.map(|tip| tip.x),
                 tip_y_mm: tip.map(|tip| tip.y),
                 tip_z_mm: tip.map(|tip| tip.z),
                 push_force_n: reported.push_force_n,
                 torque_nmm: reported.torque_nmm,
-                felt_mm,
-                felt_radius_mm: instrument.device.max_radius_within(felt_mm),
-                lateral_n: lateral.fold(0.0, |sum, force_n| sum + force_n),
+                felt_mm: Some(felt_mm),
+                felt_radius_mm: Some(instrument.device.max_radius_within(felt_mm)),
+                lateral_n: Some(lateral.fold(0.0, |sum, force_n| sum + force_n)),
             })?;
         }
         self.table.flush()
@@ -100,7 +112,7 @@ impl InstrumentTable {
 }
 
 /// Inserted lengths of the instruments after the steps of a recording.
-pub(crate) struct Lengths {
+pub struct Lengths {
     folder: PathBuf,
     /// By step; `None` for a single device, whose length is that of the line: earlier versions did not write its table.
     steps: Option<BTreeMap<usize, Vec<f64>>>,
@@ -108,40 +120,33 @@ pub(crate) struct Lengths {
 
 impl Lengths {
     /// Reads the lengths of the instruments of `stack` from the folder of a recording.
-    pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Self, Failure> {
-        let steps = if stack.is_several() {
-            let path = folder.join(INSTRUMENTS);
-            let read = by_step(&path, stack);
-            Some(read.map_err(|error| {
-                let text = "give the folder of a run of this scene (endowire run)";
-                Failure::Input(format!("{}: {error}; {text}", path.display()))
-            })?)
-        } else {
-            None
-        };
+    ///
+    /// # Errors
+    /// [`Error::Content`] for a table that is missing or cannot be read.
+    pub fn read(folder: &Path, stack: &Stack) -> Result<Self> {
+        let steps = if stack.is_several() { Some(by_step(&folder.join(INSTRUMENTS), stack)?) } else { None };
         Ok(Self { folder: folder.to_path_buf(), steps })
     }
 
     /// Inserted lengths after a step that led to this shape, mm.
-    pub(crate) fn after(&self, step: usize, shape: &Shape) -> Result<Vec<f64>, Failure> {
+    ///
+    /// # Errors
+    /// [`Error::Content`] if the table has no such step.
+    pub fn after(&self, step: usize, shape: &Shape) -> Result<Vec<f64>> {
         let Some(steps) = &self.steps else {
             return Ok(vec![shape.from_tip_mm.first().copied().unwrap_or(0.0)]);
         };
         steps.get(&step).cloned().ok_or_else(|| {
             let path = self.folder.join(INSTRUMENTS);
-            Failure::Input(format!("{}: has no step {step}; run the scene again", path.display()))
+            Error::content(&path, format!("has no step {step}; run the scene again"))
         })
     }
 }
 
 /// Inserted lengths of the instruments of `stack` by step, mm.
-fn by_step(path: &Path, stack: &Stack) -> io::Result<BTreeMap<usize, Vec<f64>>> {
-    let mut text = std::fs::read(path)?;
-    // A killed run may leave an incomplete row.
-    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
+fn by_step(path: &Path, stack: &Stack) -> Result<BTreeMap<usize, Vec<f64>>> {
     let mut steps: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-    for row in csv::Reader::from_reader(text.as_slice()).deserialize() {
-        let row: Row = row?;
+    for row in table::read::<InstrumentRow>(path)? {
         let Ok(index) = stack.find(&row.instrument) else { continue };
         steps.entry(row.step).or_insert_with(|| vec![0.0; stack.instruments().len()])[index] =
             row.inserted_mm;

@@ -8,10 +8,9 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::Path;
 
+use endowire_core::file::whole;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
-
-use super::whole;
 
 /// Size of a number in bytes, for both kinds.
 const NUMBER_BYTES: u64 = 8;
@@ -32,6 +31,7 @@ pub(crate) struct Member {
     pub(crate) kind: Kind,
     /// Numbers per row; 1 makes a one-dimensional array.
     pub(crate) columns: usize,
+    pub(crate) meaning: &'static str,
 }
 
 impl Member {
@@ -57,9 +57,9 @@ impl ArrayStream {
     /// An empty array in `folder`.
     pub(crate) fn new(member: Member, folder: &Path) -> io::Result<Self> {
         let path = folder.join(member.file_name());
-        File::create(&path)?;
+        whole::remove(&path)?;
         // Opened for appending, so that numbers stay aligned after the file was truncated.
-        let file = OpenOptions::new().read(true).append(true).open(&path)?;
+        let file = OpenOptions::new().read(true).append(true).create_new(true).open(&path)?;
         Ok(Self { member, numbers: 0, file })
     }
 
@@ -137,7 +137,10 @@ fn header(kind: &str, shape: &str) -> Vec<u8> {
 }
 
 /// Writes a map of 32-bit floats, row by row, as a `.npy` file.
-pub(crate) fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result<()> {
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result<()> {
     whole::write(path, |file| {
         let mut file = BufWriter::new(file);
         file.write_all(&header("<f4", &format!("({}, {width})", values.len() / width.max(1))))?;
@@ -147,7 +150,8 @@ pub(crate) fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result
 }
 
 /// A small array in memory.
-pub(crate) struct Array {
+#[derive(Debug)]
+pub struct Array {
     name: String,
     kind: &'static str,
     shape: Vec<usize>,
@@ -156,18 +160,21 @@ pub(crate) struct Array {
 
 impl Array {
     /// An array of bytes.
-    pub(crate) fn of_bytes(name: &str, shape: Vec<usize>, bytes: Vec<u8>) -> Self {
+    pub fn of_bytes(name: &str, shape: Vec<usize>, bytes: Vec<u8>) -> Self {
         Self { name: name.to_owned(), kind: "|u1", shape, bytes }
     }
 
     /// An array of floats.
-    pub(crate) fn of_floats(name: &str, shape: Vec<usize>, values: impl Iterator<Item = f64>) -> Self {
+    pub fn of_floats(name: &str, shape: Vec<usize>, values: impl Iterator<Item = f64>) -> Self {
         Self { name: name.to_owned(), kind: "<f8", shape, bytes: values.flat_map(f64::to_le_bytes).collect() }
     }
 }
 
 /// Packs arrays in memory into a `.npz` file.
-pub(crate) fn write_arrays(path: &Path, arrays: &[Array]) -> io::Result<()> {
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_arrays(path: &Path, arrays: &[Array]) -> io::Result<()> {
     whole::write(path, |file| {
         let mut archive = ZipWriter::new(BufWriter::new(file));
         let options = SimpleFileOptions::default()

@@ -91,6 +91,8 @@ pub enum EndedBy {
     Interrupted,
     /// An output could not be written.
     Unrecorded,
+    /// The program that moved the instruments closed the recording; there was no script.
+    Closed,
 }
 
 impl EndedBy {
@@ -105,6 +107,7 @@ impl EndedBy {
             Self::Failed => "failed",
             Self::Interrupted => "interrupted",
             Self::Unrecorded => "unrecorded",
+            Self::Closed => "closed",
         }
     }
 }
@@ -143,10 +146,14 @@ impl StepFailure {
 }
 
 impl RunOutcome {
-    /// The outcome of a script of at most `steps_asked` steps after `steps` of them, with the statistics `tally`.
-    pub fn new(
+    /// The outcome of `steps` steps of a program without a script, with the statistics `tally`.
+    pub fn of_program(simulation: &Simulation, steps: usize, tally: Tally) -> Self {
+        Self::now(simulation, (steps, steps), tally, None)
+    }
+
+    /// The state of a simulation as an outcome, without what a script says of it.
+    fn now(
         simulation: &Simulation,
-        hand: &ScriptRun<'_>,
         (steps, steps_asked): (usize, usize),
         tally: Tally,
         failure: Option<StepFailure>,
@@ -154,13 +161,11 @@ impl RunOutcome {
         let report = simulation.report();
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone());
         let instruments = names.zip(report.hands());
-        let condition = || hand.course().motions.last().and_then(|line| line.met);
-        let at_its_end = || hand.has_ended().then(|| condition().map_or(EndedBy::Script, EndedBy::from));
         Self {
             steps,
             steps_asked,
             converged: tally.unconverged_steps == 0 && failure.is_none(),
-            ended_by: failure.as_ref().map(|failure| failure.kind).or_else(at_its_end),
+            ended_by: failure.as_ref().map(|failure| failure.kind),
             failure,
             inserted_mm: report.inserted_mm,
             rotation_rad: report.rotation_rad,
@@ -169,20 +174,32 @@ impl RunOutcome {
             tip_mm: simulation.shape().tip_mm().map(Into::into),
             push_force_n: report.push_force_n,
             torque_nmm: report.torque_nmm,
-            until: hand
-                .conditions()
-                .map(|(line, course, after_step)| UntilOutcome {
-                    line: line.to_owned(),
-                    steps: course.steps,
-                    after_step,
-                    met: course.met,
-                })
-                .collect(),
+            until: vec![],
             instruments: instruments.map(|(name, report)| InstrumentOutcome { name, report }).collect(),
             energy_mj: report.energy,
             wall_force: simulation.wall_force(),
             tally,
             left_through: report.left_through,
         }
+    }
+
+    /// The outcome of a script of at most `steps_asked` steps after `steps` of them, with the statistics `tally`.
+    pub fn new(
+        simulation: &Simulation,
+        hand: &ScriptRun<'_>,
+        (steps, steps_asked): (usize, usize),
+        tally: Tally,
+        failure: Option<StepFailure>,
+    ) -> Self {
+        let condition = || hand.course().motions.last().and_then(|line| line.met);
+        let at_its_end = || hand.has_ended().then(|| condition().map_or(EndedBy::Script, EndedBy::from));
+        let until = hand.conditions().map(|(line, course, after_step)| UntilOutcome {
+            line: line.to_owned(),
+            steps: course.steps,
+            after_step,
+            met: course.met,
+        });
+        let now = Self::now(simulation, (steps, steps_asked), tally, failure);
+        Self { ended_by: now.ended_by.or_else(at_its_end), until: until.collect(), ..now }
     }
 }

@@ -5,43 +5,52 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use endowire_core::Vec3;
 use endowire_core::device::Stack;
 use endowire_core::insertion::{DetachedCoil, Simulation};
 use endowire_core::shape::Shape;
-use serde::{Deserialize, Serialize};
+use endowire_core::{Error, Result, Vec3};
 
-use super::rows;
-use super::step_table::StepTable;
-use crate::failure::Failure;
+use crate::columns::columns;
+use crate::table::{self, GIVE, StepTable};
 
 /// The table; absent if nothing was detached.
-pub(crate) const COILS: &str = "coils.csv";
+pub const COILS: &str = "coils.csv";
 /// A coil that has moved by less gets no new rows, mm.
 const MOVED_MM: f64 = 1e-3;
 
-/// Position of a coil from a step on.
+/// Position of a detached coil from a step on.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Left {
+pub struct Left {
     step: usize,
     /// Index of the coil, in order of detachment.
     number: usize,
     coil: DetachedCoil,
 }
 
-/// A row of the table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Row {
-    step: usize,
-    coil: usize,
-    instrument: String,
-    from_tip_mm: f64,
-    x_mm: f64,
-    y_mm: f64,
-    z_mm: f64,
-    tangent_x: f64,
-    tangent_y: f64,
-    tangent_z: f64,
+columns! {
+    /// A row of coils.csv: a point of the centre line of a detached coil after a step.
+    pub struct CoilRow {
+        /// Number of the step.
+        pub step: usize,
+        /// Number of the coil in order of detachment, from 0.
+        pub coil: usize,
+        /// Name of the instrument that it was.
+        pub instrument: String,
+        /// Arc length from the coil's tip.
+        pub from_tip_mm: f64,
+        /// Place of the point.
+        pub x_mm: f64,
+        /// As `x_mm`.
+        pub y_mm: f64,
+        /// As `x_mm`.
+        pub z_mm: f64,
+        /// Unit tangent there, towards the tip.
+        pub tangent_x: f64,
+        /// As `tangent_x`.
+        pub tangent_y: f64,
+        /// As `tangent_x`.
+        pub tangent_z: f64,
+    }
 }
 
 /// Writes the table of a run.
@@ -60,13 +69,13 @@ impl CoilTable {
     }
 
     /// The table of a recording that resumes after step `steps`; rows of later steps are dropped.
-    pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> Result<Self, Failure> {
+    pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> Result<Self> {
         let new = Self::new(folder);
         if !new.path.exists() {
             return Ok(new);
         }
-        let reported = after(&read(folder, stack)?, steps);
-        let table = StepTable::go_on(&new.path, steps).map_err(|e| Failure::write(&new.path, &e))?;
+        let reported = coils_after(&read_coils(folder, stack)?, steps);
+        let table = StepTable::go_on(&new.path, steps).map_err(|e| Error::file(&new.path, e))?;
         Ok(Self { table: Some(table), reported, ..new })
     }
 
@@ -118,9 +127,9 @@ fn rows_of<'a>(
     coil: usize,
     instrument: &'a str,
     Shape { positions_mm, tangents, from_tip_mm }: &'a Shape,
-) -> impl Iterator<Item = Row> + 'a {
+) -> impl Iterator<Item = CoilRow> + 'a {
     let points = positions_mm.iter().zip(tangents).zip(from_tip_mm);
-    points.map(move |((x, t), from_tip_mm)| Row {
+    points.map(move |((x, t), from_tip_mm)| CoilRow {
         step,
         coil,
         instrument: instrument.to_owned(),
@@ -135,12 +144,15 @@ fn rows_of<'a>(
 }
 
 /// The detached coils of a recorded run with these instruments.
-pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Vec<Left>, Failure> {
+///
+/// # Errors
+/// [`Error::Content`] for a table that cannot be read, or names another instrument.
+pub fn read_coils(folder: &Path, stack: &Stack) -> Result<Vec<Left>> {
     let path = folder.join(COILS);
-    let rows: Vec<Row> = rows::read(&path)?;
+    let rows: Vec<CoilRow> = table::read_if_any(&path)?.unwrap_or_default();
     let each = rows.chunk_by(|a, b| (a.step, a.coil) == (b.step, b.coil)).map(|rows| {
-        let Row { step, coil: number, ref instrument, .. } = rows[0];
-        let instrument = stack.find(instrument).map_err(|e| rows::refused(&path, &e.to_string()))?;
+        let CoilRow { step, coil: number, ref instrument, .. } = rows[0];
+        let instrument = stack.find(instrument).map_err(|e| Error::content(&path, format!("{e}; {GIVE}")))?;
         let shape = Shape {
             positions_mm: rows.iter().map(|row| Vec3::new(row.x_mm, row.y_mm, row.z_mm)).collect(),
             tangents: rows.iter().map(|row| Vec3::new(row.tangent_x, row.tangent_y, row.tangent_z)).collect(),
@@ -152,7 +164,7 @@ pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Vec<Left>, Failure> {
 }
 
 /// The coils after a step.
-pub(crate) fn after(left: &[Left], step: usize) -> Vec<DetachedCoil> {
+pub fn coils_after(left: &[Left], step: usize) -> Vec<DetachedCoil> {
     let mut coils: Vec<DetachedCoil> = Vec::new();
     for Left { number, coil, .. } in left.iter().filter(|left| left.step <= step) {
         match coils.get_mut(*number) {

@@ -6,39 +6,53 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use endowire_core::Vec3;
 use endowire_core::insertion::Simulation;
-use endowire_core::vessel::{Course, Displacement, Lumen, VesselMotion};
-use endowire_methods::Scene;
-use serde::{Deserialize, Serialize};
+use endowire_core::methods::MethodChoice;
+use endowire_core::scene::SceneOf;
+use endowire_core::vessel::{Course, Displacement, Lumen, VesselMotion, WallStore};
+use endowire_core::{Result, Vec3};
+use serde::de::DeserializeOwned;
 
-use super::rows;
-use super::step_table::StepTable;
-use crate::cache::Cache;
-use crate::failure::Failure;
+use crate::columns::columns;
+use crate::table::{self, StepTable};
 
 /// The table of unknowns.
-pub(crate) const VESSEL: &str = "vessel.csv";
+pub const VESSEL: &str = "vessel.csv";
 /// The table of named places.
-pub(crate) const PLACES: &str = "places.csv";
+pub const PLACES: &str = "places.csv";
 
-#[derive(Serialize, Deserialize)]
-struct UnknownRow {
-    step: usize,
-    unknown: usize,
-    x_mm: f64,
-    y_mm: f64,
-    z_mm: f64,
+columns! {
+    /// A row of vessel.csv: displacement of an unknown of the vessel's course after a step.
+    pub struct UnknownRow {
+        /// Number of the step.
+        pub step: usize,
+        /// Number of the unknown, from 0.
+        pub unknown: usize,
+        /// Its displacement.
+        pub x_mm: f64,
+        /// As `x_mm`.
+        pub y_mm: f64,
+        /// As `x_mm`.
+        pub z_mm: f64,
+    }
 }
 
-#[derive(Serialize)]
-struct PlaceRow<'a> {
-    step: usize,
-    place: &'a str,
-    x_mm: f64,
-    y_mm: f64,
-    z_mm: f64,
-    displacement_mm: f64,
+columns! {
+    /// A row of places.csv: where a named place of the vessel is after a step.
+    pub struct PlaceRow {
+        /// Number of the step.
+        pub step: usize,
+        /// Name of the place.
+        pub place: String,
+        /// Where it is.
+        pub x_mm: f64,
+        /// As `x_mm`.
+        pub y_mm: f64,
+        /// As `x_mm`.
+        pub z_mm: f64,
+        /// Distance from where it is at rest.
+        pub displacement_mm: f64,
+    }
 }
 
 /// Writes the tables of a run.
@@ -69,7 +83,7 @@ impl VesselTables {
                 let displacement_mm = (now - at_rest).norm();
                 self.places.push(PlaceRow {
                     step,
-                    place,
+                    place: place.to_owned(),
                     x_mm: now.x,
                     y_mm: now.y,
                     z_mm: now.z,
@@ -92,19 +106,27 @@ impl VesselTables {
 type BySteps = BTreeMap<usize, Vec<Vec3>>;
 
 /// Where the vessel of a recording is after its steps.
-pub(crate) struct Recorded {
+pub struct RecordedVessel {
     motion: Option<VesselMotion>,
     course: Option<(Arc<Course>, BySteps)>,
 }
 
-impl Recorded {
+impl RecordedVessel {
     /// Of the recording of a scene in `folder`, in this vessel.
-    pub(crate) fn read(folder: &Path, scene: &Scene, lumen: &Lumen, store: &Cache) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    /// [`Error::Content`](endowire_core::Error::Content) for a table that is missing or cannot be read; what is wrong with the scene.
+    pub fn read<M: MethodChoice + DeserializeOwned + Default>(
+        folder: &Path,
+        scene: &SceneOf<M>,
+        lumen: &Lumen,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
         let motion = VesselMotion::new(&scene.vessel.motion)?;
         let Some(course) = scene.course(lumen, store)? else { return Ok(Self { motion, course: None }) };
         let path = folder.join(VESSEL);
         let mut steps = BySteps::new();
-        for row in rows::read::<UnknownRow>(&path)? {
+        for row in table::read_if_any::<UnknownRow>(&path)?.unwrap_or_default() {
             steps.entry(row.step).or_default().push(Vec3::new(row.x_mm, row.y_mm, row.z_mm));
         }
         // The last step of a run that was killed may be incomplete.
@@ -113,12 +135,12 @@ impl Recorded {
     }
 
     /// Whether it is elsewhere in different steps.
-    pub(crate) fn changes(&self) -> bool {
+    pub fn changes(&self) -> bool {
         self.course.is_some() || self.motion.as_ref().is_some_and(VesselMotion::changes)
     }
 
     /// Its displacement after a step, at that time, s; at rest before the first.
-    pub(crate) fn at(&self, step: usize, time_s: f64) -> Option<Displacement> {
+    pub fn at(&self, step: usize, time_s: f64) -> Option<Displacement> {
         let moved = self.motion.as_ref().map(|motion| motion.at(time_s));
         let Some((course, steps)) = &self.course else { return moved };
         let still = vec![Vec3::zeros(); course.unknowns()];

@@ -7,14 +7,15 @@
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{File, FileType, OpenOptions, TryLockError};
-use std::io::{self, Write};
-use std::path::Path;
-
-use tempfile::NamedTempFile;
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
+use std::io::{self, Seek as _, Write};
+use std::path::{Path, PathBuf};
 
 /// Begin and end of the temporary name of a file: with the file's own name and random letters between them.
 const HIDDEN: &str = ".";
 const PART: &str = ".part";
+/// Random names that are tried before a folder is given up: two are the same once in four thousand million.
+const TRIES: u32 = 100;
 
 /// The folder of a path.
 fn folder(path: &Path) -> &Path {
@@ -29,28 +30,96 @@ fn begins(path: &Path) -> OsString {
     begins
 }
 
-/// End of a temporary name that has the file's extension, by which some writers choose a format.
-fn part_with_extension(path: &Path) -> OsString {
-    let mut ends = OsString::from(PART);
-    if let Some(extension) = path.extension() {
-        ends.push(".");
-        ends.push(extension);
+/// A new file in a folder, with random letters in its name. Nothing that is there is opened, and no link followed.
+fn new_file(folder: &Path, begins: &OsStr) -> io::Result<(PathBuf, File)> {
+    let mut taken = io::Error::from(io::ErrorKind::AlreadyExists);
+    for _ in 0..TRIES {
+        let random = RandomState::new().build_hasher().finish() as u32;
+        let mut name = begins.to_owned();
+        name.push(format!("{random:08x}"));
+        name.push(PART);
+        let path = folder.join(name);
+        match OpenOptions::new().read(true).write(true).create_new(true).open(&path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => taken = error,
+            opened => return opened.map(|file| (path, file)),
+        }
     }
-    ends
+    Err(taken)
 }
 
-/// A new temporary file beside a path, whose name ends so.
-fn part_of(path: &Path, ends: &OsStr) -> io::Result<NamedTempFile> {
-    let begins = begins(path);
-    let mut part = tempfile::Builder::new();
-    part.prefix(&begins).suffix(ends);
-    #[cfg(unix)]
-    {
-        // As of a file that is created: the user's mask takes the rest away.
-        use std::os::unix::fs::PermissionsExt as _;
-        part.permissions(std::fs::Permissions::from_mode(0o666));
+/// A file that is being written under a temporary name. It gets its own name by [`Part::finish`], and vanishes without
+/// that.
+#[derive(Debug)]
+pub struct Part {
+    /// The temporary name; empty once it has its own.
+    path: PathBuf,
+    file: File,
+    place: PathBuf,
+    /// Whether the place is a device, which gets the bytes at the end.
+    through: bool,
+}
+
+impl Part {
+    /// Begins a file that will be at `place`.
+    ///
+    /// # Errors
+    /// A folder, a pipe, a disk or a socket in place of the file, and a folder in which no file can be written.
+    pub fn new(place: &Path) -> io::Result<Self> {
+        let kind = special(place);
+        if let Some(kind) = kind.filter(|kind| !takes_bytes(*kind)) {
+            let what = if kind.is_dir() { "is a folder" } else { "is no regular file" };
+            let text = format!("{what}: give the name of a file");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+        }
+        let through = kind.is_some();
+        // Writers may go back in their file, which no device can.
+        let folder = if through { std::env::temp_dir() } else { folder(place).to_owned() };
+        let (path, file) = new_file(&folder, &begins(place))?;
+        // Some network file systems have no locks.
+        let _ = file.try_lock();
+        Ok(Self { path, file, place: place.to_owned(), through })
     }
-    part.tempfile_in(folder(path))
+
+    /// The file.
+    pub fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Gives the file its own name, where it replaces what is there.
+    ///
+    /// # Errors
+    /// A file that cannot be replaced.
+    pub fn finish(mut self) -> io::Result<()> {
+        if self.through {
+            let mut place = OpenOptions::new().write(true).open(&self.place)?;
+            self.file.rewind()?;
+            io::copy(&mut self.file, &mut place)?;
+            return place.flush();
+        }
+        std::fs::rename(&self.path, &self.place)?;
+        self.path = PathBuf::new();
+        Ok(())
+    }
+
+    /// As [`Self::finish`], and lasting even if the power fails.
+    fn finish_synced(self) -> io::Result<()> {
+        if self.through {
+            return self.finish();
+        }
+        self.file.sync_all()?;
+        let place = self.place.clone();
+        self.finish()?;
+        sync_folder(folder(&place));
+        Ok(())
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        if !self.path.as_os_str().is_empty() {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
 }
 
 /// The kind of what a path leads to, if it is there and no regular file. Links are followed: /dev/stdout is one.
@@ -64,44 +133,9 @@ fn special(path: &Path) -> Option<FileType> {
 /// # Errors
 /// Those of `write`; a folder, a disk or a socket in place of the file; and a file that cannot be replaced.
 pub fn write(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
-    if let Some(kind) = special(path) {
-        return write_through(path, kind, |part| write(part.as_file_mut()));
-    }
-    let mut part = part_of(path, OsStr::new(PART))?;
-    // Some network file systems have no locks.
-    let _ = part.as_file().try_lock();
-    write(part.as_file_mut())?;
-    part.as_file().sync_all()?;
-    part.persist(path).map_err(|error| error.error)?;
-    sync_folder(folder(path));
-    Ok(())
-}
-
-/// The same for what opens its file by itself: `write` gets the path of an empty file. Nothing is synced: of a film with
-/// hundreds of frames that would take most of the time.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_at(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
-    write_part(path, OsStr::new(PART), write)
-}
-
-/// The same for what chooses a format by the extension of its file: that of the empty file is the same.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_in_format(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
-    write_part(path, &part_with_extension(path), write)
-}
-
-fn write_part(path: &Path, ends: &OsStr, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
-    if let Some(kind) = special(path) {
-        return write_through(path, kind, |part| write(part.path()));
-    }
-    let part = part_of(path, ends)?;
-    write(part.path())?;
-    part.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    let mut part = Part::new(path)?;
+    write(part.file())?;
+    part.finish_synced()
 }
 
 /// Makes a rename last, where the system can.
@@ -112,25 +146,6 @@ fn sync_folder(folder: &Path) {
     }
     #[cfg(not(unix))]
     let _ = folder;
-}
-
-/// Writes to a device, which takes what it is given, and is never replaced.
-fn write_through(
-    path: &Path,
-    kind: FileType,
-    write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>,
-) -> io::Result<()> {
-    if !takes_bytes(kind) {
-        let what = if kind.is_dir() { "is a folder" } else { "is no regular file" };
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("{what}: give the name of a file")));
-    }
-    // Writers may go back in their file, which no device can.
-    let mut whole = NamedTempFile::new()?;
-    write(&mut whole)?;
-    let mut whole = File::open(whole.path())?;
-    let mut place = OpenOptions::new().write(true).open(path)?;
-    io::copy(&mut whole, &mut place)?;
-    place.flush()
 }
 
 /// Whether it is a device of characters, such as a terminal or /dev/null.
@@ -201,17 +216,9 @@ pub fn remove_unfinished_in(folder: &Path, ours: impl Fn(&OsStr) -> bool) -> io:
 /// The own name of the file of a temporary name.
 fn whole_name(part: &OsStr) -> Option<&OsStr> {
     let hidden = part.to_str()?.strip_prefix(HIDDEN)?;
-    let own = |ends: &str| {
-        let (own, random) = hidden.strip_suffix(ends)?.rsplit_once('.')?;
-        (!random.is_empty() && random.bytes().all(|letter| letter.is_ascii_alphanumeric()))
-            .then_some(OsStr::new(own))
-    };
-    let with_extension = || {
-        let (_, extension) = hidden.rsplit_once('.')?;
-        own(&format!("{PART}.{extension}"))
-            .filter(|own| Path::new(own).extension() == Some(OsStr::new(extension)))
-    };
-    own(PART).or_else(with_extension)
+    let (own, random) = hidden.strip_suffix(PART)?.rsplit_once('.')?;
+    let is_random = !random.is_empty() && random.bytes().all(|letter| letter.is_ascii_alphanumeric());
+    is_random.then_some(OsStr::new(own))
 }
 
 /// Writes a file of these bytes.
@@ -274,8 +281,7 @@ mod tests {
     fn what_was_left_is_removed_and_what_is_being_written_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
-        for name in [".a.txt.xY3.part", ".a.txt.xY4.part.txt", ".a.txt.part", ".b.txt.xY3.part", "a.txt.part"]
-        {
+        for name in [".a.txt.xY3.part", ".a.txt.part", ".b.txt.xY3.part", "a.txt.part"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         write(&path, |_| {

@@ -5,42 +5,52 @@ use std::path::Path;
 
 use endowire_core::insertion::{Packing, Simulation};
 use endowire_core::vessel::Sac;
-use serde::{Deserialize, Serialize};
+use endowire_core::{Error, Result};
+use serde::Serialize;
 
-use super::rows;
-use super::step_table::StepTable;
-use crate::failure::Failure;
+use crate::columns::columns;
+use crate::table::{self, StepTable};
 
 /// The table.
-pub(crate) const PACKING: &str = "packing.csv";
+pub const PACKING: &str = "packing.csv";
 
-/// A row of the table.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Row {
-    step: usize,
-    coils_mm3: f64,
-    packing: f64,
-    neck_coverage: f64,
-    outside_mm: f64,
-    herniated: bool,
-    dome_force_n: f64,
+columns! {
+    /// A row of packing.csv: how much coils fill of the scene's sac after a step.
+    pub struct PackingRow {
+        /// Number of the step.
+        pub step: usize,
+        /// Volume of the coils in the sac.
+        pub coils_mm3: f64,
+        /// That volume over the volume of the sac.
+        pub packing: f64,
+        /// Fraction of the neck that is covered by coils.
+        pub neck_coverage: f64,
+        /// Length of coils outside the neck.
+        pub outside_mm: f64,
+        /// Whether a loop has herniated.
+        pub herniated: bool,
+        /// Force on the dome.
+        pub dome_force_n: f64,
+    }
 }
 
 /// The packing in the summary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct Packed {
-    /// Volume of the sac, mm³, and diameter of its neck, mm.
-    pub(crate) sac_mm3: f64,
-    pub(crate) neck_diameter_mm: f64,
+pub struct Packed {
+    /// Volume of the sac.
+    pub sac_mm3: f64,
+    /// Diameter of its neck.
+    pub neck_diameter_mm: f64,
     /// At the end: volume of the coils over the volume of the sac.
-    pub(crate) density: f64,
+    pub density: f64,
     /// At the end: fraction of the neck that is covered by coils.
-    pub(crate) neck_coverage: f64,
+    pub neck_coverage: f64,
     /// At the end: length of coils outside the neck, mm.
-    pub(crate) outside_mm: f64,
-    /// Number of steps after which loops had herniated, and the first such step.
-    pub(crate) herniated_steps: usize,
-    pub(crate) first_herniated_step: Option<usize>,
+    pub outside_mm: f64,
+    /// Number of steps after which loops had herniated.
+    pub herniated_steps: usize,
+    /// The first such step.
+    pub first_herniated_step: Option<usize>,
 }
 
 /// Writes the table of a run in a vessel with a sac.
@@ -53,15 +63,10 @@ pub(crate) struct PackingTable {
 impl PackingTable {
     /// The table of a recording that begins, or resumes with this simulation after step `steps`; rows of later steps are
     /// dropped.
-    pub(crate) fn go_on(
-        folder: &Path,
-        sac: Sac,
-        steps: usize,
-        simulation: &Simulation,
-    ) -> Result<Self, Failure> {
+    pub(crate) fn go_on(folder: &Path, sac: Sac, steps: usize, simulation: &Simulation) -> Result<Self> {
         let path = folder.join(PACKING);
-        let table = StepTable::go_on(&path, steps).map_err(|e| Failure::write(&path, &e))?;
-        let (mut reported, rows) = (Packed::none(&sac), rows::read::<Row>(&path)?);
+        let table = StepTable::go_on(&path, steps).map_err(|e| Error::file(&path, e))?;
+        let (mut reported, rows) = (Packed::none(&sac), table::read::<PackingRow>(&path)?);
         // In a new folder earlier steps have no rows, and the state is all that is known of them.
         if steps > 0 && rows.is_empty() {
             let Packing { density, neck_coverage, outside_mm, .. } = Packing::of(simulation, &sac)?;
@@ -74,7 +79,7 @@ impl PackingTable {
     /// Adds the row of a step.
     pub(crate) fn push(&mut self, step: usize, simulation: &Simulation) -> io::Result<()> {
         let packing = Packing::of(simulation, &self.sac).map_err(io::Error::other)?;
-        let row = Row {
+        let row = PackingRow {
             step,
             coils_mm3: packing.coils_mm3,
             packing: packing.density,
@@ -84,7 +89,7 @@ impl PackingTable {
             dome_force_n: packing.dome_force_n,
         };
         self.reported.add(&row);
-        self.table.push(row)?;
+        self.table.push(&row)?;
         self.table.flush()
     }
 
@@ -112,7 +117,7 @@ impl Packed {
         }
     }
 
-    fn add(&mut self, row: &Row) {
+    fn add(&mut self, row: &PackingRow) {
         (self.density, self.neck_coverage, self.outside_mm) =
             (row.packing, row.neck_coverage, row.outside_mm);
         if row.herniated {
@@ -122,7 +127,7 @@ impl Packed {
     }
 
     /// In words.
-    pub(crate) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let mut text = format!(
             "{:.1} % of {:.1} mm³ filled, {:.0} % of the neck covered, {:.1} mm of coils outside",
             100.0 * self.density,

@@ -3,108 +3,86 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use endowire_core::Vec3;
 use endowire_core::shape::Shape;
-use endowire_viewer::ContactView;
-use serde::Deserialize;
+use endowire_core::{Error, Result, Vec3};
 
-use super::npz::{self, Member};
-use super::{SUMMARY, arrays};
-use crate::failure::Failure;
+use crate::arrays::{self, GROWING, SHAPES};
+use crate::npz::{self, Member};
+use crate::steps::{StepRow, read_steps};
+use crate::summary::About;
+use crate::table::GIVE;
 
-/// The part of summary.json that is needed for frames.
-#[derive(Debug, Deserialize)]
-pub(crate) struct RecordedSummary {
-    /// File of the scene.
-    pub(crate) scene_file: PathBuf,
-    /// Name of the scene.
-    pub(crate) scene: Option<String>,
-    /// File of the script, if it was not the scene's own.
-    pub(crate) script_file: Option<PathBuf>,
-    /// Hash of the scene's text and of the files it names.
-    pub(crate) scene_hash: Option<String>,
-    /// Keys of the scene that were set on the command line.
-    #[serde(default)]
-    pub(crate) set: Vec<String>,
-    /// Where the way of the tip begins; `None` in recordings of versions that did not tell.
-    #[serde(default)]
-    pub(crate) start_mm: Option<Vec3>,
-    /// Number of steps without an equilibrium; 0 in recordings of versions that did not count them.
-    #[serde(default)]
-    pub(crate) unconverged_steps: usize,
-    /// Whether the run ended by itself. The key is missing in recordings of versions that packed the arrays only in
-    /// that case.
-    #[serde(default = "yes")]
-    pub(crate) complete: bool,
+/// A contact of the wall with the device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallContact {
+    /// Place on the device's axis.
+    pub position_mm: Vec3,
+    /// Force of the wall on the device, normal and friction together.
+    pub force_n: Vec3,
 }
 
-impl RecordedSummary {
-    /// That of a recording in this scene, of which nothing else is known.
-    pub(crate) fn in_scene(scene: &Path) -> Self {
-        Self {
-            scene_file: scene.to_path_buf(),
-            scene: None,
-            script_file: None,
-            scene_hash: None,
-            set: vec![],
-            start_mm: None,
-            unconverged_steps: 0,
-            complete: true,
-        }
-    }
-
-    /// Reads a summary.json.
-    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let read = || -> io::Result<_> { Ok(serde_json::from_slice(&std::fs::read(path)?)?) };
-        read().map_err(|e| unreadable(path, &e))
-    }
-}
-
-fn yes() -> bool {
-    true
-}
-
-/// Shapes and contacts by step.
+/// A recorded run: shapes and contacts by step, in memory, and its tables, which are read when asked for.
+///
+/// ```no_run
+/// use endowire_recording::Recording;
+///
+/// let recording = Recording::read("out/arch".as_ref())?;
+/// for row in recording.rows()? {
+///     println!("{} mm: {} N", row.inserted_mm, row.push_force_n);
+/// }
+/// let last = recording.shape(recording.steps());
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 #[derive(Debug)]
-pub(crate) struct Recording {
-    pub(crate) summary: RecordedSummary,
+pub struct Recording {
+    folder: PathBuf,
+    about: About,
     positions: Vec<Vec3>,
     tangents: Vec<Vec3>,
     from_tip: Vec<f64>,
     offsets: Vec<usize>,
     contact_points: Vec<Vec3>,
-    /// Force of the wall on the device.
     contact_forces: Vec<Vec3>,
     contact_offsets: Vec<usize>,
 }
 
 impl Recording {
-    /// Reads the recording of `endowire run` in a folder; of a run that was killed, all complete steps. If the file
-    /// of the scene is given, the summary may be damaged or missing.
-    pub(crate) fn read(folder: &Path, scene: Option<&Path>) -> Result<Self, Failure> {
-        let summary = match (RecordedSummary::read(&folder.join(SUMMARY)), scene) {
-            (Ok(summary), _) => summary,
-            (Err(_), Some(scene)) => RecordedSummary { complete: false, ..RecordedSummary::in_scene(scene) },
-            (Err(failure), None) => return Err(failure),
-        };
-        let packed = folder.join(arrays::PACKED);
-        let growing = folder.join(arrays::GROWING);
+    /// Reads the recording in a folder; of a run that was killed, all complete steps.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for a folder without a recording, and files that are damaged or of a later version.
+    pub fn read(folder: &Path) -> Result<Self> {
+        Self::of(folder, About::read(folder)?)
+    }
+
+    /// As [`Self::read`], of a run in this scene: the summary may be damaged or missing.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_in(folder: &Path, scene: &Path) -> Result<Self> {
+        let unknown = || About { complete: Some(false), ..About::in_scene(scene) };
+        Self::of(folder, About::read(folder).unwrap_or_else(|_| unknown()))
+    }
+
+    fn of(folder: &Path, about: About) -> Result<Self> {
+        let (packed, growing) = (folder.join(SHAPES), folder.join(GROWING));
         // Growing arrays may still lie beside packed ones; packed ones, if they exist, are complete.
         if !packed.exists() && growing.is_dir() {
-            let bad = |e: io::Error| unreadable(&growing, &e);
             let mut recording =
-                Self::from_arrays(summary, |member| npz::read_unpacked(&growing, member)).map_err(bad)?;
+                Self::from_arrays(folder, about, |member| npz::read_unpacked(&growing, member))
+                    .map_err(|e| unreadable(&growing, &e))?;
             recording.cut_to_whole_steps();
             return Ok(recording);
         }
-        let recording = Self::from_arrays(summary, |member| npz::read(&packed, member.name))
+        let recording = Self::from_arrays(folder, about, |member| npz::read(&packed, member.name))
             .map_err(|e| unreadable(&packed, &e))?;
         recording.check().map_err(|what| unreadable(&packed, &what))?;
         Ok(recording)
     }
 
     fn from_arrays(
-        summary: RecordedSummary,
+        folder: &Path,
+        about: About,
         read: impl Fn(&Member) -> io::Result<Vec<[u8; 8]>>,
     ) -> io::Result<Self> {
         let floats = |member| -> io::Result<Vec<f64>> {
@@ -118,7 +96,8 @@ impl Recording {
             Ok(numbers.map(|n| usize::try_from(n).unwrap_or(usize::MAX)).collect())
         };
         Ok(Self {
-            summary,
+            folder: folder.to_path_buf(),
+            about,
             positions: vectors(&arrays::POSITIONS)?,
             tangents: vectors(&arrays::TANGENTS)?,
             from_tip: floats(&arrays::FROM_TIP)?,
@@ -130,7 +109,7 @@ impl Recording {
     }
 
     /// Checks that the arrays of a completed run are consistent.
-    fn check(&self) -> Result<(), &'static str> {
+    fn check(&self) -> std::result::Result<(), &'static str> {
         let (nodes, contacts) = (self.positions.len(), self.contact_points.len());
         if nodes != self.tangents.len()
             || nodes != self.from_tip.len()
@@ -173,8 +152,8 @@ impl Recording {
     }
 
     /// The first `steps` steps of the arrays in a folder.
-    pub(crate) fn read_arrays(folder: &Path, steps: usize) -> Result<Self, Failure> {
-        let mut recording = Self::read(folder, Some(Path::new("")))?;
+    pub(crate) fn read_first(folder: &Path, steps: usize) -> Result<Self> {
+        let mut recording = Self::read_in(folder, Path::new(""))?;
         if recording.steps() < steps {
             let what = format!("its arrays hold {} steps and its table {steps}", recording.steps());
             return Err(unreadable(folder, &what));
@@ -184,14 +163,35 @@ impl Recording {
         Ok(recording)
     }
 
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What its summary says.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// The rows of its table of steps. Those of a run that was resumed in another folder begin later than with step 1.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for a table that is missing or damaged.
+    pub fn rows(&self) -> Result<Vec<StepRow>> {
+        read_steps(&self.folder)
+    }
+
     /// Number of steps.
-    pub(crate) fn steps(&self) -> usize {
+    pub fn steps(&self) -> usize {
         self.offsets.len() - 1
     }
 
-    /// The shape after a step, counted from 1.
-    pub(crate) fn shape(&self, step: usize) -> Shape {
-        let range = self.offsets[step - 1]..self.offsets[step];
+    /// The shape after the step in row number `row`, from 1 to [`Self::steps`].
+    ///
+    /// # Panics
+    /// For another row.
+    pub fn shape(&self, row: usize) -> Shape {
+        let range = self.offsets[row - 1]..self.offsets[row];
         Shape {
             positions_mm: self.positions[range.clone()].to_vec(),
             tangents: self.tangents[range.clone()].to_vec(),
@@ -199,16 +199,19 @@ impl Recording {
         }
     }
 
-    /// The contacts after a step, counted from 1.
-    pub(crate) fn contacts(&self, step: usize) -> Vec<ContactView> {
-        (self.contact_offsets[step - 1]..self.contact_offsets[step])
-            .map(|k| ContactView { position_mm: self.contact_points[k], force_n: self.contact_forces[k] })
+    /// The contacts after the step in row number `row`, from 1 to [`Self::steps`].
+    ///
+    /// # Panics
+    /// For another row.
+    pub fn contacts(&self, row: usize) -> Vec<WallContact> {
+        (self.contact_offsets[row - 1]..self.contact_offsets[row])
+            .map(|k| WallContact { position_mm: self.contact_points[k], force_n: self.contact_forces[k] })
             .collect()
     }
 }
 
-fn unreadable(path: &Path, error: &dyn std::fmt::Display) -> Failure {
-    Failure::Input(format!("{}: {error}; give the folder of a recorded run (endowire run)", path.display()))
+fn unreadable(path: &Path, error: &dyn std::fmt::Display) -> Error {
+    Error::content(path, format!("{error}; {GIVE}"))
 }
 
 #[cfg(test)]
@@ -217,8 +220,9 @@ mod tests {
     use endowire_tests::damage::damaged;
     use endowire_tests::noise::Noise;
 
-    use super::super::arrays::ShapeArrays;
     use super::*;
+    use crate::arrays::ShapeArrays;
+    use crate::summary::SUMMARY;
 
     /// Records three steps of one, two and three nodes; all data of a node contain its number.
     fn killed(folder: &Path) -> ShapeArrays {
@@ -243,8 +247,8 @@ mod tests {
     fn a_recording_that_was_cut_at_any_byte_has_its_whole_steps() {
         let folder = tempfile::tempdir().unwrap();
         killed(folder.path());
-        assert_eq!(Recording::read(folder.path(), None).unwrap().steps(), 3);
-        let files: Vec<PathBuf> = std::fs::read_dir(folder.path().join(arrays::GROWING))
+        assert_eq!(Recording::read(folder.path()).unwrap().steps(), 3);
+        let files: Vec<PathBuf> = std::fs::read_dir(folder.path().join(GROWING))
             .unwrap()
             .map(|entry| entry.unwrap().path())
             .collect();
@@ -254,7 +258,7 @@ mod tests {
             let whole = std::fs::read(&file).unwrap();
             for bytes in 0..whole.len() {
                 std::fs::write(&file, &whole[..bytes]).unwrap();
-                let recording = Recording::read(folder.path(), None).unwrap();
+                let recording = Recording::read(folder.path()).unwrap();
                 seen[recording.steps()] = true;
                 for step in 1..=recording.steps() {
                     let shape = recording.shape(step);
@@ -278,7 +282,7 @@ mod tests {
             // milliseconds.
             std::fs::remove_file(file).unwrap();
             std::fs::write(file, &bytes).unwrap();
-            match Recording::read(folder, None) {
+            match Recording::read(folder) {
                 Ok(recording) => {
                     let read: usize = (1..=recording.steps())
                         .map(|step| 7 * recording.shape(step).len() + 6 * recording.contacts(step).len())
@@ -304,10 +308,10 @@ mod tests {
         let [growing, packed] = [0, 1].map(|_| tempfile::tempdir().unwrap());
         let mut noise = Noise::new(1);
         let _ = killed(growing.path());
-        let file = growing.path().join(arrays::GROWING).join(arrays::OFFSETS.file_name());
+        let file = growing.path().join(GROWING).join(arrays::OFFSETS.file_name());
         assert_eq!(damaged_copies(growing.path(), &file, &mut noise), 0, "whole steps are read");
         killed(packed.path()).pack(packed.path()).unwrap();
-        let refused = damaged_copies(packed.path(), &packed.path().join(arrays::PACKED), &mut noise);
+        let refused = damaged_copies(packed.path(), &packed.path().join(SHAPES), &mut noise);
         assert!(refused > 600, "{refused}: the archive's own sums find most damage");
     }
 
@@ -316,9 +320,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         killed(folder.path());
         std::fs::write(folder.path().join(SUMMARY), "{\"scene").unwrap();
-        let reported = Recording::read(folder.path(), None).unwrap_err().to_string();
+        let reported = Recording::read(folder.path()).unwrap_err().to_string();
         assert!(reported.contains(SUMMARY) && reported.contains("recorded run"), "{reported}");
-        assert_eq!(Recording::read(folder.path(), Some(Path::new("a.toml"))).unwrap().steps(), 3);
+        assert_eq!(Recording::read_in(folder.path(), Path::new("a.toml")).unwrap().steps(), 3);
     }
 
     #[test]
@@ -330,9 +334,9 @@ mod tests {
         arrays.push(&one, &StepReport::default(), || Ok(())).unwrap();
         arrays.push(&one, &StepReport::default(), || Err(io::Error::other("full"))).unwrap_err();
         arrays.pack(folder.path()).unwrap();
-        let packed = |member: &Member| npz::read(&folder.path().join(arrays::PACKED), member.name).unwrap();
+        let packed = |member: &Member| npz::read(&folder.path().join(SHAPES), member.name).unwrap();
         assert_eq!(packed(&arrays::OFFSETS).len(), 2);
         assert_eq!(packed(&arrays::POSITIONS).len(), 3);
-        assert!(!folder.path().join(arrays::GROWING).exists());
+        assert!(!folder.path().join(GROWING).exists());
     }
 }

@@ -4,31 +4,54 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use endowire_core::file::whole;
 use endowire_core::insertion::StepReport;
 use endowire_core::shape::Shape;
 
-use super::npz::{self, ArrayStream, Kind, Member};
-use super::whole;
+use crate::npz::{self, ArrayStream, Kind, Member};
 
 /// File of the packed arrays.
-pub(crate) const PACKED: &str = "shapes.npz";
+pub const SHAPES: &str = "shapes.npz";
 /// Folder of the growing arrays.
 pub(crate) const GROWING: &str = "shapes.part";
 
-const fn member(name: &'static str, kind: Kind, columns: usize) -> Member {
-    Member { name, kind, columns }
+const fn member(name: &'static str, kind: Kind, columns: usize, meaning: &'static str) -> Member {
+    Member { name, kind, columns, meaning }
 }
 
-pub(crate) const POSITIONS: Member = member("positions_mm", Kind::F64, 3);
-pub(crate) const TANGENTS: Member = member("tangents", Kind::F64, 3);
-pub(crate) const FROM_TIP: Member = member("from_tip_mm", Kind::F64, 1);
-pub(crate) const OFFSETS: Member = member("offsets", Kind::I64, 1);
-pub(crate) const CONTACT_POSITIONS: Member = member("contact_positions_mm", Kind::F64, 3);
-pub(crate) const CONTACT_FORCES: Member = member("contact_forces_n", Kind::F64, 3);
-pub(crate) const CONTACT_OFFSETS: Member = member("contact_offsets", Kind::I64, 1);
+pub(crate) const POSITIONS: Member =
+    member("positions_mm", Kind::F64, 3, "Places of the nodes of all steps, from the sheath to the tip.");
+pub(crate) const TANGENTS: Member =
+    member("tangents", Kind::F64, 3, "Unit tangents at the nodes, towards the tip.");
+pub(crate) const FROM_TIP: Member =
+    member("from_tip_mm", Kind::F64, 1, "Arc length of the nodes from the tip.");
+pub(crate) const OFFSETS: Member = member(
+    "offsets",
+    Kind::I64,
+    1,
+    "Step k, from 0, has the nodes offsets[k] to offsets[k + 1]; one more than there are steps.",
+);
+pub(crate) const CONTACT_POSITIONS: Member = member(
+    "contact_positions_mm",
+    Kind::F64,
+    3,
+    "Places of the contacts of all steps, on the device's axis.",
+);
+pub(crate) const CONTACT_FORCES: Member = member(
+    "contact_forces_n",
+    Kind::F64,
+    3,
+    "Forces of the wall on the device there, normal and friction together.",
+);
+pub(crate) const CONTACT_OFFSETS: Member = member(
+    "contact_offsets",
+    Kind::I64,
+    1,
+    "Step k, from 0, has the contacts contact_offsets[k] to contact_offsets[k + 1].",
+);
 
 /// All arrays, in the order of packing.
-const MEMBERS: [Member; 7] =
+pub(crate) const MEMBERS: [Member; 7] =
     [POSITIONS, TANGENTS, FROM_TIP, OFFSETS, CONTACT_POSITIONS, CONTACT_FORCES, CONTACT_OFFSETS];
 
 /// The arrays of a running recording.
@@ -53,14 +76,14 @@ impl ShapeArrays {
 
     /// Empty arrays that replace those of the recording, packed or not.
     pub(crate) fn anew(recording: &Path) -> io::Result<Self> {
-        whole::remove(&recording.join(PACKED))?;
+        whole::remove(&recording.join(SHAPES))?;
         Self::new(recording)
     }
 
     /// The first `steps` steps of the arrays of a recording, packed or not, ready for more steps.
     pub(crate) fn go_on(recording: &Path, steps: usize) -> io::Result<Self> {
         let folder = recording.join(GROWING);
-        let packed = recording.join(PACKED);
+        let packed = recording.join(SHAPES);
         if packed.exists() {
             std::fs::create_dir_all(&folder)?;
             for member in MEMBERS {
@@ -127,7 +150,7 @@ impl ShapeArrays {
 
     /// Packs the arrays into shapes.npz; if that fails, the growing ones stay.
     pub(crate) fn pack(mut self, recording: &Path) -> io::Result<()> {
-        whole::write(&recording.join(PACKED), |file| npz::write(file.try_clone()?, &mut self.arrays))?;
+        whole::write(&recording.join(SHAPES), |file| npz::write(file.try_clone()?, &mut self.arrays))?;
         // Some systems cannot remove an open file.
         drop(self.arrays);
         remove_growing(&self.folder)
