@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::vessel::Lumen;
-use endowire_viewer::{FrameTime, Moment, Seen};
+use endowire_viewer::{FrameTime, Moment, Seen, largest_force_n};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -61,6 +61,10 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let (step, later) = if one { (steps[0], k) } else { (steps[k], 0) };
         FrameTime { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s }
     };
+    // One scale for all arrows: the largest force of what is drawn.
+    let shown = if one { &steps[..1] } else { &steps[..] };
+    let largest = shown.iter().map(|step| largest_force_n(&recording.contacts(step - earlier)));
+    let plan = plan.with_forces_up_to(largest.fold(0.0, f64::max));
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
