@@ -27,7 +27,7 @@ const KEYS: [Key; 80] = [
     ("every", &[], "3"),
     ("film", &[], "\"gif\""),
     ("biplane_deg", &[], "90.0"),
-    ("frames_per_s", &[], "7.5"),
+    ("frames_per_s", &[("xray.pulse_ms", "30.0")], "7.5"),
     ("bits", &[], "16"),
     ("c_arm.pose", &[], "\"LAO 30\""),
     ("c_arm.primary_deg", &[], "30.0"),
@@ -54,7 +54,7 @@ const KEYS: [Key; 80] = [
     ("xray.focal_spot_mm", &[FINE, NEAR, MIDDLE], "3.0"),
     ("xray.device_material", &[], "\"platinum\""),
     ("xray.harmonised", &[BODY], "0.0"),
-    ("xray.edges", &[], "4.0"),
+    ("xray.edges", &[FINE, NEAR, MIDDLE], "4.0"),
     ("xray.window", &[], "[0.0, 3.0]"),
     ("exposure.curve", &[("xray.pulse_ms", "5.0")], "[[50.0, 120.0]]"),
     ("exposure.current_ma", &[NOISE, ("xray.pulse_ms", "5.0")], "[0.01, 0.02]"),
@@ -72,7 +72,7 @@ const KEYS: [Key; 80] = [
     ("patient.torso.spine", &[BODY], "false"),
     ("patient.torso.ribs", &[BODY], "false"),
     ("patient.torso.lungs", &[BODY], "false"),
-    ("patient.torso.electrodes", &[BODY], "false"),
+    ("patient.torso.electrodes", &[BODY, FINE, ("c_arm.field_mm", "600.0")], "false"),
     ("flow.tree", &[], "\"MISSING.csv\""),
     ("flow.inlet_mm", &[], "[0.0, 0.0, 80.0]"),
     ("flow.inflow_ml_per_s", &[], "5.0"),
@@ -165,7 +165,11 @@ fn run(folder: &Path, values: &[String], out: &Path) -> std::process::Command {
 }
 
 fn render(folder: &Path, values: &[String], out: &Path) -> std::process::Command {
-    endowire(&["render", text(&folder.join("recorded")), "--every", "5", "--out", text(out)], values)
+    let recorded = folder.join("recorded");
+    endowire(
+        &["render", text(&recorded), "--every", "5", "--animate", "film.png", "--out", text(out)],
+        values,
+    )
 }
 
 fn fluoro(folder: &Path, values: &[String], out: &Path) -> std::process::Command {

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::input::from_toml;
-use endowire_methods::Setting;
 use endowire_viewer::{ViewSpec, XRaySpec};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -83,7 +82,7 @@ impl Default for Vary {
 }
 
 /// Keys of `[view]` that change nothing in the pictures of a dataset, and what to do instead.
-const NOT_DRAWN: [(&str, &str); 11] = [
+pub(super) const NOT_DRAWN: [(&str, &str); 11] = [
     ("biplane_deg", "a dataset has biplane_deg beside its seed"),
     ("views", "a dataset draws fluoroscopy alone: leave the key out"),
     ("every", "moments are drawn: give moments, and vary.progress"),
@@ -96,22 +95,6 @@ const NOT_DRAWN: [(&str, &str); 11] = [
     ("detector.seed", "noise is drawn: give seed"),
     ("detector.lag", "times are drawn at random, and no picture follows another: leave it out"),
 ];
-
-/// Refuses settings of keys of `[view]` that change nothing; those of a scene's own device do.
-///
-/// # Errors
-/// Names the setting, and what to do instead.
-pub(super) fn check_settings(settings: &[Setting]) -> Result<(), Failure> {
-    for text in settings.iter().map(ToString::to_string) {
-        let Some(key) = text.strip_prefix("view.") else { continue };
-        let is_about =
-            |other: &str| key.strip_prefix(other).is_some_and(|rest| rest.starts_with(['=', '.', ' ']));
-        if let Some((_, remedy)) = NOT_DRAWN.iter().find(|(other, _)| is_about(other)) {
-            return Err(Failure::Input(format!("--set {text}: {remedy}")));
-        }
-    }
-    Ok(())
-}
 
 fn one() -> u64 {
     1
