@@ -165,7 +165,6 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     for (from, to, named) in [
         ("dose_ngy = [20.0, 90.0]", "dose_ngy = [90.0, 20.0]", "vary.dose_ngy"),
         ("dose_ngy = [20.0, 90.0]", "magnification = [0.01, 2.0]", "vary.magnification"),
-        ("dose_ngy = [20.0, 90.0]", "width_mm = [300.0, 350.0]", "vary.width_mm is that of a generated body"),
         ("moments = 3", "moments = 0", "moments"),
         ("size_px = [256, 192]", "size_px = [0, 192]", "size_px"),
         ("kvp = [70.0, 80.0]", "kvp = [71.0]", "vary.kvp: view.xray.kvp = 71: the table has 50, 55"),
@@ -185,6 +184,11 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         let reported = said(&output);
         assert!(output.status.code() == Some(2) && reported.contains(named), "{to}: {reported}");
     }
+    // The scene has no body whose width could vary.
+    std::fs::write(&spec, whole.replace("dose_ngy = [20.0, 90.0]", "width_mm = [300.0, 350.0]")).unwrap();
+    let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("wide"))], "1");
+    let reported = said(&output);
+    assert!(reported.contains("vary.width_mm is that of a generated body"), "{reported}");
 }
 
 #[test]
