@@ -32,7 +32,7 @@ pub(crate) enum Patient {
         tissue_mm: f64,
     },
     /// A body of closed surfaces.
-    Torso(Body),
+    Torso(Box<Body>),
     /// A computed tomogram.
     Tomogram(Box<Volume>),
 }
@@ -43,7 +43,7 @@ impl Patient {
             if wall.vertices_mm.is_empty() {
                 return Err(Error::Mesh("the wall has no vertices".into()));
             }
-            return Ok(Self::Torso(Body::new(torso, wall)));
+            return Ok(Self::Torso(Box::new(Body::new(torso, wall))));
         }
         if let Some(ct) = &spec.patient.ct {
             return Ok(Self::Tomogram(Box::new(Volume::read(ct, wall)?)));
