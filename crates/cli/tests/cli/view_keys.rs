@@ -230,7 +230,7 @@ fn every_key_of_the_view_changes_the_picture_on_every_way_or_is_refused() {
         WAYS.iter().flat_map(|way| KEYS.iter().map(move |key| (way, key))).collect();
     // What is said beside a key, once for each way.
     let beside: BTreeSet<&[(&str, &str)]> = KEYS.iter().map(|key| key.1).collect();
-    let before: Vec<((&str, &[(&str, &str)]), Drawn)> = WAYS
+    let before: Vec<_> = WAYS
         .iter()
         .flat_map(|way| beside.iter().map(move |beside| (way, *beside)))
         .collect::<Vec<_>>()
