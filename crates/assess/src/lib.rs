@@ -20,6 +20,7 @@
 // Scores must have the same bits on every machine.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod auc;
 mod check;
 mod course;
 mod exam;
@@ -47,6 +48,7 @@ mod unjudged;
 mod way;
 mod words;
 
+pub use auc::auc;
 pub use course::{Attempt, Course, Line, MetricLine, Trend};
 pub use endowire_recording::Outlet;
 pub use exam::{Ended, EndedBy, Exam, Standing, Used};

@@ -232,6 +232,22 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(paths)
 }
 
+/// Refuses settings of keys of `[view]` that change nothing in what a command draws; those of single tables of a list
+/// are let pass.
+///
+/// # Errors
+/// Names the setting, and what to do instead.
+pub(crate) fn refuse_settings(settings: &[Setting], without_effect: &[(&str, &str)]) -> Result<(), Failure> {
+    for text in settings.iter().map(ToString::to_string) {
+        let Some(key) = text.strip_prefix("view.") else { continue };
+        let is_about = |other: &str| key.strip_prefix(other).is_some_and(|rest| rest.starts_with(['=', '.']));
+        if let Some((_, remedy)) = without_effect.iter().find(|(other, _)| is_about(other)) {
+            return Err(Failure::Input(format!("--set {text}: {remedy}")));
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,8 @@ use endowire_core::Vec3;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::NoStore;
 use endowire_viewer::{
-    self as viewer, DevicePart, FrameTime, Image, PixelFormat, Pushed, Seen, View, ViewSpec,
+    self as viewer, ContactView, DevicePart, FrameTime, Image, Moment, PixelFormat, Pushed, Seen, View,
+    ViewSpec,
 };
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -159,21 +160,26 @@ impl Renderer {
         if self.with(py, |renderer| Ok(renderer.spec().views.is_empty()))? {
             return Err(refuse("view.views", "[]", "nothing is drawn: give \"3d\", \"fluoro\" or both"));
         }
-        self.move_vessel(py, simulation)?;
         let of = std::ptr::from_ref(simulation) as usize;
-        let (stack, shape, inserted_mm) = simulation.with(py, |simulation| {
-            (simulation.stack().clone(), simulation.shape().clone(), simulation.report().lengths_mm())
+        let (stack, shape, report, coils, displacement) = simulation.with(py, |simulation| {
+            let (shape, report) = (simulation.shape().clone(), simulation.report().clone());
+            let coils = simulation.coils().to_vec();
+            (simulation.stack().clone(), shape, report, coils, simulation.displacement())
         });
+        let inserted_mm = report.lengths_mm();
+        let contacts = report.contacts.iter();
+        let contacts: Vec<_> =
+            contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() }).collect();
         let parts = views.iter().zip(simulation.pushed());
         let parts = parts.map(
             |(view, one)| {
                 if view.parts.is_empty() { one.parts.clone() } else { view.parts.clone() }
             },
         );
-        let pushed = Pushed::of_parts(stack, parts.collect());
+        let mut pushed = Pushed::of_parts(stack, parts.collect());
         let before = self.before.lock().unwrap_or_else(PoisonError::into_inner).take();
         let (frames, time_s) = self.with(py, |renderer| {
-            let moment = match frame {
+            let frame = match frame {
                 None => renderer.next_frame(),
                 Some(frame) => FrameTime { frame, time_s: frame as f64 / renderer.spec().frames_per_s },
             };
@@ -182,9 +188,16 @@ impl Renderer {
                 inserted_mm: &before.inserted_mm,
                 time_s: before.time_s,
             });
-            let now = Seen { shape: &shape, inserted_mm: &inserted_mm, time_s: moment.time_s };
-            let pulse = pushed.pulse(before, now, renderer);
-            Ok((renderer.render_pulse(&views, &pulse, moment)?, moment.time_s))
+            let moment = Moment {
+                frame,
+                shape: &shape,
+                inserted_mm: &inserted_mm,
+                coils: &coils,
+                contacts: &contacts,
+                displacement: displacement.as_ref(),
+                before,
+            };
+            Ok((renderer.draw(&mut pushed, &moment)?, frame.time_s))
         })?;
         let now = Before { of, shape, inserted_mm, time_s };
         *self.before.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
@@ -194,8 +207,8 @@ impl Renderer {
 
     /// Labels of the fluoroscopic view, without noise: a dictionary of `mask` (height, width; k + 1 where instrument
     /// k covers half of the pixel), `vessel` (the same for the lumen, 255; None if the wall is not closed), `devices`
-    /// (centre_line_px, centre_line_mm, depth_mm, tip_px, tip_mm, tip_visible), `contacts` (pixel, position_mm,
-    /// visible) and `camera_matrix` (3, 4), which maps (x, y, z, 1) in mm to pixel coordinates times the depth from
+    /// (centre_line_px, centre_line_mm, depth_mm, tip_px, tip_mm, tip_visible, and shaft_px: its shaft outside the
+    /// vessel, which is in the picture and not simulated), `contacts` (pixel, position_mm, visible) and `camera_matrix` (3, 4), which maps (x, y, z, 1) in mm to pixel coordinates times the depth from
     /// the source. Pixel coordinates are x and y from the top left.
     fn labels<'py>(&self, py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
         let views = self.views(py, simulation)?;
@@ -211,6 +224,8 @@ impl Renderer {
             one.set_item("centre_line_px", array(py, line.as_flattened().to_vec(), [line.len(), 2])?)?;
             let line = device.centre_line_mm;
             one.set_item("centre_line_mm", array(py, line.as_flattened().to_vec(), [line.len(), 3])?)?;
+            let line = device.shaft_px;
+            one.set_item("shaft_px", array(py, line.as_flattened().to_vec(), [line.len(), 2])?)?;
             let depths = device.depth_mm.len();
             one.set_item("depth_mm", array(py, device.depth_mm, [depths])?)?;
             one.set_item("tip_mm", device.tip_mm)?;

@@ -8,7 +8,7 @@ use endowire_core::field::FieldSpec;
 use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce};
 use endowire_core::methods::{MethodChoice, Parameter};
 use endowire_methods::AnyMethod;
-use endowire_viewer::DeviceView;
+use endowire_viewer::{DeviceView, SheathMouth};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -119,10 +119,14 @@ impl Simulation {
             DeviceView::of_device(&coil.shape, &instrument.device, &instrument.parts)
         });
         let line_mm = line_mm(lengths_mm.iter().copied());
+        let sheath = SheathMouth::of_line(&shape);
         let each = self.pushed().iter().zip(lengths_mm);
         each.map(|(instrument, mm)| match mm {
             0.0 => DeviceView::default(),
-            mm => DeviceView::of_device(&shape.behind(line_mm - mm), &instrument.device, &instrument.parts),
+            mm => DeviceView {
+                sheath,
+                ..DeviceView::of_device(&shape.behind(line_mm - mm), &instrument.device, &instrument.parts)
+            },
         })
         .chain(left)
         .collect()

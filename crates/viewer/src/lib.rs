@@ -47,6 +47,7 @@ mod pulse;
 mod pushed;
 mod renderer;
 mod scene;
+mod shaft;
 mod spec;
 mod tails;
 mod three_d;
@@ -67,9 +68,10 @@ pub use patient::read_label_map;
 pub use pulse::Seen;
 pub use pushed::{Pushed, ShownDevice};
 pub use renderer::{Frames, Renderer};
+pub use shaft::SheathMouth;
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, ExposureSpec, FlowSpec, InjectionSpec, Mode,
     PatientSpec, Pose, TorsoSpec, View, ViewSpec, XRaySpec,
 };
-pub use three_d::ContactView;
+pub use three_d::{ContactView, largest_force_n};
 pub use xray::{Exposure, PathLengths, Pulse};

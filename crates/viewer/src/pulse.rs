@@ -25,6 +25,7 @@ use crate::c_arm::CArm;
 use crate::device::DeviceView;
 use crate::pushed::Pushed;
 use crate::renderer::Renderer;
+use crate::shaft::SheathMouth;
 
 /// Largest number of parts of a pulse.
 const MOST_PARTS: f64 = 32.0;
@@ -71,7 +72,7 @@ impl Pushed {
         let at = |part: f64| 1.0 - pulse_s * (part + 0.5) / parts / step_s;
         let instant = |part: usize| {
             let shapes: Vec<Shape> = ways.iter().map(|way| way.at(at(part as f64).max(0.0))).collect();
-            self.views_of(&shapes, now.inserted_mm)
+            self.views_of(&shapes, SheathMouth::of_line(now.shape), now.inserted_mm)
         };
         (0..parts as usize).rev().map(instant).collect()
     }

@@ -12,6 +12,7 @@ use serde::de::DeserializeOwned;
 
 use crate::device::{DevicePart, DeviceView, bore_too_wide};
 use crate::device_file::{device_part_names, device_parts, section_parts};
+use crate::shaft::SheathMouth;
 use crate::spec::ViewSpec;
 
 /// Instruments of a scene and their materials.
@@ -131,7 +132,7 @@ impl Pushed {
     pub fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
         let line_mm = line_mm(inserted_mm.iter().copied());
         let behind = inserted_mm.iter().filter(|mm| **mm > 0.0).map(|mm| shape.behind(line_mm - mm));
-        self.views_of(&behind.collect::<Vec<_>>(), inserted_mm)
+        self.views_of(&behind.collect::<Vec<_>>(), SheathMouth::of_line(shape), inserted_mm)
     }
 
     /// What [`Self::views`] shows, in their order.
@@ -145,11 +146,16 @@ impl Pushed {
         is_in.map(|(instrument, _)| shown(instrument, false)).chain(left).collect()
     }
 
-    /// Views of all that is in, on lines of their own.
-    pub(crate) fn views_of(&self, shapes: &[Shape], inserted_mm: &[f64]) -> Vec<DeviceView> {
+    /// Views of all that is in, on lines of their own out of a sheath.
+    pub(crate) fn views_of(
+        &self,
+        shapes: &[Shape],
+        sheath: Option<SheathMouth>,
+        inserted_mm: &[f64],
+    ) -> Vec<DeviceView> {
         let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
         let view = |(((device, parts), _), shape): (((&Device, &Vec<DevicePart>), &f64), &Shape)| {
-            DeviceView::of_device(shape, device, parts)
+            DeviceView { sheath, ..DeviceView::of_device(shape, device, parts) }
         };
         let left = self.coils.iter().map(|coil| {
             let (device, parts) =

@@ -167,14 +167,20 @@ impl Renderer {
         if !moment.time_s.is_finite() {
             return Err(Error::parameter("time_s", moment.time_s, "must be finite"));
         }
+        let in_beam = |views: &[DeviceView]| self.setup.in_beam(views);
+        let pulse: Vec<_> = match pulse {
+            [] => vec![in_beam(devices)?],
+            instants => instants.iter().map(|views| in_beam(views)).collect::<Result<_>>()?,
+        };
         let devices = RefinedDevice::all(devices)?;
-        let mut pulse: Vec<_> = pulse.iter().map(|views| RefinedDevice::all(views)).collect::<Result<_>>()?;
-        if pulse.is_empty() {
-            pulse.push(devices.clone());
-        }
         let contacts = std::mem::take(&mut self.contacts);
         let frames = self.with_fallback(|setup, engines, fluoro, kept| {
-            let solids = Solids { devices: &devices, contacts: &contacts, c_arm: setup.shown_arm.as_ref() };
+            let solids = Solids {
+                devices: &devices,
+                contacts: &contacts,
+                scale_n: setup.spec.camera.force_n,
+                c_arm: setup.shown_arm.as_ref(),
+            };
             if engines.three_d.is_none() {
                 engines.three_d = setup.camera.as_ref().map(|camera| cpu::three_d(camera, setup.wall_now()));
             }
@@ -328,7 +334,7 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`] without the fluoroscopic view.
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
-        let devices = [RefinedDevice::all(devices)?];
+        let devices = [self.setup.in_beam(devices)?];
         self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
             sequence.take_mask(scope, &devices)
@@ -360,7 +366,7 @@ impl Renderer {
             ))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
-        labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)
+        labels(&self.setup, c_arm, devices, contacts_mm, of_scope)
     }
 
     /// Runs `job`; if an adapter fails in it, switches to the CPU and runs it again.

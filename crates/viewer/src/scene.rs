@@ -8,6 +8,7 @@ use endowire_core::vessel::{Displacement, SurfaceMesh};
 use crate::c_arm::CArm;
 use crate::contrast::Flow;
 use crate::cpu::{check_closed, check_drawable};
+use crate::device::{DeviceView, RefinedDevice};
 use crate::patient::Patient;
 use crate::spec::{View, ViewSpec};
 use crate::tails::Filled;
@@ -84,6 +85,14 @@ impl Setup {
             Some(moved) => moved.air.as_ref(),
             None => self.patient.air(),
         }
+    }
+
+    /// The devices in the beam, with their shafts outside the vessel.
+    ///
+    /// # Errors
+    /// As [`RefinedDevice::all`].
+    pub(crate) fn in_beam(&self, devices: &[DeviceView]) -> Result<Vec<RefinedDevice>> {
+        RefinedDevice::all_with_shafts(devices, self.spec.patient.is_given())
     }
 
     /// A set-up with a closed wall, filled with blood to its ends.

@@ -1,7 +1,7 @@
 //! Trainees that are made up: one follows the way cleanly, others have a fault each. Every measure tells those apart that it should, and no
 //! others.
 
-use endowire_assess::{BeamState, Hand, Injection, Metric, Record, Sample, Way, assess};
+use endowire_assess::{BeamState, Hand, Injection, Metric, Record, Sample, Way, assess, auc};
 use endowire_core::Vec3;
 use endowire_core::random::{splitmix64, unit};
 use endowire_core::vessel::{CentrelinePath, CentrelineTree, anatomy};
@@ -132,23 +132,6 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
 
 /// A fault, and the measures that it makes larger, smaller and leaves alone.
 type Expected = (Fault, &'static [&'static str], &'static [&'static str], &'static [&'static str]);
-
-/// Probability that a number of the second kind is larger than one of the first, half where they are equal.
-fn auc(first: &[f64], second: &[f64]) -> f64 {
-    let pairs = first.iter().flat_map(|a| second.iter().map(move |b| (a, b)));
-    let wins: f64 = pairs
-        .map(|(a, b)| {
-            if b > a {
-                1.0
-            } else if a == b {
-                0.5
-            } else {
-                0.0
-            }
-        })
-        .sum();
-    wins / (first.len() * second.len()) as f64
-}
 
 #[test]
 fn every_measure_tells_the_trainees_apart_that_it_should_and_no_others() {

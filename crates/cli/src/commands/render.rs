@@ -4,9 +4,9 @@ use std::path::Path;
 
 use endowire_core::vessel::Lumen;
 use endowire_recording::{
-    InjectionRow, Lengths, RecordedVessel, Recording, coils_after, read_coils, step_times,
+    InjectionRow, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils, step_times,
 };
-use endowire_viewer::{ContactView, FrameTime, Moment, Seen};
+use endowire_viewer::{ContactView, FrameTime, Moment, Seen, largest_force_n};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -59,6 +59,10 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let (step, later) = if one { (steps[0], k) } else { (steps[k], 0) };
         FrameTime { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s }
     };
+    // One scale for all arrows: the largest force of what is drawn.
+    let shown = if one { &steps[..1] } else { &steps[..] };
+    let largest = shown.iter().map(|step| largest_force_n(&contact_views(&recording, step - earlier)));
+    let plan = plan.with_forces_up_to(largest.fold(0.0, f64::max));
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
     let injections = InjectionRow::read(&args.dir)?;
     let injections = injections.iter().map(flowing);
@@ -80,9 +84,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
         }
         let ending = if one { format!("_frame_{k:06}") } else { String::new() };
-        let contacts = recording.contacts(step - earlier).into_iter();
-        let contacts: Vec<_> =
-            contacts.map(|one| ContactView { position_mm: one.position_mm, force_n: one.force_n }).collect();
+        let contacts = contact_views(&recording, step - earlier);
         let shape = recording.shape(step - earlier);
         let inserted_mm = lengths.after(step, &shape)?;
         // The device rests in a step that is drawn several times.
@@ -116,6 +118,12 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     bar.finish_and_clear();
     studio.finish()?.tell(args.frames.json)
+}
+
+/// The contacts of a recorded step, by its row.
+fn contact_views(recording: &Recording, row: usize) -> Vec<ContactView> {
+    let view = |one: WallContact| ContactView { position_mm: one.position_mm, force_n: one.force_n };
+    recording.contacts(row).into_iter().map(view).collect()
 }
 
 /// Warns about a recording that is drawn in this scene.

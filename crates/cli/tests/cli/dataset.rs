@@ -164,6 +164,7 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     let whole = std::fs::read_to_string(&spec).unwrap();
     for (from, to, named) in [
         ("dose_ngy = [20.0, 90.0]", "dose_ngy = [90.0, 20.0]", "vary.dose_ngy"),
+        ("dose_ngy = [20.0, 90.0]", "magnification = [0.01, 2.0]", "vary.magnification"),
         ("moments = 3", "moments = 0", "moments"),
         ("size_px = [256, 192]", "size_px = [0, 192]", "size_px"),
         ("kvp = [70.0, 80.0]", "kvp = [71.0]", "vary.kvp: view.xray.kvp = 71: the table has 50, 55"),
@@ -183,6 +184,48 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         let reported = said(&output);
         assert!(output.status.code() == Some(2) && reported.contains(named), "{to}: {reported}");
     }
+    // The scene has no body whose width could vary.
+    std::fs::write(&spec, whole.replace("dose_ngy = [20.0, 90.0]", "width_mm = [300.0, 350.0]")).unwrap();
+    let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("wide"))], "1");
+    let reported = said(&output);
+    assert!(reported.contains("vary.width_mm is that of a generated body"), "{reported}");
+}
+
+#[test]
+fn what_varies_is_drawn_for_each_pose_and_told_with_its_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = specification(folder.path(), "");
+    let whole = std::fs::read_to_string(&spec).unwrap();
+    let images = |vary: &str, name: &str| -> Vec<Value> {
+        let text_of = whole.replace("[vary]\n", &format!("[vary]\n{vary}"));
+        std::fs::write(&spec, text_of + "[view.patient.torso]\n").unwrap();
+        let out = folder.path().join(name);
+        reported(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+        document(out.join("annotations.json"))["images"].as_array().unwrap().clone()
+    };
+    let ranges = [
+        ("magnification", [1.0, 2.0]),
+        ("width_mm", [280.0, 380.0]),
+        ("scatter_fraction", [0.1, 0.6]),
+        ("contrast_fraction", [0.0, 0.3]),
+    ];
+    let vary: String =
+        ranges.iter().map(|(key, [low, high])| format!("{key} = [{low:?}, {high:?}]\n")).collect();
+    let (drawn, fixed) = (images(&vary, "drawn"), images("", "fixed"));
+    for (key, [low, high]) in ranges {
+        let values = |images: &[Value]| -> BTreeSet<String> {
+            images.iter().map(|image| image[key].as_f64().unwrap().to_string()).collect()
+        };
+        let all = values(&drawn);
+        // One for each pose of each device.
+        assert!(all.len() == 4, "{key}: {all:?}");
+        assert!(
+            all.iter().all(|value| (low..=high).contains(&value.parse::<f64>().unwrap())),
+            "{key}: {all:?}"
+        );
+        assert_eq!(values(&fixed).len(), 1, "the twin: {key} of the scene");
+    }
+    assert_ne!(drawn[0]["camera_matrix"], fixed[0]["camera_matrix"]);
 }
 
 /// A scene whose table of materials is that of a catheter, and a wire in its place.

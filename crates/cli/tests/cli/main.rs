@@ -38,3 +38,4 @@ mod surfaces;
 mod sweep;
 mod terminal;
 mod vanished;
+mod view_keys;

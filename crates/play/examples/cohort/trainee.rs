@@ -18,6 +18,16 @@ pub(crate) enum Class {
     Blind,
 }
 
+impl Class {
+    /// All classes, the best first.
+    pub(crate) const ALL: [Self; 5] = [Self::Good, Self::Slow, Self::Wasteful, Self::Reckless, Self::Blind];
+
+    /// Whether a teacher lets them pass.
+    pub(crate) fn passes(self) -> bool {
+        matches!(self, Self::Good | Self::Slow)
+    }
+}
+
 /// When the pedal is down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Beam {

@@ -18,6 +18,7 @@ use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::material::Material;
+use crate::shaft::SheathMouth;
 pub(crate) use piece::{Piece, pieces};
 
 /// Largest distance of a piece's chord from the curve, in radii.
@@ -28,6 +29,8 @@ const LONGEST_MM: f64 = 4.0;
 /// memory.
 const MOST_PIECES: usize = 4096;
 const MOST_PIECES_IN_ALL: usize = 1 << 20;
+/// Largest distance of a part from the tip, mm.
+const FURTHEST_MM: f64 = 1e5;
 /// Largest radius of a part, mm.
 const LARGEST_RADIUS_MM: f64 = 1e3;
 
@@ -52,6 +55,9 @@ pub struct DeviceView {
     /// Its parts; a later one takes the place of what it covers of earlier ones, its lumen covers nothing. None: one
     /// solid rod.
     pub parts: Vec<DevicePart>,
+    /// The mouth of the sheath that its first point is at. Fluoroscopy then shows its shaft outside, too, on a way
+    /// through groin or arm to the edge of the picture; the 3D view, like the simulation, begins at the mouth.
+    pub sheath: Option<SheathMouth>,
 }
 
 /// A tube of one material over a stretch of a device, for instance a `[[view.device]]` table of a scene.
@@ -79,7 +85,7 @@ impl DevicePart {
             Err(Error::parameter(format!("{name}.{key}"), value, remedy))
         };
         if let Some([first, last]) = self.from_tip_mm
-            && !(first >= 0.0 && first < last && last <= 1e5)
+            && !(first >= 0.0 && first < last && last <= FURTHEST_MM)
         {
             let remedy = "must be two lengths from the tip, 0 to 100000 mm, the first less than the second";
             return refuse("from_tip_mm", format!("[{first}, {last}]"), remedy);
@@ -118,6 +124,31 @@ impl DeviceView {
         let mut view = Self::from_shape(shape, |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
         view.parts.extend_from_slice(parts);
         view
+    }
+
+    /// The refined shaft outside the sheath, from far to near, with its device's `first` point as the last; empty
+    /// without a sheath.
+    fn shaft(&self, first: &DevicePoint, in_patient: bool) -> Result<Vec<DevicePoint>> {
+        let Some(mouth) = &self.sheath else { return Ok(vec![]) };
+        let mut points = mouth.shaft(first.radius_mm, in_patient);
+        // While it moves during a pulse, a device may begin a little inside the sheath.
+        let within_mm = (mouth.position_mm - first.position_mm).norm();
+        while points.last().is_some_and(|p| (p.position_mm - mouth.position_mm).norm() < within_mm + 1.0) {
+            points.pop();
+        }
+        points.push(*first);
+        Self { points, ..Self::default() }.refined()
+    }
+
+    /// The same with the parts that reach furthest from the tip, of those at the mouth this far from it, extended: a
+    /// shaft is as long as it needs to be.
+    fn with_endless_shaft(&self, mouth_mm: f64) -> Self {
+        let end = |part: &DevicePart| part.from_tip_mm.map_or(f64::INFINITY, |[_, end]| end);
+        let furthest = self.parts.iter().map(end).fold(mouth_mm, f64::max);
+        let mut endless = self.clone();
+        let last = endless.parts.iter_mut().filter_map(|part| part.from_tip_mm.as_mut());
+        last.filter(|ends| ends[1] >= furthest).for_each(|ends| ends[1] = FURTHEST_MM);
+        endless
     }
 
     /// Refines the centre line; empty if there is nothing to draw.
@@ -180,8 +211,6 @@ pub(crate) struct Layer {
     pub(crate) material: Option<Material>,
     /// Index of its part; `None` for a device without parts.
     pub(crate) part: Option<usize>,
-    /// Extent of that part, from the tip in mm, if given.
-    pub(crate) from_tip_mm: Option<[f64; 2]>,
     /// Pieces between consecutive points.
     pieces: Range<usize>,
     outer_radius_mm: Option<f64>,
@@ -203,6 +232,8 @@ struct Cover {
 pub(crate) struct RefinedDevice {
     pub(crate) points: Vec<DevicePoint>,
     pub(crate) layers: Vec<Layer>,
+    /// Number of the first points that are those of its shaft, outside the sheath's mouth.
+    pub(crate) outside: usize,
 }
 
 /// Thickness up to which what a later layer leaves of a layer is rounding.
@@ -226,19 +257,46 @@ impl RefinedDevice {
         Ok(refined)
     }
 
+    /// As [`Self::all`], with the shafts of devices in a sheath: what is in the beam.
+    ///
+    /// # Errors
+    /// As [`Self::all`], and for a sheath that is not finite.
+    pub(crate) fn all_with_shafts(devices: &[DeviceView], in_patient: bool) -> Result<Vec<Self>> {
+        let mut refined = Vec::with_capacity(devices.len());
+        for device in devices {
+            let mut points = device.refined()?;
+            let Some(first) = points.first().copied() else { continue };
+            let shaft = device.shaft(&first, in_patient)?;
+            let outside = shaft.len().saturating_sub(1);
+            if outside == 0 {
+                refined.push(Self::cut(points, device)?);
+                continue;
+            }
+            let mouth_mm = first.position_mm;
+            points.splice(..1, shaft);
+            let from_tip_mm: f64 =
+                points[outside..].windows(2).map(|p| (p[1].position_mm - p[0].position_mm).norm()).sum();
+            let mut cut = Self::cut(points, &device.with_endless_shaft(from_tip_mm))?;
+            // Parts may have divided the shaft.
+            let at_mouth = |point: &DevicePoint| point.position_mm == mouth_mm;
+            cut.outside = cut.points.iter().position(at_mouth).unwrap_or(outside);
+            refined.push(cut);
+        }
+        Ok(refined)
+    }
+
     fn cut(mut points: Vec<DevicePoint>, device: &DeviceView) -> Result<Self> {
         if device.parts.is_empty() {
             let pieces = 0..points.len() - 1;
             let layer = Layer {
                 material: device.material,
                 part: None,
-                from_tip_mm: None,
                 pieces,
                 outer_radius_mm: None,
                 inner_radius_mm: 0.0,
                 covers: vec![],
             };
-            return Ok(Self { points, layers: vec![layer] });
+            return Ok(Self { points, layers: vec![layer], outside: 0 });
         }
         // Arc length from the tip, which is the last point.
         let mut from_tip = vec![0.0; points.len()];
@@ -281,7 +339,6 @@ impl RefinedDevice {
                 let layer = Layer {
                     material: part.material.or(device.material),
                     part: Some(i),
-                    from_tip_mm: part.from_tip_mm,
                     pieces: first..last,
                     outer_radius_mm: part.outer_radius_mm,
                     inner_radius_mm: part.inner_radius_mm,
@@ -295,7 +352,7 @@ impl RefinedDevice {
                 layers.push(layer);
             }
         }
-        Ok(Self { points, layers })
+        Ok(Self { points, layers, outside: 0 })
     }
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::c_arm::CArm;
 use crate::engine::PathEngine;
 use crate::material::Material;
-use crate::patient::{Body, Patient};
+use crate::patient::{Body, Of, Patient};
 use crate::scene::Setup;
 use crate::tails::Filled;
 
@@ -43,9 +43,12 @@ impl Anatomy {
             Patient::Torso(body) => {
                 let mut cast = |mesh: &SurfaceMesh| cast(mesh, c_arm, engine);
                 let finer = |map: Vec<f32>| finer(map, c_arm.size_px(), rays);
-                maps.body = finer(cast(&body.skin)?);
+                let mut skin = cast(&body.skin)?;
+                body.texture.apply(Of::Tissue, &mut skin, c_arm);
+                maps.body = finer(skin);
                 let (mut bone, marrow) = (cast(&body.bones)?, cast(&body.marrow)?);
                 bone.iter_mut().zip(marrow).for_each(|(b, m)| *b = (*b - Body::NOT_BONE as f32 * m).max(0.0));
+                body.texture.apply(Of::Bone, &mut bone, c_arm);
                 maps.bone = finer(bone);
                 maps.lung = air(setup, c_arm, rays, engine)?;
             }
@@ -105,8 +108,8 @@ impl Anatomy {
         if self.faded.is_empty() { 0.0 } else { self.faded[ray] }
     }
 
-    /// Thickness of soft tissue equivalent to the middle of the image: the median over its middle ninth, where
-    /// exposure control measures.
+    /// Thickness of soft tissue equivalent to the middle of the image: what lets through as much as the body does in the
+    /// mean over the middle ninth, where exposure control measures. Air beside the body does not count.
     pub(crate) fn reference_mm(&self, view: &CArm) -> f64 {
         // Relative attenuation at the 58 keV of an average quantum.
         const KEV: f64 = 58.0;
@@ -120,13 +123,19 @@ impl Anatomy {
         let mut depths = Vec::new();
         for y in height / 3..(2 * height).div_ceil(3) {
             for x in width / 3..(2 * width).div_ceil(3) {
-                let lengths = self.at(y * width + x);
-                depths.push(lengths.iter().zip(factors).map(|(l, f)| l * f).sum::<f32>());
+                let ray = y * width + x;
+                if self.is_body(ray) {
+                    depths.push(self.at(ray).iter().zip(factors).map(|(l, f)| l * f).sum::<f32>());
+                }
             }
         }
-        let middle = depths.len() / 2;
-        let (_, median, _) = depths.select_nth_unstable_by(middle, f32::total_cmp);
-        f64::from(*median)
+        if depths.is_empty() {
+            return 0.0;
+        }
+        let per_mm = Material::SoftTissue.attenuation_per_mm(KEV).unwrap_or(0.0);
+        let thinnest = f64::from(depths.iter().copied().fold(f32::MAX, f32::min));
+        let passed = depths.iter().map(|d| libm::exp(per_mm * (thinnest - f64::from(*d)))).sum::<f64>();
+        thinnest - libm::log(passed / depths.len() as f64) / per_mm
     }
 }
 
@@ -153,6 +162,9 @@ fn air(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> R
     let mut air = cast(mesh, c_arm, engine)?;
     // Vessels of a lung overlap where they divide.
     air.iter_mut().for_each(|length| *length = length.max(0.0));
+    if let Patient::Torso(body) = &*setup.patient {
+        body.texture.apply(Of::Lung, &mut air, c_arm);
+    }
     Ok(finer(air, c_arm.size_px(), rays))
 }
 

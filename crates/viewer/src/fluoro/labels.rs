@@ -4,20 +4,20 @@ use endowire_core::{Result, Vec3};
 
 use crate::c_arm::CArm;
 use crate::cpu::{Coverage, layers_in_beam};
-use crate::device::{DeviceView, RefinedDevice};
-use crate::material::Material;
+use crate::device::DeviceView;
 use crate::output::{ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat};
+use crate::scene::Setup;
 use crate::xray::Exposure;
 
-/// Labels of a frame of `devices`; `material` is that of devices without their own.
+/// Labels of a frame of `devices`.
 ///
 /// # Errors
 /// [`endowire_core::Error::Parameter`] for a device with values that are not finite.
 pub(crate) fn labels(
+    setup: &Setup,
     c_arm: &CArm,
     devices: &[DeviceView],
     contacts_mm: &[Vec3],
-    material: Material,
     (vessel, exposure): (Option<Mask>, Exposure),
 ) -> Result<Labels> {
     let contact = |point: &Vec3| {
@@ -31,7 +31,7 @@ pub(crate) fn labels(
     let mut room = [Coverage::new(c_arm), Coverage::new(c_arm)];
     let mut labelled = Vec::with_capacity(devices.len());
     for (number, device) in (1_u8..=u8::MAX).zip(devices) {
-        let label = device_label(c_arm, device, material, &mut room)?;
+        let label = device_label(setup, c_arm, device, &mut room)?;
         label.mask.pixels().iter().for_each(|&pixel| mask[pixel as usize] = number);
         labelled.push(label);
     }
@@ -52,34 +52,40 @@ fn seen(c_arm: &CArm, point: &Vec3) -> Option<[f64; 2]> {
 }
 
 fn device_label(
+    setup: &Setup,
     c_arm: &CArm,
     device: &DeviceView,
-    material: Material,
     [whole, one]: &mut [Coverage; 2],
 ) -> Result<DeviceLabel> {
     let mut parts = Vec::new();
     let mut mask = Mask::new(c_arm.size_px(), vec![]);
-    let refined = RefinedDevice::all(std::slice::from_ref(device))?;
-    let points = refined.first().map_or(&[][..], |device| &device.points);
-    for device in &refined {
-        let layers = layers_in_beam(c_arm, device);
+    let refined = setup.in_beam(std::slice::from_ref(device))?;
+    let (shaft, points) =
+        refined.first().map_or_else(Default::default, |one| one.points.split_at(one.outside));
+    for device_in_beam in &refined {
+        let layers = layers_in_beam(c_arm, device_in_beam);
         for (layer, pieces) in &layers {
             pieces.iter().filter(|(_, sign)| *sign > 0.0).for_each(|(piece, _)| one.add(c_arm, piece));
             whole.join(one);
             let covered = one.take(c_arm);
             if let Some(number) = layer.part {
-                let (material, from_tip_mm) = (layer.material.unwrap_or(material), layer.from_tip_mm);
+                let material = layer.material.unwrap_or(setup.spec.xray.device_material);
+                let from_tip_mm = device.parts[number].from_tip_mm;
                 parts.push(PartLabel { number, material, from_tip_mm, mask: covered });
             }
         }
         mask = whole.take(c_arm);
     }
+    // The mouth belongs to both.
+    let shaft = shaft.iter().chain(points.first().filter(|_| !shaft.is_empty()));
+    let shaft_px = shaft.filter_map(|p| seen(c_arm, &p.position_mm)).collect();
     let shown = points.iter().map(|p| p.position_mm).filter_map(|p| Some((seen(c_arm, &p)?, p)));
     let (centre_line_px, places): (Vec<[f64; 2]>, Vec<Vec3>) = shown.unzip();
     let tip = points.last().map(|p| p.position_mm);
     let tip_px = tip.and_then(|tip| seen(c_arm, &tip));
     Ok(DeviceLabel {
         shown: None,
+        shaft_px,
         centre_line_px,
         depth_mm: places.iter().map(|p| c_arm.depth_mm(p)).collect(),
         centre_line_mm: places.into_iter().map(Into::into).collect(),

@@ -8,12 +8,14 @@ use super::{Fluoroscope, Signal};
 use crate::device::RefinedDevice;
 use crate::output::Image;
 use crate::spec::{Mode, ViewSpec};
-use crate::xray::Detector;
+use crate::xray::{Blur, Detector};
 
 /// Number of frames averaged for a mask or a stored angiogram.
 const MASK_FRAMES: u64 = 4;
 /// Frame numbers from here on are used for the noise of masks and angiograms.
 const MASK_NUMBERS: u64 = 1 << 63;
+/// Deviation at the detector of the blur that edge enhancement compares with, mm.
+const EDGES_MM: f64 = 0.5;
 /// Weight of the newest frame in the last image hold.
 const HOLD_WEIGHT: f32 = 0.4;
 /// Subtracted values shown white and black, relative to the vessels' strongest.
@@ -59,6 +61,8 @@ pub(crate) struct Sequence {
     /// Time of a frame at the view's rate, s, and the time of the last frame.
     frame_s: f64,
     last_s: Option<f64>,
+    /// Edge enhancement: how much, and the deviation of the blur whose loss it adds, pixels.
+    edges: [f64; 2],
     /// Subtracted from −ln of each frame: the stored mask or angiogram, or shading.
     mask: Option<Vec<f32>>,
     /// Weighted mean of the last frames, the newest weighing most.
@@ -130,6 +134,7 @@ impl Sequence {
             bits: spec.bits,
             noisy: spec.detector.noise,
             frame_s: 1.0 / spec.frames_per_s,
+            edges: [spec.xray.edges, EDGES_MM / c_arm.pixel_mm()],
             last_s: None,
             mask,
             held: vec![],
@@ -191,6 +196,12 @@ impl Sequence {
     }
 
     fn shown(&self, mut values: Vec<f32>, fluoroscope: &Fluoroscope) -> Image {
+        let [more, deviation_px] = self.edges;
+        if more > 0.0 {
+            let mut coarse = values.clone();
+            Blur::new(deviation_px, fluoroscope.c_arm.size_px()).spread(&mut coarse);
+            values.iter_mut().zip(coarse).for_each(|(v, coarse)| *v += more as f32 * (*v - coarse));
+        }
         if let Some([from, densest]) = self.shoulder {
             let share = (self.window[1] - from) / (densest - from);
             values.iter_mut().filter(|v| **v > from).for_each(|v| *v = from + share * (*v - from));

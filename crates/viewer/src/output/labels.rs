@@ -41,6 +41,9 @@ pub struct DeviceLabel {
     pub centre_line_mm: Vec<[f64; 3]>,
     /// Their depths from the source along the central ray.
     pub depth_mm: Vec<f64>,
+    /// The projected shaft outside the vessel, the sheath's mouth last: it is in the picture and in the masks, and is
+    /// not simulated. Empty without a sheath.
+    pub shaft_px: Vec<[f64; 2]>,
     /// The projected tip; absent if it is not between source and detector.
     pub tip_px: Option<[f64; 2]>,
     /// The tip in space; absent if nothing is inserted.
@@ -49,7 +52,8 @@ pub struct DeviceLabel {
     pub tip_visible: bool,
     /// Its parts in order; empty for a solid rod.
     pub parts: Vec<PartLabel>,
-    /// Pixels at least half covered by it, or crossed by its axis, not behind a blade.
+    /// Pixels at least half covered by it, with its shaft outside the vessel, or crossed by its axis, not behind a
+    /// blade.
     #[serde(skip)]
     pub mask: Mask,
 }

@@ -4,10 +4,10 @@
 //! Bone is a cortical shell around marrow with a fraction of bone: its length on a ray is that of the outer surface
 //! minus (1 − fraction) of the inner one.
 
-use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
 use super::loft::loft;
+use super::texture::Texture;
 use super::trunk::Trunk;
 use crate::spec::TorsoSpec;
 
@@ -23,16 +23,17 @@ pub(crate) struct Body {
     pub(crate) bones: SurfaceMesh,
     pub(crate) marrow: SurfaceMesh,
     pub(crate) lungs: SurfaceMesh,
+    pub(crate) texture: Texture,
 }
 
 impl Body {
     /// Fraction of the marrow's length that is not bone.
     pub(crate) const NOT_BONE: f64 = 1.0 - MARROW_SHARE;
 
-    /// A body around a vessel with the given lowest and highest coordinates.
-    pub(crate) fn new(spec: &TorsoSpec, (low, high): (Vec3, Vec3)) -> Self {
-        let trunk = Trunk::new(spec, low, high);
-        let mut body = Self::default();
+    /// A body around a vessel with this wall.
+    pub(crate) fn new(spec: &TorsoSpec, wall: &SurfaceMesh) -> Self {
+        let trunk = Trunk::new(spec, wall);
+        let mut body = Self { texture: trunk.texture(), ..Self::default() };
         loft(&mut body.skin, &trunk.skin());
         for (mesh, inset) in [(&mut body.bones, 0.0), (&mut body.marrow, CORTEX_MM)] {
             if spec.spine {
@@ -46,6 +47,9 @@ impl Body {
                 trunk.girdle(mesh, inset);
             }
         }
+        if spec.electrodes {
+            trunk.electrodes(&mut body.bones);
+        }
         if spec.lungs {
             trunk.air(&mut body.lungs);
         }
@@ -55,11 +59,19 @@ impl Body {
 
 #[cfg(test)]
 mod tests {
+    use endowire_core::Vec3;
+
     use super::*;
     use crate::cpu::check_closed;
 
+    /// The corners of an artery's box.
+    fn vessel() -> SurfaceMesh {
+        let vertices_mm = vec![Vec3::new(-40.0, -50.0, 0.0), Vec3::new(40.0, 30.0, 300.0)];
+        SurfaceMesh { vertices_mm, triangles: vec![] }
+    }
+
     fn body() -> Body {
-        Body::new(&TorsoSpec::default(), (Vec3::new(-40.0, -50.0, 0.0), Vec3::new(40.0, 30.0, 300.0)))
+        Body::new(&TorsoSpec::default(), &vessel())
     }
 
     #[test]
@@ -80,7 +92,6 @@ mod tests {
 
     #[test]
     fn bodies_of_all_sizes_that_a_scene_may_give_are_made_and_closed() {
-        let vessel = (Vec3::new(-40.0, -50.0, 0.0), Vec3::new(40.0, 30.0, 300.0));
         for width_mm in [100.0, 105.0, 110.0, 113.0, 120.0, 330.0, 800.0] {
             for depth_mm in [80.0, 215.0, 600.0] {
                 for (spine_mm, diaphragm_mm) in [
@@ -90,7 +101,7 @@ mod tests {
                 ] {
                     let spec =
                         TorsoSpec { width_mm, depth_mm, spine_mm, diaphragm_mm, ..TorsoSpec::default() };
-                    let body = Body::new(&spec, vessel);
+                    let body = Body::new(&spec, &vessel());
                     for mesh in [&body.skin, &body.bones, &body.marrow, &body.lungs] {
                         assert!(mesh.vertices_mm.iter().all(|v| v.iter().all(|x| x.is_finite())), "{spec:?}");
                     }
@@ -102,8 +113,7 @@ mod tests {
 
     #[test]
     fn the_back_of_the_head_is_inside_its_skin() {
-        let high = Vec3::new(40.0, 30.0, 300.0);
-        let trunk = Trunk::new(&TorsoSpec::default(), Vec3::new(-40.0, -50.0, 0.0), high);
+        let trunk = Trunk::new(&TorsoSpec::default(), &vessel());
         let mut head = SurfaceMesh { vertices_mm: vec![], triangles: vec![] };
         trunk.head(&mut head, 0.0);
         // Behind the mastoids.
@@ -115,8 +125,9 @@ mod tests {
 
     #[test]
     fn what_is_not_wanted_is_not_there() {
-        let spec = TorsoSpec { spine: false, ribs: false, lungs: false, ..TorsoSpec::default() };
-        let body = Body::new(&spec, (Vec3::zeros(), Vec3::repeat(100.0)));
+        let spec =
+            TorsoSpec { spine: false, ribs: false, lungs: false, electrodes: false, ..TorsoSpec::default() };
+        let body = Body::new(&spec, &vessel());
         assert!(body.bones.triangles.is_empty() && body.lungs.triangles.is_empty());
         assert!(!body.skin.triangles.is_empty());
     }

@@ -105,17 +105,21 @@ pub(super) fn bowl(mesh: &mut SurfaceMesh, centre: Vec3, [outer, inner]: [f64; 2
 
 /// Adds an ellipsoid with half axes along the coordinates.
 pub(super) fn ellipsoid(mesh: &mut SurfaceMesh, centre: Vec3, half: Vec3) {
-    const RINGS: usize = 18;
+    ellipsoid_of(mesh, 18, centre, half);
+}
+
+/// The same of this number of rings.
+pub(super) fn ellipsoid_of(mesh: &mut SurfaceMesh, rings: usize, centre: Vec3, half: Vec3) {
     let ring = |i: usize| -> Vec<Vec3> {
-        let (s, c) = libm::sincos(std::f64::consts::PI * i as f64 / RINGS as f64);
-        (0..2 * RINGS)
+        let (s, c) = libm::sincos(std::f64::consts::PI * i as f64 / rings as f64);
+        (0..2 * rings)
             .map(|k| {
-                let (v, u) = libm::sincos(TAU * k as f64 / (2 * RINGS) as f64);
+                let (v, u) = libm::sincos(TAU * k as f64 / (2 * rings) as f64);
                 centre + half.component_mul(&Vec3::new(s * u, s * v, -c))
             })
             .collect()
     };
-    loft(mesh, &(1..RINGS).map(ring).collect::<Vec<_>>());
+    loft(mesh, &(1..rings).map(ring).collect::<Vec<_>>());
 }
 
 /// A smooth curve through points with their radii (Catmull and Rom 1974), all reduced by `inset`, with round ends.

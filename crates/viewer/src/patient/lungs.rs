@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
-use super::loft::{ellipsoid, hollow, loft, smooth, tube};
+use super::loft::{ellipsoid, ellipsoid_of, hollow, loft, smooth, tube};
 use super::trunk::{Trunk, step};
 
 /// Radius over which limits are blended, mm.
@@ -18,7 +18,9 @@ const BLEND_MM: f64 = 9.0;
 /// Height of the diaphragm's dome over its edge at the side, mm.
 const DOME_MM: f64 = 42.0;
 /// Half axes of the heart, and its centre relative to the middle of chest and diaphragm: left, forward, up, mm.
-const HEART_MM: [[f64; 3]; 2] = [[58.0, 44.0, 50.0], [24.0, 24.0, 34.0]];
+const HEART_MM: [[f64; 3]; 2] = [[71.0, 48.0, 58.0], [23.0, 26.0, 25.0]];
+/// Least distance of the mediastinum from the back of the breastbone, mm: the lungs nearly meet before it.
+const BEFORE_MM: f64 = 26.0;
 /// Steps towards the surface from the axis, mm.
 const STRIDE_MM: f64 = 4.0;
 /// Number of times distances are averaged with their neighbours': the region behind the heart ends smoothly.
@@ -28,8 +30,8 @@ const SIDES: usize = 48;
 const RINGS: usize = 36;
 const DOME_RINGS: usize = 12;
 /// Number of generations of a lung's vessels, and radii of the first and the thinnest, mm.
-const GENERATIONS: u32 = 6;
-const VESSELS_MM: [f64; 2] = [6.2, 0.8];
+const GENERATIONS: u32 = 7;
+const VESSELS_MM: [f64; 2] = [4.9, 0.7];
 /// Angle between a vessel and its two branches.
 const FORK_RAD: f64 = 0.5;
 /// The golden angle, by which the planes of bifurcations are rotated.
@@ -61,7 +63,8 @@ struct Lung<'a> {
     trunk: &'a Trunk,
     /// 1 the left one, −1 the right one.
     side: f64,
-    mediastinum: f64,
+    /// Largest half width of the mediastinum.
+    widest: f64,
     /// Height of the diaphragm's dome.
     dome: f64,
 }
@@ -83,13 +86,21 @@ impl Lung<'_> {
         let bulge =
             7.0 * bump(trunk.apex - 62.0, 16.0) * f64::from(self.side > 0.0) + 6.0 * bump(hilum, 26.0);
         // The right atrium, and the ascending aorta with the upper vein.
-        let right = 7.0 * bump(trunk.diaphragm + 36.0, 34.0) + 4.0 * bump(hilum + 36.0, 26.0);
+        let right = 11.0 * bump(trunk.diaphragm + 34.0, 36.0) + 4.0 * bump(hilum + 36.0, 26.0);
         let bulge = if self.side < 0.0 { right - 3.0 } else { bulge - 2.0 };
-        let inner = [self.mediastinum * (0.9 + 0.1 * narrow) + bulge, 0.98 * deep];
+        let [inner, forward] = trunk.mediastinum(self.side, z);
+        let inner = inner + bulge;
         let round = |u: f64, v: f64, half: [f64; 2]| {
             (1.0 - libm::hypot(u / half[0], v / half[1])) * half[0].min(half[1])
         };
-        let between = round(u, y - middle, inner);
+        // From the spine to the front of the great vessels.
+        let back = trunk.spine_y(z) + 10.0;
+        let front = (trunk.spine[1] - forward).min(middle - 0.15 * deep).max(middle - deep + BEFORE_MM);
+        let between = {
+            let [v, half] = [y - f64::midpoint(back, front), f64::midpoint(back, -front)];
+            let out = libm::pow(u.abs() / inner, 3.0) + libm::pow(v.abs() / half, 3.0);
+            (1.0 - libm::cbrt(out)) * inner.min(half)
+        };
         let spine = round(u, y - trunk.spine_y(z) - 4.0, [31.0, 30.0]);
         let [half, at] = HEART_MM;
         let heart = [self.side * u - at[0], y - trunk.middle_y + at[1], z - trunk.diaphragm - at[2]];
@@ -109,7 +120,7 @@ impl Lung<'_> {
     fn axis(&self, z: f64) -> [f64; 2] {
         let ([wide, _], middle) = self.trunk.chest_at(z);
         let down = step(z, self.trunk.apex, self.trunk.diaphragm + 40.0);
-        let inner = (self.mediastinum + 6.0).max(33.0);
+        let inner = (self.widest + 6.0).max(33.0);
         // At the apex between mediastinum and wall; below behind the heart.
         [inner + (0.42 + 0.1 * down) * (wide - inner), middle + 4.0 + 12.0 * down]
     }
@@ -191,7 +202,7 @@ impl Lung<'_> {
         let [axis, y] = self.axis(point.z);
         let off = libm::hypot(u - axis, point.y - y) / 75.0;
         let diaphragm = self.dome - DOME_MM * libm::pow(off, 2.4).min(1.0);
-        self.outside(u, point.y, point.z) < -5.0 && point.z > diaphragm + 6.0
+        self.outside(u, point.y, point.z) < -3.0 && point.z > diaphragm + 4.0
     }
 
     /// Adds the vessel that starts at a point, and its branches, as long as they are inside.
@@ -226,16 +237,27 @@ impl Trunk {
     /// Adds lungs, trachea and the air below.
     pub(super) fn air(&self, mesh: &mut SurfaceMesh) {
         let carina = Vec3::new(self.spine[0], self.spine_y(self.apex) - 40.0, self.apex - 85.0);
-        for (side, mediastinum) in [1.0, -1.0].into_iter().zip(self.mediastinum) {
+        for side in [1.0, -1.0] {
             // The liver lifts the right dome.
-            let lung = Lung { trunk: self, side, mediastinum, dome: self.diaphragm + 3.0 - 8.0 * side };
+            let dome = self.diaphragm + 3.0 - 8.0 * side;
+            let heights = (0..40).map(|k| self.diaphragm + self.chest() * f64::from(k) / 40.0);
+            let widest = heights.map(|z| self.mediastinum(side, z)[0]).fold(0.0, f64::max);
+            let lung = Lung { trunk: self, side, widest, dome };
             loft(mesh, &lung.rings());
             let z = lung.hilum_z();
             let [u, y] = lung.axis(z);
-            let root = Vec3::new(self.spine[0] + side * (lung.mediastinum + 12.0), y - 6.0, z);
+            let root = Vec3::new(self.spine[0] + side * (self.mediastinum(side, z)[0] + 14.0), y - 6.0, z);
             let out = Vec3::new(side * u, 0.0, 0.0).normalize();
             hollow(mesh, |mesh| {
-                for (up, back) in [(1.0, 0.1), (-0.05, -0.45), (-1.05, 0.35), (0.35, 0.7)] {
+                for (up, back) in [
+                    (1.0, 0.1),
+                    (-0.05, -0.45),
+                    (-1.05, 0.35),
+                    (0.35, 0.7),
+                    (-0.55, -0.2),
+                    (0.75, -0.5),
+                    (-0.8, 0.9),
+                ] {
                     let along = (out + Vec3::new(0.0, back, up)).normalize();
                     let normal = Vec3::new(0.0, up, -back).cross(&along).normalize();
                     lung.vessel(mesh, root, along, normal, 0);
@@ -259,7 +281,11 @@ impl Trunk {
             Vec3::new(self.spine[0] + part * self.half_width, front + back, self.diaphragm - down)
         };
         // The stomach's dome under the left diaphragm.
-        ellipsoid(mesh, at(0.4, 25.0, 38.0), Vec3::new(30.0, 22.0, 12.0));
+        for (part, down, half) in
+            [(0.36, 40.0, [22.0, 9.0, 10.0]), (0.48, 36.0, [16.0, 8.0, 9.0]), (0.28, 52.0, [12.0, 6.0, 11.0])]
+        {
+            ellipsoid(mesh, at(part, 25.0, down), Vec3::from(half));
+        }
         // Haustra: bubbles in a row, along the colon from its right to its left bend and down.
         let frame = [
             (-0.66, 190.0),
@@ -271,16 +297,24 @@ impl Trunk {
             (0.7, 150.0),
         ];
         for (pair, number) in frame.windows(2).zip(0..) {
-            for k in 0..4 {
-                let hash = |more: f64| libm::sin(f64::from(number * 4 + k) * TURN_RAD + more).abs();
-                if hash(0.4) < 0.45 {
+            for k in 0..9 {
+                let hash = |more: f64| libm::sin(f64::from(number * 9 + k) * TURN_RAD + more).abs();
+                // Gas comes in runs, between what is solid.
+                let run = libm::sin(f64::from(number * 9 + k) * 0.61 + 0.8);
+                if run < 0.15 || hash(0.4) < 0.2 {
                     continue;
                 }
-                let t = (f64::from(k) + 0.5) / 4.0;
+                let t = (f64::from(k) + 0.5) / 9.0;
                 let part = pair[0].0 + (pair[1].0 - pair[0].0) * t;
                 let down = pair[0].1 + (pair[1].1 - pair[0].1) * t;
-                let half = Vec3::new(7.0 + 7.0 * hash(1.0), 5.0 + 4.0 * hash(2.0), 4.0 + 5.0 * hash(3.0));
-                ellipsoid(mesh, at(part, 10.0 + 14.0 * hash(5.0), down + 9.0 * hash(4.0)), half);
+                // Overlapping pouches on both sides of a bowel's middle.
+                for side in [-1.0, 1.0] {
+                    let size = 0.55 + 0.75 * hash(1.0 + side);
+                    let half = Vec3::new(8.5, 4.5, 6.5) * (size * (0.5 + 0.5 * run));
+                    let aside = side * 4.0 * hash(3.0);
+                    let place = at(part, 10.0 + 12.0 * hash(5.0), down + 8.0 * hash(4.0) + aside);
+                    ellipsoid_of(mesh, 10, place + Vec3::x() * (0.5 * aside), half);
+                }
             }
         }
     }

@@ -1,10 +1,14 @@
 //! The body around the vessel: a slab, a generated body, or a tomogram.
 
+mod beside;
 mod body;
+mod electrodes;
 mod head;
 mod loft;
 mod lungs;
 mod pelvis;
+mod spine;
+mod texture;
 mod thorax;
 mod tomogram;
 mod trunk;
@@ -13,6 +17,7 @@ use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result};
 
 pub(crate) use body::Body;
+pub(crate) use texture::Of;
 pub(crate) use tomogram::Volume;
 pub use tomogram::read_label_map;
 
@@ -27,7 +32,7 @@ pub(crate) enum Patient {
         tissue_mm: f64,
     },
     /// A body of closed surfaces.
-    Torso(Body),
+    Torso(Box<Body>),
     /// A computed tomogram.
     Tomogram(Box<Volume>),
 }
@@ -35,8 +40,10 @@ pub(crate) enum Patient {
 impl Patient {
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         if let Some(torso) = &spec.patient.torso {
-            let bounds = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
-            return Ok(Self::Torso(Body::new(torso, bounds)));
+            if wall.vertices_mm.is_empty() {
+                return Err(Error::Mesh("the wall has no vertices".into()));
+            }
+            return Ok(Self::Torso(Box::new(Body::new(torso, wall))));
         }
         if let Some(ct) = &spec.patient.ct {
             return Ok(Self::Tomogram(Box::new(Volume::read(ct, wall)?)));

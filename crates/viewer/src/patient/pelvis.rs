@@ -23,6 +23,9 @@ impl Trunk {
         self.sacrum(mesh, inset);
         for side in [-1.0, 1.0] {
             self.iliac_wing(mesh, side, inset);
+            if inset == 0.0 {
+                self.pelvic_lines(mesh, side);
+            }
             self.pubic_arch(mesh, side, inset);
             self.hip_socket(mesh, side, inset);
             self.thigh_bone(mesh, side, inset);
@@ -50,7 +53,9 @@ impl Trunk {
             (0..28)
                 .map(|k| {
                     let (s, c) = libm::sincos(TAU * f64::from(k) / 28.0);
-                    self.pelvic((wide - inset) * c, back + (deep - inset) * s, up)
+                    // The front is hollow, and compact bone thick at the sides.
+                    let hollow = 1.0 - 0.25 * s.min(0.0).abs();
+                    self.pelvic((wide - 1.4 * inset) * c, back + (deep - inset) * s * hollow, up)
                 })
                 .collect()
         };
@@ -76,7 +81,7 @@ impl Trunk {
             let [from, to] = [1.25 - 0.85 * flare, 1.75 + 0.35 * flare];
             let angle = from + (to - from) * part;
             let edge = libm::pow(libm::sin(PI * part).max(0.04), 0.4) * step(up, -0.12, 0.06).max(0.05);
-            let thick = (4.2 + 8.0 * (1.0 - step(up, 0.0, 0.45))) * edge - inset.min(2.0 * edge);
+            let thick = (4.6 + 8.0 * (1.0 - step(up, 0.0, 0.45))) * edge - (1.7 * inset).min(2.6 * edge);
             let [u, v] = [hip_side + 6.0 + 36.0 * flare, 58.0 + 14.0 * flare].map(|h| h + face * thick);
             let crest = 128.0 * up - 34.0 * up * up * (2.0 * part - 0.75).powi(2);
             let back = v * libm::cos(angle) - hip_front * (1.0 - flare) + 8.0;
@@ -101,6 +106,44 @@ impl Trunk {
         tube(mesh, &smooth(&crest, inset));
     }
 
+    /// The edges of hip bones that pictures show as lines, all compact bone: the rim of the pelvis from the joint with the
+    /// sacrum to the pubis, the border behind with the notch of the sciatic nerve, and that joint.
+    fn pelvic_lines(&self, mesh: &mut SurfaceMesh, side: f64) {
+        let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back, up);
+        let rim = [
+            (at(58.0, 24.0, -26.0), 1.0),
+            (at(64.0, 18.0, -52.0), 1.9),
+            (at(74.0, 4.0, -76.0), 2.1),
+            (at(78.0, -18.0, -98.0), 2.0),
+            (at(62.0, -46.0, -112.0), 1.8),
+            (at(34.0, -72.0, -120.0), 1.2),
+        ];
+        let border = [
+            (at(50.0, 64.0, 2.0), 1.6),
+            (at(47.0, 62.0, -22.0), 1.9),
+            (at(50.0, 54.0, -48.0), 1.7),
+            (at(62.0, 42.0, -66.0), 1.6),
+            (at(72.0, 28.0, -84.0), 1.8),
+            (at(66.0, 14.0, -108.0), 2.2),
+            (at(70.0, 6.0, -130.0), 1.4),
+        ];
+        for line in [&rim[..], &border[..]] {
+            tube(mesh, &smooth(line, 0.0));
+        }
+        // Compact bone on both sides of the joint, in front and behind.
+        for (out, thick) in [(0.0, 1.1), (3.2, 1.2)] {
+            for back in [-4.0, 9.0] {
+                let line = [
+                    (at(57.0 + out - 0.3 * back, 18.0 + back, -20.0), 0.6 * thick),
+                    (at(53.5 + out - 0.2 * back, 25.0 + back, -36.0), thick),
+                    (at(47.0 + out, 31.0 + back, -52.0), thick),
+                    (at(38.5 + out, 35.0 + back, -66.0), 0.6 * thick),
+                ];
+                tube(mesh, &smooth(&line, 0.0));
+            }
+        }
+    }
+
     /// The socket of a hip, open outwards, downwards and forwards.
     fn hip_socket(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
         let [hip_side, hip_front, hip_down] = HIP_MM;
@@ -113,18 +156,22 @@ impl Trunk {
         let [hip_side, hip_front, hip_down] = HIP_MM;
         let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);
         let upper = [
-            (at(hip_side - 18.0, -6.0, -6.0), 11.0),
-            (at(48.0, -36.0, -4.0), 7.5),
-            (at(24.0, -56.0, -14.0), 7.5),
-            (at(12.0, -62.0, -26.0), 9.5),
+            (at(hip_side - 8.0, 2.0, 6.0), 2.0),
+            (at(hip_side - 20.0, -10.0, -4.0), 10.0),
+            (at(50.0, -36.0, -5.0), 6.8),
+            (at(26.0, -55.0, -13.0), 7.5),
+            (at(12.0, -62.0, -24.0), 9.0),
+            (at(9.0, -62.0, -38.0), 6.0),
         ];
         let lower = [
-            (at(hip_side - 16.0, 6.0, -8.0), 13.0),
-            (at(hip_side - 20.0, 22.0, -38.0), 12.0),
-            (at(hip_side - 30.0, 26.0, -66.0), 13.5),
-            (at(46.0, 2.0, -70.0), 8.0),
-            (at(22.0, -36.0, -50.0), 6.0),
-            (at(12.0, -58.0, -36.0), 7.5),
+            (at(hip_side - 4.0, 6.0, 10.0), 2.0),
+            (at(hip_side - 14.0, 12.0, -10.0), 12.0),
+            (at(hip_side - 20.0, 22.0, -36.0), 11.5),
+            (at(hip_side - 27.0, 26.0, -60.0), 14.0),
+            (at(53.0, 18.0, -72.0), 10.5),
+            (at(36.0, -14.0, -62.0), 6.0),
+            (at(22.0, -38.0, -50.0), 5.5),
+            (at(11.0, -58.0, -40.0), 6.0),
         ];
         for path in [&upper[..], &lower[..]] {
             tube(mesh, &smooth(path, inset));

@@ -1,17 +1,13 @@
-//! Bones of the chest: spine, ribs with their cartilages, sternum, clavicles and scapulae.
+//! Bones of the chest: ribs with their cartilages, sternum, clavicles and scapulae.
 
 use std::f64::consts::{PI, TAU};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
-use super::loft::{loft, smooth, tube};
+use super::loft::{bar, loft, smooth, tube};
 use super::trunk::{Trunk, step};
 
-/// Vertebrae by number: cervical from −6, thoracic from 1, lumbar to 17.
-const VERTEBRAE: std::ops::RangeInclusive<i32> = -6..=17;
-/// Half width and half depth of cervical, thoracic and lumbar bodies, mm.
-const BODIES_MM: [[f64; 2]; 3] = [[11.0, 8.5], [15.5, 13.5], [22.5, 16.0]];
 /// Distance of ribs outside the chest's inner surface, mm.
 const RIB_OUT_MM: f64 = 6.0;
 /// Anterior end of each rib, as an angle from the back, and its descent there in distances of vertebrae.
@@ -31,70 +27,6 @@ const RIBS: [[f64; 2]; 12] = [
 ];
 
 impl Trunk {
-    /// Adds the vertebrae, with all surfaces `inset` inside the bone's.
-    pub(super) fn spine(&self, mesh: &mut SurfaceMesh, inset: f64) {
-        for number in VERTEBRAE {
-            let z = self.vertebra(number);
-            let body = match number {
-                ..1 => BODIES_MM[0],
-                1..=12 => BODIES_MM[1],
-                _ => BODIES_MM[2],
-            };
-            let next = (self.vertebra(number - 1) - z).min(z - self.vertebra(number + 1));
-            self.vertebral_body(mesh, z, body.map(|half| half - inset), 0.4 * next - inset);
-            let slim = if number > 12 { 0.7 } else { 1.0 };
-            self.vertebral_arch(mesh, z, [body[0] / BODIES_MM[1][0], slim], inset);
-        }
-    }
-
-    fn vertebral_body(&self, mesh: &mut SurfaceMesh, z: f64, [wide, deep]: [f64; 2], half: f64) {
-        let [x, y] = [self.spine[0], self.spine_y(z)];
-        // Wider at the end plates than between them, and the plates concave.
-        let profile: [(f64, f64); 10] = [
-            (-0.82, 0.3),
-            (-0.88, 0.7),
-            (-1.0, 0.96),
-            (-0.85, 1.0),
-            (-0.4, 0.9),
-            (0.4, 0.9),
-            (0.85, 1.0),
-            (1.0, 0.96),
-            (0.88, 0.7),
-            (0.82, 0.3),
-        ];
-        let ring = |(h, waist): (f64, f64)| -> Vec<Vec3> {
-            let at = |k: i32| libm::sincos(TAU * f64::from(k) / 24.0);
-            (0..24)
-                .map(at)
-                .map(|(s, c)| Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h))
-                .collect()
-        };
-        loft(mesh, &profile.map(ring));
-    }
-
-    /// Pedicles, transverse processes, and the spinous process, scaled by size and slenderness.
-    fn vertebral_arch(&self, mesh: &mut SurfaceMesh, z: f64, [size, slim]: [f64; 2], inset: f64) {
-        let at = |side: f64, back: f64, up: f64| {
-            Vec3::new(self.spine[0] + size * side, self.spine_y(z) + size * back, z + size * up)
-        };
-        let r = |radius: f64| size * radius - inset;
-        for side in [-1.0, 1.0] {
-            tube(mesh, &[(at(side * 11.0, 13.5, 3.0), r(4.0)), (at(side * 12.0, 25.0, 3.0), r(4.0))]);
-            let process = [
-                (at(side * 12.0, 26.0, 2.0), size * slim * 4.5),
-                (at(side * 22.0, 29.0, 4.0), size * slim * 4.2),
-                (at(side * 30.0, 31.0, 6.0), size * slim * 3.2),
-            ];
-            tube(mesh, &smooth(&process, inset));
-        }
-        let spinous = [
-            (at(0.0, 26.0, 0.0), size * 3.4),
-            (at(0.0, 35.0, -8.0), size * 3.2),
-            (at(0.0, 42.0, -16.0), size * 2.6),
-        ];
-        tube(mesh, &smooth(&spinous, inset));
-    }
-
     /// Position of rib 1 to 12 at a fraction of its length.
     fn rib(&self, number: usize, side: f64, part: f64) -> Vec3 {
         let [end, fall] = RIBS[number - 1];
@@ -109,20 +41,27 @@ impl Trunk {
         joint + (free - joint) * step(part, -0.02, 0.16)
     }
 
-    /// Adds the ribs.
+    /// Adds the ribs: flat, taller than thick, with a thick lower edge.
     pub(super) fn ribs(&self, mesh: &mut SurfaceMesh, inset: f64) {
         for number in 1..=12 {
             for side in [-1.0, 1.0] {
                 let floats = number > 10;
-                let path: Vec<(Vec3, f64)> = (0..=40)
+                let places: Vec<Vec3> =
+                    (0..=40).map(|k| self.rib(number, side, f64::from(k) / 40.0)).collect();
+                let path: Vec<(Vec3, f64, Vec3)> = (0..=40)
                     .map(|k| {
-                        let part = f64::from(k) / 40.0;
+                        let part = k as f64 / 40.0;
                         // Floating ribs end in a tip.
-                        let thin = if floats { (1.0 - part.powi(6)).sqrt() } else { 1.0 };
-                        (self.rib(number, side, part), (3.9 + 1.3 * part) * thin - inset)
+                        let thin = if floats { (1.0 - 0.99 * part.powi(6)).sqrt() } else { 1.0 };
+                        let along = (places[(k + 1).min(40)] - places[k.saturating_sub(1)]).normalize();
+                        let up = (Vec3::z() - along * along.z).normalize();
+                        // Round at the neck, flat at the side, wider to the front.
+                        let flat = step(part, 0.05, 0.3);
+                        let tall = 4.4 + 2.0 * flat + 1.0 * step(part, 0.6, 1.0);
+                        (places[k], (4.0 - 0.7 * flat) * thin, up * (tall * thin))
                     })
                     .collect();
-                tube(mesh, &path);
+                bar(mesh, &path, inset);
             }
         }
     }

@@ -4,7 +4,10 @@
 //! are the twelve thoracic vertebrae; abdomen and pelvis follow below, neck and head above, at adult sizes.
 
 use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
 
+use super::beside::Beside;
+use super::texture::Texture;
 use crate::spec::TorsoSpec;
 
 /// Distance of the skin of the back from the middle of the vertebral bodies.
@@ -17,9 +20,14 @@ const BELOW_MM: [f64; 2] = [260.0, 600.0];
 const LEAST_CHEST_MM: f64 = 190.0;
 /// Thickness of the chest's wall.
 const CHEST_WALL_MM: f64 = 22.0;
-/// Smallest extent of the mediastinum to one side, and largest as a fraction of the body's width.
-const LEAST_SIDE_MM: f64 = 34.0;
-const MOST_SIDE: f64 = 0.3;
+/// Half width of a mediastinum without the vessel of a scene, distance of the vessel from the lungs, largest half width
+/// as a fraction of the body's, and above the arch, mm.
+const LEAST_SIDE_MM: f64 = 27.0;
+const AROUND_VESSEL_MM: f64 = 5.0;
+const MOST_SIDE: f64 = 0.6;
+const MOST_ABOVE_MM: f64 = 42.0;
+/// Distance from the tips of the lungs to the arch.
+const ARCH_BELOW_MM: f64 = 45.0;
 /// Half width and half depth of the ring of the first ribs.
 const FIRST_RIB_MM: [f64; 2] = [56.0, 44.0];
 /// Half width and half depth of the neck.
@@ -43,8 +51,8 @@ pub(super) struct Trunk {
     bottom: f64,
     pub(super) diaphragm: f64,
     pub(super) apex: f64,
-    /// Extent of the mediastinum to the left and right of the spine.
-    pub(super) mediastinum: [f64; 2],
+    /// The vessel of the scene.
+    beside: Beside,
 }
 
 /// Smooth step from 0 to 1 as `x` goes from `a` to `b`.
@@ -64,19 +72,13 @@ fn oval(half: [f64; 2], power: f64, angle: f64) -> [f64; 2] {
 }
 
 impl Trunk {
-    /// For a vessel with the given lowest and highest coordinates.
-    pub(super) fn new(spec: &TorsoSpec, low: Vec3, high: Vec3) -> Self {
+    /// For a vessel with this wall, which has vertices.
+    pub(super) fn new(spec: &TorsoSpec, wall: &SurfaceMesh) -> Self {
+        let (low, high) = wall.bounds_mm().unwrap_or_default();
         let spine = spec.spine_mm.unwrap_or([(low.x + high.x) / 2.0, high.y + BEHIND_MM]);
         let half_depth = spec.depth_mm / 2.0;
-        // The vessel is kept outside the lungs, within reason: in a slim body the lungs keep their place.
-        let side = |reach: f64| (reach + 8.0).max(LEAST_SIDE_MM).min(MOST_SIDE * spec.width_mm);
         let diaphragm = spec.diaphragm_mm.unwrap_or(low.z + (high.z - low.z) / 3.0);
         let apex = (high.z - 10.0).max(diaphragm + LEAST_CHEST_MM);
-        // A vessel below the diaphragm does not widen what is above it.
-        let mediastinum = match high.z > diaphragm {
-            true => [side(high.x - spine[0]), side(spine[0] - low.x)],
-            false => [side(0.0); 2],
-        };
         Self {
             spine,
             middle_y: spine[1] + BACK_MM - half_depth,
@@ -85,8 +87,23 @@ impl Trunk {
             bottom: (low.z - BELOW_MM[0]).min(diaphragm - BELOW_MM[1]),
             diaphragm,
             apex,
-            mediastinum,
+            beside: Beside::new(wall, spine),
         }
+    }
+
+    /// The texture of its tissues.
+    pub(super) fn texture(&self) -> Texture {
+        Texture { spine_mm: self.spine, middle_mm: [self.spine[0], self.middle_y] }
+    }
+
+    /// Half width of the mediastinum at a height on a side, 1 the left one, and how far it reaches forward from the
+    /// spine's middle. The vessel is kept outside the lungs, within reason: in a slim body the lungs keep their place.
+    pub(super) fn mediastinum(&self, side: f64, z: f64) -> [f64; 2] {
+        let [left, right, forward] = self.beside.at(z);
+        let reach = if side > 0.0 { left } else { right } + AROUND_VESSEL_MM;
+        let above = step(z, self.apex - ARCH_BELOW_MM - 15.0, self.apex - ARCH_BELOW_MM + 15.0);
+        let most = mix(MOST_SIDE * self.half_width, MOST_ABOVE_MM, above).min(MOST_SIDE * self.half_width);
+        [reach.clamp(LEAST_SIDE_MM.min(most), most), forward + AROUND_VESSEL_MM]
     }
 
     /// Height of the chest.

@@ -38,8 +38,12 @@ impl Renderer {
             return Err(Error::parameter("view.views", "without 3d", "add \"3d\""));
         };
         let devices = RefinedDevice::all(devices)?;
-        let solids =
-            Solids { devices: &devices, contacts: &self.contacts, c_arm: self.setup.shown_arm.as_ref() };
+        let solids = Solids {
+            devices: &devices,
+            contacts: &self.contacts,
+            scale_n: self.setup.spec.camera.force_n,
+            c_arm: self.setup.shown_arm.as_ref(),
+        };
         let view = match &mut self.engines.later {
             Some(view) => view,
             none => none.insert(graphics.three_d(camera, self.setup.wall_now())?),

@@ -33,7 +33,7 @@ impl Renderer {
         let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
         let [width, height] = c_arm.size_px();
         let pixels = width as usize * height as usize;
-        let devices = RefinedDevice::all(devices)?;
+        let devices = self.setup.in_beam(devices)?;
         if self.central.is_none() {
             self.central = Some(self.with_fallback(|setup, engines, _, _| {
                 let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
@@ -80,7 +80,7 @@ impl Renderer {
     /// # Errors
     /// As [`Self::path_lengths`].
     pub fn transmission_at(&mut self, devices: &[DeviceView], time_s: f64) -> Result<Vec<f32>> {
-        let devices = RefinedDevice::all(devices)?;
+        let devices = self.setup.in_beam(devices)?;
         self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
             let medium = injected(setup, scope, &devices, Some(time_s));

@@ -39,6 +39,8 @@ pub struct TorsoSpec {
     pub ribs: bool,
     /// Lungs, trachea and the air of stomach and colon.
     pub lungs: bool,
+    /// Electrodes of an ECG on the chest, with their leads.
+    pub electrodes: bool,
 }
 
 impl Default for TorsoSpec {
@@ -51,6 +53,7 @@ impl Default for TorsoSpec {
             spine: true,
             ribs: true,
             lungs: true,
+            electrodes: true,
         }
     }
 }
@@ -69,6 +72,11 @@ pub struct CtSpec {
 }
 
 impl PatientSpec {
+    /// Whether there is a patient, and not just a slab.
+    pub(crate) fn is_given(&self) -> bool {
+        self.torso.is_some() || self.ct.is_some()
+    }
+
     pub(super) fn validate(&self) -> Result<()> {
         if let Some(torso) = &self.torso {
             finite_within("view.patient.torso.width_mm", torso.width_mm, [100.0, 800.0])?;

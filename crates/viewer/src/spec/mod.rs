@@ -31,6 +31,9 @@ const COORDINATE_MM: [f64; 2] = [-1e5, 1e5];
 /// A hundred turns.
 const MOST_TURN_DEG: f64 = 36_000.0;
 
+/// Forces that arrows may be scaled by, N: those of coils are tenths of a millinewton.
+const FORCE_N: [f64; 2] = [1e-6, 1000.0];
+
 /// Largest number of tables of injections and of parts.
 const MOST_TABLES: usize = 1000;
 
@@ -152,8 +155,11 @@ pub struct CameraSpec {
     /// Whether a scale bar is drawn.
     pub scale_bar: bool,
     /// Whether letters at the borders show directions (L left, R right, H head, F feet, A front, P back), and a
-    /// legend the largest force.
+    /// legend the scale of the forces.
     pub markers: bool,
+    /// Force whose arrow is as long as that of the legend, 0.000001 to 1000 N: one scale for all frames. Absent: the
+    /// largest of each frame; of all that it draws in `endowire render`.
+    pub force_n: Option<f64>,
     /// Whether the beam of the C-arm is drawn; the camera then moves back to show the field at the isocentre.
     pub c_arm: bool,
 }
@@ -167,6 +173,7 @@ impl Default for CameraSpec {
             orbit_deg: None,
             scale_bar: true,
             markers: true,
+            force_n: None,
             c_arm: false,
         }
     }
@@ -262,6 +269,7 @@ impl ViewSpec {
         {
             finite_within(&format!("view.camera.{key}"), angle.unwrap_or(0.0), [-360.0, 360.0])?;
         }
+        finite_within("view.camera.force_n", self.camera.force_n.unwrap_or(1.0), FORCE_N)?;
         for (key, turn) in
             [("turn_deg", self.camera.turn_deg), ("orbit_deg", self.camera.orbit_deg.unwrap_or(0.0))]
         {
@@ -339,7 +347,9 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 50] = [
+        let cases: [(&str, Spoil); 52] = [
+            ("xray.edges", |s| s.xray.edges = 5.1),
+            ("camera.force_n", |s| s.camera.force_n = Some(0.0)),
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),

@@ -69,6 +69,9 @@ pub struct XRaySpec {
     /// Fraction of the anatomy's low-frequency shading removed in the display of fluoroscopy and cine, so that lungs
     /// and spine are both visible; 0 shows the logarithm of the signal unchanged, 1 removes all of it.
     pub harmonised: f64,
+    /// Edge enhancement of the display: this much of what is finer than half a millimetre at the detector is added once
+    /// more, 0 to 5. It makes wires stand out, and noise.
+    pub edges: f64,
     /// Line integrals shown white and black in fluoroscopy and cine, -100 to 100 with the black one larger by at
     /// least 0.0001; absent: fitted to the anatomy, equal for all frames of a run.
     pub window: Option<[f64; 2]>,
@@ -91,6 +94,7 @@ impl Default for XRaySpec {
             focal_spot_mm: 0.6,
             device_material: Material::Steel316L,
             harmonised: 0.55,
+            edges: 0.0,
             window: None,
         }
     }
@@ -112,6 +116,7 @@ impl XRaySpec {
         finite_within("view.xray.csi_mm", self.csi_mm, [0.001, 10.0])?;
         finite_within("view.xray.focal_spot_mm", self.focal_spot_mm, [0.0, 3.0])?;
         finite_within("view.xray.harmonised", self.harmonised, [0.0, 1.0])?;
+        finite_within("view.xray.edges", self.edges, [0.0, 5.0])?;
         if let Some([white, black]) = self.window
             && !(white >= -100.0 && black <= 100.0 && black - white >= 1e-4)
         {

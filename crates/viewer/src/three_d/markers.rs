@@ -7,7 +7,7 @@ use crate::spec::CameraSpec;
 use crate::three_d::Camera;
 use crate::three_d::room::Room;
 use crate::three_d::scale_bar::{self, INK};
-use crate::three_d::solids::{ContactView, FORCE, largest_and_px_per_n};
+use crate::three_d::solids::{ContactView, FORCE, scale_and_px_per_n};
 use crate::three_d::text::{ROWS, columns, text};
 
 const WHITE: [u8; 4] = [255; 4];
@@ -49,7 +49,7 @@ fn letters(image: &mut Image, [right, up]: [Vec3; 2], room: &mut Room) {
     }
 }
 
-/// Annotates a 3D frame as its camera specifies: scale, directions, and the largest of these contact forces, as far as
+/// Annotates a 3D frame as its camera specifies: scale, directions, and the scale of these contact forces, as far as
 /// there is room.
 pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, contacts: &[ContactView]) {
     let mut room = Room::new(image);
@@ -58,13 +58,12 @@ pub(crate) fn annotate(image: &mut Image, camera: &Camera, spec: &CameraSpec, co
     }
     if spec.markers {
         letters(image, camera.right_and_up(), &mut room);
-        legend(image, contacts, &mut room);
+        legend(image, scale_and_px_per_n(contacts, spec.force_n), &mut room);
     }
 }
 
-/// An arrow as long as that of the largest force, with its magnitude.
-fn legend(image: &mut Image, contacts: &[ContactView], room: &mut Room) {
-    let (strongest, px_per_n) = largest_and_px_per_n(contacts);
+/// An arrow as long as that of the force that sets the scale, with its magnitude.
+fn legend(image: &mut Image, (strongest, px_per_n): (f64, f64), room: &mut Room) {
     // An arrow of less than a pixel is none.
     if strongest * px_per_n < 1.0 {
         return;
@@ -114,6 +113,15 @@ mod tests {
         // There is no room for a legend beside the scale.
         assert!(pixels(64, &[contact]) == pixels(64, &[]));
         assert!(pixels(320, &[contact]) != pixels(320, &[]), "the twin: there is");
+        // A given scale has its legend in every frame of a film, also where there are no contacts.
+        let given = |contacts: &[ContactView]| {
+            let spec = CameraSpec { force_n: Some(0.05), ..CameraSpec::default() };
+            let camera = Camera::new(&spec, [320; 2], &wall, &[]);
+            let mut image = Image::new(320, 320, PixelFormat::Rgba8, vec![255; 4 * 320 * 320]);
+            annotate(&mut image, &camera, &spec, contacts);
+            image.into_data()
+        };
+        assert!(given(&[]) == pixels(320, &[contact]) && given(&[]) == given(&[contact]));
         let ink = pixels(64, &[]).chunks_exact(4).filter(|pixel| *pixel != [255; 4]).count();
         assert!(ink > 40, "{ink} pixels of a scale and of letters");
         // Smaller than a letter.

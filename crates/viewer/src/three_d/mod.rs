@@ -12,6 +12,6 @@ mod text;
 pub(crate) use camera::Camera;
 pub(crate) use markers::{annotate, draw as draw_markers};
 pub(crate) use mesh::{Vertex, wall_triangles};
-pub use solids::ContactView;
+pub use solids::{ContactView, largest_force_n};
 pub(crate) use solids::{Solids, solid_triangles};
 pub(crate) use style::Style;

@@ -19,7 +19,7 @@ const LEAST_WIDTH_PX: f64 = 2.4;
 /// Half a contact's dot, and half the shaft of an arrow, pixels.
 const DOT_PX: f64 = 3.2;
 const SHAFT_PX: f64 = 1.1;
-/// Length of the longest arrow, pixels in a frame of 640.
+/// Length of the arrow of the force that sets the scale, pixels in a frame of 640.
 const ARROW_PX: f64 = 60.0;
 /// Smallest force with an arrow of that length, N: those of coils are tenths of a millinewton, and the rounding of a
 /// device at rest shall have no arrow.
@@ -44,6 +44,8 @@ pub struct ContactView {
 pub(crate) struct Solids<'a> {
     pub(crate) devices: &'a [RefinedDevice],
     pub(crate) contacts: &'a [ContactView],
+    /// The force with the arrow of the legend, N; absent: the largest of `contacts`.
+    pub(crate) scale_n: Option<f64>,
     pub(crate) c_arm: Option<&'a CArm>,
 }
 
@@ -72,7 +74,7 @@ struct Section {
 pub(crate) fn solid_triangles(camera: &Camera, solids: &Solids) -> Vec<Vertex> {
     let mut vertices = Vec::new();
     solids.devices.iter().for_each(|device| self::device(camera, device, &mut vertices));
-    contacts(camera, solids.contacts, &mut vertices);
+    contacts(camera, solids, &mut vertices);
     if let Some(c_arm) = solids.c_arm {
         frustum(camera, c_arm, &mut vertices);
     }
@@ -124,17 +126,23 @@ fn cap(end: Section, outwards: f64, sections: &mut Vec<Section>) {
     }
 }
 
-/// The largest force of contacts, N, and the length of an arrow per newton, pixels in a frame of 640.
-pub(crate) fn largest_and_px_per_n(contacts: &[ContactView]) -> (f64, f64) {
-    let largest_n = contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max);
-    (largest_n, ARROW_PX / largest_n.max(LEAST_LONG_N))
+/// The largest force of contacts, N.
+pub fn largest_force_n(contacts: &[ContactView]) -> f64 {
+    contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max)
+}
+
+/// The force of the legend, given or the largest of contacts, N, and the length of an arrow per newton, pixels in a frame
+/// of 640.
+pub(crate) fn scale_and_px_per_n(contacts: &[ContactView], scale_n: Option<f64>) -> (f64, f64) {
+    let shown_n = scale_n.unwrap_or_else(|| largest_force_n(contacts));
+    (shown_n, ARROW_PX / shown_n.max(LEAST_LONG_N))
 }
 
 /// Dots at contacts of devices with the wall, and arrows along their forces.
-fn contacts(camera: &Camera, contacts: &[ContactView], vertices: &mut Vec<Vertex>) {
-    let (_, px_per_n) = largest_and_px_per_n(contacts);
+fn contacts(camera: &Camera, solids: &Solids, vertices: &mut Vec<Vertex>) {
+    let (_, px_per_n) = scale_and_px_per_n(solids.contacts, solids.scale_n);
     let scale = f64::from(camera.size_px[0].max(camera.size_px[1])) / 640.0;
-    for contact in contacts {
+    for contact in solids.contacts {
         let at = contact.position_mm;
         let radius = px(camera, &at, DOT_PX * scale);
         let dot = |along: Vec3| Section { centre: at, radius, along, tilt: [0.0, 1.0], colour: CONTACT };
@@ -249,12 +257,16 @@ mod tests {
         let of = |largest_n: f64| {
             let contact =
                 |force_n: f64| ContactView { position_mm: Vec3::zeros(), force_n: Vec3::x() * force_n };
-            let (found_n, px_per_n) = largest_and_px_per_n(&[contact(0.5 * largest_n), contact(largest_n)]);
+            let both = [contact(0.5 * largest_n), contact(largest_n)];
+            let (found_n, px_per_n) = scale_and_px_per_n(&both, None);
             assert_eq!(found_n, largest_n);
+            // A given scale is the same for all forces.
+            let given = scale_and_px_per_n(&both, Some(0.25));
+            assert_eq!(given, scale_and_px_per_n(&[contact(7.0)], Some(0.25)));
             px_per_n * largest_n
         };
         assert!((of(0.3) - ARROW_PX).abs() < 1e-12 && (of(2e-4) - ARROW_PX).abs() < 1e-12);
         assert!(of(1e-7) < 1.0 && of(0.0) == 0.0);
-        assert_eq!(largest_and_px_per_n(&[]).0, 0.0);
+        assert_eq!(scale_and_px_per_n(&[], None).0, 0.0);
     }
 }

@@ -12,7 +12,7 @@ const FEWEST_ROWS: usize = 16;
 
 /// A Gaussian kernel for one image size.
 #[derive(Debug)]
-pub(super) struct Blur {
+pub(crate) struct Blur {
     size_px: [usize; 2],
     /// Symmetric kernel: the middle and one side.
     kernel: Vec<f32>,
@@ -21,7 +21,7 @@ pub(super) struct Blur {
 
 impl Blur {
     /// For a deviation in pixels.
-    pub(super) fn new(deviation_px: f64, size_px: [u32; 2]) -> Self {
+    pub(crate) fn new(deviation_px: f64, size_px: [u32; 2]) -> Self {
         let reach = if deviation_px < LEAST_PX { 0 } else { (KERNEL_REACH * deviation_px).ceil() as usize };
         // Integrals of the Gaussian over pixels tend to its samples; a narrow one is summed over sub-pixels.
         const PARTS: i32 = 16;
@@ -48,7 +48,7 @@ impl Blur {
     }
 
     /// Blurs an image; borders are repeated.
-    pub(super) fn spread(&mut self, image: &mut [f32]) {
+    pub(crate) fn spread(&mut self, image: &mut [f32]) {
         if !self.is_visible() {
             return;
         }

@@ -11,6 +11,7 @@ mod quadrature;
 mod spectrum;
 
 pub(crate) use beam::{Beam, Lanes};
+pub(crate) use blur::Blur;
 pub(crate) use detector::Detector;
 pub(crate) use exp::{LANES, ln_lanes};
 pub(crate) use exposure::check as check_exposure;

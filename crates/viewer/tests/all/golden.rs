@@ -151,7 +151,7 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
 
     // A thick patient: more voltage, less contrast.
     let mut thick = view(Mode::Fluoro);
-    thick.patient.torso = Some(TorsoSpec { width_mm: 460.0, depth_mm: 330.0, ..TorsoSpec::default() });
+    thick.patient.torso = Some(TorsoSpec { width_mm: 480.0, depth_mm: 450.0, ..TorsoSpec::default() });
     (thick.xray.pulse_ms, thick.exposure) = (8.0, (!twin).then(ExposureSpec::default));
     add("exposure", frame(&mut Renderer::new(&thick, &wall("aortic_arch")).unwrap(), 0.0, 3));
 

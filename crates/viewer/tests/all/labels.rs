@@ -4,7 +4,7 @@ use crate::common;
 
 use common::*;
 use endowire_core::Vec3;
-use endowire_viewer::{Backend, DevicePart, DeviceView, Material, Renderer};
+use endowire_viewer::{Backend, DevicePart, DeviceView, Material, Renderer, SheathMouth, TorsoSpec};
 
 /// Rays across a pixel of the rasterisation to compare with.
 const RAYS: u32 = 8;
@@ -140,4 +140,42 @@ fn every_part_and_instrument_has_its_own_mask_and_the_matrix_projects() {
     }
     assert_eq!(labels.contacts[0].position_mm, <[f64; 3]>::from(line(0.3)));
     assert_eq!(wire.tip_mm, Some(line(1.0).into()));
+}
+
+#[test]
+fn a_device_comes_out_of_the_edge_of_the_picture_and_so_do_its_masks() {
+    // A catheter from the middle of the picture upwards, with a band that ends before the mouth of its sheath.
+    let part = |from_tip_mm, material| DevicePart {
+        from_tip_mm: Some(from_tip_mm),
+        material: Some(material),
+        ..DevicePart::default()
+    };
+    let parts = vec![part([0.0, 200.0], Material::Steel316L), part([0.0, 5.0], Material::Platinum)];
+    let bare = DeviceView { parts, ..device(9, 0.8, |w| Vec3::new(0.0, 0.0, 30.0 * w)) };
+    let sheath = Some(SheathMouth { position_mm: Vec3::zeros(), direction: Vec3::z() });
+    let sheathed = DeviceView { sheath, ..bare.clone() };
+    for torso in [None, Some(TorsoSpec::default())] {
+        let mut spec = spec(Backend::Cpu, 160, 1.0);
+        (spec.patient.torso, spec.detector.noise) = (torso, false);
+        let mut renderer = Renderer::new(&spec, &sphere(60.0, 20, Vec3::zeros())).unwrap();
+        let mut drawn = |device: &DeviceView| {
+            let labels = renderer.labels(std::slice::from_ref(device), &[]).unwrap();
+            let picture = renderer.render(std::slice::from_ref(device)).unwrap().fluoro.unwrap();
+            (labels.devices.into_iter().next().unwrap(), picture)
+        };
+        let ((with, with_shaft), (without, none)) = (drawn(&sheathed), drawn(&bare));
+        let in_last_row =
+            |mask: &endowire_viewer::Mask| mask.pixels().iter().any(|pixel| *pixel >= 159 * 160);
+        assert!(
+            in_last_row(&with.mask) && in_last_row(&with.parts[0].mask) && !in_last_row(&with.parts[1].mask)
+        );
+        assert!(!in_last_row(&without.mask), "the twin begins in mid-air");
+        let last_row = |picture: &endowire_viewer::Image| picture.data()[159 * 160..].to_vec();
+        assert_ne!(last_row(&with_shaft), last_row(&none));
+        // What is simulated is labelled as before, and the rest says what it is.
+        assert_eq!((&with.centre_line_mm, with.tip_px), (&without.centre_line_mm, without.tip_px));
+        assert_eq!(with.parts[0].from_tip_mm, Some([0.0, 200.0]));
+        assert!(without.shaft_px.is_empty() && with.shaft_px.last() == with.centre_line_px.first());
+        assert!(with.shaft_px[0][1] > 160.0, "{:?}", with.shaft_px[0]);
+    }
 }

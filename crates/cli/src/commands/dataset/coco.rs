@@ -67,6 +67,15 @@ pub(super) struct ImageRow {
     pub(super) secondary_deg: f64,
     pub(super) kvp: f64,
     pub(super) dose_ngy: f64,
+    #[serde(default)]
+    pub(super) magnification: f64,
+    /// Width of the generated body, if there is one.
+    #[serde(default)]
+    pub(super) width_mm: Option<f64>,
+    #[serde(default)]
+    pub(super) scatter_fraction: f64,
+    #[serde(default)]
+    pub(super) contrast_fraction: f64,
     pub(super) camera_matrix: [[f64; 4]; 3],
 }
 

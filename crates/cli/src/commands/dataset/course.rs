@@ -187,6 +187,10 @@ fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<V
             file.display()
         ));
     }
+    if view.patient.torso.is_none() && spec.vary.width_mm.is_some() {
+        let text = "vary.width_mm is that of a generated body, and there is none: give view.patient.torso, or leave it out";
+        return Err(Failure::Input(text.to_owned()).at(file.display()));
+    }
     if view.exposure.is_some() && spec.vary.kvp.is_some() {
         let text = "vary.kvp and [view.exposure] both say the voltage: leave out one of them";
         return Err(Failure::Input(text.to_owned()).at(file.display()));

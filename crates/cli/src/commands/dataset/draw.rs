@@ -12,6 +12,10 @@ pub(super) enum What {
     Noise,
     Progress,
     Time,
+    Magnification,
+    Width,
+    Scatter,
+    Contrast,
 }
 
 /// Random numbers for a place in a dataset.

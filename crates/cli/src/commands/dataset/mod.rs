@@ -27,7 +27,7 @@ use crate::scenes;
 use coco::{Annotation, Category, ImageRow, categories};
 use course::Course;
 use shot::Part;
-use spec::Spec;
+use spec::{NOT_DRAWN, Spec};
 
 /// Annotations of all pictures.
 #[derive(Debug, Serialize)]
@@ -65,6 +65,7 @@ struct Written {
 /// Draws the pictures that are missing.
 pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let spec = Spec::read(&args.spec)?;
+    scenes::refuse_settings(&args.set.set, &NOT_DRAWN)?;
     let provenance = provenance(args, &spec)?;
     let folder = &args.out;
     let _claim = claim(&provenance, folder)?;

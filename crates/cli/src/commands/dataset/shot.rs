@@ -108,6 +108,10 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
                 secondary_deg: angles[1],
                 kvp: labels.exposure.kvp,
                 dose_ngy: labels.exposure.dose_ngy,
+                magnification: view.c_arm.magnification,
+                width_mm: view.patient.torso.as_ref().map(|torso| torso.width_mm),
+                scatter_fraction: view.detector.scatter_fraction,
+                contrast_fraction: view.xray.contrast_fraction,
                 camera_matrix: labels.camera_matrix,
             });
         }
@@ -135,6 +139,18 @@ pub(super) fn planes(spec: &Spec, of_course: &ViewSpec, shot: usize) -> Vec<View
     if let Some(&kvp) = voltages.get((draw.unit(What::Voltage) * voltages.len() as f64) as usize) {
         view.xray.kvp = kvp;
     }
+    if let Some(range) = vary.magnification {
+        view.c_arm.magnification = draw.within(What::Magnification, range);
+    }
+    if let (Some(range), Some(torso)) = (vary.width_mm, &mut view.patient.torso) {
+        torso.width_mm = draw.within(What::Width, range);
+    }
+    if let Some(range) = vary.scatter_fraction {
+        view.detector.scatter_fraction = draw.within(What::Scatter, range);
+    }
+    if let Some(range) = vary.contrast_fraction {
+        view.xray.contrast_fraction = draw.within(What::Contrast, range);
+    }
     if let Some(range) = vary.dose_ngy {
         view.detector.dose_ngy = Some(draw.within(What::Dose, range.map(f64::ln)).exp());
     }
@@ -159,6 +175,8 @@ fn label_arrays(labels: &Labels) -> Vec<Array> {
         let line_mm = device.centre_line_mm.iter().flatten().copied();
         arrays.push(Array::of_floats(&format!("line_{k}_px"), vec![points, 2], line_px));
         arrays.push(Array::of_floats(&format!("line_{k}_mm"), vec![points, 3], line_mm));
+        let shaft_px = device.shaft_px.iter().flatten().copied();
+        arrays.push(Array::of_floats(&format!("shaft_{k}_px"), vec![device.shaft_px.len(), 2], shaft_px));
         arrays.push(Array::of_floats(
             &format!("depth_{k}_mm"),
             vec![points],

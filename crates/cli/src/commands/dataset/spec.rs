@@ -52,6 +52,12 @@ pub(super) struct Vary {
     pub(super) kvp: Option<Vec<f64>>,
     /// Drawn for each pose on a logarithmic scale; by default the usual dose of the mode.
     pub(super) dose_ngy: Option<[f64; 2]>,
+    /// Drawn for each pose; by default the scene's: magnification mode, width of the generated body, fraction of
+    /// scattered photons, fraction of contrast medium constantly in the blood.
+    pub(super) magnification: Option<[f64; 2]>,
+    pub(super) width_mm: Option<[f64; 2]>,
+    pub(super) scatter_fraction: Option<[f64; 2]>,
+    pub(super) contrast_fraction: Option<[f64; 2]>,
     /// Drawn for each picture: time of injections.
     pub(super) time_s: [f64; 2],
     /// Drawn for each picture: fraction of the script that has been carried out.
@@ -65,11 +71,30 @@ impl Default for Vary {
             secondary_deg: [-25.0, 25.0],
             kvp: None,
             dose_ngy: None,
+            magnification: None,
+            width_mm: None,
+            scatter_fraction: None,
+            contrast_fraction: None,
             time_s: [0.0, 0.0],
             progress: [0.2, 1.0],
         }
     }
 }
+
+/// Keys of `[view]` that change nothing in the pictures of a dataset, and what to do instead.
+pub(super) const NOT_DRAWN: [(&str, &str); 11] = [
+    ("biplane_deg", "a dataset has biplane_deg beside its seed"),
+    ("views", "a dataset draws fluoroscopy alone: leave the key out"),
+    ("every", "moments are drawn: give moments, and vary.progress"),
+    ("film", "a dataset has pictures alone: leave the key out"),
+    ("camera", "belongs to the 3D view, and a dataset draws fluoroscopy alone: leave it out"),
+    ("c_arm.pose", "poses are drawn: give vary.primary_deg and vary.secondary_deg"),
+    ("c_arm.primary_deg", "poses are drawn: give vary.primary_deg"),
+    ("c_arm.secondary_deg", "poses are drawn: give vary.secondary_deg"),
+    ("device", "device files say what their devices are made of (devices)"),
+    ("detector.seed", "noise is drawn: give seed"),
+    ("detector.lag", "times are drawn at random, and no picture follows another: leave it out"),
+];
 
 fn one() -> u64 {
     1
@@ -127,7 +152,12 @@ impl Spec {
         }
         let vary = &self.vary;
         let dose = vary.dose_ngy.unwrap_or([1.0; 2]);
+        let magnification = vary.magnification.unwrap_or([1.0; 2]);
         for (key, [low, high], [least, most]) in [
+            ("magnification", magnification, [0.1, 100.0]),
+            ("width_mm", vary.width_mm.unwrap_or([100.0; 2]), [100.0, 800.0]),
+            ("scatter_fraction", vary.scatter_fraction.unwrap_or([0.0; 2]), [0.0, 0.95]),
+            ("contrast_fraction", vary.contrast_fraction.unwrap_or([0.0; 2]), [0.0, 1.0]),
             ("primary_deg", vary.primary_deg, [-180.0, 180.0]),
             ("secondary_deg", vary.secondary_deg, [-90.0, 90.0]),
             ("dose_ngy", dose, [0.001, 1e6]),
@@ -159,19 +189,11 @@ impl Spec {
 
     /// Refuses keys of `[view]` that have no effect on the pictures of a dataset.
     fn check_view(&self) -> Result<(), Failure> {
-        for (keys, remedy) in [
-            (&["biplane_deg"][..], "a dataset has biplane_deg beside its seed"),
-            (&["views"], "a dataset draws fluoroscopy alone: leave the key out"),
-            (&["c_arm", "pose"], "poses are drawn: give vary.primary_deg and vary.secondary_deg"),
-            (&["c_arm", "primary_deg"], "poses are drawn: give vary.primary_deg"),
-            (&["c_arm", "secondary_deg"], "poses are drawn: give vary.secondary_deg"),
-            (&["device"], "device files say what their devices are made of (devices)"),
-            (&["detector", "seed"], "noise is drawn: give seed"),
-        ] {
-            let (first, others) = keys.split_first().map_or(("", keys), |(first, others)| (*first, others));
-            let value = others.iter().fold(self.view.get(first), |value, key| value?.get(key));
-            if let Some(value) = value {
-                return Err(Failure::Input(format!("view.{} = {value}: {remedy}", keys.join("."))));
+        for (key, remedy) in NOT_DRAWN {
+            let mut parts = key.split('.');
+            let first = parts.next().and_then(|part| self.view.get(part));
+            if let Some(value) = parts.fold(first, |value, part| value?.get(part)) {
+                return Err(Failure::Input(format!("view.{key} = {value}: {remedy}")));
             }
         }
         let mode = self.view.get("xray").and_then(|xray| xray.get("mode"));

@@ -63,9 +63,22 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     }
     match subjects::if_meant(&args.scene)? {
         Some(subject) => play_in(&in_subject(args, &subject)?, Some(subject)),
-        None => play_in(args, None),
+        None => {
+            scenes::refuse_settings(&args.set.set, &NOT_SHOWN)?;
+            play_in(args, None)
+        }
     }
 }
+
+/// Keys of `[view]` that change nothing in a session, and what to do instead.
+const NOT_SHOWN: [(&str, &str); 6] = [
+    ("size_px", "pictures have the size of the window, or that of --size"),
+    ("views", "a session has both views"),
+    ("every", "is for endowire run, which repeats the recorded script"),
+    ("film", "is for endowire run, which repeats the recorded script"),
+    ("frames_per_s", "live pictures come at the rate of the screen"),
+    ("bits", "a screen has eight"),
+];
 
 /// The same arguments with the scene and settings of a subject.
 fn in_subject(args: &PlayArgs, subject: &Subject) -> Result<PlayArgs, Failure> {

@@ -68,6 +68,9 @@ impl Written {
     }
 }
 
+/// Forces below this are rounding, N: the view takes no smaller scale.
+const LEAST_FORCE_N: f64 = 1e-6;
+
 /// The frames to draw with the options of the command line, checked before anything is computed.
 pub(super) struct Plan<'a> {
     args: &'a FrameArgs,
@@ -98,7 +101,9 @@ impl<'a> Plan<'a> {
         spec.validate().map_err(|e| in_options(args, path, e.into()))?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
         let frames = wishes::frames_of_turn(args, spec.frames_per_s)?.unwrap_or(frames);
-        wishes::check(args, &spec, frames)?;
+        // Devices of a scene rest, and move with a vessel alone.
+        let rests = command == "fluoro" && scene.vessel.motion.is_empty();
+        wishes::check(args, &spec, frames, rests)?;
         std::fs::create_dir_all(&folder).map_err(|e| {
             Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
         })?;
@@ -118,6 +123,13 @@ impl<'a> Plan<'a> {
     /// Sets the times of the frames, instead of a constant rate.
     pub(super) fn at(self, times_s: &[f64]) -> Self {
         Self { pace: Pace::of(times_s, self.spec.frames_per_s), ..self }
+    }
+
+    /// Draws forces up to this one, N, to one scale in all frames, unless the view gives another.
+    pub(super) fn with_forces_up_to(mut self, largest_n: f64) -> Self {
+        let scale = &mut self.spec.camera.force_n;
+        *scale = scale.or((largest_n >= LEAST_FORCE_N).then_some(largest_n));
+        self
     }
 
     /// Number of frames to draw.

@@ -41,6 +41,12 @@ const OPTIONS: [(&str, &str); 6] = [
     ("--view", "views"),
 ];
 
+/// Keys of `[view]` for `endowire run`, and what does the same here.
+const OF_RUNS: [(&str, &str); 2] = [
+    ("every", "is for endowire run; --every of endowire render draws every so many steps of a recording"),
+    ("film", "is for endowire run; --animate FILE writes a film"),
+];
+
 /// The options that are given, with the keys of `[view]` that they set.
 fn given(args: &FrameArgs) -> impl Iterator<Item = (&'static str, &'static str)> {
     let is_given = [
@@ -73,12 +79,22 @@ pub(super) fn at_fault(args: &FrameArgs, message: &str) -> Option<String> {
 }
 
 /// Refuses keys that are set twice, and those that have no effect.
-fn check_set(args: &FrameArgs, spec: &ViewSpec) -> Result<(), Failure> {
+fn check_set(args: &FrameArgs, spec: &ViewSpec, rests: bool) -> Result<(), Failure> {
     let patient = spec.patient.torso.is_some() || spec.patient.ct.is_some();
     for text in &args.set {
         let key = key_of_view(text);
         if let Some((option, _)) = given(args).find(|(_, other)| *other == key) {
             let text = format!("--set {text}: {option} gives the same: leave out one of the two");
+            return Err(Failure::Input(text));
+        }
+        if let Some((_, remedy)) = OF_RUNS.iter().find(|(other, _)| *other == key) {
+            return Err(Failure::Input(format!("--set {text}: {remedy}")));
+        }
+        if key == "xray.pulse_ms" && rests && spec.exposure.is_none() {
+            let text = format!(
+                "--set {text}: nothing moves here, so a pulse of any length shows the same: leave it out, or draw a run with \
+                 endowire render"
+            );
             return Err(Failure::Input(text));
         }
         if key == "xray.tissue_mm" && patient {
@@ -92,9 +108,9 @@ fn check_set(args: &FrameArgs, spec: &ViewSpec) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses options that are incompatible.
-pub(super) fn check(args: &FrameArgs, spec: &ViewSpec, frames: usize) -> Result<(), Failure> {
-    check_set(args, spec)?;
+/// Refuses options that are incompatible; `rests` says that nothing moves in what is drawn.
+pub(super) fn check(args: &FrameArgs, spec: &ViewSpec, frames: usize, rests: bool) -> Result<(), Failure> {
+    check_set(args, spec, rests)?;
     for (key, turn) in [("--orbit", args.orbit), ("--turn", args.turn)] {
         if let Some(turn) = turn.filter(|turn| !(-MOST_TURN_DEG..=MOST_TURN_DEG).contains(turn)) {
             let text = format!("{key} {turn:e}: give -{MOST_TURN_DEG} to {MOST_TURN_DEG} degrees");
