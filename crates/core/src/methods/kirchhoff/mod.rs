@@ -482,8 +482,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
     fn gradients(
         &self,
         surroundings: &Surroundings<'_>,
-        commands: &[Vec<Move>],
-        by: &[Parameter],
+        commands: (&[Vec<Move>], &[f64]),
+        by: &[Vec<(Parameter, f64)>],
         checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
         self.gradients_of(surroundings, (commands, by), checked)

@@ -9,6 +9,7 @@ use super::super::search::{Beginning, Bounds, Lagged, Search};
 use super::super::state::KirchhoffState;
 use super::super::workspace::Tools;
 use super::{Acting, End, singular};
+use crate::methods::Sheath;
 use crate::methods::kirchhoff::Environment;
 use crate::rod::{ElementData, Frame, Layout, RodState};
 use crate::solve::gmres;
@@ -18,6 +19,8 @@ use crate::{Result, Vec3};
 const TURN_RAD: f64 = 3e-6;
 /// Accuracy of dx/dp, of what these differences have, and the most products for it.
 const ACCURACY: (f64, usize) = (1e-8, 40);
+/// A sheath so much elsewhere, mm and rad, is where it was.
+const ROUNDED: f64 = 1e-12;
 /// With a larger residual dx/dp is not found.
 const LEAST_ACCURACY: f64 = 1e-5;
 
@@ -48,6 +51,7 @@ impl<const C: usize> Tools<C> {
         }
         let KirchhoffState { rod, touches, .. } = after;
         rod.copy_from(&end.state.rod);
+        enter::<C>(&mesh.elements, surroundings.sheath, rod);
         if !end.triads.is_empty() {
             measure_beside(rod, &end.triads, &triads);
         }
@@ -66,16 +70,16 @@ impl<const C: usize> Tools<C> {
         Some((found, triads))
     }
 
-    /// Completes the state at the end of a part: that after the way if its forces were assembled, as in the last part, or else
+    /// Completes the state at the end of a part: that after the way if its forces were assembled for what `reads` them, or else
     /// the one before it, which then goes.
     pub(super) fn finish(
         &mut self,
         acting: &Acting<'_>,
-        (own, is_last): (Environment<'_>, bool),
+        (own, reads): (Environment<'_>, bool),
         (way, by): (&[f64], f64),
         next: &mut Configuration,
     ) {
-        if is_last {
+        if reads {
             let (mesh, after) = next.parts();
             self.keep(acting.start, mesh, after);
             self.write_forces(&own, next);
@@ -170,6 +174,23 @@ fn advance<const C: usize>(
 pub(super) fn rows<const C: usize>(search: &Search<'_, '_, C>) -> Vec<f64> {
     let assembly = &search.newton.assembly;
     assembly.residual.iter().zip(&assembly.correction).map(|(row, more)| row + more).collect()
+}
+
+/// Moves a rod to a sheath that is a little elsewhere: all of it by the motion of the mouth, and its first tangent into the direction.
+fn enter<const C: usize>(elements: &[ElementData], sheath: &Sheath, rod: &mut RodState) {
+    let shift = sheath.position_mm - rod.positions[0];
+    let (a, b) = rod.frames[0].log(&sheath.direction);
+    if shift.norm() + a.abs() + b.abs() <= ROUNDED {
+        return;
+    }
+    let mut way = vec![0.0; Layout::<C>::dimension(elements.len())];
+    for node in 0..=elements.len() {
+        way[Layout::<C>.position(node)..][..3].copy_from_slice(shift.as_slice());
+    }
+    let tangent = Layout::<C>.tangent(0);
+    (way[tangent], way[tangent + 1]) = (a, b);
+    let from = rod.clone();
+    rod.advance::<C>(elements, &from, &way, 1.0);
 }
 
 /// Measures the spin of a rod from triads that are turned as `own` are against those of the part's end.
