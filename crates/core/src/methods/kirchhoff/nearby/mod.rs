@@ -12,11 +12,30 @@
 //! which slips from where the part began, remembers. Each parameter has two states, a little below and above; these are the only
 //! derivatives that are kept. The right-hand side is the difference of R, at the same x, between both sides.
 //!
-//! ∂R/∂x is more than Newton's matrix: within a Newton step the normal forces of friction, the drag of blood and the forces
-//! between instruments are lagged, and loads that follow the rod have no symmetric stiffness. Here R contains them as they are at x
-//! ([`Search::assemble`]), its products with a direction are differences too, and Newton's factors are the preconditioner
-//! ([`gmres`]). Without any of these Newton's factors
-//! suffice.
+//! ∂R/∂x = K + U is more than Newton's matrix K: within a Newton step the normal forces of friction, the drag of blood and the forces
+//! between instruments are lagged. Here R contains them as they are at x ([`Search::assemble`](super::search::Search::assemble)). So
+//!
+//! ```text
+//! (1 + K⁻¹U) dx/dp = K⁻¹b
+//! ```
+//!
+//! is solved by [`gmres`](crate::solve::gmres), where U v is a difference along v of what forces that follow have more than those that stay as they are at
+//! x. All else cancels in it to the last digits, which K⁻¹ would make a thousand times larger: the rod is that much stiffer along itself
+//! and against the wall than across. For the same reason it is the error of the motion that is made small, not that of the forces. Without
+//! lagged forces Newton's factors suffice.
+//!
+//! How far a device has spun in a part is measured by the smallest rotation of each of its triads from where the part began, also beside
+//! x: of triads that come from x by the smallest rotation it differs by half the product of both rotations, which is of first order in
+//! dx/dp.
+//!
+//! Friction is smooth only on the scale of ε, within which it sticks ([`crate::contact::friction`]): where a point slips by u, a
+//! difference over ±h across the slip has an error of h²/2|u|² of the stiffness μN/|u|. All differences are therefore kept within a small
+//! part of ε ([`STICKING`]).
+//!
+//! Where the sheath is elsewhere on a side, R is taken at x moved along: all nodes by the motion of the mouth, the first tangent into
+//! the new direction. The motion that balances the difference comes on top.
+//!
+//! Several parameters that change together, each so much, are one p: dx/dp is then the product of the Jacobian with these changes.
 //!
 //! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
 //! anchored anew, has no derivative.
@@ -37,18 +56,16 @@ use super::substep::{Attempt, Part};
 use super::workspace::Tools;
 use crate::device::Stack;
 use crate::methods::{Parameter, Parts, Slope, Surroundings, Together};
-use crate::rod::Frame;
 use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
-use forces::{go, longest_mm, rows};
+use forces::{go, longest_mm, rows, spins};
 
 /// Change of a parameter to either side, as a fraction of its scale: differences then have as many digits from rounding as from
 /// curvature.
 const STEP: f64 = 1e-5;
-/// Largest motion h of a node in all differences, as a fraction of the slip ε within which friction sticks. Where a point slips by u
-/// its friction turns with u, and differences are off by h²/2|u|², which is h²/2ε² at most where it slips: less than 10⁻⁷.
-/// In a later part ε may be ten times smaller, and they are off by 10⁻⁵ at most.
-const STICKING: f64 = 3e-4;
+/// Largest motion h of a node in all differences, as a fraction of the slip ε within which friction sticks. Differences are off by
+/// h²/2ε² where a point just slips, a few parts in a million, and much less where it slips farther; with less h rounding adds as much.
+const STICKING: f64 = 3e-3;
 
 /// Scale of a field that is nought, T or N/mm.
 const WEAK_FIELD: f64 = 1e-3;
@@ -82,8 +99,8 @@ pub(super) struct Nearby {
 /// The end of a part, beside which others are sought.
 struct End<'a> {
     state: &'a KirchhoffState,
-    /// Triads from which the spin of the device is measured in it; none for the end itself.
-    triads: Vec<Frame>,
+    /// How the triads from which its spin is measured are turned against those of the slid device, rad, once they are known.
+    spins: Vec<f64>,
 }
 
 /// What acts in a part on one side.
@@ -159,7 +176,7 @@ impl Nearby {
             iterations: 0,
         };
         let part = Part { resumed: Some(&under_way), ..attempt.part };
-        let mut end = End { state: end, triads: Vec::new() };
+        let mut end = End { state: end, spins: Vec::new() };
         let own = steered(environment.surroundings.stack, attempt.hands);
         let nominal_start = taken_along(was, passage);
         let nominal = Acting {
@@ -174,14 +191,14 @@ impl Nearby {
         let progress =
             self.first.as_ref().map_or(1.0, |first| progress(first, attempt.hands, attempt.part.to));
         let Self { parameters, sides, cut, begins, next, .. } = self;
-        let assembled = tools.beside(&nominal, &end, next, |search, lagged| {
+        let assembled = tools.beside(&nominal, &end, next, |search, lagged, _| {
             search.assemble(lagged, true);
-            let lags = search.lags(lagged) || !search.newton.assembly.rank_ones.is_empty();
+            let lags = search.lags(lagged);
             let is_regular = search.newton.factor(search.elements, search.supports).is_some();
             (rows(search), lags, is_regular)
         });
-        let Some(((at_end, lags, true), triads)) = assembled else { return Err(singular()) };
-        end.triads = triads;
+        let Some(((at_end, lags, true), slid)) = assembled else { return Err(singular()) };
+        end.spins = spins(&end.state.rod, &slid);
         let most_mm = STICKING * tools.friction.stick_mm();
         // Where all sides begin in the same state they may come nearer.
         let begins = std::mem::take(begins);
@@ -192,7 +209,7 @@ impl Nearby {
                 let mut forces = [at_end.clone(), at_end.clone()];
                 for ((side, forces), hands) in sides.iter_mut().zip(&mut forces).zip(&hands) {
                     let there = side.with(environment, (hands, passage), part, |beside, _| {
-                        tools.beside(beside, &end, next, |search, lagged| {
+                        tools.beside(beside, &end, next, |search, lagged, _| {
                             search.assemble(lagged, false);
                             rows(search)
                         })
@@ -225,14 +242,14 @@ impl Nearby {
             for (side, hands) in sides.iter_mut().zip(&hands) {
                 let by = side.by;
                 if by == 0.0 {
-                    tools.beside(&nominal, &end, next, |search, lagged| search.assemble(lagged, false));
+                    tools.beside(&nominal, &end, next, |search, lagged, _| search.assemble(lagged, false));
                     tools.finish(&nominal, (nominal.environment, reads), (&way, 0.0), next);
                 } else {
                     std::mem::swap(&mut side.next, next);
                     side.with(environment, (hands, passage), part, |beside, own| {
                         if reads {
-                            tools.beside(beside, &end, next, |search, lagged| {
-                                go(search, &search.state.clone(), (&way, by));
+                            tools.beside(beside, &end, next, |search, lagged, triads| {
+                                go(search, &search.state.clone(), (&way, by), triads);
                                 search.assemble(lagged, false);
                             });
                         }
