@@ -64,7 +64,7 @@ impl FieldSpec {
     pub(crate) fn set_vector(&mut self, to: [f64; 3]) {
         match self {
             Self::Magnet { field_t: vector, .. } | Self::Weight { force_n_per_mm: vector, .. } => {
-                *vector = to
+                *vector = to;
             }
         }
     }

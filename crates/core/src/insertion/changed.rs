@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::builder::check_entry;
 use super::simulation::{Environment, Simulation, surroundings};
-use crate::methods::{Gradient, Move, Parameter, Parts, StepReport, Surroundings, Together};
+use crate::methods::{Gradient, Move, Parameter, Parts, StepReport, Surroundings, Timed, Together};
 use crate::vessel::Lumen;
 use crate::{Error, Result};
 
@@ -56,11 +56,7 @@ impl Simulation {
     }
 
     /// Derivatives of what commands would lead to until these times.
-    fn derivatives(
-        &self,
-        (commands, times_s): (&[Vec<Move>], &[f64]),
-        by: &[Together],
-    ) -> Result<Vec<Gradient>> {
+    fn derivatives(&self, (commands, times_s): Timed<'_>, by: &[Together]) -> Result<Vec<Gradient>> {
         if times_s.len() != commands.len() {
             let remedy = format!("there are {} commands: give one for each", commands.len());
             return Err(Error::parameter("gradient.times_s", format!("{} times", times_s.len()), remedy));

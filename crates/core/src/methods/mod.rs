@@ -60,6 +60,9 @@ pub struct Surroundings<'a> {
     pub time_s: [f64; 2],
 }
 
+/// Moves of commands, and the time after each, s.
+pub type Timed<'a> = (&'a [Vec<Move>], &'a [f64]);
+
 /// Returns true once a long computation is to end; called from any thread.
 pub type Stop = dyn Fn() -> bool + Send + Sync;
 
@@ -163,7 +166,7 @@ pub trait Method: Send {
     fn gradients(
         &self,
         _surroundings: &Surroundings<'_>,
-        _commands: (&[Vec<Move>], &[f64]),
+        _commands: Timed<'_>,
         _by: &[Vec<(Parameter, f64)>],
         _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {

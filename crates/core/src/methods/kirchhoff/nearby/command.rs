@@ -9,7 +9,7 @@ use super::super::workspace::Workspace;
 use super::super::{Environment, Kirchhoff, write_line};
 use super::Nearby;
 use super::read::margin;
-use crate::methods::{Gradient, Move, StepReport, Surroundings, Together};
+use crate::methods::{Gradient, Move, StepReport, Surroundings, Timed, Together};
 use crate::shape::Shape;
 use crate::{Error, Result};
 
@@ -21,7 +21,7 @@ impl<const C: usize> Kirchhoff<C> {
     pub(in super::super) fn gradients_of(
         &self,
         surroundings: &Surroundings<'_>,
-        ((commands, times_s), by): ((&[Vec<Move>], &[f64]), &[Together]),
+        ((commands, times_s), by): (Timed<'_>, &[Together]),
         checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
         if surroundings.course.is_some() {
