@@ -7,6 +7,7 @@ use endowire_core::vessel::CentrelinePath;
 use endowire_core::{Error, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::{List, Numbers, array, natural, natural_or, rows};
 use crate::error::{exception, refuse};
@@ -82,6 +83,29 @@ impl Controller {
             None => vec![team.lead],
         };
         Ok(Self::of(SearchAhead::new(path(&path_mm)?, team, turned, arrived_mm)))
+    }
+
+    /// A `Planner`: it plans the whole way on copies of the simulation before the first command, and carries the plan out.
+    ///
+    /// Raises InputError as `follow_path`.
+    #[staticmethod]
+    #[pyo3(
+        signature = (path_mm, *, arrived_mm = 5.0, lead = None, followers = None),
+        text_signature = "(path_mm, *, arrived_mm=5.0, lead=0, followers=None)"
+    )]
+    fn plan<'py>(
+        path_mm: &Bound<'py, PyAny>,
+        arrived_mm: f64,
+        lead: Option<&Bound<'py, PyAny>>,
+        followers: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = path_mm.py();
+        let given = PyDict::new(py);
+        given.set_item("arrived_mm", arrived_mm)?;
+        for (name, value) in [("lead", lead), ("followers", followers)] {
+            value.map_or(Ok(()), |value| given.set_item(name, value))?;
+        }
+        py.import("endowire.planning")?.getattr("Planner")?.call((path_mm,), Some(&given))
     }
 
     /// The next command for the current state of a simulation: advance_mm and rotate_rad of each instrument, shape

@@ -136,7 +136,7 @@ impl Simulation {
     fn gradients_of(
         &self,
         py: Python<'_>,
-        commands: &[Vec<insertion::Move>],
+        (commands, times_s): (&[Vec<insertion::Move>], Option<Vec<f64>>),
         by: &[String],
     ) -> PyResult<Vec<Gradient>> {
         let found = self.with(py, |simulation| {
@@ -144,7 +144,10 @@ impl Simulation {
             let each = by.iter().map(|word| Parameter::named(word, stack));
             let by: Vec<Parameter> = each.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
             let words: Vec<String> = by.iter().map(|parameter| parameter.name(stack)).collect();
-            let all = simulation.gradients(commands, &by)?;
+            let all = match &times_s {
+                Some(times_s) => simulation.gradients_until(commands, times_s, &by)?,
+                None => simulation.gradients(commands, &by)?,
+            };
             Ok(all.into_iter().map(|gradient| Gradient { gradient, by: words.clone() }).collect())
         });
         found.map_err(exception)
@@ -277,24 +280,27 @@ impl Simulation {
         ticked.map(StepReport::new).map_err(exception)
     }
 
-    /// Derivatives of what `step` with this command would lead to from here; nothing changes, and time stands still. `by` is a list of
-    /// words: "advance", "rotate", "hand" (both) and "steer" of the command; "EI[k]", "GJ[k]", "rest_u[k]", "rest_v[k]" and
-    /// "rest[k]" (both) of section k, the tip's 0; "wall", its modulus, and "friction", its coefficient. Those of an instrument begin
+    /// Derivatives of what `step` with this command would lead to from here; nothing changes. `by` is a list of
+    /// words: "advance", "rotate", "hand" (both) and "steer" of the command; "EI[k]", "GJ[k]", "rest_u[k]", "rest_v[k]",
+    /// "rest[k]" (both) and "radius[k]" of section k, the tip's 0; "wall", its modulus, and "friction", its coefficient; "entry_x", …,
+    /// "entry" (all three), where the sheath's mouth is, and "direction_x", …, "direction", where it points; "field_x[k]", …, "field[k]",
+    /// the field of a magnet or a weight, as `set_fields` has it. Those of an instrument begin
     /// with its name, "catheter.EI[1]"; without one they are of the innermost. Returns the Gradient.
     ///
     /// Raises what `step` raises; InputError for a parameter that does not exist or has no derivative, for other methods than
     /// kirchhoff, for loops that touch and for detached coils; ComputationError where the command passes a jump.
-    #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, by, steer=None))]
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, time_s=None, *, by, steer=None))]
     fn gradient(
         &self,
         py: Python<'_>,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
+        time_s: Option<f64>,
         by: List<String>,
         steer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Gradient> {
         let moves = self.moves(advance_mm, rotate_rad, steer)?;
-        Ok(self.gradients_of(py, &[moves], &by.0)?.remove(0))
+        Ok(self.gradients_of(py, (&[moves], time_s.map(|time_s| vec![time_s])), &by.0)?.remove(0))
     }
 
     /// The same simulation, in the same state, where parameters have other values: a dictionary of words of `gradient` and numbers,
@@ -322,17 +328,51 @@ impl Simulation {
         match values.map_err(exception)?[..] {
             [Some(value)] => Ok(value),
             [None] => Err(refuse("of", format!("{of:?}"), "belongs to a command")),
-            _ => Err(refuse("of", format!("{of:?}"), "stands for two: name each")),
+            _ => Err(refuse("of", format!("{of:?}"), "stands for several: name each")),
         }
     }
 
     /// As `gradient`, of commands one after the other: an array as that of `run`. Returns a Gradient for each. Derivatives go through
-    /// all commands, since friction remembers; "advance", "rotate" and "steer" are of the first, and stay in those that follow.
+    /// all commands, since friction remembers; "advance", "rotate" and "steer" are of the first, and stay in those that follow. `times_s`
+    /// are the times after the commands, s; without them time stands still.
     ///
     /// Raises what `gradient` raises.
-    #[pyo3(signature = (moves, *, by))]
-    fn gradients(&self, py: Python<'_>, moves: Numbers<'_>, by: List<String>) -> PyResult<Vec<Gradient>> {
-        self.gradients_of(py, &crate::moves::moves(&moves, None, self.pushed().len())?, &by.0)
+    #[pyo3(signature = (moves, *, by, times_s=None))]
+    fn gradients(
+        &self,
+        py: Python<'_>,
+        moves: Numbers<'_>,
+        by: List<String>,
+        times_s: Option<List<f64>>,
+    ) -> PyResult<Vec<Gradient>> {
+        let moves = crate::moves::moves(&moves, None, self.pushed().len())?;
+        self.gradients_of(py, (&moves, times_s.map(|times_s| times_s.0)), &by.0)
+    }
+
+    /// As `gradients`, along one change of parameters together: a dictionary of words of `gradient`, each for one parameter, and how much of
+    /// it changes, {"EI[0]": 1.0, "friction": -0.01}. Each Gradient has the one column "along", the product of the matrix of `gradients`
+    /// with these numbers, at the cost of one parameter.
+    ///
+    /// Raises what `gradient` raises, and InputError where nothing changes.
+    #[pyo3(signature = (moves, along, *, times_s=None))]
+    fn jvp(
+        &self,
+        py: Python<'_>,
+        moves: Numbers<'_>,
+        along: &Bound<'_, PyDict>,
+        times_s: Option<List<f64>>,
+    ) -> PyResult<Vec<Gradient>> {
+        let moves = crate::moves::moves(&moves, None, self.pushed().len())?;
+        let words =
+            along.iter().map(|(word, weight)| Ok((word.extract::<String>()?, weight.extract::<Real>()?.0)));
+        let words: Vec<(String, f64)> = words.collect::<PyResult<_>>()?;
+        let found = self.with(py, |simulation| {
+            let along = start::each(simulation, "along", &words)?;
+            let times_s = times_s.map_or_else(|| vec![simulation.time_s(); moves.len()], |times_s| times_s.0);
+            simulation.jvp(&moves, &times_s, &along)
+        });
+        let all = found.map_err(exception)?.into_iter();
+        Ok(all.map(|gradient| Gradient { gradient, by: vec!["along".to_owned()] }).collect())
     }
 
     /// The linear solves (`StepReport.solves`) after which `step` with this command ends, with what is behind from

@@ -3,6 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use endowire_core::Error;
 use endowire_core::device::{self, Stack};
 use endowire_core::insertion::{self, WallProperties};
 use endowire_core::methods::Parameter;
@@ -160,14 +161,20 @@ pub(crate) fn changed(
     simulation: &insertion::Simulation,
     values: &[(String, f64)],
 ) -> PyResult<insertion::Simulation> {
-    let mut parameters = Vec::with_capacity(values.len());
-    for (word, value) in values {
-        let [parameter] = Parameter::named(word, simulation.stack()).map_err(exception)?[..] else {
-            return Err(refuse("changed", format!("{word:?}"), "stands for two: name each"));
-        };
-        parameters.push((parameter, *value));
-    }
-    simulation.changed(&parameters).map_err(exception)
+    each(simulation, "changed", values).and_then(|values| simulation.changed(&values)).map_err(exception)
+}
+
+/// The parameters of words that stand for one each, with their numbers.
+pub(crate) fn each(
+    simulation: &insertion::Simulation,
+    name: &str,
+    numbers: &[(String, f64)],
+) -> Result<Vec<(Parameter, f64)>, Error> {
+    let one = |(word, number): &(String, f64)| match Parameter::named(word, simulation.stack())?[..] {
+        [parameter] => Ok((parameter, *number)),
+        _ => Err(Error::parameter(name, format!("{word:?}"), "stands for several: name each")),
+    };
+    numbers.iter().map(one).collect()
 }
 
 impl Arguments {

@@ -102,7 +102,7 @@ def test_wrong_input_is_named(vessel):
             endowire.fit(truth, *arguments)
     with pytest.raises(endowire.InputError, match="not free"):
         endowire.fit(truth, MOVES, tip, ["EI[0]"], prior={"EI[1]": (1.0, 1.0)})
-    with pytest.raises(endowire.InputError, match="stands for two"):
+    with pytest.raises(endowire.InputError, match="stands for several"):
         truth.changed({"rest[0]": 0.1})
     with pytest.raises(endowire.InputError, match="bending_stiffness"):
         truth.changed({"EI[0]": -1.0})

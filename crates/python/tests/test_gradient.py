@@ -63,6 +63,41 @@ def test_products_are_those_of_the_matrix(vessel):
     assert gradient.report.converged and gradient.one_sided.dtype == bool
 
 
+def test_entry_radius_and_fields_are_parameters_too(vessel):
+    simulation = inserted(vessel)
+    simulation.set_fields([{"kind": "magnet", "end_mm": 6.0, "moment_am2": 2e-4, "field_t": [0.03, 0.0, 0.01]}])
+    simulation.step(0.5)
+    by = ["entry", "direction_x", "radius[0]", "field_x[0]"]
+    gradient = simulation.gradient(**COMMAND, by=by)
+    assert gradient.by == ["entry_x", "entry_y", "entry_z", "direction_x", "radius[0]", "field_x[0]"]
+    for name, h in (("entry_x", 2e-5), ("direction_x", 1e-6), ("radius[0]", 1e-6), ("field_x[0]", 1e-4)):
+        def tip(by, name=name):
+            there = simulation.changed({name: simulation.value(name) + by})
+            there.step(**COMMAND)
+            return there.tip_mm
+
+        difference = (tip(h) - tip(-h)) / (2.0 * h)
+        slope = gradient.of("tip")[:, gradient.by.index(name)]
+        assert np.linalg.norm(slope - difference) < 1e-5 * np.linalg.norm(difference), name
+        # None of the others is taken for it.
+        other = gradient.of("tip")[:, gradient.by.index(name) - 1]
+        assert np.linalg.norm(other - difference) > 1e-2 * np.linalg.norm(difference), name
+
+
+def test_a_change_together_costs_one_parameter_and_has_their_sum(vessel):
+    simulation = inserted(vessel)
+    moves = np.array([[[1.3, 0.05]], [[1.0, 0.0]]])
+    along = {"EI[0]": 0.5, "rest_u[0]": -1e-3, "entry_y": 0.1}
+    both = simulation.gradients(moves, by=list(along))[1], simulation.jvp(moves, along)[1]
+    assert both[1].by == ["along"]
+    for of in ("tip", "push_force"):
+        np.testing.assert_allclose(both[1].of(of)[:, 0], both[0].jvp(of, list(along.values())), rtol=1e-5, atol=1e-8)
+    with pytest.raises(endowire.InputError, match="stands for several"):
+        simulation.jvp(moves, {"entry": 1.0})
+    with pytest.raises(endowire.InputError, match="times"):
+        simulation.gradients(moves, by=["EI[0]"], times_s=[1.0])
+
+
 def test_what_has_no_derivative_is_refused(vessel):
     simulation = inserted(vessel)
     gradient = simulation.gradient(**COMMAND, by=["advance"])

@@ -116,6 +116,27 @@ def test_others_stay_where_one_is_led(vessel, wire):
     assert endowire.plan(both, path_mm, lead=1).moves[:, 1].any()
 
 
+def test_others_follow_in_a_plan_as_behind_other_controllers(vessel, wire):
+    catheter = endowire.Instrument(
+        [{"length_mm": 150.0, "radius_mm": 0.9, "inner_radius_mm": 0.6, "bending_stiffness_nmm2": 30.0}]
+    )
+    both = endowire.Simulation(vessel, [wire, catheter], method={"name": "kirchhoff", "element_mm": 5.0})
+    path_mm = vessel.path(vessel.centreline[40, :3].tolist())
+    found = endowire.plan(both, path_mm, followers=[(1, 15.0)])
+    wire_mm, catheter_mm = found.simulation.inserted_mm
+    assert found.reached and catheter_mm == pytest.approx(wire_mm - 15.0) and catheter_mm > 5.0
+    assert not found.moves[:, 1, 1].any()
+    # The same by the controller that carries it out.
+    hand, there = endowire.Controller.plan(path_mm, followers=[(1, 15.0)]), both.copy()
+    while (move := hand.next(there)) is not None:
+        there.step(move[:, 0], move[:, 1])
+    assert hand.ended == "arrived" and np.array_equal(there.inserted_mm, found.simulation.inserted_mm)
+    assert isinstance(hand, endowire.Planner)
+    for followers in ([(0, 5.0)], [(2, 5.0)]):
+        with pytest.raises(endowire.InputError, match="each is in a team once"):
+            endowire.plan(both, path_mm, followers=followers)
+
+
 def test_wrong_input_is_named(branch):
     simulation, path_mm = branch
     for make, words in (
@@ -124,6 +145,7 @@ def test_wrong_input_is_named(branch):
         (lambda: endowire.Planner(path_mm, arrived_mm=-1.0), "arrived_mm = -1: must be a distance"),
         (lambda: endowire.Planner(path_mm, lead=-1), "lead = -1"),
         (lambda: endowire.plan(simulation, path_mm, lead=2), "lead = 2: there are 1"),
+        (lambda: endowire.Controller.plan(path_mm, followers=[(1, -1.0)]), "followers = -1"),
     ):
         with pytest.raises(endowire.InputError, match=words):
             make()

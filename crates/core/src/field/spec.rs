@@ -53,6 +53,22 @@ impl FieldSpec {
         })
     }
 
+    /// Its field, T, or its force per length, N/mm.
+    pub(crate) fn vector(&self) -> [f64; 3] {
+        match self {
+            Self::Magnet { field_t: vector, .. } | Self::Weight { force_n_per_mm: vector, .. } => *vector,
+        }
+    }
+
+    /// Sets that.
+    pub(crate) fn set_vector(&mut self, to: [f64; 3]) {
+        match self {
+            Self::Magnet { field_t: vector, .. } | Self::Weight { force_n_per_mm: vector, .. } => {
+                *vector = to;
+            }
+        }
+    }
+
     /// Checks that it acts on one of these instruments, and within its length. `name` is its own in errors.
     ///
     /// # Errors

@@ -88,17 +88,14 @@ impl<'a> SimulationBuilder<'a> {
     pub fn build(self) -> Result<Simulation> {
         let Self { lumen, stack, sheath, properties, motion, course, flow, method, store } = self;
         properties.check(&lumen, store)?;
-        check_inside(&lumen, &sheath)?;
         flow.iter().try_for_each(|flow| flow.check_within(&lumen))?;
-        let room_mm = lumen.distance_mm(&sheath.position_mm)?;
-        stack.devices().try_for_each(|device| check_mouth(room_mm, device, &sheath))?;
-        motion.iter().try_for_each(|motion| check_still(room_mm, motion, &stack, &sheath))?;
+        check_entry(&lumen, motion.as_ref(), &stack, &sheath)?;
         // With more than three instruments, those without a rest shape have friction along the line only.
         let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
         let twists = properties.has_friction() || rub;
         let stack = if twists { stack.twisted()? } else { stack };
-        let mark = OnceLock::new();
-        let scene = Environment { lumen, properties, sheath, stack, motion, course, flow, mark };
+        let (thickest_mm, mark) = (stack.radii_mm().1, OnceLock::new());
+        let scene = Environment { lumen, properties, sheath, stack, motion, course, flow, thickest_mm, mark };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {
@@ -119,6 +116,20 @@ impl<'a> SimulationBuilder<'a> {
         let (fields, fields_before) = (Arc::new([]), Arc::new([]));
         Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0, fields, fields_before, stop: None })
     }
+}
+
+/// Rejects a sheath whose mouth is outside the vessel, instruments that are too thick for it there, and a vessel that would move
+/// through them.
+pub(super) fn check_entry(
+    lumen: &Lumen,
+    motion: Option<&VesselMotion>,
+    stack: &Stack,
+    sheath: &Sheath,
+) -> Result<()> {
+    check_inside(lumen, sheath)?;
+    let room_mm = lumen.distance_mm(&sheath.position_mm)?;
+    stack.devices().try_for_each(|device| check_mouth(room_mm, device, sheath))?;
+    motion.map_or(Ok(()), |motion| check_still(room_mm, motion, stack, sheath))
 }
 
 /// Rejects a sheath whose mouth is outside the vessel.

@@ -2,6 +2,7 @@
 
 mod batch;
 mod builder;
+mod changed;
 #[cfg(test)]
 mod gradient_tests;
 mod mark;

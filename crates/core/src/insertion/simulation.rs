@@ -8,8 +8,8 @@ use crate::field::Field;
 use crate::flow::BloodFlow;
 use crate::insertion::{SimulationBuilder, mark};
 use crate::methods::{
-    Command, DetachedCoil, Gradient, LateralForce, Method, Move, Parameter, Sheath, State, StepReport, Stop,
-    Surroundings, WallForce, displacement,
+    Command, DetachedCoil, LateralForce, Method, Move, Sheath, State, StepReport, Stop, Surroundings,
+    WallForce, displacement,
 };
 use crate::shape::Shape;
 use crate::vessel::{Course, Displacement, Lumen, VesselMotion};
@@ -33,7 +33,7 @@ pub struct Simulation {
 }
 
 /// Fields that clones share.
-type Fields = Arc<[Arc<dyn Field>]>;
+pub(super) type Fields = Arc<[Arc<dyn Field>]>;
 
 /// The immutable part of a simulation.
 pub(super) struct Environment {
@@ -45,6 +45,8 @@ pub(super) struct Environment {
     /// The course of the vessel, if it yields.
     pub(super) course: Option<Arc<Course>>,
     pub(super) flow: Option<BloodFlow>,
+    /// Radius of the thickest instrument for which the method's wall was made, mm.
+    pub(super) thickest_mm: f64,
     /// A number that stands for it, once it was needed.
     pub(super) mark: OnceLock<u64>,
 }
@@ -87,6 +89,7 @@ macro_rules! surroundings {
         }
     };
 }
+pub(super) use surroundings;
 
 impl Simulation {
     /// A builder for a simulation of a device, or of several instruments, that enter a vessel through `sheath`.
@@ -139,50 +142,6 @@ impl Simulation {
         stepped.map_err(|error| self.telling_what_is_behind(error))?;
         self.arrived(time_s);
         Ok(self.method.report())
-    }
-
-    /// Derivatives, by these parameters, of what commands would lead to from here, one after the other: one [`Gradient`] for each.
-    /// Nothing changes, and time stands still.
-    ///
-    /// They are those of [`Simulation::step_together`], through all parts of all commands, since friction remembers. Contacts keep
-    /// their status, and [`Gradient::margin`] says how far the next change is.
-    ///
-    /// # Errors
-    /// As [`Simulation::step_together`]; a parameter that does not exist, a method other than `kirchhoff`, loops that touch and
-    /// detached coils ([`Error::Parameter`]); a command that passes a jump ([`Error::Computation`]).
-    pub fn gradients(&self, commands: &[Vec<Move>], by: &[Parameter]) -> Result<Vec<Gradient>> {
-        let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
-        self.method.gradients(&surroundings!(self, self.time_s), commands, by, &checked)
-    }
-
-    /// The same simulation, in the same state, where parameters of the scene have other values; the moduli of regions of the wall
-    /// change in proportion to the wall's. The device lies where it lay until the next step that moves it.
-    ///
-    /// # Errors
-    /// A parameter that does not exist there or belongs to a command, and a value that the scene could not have.
-    pub fn changed(&self, values: &[(Parameter, f64)]) -> Result<Self> {
-        let Environment { lumen, properties, sheath, stack, motion, course, flow, .. } = &*self.scene;
-        let (mut stack, mut properties) = (stack.clone(), properties.clone());
-        for (parameter, value) in values {
-            if parameter.value(&stack, &properties)?.is_none() {
-                return Err(parameter.refused("it belongs to a command: move the hand"));
-            }
-            parameter.set(&mut stack, &mut properties, *value);
-        }
-        stack.check_sections()?;
-        properties.check_outside_regions()?;
-        let (lumen, sheath, motion, flow) = (lumen.clone(), *sheath, motion.clone(), flow.clone());
-        let (course, mark) = (course.clone(), OnceLock::new());
-        let scene = Environment { lumen, properties, sheath, stack, motion, course, flow, mark };
-        Ok(Self { scene: Arc::new(scene), ..self.clone() })
-    }
-
-    /// The value of a parameter of the scene; none if it belongs to a command.
-    ///
-    /// # Errors
-    /// A parameter that does not exist there.
-    pub fn value(&self, parameter: &Parameter) -> Result<Option<f64>> {
-        parameter.value(&self.scene.stack, &self.scene.properties)
     }
 
     /// Time and fields after a command.
@@ -239,7 +198,7 @@ impl Simulation {
     }
 
     /// The time at the end of a step.
-    fn check_time(&self, time_s: Option<f64>) -> Result<f64> {
+    pub(super) fn check_time(&self, time_s: Option<f64>) -> Result<f64> {
         let time_s = time_s.unwrap_or(self.time_s);
         if (self.time_s..=LATEST_S).contains(&time_s) {
             return Ok(time_s);
@@ -339,7 +298,7 @@ impl Simulation {
     }
 
     /// Checks moves that follow the step of this report.
-    fn check_moves_after(&self, report: &StepReport, moves: &[Move]) -> Result<()> {
+    pub(super) fn check_moves_after(&self, report: &StepReport, moves: &[Move]) -> Result<()> {
         let instruments = self.scene.stack.instruments();
         // Including motion left over by earlier commands.
         let reached = |index: usize| report.hand(index).inserted_mm;

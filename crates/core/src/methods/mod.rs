@@ -5,13 +5,16 @@ mod detached;
 mod finite;
 mod gradient;
 pub mod kirchhoff;
+mod parameter;
 mod report;
 mod sheath;
 mod state;
 
 pub use command::{Command, Move};
 pub use detached::DetachedCoil;
-pub use gradient::{Gradient, Margin, Parameter, Slope};
+pub use gradient::{Gradient, Margin, Slope};
+pub use parameter::Parameter;
+pub(crate) use parameter::{Parts, Together};
 pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
@@ -56,6 +59,9 @@ pub struct Surroundings<'a> {
     /// Time before and after the step, s.
     pub time_s: [f64; 2],
 }
+
+/// Moves of commands, and the time after each, s.
+pub type Timed<'a> = (&'a [Vec<Move>], &'a [f64]);
 
 /// Returns true once a long computation is to end; called from any thread.
 pub type Stop = dyn Fn() -> bool + Send + Sync;
@@ -151,16 +157,17 @@ pub trait Method: Send {
         None
     }
 
-    /// Derivatives of what commands lead to, one after the other, from the state as it is; the state does not change. Each
-    /// command was `checked` against the report before it.
+    /// Derivatives of what commands lead to, one after the other, each with the time after it, s, from the state as it is; the state
+    /// does not change. A derivative is by parameters that change together, each so much. Each command was `checked` against the report
+    /// before it.
     ///
     /// # Errors
     /// A method without gradients; as [`Method::step`]; a parameter that does not exist, and a result that has no derivative.
     fn gradients(
         &self,
         _surroundings: &Surroundings<'_>,
-        _commands: &[Vec<Move>],
-        _by: &[Parameter],
+        _commands: Timed<'_>,
+        _by: &[Vec<(Parameter, f64)>],
         _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
         Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))

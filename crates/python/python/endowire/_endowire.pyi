@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import EndowireError
+from .planning import Planner
 
 __version__: str
 
@@ -220,13 +221,17 @@ class Simulation:
         self,
         advance_mm: ArrayLike | None = None,
         rotate_rad: ArrayLike | None = None,
+        time_s: float | None = None,
         *,
         by: Sequence[str],
         steer: ArrayLike | None = None,
     ) -> Gradient: ...
     def changed(self, values: Mapping[str, float]) -> Simulation: ...
     def value(self, of: str) -> float: ...
-    def gradients(self, moves: ArrayLike, *, by: Sequence[str]) -> list[Gradient]: ...
+    def gradients(self, moves: ArrayLike, *, by: Sequence[str], times_s: Sequence[float] | None = None) -> list[Gradient]: ...
+    def jvp(
+        self, moves: ArrayLike, along: Mapping[str, float], *, times_s: Sequence[float] | None = None
+    ) -> list[Gradient]: ...
     def most_solves(
         self,
         advance_mm: ArrayLike | None = None,
@@ -413,6 +418,14 @@ class Controller:
         followers: Sequence[tuple[int, float]] | None = None,
         turned: ArrayLike | None = None,
     ) -> Controller: ...
+    @staticmethod
+    def plan(
+        path_mm: ArrayLike,
+        *,
+        arrived_mm: float = 5.0,
+        lead: int = 0,
+        followers: Sequence[tuple[int, float]] | None = None,
+    ) -> Planner: ...
     def next(self, simulation: Simulation) -> NDArray[np.float64] | None: ...
     @property
     def ended(self) -> str | None: ...

@@ -12,7 +12,7 @@ is no derivative (`crates/python/benches/plans.py gradients` counts them).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import ceil, inf, pi
 
@@ -76,7 +76,7 @@ class _Mark:
     inserted_mm: float
     #: The state before, and the command.
     before: _Mark | None
-    command: tuple[float, float]
+    moves: NDArray[np.float64]
     tip_mm: NDArray[np.float64]
 
     def back(self) -> Iterator[_Mark]:
@@ -92,26 +92,28 @@ class _Search:
 
     def __init__(self, planner: Planner, simulation: Simulation) -> None:
         self.planner, self.trials, self.steps = planner, 0, 0
-        self.best = self.mark(simulation.copy(), None, (0.0, 0.0))
+        self.best = self.mark(simulation.copy(), None, np.zeros((simulation.n_instruments, 2)))
 
-    def mark(self, simulation: Simulation, before: _Mark | None, command: tuple[float, float]) -> _Mark:
+    def mark(self, simulation: Simulation, before: _Mark | None, moves: NDArray[np.float64]) -> _Mark:
         lead = self.planner.lead
         tip_mm = simulation.tips_mm[lead]
         arc_mm, off_mm, radius_mm = self.planner.on_path(tip_mm)
         worth_mm = arc_mm - ASTRAY_COST * max(0.0, off_mm - radius_mm)
-        return _Mark(simulation, worth_mm, float(simulation.inserted_mm[lead]), before, command, tip_mm)
+        return _Mark(simulation, worth_mm, float(simulation.inserted_mm[lead]), before, moves, tip_mm)
 
     def command(self, mark: _Mark, advance_mm: float, rotate_rad: float) -> _Mark | None:
+        """The state after a command of the leading instrument, with those that follow it; none where it fails."""
+        return self.carry_out(mark, self.planner.moves(mark.simulation, advance_mm, rotate_rad))
+
+    def carry_out(self, mark: _Mark, moves: NDArray[np.float64]) -> _Mark | None:
         """The state after a command; none where it fails, as at the end of the way or of the instrument."""
-        simulation, lead = mark.simulation.copy(), self.planner.lead
-        advance, rotate = np.zeros(simulation.n_instruments), np.zeros(simulation.n_instruments)
-        advance[lead], rotate[lead] = advance_mm, rotate_rad
+        simulation = mark.simulation.copy()
         self.steps += 1
         try:
-            simulation.step(advance, rotate)
+            simulation.step(moves[:, 0], moves[:, 1])
         except EndowireError:
             return None
-        return self.mark(simulation, mark, (advance_mm, rotate_rad))
+        return self.mark(simulation, mark, moves)
 
     def push(self, begin: _Mark, most_mm: float) -> _Mark:
         """Pushes on from a state as long as that leads farther: the best state that it comes to."""
@@ -159,12 +161,12 @@ class _Search:
     def follow(self, begin: _Mark) -> _Mark:
         """Follows the way from a state, turning at every push, until the hand would pull back: the best state that it comes to."""
         planner, best, last = self.planner, begin, begin
-        hand = Controller.follow_path(planner.path_mm, arrived_mm=planner.arrived_mm, lead=planner.lead)
+        hand = planner.hand()
         while not planner.has_arrived(best.tip_mm):
             move = hand.next(last.simulation)
             if move is None or hand.retries > 0:
                 break
-            following = self.command(last, *move[planner.lead].tolist())
+            following = self.carry_out(last, move)
             if following is None:
                 break
             last = following
@@ -182,7 +184,7 @@ class _Search:
         marks = list(self.best.back())[:-1][::-1]
         moves = np.zeros((len(marks), self.best.simulation.n_instruments, 2))
         for k, mark in enumerate(marks):
-            moves[k, self.planner.lead] = mark.command
+            moves[k] = mark.moves
         return Plan(
             moves=moves,
             reached=self.planner.has_arrived(self.best.tip_mm),
@@ -216,16 +218,24 @@ class Planner:
     """Plans the whole way on copies of the simulation before the first command, and carries the plan out: used as a
     `Controller`, by `next`. It makes a new plan where the tip is not where its plan has it.
 
-    ``path_mm`` is the way, shape (n, 4): x, y, z and the vessel's radius, mm. ``lead`` is the instrument that is moved; others
-    stay. It has arrived when the tip is in the vessel and at most ``arrived_mm`` before the end of the way. Commands are pushes of at
+    ``path_mm`` is the way, shape (n, 4): x, y, z and the vessel's radius, mm. ``lead`` is the instrument that is led; ``followers`` follow
+    behind its tip, as pairs of an instrument and a distance, mm, and others stay. It has arrived when the tip is in the vessel and at most ``arrived_mm`` before the end of the way. Commands are pushes of at
     most 4 mm and turns of at most 0.35 rad. The same simulation gives the same plan, to the bit.
 
     Raises InputError for an invalid path, a distance below 0 and an instrument that is no whole number of at least 0.
     """
 
-    def __init__(self, path_mm: ArrayLike, *, arrived_mm: float = 5.0, lead: int = 0) -> None:
+    def __init__(
+        self,
+        path_mm: ArrayLike,
+        *,
+        arrived_mm: float = 5.0,
+        lead: int = 0,
+        followers: Sequence[tuple[int, float]] = (),
+    ) -> None:
         # It checks what all controllers check, with the same messages.
-        Controller.search_ahead(path_mm, arrived_mm=arrived_mm, lead=lead)
+        Controller.search_ahead(path_mm, arrived_mm=arrived_mm, lead=lead, followers=list(followers))
+        self.followers = [(int(instrument), float(behind_mm)) for instrument, behind_mm in followers]
         self.path_mm = table = np.array(path_mm, dtype=float)
         self.lead, self.arrived_mm = int(lead), float(arrived_mm)
         self._begin_mm, self._along_mm = table[:-1, :3], np.diff(table[:, :3], axis=0)
@@ -239,6 +249,19 @@ class Planner:
         #: Number of plans that were made after the first, since the tip was elsewhere.
         self.retries = 0
         self._done = 0
+
+    def hand(self) -> Controller:
+        """The hand that follows the way, with the same instruments."""
+        return Controller.follow_path(self.path_mm, arrived_mm=self.arrived_mm, lead=self.lead, followers=self.followers)
+
+    def moves(self, simulation: Simulation, advance_mm: float, rotate_rad: float) -> NDArray[np.float64]:
+        """The command in which the leading instrument does this, and the others move to their places behind it, by at most as much."""
+        moves, inserted_mm = np.zeros((simulation.n_instruments, 2)), simulation.inserted_mm
+        moves[self.lead] = advance_mm, rotate_rad
+        for instrument, behind_mm in self.followers:
+            place_mm = max(0.0, inserted_mm[self.lead] + advance_mm - behind_mm)
+            moves[instrument, 0] = np.clip(place_mm - inserted_mm[instrument], -advance_mm, advance_mm)
+        return moves
 
     def on_path(self, place_mm: NDArray[np.float64]) -> tuple[float, float, float]:
         """The point on the way nearest to a place: length from the beginning, distance, and the vessel's radius there, mm."""
@@ -261,10 +284,12 @@ class Planner:
     def find(self, simulation: Simulation) -> Plan:
         """A plan from the state of a simulation, which does not move.
 
-        Raises InputError for a ``lead`` that it does not have.
+        Raises InputError for instruments that it does not have, or that are both led and follow.
         """
         if self.lead >= simulation.n_instruments:
             raise InputError(f"lead = {self.lead}: there are {simulation.n_instruments}, the innermost is 0")
+        # It checks the others.
+        self.hand().next(simulation)
         return _Search(self, simulation).run()
 
     def next(self, simulation: Simulation) -> NDArray[np.float64] | None:
@@ -288,10 +313,17 @@ class Planner:
         return None
 
 
-def plan(simulation: Simulation, path_mm: ArrayLike, *, arrived_mm: float = 5.0, lead: int = 0) -> Plan:
+def plan(
+    simulation: Simulation,
+    path_mm: ArrayLike,
+    *,
+    arrived_mm: float = 5.0,
+    lead: int = 0,
+    followers: Sequence[tuple[int, float]] = (),
+) -> Plan:
     """Commands that bring the tip of an instrument along a way to its end (`Planner`, which carries them out as well). The simulation does
     not move: ``simulation.run(plan.moves)`` does that.
 
     Raises InputError as `Planner` and `Planner.find`.
     """
-    return Planner(path_mm, arrived_mm=arrived_mm, lead=lead).find(simulation)
+    return Planner(path_mm, arrived_mm=arrived_mm, lead=lead, followers=followers).find(simulation)

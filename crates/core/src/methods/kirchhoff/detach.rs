@@ -79,7 +79,8 @@ impl<const C: usize> Workspace<C> {
             state.withdraw(stack, &hands);
         } else {
             let tail = |instrument: usize, _: f64| state.twists[instrument].mouth_rad;
-            transport_together((&self.mesh, &from.rod), mesh, (stack.sets(), tail), &mut state.rod);
+            let mouth = (&from.rod.frames[0], &from.rod.positions[0]);
+            transport_together((&self.mesh, &from.rod), (mesh, mouth), (stack.sets(), tail), &mut state.rod);
             state.move_hands(&hands);
             // The axial force of the coil is gone: in a straight catheter its energy is too small for descent to find
             // that.

@@ -105,7 +105,7 @@ use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching}
 use crate::device::{Stack, line_mm};
 use crate::field::FieldLoad;
 use crate::methods::{
-    Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings,
+    Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings, Timed,
 };
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, RodState, TWISTED};
@@ -482,8 +482,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
     fn gradients(
         &self,
         surroundings: &Surroundings<'_>,
-        commands: &[Vec<Move>],
-        by: &[Parameter],
+        commands: Timed<'_>,
+        by: &[Vec<(Parameter, f64)>],
         checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
         self.gradients_of(surroundings, (commands, by), checked)

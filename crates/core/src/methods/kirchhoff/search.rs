@@ -390,7 +390,8 @@ impl<const C: usize> Search<'_, '_, C> {
         self.has_friction || lagged.flow.is_some() || !self.contact.between().places().is_empty()
     }
 
-    fn assemble_once(&mut self, hessian: bool) {
+    /// As [`Search::assemble`], with lagged forces as they were.
+    pub(super) fn assemble_once(&mut self, hessian: bool) {
         let elements = self.elements;
         self.with_outside(|newton, supports, outside, state| match hessian {
             true => newton.assemble(elements, supports, outside, state),

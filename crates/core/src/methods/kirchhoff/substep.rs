@@ -16,8 +16,10 @@ use super::transport::{place_on_curve, transport, transport_together};
 use super::workspace::Tools;
 use super::yielding::Yielding;
 use super::{Environment, inner_friction, meshed};
+use crate::Vec3;
 use crate::contact::{ContactPoint, FrictionLaw, least_force_n, stick_mm};
-use crate::rod::RodState;
+use crate::methods::Sheath;
+use crate::rod::{Frame, RodState};
 
 /// A part of a command.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +48,17 @@ pub(super) struct Attempt<'a> {
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
 }
 
+/// A sheath that points in the same direction, to rounding.
+const SAME_DIRECTION: f64 = 1e-12;
+
+/// The mouth of a sheath that is elsewhere than that from which a rod comes; none where it is the same.
+fn moved_mouth(sheath: &Sheath, rod: &RodState) -> Option<(Frame, Vec3)> {
+    let (frame, was) = (sheath.frame(), &rod.frames[0]);
+    let turned = (frame.t - was.t).norm().max((frame.u - was.u).norm());
+    let same = sheath.position_mm == rod.positions[0] && turned <= SAME_DIRECTION;
+    (!same).then_some((frame, sheath.position_mm))
+}
+
 impl<const C: usize> Tools<C> {
     /// Slides the device at `start` to the positions of the hands, on the mesh of the length then inserted, with its
     /// friction and knowledge of the wall; coils do not move.
@@ -65,15 +78,18 @@ impl<const C: usize> Tools<C> {
             Some(_) => tails.angle_before(stack, instrument, from_tip_mm),
             None => 0.0,
         };
+        let moved = moved_mouth(environment.surroundings.sheath, &start.state.rod);
         let transport_from = |start: Start<'_>, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
+            let own = (&from.1.frames[0], &from.1.positions[0]);
+            let mouth = moved.as_ref().map_or(own, |(frame, position)| (frame, position));
             if mesh.elements.is_empty() {
                 rod.copy_from(from.1);
                 rod.truncate(1);
             } else if stack.is_several() {
-                transport_together(from, mesh, (stack.sets(), tail), rod);
+                transport_together(from, (mesh, mouth), (stack.sets(), tail), rod);
             } else {
-                transport(from, mesh, |from_tip_mm| tail(0, from_tip_mm), rod);
+                transport(from, (mesh, mouth), |from_tip_mm| tail(0, from_tip_mm), rod);
             }
         };
         set_motions(&start.state.hands, hands, &mut self.guess.motions);

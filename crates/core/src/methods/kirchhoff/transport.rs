@@ -6,6 +6,9 @@ use crate::rod::{Frame, RodState};
 
 use super::mesh::Mesh;
 
+/// Triad and position of a device in the sheath's mouth.
+pub(super) type Mouth<'a> = (&'a Frame, &'a Vec3);
+
 /// Unit tangent at an arc length from the sheath on the curve of `state`.
 ///
 /// `element` is where the search starts, updated to where it was found: calls go from the sheath to the tip.
@@ -44,18 +47,19 @@ pub(super) fn place_on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64)
     (place, state.tangent_in(e, xi))
 }
 
-/// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
-fn slide_curve(from: &Mesh, state: &RodState, to: &Mesh, out: &mut RodState) {
+/// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve from the sheath's
+/// mouth.
+fn slide_curve((from, state): (&Mesh, &RodState), mouth: Mouth<'_>, to: &Mesh, out: &mut RodState) {
     let inserted = to.from_tip_mm[0];
     let mut element = 0;
     let direction = |from_tip_mm: f64| on_curve(from, state, inserted - from_tip_mm, &mut element);
-    lay((&state.frames[0], &state.positions[0]), to, direction, out);
+    lay(mouth, to, direction, out);
 }
 
 /// Triads, chords and positions of a rod with this triad and position at its start, and these tangents as a function
 /// of the distance from its tip. Calls go from the sheath to the tip; the triads are carried without twist.
 pub(super) fn lay(
-    (first, start): (&Frame, &Vec3),
+    (first, start): Mouth<'_>,
     to: &Mesh,
     mut direction: impl FnMut(f64) -> Vec3,
     out: &mut RodState,
@@ -84,11 +88,11 @@ pub(super) fn lay(
 /// its distance from the tip.
 pub(super) fn transport(
     (from, state): (&Mesh, &RodState),
-    to: &Mesh,
+    (to, mouth): (&Mesh, Mouth<'_>),
     tail: impl Fn(f64) -> f64,
     out: &mut RodState,
 ) {
-    slide_curve(from, state, to, out);
+    slide_curve((from, state), mouth, to, out);
     let n = to.elements.len();
     // Axial forces, angles and bubbles of the same piece of device, by its distance from the tip.
     let old = state.elements();
@@ -113,11 +117,11 @@ pub(super) fn transport(
 /// marks, so angles are interpolated.
 pub(super) fn transport_together(
     (from, state): (&Mesh, &RodState),
-    to: &Mesh,
+    (to, mouth): (&Mesh, Mouth<'_>),
     (sets, tail): (&[Option<usize>], impl Fn(usize, f64) -> f64),
     out: &mut RodState,
 ) {
-    slide_curve(from, state, to, out);
+    slide_curve((from, state), mouth, to, out);
     let (n, old) = (to.elements.len(), state.elements());
     // The first element whose far end is not before a position; elements are in order, sheath first.
     let holding = |from_tip: f64| from.from_tip_mm[1..].partition_point(|end| *end > from_tip);

@@ -34,7 +34,7 @@ fn bent(mesh: &Mesh, angle: impl Fn(f64) -> f64) -> RodState {
 
 fn slid(from: &Mesh, state: &RodState, to: &Mesh) -> RodState {
     let mut out = RodState::default();
-    transport((from, state), to, |_| state.angles[0], &mut out);
+    transport((from, state), (to, (&state.frames[0], &state.positions[0])), |_| state.angles[0], &mut out);
     out
 }
 
@@ -96,7 +96,12 @@ fn several_instruments_slide_as_one_where_there_is_one() {
     }
     let alone = slid(&from, &state, &to);
     let mut together = RodState::default();
-    transport_together((&from, &state), &to, (&[Some(0)], |_, _| state.angles[0]), &mut together);
+    transport_together(
+        (&from, &state),
+        (&to, (&state.frames[0], &state.positions[0])),
+        (&[Some(0)], |_, _| state.angles[0]),
+        &mut together,
+    );
     assert_eq!((&together.positions, &together.chords), (&alone.positions, &alone.chords));
     for (a, b) in together.angles.iter().zip(&alone.angles).skip(2) {
         assert!((a - b).abs() < 1e-12, "{a} {b}");

@@ -9,7 +9,7 @@ use super::super::workspace::Workspace;
 use super::super::{Environment, Kirchhoff, write_line};
 use super::Nearby;
 use super::read::margin;
-use crate::methods::{Gradient, Move, Parameter, StepReport, Surroundings};
+use crate::methods::{Gradient, Move, StepReport, Surroundings, Timed, Together};
 use crate::shape::Shape;
 use crate::{Error, Result};
 
@@ -21,7 +21,7 @@ impl<const C: usize> Kirchhoff<C> {
     pub(in super::super) fn gradients_of(
         &self,
         surroundings: &Surroundings<'_>,
-        (commands, by): (&[Vec<Move>], &[Parameter]),
+        ((commands, times_s), by): (Timed<'_>, &[Together]),
         checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
         if surroundings.course.is_some() {
@@ -36,16 +36,21 @@ impl<const C: usize> Kirchhoff<C> {
             let remedy = "earlier commands are not done: finish them, or drop them with forget";
             return Err(Error::parameter("gradient", "behind", remedy));
         }
-        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        let mut surroundings = *surroundings;
+        let environment = Environment::new(&surroundings, &self.surface, &self.options);
         let (mut state, mut report) = (Arc::clone(&self.state), StepReport::clone(&self.report));
         let mut workspace = Workspace::<C>::new(&environment, &state);
         let mut nearby: Option<Nearby> = None;
         let mut gradients = Vec::with_capacity(commands.len());
-        for moves in commands {
+        for (moves, time_s) in commands.iter().zip(times_s) {
             checked(&report, moves)?;
+            surroundings.time_s = [surroundings.time_s[1], *time_s];
+            let still = !surroundings.moves() && !surroundings.fields_change();
+            let environment = Environment::new(&surroundings, &self.surface, &self.options);
             workspace.way.begin(surroundings.stack, (&state.hands, &[]), moves);
             let target = workspace.way.target.clone();
             if workspace.way.is_done()
+                && still
                 && let Some(last) = gradients.last()
             {
                 let mut same = Gradient::clone(last);
@@ -53,7 +58,7 @@ impl<const C: usize> Kirchhoff<C> {
                 gradients.push(same);
                 continue;
             }
-            if workspace.way.is_done() || lengths(&target).all(|inserted_mm| inserted_mm == 0.0) {
+            if (workspace.way.is_done() && still) || lengths(&target).all(|inserted_mm| inserted_mm == 0.0) {
                 let remedy = "nothing moves, or nothing is in: give a command that moves what is in";
                 return Err(Error::parameter("gradient.moves", moves.len(), remedy));
             }
@@ -83,6 +88,7 @@ impl<const C: usize> Kirchhoff<C> {
             gradients.push(Gradient { report: report.clone(), shape, slopes, margin });
             state = Arc::clone(&workspace.now.state);
             std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
+            surroundings.fields[0] = surroundings.fields[1];
         }
         Ok(gradients)
     }

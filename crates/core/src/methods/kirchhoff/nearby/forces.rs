@@ -9,6 +9,7 @@ use super::super::search::{Beginning, Bounds, Lagged, Search};
 use super::super::state::KirchhoffState;
 use super::super::workspace::Tools;
 use super::{Acting, End, singular};
+use crate::methods::Sheath;
 use crate::methods::kirchhoff::Environment;
 use crate::rod::{ElementData, Frame, Layout, RodState};
 use crate::solve::gmres;
@@ -16,26 +17,30 @@ use crate::{Result, Vec3};
 
 /// Largest rotation, rad, of a node in the differences along a direction; as [`super::STEP`].
 const TURN_RAD: f64 = 3e-6;
-/// Accuracy of dx/dp, of what these differences have, and the most products for it.
-const ACCURACY: (f64, usize) = (1e-8, 40);
+/// Accuracy of dx/dp, and the most products for it.
+const ACCURACY: (f64, usize) = (1e-9, 60);
+/// A sheath so much elsewhere, mm and rad, is where it was.
+const ROUNDED: f64 = 1e-12;
 /// With a larger residual dx/dp is not found.
 const LEAST_ACCURACY: f64 = 1e-5;
 
 impl<const C: usize> Tools<C> {
-    /// Begins a part on one side and calls `what` at the configuration of its end. Returns its result with the triads from which
-    /// spin is measured there; `None` if the mesh is another one.
+    /// Begins a part on one side and calls `what` at the configuration of its end, with the triads from which spin is measured there.
+    /// Returns its result with the triads of the slid device; `None` if the mesh is another one.
     pub(super) fn beside<T>(
         &mut self,
         acting: &Acting<'_>,
         end: &End<'_>,
         next: &mut Configuration,
-        what: impl FnOnce(&mut Search<'_, '_, C>, &Lagged<'_>) -> T,
+        what: impl FnOnce(&mut Search<'_, '_, C>, &Lagged<'_>, &[Frame]) -> T,
     ) -> Option<(T, Vec<Frame>)> {
         let Acting { environment, materials, start, attempt } = acting;
         let surroundings = &environment.surroundings;
         self.friction.set_coefficient(surroundings.properties.largest_friction());
         self.transport_to(environment, *start, *attempt, next);
-        let triads = self.triads(next);
+        let slid = self.slid_triads(next);
+        let triads: Vec<Frame> =
+            slid.iter().zip(&end.spins).map(|(triad, spin)| triad.turned(*spin)).collect();
         let (mesh, after) = next.parts();
         if (mesh.elements.len(), mesh.points.len()) != (end.state.rod.elements(), end.state.known.len()) {
             return None;
@@ -48,9 +53,8 @@ impl<const C: usize> Tools<C> {
         }
         let KirchhoffState { rod, touches, .. } = after;
         rod.copy_from(&end.state.rod);
-        if !end.triads.is_empty() {
-            measure_beside(rod, &end.triads, &triads);
-        }
+        enter::<C>(&mesh.elements, surroundings.sheath, rod);
+        rod.measure_from(&triads);
         rod.place(&mesh.elements);
         let stack = materials.unwrap_or(surroundings.stack);
         let bounds = Bounds { effort: Effort::Near, most: 0, most_solves: 0, resumed: None, moved_mm: None };
@@ -59,23 +63,23 @@ impl<const C: usize> Tools<C> {
             Ok::<_, Infallible>(())
         };
         let Ok(found) = self.with_search(environment, (mesh, stack, rod), bounds, begin, |search, lagged| {
-            let found = what(search, lagged);
+            let found = what(search, lagged, &triads);
             search.contact.touches(search.elements, search.state, touches);
             found
         });
-        Some((found, triads))
+        Some((found, slid))
     }
 
-    /// Completes the state at the end of a part: that after the way if its forces were assembled, as in the last part, or else
+    /// Completes the state at the end of a part: that after the way if its forces were assembled for what `reads` them, or else
     /// the one before it, which then goes.
     pub(super) fn finish(
         &mut self,
         acting: &Acting<'_>,
-        (own, is_last): (Environment<'_>, bool),
+        (own, reads): (Environment<'_>, bool),
         (way, by): (&[f64], f64),
         next: &mut Configuration,
     ) {
-        if is_last {
+        if reads {
             let (mesh, after) = next.parts();
             self.keep(acting.start, mesh, after);
             self.write_forces(&own, next);
@@ -89,8 +93,8 @@ impl<const C: usize> Tools<C> {
         self.tails.write((own.surroundings.sheath, *across_n), rod, twists, hand_forces);
     }
 
-    /// The triads from which the spin of the device is measured in the part that was begun last, slid and not yet solved.
-    fn triads(&self, next: &Configuration) -> Vec<Frame> {
+    /// The triads of the device in the part that was begun last, slid and not yet solved; none without friction.
+    fn slid_triads(&self, next: &Configuration) -> Vec<Frame> {
         let moved = &self.guess.before_motion;
         let friction = self.friction.acts();
         match (friction, moved.is_empty()) {
@@ -107,31 +111,41 @@ impl<const C: usize> Tools<C> {
         (right, lags, most_mm): (&[f64], bool, f64),
         next: &mut Configuration,
     ) -> Result<Vec<f64>> {
-        let found = self.beside(nominal, end, next, |search, lagged| {
+        let found = self.beside(nominal, end, next, |search, lagged, triads| {
             let (elements, base) = (search.elements, search.state.clone());
-            let search = std::cell::RefCell::new(search);
-            let precondition = |forces: &[f64]| {
-                let mut way = forces.to_vec();
-                search.borrow().newton.apply_inverse(elements, &mut way);
-                way
-            };
+            let mut way = right.to_vec();
+            search.newton.apply_inverse(elements, &mut way);
             // All of it is in Newton's matrix.
             if !lags {
-                return (precondition(right), 0.0);
+                return (way, 0.0);
             }
             let apply = |way: &[f64]| {
                 let (turn, twist) = RodState::largest_turn::<C>(elements, &base, way);
                 let turned = TURN_RAD / turn.max(twist).max(f64::MIN_POSITIVE);
                 let part = turned.min(most_mm / longest_mm::<C>(way).max(f64::MIN_POSITIVE));
-                let [less, more] = [-part, part].map(|part| {
-                    let search = &mut **search.borrow_mut();
-                    go(search, &base, (way, part));
-                    search.assemble(lagged, false);
+                // What lags follows from the equilibrium, and stays or follows from the states beside it.
+                search.state.copy_from(&base);
+                search.contact.follow_depths();
+                search.assemble(lagged, false);
+                search.contact.hold_friction();
+                let mut forces = [-part, part].map(|part| {
+                    go(search, &base, (way, part), &[]);
+                    search.assemble_once(false);
                     rows(search)
                 });
-                less.iter().zip(&more).map(|(less, more)| (more - less) / (2.0 * part)).collect()
+                search.contact.follow_depths();
+                for (stays, part) in forces.iter_mut().zip([-part, part]) {
+                    go(search, &base, (way, part), triads);
+                    search.assemble(lagged, false);
+                    stays.iter_mut().zip(rows(search)).for_each(|(stays, follows)| *stays = follows - *stays);
+                }
+                let [less, more] = forces;
+                let mut lagging: Vec<f64> =
+                    less.iter().zip(&more).map(|(less, more)| (more - less) / (2.0 * part)).collect();
+                search.newton.apply_inverse(elements, &mut lagging);
+                way.iter().zip(&lagging).map(|(way, lagging)| way + lagging).collect()
             };
-            gmres(right, ACCURACY, precondition, apply)
+            gmres(&way, ACCURACY, apply)
         });
         match found {
             Some(((way, off), _)) if off <= LEAST_ACCURACY && way.iter().all(|part| part.is_finite()) => {
@@ -149,9 +163,15 @@ pub(super) fn longest_mm<const C: usize>(way: &[f64]) -> f64 {
     (0..nodes).map(at).fold(0.0, f64::max)
 }
 
-/// Sets the state of a search to that after a piece of a way from another one.
-pub(super) fn go<const C: usize>(search: &mut Search<'_, '_, C>, from: &RodState, way: (&[f64], f64)) {
+/// Sets the state of a search to that after a piece of a way from another one, with its spin measured from these triads.
+pub(super) fn go<const C: usize>(
+    search: &mut Search<'_, '_, C>,
+    from: &RodState,
+    way: (&[f64], f64),
+    triads: &[Frame],
+) {
     advance::<C>(search.elements, from, way, search.state);
+    search.state.measure_from(triads);
 }
 
 /// The state after a piece of a way, with its axial forces.
@@ -172,16 +192,29 @@ pub(super) fn rows<const C: usize>(search: &Search<'_, '_, C>) -> Vec<f64> {
     assembly.residual.iter().zip(&assembly.correction).map(|(row, more)| row + more).collect()
 }
 
-/// Measures the spin of a rod from triads that are turned as `own` are against those of the part's end.
-fn measure_beside(rod: &mut RodState, ends: &[Frame], own: &[Frame]) {
-    let turned: Vec<Frame> = ends
-        .iter()
-        .zip(own)
-        .zip(&rod.frames)
-        .map(|((end, own), at)| {
-            let (end, own) = (end.transported_to(&at.t), own.transported_to(&at.t));
-            at.turned(libm::atan2(end.v.dot(&own.u), end.u.dot(&own.u)))
-        })
-        .collect();
-    rod.measure_from(&turned);
+/// Moves a rod to a sheath that is a little elsewhere: all of it by the motion of the mouth, and its first tangent into the direction.
+fn enter<const C: usize>(elements: &[ElementData], sheath: &Sheath, rod: &mut RodState) {
+    let shift = sheath.position_mm - rod.positions[0];
+    let (a, b) = rod.frames[0].log(&sheath.direction);
+    if shift.norm() + a.abs() + b.abs() <= ROUNDED {
+        return;
+    }
+    let mut way = vec![0.0; Layout::<C>::dimension(elements.len())];
+    for node in 0..=elements.len() {
+        way[Layout::<C>.position(node)..][..3].copy_from_slice(shift.as_slice());
+    }
+    let tangent = Layout::<C>.tangent(0);
+    (way[tangent], way[tangent + 1]) = (a, b);
+    let from = rod.clone();
+    rod.advance::<C>(elements, &from, &way, 1.0);
+}
+
+/// How the triads from which the spin of a rod is measured are turned against those of the slid device: Newton's steps from there turn a little
+/// about the smallest rotation.
+pub(super) fn spins(rod: &RodState, slid: &[Frame]) -> Vec<f64> {
+    let each = slid.iter().zip(&rod.frames).map(|(slid, at)| {
+        let back = at.transported_to(&slid.t).u;
+        libm::atan2(back.dot(&slid.v), back.dot(&slid.u))
+    });
+    each.collect()
 }

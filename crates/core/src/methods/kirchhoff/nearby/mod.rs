@@ -12,11 +12,30 @@
 //! which slips from where the part began, remembers. Each parameter has two states, a little below and above; these are the only
 //! derivatives that are kept. The right-hand side is the difference of R, at the same x, between both sides.
 //!
-//! ∂R/∂x is more than Newton's matrix: within a Newton step the normal forces of friction, the drag of blood and the forces
-//! between instruments are lagged, and loads that follow the rod have no symmetric stiffness. Here R contains them as they are at x
-//! ([`Search::assemble`]), its products with a direction are differences too, and Newton's factors are the preconditioner
-//! ([`gmres`]). Without any of these Newton's factors
-//! suffice.
+//! ∂R/∂x = K + U is more than Newton's matrix K: within a Newton step the normal forces of friction, the drag of blood and the forces
+//! between instruments are lagged. Here R contains them as they are at x ([`Search::assemble`](super::search::Search::assemble)). So
+//!
+//! ```text
+//! (1 + K⁻¹U) dx/dp = K⁻¹b
+//! ```
+//!
+//! is solved by [`gmres`](crate::solve::gmres), where U v is a difference along v of what forces that follow have more than those that stay as they are at
+//! x. All else cancels in it to the last digits, which K⁻¹ would make a thousand times larger: the rod is that much stiffer along itself
+//! and against the wall than across. For the same reason it is the error of the motion that is made small, not that of the forces. Without
+//! lagged forces Newton's factors suffice.
+//!
+//! How far a device has spun in a part is measured by the smallest rotation of each of its triads from where the part began, also beside
+//! x: of triads that come from x by the smallest rotation it differs by half the product of both rotations, which is of first order in
+//! dx/dp.
+//!
+//! Friction is smooth only on the scale of ε, within which it sticks ([`crate::contact::friction`]): where a point slips by u, a
+//! difference over ±h across the slip has an error of h²/2|u|² of the stiffness μN/|u|. All differences are therefore kept within a small
+//! part of ε ([`STICKING`]).
+//!
+//! Where the sheath is elsewhere on a side, R is taken at x moved along: all nodes by the motion of the mouth, the first tangent into
+//! the new direction. The motion that balances the difference comes on top.
+//!
+//! Several parameters that change together, each so much, are one p: dx/dp is then the product of the Jacobian with these changes.
 //!
 //! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
 //! anchored anew, has no derivative.
@@ -25,7 +44,6 @@ mod command;
 mod forces;
 mod read;
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::Environment;
@@ -36,26 +54,30 @@ use super::part::{Effort, Found, Limits};
 use super::state::{KirchhoffState, UnderWay};
 use super::substep::{Attempt, Part};
 use super::workspace::Tools;
-use crate::contact::WallProperties;
 use crate::device::Stack;
-use crate::methods::{Parameter, Slope, Surroundings};
-use crate::rod::Frame;
+use crate::methods::{Parameter, Parts, Slope, Surroundings, Together};
 use crate::solve::Neighbourhood;
-use crate::{Error, Result};
-use forces::{go, longest_mm, rows};
+use crate::{Error, Result, Vec3};
+use forces::{go, longest_mm, rows, spins};
 
 /// Change of a parameter to either side, as a fraction of its scale: differences then have as many digits from rounding as from
 /// curvature.
 const STEP: f64 = 1e-5;
-/// Largest motion of a node in all differences, as a fraction of the slip within which friction sticks.
-const STICKING: f64 = 1e-2;
+/// Largest motion h of a node in all differences, as a fraction of the slip ε within which friction sticks. Differences are off by
+/// h²/2ε² where a point just slips, a few parts in a million, and much less where it slips farther; with less h rounding adds as much.
+const STICKING: f64 = 3e-3;
+
+/// Scale of a field that is nought, T or N/mm.
+const WEAK_FIELD: f64 = 1e-3;
+
 /// The scene and the state where one parameter is a little less, or more.
 #[derive(Debug)]
 struct Side {
     /// Change of the parameter.
     by: f64,
-    stack: Stack,
-    properties: WallProperties,
+    parts: Parts,
+    /// Instruments from whose rest shape nodes follow, if that changes: nodes must not move with it.
+    nodes: Option<Stack>,
     at: Configuration,
     /// At the end of the part that is followed.
     next: Configuration,
@@ -63,7 +85,7 @@ struct Side {
 
 /// The states beside a command.
 pub(super) struct Nearby {
-    parameters: Vec<Parameter>,
+    parameters: Vec<Together>,
     sides: Vec<[Side; 2]>,
     /// Whether one side of a parameter has another mesh.
     cut: Vec<bool>,
@@ -77,8 +99,8 @@ pub(super) struct Nearby {
 /// The end of a part, beside which others are sought.
 struct End<'a> {
     state: &'a KirchhoffState,
-    /// Triads from which the spin of the device is measured in it; none for the end itself.
-    triads: Vec<Frame>,
+    /// How the triads from which its spin is measured are turned against those of the slid device, rad, once they are known.
+    spins: Vec<f64>,
 }
 
 /// What acts in a part on one side.
@@ -99,17 +121,17 @@ impl Nearby {
         environment: &Environment<'_>,
         from: Start<'_>,
         target: Vec<Hand>,
-        by: &[Parameter],
+        by: &[Together],
     ) -> Result<Self> {
         let at = || Configuration { mesh: from.mesh.clone(), state: Arc::new(from.state.clone()) };
-        let side = |parameter: &Parameter, by: f64| {
-            let (stack, properties) = changed(&environment.surroundings, parameter, by)?;
-            Ok::<Side, Error>(Side { by, stack, properties, at: at(), next: at() })
+        let side = |together: &Together, by: f64| {
+            let (parts, nodes) = changed(&environment.surroundings, together, by)?;
+            Ok::<Side, Error>(Side { by, parts, nodes, at: at(), next: at() })
         };
         let mut sides = Vec::with_capacity(by.len());
-        for parameter in by {
-            let step = STEP * scale(environment, parameter)?;
-            sides.push([side(parameter, -step)?, side(parameter, step)?]);
+        for together in by {
+            let step = STEP * scale(environment, together)?;
+            sides.push([side(together, -step)?, side(together, step)?]);
         }
         Ok(Self {
             parameters: by.to_vec(),
@@ -154,7 +176,7 @@ impl Nearby {
             iterations: 0,
         };
         let part = Part { resumed: Some(&under_way), ..attempt.part };
-        let mut end = End { state: end, triads: Vec::new() };
+        let mut end = End { state: end, spins: Vec::new() };
         let own = steered(environment.surroundings.stack, attempt.hands);
         let nominal_start = taken_along(was, passage);
         let nominal = Acting {
@@ -164,28 +186,30 @@ impl Nearby {
             attempt: Attempt { part, left: passage.map(|passage| (was, passage)), ..attempt },
         };
         let is_last = attempt.hands == target && attempt.part.to == 1.0;
+        // Friction in the sheath's mouth follows from the force there in the part before.
+        let reads = is_last || environment.surroundings.sheath.friction > 0.0;
         let progress =
             self.first.as_ref().map_or(1.0, |first| progress(first, attempt.hands, attempt.part.to));
         let Self { parameters, sides, cut, begins, next, .. } = self;
-        let assembled = tools.beside(&nominal, &end, next, |search, lagged| {
+        let assembled = tools.beside(&nominal, &end, next, |search, lagged, _| {
             search.assemble(lagged, true);
-            let lags = search.lags(lagged) || !search.newton.assembly.rank_ones.is_empty();
+            let lags = search.lags(lagged);
             let is_regular = search.newton.factor(search.elements, search.supports).is_some();
             (rows(search), lags, is_regular)
         });
-        let Some(((at_end, lags, true), triads)) = assembled else { return Err(singular()) };
-        end.triads = triads;
+        let Some(((at_end, lags, true), slid)) = assembled else { return Err(singular()) };
+        end.spins = spins(&end.state.rod, &slid);
         let most_mm = STICKING * tools.friction.stick_mm();
         // Where all sides begin in the same state they may come nearer.
         let begins = std::mem::take(begins);
-        for ((parameter, sides), cut) in parameters.iter().zip(sides).zip(cut) {
+        for ((together, sides), cut) in parameters.iter().zip(sides).zip(cut) {
             let mut may_come_nearer = begins;
             let (hands, way) = loop {
-                let hands = [0, 1].map(|k| moved(parameter, attempt.hands, sides[k].by * progress));
+                let hands = [0, 1].map(|k| moved(together, attempt.hands, sides[k].by * progress));
                 let mut forces = [at_end.clone(), at_end.clone()];
                 for ((side, forces), hands) in sides.iter_mut().zip(&mut forces).zip(&hands) {
-                    let there = side.with(environment, parameter, (hands, passage), part, |beside, _| {
-                        tools.beside(beside, &end, next, |search, lagged| {
+                    let there = side.with(environment, (hands, passage), part, |beside, _| {
+                        tools.beside(beside, &end, next, |search, lagged, _| {
                             search.assemble(lagged, false);
                             rows(search)
                         })
@@ -200,7 +224,7 @@ impl Nearby {
                 let between = sides[1].by - sides[0].by;
                 if between == 0.0 {
                     let remedy = "the mesh changes on both sides: give a slightly other command";
-                    return Err(parameter.refused(remedy));
+                    return Err(together[0].0.refused(remedy));
                 }
                 let right: Vec<f64> =
                     forces[0].iter().zip(&forces[1]).map(|(less, more)| (less - more) / between).collect();
@@ -212,24 +236,24 @@ impl Nearby {
                 }
                 for side in sides.iter_mut().filter(|side| side.by != 0.0) {
                     side.by = by.copysign(side.by);
-                    (side.stack, side.properties) = changed(&environment.surroundings, parameter, side.by)?;
+                    (side.parts, side.nodes) = changed(&environment.surroundings, together, side.by)?;
                 }
             };
             for (side, hands) in sides.iter_mut().zip(&hands) {
                 let by = side.by;
                 if by == 0.0 {
-                    tools.beside(&nominal, &end, next, |search, lagged| search.assemble(lagged, false));
-                    tools.finish(&nominal, (nominal.environment, is_last), (&way, 0.0), next);
+                    tools.beside(&nominal, &end, next, |search, lagged, _| search.assemble(lagged, false));
+                    tools.finish(&nominal, (nominal.environment, reads), (&way, 0.0), next);
                 } else {
                     std::mem::swap(&mut side.next, next);
-                    side.with(environment, parameter, (hands, passage), part, |beside, own| {
-                        if is_last {
-                            tools.beside(beside, &end, next, |search, lagged| {
-                                go(search, &search.state.clone(), (&way, by));
+                    side.with(environment, (hands, passage), part, |beside, own| {
+                        if reads {
+                            tools.beside(beside, &end, next, |search, lagged, triads| {
+                                go(search, &search.state.clone(), (&way, by), triads);
                                 search.assemble(lagged, false);
                             });
                         }
-                        tools.finish(beside, (own, is_last), (&way, by), next);
+                        tools.finish(beside, (own, reads), (&way, by), next);
                     });
                 }
                 std::mem::swap(&mut side.at, next);
@@ -251,24 +275,27 @@ impl Side {
     fn with<T>(
         &self,
         environment: &Environment<'_>,
-        parameter: &Parameter,
         (hands, passage): (&[Hand], Option<Passage<'_>>),
         part: Part<'_>,
         what: impl FnOnce(&Acting<'_>, Environment<'_>) -> T,
     ) -> T {
         let was = self.at.start();
         let start = taken_along(was, passage);
-        let own = steered(&self.stack, hands);
-        let surroundings = Surroundings { properties: &self.properties, ..environment.surroundings };
+        let Parts { stack, wall, sheath, fields } = &self.parts;
+        let fields = &fields[..];
+        let own = steered(stack, hands);
+        let [before, _] = environment.surroundings.fields;
+        // Fields that do not change in the command are other ones before it too.
+        let before = if environment.surroundings.fields_change() { before } else { fields };
+        let surroundings =
+            Surroundings { properties: wall, sheath, fields: [before, fields], ..environment.surroundings };
         let aside = Environment { surroundings, ..*environment };
         let own_environment = aside.steered(&own);
-        // Nodes follow from the rest shape, and must not move with it.
-        let reshaped = matches!(parameter, Parameter::RestCurvature { .. });
-        let others: Cow<'_, Stack> = steered(environment.surroundings.stack, hands);
+        let others = self.nodes.as_ref().map(|nodes| steered(nodes, hands));
         let limits = Limits { iterations: 0, solves: 0 };
         let beside = Acting {
-            environment: if reshaped { aside.steered(&others) } else { own_environment },
-            materials: reshaped.then_some(&*own),
+            environment: others.as_ref().map_or(own_environment, |others| aside.steered(others)),
+            materials: others.as_ref().map(|_| &*own),
             start: start.as_ref().map_or(was, |state| Start { mesh: was.mesh, state }),
             attempt: Attempt { part, hands, limits, left: passage.map(|passage| (was, passage)) },
         };
@@ -288,42 +315,76 @@ fn progress([from, target]: &[Vec<Hand>; 2], hands: &[Hand], to: f64) -> f64 {
     longest.filter(|(whole, _)| *whole != 0.0).map_or(to, |(whole, so_far)| so_far / whole)
 }
 
-/// The hands where a parameter that moves one is changed.
-fn moved(parameter: &Parameter, hands: &[Hand], by: f64) -> Vec<Hand> {
+/// The hands where parameters that move some are changed.
+fn moved(together: &Together, hands: &[Hand], by: f64) -> Vec<Hand> {
     let mut hands = hands.to_vec();
-    match *parameter {
-        Parameter::Advance { instrument } => hands[instrument].inserted_mm += by,
-        Parameter::Rotation { instrument } => hands[instrument].turn_rad += by,
-        Parameter::Steering { instrument } => hands[instrument].steer += by,
-        _ => {}
+    for (parameter, weight) in together {
+        match *parameter {
+            Parameter::Advance { instrument } => hands[instrument].inserted_mm += weight * by,
+            Parameter::Rotation { instrument } => hands[instrument].turn_rad += weight * by,
+            Parameter::Steering { instrument } => hands[instrument].steer += weight * by,
+            _ => {}
+        }
     }
     hands
 }
 
-/// The instruments and the wall where a parameter is changed.
-fn changed(
-    surroundings: &Surroundings<'_>,
-    parameter: &Parameter,
-    by: f64,
-) -> Result<(Stack, WallProperties)> {
-    let (mut stack, mut wall) = (surroundings.stack.clone(), surroundings.properties.clone());
-    if let Some(value) = parameter.value(&stack, &wall)? {
-        parameter.set(&mut stack, &mut wall, value + by);
+/// What parameters change.
+fn parts(surroundings: &Surroundings<'_>) -> Parts {
+    let Surroundings { stack, properties, sheath, fields: [_, fields], .. } = *surroundings;
+    Parts { stack: stack.clone(), wall: properties.clone(), sheath: *sheath, fields: fields.into() }
+}
+
+/// That where parameters are changed, and instruments with the rest shape as it is, if that is changed.
+fn changed(surroundings: &Surroundings<'_>, together: &Together, by: f64) -> Result<(Parts, Option<Stack>)> {
+    let mut there = parts(surroundings);
+    let mut nodes = there.clone();
+    for (parameter, weight) in together {
+        let Some(value) = parameter.value(&nodes)? else { continue };
+        parameter.set(&mut there, value + weight * by)?;
+        if !matches!(parameter, Parameter::RestCurvature { .. }) {
+            parameter.set(&mut nodes, value + weight * by)?;
+        }
     }
-    Ok((stack, wall))
+    let reshaped = together.iter().any(|(parameter, _)| matches!(parameter, Parameter::RestCurvature { .. }));
+    Ok((there, reshaped.then_some(nodes.stack)))
+}
+
+/// The scale of a change of parameters: the one of which it changes most in units of its own.
+///
+/// # Errors
+/// A parameter that does not exist, and no change.
+fn scale(environment: &Environment<'_>, together: &Together) -> Result<f64> {
+    let mut most: f64 = 0.0;
+    for (parameter, weight) in together {
+        most = most.max(weight.abs() / own_scale(environment, parameter)?);
+    }
+    if most > 0.0 && most.is_finite() {
+        return Ok(1.0 / most);
+    }
+    let changes: Vec<f64> = together.iter().map(|(_, weight)| *weight).collect();
+    Err(Error::parameter("gradient.along", format!("{changes:?}"), "must be finite, and not all zero"))
 }
 
 /// The scale of a parameter.
 ///
 /// # Errors
 /// One that does not exist.
-fn scale(environment: &Environment<'_>, parameter: &Parameter) -> Result<f64> {
-    let Surroundings { stack, properties, .. } = environment.surroundings;
-    let value = parameter.value(stack, properties)?;
+fn own_scale(environment: &Environment<'_>, parameter: &Parameter) -> Result<f64> {
+    let parts = parts(&environment.surroundings);
+    let value = parameter.value(&parts)?;
+    let Parts { stack, fields, .. } = &parts;
     Ok(match *parameter {
-        Parameter::Advance { .. } => environment.options.element_mm,
+        Parameter::Advance { .. } | Parameter::EntryPosition { .. } => environment.options.element_mm,
+        // The tip then moves as far, however long the device is.
+        Parameter::EntryDirection { .. } => environment.options.element_mm / stack.length_mm(),
         Parameter::RestCurvature { instrument, section, .. } => {
             1.0 / stack.instruments()[instrument].device.sections()[section].length_mm
+        }
+        Parameter::Field { field, .. } => {
+            let vector = fields.get(field).and_then(|field| field.spec()).map(|spec| spec.vector());
+            let size = vector.map_or(0.0, |vector| Vec3::from(vector).norm());
+            if size > 0.0 { size } else { WEAK_FIELD }
         }
         _ => value.unwrap_or(1.0),
     })
