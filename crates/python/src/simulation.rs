@@ -314,7 +314,7 @@ impl Simulation {
         let values: Vec<(String, f64)> = values.collect::<PyResult<_>>()?;
         let now = self.with(py, |simulation| simulation.clone());
         let changed = start::changed(&now, &values)?;
-        Ok(Self::new(changed, Arc::new(Py::new(py, Start::changed(&self.start, values)?)?)))
+        Ok(Self::new(changed, Arc::new(Py::new(py, Start::changed_with(&self.start, &now, values)?)?)))
     }
 
     /// The value of a parameter, a word of `gradient`.

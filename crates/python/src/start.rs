@@ -104,6 +104,26 @@ impl Start {
         Ok(Self { instruments, simulation: Mutex::new(simulation), made_of: MadeOf::Changed(this, values) })
     }
 
+    /// The start of a simulation from this one where parameters have other values. Fields that were set later are not part of
+    /// a start, and neither are their values.
+    pub(crate) fn changed_with(
+        this: &Py<Self>,
+        now: &insertion::Simulation,
+        mut values: Vec<(String, f64)>,
+    ) -> PyResult<Self> {
+        let start = this.get().simulation();
+        let specs =
+            |of: &insertion::Simulation| of.fields()[1].iter().map(|field| field.spec()).collect::<Vec<_>>();
+        if specs(&start) != specs(now) {
+            let stack = start.stack();
+            let is_field = |word: &str| {
+                matches!(Parameter::named(word, stack).as_deref(), Ok([Parameter::Field { .. }]))
+            };
+            values.retain(|(word, _)| !is_field(word));
+        }
+        Self::changed(this, values)
+    }
+
     /// The simulation; Ctrl-C ends its long steps.
     pub(crate) fn simulation(&self) -> insertion::Simulation {
         let mut simulation = self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone();

@@ -265,6 +265,9 @@ impl Parameter {
             (Self::EntryDirection { axis }, _) => Some(along(sheath.direction.into(), axis)?),
             (Self::Field { field, axis }, _) => {
                 let Some(acting) = fields.get(field) else {
+                    if fields.is_empty() {
+                        return Err(self.refused("no field acts: set one"));
+                    }
                     return Err(self.refused(format!("there are {} fields, the first is 0", fields.len())));
                 };
                 let spec = acting.spec();

@@ -13,8 +13,9 @@ use crate::{Vec3, parallel};
 
 /// Height above the surface up to which lists are complete, in radii of the thickest device and in supports.
 const HEIGHT: (f64, f64) = (1.5, 0.5);
-/// Largest number of triangles for which all lists are made in advance.
-const AT_ONCE: usize = 400_000;
+/// Largest number of triangles for which lists are made in advance, and of vertices in all of these: in a gap that is much narrower than the
+/// device every list is long.
+const AT_ONCE: (usize, usize) = (400_000, 30_000_000);
 
 /// For every triangle, the vertices whose support may reach a point over it.
 #[derive(Debug, Clone)]
@@ -34,15 +35,20 @@ impl Lists {
 
     /// Makes all lists of a small mesh, so that steps do not allocate.
     pub(super) fn prepare(&self, quadrics: &[Quadric]) {
-        if self.known.len() > AT_ONCE {
+        if self.known.len() > AT_ONCE.0 {
             return;
         }
         parallel::parts(self.known.len(), |part| {
+            let mut left = AT_ONCE.1 / self.known.len().max(1) * part.len();
             let (mut seen, mut list) = (vec![u32::MAX; quadrics.len()], Vec::new());
             for triangle in part {
                 let is_new = marking(&mut seen, triangle);
                 self.gather(quadrics, triangle, |q| self.reach_mm(q), is_new, &mut list);
                 self.known[triangle].get_or_init(|| list.as_slice().into());
+                if list.len() > left {
+                    break;
+                }
+                left -= list.len();
             }
         });
     }

@@ -358,8 +358,8 @@ fn instruments_that_rub_each_other_rest_in_a_vessel_that_breathes() {
         assert!(report.converged);
         most = most.max(report.iterations);
     }
-    // As if they stuck at once: 80 and more.
-    assert!(most <= 20, "{most}");
+    // If what sticks did not creep at all: up to 1,800.
+    assert!(most <= 60, "{most}");
 }
 
 #[test]

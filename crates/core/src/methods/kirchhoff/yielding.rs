@@ -63,8 +63,6 @@ const MOST_ROUNDS: usize = 80;
 /// A step goes back where the energy rises at its end by more than this of the slope by which it fell at its beginning, as where
 /// contacts change status.
 const RISES: f64 = 0.5;
-/// Friction is widened where so many steps have gone too far: one may be for the shape of the vessel alone.
-const WIDENS_AT: usize = 2;
 /// A wider ε shrinks by this factor, from a solution that is this near, relative to the largest force.
 const NARROWS: f64 = 0.5;
 const NEAR_ENOUGH: f64 = 0.1;
@@ -482,7 +480,7 @@ impl<const C: usize> Tools<C> {
         let mut searched = first;
         let is_flight = effort == Effort::Flight;
         let mut line: Option<Line> = None;
-        let mut overshoots = 0;
+        let mut widens = !is_flight;
         for _ in 0..MOST_ROUNDS {
             let Some(follows) = searched.follows.take() else { return searched };
             let before = rod.clone();
@@ -510,10 +508,10 @@ impl<const C: usize> Tools<C> {
             self.friction.go_with((&course.displacement, &moved));
             let moved_mm = farthest_mm * moved.stretch();
             (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
-            overshoots += usize::from(back.is_some());
-            if overshoots == WIDENS_AT && back.is_some() && stick_mm.is_finite() {
-                course.stick_mm = stick_mm;
+            // What relaxes shrinks ε itself, from one solution to the next.
+            if widens && back.is_some() && searched.slides == 0 && stick_mm.is_finite() {
                 self.friction.stick_at(step_mm.iter().map(Vec3::norm).fold(stick_mm, f64::max));
+                widens = false;
                 line = None;
             }
             let there = environment.displaced(Some(&course.displacement));
