@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::links::{JOINS, split_link};
 use super::point_lists::{self, Columns};
-use super::{CentrelineLink, line_files};
+use super::{CentrelineLink, line_files, swc};
 use crate::error::nearest_name;
 use crate::file::{FileSystem, Files, foreign};
 use crate::{Error, Result, Vec3, text};
@@ -209,6 +209,10 @@ impl CentrelineTree {
         if let Some(kind) = foreign(bytes) {
             return Err(bad(kind.to_owned()));
         }
+        if swc::is_swc(path) {
+            let nodes = swc::parse(&String::from_utf8_lossy(&text::without_mark(bytes)));
+            return nodes.and_then(Self::of_nodes).map_err(bad);
+        }
         match line_files::read(bytes, path) {
             Some(lines) => lines.and_then(|lines| Self::of_lines(&lines)).map_err(bad),
             None => Self::parse(&String::from_utf8_lossy(&text::without_mark(bytes))).map_err(bad),
@@ -224,7 +228,11 @@ impl CentrelineTree {
                 })?;
             }
         }
-        let nodes = point_lists::joined(lines)?;
+        Self::of_nodes(point_lists::joined(lines)?)
+    }
+
+    /// The tree of points.
+    fn of_nodes(nodes: Vec<CentrelineNode>) -> std::result::Result<Self, String> {
         if nodes.len() < 2 {
             return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
         }

@@ -31,6 +31,7 @@ mod repairs;
 mod sac;
 mod sliver;
 mod survey;
+mod swc;
 mod swept;
 #[cfg(test)]
 mod tests;

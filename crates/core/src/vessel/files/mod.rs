@@ -89,6 +89,7 @@ impl Format {
 fn format_of(path: &Path) -> Result<Format> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
+        Some("swc") => Err(Error::content(path, "is a centre line, no surface: give it as vessel.tree")),
         Some(name) => Format::of_extension(name)
             .ok_or_else(|| Error::content(path, format!("unknown mesh format .{name}; {KNOWN}"))),
         None => Err(Error::content(path, format!("no extension tells the mesh format; {KNOWN}"))),
