@@ -57,6 +57,8 @@ pub struct Replaced {
 
 /// Prepares a folder for a recording: creates it if necessary, locks it, and removes an earlier recording.
 pub(crate) fn claim(folder: &Path, among: Among) -> Result<(Claim, Replaced)> {
+    // No path is the folder in which the program runs.
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let failed = |e: io::Error| Error::file(folder, e);
     // Checked before locking, because the lock would add a file to a folder that is not a recording.
     let recording = is_recording(folder);
@@ -220,5 +222,11 @@ mod tests {
         assert!(refused.contains("another run is recording"), "{refused}");
         drop(first);
         assert!(claim(folder.path(), Among::Nothing).is_ok());
+    }
+
+    #[test]
+    fn no_path_is_the_folder_in_which_it_runs_and_its_files_stay() {
+        let refused = claim(Path::new(""), Among::Nothing).err().unwrap().to_string();
+        assert!(refused.contains("would mix with its files"), "{refused}");
     }
 }
