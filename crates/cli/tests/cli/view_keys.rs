@@ -21,7 +21,7 @@ const NEAR: (&str, &str) = ("c_arm.field_mm", "50.0");
 const MIDDLE: (&str, &str) = ("c_arm.isocentre_mm", "[0.0, 0.0, 15.0]");
 
 /// All keys. Pictures of all backends are the same; one that there is not is refused, and so is a file that is missing.
-const KEYS: [Key; 80] = [
+static KEYS: [Key; 80] = [
     ("size_px", &[], "[40, 30]"),
     ("views", &[], "[\"fluoro\"]"),
     ("every", &[], "3"),
@@ -145,10 +145,16 @@ fn pictures(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
+/// What is said beside a key.
+type Beside = &'static [(&'static str, &'static str)];
+
+/// A key on a way.
+type Case = (&'static Way, &'static Key);
+
 /// A way to a picture: draws the scene of a folder with these values into another folder.
 type Way = (&'static str, fn(&Path, &[String], &Path) -> std::process::Command);
 
-const WAYS: [Way; 5] =
+static WAYS: [Way; 5] =
     [("run", run), ("render", render), ("fluoro", fluoro), ("dataset", dataset), ("play", play)];
 
 fn endowire(first: &[&str], values: &[String]) -> std::process::Command {
@@ -208,16 +214,18 @@ fn refuses_beside(said: &str, beside: &[(&str, &str)]) -> bool {
 /// Every key on one of the ways, in turn.
 #[test]
 fn every_key_of_the_view_changes_the_picture_or_is_refused() {
-    changed_or_refused(KEYS.iter().enumerate().map(|(k, key)| (&WAYS[k % WAYS.len()], key)).collect());
+    let cases: Vec<Case> = KEYS.iter().enumerate().map(|(k, key)| (&WAYS[k % WAYS.len()], key)).collect();
+    changed_or_refused(&cases);
 }
 
 #[test]
 #[ignore = "minutes: all keys on all ways"]
 fn every_key_of_the_view_changes_the_picture_on_every_way_or_is_refused() {
-    changed_or_refused(WAYS.iter().flat_map(|way| KEYS.iter().map(move |key| (way, key))).collect());
+    let cases: Vec<Case> = WAYS.iter().flat_map(|way| KEYS.iter().map(move |key| (way, key))).collect();
+    changed_or_refused(&cases);
 }
 
-fn changed_or_refused(cases: Vec<(&Way, &Key)>) {
+fn changed_or_refused(cases: &[Case]) {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path());
     std::fs::write(
@@ -238,7 +246,7 @@ fn changed_or_refused(cases: Vec<(&Way, &Key)>) {
 
     let set = |(key, value): (&str, &str)| format!("view.{key}={value}");
     // What is said beside a key, once for each way.
-    let beside: BTreeMap<(&str, &[(&str, &str)]), &Way> =
+    let beside: BTreeMap<(&str, Beside), &Way> =
         cases.iter().map(|(way, key)| ((way.0, key.1), *way)).collect();
     let before: Vec<_> = beside
         .into_par_iter()
