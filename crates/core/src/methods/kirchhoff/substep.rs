@@ -112,7 +112,7 @@ impl<const C: usize> Tools<C> {
             transport_from(start, &mut after.rod);
         }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
-        let carried_mm = left.map_or(0.0, |(was, _)| farthest_mm(&was.state.rod, &start.state.rod));
+        let carried_mm = left.map_or(0.0, |(was, _)| was.state.rod.farthest_mm(&start.state.rod));
         let pressed = resumed.map_or(start, |resumed| Start { mesh, state: &resumed.state });
         inner_friction::begin(stack, pressed, (mesh, &after.rod), (moves, carried_mm), places);
         after.move_hands(hands);
@@ -337,11 +337,6 @@ impl<const C: usize> Tools<C> {
             search.searched(lagged, &judged, touches)
         })
     }
-}
-
-/// How far the nodes of one device have moved at most, mm.
-fn farthest_mm(from: &RodState, to: &RodState) -> f64 {
-    from.positions.iter().zip(&to.positions).map(|(a, b)| (b - a).norm()).fold(0.0, f64::max)
 }
 
 /// Work of changing fields, mJ: the change of the field energy at the old and at the new configuration.

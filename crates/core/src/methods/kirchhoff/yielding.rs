@@ -166,12 +166,12 @@ impl<'a> Yielding<'a> {
         let tolerance = if search.has_friction { search.tolerance.max(friction) } else { search.tolerance };
         let is_within =
             |tolerance: f64| off_n.iter().map(Vec3::amax).fold(0.0, f64::max) <= tolerance * largest_n;
-        let is_wide = search.contact.stick_mm() > self.stick_mm;
+        let mut stick_mm = search.contact.stick_mm();
+        let is_wide = stick_mm > self.stick_mm;
         if !is_wide && is_within(tolerance) {
             return Ok(None);
         }
         let narrows = is_wide && is_within(NEAR_ENOUGH);
-        let mut stick_mm = search.contact.stick_mm();
         search.assemble(lagged, true);
         let factored = search.newton.factor(search.elements, search.supports);
         factored.ok_or(StopReason::Singular)?;
