@@ -57,7 +57,8 @@ pub(crate) fn of_recording(
 
 /// Reads a recording; with its scene given, its summary may be damaged or missing.
 pub(crate) fn recording(folder: &Path, scene: Option<&Path>) -> Result<Recording, Failure> {
-    let recording = scene.map_or_else(|| Recording::read(folder), |scene| Recording::read_in(folder, scene))?;
+    let recording =
+        scene.map_or_else(|| Recording::read(folder), |scene| Recording::read_in(folder, scene))?;
     tell_left_out(folder, recording.left_out());
     Ok(recording)
 }

@@ -10,7 +10,8 @@ use endowire_recording as recording;
 use endowire_recording::table::read_if_any;
 use endowire_recording::{
     COILS, CoilRow, Column, EndedBy, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, PACKING, PLACES,
-    PackingRow, PlaceRow, Program, Provenance, STEPS, SUMMARY, StepFailure, StepRow, Summary, UnknownRow, VESSEL, schema,
+    PackingRow, PlaceRow, Program, Provenance, STEPS, SUMMARY, StepFailure, StepRow, Summary, UnknownRow,
+    VESSEL, schema,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeWarning, PySystemExit};
@@ -356,11 +357,7 @@ fn ended_by(raised: &Bound<'_, PyAny>) -> PyResult<EndedBy> {
 
 impl Recorder {
     /// Completes the recording; a failure has ended it if `failed` says so.
-    fn end(
-        &self,
-        py: Python<'_>,
-        failed: impl FnOnce(&Open) -> Option<StepFailure> + Send,
-    ) -> PyResult<()> {
+    fn end(&self, py: Python<'_>, failed: impl FnOnce(&Open) -> Option<StepFailure> + Send) -> PyResult<()> {
         let ended = py.detach(|| {
             let Some(open) = self.lock().take() else { return Ok(()) };
             let failure = failed(&open);

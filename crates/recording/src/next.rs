@@ -48,8 +48,13 @@ impl Reached {
             return Some("the simulation has another vessel, wall, sheath or other instruments".to_owned());
         }
         // Detaching a coil withdraws its pusher.
-        let detached: Vec<usize> =
-            simulation.coils().get(self.coils..).unwrap_or_default().iter().map(|coil| coil.instrument).collect();
+        let detached: Vec<usize> = simulation
+            .coils()
+            .get(self.coils..)
+            .unwrap_or_default()
+            .iter()
+            .map(|coil| coil.instrument)
+            .collect();
         // What was behind may have been dropped before the step (`forget`).
         let wrong = [true, false].map(|is_behind| {
             let hands = (0..self.hands.len()).filter(|hand| !detached.contains(hand));

@@ -392,7 +392,10 @@ mod tests {
         let _ = killed(growing.path());
         let file = growing.path().join(GROWING).join(arrays::OFFSETS.file_name());
         let refused = damaged_copies(growing.path(), &file, &mut noise);
-        assert!((1..2_000).contains(&refused), "{refused}: whole steps are read, and other shapes are not those of the table");
+        assert!(
+            (1..2_000).contains(&refused),
+            "{refused}: whole steps are read, and other shapes are not those of the table"
+        );
         killed(packed.path()).pack(packed.path()).unwrap();
         let refused = damaged_copies(packed.path(), &packed.path().join(SHAPES), &mut noise);
         assert!(refused > 600, "{refused}: the archive's own sums find most damage");

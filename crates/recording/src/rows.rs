@@ -16,8 +16,10 @@ use crate::table::{self, GIVE};
 use crate::vessel::{PLACES, PlaceRow, UnknownRow, VESSEL};
 
 /// The remedy for tables that do not fit each other.
-pub(crate) const AGAIN: &str =
-    "rows are missing, or are of another run: run the scene again (endowire run)";
+pub(crate) const AGAIN: &str = "rows are missing, or are of another run: run the scene again (endowire run)";
+
+/// Longer lists of instruments, places or unknowns are told in short.
+const MOST_LISTED: usize = 12;
 
 /// Rows of the tables of a recording, of the same steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +71,10 @@ impl Rows {
             match count {
                 Some(count) => shorten(name, count),
                 None if is_due && !steps.is_empty() => {
-                    return Err(Error::content(&folder.join(name), format!("is missing, and {STEPS} needs it: {AGAIN}")));
+                    return Err(Error::content(
+                        &folder.join(name),
+                        format!("is missing, and {STEPS} needs it: {AGAIN}"),
+                    ));
                 }
                 None => {}
             }
@@ -138,10 +143,20 @@ impl Of<'_> {
                 if self.is_killed {
                     break;
                 }
-                return refused(&path, &format!("line {line}: step"), step, &format!("is no step of {STEPS}"));
+                return refused(
+                    &path,
+                    &format!("line {line}: step"),
+                    step,
+                    &format!("is no step of {STEPS}"),
+                );
             };
             if step != due {
-                return refused(&path, &format!("line {line}: step"), step, &format!("{STEPS} has step {due} there"));
+                return refused(
+                    &path,
+                    &format!("line {line}: step"),
+                    step,
+                    &format!("{STEPS} has step {due} there"),
+                );
             }
             if !known.is_empty() && keys != known {
                 if self.is_killed && rows.peek().is_none() && known.starts_with(&keys) {
@@ -160,14 +175,26 @@ impl Of<'_> {
         let has_none = all.is_empty() && name == PLACES;
         if !is_whole && !has_none && !self.is_killed {
             let step = self.steps.get(all.len()).map_or(0, |row| row.step);
-            return refused(&path, "step", step, &format!("is missing from line {line} on, and {STEPS} has it"));
+            return refused(
+                &path,
+                "step",
+                step,
+                &format!("is missing from line {line} on, and {STEPS} has it"),
+            );
         }
         Ok(Some(all))
     }
 }
 
+/// Keys in words; of more than a line has room for, the first and the last.
 fn list(keys: &[impl Display]) -> String {
-    keys.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    let texts: Vec<String> = keys.iter().map(ToString::to_string).collect();
+    match texts.as_slice() {
+        [first, second, .., last] if texts.len() > MOST_LISTED => {
+            format!("{first}, {second}, …, {last}: {} in all", texts.len())
+        }
+        _ => texts.join(", "),
+    }
 }
 
 /// Refuses a table with a value that contradicts what the others say.

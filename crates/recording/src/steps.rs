@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use endowire_core::insertion::{Move, Simulation};
 use endowire_core::Result;
+use endowire_core::insertion::{Move, Simulation};
 
 use crate::columns::columns;
 use crate::table;

@@ -484,7 +484,11 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
             cut("instruments.csv", 5),
             "step[3].instrument = [wire]: those of the run are [wire, catheter]",
         ),
-        ("instruments.csv", lines("instruments.csv", 1), "step = 1: is missing from line 2 on, and steps.csv has it"),
+        (
+            "instruments.csv",
+            lines("instruments.csv", 1),
+            "step = 1: is missing from line 2 on, and steps.csv has it",
+        ),
         (
             "instruments.csv",
             HANDS.replace("5,5,0,0", "-5,5,0,0"),
@@ -563,7 +567,8 @@ fn the_folder_of_a_run_says_where_its_way_began_and_in_which_scene() {
     };
     let without = length_mm(r#"{"schema": 1, "scene_file": "a.toml", "steps": 3}"#);
     assert_eq!(without, 48.0);
-    let with = length_mm(r#"{"schema": 1, "scene_file": "a.toml", "set": ["seed=2"], "start_mm": [7.0, 0.0, 0.0]}"#);
+    let with =
+        length_mm(r#"{"schema": 1, "scene_file": "a.toml", "set": ["seed=2"], "start_mm": [7.0, 0.0, 0.0]}"#);
     assert_eq!(with, 48.0 + 3.0, "3 mm in the first step");
     let session = SessionFile::read(folder.path()).unwrap();
     assert_eq!(

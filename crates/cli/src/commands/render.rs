@@ -177,4 +177,3 @@ fn wanted(args: &RenderArgs, recording: &Recording, earlier: usize) -> Result<Ve
     }
     Ok(steps)
 }
-

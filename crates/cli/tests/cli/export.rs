@@ -147,7 +147,10 @@ fn a_vessel_that_moves_is_exported_where_it_is_at_the_end_of_each_step() {
     let gltf::Gltf { document, .. } = gltf::Gltf::from_slice(&std::fs::read(&glb).unwrap()).unwrap();
     let vessel = document.meshes().next().unwrap().primitives().next().unwrap();
     let keys = vessel.morph_targets().count();
-    assert!((2..=4).contains(&keys) && said.contains(&format!("has {keys} keys, and between them it is")), "{said}");
+    assert!(
+        (2..=4).contains(&keys) && said.contains(&format!("has {keys} keys, and between them it is")),
+        "{said}"
+    );
 }
 
 /// A run of the scene in a folder, exported to a file.
@@ -281,7 +284,8 @@ fn tables_with_rows_that_are_missing_are_shown_up_to_a_kill_or_refused() {
     all("steps.csv: line 6: step = 6: comes after step 4: rows are missing", 2);
     std::fs::write(&steps, &table[..table.len() - 9]).unwrap();
     all("steps.csv: step = 14: is the last one, and summary.json counts 15 steps", 2);
-    let killed = told.replace("\"complete\": true", "\"complete\": false").replace("\"steps\": 15", "\"steps\": 0");
+    let killed =
+        told.replace("\"complete\": true", "\"complete\": false").replace("\"steps\": 15", "\"steps\": 0");
     std::fs::write(&summary, &killed).unwrap();
     all("the row of line 16 of steps.csv is cut: read up to the last whole step", 0);
     // Killed before its first step.

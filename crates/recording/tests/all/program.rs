@@ -141,20 +141,48 @@ fn tables_that_are_not_of_the_steps_of_the_shapes_are_refused() {
     let swapped = changed(&changed(&steps, 3, steps.lines().nth(3)), 4, steps.lines().nth(2));
     let other = steps.replacen(steps.lines().nth(2).unwrap().split(',').nth(8).unwrap(), "0.125", 1);
     for (name, text, reported) in [
-        (STEPS, Some(changed(&steps, 3, None)), "steps.csv: line 3: step = 3: comes after step 1: rows are missing"),
-        (STEPS, Some(changed(&steps, 2, None)), "instruments.csv: line 2: step = 1: steps.csv has step 2 there"),
-        (STEPS, Some(changed(&steps, 5, None)), "steps.csv: step = 3: is the last one, and summary.json counts 4"),
+        (
+            STEPS,
+            Some(changed(&steps, 3, None)),
+            "steps.csv: line 3: step = 3: comes after step 1: rows are missing",
+        ),
+        (
+            STEPS,
+            Some(changed(&steps, 2, None)),
+            "instruments.csv: line 2: step = 1: steps.csv has step 2 there",
+        ),
+        (
+            STEPS,
+            Some(changed(&steps, 5, None)),
+            "steps.csv: step = 3: is the last one, and summary.json counts 4",
+        ),
         (STEPS, Some(changed(&steps, 3, Some("2,6.0"))), "steps.csv: CSV error: record 2 (line: 3"),
         (STEPS, Some(swapped), "steps.csv: line 3: step = 3: comes after step 1"),
         (STEPS, Some(other), "steps.csv: line 3: step 2 has "),
         (STEPS, Some(half(&steps)), "steps.csv: step = 3: is the last one"),
         (STEPS, Some(steps.clone() + "5,6"), "steps.csv: line = 6: summary.json says that the run has ended"),
         (STEPS, None, "steps.csv: "),
-        (INSTRUMENTS, Some(changed(&instruments, 3, None)), "instruments.csv: line 3: step = 3: steps.csv has step 2"),
-        (INSTRUMENTS, Some(changed(&instruments, 5, None)), "instruments.csv: step = 4: is missing from line 5 on"),
+        (
+            INSTRUMENTS,
+            Some(changed(&instruments, 3, None)),
+            "instruments.csv: line 3: step = 3: steps.csv has step 2",
+        ),
+        (
+            INSTRUMENTS,
+            Some(changed(&instruments, 5, None)),
+            "instruments.csv: step = 4: is missing from line 5 on",
+        ),
         (INSTRUMENTS, Some(half(&instruments)), "instruments.csv: step = 4: is missing from line 5 on"),
-        (INSTRUMENTS, Some(instruments.replace("\n3,device,", "\n3,wire,")), "line 4: step[3].instrument = [wire]"),
-        (INSTRUMENTS, Some(instruments.replace(",device,", ",wire,")), "line 2: step[1].instrument = [wire]: those of the run"),
+        (
+            INSTRUMENTS,
+            Some(instruments.replace("\n3,device,", "\n3,wire,")),
+            "line 4: step[3].instrument = [wire]",
+        ),
+        (
+            INSTRUMENTS,
+            Some(instruments.replace(",device,", ",wire,")),
+            "line 2: step[1].instrument = [wire]: those of the run",
+        ),
         (INSTRUMENTS, None, "instruments.csv: is missing, and steps.csv needs it"),
         (SUMMARY, Some("[]".to_owned()), "summary.json: schema: the version of the format"),
         (SUMMARY, Some("{}".to_owned()), "summary.json: schema: the version of the format"),
@@ -165,7 +193,9 @@ fn tables_that_are_not_of_the_steps_of_the_shapes_are_refused() {
     // The same last rows are what a kill leaves.
     let summary = text(SUMMARY).replace("\"complete\": true", "\"complete\": false");
     std::fs::write(folder.path().join(SUMMARY), summary.replace("\"steps\": 4", "\"steps\": 2")).unwrap();
-    for (name, text) in [(STEPS, half(&steps)), (STEPS, changed(&steps, 5, None)), (INSTRUMENTS, half(&instruments))] {
+    for (name, text) in
+        [(STEPS, half(&steps)), (STEPS, changed(&steps, 5, None)), (INSTRUMENTS, half(&instruments))]
+    {
         let path = folder.path().join(name);
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, text).unwrap();
@@ -191,7 +221,11 @@ fn a_step_that_is_not_the_next_one_of_the_simulation_is_refused() {
     step(&mut simulation);
     recorder.record(&moves, 1.0, &simulation).unwrap();
     let twice = refused(&mut recorder, &simulation, 2.0);
-    assert!(twice.contains("step 2 is not the next one") && twice.contains("to 12 mm and 0.4 rad, and it is at 6 mm"), "{twice}");
+    assert!(
+        twice.contains("step 2 is not the next one")
+            && twice.contains("to 12 mm and 0.4 rad, and it is at 6 mm"),
+        "{twice}"
+    );
     step(&mut simulation);
     let earlier = refused(&mut recorder, &simulation, 0.5);
     assert!(earlier.contains("time_s = 0.5: must be a time from that of the last step, 1 s"), "{earlier}");

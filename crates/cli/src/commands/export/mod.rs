@@ -14,9 +14,7 @@ use endowire_core::device::{Stack, line_mm};
 use endowire_core::insertion::Sheath;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Lumen, Wall};
-use endowire_recording::{
-    Left, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils,
-};
+use endowire_recording::{Left, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils};
 
 use self::vessel_keys::VesselKeys;
 use crate::args::ExportArgs;

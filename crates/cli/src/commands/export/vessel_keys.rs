@@ -42,7 +42,10 @@ impl VesselKeys {
     pub(super) fn text(&self) -> Option<String> {
         let count = self.keys.len();
         (count > 0).then(|| {
-            format!("the vessel has {count} keys, and between them it is within {:.2} mm of where it was", self.error_mm)
+            format!(
+                "the vessel has {count} keys, and between them it is within {:.2} mm of where it was",
+                self.error_mm
+            )
         })
     }
 }
@@ -71,7 +74,8 @@ fn choose(moments: &[Moment], most: usize) -> (Vec<usize>, f64) {
     let mut keys = vec![0, last];
     keys.dedup();
     // What is worst behind each key but the last.
-    let mut behind: Vec<Option<(usize, f64)>> = keys.windows(2).map(|pair| worst(moments, pair[0], pair[1])).collect();
+    let mut behind: Vec<Option<(usize, f64)>> =
+        keys.windows(2).map(|pair| worst(moments, pair[0], pair[1])).collect();
     loop {
         let far = |known: &Option<(usize, f64)>| known.map_or(0.0, |(_, error_mm)| error_mm);
         let farthest = (0..behind.len()).max_by(|a, b| far(&behind[*a]).total_cmp(&far(&behind[*b])));
