@@ -103,12 +103,12 @@ fn check_steps(path: &Path, steps: &[StepRow], about: &About) -> Result<()> {
         }
     }
     let last = steps.last().map_or(0, |row| row.step);
-    match about.steps.filter(|count| last < *count || about.complete == Some(true) && last > *count) {
-        Some(count) => {
-            refused(path, "step", last, &format!("is the last one, and {SUMMARY} counts {count} steps"))
-        }
-        None => Ok(()),
+    let wrong = |count: &usize| last < *count || about.complete == Some(true) && last > *count;
+    let Some(count) = about.steps.filter(wrong) else { return Ok(()) };
+    if steps.is_empty() {
+        return refused(path, "steps", "[]", &format!("it has no step, and {SUMMARY} counts {count} steps"));
     }
+    refused(path, "step", last, &format!("is the last one, and {SUMMARY} counts {count} steps"))
 }
 
 /// The steps whose rows are wanted of other tables.
