@@ -34,6 +34,7 @@ else
   target=. picture=assets/pictures/compare.png
 fi
 methods=$(realpath --relative-to="$target" docs/methods/README.md)
+others=$(realpath --relative-to="$target" benches/cosseratbench/README.md)
 
 # A command, and what it says, kept once it has come to its end.
 measure() {
@@ -63,7 +64,8 @@ block() {
   printf '## %s\n```sh\n' "$1"; cat "$out/$2.cmd"; printf '```\n```text\n'; cat "$out/$2.txt"; printf '```\n\n'
 }
 {
-  printf '# Measured\n\n%s\nThe methods are described in [docs/methods](%s).\n\n' "$origin" "$methods"
+  printf '# Measured\n\n%s\nThe methods are described in [docs/methods](%s). How rods do in a bench of others is in [benches/cosseratbench](%s).\n\n' \
+    "$origin" "$methods" "$others"
   printf '![Error against time of every method, five scenes](%s)\n\n' "$picture"
   block "Error against time" compare
   block "Table 1 of Li et al. 2011, for every method" timing
