@@ -9,16 +9,16 @@ use endowire_methods::Scene;
 use endowire_recording::{Program, Provenance, Recorder, Recording};
 use endowire_viewer::{Pushed, Renderer, ViewSpec};
 
-fn main() -> endowire_core::Result<()> {
+pub(crate) fn main() -> endowire_core::Result<()> {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/scenes/curved_tube.toml"));
-    let out = std::env::temp_dir().join("endowire-scene");
+    let out = Path::new("out/scene");
 
     let scene = Scene::read(path)?;
     let mut simulation = scene.simulation(&NoStore)?;
     let spec = ViewSpec { size_px: [256, 256], ..ViewSpec::of_scene(&scene, path)? };
     let mut renderer = Renderer::of_wall(&spec, simulation.lumen().wall(&NoStore)?)?;
 
-    let mut recorder = Recorder::new(&out, &simulation)?;
+    let mut recorder = Recorder::new(out, &simulation)?;
     for step in 1..=20 {
         let moves = [Move { instrument: 0, command: Command::advance(4.0) }];
         simulation.step_together(&moves)?;
@@ -33,6 +33,6 @@ fn main() -> endowire_core::Result<()> {
     if let Some(picture) = renderer.render(&devices)?.fluoro {
         picture.write_png(out.join("fluoro.png"))?;
     }
-    println!("{} steps and fluoro.png in {}", Recording::read(&out)?.steps(), out.display());
+    println!("{} steps and fluoro.png in {}", Recording::read(out)?.steps(), out.display());
     Ok(())
 }

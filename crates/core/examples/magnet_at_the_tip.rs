@@ -64,7 +64,7 @@ impl Field for Steered {
     }
 }
 
-fn main() -> Result<()> {
+pub(crate) fn main() -> Result<()> {
     let tree = anatomy::tree("aortic_arch").expect("a built-in anatomy");
     let vessel = GeneratedWall::new(&tree, Resolution::EdgeMm(3.0))?;
     let sheath = Sheath::at_opening(&vessel.wall, vessel.inlet, 2.0)?;

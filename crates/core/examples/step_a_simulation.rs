@@ -6,7 +6,7 @@ use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 
-fn main() -> endowire_core::Result<()> {
+pub(crate) fn main() -> endowire_core::Result<()> {
     let tree = anatomy::tree("curved_tube").expect("a built-in anatomy");
     let vessel = GeneratedWall::new(&tree, Resolution::EdgeMm(1.0))?;
     let sheath = Sheath::at_opening(&vessel.wall, vessel.inlet, 1.0)?;

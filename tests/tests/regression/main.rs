@@ -6,6 +6,7 @@ mod arrival;
 mod catalogue;
 mod damaged_files;
 mod deployments;
+mod examples;
 mod hard_scenes;
 mod instruments;
 mod passages;
