@@ -224,6 +224,7 @@ impl StaticCase {
 
     /// The surface of a rod that touches itself.
     fn check_surface(&self, surface: &Surface) -> Result<()> {
+        crate::contact::pairs::check_built("self_contact")?;
         positive("self_contact.radius", surface.radius)?;
         let most = self.rod.line_length() / LEAST_SLENDERNESS;
         if surface.radius > most {

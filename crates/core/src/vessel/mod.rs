@@ -18,6 +18,8 @@ mod labels;
 mod line_files;
 mod links;
 mod lumen;
+#[cfg(feature = "markups")]
+mod markups;
 mod mesh;
 pub mod motion;
 mod opening;

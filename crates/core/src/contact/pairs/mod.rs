@@ -161,6 +161,17 @@ pub struct SelfContact {
     contacts: ContactTuning,
 }
 
+/// Whether this build has what rods that touch themselves need; `what` asks for it.
+///
+/// # Errors
+/// [`crate::Error::Feature`] if not.
+pub(crate) fn check_built(what: &str) -> crate::Result<()> {
+    match cfg!(feature = "self-contact") {
+        true => Ok(()),
+        false => Err(crate::Error::feature("self-contact", what)),
+    }
+}
+
 impl SelfContact {
     /// For a rod with these elements and their surfaces.
     pub fn new(elements: &[ElementData], capsules: Vec<Capsule>) -> Self {

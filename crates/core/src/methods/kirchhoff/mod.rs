@@ -282,6 +282,9 @@ impl<const C: usize> Kirchhoff<C> {
             );
             return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, remedy));
         }
+        if options.self_contact {
+            crate::contact::pairs::check_built("method.self_contact = true")?;
+        }
         if options.self_contact && surroundings.motion.is_some() {
             let remedy =
                 "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
