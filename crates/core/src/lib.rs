@@ -82,7 +82,8 @@ pub mod vessel;
 
 pub use device::{Device, DeviceFile, Instrument, Section, Stack};
 pub use error::{Error, PhysicalEnd, Result};
-pub use field::{Field, Magnet, Weight};
+pub use field::Magnet;
+pub use field::{Field, Weight};
 pub use flow::BloodFlow;
 pub use insertion::{Batch, Command, Contact, Move, Sheath, Simulation, State, StepReport, WallProperties};
 pub use methods::kirchhoff::{Accuracy, KirchhoffOptions};

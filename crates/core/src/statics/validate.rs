@@ -133,7 +133,7 @@ fn check_sections(list: &str, sections: &[Section]) -> Result<()> {
 
 impl StaticCase {
     /// Checks every value, and that none contradicts another.
-    pub fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         if self.rod.instrument.is_empty() {
             positive("rod.length", self.rod.length)?;
         }

@@ -68,7 +68,7 @@ impl Capsule {
     pub(crate) const NONE: Self = Self { radius_mm: 0.0, modulus_n_per_mm2: 0.0 };
 
     /// A practically rigid surface of a rod of this radius, mm, and bending stiffness, N·mm².
-    pub fn rigid(radius_mm: f64, bending_nmm2: f64) -> Self {
+    pub(crate) fn rigid(radius_mm: f64, bending_nmm2: f64) -> Self {
         Self { radius_mm, modulus_n_per_mm2: Self::RIGID * bending_nmm2 / radius_mm.powi(4) }
     }
 }
@@ -174,7 +174,7 @@ pub(crate) fn check_built(what: &str) -> crate::Result<()> {
 
 impl SelfContact {
     /// For a rod with these elements and their surfaces.
-    pub fn new(elements: &[ElementData], capsules: Vec<Capsule>) -> Self {
+    pub(crate) fn new(elements: &[ElementData], capsules: Vec<Capsule>) -> Self {
         let mut contact = Self::default();
         contact.renew(elements, capsules);
         contact

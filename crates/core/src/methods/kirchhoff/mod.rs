@@ -167,7 +167,7 @@ const POINT_LIMIT: usize = 1_000_000;
 const ELEMENT_LIMIT: f64 = 100_000.0;
 
 /// The exact rod as an insertion method, with or without material angles.
-pub struct Kirchhoff<const C: usize> {
+pub(crate) struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
     surface: Arc<ContactSurface>,
     state: Arc<KirchhoffState>,
@@ -253,7 +253,7 @@ impl<const C: usize> Kirchhoff<C> {
     ///
     /// # Errors
     /// An element length that is not positive or leads to too many elements.
-    pub fn new(
+    pub(crate) fn new(
         options: KirchhoffOptions,
         surroundings: &Surroundings<'_>,
         store: &dyn WallStore,
