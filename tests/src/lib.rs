@@ -9,7 +9,7 @@ pub mod spoiled;
 pub mod sweep;
 pub mod twin;
 
-pub use endowire_verify::{crossing, noise};
+pub use endowire_lab::{crossing, noise};
 
 /// The guide's example is compiled and run with the tests.
 #[cfg(doctest)]

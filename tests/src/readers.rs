@@ -10,9 +10,9 @@ use endowire_core::vessel::{
     CentrelineTree, GeneratedWall, LabelOptions, LabelSurface, NoStore, Resolution, SurfaceMesh, anatomy,
 };
 use endowire_core::{Error, Result, Vec3};
+use endowire_lab::surfaces::Sidecar;
 use endowire_methods::Scene;
 use endowire_sweep::Sweep;
-use endowire_verify::surfaces::Sidecar;
 use endowire_viewer::{CtSpec, Renderer, View, ViewSpec, read_label_map};
 
 fn surface(bytes: &[u8], name: &str) -> Result<()> {

@@ -4,7 +4,7 @@ use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{SurfaceMesh, Wall};
-use endowire_verify::crossing::curve;
+use endowire_lab::crossing::curve;
 
 /// Commands at the end whose push forces are averaged: where a wire slides over single triangles, one force is chance.
 const AVERAGED: usize = 10;

@@ -3,12 +3,10 @@
 mod args;
 mod cache;
 mod commands;
-mod devices;
 mod environment;
 mod failure;
 mod output;
 mod scenes;
-mod studies;
 mod subjects;
 
 use std::process::ExitCode;

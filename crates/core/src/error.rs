@@ -37,6 +37,14 @@ pub enum Error {
         /// What would be valid.
         remedy: String,
     },
+    /// This crate was built without what is needed.
+    #[error("{what} needs the feature {feature:?} of endowire-core: build with it")]
+    Feature {
+        /// What needs it, as the user writes it (`method.self_contact = true`).
+        what: String,
+        /// The feature.
+        feature: &'static str,
+    },
     /// A surface mesh is unsuitable as a vessel wall.
     #[error("mesh: {0}")]
     Mesh(String),
@@ -116,6 +124,11 @@ impl Error {
     /// A [`Error::Content`] for `path`.
     pub fn content(path: &Path, reason: impl Into<String>) -> Self {
         Self::Content { path: path.to_path_buf(), reason: reason.into() }
+    }
+
+    /// A [`Error::Feature`].
+    pub(crate) fn feature(feature: &'static str, what: impl std::fmt::Display) -> Self {
+        Self::Feature { what: what.to_string(), feature }
     }
 
     /// Whether the input is at fault (in contrast to a computation that failed on valid input).

@@ -40,6 +40,17 @@
 //! | [`statics`] | static problems of rods without a vessel |
 //! | [`rod`], [`solve`], [`contact`], [`banded`] | elements, Newton's method, walls and loops: your own solver |
 //! | [`insertion`] | scripts, batches and tallies of insertions |
+//!
+//! Features, all of them on; with none a device in a vessel needs half of the crates. What needs one that is off is an [`Error::Feature`] that names it:
+//!
+//! | feature | what needs it |
+//! |---|---|
+//! | `markups` | centre lines of 3D Slicer (`.mrk.json`) |
+//! | `scene-files` | scenes, devices, scripts and cases in TOML |
+//! | `self-contact` | devices that touch themselves |
+//! | `threads` | nothing: without it everything runs on the calling thread, [`Batch`] too |
+//! | `union` | surfaces whose parts overlap without being joined |
+//! | `vtp` | surfaces and centre lines in VTK's XML format |
 
 // Results are bit-identical on every machine: functions whose rounding depends on the platform are disallowed.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
@@ -71,7 +82,8 @@ pub mod vessel;
 
 pub use device::{Device, DeviceFile, Instrument, Section, Stack};
 pub use error::{Error, PhysicalEnd, Result};
-pub use field::{Field, Magnet, Weight};
+pub use field::Magnet;
+pub use field::{Field, Weight};
 pub use flow::BloodFlow;
 pub use insertion::{Batch, Command, Contact, Move, Sheath, Simulation, State, StepReport, WallProperties};
 pub use methods::kirchhoff::{Accuracy, KirchhoffOptions};

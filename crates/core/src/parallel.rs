@@ -10,7 +10,8 @@ const LEAST: usize = 512;
 
 /// `work` on consecutive parts of `0..count`, in order.
 pub(crate) fn parts<T: Send>(count: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
-    let threads = thread::available_parallelism().map_or(1, usize::from).min(THREADS).min(count / LEAST);
+    let most = if cfg!(feature = "threads") { THREADS } else { 1 };
+    let threads = thread::available_parallelism().map_or(1, usize::from).min(most).min(count / LEAST);
     if threads < 2 {
         return vec![work(0..count)];
     }

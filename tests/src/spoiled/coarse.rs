@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_verify::crossing::CrossingTest;
+use endowire_lab::crossing::CrossingTest;
 
 use super::Editable;
 use crate::noise::Noise;

@@ -9,7 +9,7 @@ mod sheets;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_verify::crossing::CrossingTest;
+use endowire_lab::crossing::CrossingTest;
 
 use crate::noise::Noise;
 use edit::Editable;

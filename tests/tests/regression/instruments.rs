@@ -2,7 +2,7 @@
 //! state, and what cannot be done changes nothing. All of it to the bit.
 
 use endowire_core::insertion::{Command, Move, Simulation, State};
-use endowire_verify::instrument_stress::{self, InstrumentCase, InstrumentStress, RandomHands, bytes};
+use endowire_lab::instrument_stress::{self, InstrumentCase, InstrumentStress, RandomHands, bytes};
 
 /// The cases of the stress table, or those of one vessel.
 fn cases(vessel: Option<&str>) -> Vec<InstrumentCase> {

@@ -16,10 +16,10 @@ use endowire_core::scene::Scene;
 use endowire_core::vessel::{
     CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, SurfaceMesh, Wall, anatomy,
 };
+use endowire_lab::insertion_stress::InsertionStress;
 use endowire_tests::crossing::CrossingTest;
 use endowire_tests::noise::Noise;
 use endowire_tests::sweep::Tally;
-use endowire_verify::insertion_stress::InsertionStress;
 
 use super::arrival::{asset, run_scene, scene};
 

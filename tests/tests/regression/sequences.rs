@@ -1,6 +1,6 @@
 //! Random commands of up to 40 mm end where their parts do: two of the three hundred sequences of `endowire verify --stress`.
 
-use endowire_verify::sequences::run;
+use endowire_lab::sequences::run;
 
 #[test]
 fn large_commands_end_where_their_parts_do() {

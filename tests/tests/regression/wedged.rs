@@ -4,7 +4,7 @@ use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Contact, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_verify::insertion_stress::InsertionStress;
+use endowire_lab::insertion_stress::InsertionStress;
 
 const FRICTION: f64 = 0.5;
 

@@ -3,7 +3,7 @@
 
 use endowire_core::statics::{LoadKind, StaticCase, StaticSolution};
 use endowire_core::{Vec3, nalgebra};
-use endowire_verify::{Row, stress};
+use endowire_lab::{Row, stress};
 use std::path::Path;
 
 fn folder() -> std::path::PathBuf {

@@ -9,7 +9,7 @@ use endowire_core::methods::OwnMethod;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::{CentrelineRecipe, CentrelineTree, Lumen, NoStore, Wall, WallRecipe, WallStore};
 use endowire_core::{Error, Result, Vec3};
-use endowire_verify::sequences::APART_MM;
+use endowire_lab::sequences::APART_MM;
 
 use crate::rows::Row;
 

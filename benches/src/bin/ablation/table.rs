@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use endowire_core::{Error, Result};
-use endowire_verify::sequences::APART_MM;
+use endowire_lab::sequences::APART_MM;
 
 use crate::results::Measured;
 use crate::rows::Row;

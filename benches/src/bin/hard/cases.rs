@@ -6,7 +6,7 @@ use endowire_core::Result;
 use endowire_core::insertion::Move;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
-use endowire_verify::sequences::APART_MM;
+use endowire_lab::sequences::APART_MM;
 
 use crate::course::Course;
 

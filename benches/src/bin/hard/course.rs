@@ -5,7 +5,7 @@ use std::time::Instant;
 use endowire_core::Result;
 use endowire_core::insertion::{Move, Simulation, Step};
 use endowire_core::methods::StepReport;
-use endowire_verify::sequences::part_of;
+use endowire_lab::sequences::part_of;
 
 /// One way through commands, and what it took.
 pub(crate) struct Course {

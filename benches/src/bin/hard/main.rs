@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::process::ExitCode;
 
 use endowire_core::{Error, Result};
-use endowire_verify::{deployments, sequences};
+use endowire_lab::{deployments, sequences};
 
 /// Rows of so many seeds in which something is wrong.
 fn seeded<R: std::fmt::Display>(

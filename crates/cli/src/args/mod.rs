@@ -5,11 +5,10 @@
     reason = "doc comments here are help texts, in which script[0] is no link"
 )]
 
-mod bench;
-mod evidence;
 mod inputs;
+#[cfg_attr(not(feature = "lab"), path = "no_lab.rs")]
+mod lab;
 mod pictures;
-mod studies;
 mod subjects;
 
 use std::path::PathBuf;
@@ -18,18 +17,17 @@ use clap::{Parser, Subcommand};
 use endowire_methods::Setting;
 use endowire_sweep::Shard;
 
-pub(crate) use bench::{
-    BenchCommand, BenchOutputArgs, BendArgs, PushArgs, TipLoadArgs, TorqueArgs, TrackArgs,
-};
-pub(crate) use evidence::EvidenceArgs;
 pub(crate) use inputs::{
     CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, FromLabelsArgs, GenerateArgs, PassableArgs,
     RepairArgs, SacArgs, StraightenArgs, VesselCommand,
 };
-pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
-pub(crate) use studies::{
-    CoilArgs, CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
+pub(crate) use lab::{BenchCommand, CompareArgs, EvidenceArgs, ExperimentCommand, VerifyArgs};
+#[cfg(feature = "lab")]
+pub(crate) use lab::{
+    BenchOutputArgs, BendArgs, CoilArgs, DeformationArgs, LoopArgs, NavigationArgs, PushArgs, TimingArgs,
+    TipLoadArgs, TorqueArgs, TrackArgs,
 };
+pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use subjects::{SubjectCommand, SubjectRunArgs};
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
@@ -79,14 +77,14 @@ pub(crate) enum Command {
     Device(DeviceCommand),
     /// Bench tests of devices: torque response, push along a tortuous path, tip load, three-point bending; several devices in one table and
     /// one picture
-    #[command(subcommand)]
+    #[cfg_attr(feature = "lab", command(subcommand))]
     Bench(BenchCommand),
     /// Studies that compare the model with measurements and exact laws: question, data, figure, error, and what they do not show
     Evidence(EvidenceArgs),
     /// Run time against error, method by method: tables and a work–precision picture
     Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011
-    #[command(subcommand)]
+    #[cfg_attr(feature = "lab", command(subcommand))]
     Experiment(ExperimentCommand),
     /// Make a folder with a scene to start from: vessel, device, script, views. It runs at once
     New(NewArgs),
@@ -339,40 +337,6 @@ pub(crate) struct RodArgs {
     /// Case file (TOML)
     pub(crate) case: PathBuf,
     /// Print the solution as one JSON document on stdout
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, clap::Args)]
-pub(crate) struct VerifyArgs {
-    /// Add the numerical stress table: extreme stiffnesses, loads, meshes and shapes
-    #[arg(long)]
-    pub(crate) stress: bool,
-    /// Number of random commands in each case of the stress table with several instruments
-    #[arg(long, default_value_t = 1_000, value_name = "COUNT", requires = "stress")]
-    pub(crate) commands: usize,
-    /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
-    /// surface may give unit_mm, a table sheath, length_mm and device_radius_mm)
-    #[arg(long, value_name = "DIR", conflicts_with = "stress")]
-    pub(crate) surfaces: Option<PathBuf>,
-    /// Every combination of the matrix: 162 cells per wire instead of 18
-    #[arg(long, requires = "surfaces")]
-    pub(crate) full: bool,
-    /// Only cells whose name has all of these words, as in "phantom* 0.035 mu0.3"
-    #[arg(long, value_name = "PATTERN", requires = "surfaces")]
-    pub(crate) cells: Option<String>,
-    /// Print the cells as scene files instead of running them
-    #[arg(long, requires = "surfaces", conflicts_with = "json")]
-    pub(crate) scene: bool,
-    /// Cells that run at the same time; the number of cores if absent
-    #[arg(long, value_name = "N", requires = "surfaces")]
-    pub(crate) jobs: Option<usize>,
-    /// Longest time of a cell: one that takes longer fails
-    #[arg(long, default_value_t = 120.0, value_name = "S", requires = "surfaces")]
-    pub(crate) limit_s: f64,
-    #[command(flatten)]
-    pub(crate) cache: CacheArgs,
-    /// Print the rows as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -1,20 +1,17 @@
 //! The commands, one file each.
 
 mod assess;
-mod bench;
 mod centreline;
-mod compare;
 mod dataset;
 mod device;
 mod doctor;
-mod evidence;
-mod experiment;
 mod export;
 mod felt;
 mod fluoro;
 mod from_labels;
+#[cfg_attr(not(feature = "lab"), path = "no_lab.rs")]
+mod lab;
 mod new;
-mod parallel;
 mod passable;
 pub(crate) mod play;
 mod render;
@@ -26,9 +23,7 @@ mod shell;
 mod straighten;
 mod studio;
 mod subject;
-mod surfaces;
 mod sweep;
-mod verify;
 mod vessel;
 
 pub(crate) use centreline::parse_end;
@@ -49,7 +44,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Dataset(args) => dataset::dataset(args),
         Command::Rod(args) => rod::rod(args),
-        Command::Verify(args) => verify::verify(args),
+        Command::Verify(args) => lab::verify(args),
         Command::Vessel(VesselCommand::Check { file, frame, septum_mm, repair, felt, json }) => {
             vessel::check_file(file, (*frame).into(), *septum_mm, repair, felt, *json)
         }
@@ -63,14 +58,14 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Device(DeviceCommand::List { folder, out, json }) => {
             device::list(folder, out.as_deref(), *json)
         }
-        Command::Evidence(args) => evidence::evidence(args),
-        Command::Bench(command) => bench::bench(command),
-        Command::Compare(args) => compare::compare(args),
+        Command::Evidence(args) => lab::evidence(args),
+        Command::Bench(command) => lab::bench(command),
+        Command::Compare(args) => lab::compare(args),
         Command::Report(args) => report::report(args),
         Command::New(args) => new::new(args),
         Command::Doctor { json } => doctor::doctor(*json),
         Command::Completions { shell } => shell::completions(*shell),
         Command::Man { command } => shell::man(command.as_deref()),
-        Command::Experiment(command) => experiment::experiment(command),
+        Command::Experiment(command) => lab::experiment(command),
     }
 }

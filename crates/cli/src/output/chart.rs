@@ -1,6 +1,6 @@
 //! Charts as SVG and PNG, identical on every machine: the font is part of the program.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Once;
 
 use plotters::coord::Shift;
@@ -52,12 +52,13 @@ pub(crate) trait Chart {
 }
 
 /// Draws a chart to two files in `folder`: NAME.svg and NAME.png.
+#[cfg(feature = "lab")]
 pub(crate) fn write(
     folder: &Path,
     name: &str,
     size: (u32, u32),
     chart: &impl Chart,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<Vec<std::path::PathBuf>, Failure> {
     let paths = ["svg", "png"].map(|extension| folder.join(format!("{name}.{extension}")));
     paths.iter().try_for_each(|path| write_file(path, size, chart))?;
     Ok(paths.into())

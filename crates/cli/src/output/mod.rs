@@ -1,6 +1,7 @@
 //! All output of the program: recordings, arrays, provenance, progress.
 
 pub(crate) mod chart;
+#[cfg(feature = "lab")]
 pub(crate) mod curves;
 pub(crate) mod film;
 pub(crate) mod frames;
@@ -10,6 +11,7 @@ pub(crate) mod provenance;
 mod recorder;
 pub(crate) mod saved;
 pub(crate) mod session;
+#[cfg(feature = "lab")]
 pub(crate) mod study;
 pub(crate) mod vtk;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::process::{Command, Output};
 
-use endowire_verify::evidence::{STUDIES, three_tubes};
+use endowire_lab::evidence::{STUDIES, three_tubes};
 use serde_json::Value;
 
 use crate::common::{said, workspace};

@@ -109,7 +109,7 @@ impl<const C: usize> Factor<C> {
     }
 
     /// Replaces `b` by the solution of `A x = b` with the matrix factored last.
-    pub fn solve(&self, b: &mut [f64]) {
+    pub(crate) fn solve(&self, b: &mut [f64]) {
         Arch::new().dispatch(Solve::<C, true> { factor: self, b });
     }
 

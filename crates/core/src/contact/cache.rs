@@ -114,7 +114,7 @@ pub struct ContactCache {
 
 /// What the points of a device know of the wall at an equilibrium.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct KnownPoints {
+pub(crate) struct KnownPoints {
     points: Vec<KnownPoint>,
 }
 
@@ -125,7 +125,7 @@ impl KnownPoints {
     }
 
     /// Clears all knowledge; keeps the memory.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.points.clear();
     }
 
@@ -261,7 +261,7 @@ impl ContactCache {
     }
 
     /// Continues with the stored knowledge of the same points.
-    pub fn resume(&mut self, known: &KnownPoints) {
+    pub(crate) fn resume(&mut self, known: &KnownPoints) {
         self.points.clear();
         self.readings.clear();
         self.go_on(known);

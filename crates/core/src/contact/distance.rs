@@ -65,13 +65,6 @@ pub struct Distance {
     pub hessian: Matrix3<f64>,
 }
 
-impl Distance {
-    /// Unit normal of the wall, into the lumen: the normalised gradient.
-    pub fn normal(&self) -> Vec3 {
-        self.gradient / self.gradient.norm()
-    }
-}
-
 /// How near a point is to the wall, exact only within a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Nearness {

@@ -11,7 +11,7 @@ use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 /// Drag at the contact points of a device.
 #[derive(Debug, Clone, Default)]
-pub struct Drag {
+pub(crate) struct Drag {
     /// Force on each point, N.
     forces_n: Vec<Vec3>,
     /// The same forces summed by element, as derivatives of V.

@@ -32,7 +32,7 @@ mod follow;
 mod moving;
 mod slider;
 
-pub use between::{Between, InnerFriction, Place};
+pub(crate) use between::{Between, InnerFriction, Place};
 pub(in crate::contact) use coulomb::{Coulomb, FrictionDerivatives};
 pub(in crate::contact) use follow::unsettled;
 pub use slider::NormalForce;
@@ -73,7 +73,7 @@ pub struct HandMotion {
 
 impl HandMotion {
     /// Advance, mm; positive inwards.
-    pub fn advance_mm(&self) -> f64 {
+    pub(crate) fn advance_mm(&self) -> f64 {
         self.to_mm - self.from_mm
     }
 
@@ -270,12 +270,12 @@ impl Friction {
     }
 
     /// Resumes renewing normal forces.
-    pub fn release(&mut self) {
+    pub(crate) fn release(&mut self) {
         self.law.release();
     }
 
     /// Sets the normal forces to those of a solution, one per point, and renews them from there.
-    pub fn resume<'a>(&mut self, forces: impl IntoIterator<Item = &'a NormalForce>) {
+    pub(crate) fn resume<'a>(&mut self, forces: impl IntoIterator<Item = &'a NormalForce>) {
         self.release();
         self.sliders.iter_mut().zip(forces).for_each(|(s, f)| (s.normal, s.force_n) = (f.normal, f.force_n));
     }

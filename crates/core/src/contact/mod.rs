@@ -1,37 +1,42 @@
 //! Contact of a device with the wall and with itself: distance, energy, friction.
 
 mod cache;
-pub mod distance;
+pub(crate) mod distance;
 mod drag;
 pub mod extension;
-pub mod friction;
+pub(crate) mod friction;
 mod moved;
 mod narrow;
-pub mod pairs;
+pub(crate) mod pairs;
 pub(crate) mod passage;
-pub mod point;
-pub mod potential;
+pub(crate) mod point;
+pub(crate) mod potential;
 mod properties;
 mod proximity;
 mod quadric;
 mod quadric_fit;
 mod reader;
-pub mod regions;
+pub(crate) mod regions;
 #[cfg(test)]
 mod ridge_tests;
 #[cfg(test)]
 mod rim_tests;
 mod set;
-pub mod surface;
-pub mod wall;
+pub(crate) mod surface;
+pub(crate) mod wall;
 
-pub use cache::{ContactCache, KnownPoints};
-pub use distance::{Distance, Nearness, SmoothWall};
-pub use drag::Drag;
+pub use cache::ContactCache;
+pub(crate) use cache::KnownPoints;
+pub use distance::Distance;
+pub use distance::{Nearness, SmoothWall};
+pub(crate) use drag::Drag;
+pub use friction::NormalForce;
 pub(crate) use friction::stick_mm;
-pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place};
+pub(crate) use friction::{Between, InnerFriction, Place};
+pub use friction::{Friction, HandMotion};
 pub use moved::MovedWall;
-pub use pairs::{Capsule, SelfContact, Touching};
+pub use pairs::Touching;
+pub use pairs::{Capsule, SelfContact};
 pub(crate) use pairs::{FrictionLaw, PairForce, Pressing, RodPlace};
 pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
@@ -39,7 +44,8 @@ pub use properties::{WallProperties, WallRegion};
 pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
 pub use regions::RegionMap;
-pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
+pub use surface::{ContactMesh, ContactSurface};
+pub use surface::{Deviation, Hint};
 pub(crate) use wall::Reaction;
 pub use wall::WallContact;
 pub(crate) use wall::least_force_n;

@@ -69,7 +69,7 @@ impl Deref for MovedWall<'_> {
 
 impl<'a> MovedWall<'a> {
     /// The wall displaced.
-    pub fn new(surface: &'a ContactSurface, displacement: Option<&'a Displacement>) -> Self {
+    pub(crate) fn new(surface: &'a ContactSurface, displacement: Option<&'a Displacement>) -> Self {
         Self { surface, displacement }
     }
 

@@ -27,7 +27,7 @@ impl WallPotential {
     }
 
     /// ψ(d) in mJ/mm.
-    pub fn value(&self, distance_mm: f64) -> f64 {
+    pub(crate) fn value(&self, distance_mm: f64) -> f64 {
         let p = self.penetration_mm(distance_mm);
         0.5 * self.modulus_n_per_mm2 * p * p
     }

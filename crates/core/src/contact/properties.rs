@@ -103,7 +103,7 @@ impl WallProperties {
     /// decade takes the same part of the transition. Blended linearly, the modulus would rise a thousandfold within
     /// the first ten-thousandth of it, and the range in which a Newton step is reliable, k/|∇k|, would be smallest
     /// where the wall is softest.
-    pub fn at(&self, x: &Vec3) -> (f64, f64) {
+    pub(crate) fn at(&self, x: &Vec3) -> (f64, f64) {
         let (mut ln_modulus, mut friction) = (0.0, self.friction);
         for region in &self.region {
             let share = region.share(x);

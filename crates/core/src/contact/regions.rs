@@ -47,7 +47,7 @@ impl Blend {
 
 /// The wall's modulus at a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stiffness {
+pub(crate) struct Stiffness {
     /// eˢ: ratio to the modulus k₀ of the potential.
     pub factor: f64,
     /// ∇s, 1/mm, and ∇∇s, 1/mm², where moduli differ.

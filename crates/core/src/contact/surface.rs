@@ -138,7 +138,7 @@ impl ContactSurface {
     }
 
     /// Its mesh; `None` for a centre line.
-    pub fn mesh(&self) -> Option<&ContactMesh> {
+    pub(crate) fn mesh(&self) -> Option<&ContactMesh> {
         match &self.source {
             Source::Mesh(mesh) => Some(mesh),
             Source::Swept(..) => None,

@@ -5,10 +5,6 @@
 //! the matrix's column, and those of each column whose first row it is (T. A. Davis, *Direct Methods for Sparse Linear
 //! Systems*, 2006, section 4.4).
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::amd;
-
 use crate::banded::FactorError;
 
 /// A block of the matrix's lower triangle in the order of elimination.
@@ -152,8 +148,19 @@ impl Structure {
     }
 }
 
+/// The order of the nodes: right, with more fill. Methods that ask for self-contact are refused before.
+#[cfg(not(feature = "self-contact"))]
+fn order(count: usize, _: &[(usize, usize)]) -> Result<Vec<usize>, FactorError> {
+    Ok((0..count).collect())
+}
+
 /// An order in which to eliminate nodes; the last one, that of end supports, stays last.
+#[cfg(feature = "self-contact")]
 fn order(count: usize, couplings: &[(usize, usize)]) -> Result<Vec<usize>, FactorError> {
+    use faer::dyn_stack::{MemBuffer, MemStack};
+    use faer::sparse::SymbolicSparseColMatRef;
+    use faer::sparse::linalg::amd;
+
     let nodes = count - 1;
     let mut edges: Vec<(usize, usize)> = couplings.to_vec();
     edges.extend((1..nodes).map(|j| (j - 1, j)));

@@ -226,7 +226,7 @@ impl Stack {
     }
 
     /// Whether any of the instruments bends more easily in one plane.
-    pub fn has_soft_plane(&self) -> bool {
+    pub(crate) fn has_soft_plane(&self) -> bool {
         self.devices().any(Device::has_soft_plane)
     }
 

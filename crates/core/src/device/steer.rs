@@ -25,7 +25,7 @@ pub struct Steer {
 
 impl Steer {
     /// Rest curvature that the value 1 adds, along the first and second material direction, 1/mm.
-    pub fn curvature_per_mm(&self) -> [f64; 2] {
+    pub(crate) fn curvature_per_mm(&self) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.plane_deg.to_radians());
         [self.curvature_per_mm_at_1 * cos, self.curvature_per_mm_at_1 * sin]
     }

@@ -18,7 +18,7 @@ struct Sample {
 
 /// The energy of a line of elements in a field, or in a mean of two fields, as Newton's method asks for it.
 #[derive(Debug, Clone)]
-pub struct FieldLoad<'a> {
+pub(crate) struct FieldLoad<'a> {
     /// Fields with their weights, and where each is asked: first samples of an element, then those of the next.
     parts: Vec<(&'a dyn Field, f64, Vec<Sample>)>,
     /// Sizes of forces and moments at the base.
@@ -28,7 +28,7 @@ pub struct FieldLoad<'a> {
 impl<'a> FieldLoad<'a> {
     /// That of fields with weights on a line whose nodes are so far from its tip, the sheath's first, mm. Instruments are in so far, the innermost first, mm;
     /// a device alone as far as its line is long.
-    pub fn new(
+    pub(crate) fn new(
         fields: impl IntoIterator<Item = (&'a dyn Field, f64)>,
         from_tip_mm: &[f64],
         inserted_mm: &[f64],

@@ -35,7 +35,7 @@ use nalgebra::Matrix3;
 
 use crate::{Error, Result, Vec3};
 
-pub use load::FieldLoad;
+pub(crate) use load::FieldLoad;
 pub use magnet::Magnet;
 pub use spec::FieldSpec;
 pub use weight::Weight;

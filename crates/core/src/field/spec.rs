@@ -73,7 +73,7 @@ impl FieldSpec {
     ///
     /// # Errors
     /// An instrument that is not there; a magnet that ends beyond its instrument.
-    pub fn check(&self, name: &str, stack: &Stack) -> Result<()> {
+    pub(crate) fn check(&self, name: &str, stack: &Stack) -> Result<()> {
         let (Self::Magnet { instrument, .. } | Self::Weight { instrument, .. }) = *self;
         let Some(held) = stack.instruments().get(instrument) else {
             let remedy = format!("there are {}, the innermost is 0", stack.instruments().len());

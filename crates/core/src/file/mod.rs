@@ -78,7 +78,7 @@ pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
 ///
 /// # Errors
 /// [`Error::Content`] for what is no text, with what it is instead where that is plain.
-pub fn text(bytes: &[u8], path: &Path) -> Result<String> {
+pub(crate) fn text(bytes: &[u8], path: &Path) -> Result<String> {
     if let Some(kind) = foreign(bytes) {
         return Err(Error::content(path, kind));
     }

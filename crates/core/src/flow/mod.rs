@@ -36,7 +36,8 @@ mod tree;
 #[cfg(test)]
 pub(crate) use drag::drag_n_per_mm;
 pub use rings::Rings;
-pub use tree::{FlowGraph, FlowLink, FlowNode, check_place, flow_nodes};
+pub use tree::FlowLink;
+pub use tree::{FlowGraph, FlowNode, check_place};
 
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
@@ -234,7 +235,7 @@ mod tests {
     fn what_a_sac_takes_in_comes_back() {
         let vessel = anatomy::tree("basilar_aneurysm").unwrap();
         let shares = |tree: &CentrelineTree| {
-            let nodes = flow_nodes(tree, Some(Vec3::zeros()), 3.0, ["a", "b"]).unwrap();
+            let nodes = FlowGraph::new(tree, Some(Vec3::zeros()), 3.0, ["a", "b"]).unwrap().nodes;
             let at = |name: &str| tree.nodes()[tree.target(name).unwrap().row].position_mm;
             let share = |name: &str| {
                 nodes.iter().find(|node| node.position_mm == at(name)).map_or(f64::NAN, |node| node.share)

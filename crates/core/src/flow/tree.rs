@@ -77,19 +77,6 @@ impl FlowNode {
     }
 }
 
-/// The points of a tree, as [`FlowGraph::new`] finds them.
-///
-/// # Errors
-/// As [`FlowGraph::new`].
-pub fn flow_nodes(
-    tree: &CentrelineTree,
-    inlet_mm: Option<Vec3>,
-    split_exponent: f64,
-    keys: [&str; 2],
-) -> Result<Vec<FlowNode>> {
-    FlowGraph::new(tree, inlet_mm, split_exponent, keys).map(|graph| graph.nodes)
-}
-
 impl FlowGraph {
     /// The points of a tree, with intermediate ones, from the inlet downstream, and its links.
     ///

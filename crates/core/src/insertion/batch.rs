@@ -2,12 +2,14 @@
 
 use std::cmp::Reverse;
 
+#[cfg(feature = "threads")]
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use crate::insertion::{Command, Move, Simulation};
 use crate::{Error, Result};
 
-/// Simulations that are stepped on all cores, or on the number of threads in `RAYON_NUM_THREADS`.
+/// Simulations that are stepped on all cores, or on the number of threads in `RAYON_NUM_THREADS`;
+/// one after the other without the feature `threads`.
 ///
 /// Each has its own state and shares what clones share: a thousand clones of one simulation contain one vessel.
 /// Results are bitwise those of stepping one after the other.
@@ -92,7 +94,10 @@ impl Batch {
         let mut all: Vec<_> = self.simulations.iter_mut().zip(given).enumerate().collect();
         all.sort_by_cached_key(|(_, (simulation, _))| Reverse(labour(simulation)));
         let step = |(index, (simulation, one))| (index, work(simulation, one));
+        #[cfg(feature = "threads")]
         let mut reported: Vec<_> = all.into_iter().par_bridge().map(step).collect();
+        #[cfg(not(feature = "threads"))]
+        let mut reported: Vec<_> = all.into_iter().map(step).collect();
         reported.sort_by_key(|(index, _)| *index);
         Ok(reported.into_iter().map(|(_, reported)| reported).collect())
     }

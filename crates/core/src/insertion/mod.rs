@@ -14,16 +14,15 @@ mod tally;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::{
-    Command, DetachedCoil, Energy, InstrumentReport, Jump, LateralForce, Move, Sheath, State, StepReport,
-    Surroundings, WallForce,
+    Command, DetachedCoil, InstrumentReport, LateralForce, Move, Sheath, State, StepReport, Surroundings,
+    WallForce,
 };
+pub use crate::methods::{Energy, Jump};
 pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use nodes::nodes_from_tip;
 pub use packing::Packing;
-pub use script::{
-    Condition, Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
-    script_commands,
-};
+pub use script::{Condition, Inject, LineCourse, Until};
+pub use script::{Injection, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, script_commands};
 pub use simulation::Simulation;
 pub use tally::Tally;

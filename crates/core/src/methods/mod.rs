@@ -12,10 +12,12 @@ mod state;
 
 pub use command::{Command, Move};
 pub use detached::DetachedCoil;
-pub use gradient::{Gradient, Margin, Slope};
+pub use gradient::Margin;
+pub use gradient::{Gradient, Slope};
 pub use parameter::Parameter;
 pub(crate) use parameter::{Parts, Together};
-pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
+pub use report::{Energy, Jump};
+pub use report::{InstrumentReport, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
 
@@ -61,14 +63,14 @@ pub struct Surroundings<'a> {
 }
 
 /// Moves of commands, and the time after each, s.
-pub type Timed<'a> = (&'a [Vec<Move>], &'a [f64]);
+pub(crate) type Timed<'a> = (&'a [Vec<Move>], &'a [f64]);
 
 /// Returns true once a long computation is to end; called from any thread.
-pub type Stop = dyn Fn() -> bool + Send + Sync;
+pub(crate) type Stop = dyn Fn() -> bool + Send + Sync;
 
 impl<'a> Surroundings<'a> {
     /// Whether the vessel moves in the step.
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         let [before, after] = self.time_s;
         before != after && self.motion.is_some_and(VesselMotion::changes)
     }

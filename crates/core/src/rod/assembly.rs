@@ -61,7 +61,7 @@ pub struct Assembly<const C: usize> {
 
 impl<const C: usize> Assembly<C> {
     /// Allocates for a rod of `elements` elements.
-    pub fn new(elements: usize) -> Self {
+    pub(crate) fn new(elements: usize) -> Self {
         let n = Layout::<C>::dimension(elements);
         Self {
             matrix: BandMatrix::zeros(n),

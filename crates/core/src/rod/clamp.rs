@@ -55,7 +55,7 @@ impl Clamp {
 
     /// The same for a rod that is stiffer in some planes than in others: F = −n·t − ½t′ᵀBt′ − ½GJτ². Its stiffness B
     /// ([`Material`](super::Material)) and its rest curvature are along the directions of its material triad.
-    pub fn skew_push_force(
+    pub(crate) fn skew_push_force(
         &self,
         material: &Frame,
         stiffness: (f64, [f64; 3]),

@@ -60,7 +60,7 @@ impl Frame {
     }
 
     /// The triad turned about its tangent by `angle`.
-    pub fn turned(&self, angle: f64) -> Self {
+    pub(crate) fn turned(&self, angle: f64) -> Self {
         let (s, c) = libm::sincos(angle);
         Self { t: self.t, u: self.u * c + self.v * s, v: self.v * c - self.u * s }
     }

@@ -24,34 +24,35 @@
 //!
 //! Any consistent units may be used: nothing here assumes millimetres.
 
-pub mod assembly;
+pub(crate) mod assembly;
 mod batch;
 mod bending;
-pub mod clamp;
-pub mod couples;
+pub(crate) mod clamp;
+pub(crate) mod couples;
 pub mod element;
 mod element_torsion;
-pub mod frame;
+pub(crate) mod frame;
 mod invariants;
-pub mod lagrangian;
+pub(crate) mod lagrangian;
 mod lanes;
-pub mod layout;
+pub(crate) mod layout;
 mod play;
-pub mod points;
+pub(crate) mod points;
 pub mod quadrature;
 mod rim;
 pub(crate) mod scatter;
 mod several;
 mod share;
-pub mod state;
-pub mod stencils;
-pub mod supports;
+pub(crate) mod state;
+pub(crate) mod stencils;
+pub(crate) mod supports;
 mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
 pub use couples::{Couple, Link};
-pub use element::{ElementData, Energy, Material};
+pub use element::Energy;
+pub use element::{ElementData, Material};
 pub use frame::Frame;
 pub use lagrangian::{element_energy, element_system};
 pub(crate) use lagrangian::{element_gradients, stored_energy};
@@ -61,10 +62,12 @@ pub use play::Tilt;
 pub(crate) use play::{Side, window};
 pub use points::PointSum;
 pub(crate) use rim::beyond;
-pub use share::{shares, times};
+pub(crate) use share::{shares, times};
 pub use state::RodState;
-pub use stencils::{Stencils, Triple};
-pub use supports::{EndAngle, Supports};
+pub use stencils::Stencils;
+pub use stencils::Triple;
+pub use supports::EndAngle;
+pub use supports::Supports;
 
 #[cfg(test)]
 mod derivative_tests;

@@ -26,12 +26,12 @@ pub struct PointSum {
 
 impl PointSum {
     /// Whether nothing has been added.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         !self.felt
     }
 
     /// Energy of constant gradients, zero where all points are at the device's first node: Σ gᵢ·(xᵢ − x₀).
-    pub fn along(&self, state: &RodState, element: &ElementData, e: usize) -> f64 {
+    pub(crate) fn along(&self, state: &RodState, element: &ElementData, e: usize) -> f64 {
         let start = state.positions[0];
         let [x0, x1] = [e, e + 1].map(|node| state.positions[node] - start);
         let [t0, t1] = [e, e + 1].map(|node| state.frames[node].t * element.length);

@@ -29,7 +29,7 @@ pub struct Point {
 impl Point {
     /// The weights at `xi`.
     #[inline]
-    pub const fn at(xi: f64, weight: f64) -> Self {
+    pub(crate) const fn at(xi: f64, weight: f64) -> Self {
         Self {
             xi,
             weight,

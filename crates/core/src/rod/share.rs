@@ -8,7 +8,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Weights of the Gauss points in the integral over a part of an element, as multiples of their weights over all of
 /// it.
-pub fn shares(from: f64, to: f64) -> [f64; 3] {
+pub(crate) fn shares(from: f64, to: f64) -> [f64; 3] {
     let power = |n: i32| (to.powi(n) - from.powi(n)) / f64::from(n);
     let [a, b, c] = GAUSS.map(|point| point.xi);
     // ∫ (ξ − p)(ξ − q) over the part.
@@ -21,7 +21,7 @@ pub fn shares(from: f64, to: f64) -> [f64; 3] {
 }
 
 /// A moment: the stiffness B = EI + (p c; c q) of a cross-section times a curvature along d₁ and d₂.
-pub fn times((bending, [p, q, c]): (f64, [f64; 3]), [u, v]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn times((bending, [p, q, c]): (f64, [f64; 3]), [u, v]: [f64; 2]) -> [f64; 2] {
     [bending * u + (p * u + c * v), bending * v + (c * u + q * v)]
 }
 

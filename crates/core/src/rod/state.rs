@@ -66,7 +66,7 @@ impl RodState {
     }
 
     /// Computes all node positions from the first node and the chords of these elements.
-    pub fn place(&mut self, elements: &[ElementData]) {
+    pub(crate) fn place(&mut self, elements: &[ElementData]) {
         for (e, data) in elements.iter().enumerate() {
             self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;
         }
@@ -215,7 +215,13 @@ impl RodState {
     /// chords and positions follow. So a state that satisfies the constraints stays on the constraint manifold for
     /// any step length, and the energy along the step is the potential energy itself. Constant curvature is
     /// reproduced exactly: one full step solves a pure end moment of any size.
-    pub fn advance<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64], alpha: f64) {
+    pub(crate) fn advance<const C: usize>(
+        &mut self,
+        elements: &[ElementData],
+        base: &Self,
+        d: &[f64],
+        alpha: f64,
+    ) {
         let l = Layout::<C>;
         let k = Layout::<C>::ANGLES;
         for i in 0..base.frames.len() {

@@ -46,7 +46,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     ///
     /// # Errors
     /// As [`SceneOf::centreline`] and [`BloodFlow::new`].
-    pub fn flow(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<Option<BloodFlow>> {
+    pub(crate) fn flow(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<Option<BloodFlow>> {
         let Some(flow) = &self.vessel.flow else { return Ok(None) };
         let tree = self.known_or(store, || lumen.wall(store).cloned())?;
         BloodFlow::new(tree, flow).map(Some)

@@ -61,4 +61,5 @@ mod tables;
 
 pub use sac::SacSpec;
 pub use spec::{Scene, SceneOf};
-pub use tables::{DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
+pub use tables::SheathSpec;
+pub use tables::{DeviceSpec, InstrumentSpec, VesselSpec};

@@ -375,7 +375,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     ///
     /// # Errors
     /// A length greater than the instrument's, and instruments that cannot be inserted together by these lengths.
-    pub fn inserted_mm(&self, stack: &Stack) -> Result<Vec<f64>> {
+    pub(crate) fn inserted_mm(&self, stack: &Stack) -> Result<Vec<f64>> {
         let mut lengths_mm = vec![0.0; stack.instruments().len()];
         for (index, (spec, device)) in self.instrument.iter().zip(stack.devices()).enumerate() {
             if !(0.0..=device.length_mm()).contains(&spec.inserted_mm) {

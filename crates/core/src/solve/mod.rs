@@ -5,13 +5,13 @@
 //! contacts within a step, the descent from saddle points, and unsymmetric stiffness.
 
 pub(crate) mod contacts;
-pub mod external;
+pub(crate) mod external;
 mod factors;
 mod krylov;
 mod line_search;
 pub(crate) mod neighbourhood;
-pub mod newton;
-pub mod report;
+pub(crate) mod newton;
+pub(crate) mod report;
 mod residual;
 mod saddle;
 mod shift;
@@ -20,13 +20,16 @@ mod together;
 mod trial;
 mod unsymmetric;
 
-pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
+pub use external::{ContactMerit, Moved};
+pub use external::{Contacts, External, Sizes};
 pub(crate) use krylov::gmres;
 pub(crate) use neighbourhood::Neighbourhood;
 pub use newton::Newton;
-pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
+pub use report::NewtonOptions;
+pub use report::StepRecord;
+pub use report::{NewtonReport, StopReason};
 pub use residual::ResidualSize;
-pub use together::Together;
+pub(crate) use together::Together;
 
 #[cfg(test)]
 pub(crate) mod newton_tests;

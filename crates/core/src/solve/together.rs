@@ -4,7 +4,7 @@ use super::external::{Contacts, External, Sizes};
 use crate::rod::{ElementData, RodState, Stencils};
 
 /// External energies that act together: loads, a wall, and self-contact of the rod; those that there are.
-pub struct Together<'a, const N: usize>(pub [Option<&'a mut dyn External>; N]);
+pub(crate) struct Together<'a, const N: usize>(pub [Option<&'a mut dyn External>; N]);
 
 impl<const N: usize> External for Together<'_, N> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {

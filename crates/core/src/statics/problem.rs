@@ -161,7 +161,7 @@ impl StaticProblem {
 
     /// The same in fields, whose units of length and energy are those of the case. They act in full in all load steps, and are no part of the energies of the
     /// solution.
-    pub fn solve_in(&self, fields: &[Arc<dyn Field>]) -> Result<Solved> {
+    pub(crate) fn solve_in(&self, fields: &[Arc<dyn Field>]) -> Result<Solved> {
         let solved = by_angles!(self.angles, self.run(fields));
         let energy = &solved.energy;
         if self.angles > 0

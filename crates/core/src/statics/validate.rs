@@ -133,7 +133,7 @@ fn check_sections(list: &str, sections: &[Section]) -> Result<()> {
 
 impl StaticCase {
     /// Checks every value, and that none contradicts another.
-    pub fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         if self.rod.instrument.is_empty() {
             positive("rod.length", self.rod.length)?;
         }
@@ -224,6 +224,7 @@ impl StaticCase {
 
     /// The surface of a rod that touches itself.
     fn check_surface(&self, surface: &Surface) -> Result<()> {
+        crate::contact::pairs::check_built("self_contact")?;
         positive("self_contact.radius", surface.radius)?;
         let most = self.rod.line_length() / LEAST_SLENDERNESS;
         if surface.radius > most {

@@ -39,7 +39,7 @@ pub struct ContactTuning {
 
 impl ContactTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         follow: 0.5,
         look_again: 0.5,
         look_mm: 0.5,

@@ -36,7 +36,7 @@ pub struct FrictionTuning {
 
 impl FrictionTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         stick: 1e-3,
         stick_at_rest: 0.3,
         least_at_rest: 0.01,

@@ -19,7 +19,7 @@ pub struct MeshTuning {
 
 impl MeshTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         largest_turn_rad: 0.5,
         alike: 0.25,
         alike_rad: 0.1,

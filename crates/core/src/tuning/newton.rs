@@ -93,7 +93,7 @@ pub struct NewtonTuning {
 
 impl NewtonTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         largest_turn_rad: 1.4,
         trials: 24,
         lengthening: 2.0,

@@ -55,7 +55,7 @@ pub struct PairTuning {
 
 impl PairTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         spacing_radii: 0.5,
         shoulder: 0.1,
         near: 1.5,

@@ -19,7 +19,7 @@ pub struct PassageTuning {
 
 impl PassageTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         wedged: 0.5,
         front: 60,
         spacings: [0.25, 0.0625],

@@ -77,7 +77,7 @@ pub struct StepTuning {
 
 impl StepTuning {
     /// The numbers the method is tested with.
-    pub const DEFAULT: Self = Self {
+    pub(crate) const DEFAULT: Self = Self {
         fold_mm: 0.05,
         snap_radii: 2.0,
         held_mm: 0.5,
@@ -118,7 +118,7 @@ impl StepTuning {
     ///
     /// All parts count, whether they are accepted or thrown away, with those in which the device moves to where it
     /// rests, and `of_a_part` for each. The Newton iteration in progress is finished.
-    pub fn most_solves(&self, motion_mm: f64) -> usize {
+    pub(crate) fn most_solves(&self, motion_mm: f64) -> usize {
         self.solves.saturating_add((self.solves_per_mm * motion_mm.min(self.solves_up_to_mm)) as usize)
     }
 }

@@ -213,6 +213,7 @@ impl CentrelineTree {
             let nodes = swc::parse(&String::from_utf8_lossy(&text::without_mark(bytes)));
             return nodes.and_then(Self::of_nodes).map_err(bad);
         }
+        line_files::check_built(path)?;
         match line_files::read(bytes, path) {
             Some(lines) => lines.and_then(|lines| Self::of_lines(&lines)).map_err(bad),
             None => Self::parse(&String::from_utf8_lossy(&text::without_mark(bytes))).map_err(bad),

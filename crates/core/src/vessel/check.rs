@@ -160,7 +160,7 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
 ///
 /// # Errors
 /// As [`check`], and [`Error::Parameter`] for a thickness that is not a number of 0 or more.
-pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result<CheckReport> {
+pub(crate) fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result<CheckReport> {
     check_repaired(surface, unit_mm, septum_mm, &RepairOptions::default())
 }
 

@@ -2,122 +2,73 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
-
 use super::CentrelineNode;
-use super::files::{PatientAxes, vtp_lines};
-use crate::Vec3;
+use crate::{Error, Result};
+
+/// The points of each line, or what is wrong with them.
+pub(super) type Lines = std::result::Result<Vec<Vec<CentrelineNode>>, String>;
 
 /// Names of radii, in lower case.
+#[cfg(any(feature = "markups", feature = "vtp"))]
 const RADIUS: [&str; 2] = ["maximuminscribedsphereradius", "radius"];
 /// What to do about a line without radii.
-const NO_RADII: &str = "it has no radii, and the vessel would have no width: write it with them, as VMTK's vmtkcenterlines and 3D \
+#[cfg(any(feature = "markups", feature = "vtp"))]
+pub(super) const NO_RADII: &str = "it has no radii, and the vessel would have no width: write it with them, as VMTK's vmtkcenterlines and 3D \
                         Slicer's Extract Centerline do (MaximumInscribedSphereRadius, Radius)";
 
 /// Whether this is the name of an array of radii.
+#[cfg(any(feature = "markups", feature = "vtp"))]
 pub(super) fn is_radius(name: &str) -> bool {
     RADIUS.contains(&name.to_lowercase().as_str())
 }
 
+/// Whether this build reads files of this kind.
+///
+/// # Errors
+/// [`Error::Feature`] if not.
+pub(super) fn check_built(path: &Path) -> Result<()> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let (feature, is_on) = match extension.as_str() {
+        "vtp" => ("vtp", cfg!(feature = "vtp")),
+        "json" => ("markups", cfg!(feature = "markups")),
+        _ => return Ok(()),
+    };
+    if is_on { Ok(()) } else { Err(Error::feature(feature, path.display())) }
+}
+
 /// The lines of a file of these kinds, by its extension, in the axes of scenes; `None` for a table.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Option<Result<Vec<Vec<CentrelineNode>>, String>> {
+#[cfg_attr(
+    not(any(feature = "markups", feature = "vtp")),
+    allow(unused_variables, reason = "no kind is left that is read")
+)]
+pub(super) fn read(bytes: &[u8], path: &Path) -> Option<Lines> {
     let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
     match extension.as_str() {
+        #[cfg(feature = "vtp")]
         "vtp" => Some(vtp(bytes)),
-        "json" => Some(markups(bytes)),
+        #[cfg(feature = "markups")]
+        "json" => Some(super::markups::curves(bytes)),
         "vtk" => Some(Err("lines are read from .vtp files: write it as one (VMTK: -ofile line.vtp)".into())),
         _ => None,
     }
 }
 
-fn vtp(bytes: &[u8]) -> Result<Vec<Vec<CentrelineNode>>, String> {
-    let lines = vtp_lines(bytes, is_radius)?;
-    let node =
-        |(position_mm, radius_mm): (Vec3, f64)| CentrelineNode { position_mm, radius_mm, parent: None };
+#[cfg(feature = "vtp")]
+fn vtp(bytes: &[u8]) -> Lines {
+    let lines = super::files::vtp_lines(bytes, is_radius)?;
+    let node = |(position_mm, radius_mm): (crate::Vec3, f64)| CentrelineNode {
+        position_mm,
+        radius_mm,
+        parent: None,
+    };
     lines
         .into_iter()
         .map(|line| {
             let points = line.into_iter().map(|(place, radius)| Some((place, radius?)));
-            let points: Option<Vec<(Vec3, f64)>> = points.collect();
+            let points: Option<Vec<(crate::Vec3, f64)>> = points.collect();
             Ok(points.ok_or(NO_RADII)?.into_iter().map(node).collect())
         })
         .collect()
-}
-
-/// A markups file, as far as it is read.
-#[derive(Deserialize)]
-struct Markups {
-    markups: Vec<Markup>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Markup {
-    coordinate_system: Option<String>,
-    coordinate_units: Option<serde_json::Value>,
-    #[serde(default)]
-    control_points: Vec<ControlPoint>,
-    #[serde(default)]
-    measurements: Vec<Measurement>,
-}
-
-#[derive(Deserialize)]
-struct ControlPoint {
-    position: Option<[f64; 3]>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Measurement {
-    #[serde(default)]
-    name: String,
-    #[serde(default)]
-    control_point_values: Vec<f64>,
-}
-
-/// The curves of 3D Slicer's markups, with their measurement `Radius`.
-fn markups(bytes: &[u8]) -> Result<Vec<Vec<CentrelineNode>>, String> {
-    let file: Markups = serde_json::from_slice(bytes)
-        .map_err(|error| format!("is no markups file of 3D Slicer that can be read: {error}"))?;
-    let mut lines = Vec::new();
-    for (number, markup) in file.markups.iter().enumerate() {
-        if let Some(unit) = markup.coordinate_units.as_ref().and_then(serde_json::Value::as_str)
-            && unit != "mm"
-        {
-            return Err(format!("markup {number}: coordinateUnits = {unit:?}: write it in mm"));
-        }
-        let axes: PatientAxes = match markup.coordinate_system.as_deref() {
-            None => PatientAxes::Lps,
-            Some(name) => name
-                .parse()
-                .map_err(|_| format!("markup {number}: coordinateSystem = {name:?}: must be LPS or RAS"))?,
-        };
-        // Points that are not placed have no position.
-        let places: Vec<Vec3> =
-            markup.control_points.iter().filter_map(|p| p.position).map(Vec3::from).collect();
-        if places.len() < 2 {
-            continue;
-        }
-        let radii = markup.measurements.iter().find(|one| is_radius(&one.name)).ok_or(NO_RADII)?;
-        let radii = &radii.control_point_values;
-        if radii.len() != places.len() {
-            return Err(format!(
-                "markup {number}: {} control points have {} radii: write both again",
-                places.len(),
-                radii.len()
-            ));
-        }
-        let node = |(place, radius): (&Vec3, &f64)| CentrelineNode {
-            position_mm: axes.to_lps(*place),
-            radius_mm: *radius,
-            parent: None,
-        };
-        lines.push(places.iter().zip(radii).map(node).collect());
-    }
-    match lines.is_empty() {
-        true => Err("holds no curve of two points or more".into()),
-        false => Ok(lines),
-    }
 }
 
 #[cfg(test)]

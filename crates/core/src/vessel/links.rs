@@ -79,13 +79,13 @@ impl CentrelineTree {
     }
 
     /// The row that a leaf joins, if it does.
-    pub fn joined_by(&self, row: usize) -> Option<usize> {
+    pub(crate) fn joined_by(&self, row: usize) -> Option<usize> {
         let found = self.links.binary_search_by_key(&row, |link| link.row).ok()?;
         Some(self.links[found].joins)
     }
 
     /// The rows next to each row: its parent, its children, and those that links join it to.
-    pub fn neighbours(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn neighbours(&self) -> Vec<Vec<usize>> {
         let mut beside = vec![Vec::new(); self.nodes().len()];
         let sides = self.nodes().iter().enumerate().filter_map(|(row, node)| Some((row, node.parent?)));
         for (a, b) in sides.chain(self.links.iter().map(|link| (link.row, link.joins))) {

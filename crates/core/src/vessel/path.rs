@@ -115,7 +115,7 @@ impl CentrelinePath {
 
     /// The point at an arc length from the inlet, and the radius there, linear between points, mm; beyond the end,
     /// the end.
-    pub fn place(&self, mut arc_mm: f64) -> (Vec3, f64) {
+    pub(crate) fn place(&self, mut arc_mm: f64) -> (Vec3, f64) {
         for pair in self.points.windows(2) {
             let piece = pair[1].0 - pair[0].0;
             let length = piece.norm();

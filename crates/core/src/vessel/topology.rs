@@ -1,7 +1,7 @@
 //! Triangles at the edges of a mesh.
 
 /// Marks an edge without a single partner: open, or shared by more than two triangles.
-pub const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// One use of an undirected edge by a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

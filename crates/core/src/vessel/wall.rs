@@ -6,7 +6,7 @@ use super::in_front::Ends;
 use super::mesh::retain_numbered;
 use super::opening::{self, Boundary, Opening};
 use super::repairs::{Repair, RepairKind, RepairMode, RepairOptions, named};
-pub use super::topology::NONE as NO_NEIGHBOUR;
+pub(crate) use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;
 use super::{SurfaceMesh, far, orient, repair, sliver};
@@ -332,7 +332,7 @@ impl Wall {
     }
 
     /// For every triangle, the one across each of its sides (side k runs from corner k to the next), or [`NO_NEIGHBOUR`].
-    pub fn neighbours(&self) -> Vec<[u32; 3]> {
+    pub(crate) fn neighbours(&self) -> Vec<[u32; 3]> {
         EdgeTable::new(&self.mesh.triangles).neighbours(self.mesh.triangles.len())
     }
 

@@ -54,7 +54,7 @@ fn behind_the_surface_the_distance_goes_on_as_in_front() {
     for i in 0..200 {
         // Across the surface.
         let (x, front) = from_inside(&wall, i, 0.0);
-        let n = front.normal();
+        let n = front.gradient / front.gradient.norm();
         let x = x - n * front.value_mm;
         let triangle = wall.1.nearest(&x, 10.0).unwrap().triangle;
         let (front, back) =

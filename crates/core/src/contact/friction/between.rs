@@ -33,7 +33,7 @@ use crate::tuning::FrictionTuning;
 
 /// Friction of one instrument on the next one outside it at a node, at the end of the last step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct InnerFriction {
+pub(crate) struct InnerFriction {
     /// Component along the line, against the slip, as a fraction of the largest friction.
     pub along: f64,
     /// Component around the line: by Coulomb's law the squares of both sum to 1 where one slips, and to less where it
@@ -45,7 +45,7 @@ pub struct InnerFriction {
 
 /// A node with friction between two instruments.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub(crate) struct Place {
     /// The node.
     pub node: usize,
     /// The inner instrument.
@@ -74,7 +74,7 @@ pub struct Place {
 
 impl Place {
     /// A node of two instruments, with slip and normal force still unknown.
-    pub fn new((node, inner, outer): (usize, usize, usize), coefficient: f64, radius_mm: f64) -> Self {
+    pub(crate) fn new((node, inner, outer): (usize, usize, usize), coefficient: f64, radius_mm: f64) -> Self {
         Self {
             node,
             inner,
@@ -118,7 +118,7 @@ impl Place {
     }
 
     /// First and second derivative of D in ϑ, N·mm.
-    pub fn couple(&self, state: &RodState) -> (f64, f64) {
+    pub(crate) fn couple(&self, state: &RodState) -> (f64, f64) {
         let (around, slip) = self.slip_mm(state);
         let (over, second) = rates(slip, self.stick_mm);
         let part = if slip > 0.0 { around / slip } else { 0.0 };
@@ -129,7 +129,7 @@ impl Place {
 
 /// Friction between instruments in one step.
 #[derive(Debug, Clone, Default)]
-pub struct Between {
+pub(crate) struct Between {
     places: Vec<Place>,
     tuning: FrictionTuning,
 }

@@ -68,7 +68,7 @@ impl Capsule {
     pub(crate) const NONE: Self = Self { radius_mm: 0.0, modulus_n_per_mm2: 0.0 };
 
     /// A practically rigid surface of a rod of this radius, mm, and bending stiffness, N·mm².
-    pub fn rigid(radius_mm: f64, bending_nmm2: f64) -> Self {
+    pub(crate) fn rigid(radius_mm: f64, bending_nmm2: f64) -> Self {
         Self { radius_mm, modulus_n_per_mm2: Self::RIGID * bending_nmm2 / radius_mm.powi(4) }
     }
 }
@@ -161,9 +161,20 @@ pub struct SelfContact {
     contacts: ContactTuning,
 }
 
+/// Whether this build has what rods that touch themselves need; `what` asks for it.
+///
+/// # Errors
+/// [`crate::Error::Feature`] if not.
+pub(crate) fn check_built(what: &str) -> crate::Result<()> {
+    match cfg!(feature = "self-contact") {
+        true => Ok(()),
+        false => Err(crate::Error::feature("self-contact", what)),
+    }
+}
+
 impl SelfContact {
     /// For a rod with these elements and their surfaces.
-    pub fn new(elements: &[ElementData], capsules: Vec<Capsule>) -> Self {
+    pub(crate) fn new(elements: &[ElementData], capsules: Vec<Capsule>) -> Self {
         let mut contact = Self::default();
         contact.renew(elements, capsules);
         contact

@@ -12,10 +12,13 @@ mod run;
 mod tests;
 mod until;
 
-pub use inject::{Inject, Injection};
+pub use inject::Inject;
+pub use inject::Injection;
 pub use line::ScriptLine;
-pub use run::{LineCourse, ScriptCourse, ScriptRun, Step};
-pub use until::{Condition, Met, Until};
+pub use run::LineCourse;
+pub use run::{ScriptCourse, ScriptRun, Step};
+pub use until::Met;
+pub use until::{Condition, Until};
 
 use super::simulation::check_command;
 use super::{Command, Move};

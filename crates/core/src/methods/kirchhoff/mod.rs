@@ -167,7 +167,7 @@ const POINT_LIMIT: usize = 1_000_000;
 const ELEMENT_LIMIT: f64 = 100_000.0;
 
 /// The exact rod as an insertion method, with or without material angles.
-pub struct Kirchhoff<const C: usize> {
+pub(crate) struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
     surface: Arc<ContactSurface>,
     state: Arc<KirchhoffState>,
@@ -253,7 +253,7 @@ impl<const C: usize> Kirchhoff<C> {
     ///
     /// # Errors
     /// An element length that is not positive or leads to too many elements.
-    pub fn new(
+    pub(crate) fn new(
         options: KirchhoffOptions,
         surroundings: &Surroundings<'_>,
         store: &dyn WallStore,
@@ -281,6 +281,9 @@ impl<const C: usize> Kirchhoff<C> {
                 "makes {points} contact points along the device, and more than {POINT_LIMIT} take gigabytes: allow them farther apart"
             );
             return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, remedy));
+        }
+        if options.self_contact {
+            crate::contact::pairs::check_built("method.self_contact = true")?;
         }
         if options.self_contact && surroundings.motion.is_some() {
             let remedy =

@@ -19,6 +19,7 @@ use crate::text;
 use crate::{Error, Result, Vec3};
 use frame::ToldAxes;
 pub use frame::{PatientAxes, SurfaceFrame};
+#[cfg(feature = "vtp")]
 pub(super) use vtk::parse_lines as vtp_lines;
 
 /// The supported formats, for messages.
@@ -48,6 +49,7 @@ enum Format {
     Obj,
     Ply,
     /// VTK's XML format.
+    #[cfg(feature = "vtp")]
     Vtp,
     /// VTK's older format.
     Vtk,
@@ -60,6 +62,7 @@ impl Format {
             "stl" => Self::Stl,
             "obj" => Self::Obj,
             "ply" => Self::Ply,
+            #[cfg(feature = "vtp")]
             "vtp" => Self::Vtp,
             "vtk" => Self::Vtk,
             _ => return None,
@@ -72,8 +75,8 @@ impl Format {
             (b"ply\n", Some(Self::Ply), "PLY files (.ply) do"),
             (b"ply\r", Some(Self::Ply), "PLY files (.ply) do"),
             (b"# vtk DataFile", Some(Self::Vtk), "legacy VTK files (.vtk) do"),
-            (b"<VTKFile", Some(Self::Vtp), "VTK's XML files (.vtp) do"),
-            (b"<?xml", Some(Self::Vtp), "XML files, such as .vtp, do"),
+            (b"<VTKFile", Self::of_extension("vtp"), "VTK's XML files (.vtp) do"),
+            (b"<?xml", Self::of_extension("vtp"), "XML files, such as .vtp, do"),
         ];
         // A binary STL has any title, and a count that fits its size.
         let count = bytes.get(80..84).and_then(|count| count.try_into().ok()).map(u32::from_le_bytes);
@@ -90,6 +93,7 @@ fn format_of(path: &Path) -> Result<Format> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
         Some("swc") => Err(Error::content(path, "is a centre line, no surface: give it as vessel.tree")),
+        Some("vtp") if !cfg!(feature = "vtp") => Err(Error::feature("vtp", path.display())),
         Some(name) => Format::of_extension(name)
             .ok_or_else(|| Error::content(path, format!("unknown mesh format .{name}; {KNOWN}"))),
         None => Err(Error::content(path, format!("no extension tells the mesh format; {KNOWN}"))),
@@ -152,7 +156,7 @@ impl SurfaceMesh {
             Format::Stl => stl::bytes(self),
             Format::Obj => obj::bytes(self),
             Format::Ply => ply::bytes(self),
-            Format::Vtp | Format::Vtk => {
+            _ => {
                 return Err(Error::content(path, format!("this format is read, not written; {WRITTEN}")));
             }
         };
@@ -172,6 +176,7 @@ fn parse(format: Format, bytes: &[u8]) -> std::result::Result<Parsed, Reason> {
         Format::Stl => stl::parse(&bytes),
         Format::Obj => obj::parse(&bytes),
         Format::Ply => ply::parse(&bytes),
+        #[cfg(feature = "vtp")]
         Format::Vtp => vtk::parse_xml(&bytes),
         Format::Vtk => vtk::parse_legacy(&bytes),
     };

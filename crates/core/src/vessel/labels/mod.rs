@@ -29,7 +29,8 @@ pub use map::LabelMap;
 use mask::Mask;
 use net::Net;
 pub use options::{Ends, LabelOptions, Parts};
-pub use report::{LabelEnd, LabelReport};
+pub use report::LabelEnd;
+pub use report::LabelReport;
 use smooth::Lattice;
 
 /// Half of the side of the box in which a vertex of the surface may be moved, in voxels.

@@ -25,9 +25,11 @@ mod mode;
 #[cfg(test)]
 mod tests;
 
-pub use displacement::{Displacement, Local};
+pub use displacement::Displacement;
+pub use displacement::Local;
 pub use fade::Around;
-pub use mode::{MotionMode, Turn, Waveform};
+pub use mode::Turn;
+pub use mode::{MotionMode, Waveform};
 
 use crate::error::number;
 use crate::{Error, Result, Vec3};

@@ -19,6 +19,7 @@ mod seams;
 #[cfg(test)]
 mod shapes;
 mod sheets;
+#[cfg_attr(not(feature = "union"), path = "no_solid.rs")]
 mod solid;
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::contents::LumenOf;
 use super::holes::Rim;
-use super::solid::{Closed, Solid};
+use super::solid::Solid;
 use crate::vessel::crossings::Crossings;
 use crate::vessel::mesh::retain_numbered;
 use crate::vessel::opening::{self, Boundary};
@@ -29,6 +29,13 @@ const OPEN: f64 = 0.5;
 const MOSTLY: f64 = 0.5;
 /// Number of pieces above which no rims are compared: a vessel in parts has fewer.
 const MOST_PIECES: usize = 64;
+
+/// Closed triangles, each with a number that its parts keep.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Closed {
+    pub(super) vertices_mm: Vec<Vec3>,
+    pub(super) triangles: Vec<([u32; 3], u32)>,
+}
 
 /// The pieces of a mesh, and which of them overlap.
 pub(super) struct Overlaps {
@@ -283,6 +290,10 @@ impl Overlaps {
             Some(self.piece_of[t]).filter(|p| members.contains(p))
         });
         let places: Vec<String> = each.iter().map(ToString::to_string).collect();
+        if !cfg!(feature = "union") {
+            let (count, places) = (members.len(), places.join(", "));
+            return Error::feature("union", format!("uniting {count} parts that overlap ({places})"));
+        }
         Error::Mesh(format!(
             "{} parts overlap without being joined, and could not be united: {}; unite them in a program for meshes (\"boolean \
              union\"), or move them apart",

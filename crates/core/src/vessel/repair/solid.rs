@@ -3,14 +3,8 @@
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{BooleanEngine, Error as Status, MeshGL64, OpType};
 
+use super::overlap::Closed;
 use crate::Vec3;
-
-/// Closed triangles, each with a number that its parts keep.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Closed {
-    pub(super) vertices_mm: Vec<Vec3>,
-    pub(super) triangles: Vec<([u32; 3], u32)>,
-}
 
 /// A closed part on its way through unions and differences.
 pub(super) struct Solid(Manifold);

@@ -52,8 +52,10 @@ mod straightening;
 #[cfg(test)]
 mod tests;
 
-pub use spec::{YieldingBranch, YieldingEnds, YieldingPreset, YieldingSpec, YieldingTether};
-pub use straightening::{BeforeAfter, Landmark, Straightening, Stretch};
+pub use spec::YieldingSpec;
+pub use spec::{YieldingBranch, YieldingEnds, YieldingPreset, YieldingTether};
+pub use straightening::BeforeAfter;
+pub use straightening::{Landmark, Straightening, Stretch};
 
 use std::sync::Arc;
 

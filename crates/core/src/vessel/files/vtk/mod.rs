@@ -3,15 +3,19 @@
 //! Own implementation, because the crate for them (vtkio 0.6) aborts on damaged files, and supports neither padded
 //! parts of base64 nor the cells of legacy files since version 5.
 
+#[cfg(feature = "vtp")]
 mod arrays;
 mod legacy;
+#[cfg(feature = "vtp")]
 mod xml;
 
 use super::Reason;
 use super::faces::Faces;
 use super::scalar::index;
 pub(super) use legacy::parse as parse_legacy;
+#[cfg(feature = "vtp")]
 pub(super) use xml::parse as parse_xml;
+#[cfg(feature = "vtp")]
 pub(in crate::vessel) use xml::parse_lines;
 
 /// What to do about data that are not a surface.
@@ -80,5 +84,5 @@ impl Cells {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "vtp"))]
 mod tests;
