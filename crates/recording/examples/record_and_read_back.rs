@@ -23,7 +23,7 @@ pub(crate) fn main() -> endowire_core::Result<()> {
     recorder.finish(&mut summary)?;
 
     let recording = Recording::read(folder)?;
-    let largest_n = recording.rows()?.iter().map(|row| row.push_force_n).fold(0.0, f64::max);
+    let largest_n = recording.rows().iter().map(|row| row.push_force_n).fold(0.0, f64::max);
     println!("{} steps, {largest_n:.4} N at most", recording.steps());
     println!("tip at the end: {:?} mm", recording.shape(recording.steps()).tip_mm());
     Ok(())

@@ -49,13 +49,14 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::Environment;
 use super::configuration::{Configuration, Start};
+use super::mesh::Mesh;
 use super::part::{Effort, Limits, Lost};
 use super::search::{Beginning, Bounds, Judged, Lagged, Search, Searched};
 use super::state::KirchhoffState;
 use super::substep::Attempt;
 use super::workspace::Tools;
 use crate::Vec3;
-use crate::contact::{Friction, HandMotion, Reaction};
+use crate::contact::{Friction, HandMotion, Reaction, Touch};
 use crate::rod::scatter::{angle_weights, point_columns};
 use crate::rod::{Layout, RodState};
 use crate::solve::StopReason;
@@ -468,6 +469,33 @@ impl Pulls {
 }
 
 impl<const C: usize> Tools<C> {
+    /// Searches from where a device that was in equilibrium in `before` is after this motion.
+    fn search_on(
+        &mut self,
+        environment: &Environment<'_>,
+        (mesh, rod, touches): (&Mesh, &mut RodState, &mut Vec<(usize, Touch)>),
+        bounds: Bounds,
+        (before, way): (&RodState, &[f64]),
+        judged: &Judged<'_>,
+    ) -> Searched {
+        let elements = &mesh.elements;
+        let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
+            state.advance::<C>(elements, before, way, 1.0);
+            state.take_tensions::<C>(elements, before, way);
+            if contact.is_outside(elements, state) {
+                state.copy_from(before);
+            }
+            contact.rooms(elements, state, &mut guess.room_mm);
+            newton.neighbourhood.begin(state, &guess.room_mm, &environment.options.tuning.newton);
+            Ok::<_, Infallible>(())
+        };
+        let stack = environment.surroundings.stack;
+        let Ok(found) = self.with_search(environment, (mesh, stack, rod), bounds, begin, |search, lagged| {
+            search.searched(lagged, judged, touches)
+        });
+        found
+    }
+
     /// Lets the course follow an equilibrium of the device, and the device the course, until both are in equilibrium.
     pub(super) fn follow_course(
         &mut self,
@@ -477,7 +505,6 @@ impl<const C: usize> Tools<C> {
         next: &mut Configuration,
     ) -> Searched {
         let tuning = &environment.options.tuning;
-        let stack = environment.surroundings.stack;
         let most_mm = course.most_mm(environment);
         let (mesh, after) = next.parts();
         let KirchhoffState { rod, touches, .. } = after;
@@ -538,28 +565,16 @@ impl<const C: usize> Tools<C> {
                     resumed: None,
                     moved_mm: Some(moved_mm),
                 };
-                let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
-                    state.advance::<C>(elements, &before, &way, 1.0);
-                    state.take_tensions::<C>(elements, &before, &way);
-                    if contact.is_outside(elements, state) {
-                        state.copy_from(&before);
-                    }
-                    contact.rooms(elements, state, &mut guess.room_mm);
-                    newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
-                    Ok::<_, Infallible>(())
-                };
                 let judged =
                     Judged { course: Some((course, most_mm)), before: 0, may_snap: may_snap || is_flight };
                 let mut search = |effort: Effort, taken: (usize, usize)| {
-                    let bounds = bounds(effort, taken);
-                    let Ok(found) = self.with_search(
+                    self.search_on(
                         &there,
-                        (mesh, stack, &mut *rod),
-                        bounds,
-                        begin,
-                        |search, lagged| search.searched(lagged, &judged, touches),
-                    );
-                    found
+                        (mesh, rod, touches),
+                        bounds(effort, taken),
+                        (&before, &way),
+                        &judged,
+                    )
                 };
                 // With friction that follows; a device in flight may snap once more.
                 let again = search(Effort::Near, searched.taken);

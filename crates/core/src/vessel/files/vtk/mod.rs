@@ -84,5 +84,6 @@ impl Cells {
     }
 }
 
-#[cfg(all(test, feature = "vtp"))]
+#[cfg(test)]
+#[cfg(feature = "vtp")]
 mod tests;
