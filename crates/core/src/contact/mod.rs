@@ -29,6 +29,7 @@ pub use cache::{ContactCache, KnownPoints};
 pub use distance::{Distance, Nearness, SmoothWall};
 pub use drag::Drag;
 pub(crate) use friction::stick_mm;
+pub(crate) use friction::CarriedSlopes;
 pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place};
 pub use moved::MovedWall;
 pub use pairs::{Capsule, SelfContact, Touching};
@@ -40,7 +41,7 @@ pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
 pub use regions::RegionMap;
 pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
-pub(crate) use wall::Reaction;
+pub(crate) use wall::{BySpace, FrictionSlopes, PressingSlopes, Reaction};
 pub use wall::WallContact;
 pub(crate) use wall::least_force_n;
 

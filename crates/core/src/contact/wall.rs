@@ -19,6 +19,7 @@ mod friction;
 mod passing;
 mod reactions;
 mod reading;
+mod slopes;
 
 use super::cache::ContactCache;
 use super::point::{Contact, ContactPoint, Counters, Touch};
@@ -32,6 +33,7 @@ use crate::solve::{Contacts, External, Sizes};
 pub(super) use clear::Span;
 pub(super) use contacts::PointPlace;
 pub(crate) use reactions::Reaction;
+pub(crate) use slopes::{BySpace, FrictionSlopes, PressingSlopes};
 use reading::Reading;
 
 /// Force scale of a device of this bending stiffness, N·mm², bent to this radius, mm, N.

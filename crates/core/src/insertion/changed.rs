@@ -57,6 +57,16 @@ impl Simulation {
 
     /// Derivatives of what commands would lead to until these times.
     fn derivatives(&self, (commands, times_s): Timed<'_>, by: &[Together]) -> Result<Vec<Gradient>> {
+        self.check_times((commands, times_s))?;
+        let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
+        self.method.gradients(&surroundings!(self, self.time_s), (commands, times_s), by, &checked)
+    }
+
+    /// Checks the times after commands.
+    ///
+    /// # Errors
+    /// Another number of times, and times that are not in their order.
+    pub(super) fn check_times(&self, (commands, times_s): Timed<'_>) -> Result<()> {
         if times_s.len() != commands.len() {
             let remedy = format!("there are {} commands: give one for each", commands.len());
             return Err(Error::parameter("gradient.times_s", format!("{} times", times_s.len()), remedy));
@@ -70,8 +80,7 @@ impl Simulation {
             }
             last_s = *time_s;
         }
-        let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
-        self.method.gradients(&surroundings!(self, self.time_s), (commands, times_s), by, &checked)
+        Ok(())
     }
 
     /// The same simulation, in the same state, where parameters of the scene have other values; the moduli of regions of the wall

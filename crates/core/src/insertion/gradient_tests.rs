@@ -40,10 +40,10 @@ fn stack(several: bool) -> Stack {
 
 /// A vessel with instruments.
 #[derive(Debug, Clone, Copy)]
-struct Scene {
+pub(super) struct Scene {
     tree: &'static str,
     several: bool,
-    friction: f64,
+    pub(super) friction: f64,
     /// Whether the vessel moves, by a step in a tenth of a second.
     moves: bool,
 }
@@ -63,7 +63,7 @@ fn breathing(sheath: &Sheath) -> MotionMode {
     }
 }
 
-fn simulation(scene: Scene) -> Simulation {
+pub(super) fn simulation(scene: Scene) -> Simulation {
     let Scene { tree, several, friction, moves } = scene;
     let tree = anatomy::tree(tree).unwrap();
     let vessel = SweptVessel::new(tree, Resolution::EdgeMm(1.0)).unwrap();
@@ -91,7 +91,7 @@ fn simulation(scene: Scene) -> Simulation {
 }
 
 /// The time after the next command.
-fn then_s(simulation: &Simulation) -> f64 {
+pub(super) fn then_s(simulation: &Simulation) -> f64 {
     if simulation.displacement().is_some() { simulation.time_s() + 0.1 } else { simulation.time_s() }
 }
 
@@ -132,7 +132,7 @@ fn slopes(gradient: &Gradient, k: usize) -> Vec<f64> {
 }
 
 /// All parameters of instruments with two sections each.
-fn parameters(instruments: usize, friction: f64) -> Vec<Parameter> {
+pub(super) fn parameters(instruments: usize, friction: f64) -> Vec<Parameter> {
     let mut by = vec![Parameter::WallModulus];
     for axis in 0..3 {
         by.extend([Parameter::EntryPosition { axis }, Parameter::EntryDirection { axis }]);
@@ -171,7 +171,7 @@ fn half(parameter: Parameter) -> f64 {
 }
 
 /// Numbers that look random.
-struct Numbers(u64);
+pub(super) struct Numbers(pub(super) u64);
 
 /// Gradients against differences.
 #[derive(Default)]
@@ -209,12 +209,12 @@ impl std::fmt::Display for Compared {
 
 impl Numbers {
     /// The next one, between these two.
-    fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
+    pub(super) fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
         self.0 += 1;
         low + (high - low) * unit(splitmix64(7, self.0))
     }
 
-    fn moves(&mut self, hands: usize) -> Vec<Move> {
+    pub(super) fn moves(&mut self, hands: usize) -> Vec<Move> {
         let each = (0..hands).map(|instrument| {
             let advance_mm = self.between([1.0, 3.0]) - 0.3 * instrument as f64;
             let rotate_rad = self.between([-0.2, 0.2]);
@@ -288,7 +288,7 @@ const SMOOTH: [f64; 2] = [2e-6, 2e-5];
 const RUBBED: [f64; 2] = [1e-3, 2e-3];
 
 /// Scenes without friction, with it, with two instruments, and in a vessel that moves.
-const SCENES: [Scene; 5] = [
+pub(super) const SCENES: [Scene; 5] = [
     TUBE,
     Scene { tree: "aortic_arch", several: true, ..TUBE },
     Scene { friction: 0.2, ..TUBE },

@@ -12,7 +12,7 @@ mod state;
 
 pub use command::{Command, Move};
 pub use detached::DetachedCoil;
-pub use gradient::{Gradient, Margin, Slope};
+pub use gradient::{Gradient, Margin, Passed, Pulled, Slope, Tape, Weights};
 pub use parameter::Parameter;
 pub(crate) use parameter::{Parts, Together};
 pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
@@ -170,6 +170,19 @@ pub trait Method: Send {
         _by: &[Vec<(Parameter, f64)>],
         _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
+        Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))
+    }
+
+    /// Carries out commands as [`Method::gradients`] does, from the state as it is, and records them; the state does not change.
+    ///
+    /// # Errors
+    /// As [`Method::gradients`], without parameters.
+    fn record(
+        &self,
+        _surroundings: &Surroundings<'_>,
+        _commands: Timed<'_>,
+        _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
+    ) -> Result<Box<dyn Tape>> {
         Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))
     }
 

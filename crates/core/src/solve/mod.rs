@@ -7,6 +7,7 @@
 pub(crate) mod contacts;
 pub mod external;
 mod factors;
+mod inverse;
 mod krylov;
 mod line_search;
 pub(crate) mod neighbourhood;
@@ -21,6 +22,7 @@ mod trial;
 mod unsymmetric;
 
 pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
+pub(crate) use inverse::Inverse;
 pub(crate) use krylov::gmres;
 pub(crate) use neighbourhood::Neighbourhood;
 pub use newton::Newton;
