@@ -41,7 +41,7 @@ pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
 pub use regions::RegionMap;
 pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
-pub(crate) use wall::{BySpace, FrictionSlopes, PressingSlopes, Reaction};
+pub(crate) use wall::{FrictionSlopes, PressingSlopes, Reaction};
 pub use wall::WallContact;
 pub(crate) use wall::least_force_n;
 

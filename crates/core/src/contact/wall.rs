@@ -33,7 +33,7 @@ use crate::solve::{Contacts, External, Sizes};
 pub(super) use clear::Span;
 pub(super) use contacts::PointPlace;
 pub(crate) use reactions::Reaction;
-pub(crate) use slopes::{BySpace, FrictionSlopes, PressingSlopes};
+pub(crate) use slopes::{FrictionSlopes, PressingSlopes};
 use reading::Reading;
 
 /// Force scale of a device of this bending stiffness, N·mm², bent to this radius, mm, N.

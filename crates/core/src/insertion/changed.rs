@@ -92,12 +92,12 @@ impl Simulation {
     /// a tenth thicker than all of those the wall was made for, or too thick for the vessel.
     pub fn changed(&self, values: &[(Parameter, f64)]) -> Result<Self> {
         let mut parts = self.parts();
-        for (parameter, value) in values {
+        for (parameter, _) in values {
             if parameter.value(&parts)?.is_none() {
                 return Err(parameter.refused("it belongs to a command: move the hand"));
             }
-            parameter.set(&mut parts, *value)?;
         }
+        Parameter::set_all(values, &mut parts)?;
         let Parts { stack, wall: properties, sheath, fields } = parts;
         stack.check_sections()?;
         properties.check_outside_regions()?;

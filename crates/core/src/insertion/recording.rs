@@ -1,6 +1,7 @@
 //! Commands that are recorded, and derivatives of sums of what they lead to by any number of parameters at once.
 
-use super::simulation::{Environment, Simulation, surroundings};
+use super::simulation::{Simulation, surroundings};
+use crate::device::Stack;
 use crate::methods::{Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Weights};
 use crate::{Error, Result};
 
@@ -39,12 +40,16 @@ impl Recording {
         self.tape.passed()
     }
 
+    /// The instruments that were moved.
+    pub fn stack(&self) -> &Stack {
+        self.simulation.stack()
+    }
+
     /// Derivatives of the sum of what the commands led to, with the weights of each command in their order, by these parameters; and by the
     /// motion of each hand in each command.
     ///
     /// # Errors
-    /// More weights than commands or than numbers, a parameter that does not exist, a singular equilibrium ([`Error::Computation`]); the push
-    /// force of several instruments that rub.
+    /// More weights than commands or than numbers, a parameter that does not exist, a singular equilibrium ([`Error::Computation`]).
     pub fn vjp(&self, weights: &[Weights], by: &[Parameter]) -> Result<Pulled> {
         self.pull(weights, by, true)
     }

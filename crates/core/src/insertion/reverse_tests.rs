@@ -23,14 +23,14 @@ fn before(scene: usize, seed: u64, commands: usize) -> (Simulation, Vec<Vec<Move
 }
 
 /// Weights of all that commands lead to.
-fn weights(recording: &Recording, instruments: usize, forces: bool) -> Vec<Weights> {
+fn weights(recording: &Recording, instruments: usize) -> Vec<Weights> {
     let mut numbers = Numbers(5);
     let mut number = || numbers.between([-1.0, 1.0]);
     let mut vector = || Vec3::new(number(), number(), number());
     let each = recording.passed().iter().map(|passed| {
         let mut list = |count: usize| (0..count).map(|_| vector().x).collect::<Vec<f64>>();
         Weights {
-            push_force_n: if forces { list(instruments) } else { Vec::new() },
+            push_force_n: list(instruments),
             torque_nmm: list(instruments),
             energy_mj: list(1)[0],
             contact_forces_n: list(passed.report.contacts.len()),
@@ -63,8 +63,7 @@ fn backwards_and_forwards_are_the_same() {
         let instruments = now.stack().instruments().len();
         let by = parameters(instruments, SCENES[scene].friction);
         let recording = now.record(&commands, &times_s).unwrap();
-        let rubs = instruments > 1 && SCENES[scene].friction > 0.0;
-        let weights = weights(&recording, instruments, !rubs);
+        let weights = weights(&recording, instruments);
         let back = recording.vjp(&weights, &by).unwrap();
         let scale = back.by.iter().fold(0.0f64, |most, one| most.max(one.abs()));
         for (parameter, back) in by.iter().zip(&back.by) {
@@ -134,7 +133,7 @@ fn what_a_reverse_pass_costs() {
         let recorded_s = began.elapsed().as_secs_f64();
         let weights: Vec<Weights> =
             (0..6).map(|_| Weights { tip_mm: Vec3::x(), ..Weights::default() }).collect();
-        let mut cost = |by: &[Parameter], hands: bool| {
+        let cost = |by: &[Parameter], hands: bool| {
             let began = Instant::now();
             if hands { recording.vjp(&weights, by).unwrap() } else { recording.vjp_by(&weights, by).unwrap() };
             began.elapsed().as_secs_f64() / steps_s

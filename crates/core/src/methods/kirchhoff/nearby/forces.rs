@@ -9,7 +9,7 @@ use super::super::search::{Beginning, Bounds, Lagged, Search};
 use super::super::state::KirchhoffState;
 use super::super::workspace::Tools;
 use super::sparse::Sparse;
-use super::{Acting, End, singular};
+use super::{Acting, End, STICKING, singular};
 use crate::methods::Sheath;
 use crate::methods::kirchhoff::Environment;
 use crate::rod::{ElementData, Frame, Layout, RodState};
@@ -228,12 +228,13 @@ pub(super) fn spins(rod: &RodState, slid: &[Frame]) -> Vec<f64> {
 }
 
 /// What forces that follow from the state have more than those that stay, by each unknown in turn: for those that depend on more than the
-/// place of a contact, as drag and forces between instruments do. Their spin is measured from these triads.
+/// place of a contact, as drag and forces between instruments do. Their spin is measured from these triads. And all forces by the angle
+/// from which each place between instruments slips.
 pub(super) fn lagging_everywhere<const C: usize>(
     search: &mut Search<'_, '_, C>,
     lagged: &Lagged<'_>,
     triads: &[Frame],
-) -> Sparse {
+) -> [Sparse; 2] {
     let base = search.state.clone();
     let mut lagging = Sparse::default();
     let unknowns = Layout::<C>.support(search.elements.len());
@@ -261,5 +262,21 @@ pub(super) fn lagging_everywhere<const C: usize>(
         }
     }
     search.state.copy_from(&base);
-    lagging
+    search.assemble(lagged, false);
+    let mut slipping = Sparse::default();
+    for place in 0..search.contact.between().places().len() {
+        let at = search.contact.between().places()[place];
+        let part = TURN_RAD.min(STICKING * at.stick_mm / at.radius_mm);
+        let sides = [-part, 2.0 * part].map(|by| {
+            search.contact.between().slip_from(place, by);
+            search.assemble(lagged, false);
+            rows(search)
+        });
+        search.contact.between().slip_from(place, -part);
+        for row in 0..unknowns {
+            slipping.add(row, place, (sides[1][row] - sides[0][row]) / (2.0 * part));
+        }
+    }
+    search.assemble(lagged, false);
+    [lagging, slipping]
 }

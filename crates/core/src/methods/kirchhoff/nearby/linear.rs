@@ -30,7 +30,7 @@ use super::super::tail::{TWIST, Twist};
 use super::super::workspace::Tools;
 use super::forces::{entering, go, rows, spins};
 use super::recorded::Piece;
-use super::remembered::{Between, Chain, Memory, TAIL_STEP};
+use super::remembered::{Between, Chain, Memory, TAIL_STEP, WRENCH};
 use super::sparse::Sparse;
 use super::{Acting, End, STEP, STICKING, Scene, own_scale, singular};
 use crate::contact::{Place, PressingSlopes};
@@ -113,12 +113,17 @@ pub(super) struct Linear<const C: usize> {
     inverse: Inverse<C>,
     lagging: Sparse,
     chain: Chain,
+    /// Forces by the angles from which places between instruments slip.
+    slipping: Sparse,
+    /// How many rows the chain has beyond those of unknowns, and how many of these, the last, are of places between instruments.
+    beyond: usize,
+    places: usize,
     before: Memory,
     after: Memory,
     pub(super) numbers: Numbers,
     /// Numbers by the unknowns of the rod, then by what is remembered.
     reads: Sparse,
-    /// Numbers by the forces on what the mouth holds.
+    /// Numbers by the forces on what the mouth holds, and on places beyond.
     mouth: Sparse,
     held: Vec<usize>,
     /// Of each hand, and each of its three motions: by its position before and after the part.
@@ -131,6 +136,7 @@ struct Around<'a> {
     environment: Environment<'a>,
     piece: &'a Piece,
     end: End<'a>,
+    /// Whether forces at the mouth are read.
     reads: bool,
     touches: Vec<usize>,
 }
@@ -205,7 +211,7 @@ struct AtEnd<const C: usize> {
     rows: Vec<f64>,
     inverse: Inverse<C>,
     pressing: Vec<PressingSlopes>,
-    places: Vec<(Place, f64)>,
+    places: Vec<Place>,
     held: Vec<usize>,
     lags: bool,
 }
@@ -229,12 +235,12 @@ impl<const C: usize> Linear<C> {
         let end = End { state: piece.end(), spins: Vec::new() };
         let mut around = Around { environment, piece, end, reads, touches };
         let on = (own_start, &piece.hands[..]);
-        let (at, slid, mut linear) = piece.with(&environment, &nominal, on, |acting, _| {
+        let (at, slid, here, mut linear) = piece.with(&environment, &nominal, on, |acting, own| {
             let (at, slid) = tools.beside(acting, &around.end, next, at_end::<C>).ok_or_else(singular)?;
             let at = at.ok_or_else(singular)?;
             let between = between(acting, own_start, next, (&around.end, &slid), tools);
             let lagging = between.lagging::<C>(&at.pressing);
-            let chain = between.chain::<C>(&at.pressing, &at.places);
+            let chain = between.chain::<C>(&at.pressing, &at.places, at.rows.len());
             let before = between.memory::<C>();
             let after = Memory { rows: at.rows.len(), instruments: before.instruments };
             let numbers = Numbers {
@@ -242,10 +248,14 @@ impl<const C: usize> Linear<C> {
                 nodes: if piece.is_last { piece.end().rod.positions.len() } else { 0 },
                 touches: if piece.is_last { around.touches.clone() } else { Vec::new() },
             };
+            let rubbing = at.pressing.iter().filter(|at| at.friction.is_some()).count();
             let linear = Self {
+                beyond: WRENCH * rubbing + at.places.len(),
+                places: at.places.len(),
                 inverse: at.inverse.clone(),
                 lagging,
                 chain,
+                slipping: Sparse::default(),
                 before,
                 after,
                 numbers,
@@ -255,8 +265,15 @@ impl<const C: usize> Linear<C> {
                 hands: Vec::new(),
                 scene: Vec::new(),
             };
-            Ok::<_, crate::Error>((at, slid, linear))
+            let numbers = around.numbers(tools, &own, next);
+            let here = Found { rows: at.rows.clone(), numbers, along: None, same_contacts: true };
+            Ok::<_, crate::Error>((at, slid, here, linear))
         })?;
+        linear.read_tails(tools, &around, (&nominal, on), next);
+        if piece.is_last {
+            linear.read_places();
+            linear.read_contacts(&around, next, &at.pressing);
+        }
         around.end.spins = spins(&piece.end().rod, &slid);
         if at.lags {
             let dense = piece.with(&environment, &nominal, on, |acting, _| {
@@ -264,16 +281,11 @@ impl<const C: usize> Linear<C> {
                     super::forces::lagging_everywhere(search, lagged, triads)
                 })
             });
-            linear.lagging = dense.map(|(dense, _)| dense).ok_or_else(singular)?;
+            let ([lagging, slipping], _) = dense.ok_or_else(singular)?;
+            (linear.lagging, linear.slipping) = (lagging, slipping);
         }
-        let here = around.found::<C>(tools, &nominal, on, next).ok_or_else(singular)?;
-        linear.read_tails(tools, &around, (&nominal, on), next);
-        if reads {
-            linear.read_forces(tools, &around, (&nominal, on), wanted, next);
-        }
-        if piece.is_last {
-            linear.read_places();
-            linear.read_contacts(&around, next, &at.pressing);
+        if environment.surroundings.sheath.friction > 0.0 || (piece.is_last && wanted.push) {
+            linear.read_forces(tools, &around, (&nominal, on), &at, next);
         }
         if piece.is_last && wanted.energy {
             linear.read_energy(tools, &around, (&nominal, on), next);
@@ -350,42 +362,36 @@ impl<const C: usize> Linear<C> {
         next: &mut Configuration,
     ) {
         let (l, end) = (Layout::<C>, around.end.state);
-        let rows = self.after.rows;
-        let is_last = around.piece.is_last;
-        let kept = |numbers: &Numbers| {
-            let mut all: Vec<usize> = (0..numbers.memory()).collect();
-            if is_last {
-                let forces = (0..numbers.instruments).flat_map(|k| [numbers.push(k), numbers.torque(k)]);
-                all.extend(forces.chain([numbers.energy()]));
-            }
-            all
-        };
-        let kept = kept(&self.numbers);
-        // Numbers that tails give alone: twists and, in the last part, their forces, at the forces of the last assembly.
-        let count = start.state.hands.len();
+        let (rows, count, numbers) = (self.after.rows, start.state.hands.len(), self.numbers.clone());
+        let mut kept: Vec<usize> = (0..numbers.memory() - 1).collect();
+        if around.piece.is_last {
+            kept.extend((0..count).map(|k| numbers.torque(k)));
+        }
+        // Tails know these from the angle at the mouth; other forces there change with it by the rod as well.
+        let of_tails = kept.clone();
+        kept.push(numbers.memory() - 1);
+        if around.piece.is_last {
+            kept.extend((0..count).map(|k| numbers.push(k)).chain([numbers.energy()]));
+        }
         around.piece.with(&around.environment, scene, (start, hands), |acting, own| {
             let base = next.state.rod.clone();
-            let mut read = |tools: &mut Tools<C>, next: &mut Configuration| around.numbers(tools, &own, next);
+            let read = |tools: &mut Tools<C>, next: &mut Configuration| around.numbers(tools, &own, next);
             for instrument in 0..count {
                 let Some(set) = tools.tails.each()[instrument].set else { continue };
-                if around.reads {
-                    // By the forces, which are read with all unknowns near the mouth.
-                    continue;
-                }
                 let mut side = |by: f64, tools: &mut Tools<C>| {
                     next.parts().1.rod.angles[set] = base.angles[set] + by;
                     read(tools, next)
                 };
                 let (less, more) = (side(-TAIL_STEP, tools), side(TAIL_STEP, tools));
                 next.parts().1.rod.angles[set] = base.angles[set];
-                for k in &kept {
+                for k in &of_tails {
                     self.reads.add(*k, l.angle(0, set), (more[*k] - less[*k]) / (2.0 * TAIL_STEP));
                 }
             }
             let mut other = acting.attempt.left.map_or(acting.start, |(was, _)| was).state.clone();
-            let numbers = (0..count).flat_map(|k| (0..TWIST).map(move |number| (k, number)));
+            let each = (0..count).flat_map(|k| (0..TWIST).map(move |number| (k, number)));
             let across = self.before.across();
-            for (k, number) in numbers.chain([(count, 0)]) {
+            for (k, number) in each.chain([(count, 0)]) {
                 let mut side = |by: f64, tools: &mut Tools<C>| {
                     let was = (other.twists.clone(), other.across_n);
                     match other.twists.get_mut(k) {
@@ -420,20 +426,19 @@ impl<const C: usize> Linear<C> {
         tools: &mut Tools<C>,
         around: &Around<'_>,
         (scene, on): (&Scene, (Start<'_>, &[Hand])),
-        wanted: Wanted,
+        at: &AtEnd<C>,
         next: &mut Configuration,
     ) {
         let l = Layout::<C>;
         let numbers = self.numbers.clone();
-        let mut kept: Vec<usize> = (0..numbers.memory()).collect();
+        let mut kept = vec![numbers.memory() - 1];
         if around.piece.is_last {
-            kept.extend((0..numbers.instruments).flat_map(|k| [numbers.push(k), numbers.torque(k)]));
+            kept.extend((0..numbers.instruments).map(|k| numbers.push(k)));
         }
-        let forces = wanted.push || around.environment.surroundings.sheath.friction > 0.0;
+        // Those of several instruments depend on all of the line.
         let several = numbers.instruments > 1;
         let most = if several { l.support(around.end.state.rod.elements()) } else { 2 * Layout::<C>::BLOCK };
-        let angles = (0..Layout::<C>::ANGLES).map(|set| l.angle(0, set));
-        let unknowns: Vec<usize> = if forces { (0..most).collect() } else { angles.collect() };
+        let unknowns: Vec<usize> = (0..most).collect();
         let step = UNKNOWN_STEP.min(STICKING * tools.friction.stick_mm());
         around.piece.with(&around.environment, scene, on, |acting, own| {
             for unknown in unknowns.iter().filter(|row| !self.held.contains(row)) {
@@ -452,15 +457,51 @@ impl<const C: usize> Linear<C> {
                 }
             }
             tools.beside(acting, &around.end, next, |search, lagged, _| search.assemble(lagged, false));
-            for row in self.held.clone().into_iter().filter(|_| forces) {
-                let at = tools.newton.start_residual[row];
+            for row in self.held.clone() {
+                let held = tools.newton.start_residual[row];
                 let sides = [-step, step].map(|by| {
-                    tools.newton.start_residual[row] = at + by;
+                    tools.newton.start_residual[row] = held + by;
                     around.numbers(tools, &own, next)
                 });
-                tools.newton.start_residual[row] = at;
+                tools.newton.start_residual[row] = held;
                 for k in &kept {
                     self.mouth.add(*k, row, (sides[1][*k] - sides[0][*k]) / (2.0 * step));
+                }
+            }
+            if !several {
+                return;
+            }
+            // Friction works where the mesh moves with a hand.
+            let mut row = self.after.rows;
+            for point in at.pressing.iter().filter(|point| point.friction.is_some()) {
+                let found = around.touches.binary_search(&point.index).ok();
+                for (k, part) in found.into_iter().flat_map(|k| (0..WRENCH).map(move |part| (k, part))) {
+                    let press = |by: f64, next: &mut Configuration| {
+                        let (_, touch) = &mut next.parts().1.touches[k];
+                        match part {
+                            3 => touch.friction_nmm -= by,
+                            axis => touch.contact.friction_n[axis] -= by,
+                        }
+                    };
+                    press(-step, next);
+                    let less = around.numbers(tools, &own, next);
+                    press(2.0 * step, next);
+                    let more = around.numbers(tools, &own, next);
+                    press(-step, next);
+                    for number in &kept {
+                        self.mouth.add(*number, row + part, (more[*number] - less[*number]) / (2.0 * step));
+                    }
+                }
+                row += WRENCH;
+            }
+            for k in 0..at.places.len() {
+                let sides = [-1.0, 2.0].map(|by| {
+                    tools.friction.between.slip_from(k, by * step);
+                    around.numbers(tools, &own, next)
+                });
+                tools.friction.between.slip_from(k, -step);
+                for number in &kept {
+                    self.mouth.add(*number, row + k, (sides[1][*number] - sides[0][*number]) / (2.0 * step));
                 }
             }
         });
@@ -551,9 +592,11 @@ impl<const C: usize> Linear<C> {
     /// # Errors
     /// A singular equilibrium.
     pub(super) fn forwards(&self, memory: &[f64], along: &[(&Column, f64)]) -> Result<(Vec<f64>, Vec<f64>)> {
-        let mut forces = vec![0.0; self.after.rows];
+        let mut forces = vec![0.0; self.after.rows + self.beyond];
         self.chain.add_times(memory, &mut forces);
-        let mut right: Vec<f64> = forces.iter().map(|force| -force).collect();
+        let slips = forces[forces.len() - self.places..].to_vec();
+        self.slipping.add_times(&slips, &mut forces);
+        let mut right: Vec<f64> = forces[..self.after.rows].iter().map(|force| -force).collect();
         self.held.iter().for_each(|row| right[*row] = 0.0);
         for (column, by) in along {
             right.iter_mut().zip(&column.right).for_each(|(right, own)| *right += by * own);
@@ -588,7 +631,12 @@ impl<const C: usize> Linear<C> {
         let forces = self.solve(&all, true)?;
         let mut on_rows: Vec<f64> = forces.iter().map(|force| -force).collect();
         self.held.iter().for_each(|row| on_rows[*row] = 0.0);
+        on_rows.resize(self.after.rows + self.beyond, 0.0);
         self.mouth.add_transposed_times(&numbers, &mut on_rows);
+        let mut slips = vec![0.0; self.places];
+        self.slipping.add_transposed_times(&on_rows, &mut slips);
+        let first = on_rows.len() - self.places;
+        on_rows[first..].iter_mut().zip(&slips).for_each(|(to, slip)| *to += slip);
         self.chain.add_transposed_times(&on_rows, &mut before);
         Ok((before, Weighted { forces, way: way.to_vec(), numbers }))
     }
@@ -662,9 +710,7 @@ fn at_end<const C: usize>(
     search.assemble(lagged, true);
     search.newton.factor(search.elements, search.supports)?;
     let pressing = search.contact.slopes(search.elements, search.state);
-    let state = &*search.state;
-    let places: Vec<(Place, f64)> =
-        search.contact.between().places().iter().map(|place| (*place, place.couple(state).1)).collect();
+    let places = search.contact.between().places().to_vec();
     Some(AtEnd {
         rows: rows(search),
         inverse: search.newton.inverse(),

@@ -396,14 +396,15 @@ fn parts(surroundings: &Surroundings<'_>) -> Parts {
 fn changed(surroundings: &Surroundings<'_>, together: &Together, by: f64) -> Result<(Parts, Option<Stack>)> {
     let mut there = parts(surroundings);
     let mut nodes = there.clone();
+    let mut values = Vec::with_capacity(together.len());
     for (parameter, weight) in together {
-        let Some(value) = parameter.value(&nodes)? else { continue };
-        parameter.set(&mut there, value + weight * by)?;
-        if !matches!(parameter, Parameter::RestCurvature { .. }) {
-            parameter.set(&mut nodes, value + weight * by)?;
-        }
+        values.extend(parameter.value(&nodes)?.map(|value| (*parameter, value + weight * by)));
     }
-    let reshaped = together.iter().any(|(parameter, _)| matches!(parameter, Parameter::RestCurvature { .. }));
+    Parameter::set_all(&values, &mut there)?;
+    let count = values.len();
+    values.retain(|(parameter, _)| !matches!(parameter, Parameter::RestCurvature { .. }));
+    Parameter::set_all(&values, &mut nodes)?;
+    let reshaped = values.len() < count;
     Ok((there, reshaped.then_some(nodes.stack)))
 }
 

@@ -37,6 +37,9 @@ use crate::rod::{Frame, Layout, RodState};
 /// Step of differences in the numbers of a tail's twist.
 pub(super) const TAIL_STEP: f64 = 1e-6;
 
+/// Numbers of a force and a moment about the device.
+pub(super) const WRENCH: usize = 4;
+
 /// Where the numbers are that are remembered of a state with so many rows and instruments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Memory {
@@ -317,9 +320,14 @@ impl Between<'_> {
         row
     }
 
-    /// Derivatives of the forces on the rod in what is remembered: friction on the wall and between instruments, with the second
-    /// derivative of its energy at each node.
-    pub(super) fn chain<const C: usize>(&self, pressing: &[PressingSlopes], places: &[(Place, f64)]) -> Chain {
+    /// Derivatives of the forces on the rod in what is remembered, by friction on the wall. From row `beyond` on, those of the force and the
+    /// moment at each point that rubs there, and of the angle from which each place between instruments slips, for what follows from these.
+    pub(super) fn chain<const C: usize>(
+        &self,
+        pressing: &[PressingSlopes],
+        places: &[Place],
+        beyond: usize,
+    ) -> Chain {
         let l = Layout::<C>;
         let rod = &self.before.state.rod;
         let elements = [rod.elements(), self.mesh.line()];
@@ -341,23 +349,28 @@ impl Between<'_> {
                 chain.turns.add_row(elements[0] + e, &dotted(&by, &self.slid_direction::<C>(node)), 1.0);
             }
         }
-        for at in pressing {
-            if let Some(friction) = &at.friction {
-                self.add_friction::<C>(at.index, friction, &mut chain.rows);
-            }
+        let rubbing = pressing.iter().filter_map(|at| Some((at.index, at.friction.as_ref()?)));
+        let mut first = beyond;
+        for (index, friction) in rubbing {
+            self.add_friction::<C>(index, friction, (&mut chain.rows, first));
+            first += WRENCH;
         }
-        for (place, stiffness) in places {
+        for (k, place) in places.iter().enumerate() {
             let Some((inner, outer)) = place.sets else { continue };
             let mut from = self.slid_angle::<C>(place.node, inner);
             plus(&mut from, &self.slid_angle::<C>(place.node, outer), -1.0);
-            chain.rows.add_row(l.angle(place.node, inner), &from, -stiffness);
-            chain.rows.add_row(l.angle(place.node, outer), &from, *stiffness);
+            chain.rows.add_row(first + k, &from, 1.0);
         }
         chain
     }
 
     /// Adds the derivatives of the friction of a point on the wall.
-    fn add_friction<const C: usize>(&self, index: usize, friction: &FrictionSlopes, rows: &mut Sparse) {
+    fn add_friction<const C: usize>(
+        &self,
+        index: usize,
+        friction: &FrictionSlopes,
+        (rows, first): (&mut Sparse, usize),
+    ) {
         let point = &self.mesh.points[index];
         let (e, xi, set) = point.place();
         let [w0, w1, wb] = Point::at(xi, 0.0).phi;
@@ -393,6 +406,8 @@ impl Between<'_> {
         for same in all.chunk_by(|a, b| a.0 == b.0) {
             let force: Vec3 = same.iter().map(|(_, force, _)| force).sum();
             let moment: f64 = same.iter().map(|(.., moment)| moment).sum();
+            (0..3).for_each(|axis| rows.add(first + axis, same[0].0, force[axis]));
+            rows.add(first + 3, same[0].0, moment);
             for (row, way) in &columns {
                 rows.add(*row, same[0].0, way.dot(&force));
             }

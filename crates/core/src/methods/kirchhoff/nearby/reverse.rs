@@ -232,11 +232,6 @@ impl<const C: usize> Tape for Record<C> {
 
     fn pull(&self, first: &Surroundings<'_>, weights: &[Weights], (by, hands): (&[Parameter], bool)) -> Result<Pulled> {
         let instruments = first.stack.instruments().len();
-        let rubs = first.properties.has_friction() || first.stack.has_inner_friction();
-        if instruments > 1 && rubs && weights.iter().any(|one| one.wanted().push) {
-            let remedy = "the push force of several instruments that rub is differentiated forwards alone: use gradients";
-            return Err(Error::parameter("vjp.push_force_n", "given", remedy));
-        }
         let wants_hands = hands || by.iter().any(|parameter| motion(parameter).is_some());
         let scenes = self.scenes(first, by)?;
         let environment = Environment::new(first, &self.surface, &self.options);
