@@ -1,5 +1,7 @@
 //! Commands that are recorded, to be differentiated backwards.
 
+use std::sync::{Mutex, PoisonError};
+
 use endowire_core::Vec3;
 use endowire_core::insertion;
 use endowire_core::methods::{self, Parameter, Weights};
@@ -15,7 +17,8 @@ use crate::report::StepReport;
 /// number of parameters, at the cost of a part of a step. `len` is the number of commands.
 #[pyclass(frozen, module = "endowire", name = "Recorded")]
 pub(crate) struct Recorded {
-    pub(crate) inner: insertion::Recording,
+    inner: Mutex<insertion::Recording>,
+    passed: Vec<methods::Passed>,
 }
 
 /// Derivatives of a weighted sum of what commands led to (`Recorded.vjp`).
@@ -26,12 +29,16 @@ pub(crate) struct Pulled {
 }
 
 impl Recorded {
+    pub(crate) fn new(inner: insertion::Recording) -> Self {
+        let passed = inner.passed().to_vec();
+        Self { inner: Mutex::new(inner), passed }
+    }
+
     /// What command `k` led to, counted from the end if negative.
     fn passed(&self, k: isize) -> PyResult<&methods::Passed> {
-        let all = self.inner.passed();
-        let count = all.len();
+        let count = self.passed.len();
         let index = if k < 0 { k + count as isize } else { k };
-        let found = usize::try_from(index).ok().and_then(|index| all.get(index));
+        let found = usize::try_from(index).ok().and_then(|index| self.passed.get(index));
         found.ok_or_else(|| refuse("k", k.to_string(), &format!("there are {count} commands, the first is 0")))
     }
 }
@@ -76,7 +83,7 @@ fn weights(given: &Bound<'_, PyDict>, passed: &methods::Passed) -> PyResult<Weig
 #[pymethods]
 impl Recorded {
     fn __len__(&self) -> usize {
-        self.inner.passed().len()
+        self.passed.len()
     }
 
     /// The report of command `k`, counted from the end if negative.
@@ -107,7 +114,7 @@ impl Recorded {
         weights: Vec<Bound<'_, PyDict>>,
         by: Option<List<String>>,
     ) -> PyResult<Pulled> {
-        let passed = self.inner.passed();
+        let passed = &self.passed;
         if weights.len() > passed.len() {
             let remedy = format!("there are {} commands: give a dictionary for each", passed.len());
             return Err(refuse("weights", format!("of {} commands", weights.len()), &remedy));
@@ -115,13 +122,14 @@ impl Recorded {
         let weights = weights.iter().zip(passed).map(|(given, passed)| self::weights(given, passed));
         let weights: Vec<Weights> = weights.collect::<PyResult<_>>()?;
         let words = by.map_or_else(Vec::new, |by| by.0);
-        let found = py.detach(|| {
-            let stack = self.inner.stack();
+        let found: endowire_core::Result<Pulled> = py.detach(|| {
+            let inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let stack = inner.stack();
             let each = words.iter().map(|word| Parameter::named(word, stack));
             let by: Vec<Parameter> =
                 each.collect::<endowire_core::Result<Vec<_>>>()?.into_iter().flatten().collect();
             let words = by.iter().map(|parameter| parameter.name(stack)).collect();
-            Ok(Pulled { inner: self.inner.vjp(&weights, &by)?, by: words })
+            Ok(Pulled { inner: inner.vjp(&weights, &by)?, by: words })
         });
         found.map_err(exception)
     }

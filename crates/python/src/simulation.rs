@@ -361,7 +361,7 @@ impl Simulation {
             let times_s = times_s.map_or_else(|| vec![simulation.time_s(); moves.len()], |times_s| times_s.0);
             simulation.record(&moves, &times_s)
         });
-        Ok(Recorded { inner: found.map_err(exception)? })
+        Ok(Recorded::new(found.map_err(exception)?))
     }
 
     /// As `gradients`, along one change of parameters together: a dictionary of words of `gradient`, each for one parameter, and how much of
