@@ -59,6 +59,9 @@ impl Simulation {
     /// Derivatives of what commands would lead to until these times.
     fn derivatives(&self, (commands, times_s): Timed<'_>, by: &[Together]) -> Result<Vec<Gradient>> {
         self.check_times((commands, times_s))?;
+        for together in by {
+            Parameter::check_each_once(together.iter().map(|(parameter, _)| parameter))?;
+        }
         let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
         self.method.gradients(&surroundings!(self, self.time_s), (commands, times_s), by, &checked)
     }
@@ -71,9 +74,6 @@ impl Simulation {
         if times_s.len() != commands.len() {
             let remedy = format!("there are {} commands: give one for each", commands.len());
             return Err(Error::parameter("times_s", format!("{} times", times_s.len()), remedy));
-        }
-        for together in by {
-            Parameter::check_each_once(together.iter().map(|(parameter, _)| parameter))?;
         }
         let mut last_s = self.time_s;
         for time_s in times_s {

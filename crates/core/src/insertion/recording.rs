@@ -49,7 +49,7 @@ impl Recording {
     /// motion of each hand in each command.
     ///
     /// # Errors
-    /// More weights than commands or than numbers, a parameter that does not exist, a singular equilibrium ([`Error::Computation`]).
+    /// More weights than commands or than numbers, a parameter that does not exist or occurs twice, a singular equilibrium ([`Error::Computation`]).
     pub fn vjp(&self, weights: &[Weights], by: &[Parameter]) -> Result<Pulled> {
         self.pull(weights, by, true)
     }
@@ -68,6 +68,7 @@ impl Recording {
             let remedy = format!("there are {commands} commands: give weights of each");
             return Err(Error::parameter("vjp.weights", weights.len(), remedy));
         }
+        Parameter::check_each_once(by)?;
         let simulation = &self.simulation;
         self.tape.pull(&surroundings!(simulation, simulation.time_s), weights, (by, hands))
     }
@@ -77,6 +78,7 @@ impl Recording {
     /// # Errors
     /// As [`Recording::vjp`].
     pub fn jvp(&self, along: &[(Parameter, f64)]) -> Result<Vec<Weights>> {
+        Parameter::check_each_once(along.iter().map(|(parameter, _)| parameter))?;
         let simulation = &self.simulation;
         self.tape.push(&surroundings!(simulation, simulation.time_s), along)
     }
