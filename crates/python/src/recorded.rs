@@ -39,7 +39,8 @@ impl Recorded {
         let count = self.passed.len();
         let index = if k < 0 { k + count as isize } else { k };
         let found = usize::try_from(index).ok().and_then(|index| self.passed.get(index));
-        found.ok_or_else(|| refuse("k", k.to_string(), &format!("there are {count} commands, the first is 0")))
+        found
+            .ok_or_else(|| refuse("k", k.to_string(), &format!("there are {count} commands, the first is 0")))
     }
 }
 

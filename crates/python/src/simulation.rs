@@ -18,9 +18,9 @@ use crate::arrays::{List, Numbers, Real, lengths_mm, natural, natural_or, place,
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::gradient::Gradient;
-use crate::recorded::Recorded;
 use crate::instrument::Instrument;
 use crate::moves::{of_each, together};
+use crate::recorded::Recorded;
 use crate::report::StepReport;
 use crate::start::{self, Arguments, Start};
 use crate::state::{State, fields_of};

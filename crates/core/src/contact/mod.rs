@@ -28,8 +28,8 @@ pub mod wall;
 pub use cache::{ContactCache, KnownPoints};
 pub use distance::{Distance, Nearness, SmoothWall};
 pub use drag::Drag;
-pub(crate) use friction::stick_mm;
 pub(crate) use friction::CarriedSlopes;
+pub(crate) use friction::stick_mm;
 pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place};
 pub use moved::MovedWall;
 pub use pairs::{Capsule, SelfContact, Touching};
@@ -41,9 +41,9 @@ pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
 pub use regions::RegionMap;
 pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
-pub(crate) use wall::{FrictionSlopes, PressingSlopes, Reaction};
 pub use wall::WallContact;
 pub(crate) use wall::least_force_n;
+pub(crate) use wall::{FrictionSlopes, PressingSlopes, Reaction};
 
 /// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;

@@ -33,8 +33,8 @@ use crate::solve::{Contacts, External, Sizes};
 pub(super) use clear::Span;
 pub(super) use contacts::PointPlace;
 pub(crate) use reactions::Reaction;
-pub(crate) use slopes::{FrictionSlopes, PressingSlopes};
 use reading::Reading;
+pub(crate) use slopes::{FrictionSlopes, PressingSlopes};
 
 /// Force scale of a device of this bending stiffness, N·mm², bent to this radius, mm, N.
 pub(crate) fn least_force_n(bending_nmm2: f64, bend_mm: f64) -> f64 {

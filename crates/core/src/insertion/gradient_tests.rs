@@ -298,7 +298,11 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
                 let whole = size(&mut differences.clone().take(3 + 2 * hands));
                 let off = size(&mut differences.zip(own).map(|(a, b)| a - b));
                 if off > 1e-4 * whole.max(1e-2) {
-                    println!("{parameter:?} after {k}: off by {:.1e}, from sides {:.1e}", off / whole.max(1e-2), compared.errors[compared.errors.len() - 1]);
+                    println!(
+                        "{parameter:?} after {k}: off by {:.1e}, from sides {:.1e}",
+                        off / whole.max(1e-2),
+                        compared.errors[compared.errors.len() - 1]
+                    );
                 }
                 compared.recorded.push(off / whole.max(1e-2));
             }
@@ -498,7 +502,8 @@ fn what_has_no_gradient_is_refused() {
     assert!(changed(Parameter::EntryDirection { axis: 2 }, -5.0).contains("backwards"));
     // Whatever their order, components of a direction are those of one vector.
     let turned = [(Parameter::EntryDirection { axis: 0 }, 0.1), (Parameter::EntryDirection { axis: 1 }, 0.2)];
-    let both = [turned, [turned[1], turned[0]]].map(|turned| now.changed(&turned).unwrap().sheath().direction);
+    let both =
+        [turned, [turned[1], turned[0]]].map(|turned| now.changed(&turned).unwrap().sheath().direction);
     let mut along = now.sheath().direction;
     (along.x, along.y) = (0.1, 0.2);
     assert!(both[0] == both[1] && (both[0] - along.normalize()).norm() < 1e-15, "{both:?}");

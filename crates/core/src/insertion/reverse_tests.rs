@@ -79,8 +79,12 @@ fn backwards_and_forwards_are_the_same() {
         // The first command's hands are parameters too.
         for (parameter, back) in by.iter().zip(&back.by) {
             match *parameter {
-                Parameter::Advance { instrument } => assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0),
-                Parameter::Rotation { instrument } => assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1),
+                Parameter::Advance { instrument } => {
+                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0)
+                }
+                Parameter::Rotation { instrument } => {
+                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1)
+                }
                 _ => {}
             }
         }
@@ -104,11 +108,19 @@ fn backwards_it_is_the_gradient_of_the_commands() {
             assert_eq!(passed.report, gradient.report);
         }
         for axis in 0..3 {
-            let weights = [Weights::default(), Weights::default(), Weights { tip_mm: Vec3::ith(axis, 1.0), ..Weights::default() }];
+            let weights = [
+                Weights::default(),
+                Weights::default(),
+                Weights { tip_mm: Vec3::ith(axis, 1.0), ..Weights::default() },
+            ];
             let back = recording.vjp_by(&weights, &by).unwrap();
             for (k, parameter) in by.iter().enumerate() {
                 let tip = gradients[2].slopes[k].tip_mm;
-                println!("{scene} {axis} {parameter:?}: {:.3e} {:.1e}", tip[axis], (tip[axis] - back.by[k]).abs() / tip.norm());
+                println!(
+                    "{scene} {axis} {parameter:?}: {:.3e} {:.1e}",
+                    tip[axis],
+                    (tip[axis] - back.by[k]).abs() / tip.norm()
+                );
             }
         }
     }
@@ -135,13 +147,25 @@ fn what_a_reverse_pass_costs() {
             (0..6).map(|_| Weights { tip_mm: Vec3::x(), ..Weights::default() }).collect();
         let cost = |by: &[Parameter], hands: bool| {
             let began = Instant::now();
-            if hands { recording.vjp(&weights, by).unwrap() } else { recording.vjp_by(&weights, by).unwrap() };
+            if hands {
+                recording.vjp(&weights, by).unwrap()
+            } else {
+                recording.vjp_by(&weights, by).unwrap()
+            };
             began.elapsed().as_secs_f64() / steps_s
         };
-        let costs = [cost(&[], false), cost(&[Parameter::WallModulus], false), cost(&[], true), cost(&by, true)];
+        let costs =
+            [cost(&[], false), cost(&[Parameter::WallModulus], false), cost(&[], true), cost(&by, true)];
         println!(
             "{:?}: {:.1} ms a step, recorded {:.2}; none {:.2}, one parameter {:.2}, all hands {:.2}, with {} parameters {:.2} steps",
-            SCENES[scene], 1e3 * steps_s / 6.0, recorded_s / steps_s, costs[0], costs[1], costs[2], by.len(), costs[3]
+            SCENES[scene],
+            1e3 * steps_s / 6.0,
+            recorded_s / steps_s,
+            costs[0],
+            costs[1],
+            costs[2],
+            by.len(),
+            costs[3]
         );
     }
 }

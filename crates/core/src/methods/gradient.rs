@@ -97,7 +97,8 @@ pub trait Tape: Send + Sync {
     ///
     /// # Errors
     /// A parameter that does not exist, and weights of another number.
-    fn pull(&self, first: &Surroundings<'_>, weights: &[Weights], by: (&[Parameter], bool)) -> Result<Pulled>;
+    fn pull(&self, first: &Surroundings<'_>, weights: &[Weights], by: (&[Parameter], bool))
+    -> Result<Pulled>;
 
     /// Changes of what each command leads to for small changes of parameters, in the order of their weights.
     ///

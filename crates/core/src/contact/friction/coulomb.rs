@@ -114,10 +114,15 @@ impl Coulomb {
     }
 
     /// Derivatives of the friction force and moment of a slider, at this place and angle, in its normal.
-    pub(in crate::contact) fn by_normal(&self, slider: &Slider, (x, angle): (&Vec3, f64)) -> (Matrix3<f64>, Vec3) {
+    pub(in crate::contact) fn by_normal(
+        &self,
+        slider: &Slider,
+        (x, angle): (&Vec3, f64),
+    ) -> (Matrix3<f64>, Vec3) {
         let (slip, spin) = slider.slip(x, angle);
         let (way, normal) = (x - slider.from_mm, slider.normal);
-        let (force, along) = force_of_slip(self.largest_n(slider), &Matrix3::identity(), &slip, self.stick_mm);
+        let (force, along) =
+            force_of_slip(self.largest_n(slider), &Matrix3::identity(), &slip, self.stick_mm);
         let turn = slider.along.cross_matrix() * -slider.radius_mm;
         let by_normal = turn * (angle - slider.from_rad)
             - Matrix3::identity() * normal.dot(&way)

@@ -54,7 +54,10 @@ const STEP: [f64; 2] = [1e-4, 1e-6];
 
 impl CarriedSlopes {
     /// Of a device at this place with this direction.
-    pub(crate) fn at((place, direction): (Vec3, Vec3), (before, after): (&Displacement, &Displacement)) -> Self {
+    pub(crate) fn at(
+        (place, direction): (Vec3, Vec3),
+        (before, after): (&Displacement, &Displacement),
+    ) -> Self {
         let carried = |place: Vec3, direction: Vec3| {
             let mut slider = Slider::at((place, direction), (0.0, 0.0), 0.0);
             slider.carry(before, after);

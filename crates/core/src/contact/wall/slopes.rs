@@ -129,9 +129,6 @@ fn slider_slopes(slider: &Slider, hessian: &Matrix3<f64>, force: &Vec3, angle: f
     FrictionSlopes {
         by_spin: (mixed, mixed.dot(&spin)),
         by_place: (-hessian, -mixed),
-        by_direction: (
-            hessian * turn * spun_rad,
-            turn.tr_mul(&mixed) * spun_rad + turn.tr_mul(force),
-        ),
+        by_direction: (hessian * turn * spun_rad, turn.tr_mul(&mixed) * spun_rad + turn.tr_mul(force)),
     }
 }

@@ -33,13 +33,13 @@ use super::recorded::Piece;
 use super::remembered::{Between, Chain, Memory, TAIL_STEP, WRENCH};
 use super::sparse::Sparse;
 use super::{Acting, End, STEP, STICKING, Scene, own_scale, singular};
+use crate::Result;
 use crate::contact::{Place, PressingSlopes};
 use crate::methods::Parameter;
 use crate::methods::kirchhoff::Environment;
 use crate::rod::scatter::point_columns;
 use crate::rod::{Frame, Layout, RodState};
 use crate::solve::{Inverse, gmres};
-use crate::Result;
 
 /// Step of differences in unknowns of the rod.
 const UNKNOWN_STEP: f64 = 3e-6;
@@ -173,7 +173,12 @@ impl Around<'_> {
     }
 
     /// The numbers that are read after the last assembly.
-    fn numbers<const C: usize>(&self, tools: &mut Tools<C>, own: &Environment<'_>, next: &mut Configuration) -> Vec<f64> {
+    fn numbers<const C: usize>(
+        &self,
+        tools: &mut Tools<C>,
+        own: &Environment<'_>,
+        next: &mut Configuration,
+    ) -> Vec<f64> {
         if self.reads {
             tools.write_forces(own, next);
         }
@@ -400,7 +405,8 @@ impl<const C: usize> Linear<C> {
                     }
                     tools.tails.begin(&acting.environment, (&other, acting.attempt.hands));
                     (other.twists, other.across_n) = was;
-                    let torques = tools.tails.each().iter().map(|tail| tail.on(&end.rod).body_nmm).collect::<Vec<_>>();
+                    let torques =
+                        tools.tails.each().iter().map(|tail| tail.on(&end.rod).body_nmm).collect::<Vec<_>>();
                     (torques, read(tools, next))
                 };
                 let (less, more) = (side(-TAIL_STEP, tools), side(TAIL_STEP, tools));

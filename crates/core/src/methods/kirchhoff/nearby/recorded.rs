@@ -49,7 +49,8 @@ impl Piece {
         what: impl FnOnce(&Acting<'_>, Environment<'_>) -> T,
     ) -> T {
         let UnderWay { part_mm, effort, .. } = self.end;
-        let part = Part { effort, part_mm, to: self.to, holds_still: self.holds_still, resumed: Some(&self.end) };
+        let part =
+            Part { effort, part_mm, to: self.to, holds_still: self.holds_still, resumed: Some(&self.end) };
         let passage: Option<Passage<'_>> = self.passage.as_ref().map(|(before, after)| (before, after));
         scene.with(environment, (start, (hands, passage)), part, what)
     }

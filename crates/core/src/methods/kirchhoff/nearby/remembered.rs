@@ -189,7 +189,11 @@ impl Between<'_> {
         let last = rod.elements();
         let Some((e, xi)) = self.on_curve(from_sheath_mm) else {
             let frame = &rod.frames[last];
-            return if last == 0 { Vec::new() } else { vec![(l.tangent(last), frame.u), (l.tangent(last) + 1, frame.v)] };
+            return if last == 0 {
+                Vec::new()
+            } else {
+                vec![(l.tangent(last), frame.u), (l.tangent(last) + 1, frame.v)]
+            };
         };
         let (first, second, point) = (&rod.frames[e], &rod.frames[e + 1], Point::at(xi, 0.0));
         let slope = point.derivatives(rod.chords[e], first.t, second.t).0;
@@ -203,7 +207,10 @@ impl Between<'_> {
             all.extend([(l.position(e) + axis, -way), (l.position(e + 1) + axis, way)]);
         }
         for (node, frame, share) in [(e, first, near), (e + 1, second, far)] {
-            all.extend([(l.tangent(node), across * frame.u * share), (l.tangent(node) + 1, across * frame.v * share)]);
+            all.extend([
+                (l.tangent(node), across * frame.u * share),
+                (l.tangent(node) + 1, across * frame.v * share),
+            ]);
         }
         all
     }
@@ -397,8 +404,11 @@ impl Between<'_> {
             place = times(&moved.place, &place);
         }
         let mut all: Vec<(usize, Vec3, f64)> = Vec::with_capacity(spin.len() + place.len() + direction.len());
-        all.extend(spin.iter().map(|(column, by)| (*column, friction.by_spin.0 * *by, friction.by_spin.1 * by)));
-        for (vectors, (force, moment)) in [(&place, &friction.by_place), (&direction, &friction.by_direction)] {
+        all.extend(
+            spin.iter().map(|(column, by)| (*column, friction.by_spin.0 * *by, friction.by_spin.1 * by)),
+        );
+        for (vectors, (force, moment)) in [(&place, &friction.by_place), (&direction, &friction.by_direction)]
+        {
             all.extend(vectors.iter().map(|(column, way)| (*column, force * way, moment.dot(way))));
         }
         all.sort_unstable_by_key(|(column, ..)| *column);

@@ -15,7 +15,9 @@ use super::read::margin;
 use super::recorded::{Piece, Recorder};
 use super::{STEP, Scene, scale};
 use crate::contact::ContactSurface;
-use crate::methods::{Command, Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Timed, Weights};
+use crate::methods::{
+    Command, Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Timed, Weights,
+};
 use crate::shape::Shape;
 use crate::{Error, Result};
 
@@ -72,8 +74,14 @@ impl<const C: usize> Kirchhoff<C> {
             workspace.way.begin(surroundings.stack, (&state.hands, &[]), moves);
             let way = [state.hands.clone(), workspace.way.target.clone()];
             let still = workspace.way.is_done() && !surroundings.moves() && !surroundings.fields_change();
-            let mut command =
-                Recorded { moves: moves.clone(), time_s: surroundings.time_s, from, way, pieces: Some(Vec::new()), is_first };
+            let mut command = Recorded {
+                moves: moves.clone(),
+                time_s: surroundings.time_s,
+                from,
+                way,
+                pieces: Some(Vec::new()),
+                is_first,
+            };
             match record.passed.last() {
                 Some(last) if still => {
                     let mut same = last.clone();
@@ -85,7 +93,8 @@ impl<const C: usize> Kirchhoff<C> {
                     return Err(Error::parameter("gradient.moves", moves.len(), remedy));
                 }
                 _ => {
-                    command.pieces = Some(command.carried_out(&mut workspace, &environment, Some(&mut report))?);
+                    command.pieces =
+                        Some(command.carried_out(&mut workspace, &environment, Some(&mut report))?);
                     let end = workspace.now.start();
                     let mut shape = Shape::default();
                     write_line(end.state, &end.mesh.from_tip_mm, &mut shape);
@@ -230,7 +239,12 @@ impl<const C: usize> Tape for Record<C> {
         &self.passed
     }
 
-    fn pull(&self, first: &Surroundings<'_>, weights: &[Weights], (by, hands): (&[Parameter], bool)) -> Result<Pulled> {
+    fn pull(
+        &self,
+        first: &Surroundings<'_>,
+        weights: &[Weights],
+        (by, hands): (&[Parameter], bool),
+    ) -> Result<Pulled> {
         let instruments = first.stack.instruments().len();
         let wants_hands = hands || by.iter().any(|parameter| motion(parameter).is_some());
         let scenes = self.scenes(first, by)?;
@@ -299,8 +313,7 @@ impl<const C: usize> Tape for Record<C> {
             None => scene.next().unwrap_or_default(),
         });
         let (by, sided) = each.unzip();
-        let command =
-            |&[advance_mm, rotate_rad, steer]: &[f64; 3]| Command { advance_mm, rotate_rad, steer };
+        let command = |&[advance_mm, rotate_rad, steer]: &[f64; 3]| Command { advance_mm, rotate_rad, steer };
         let hands = match hands {
             true => moved.iter().map(|all| all.iter().map(command).collect()).collect(),
             false => Vec::new(),
@@ -336,7 +349,8 @@ impl<const C: usize> Tape for Record<C> {
                         match motion(parameter) {
                             Some((instrument, kind)) => {
                                 let own = linear.hands[instrument][kind].iter().flatten();
-                                columns.extend(own.zip(shares).map(|(column, share)| (column, weight * share)));
+                                columns
+                                    .extend(own.zip(shares).map(|(column, share)| (column, weight * share)));
                             }
                             None => columns.extend(scene.next().map(|column| (column, *weight))),
                         }
