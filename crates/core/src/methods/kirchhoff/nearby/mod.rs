@@ -37,6 +37,8 @@
 //!
 //! Several parameters that change together, each so much, are one p: dx/dp is then the product of the Jacobian with these changes.
 //!
+//! Commands that are recorded (`recorded`, `reverse`) are linearised part by part in `linear`, where derivatives go in both directions.
+//!
 //! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
 //! anchored anew, has no derivative.
 
