@@ -96,33 +96,39 @@ fn first(recording: &Recording, weights: &[Weights], instrument: usize) -> (f64,
     (hand.advance_mm, hand.rotate_rad)
 }
 
+/// A tube without friction, with it, and one that moves.
+const ALONE: [usize; 3] = [0, 2, 4];
+/// Gradients from sides are no nearer than this, relative to that of the tip, where the vessel moves.
+const OF_SIDES: f64 = 5e-3;
+
 #[test]
 fn backwards_it_is_the_gradient_of_the_commands() {
-    for scene in 0..SCENES.len() {
+    for scene in ALONE {
         let (now, commands, times_s) = before(scene, 300 + scene as u64, 3);
-        let instruments = now.stack().instruments().len();
-        let by = parameters(instruments, SCENES[scene].friction);
+        let by = parameters(1, SCENES[scene].friction);
         let recording = now.record(&commands, &times_s).unwrap();
         let gradients = now.gradients_until(&commands, &times_s, &by).unwrap();
-        for (passed, gradient) in recording.passed().iter().zip(&gradients) {
-            assert_eq!(passed.report, gradient.report);
+        let mut alone = now.clone();
+        for ((moves, time_s), passed) in commands.iter().zip(&times_s).zip(recording.passed()) {
+            // Recorded or not, steps take the same.
+            assert_eq!(alone.step_until(moves, Some(*time_s)).unwrap(), &passed.report);
         }
-        for axis in 0..3 {
-            let weights = [
-                Weights::default(),
-                Weights::default(),
-                Weights { tip_mm: Vec3::ith(axis, 1.0), ..Weights::default() },
-            ];
-            let back = recording.vjp_by(&weights, &by).unwrap();
-            for (k, parameter) in by.iter().enumerate() {
-                let tip = gradients[2].slopes[k].tip_mm;
-                println!(
-                    "{scene} {axis} {parameter:?}: {:.3e} {:.1e}",
-                    tip[axis],
-                    (tip[axis] - back.by[k]).abs() / tip.norm()
-                );
+        let slopes: Vec<Vec3> = gradients[2].slopes.iter().map(|slope| slope.tip_mm).collect();
+        let none = Weights::default();
+        let back = [0, 1, 2].map(|axis| {
+            let last = Weights { tip_mm: Vec3::ith(axis, 1.0), ..none.clone() };
+            recording.vjp_by(&[none.clone(), none.clone(), last], &by).unwrap().by
+        });
+        for (k, parameter) in by.iter().enumerate() {
+            let own = Vec3::new(back[0][k], back[1][k], back[2][k]);
+            // What hardly moves the tip has no digits in common.
+            if slopes[k].norm() > 1e-4 {
+                let off = (own - slopes[k]).norm() / slopes[k].norm();
+                assert!(off < OF_SIDES, "{scene} {parameter:?}: {own:?} {:?}", slopes[k]);
             }
         }
+        // One parameter is not another.
+        assert!((back[0][0] - slopes[1].x).abs() > 1e-3 * slopes[1].norm());
     }
 }
 
