@@ -18,6 +18,7 @@ mod instrument;
 mod interrupt;
 mod moves;
 mod record;
+mod recorded;
 mod recording;
 mod report;
 mod rod;
@@ -49,6 +50,8 @@ mod _endowire {
     use super::instrument::Instrument;
     #[pymodule_export]
     use super::record::Record;
+    #[pymodule_export]
+    use super::recorded::{Pulled, Recorded};
     #[pymodule_export]
     use super::recording::{Recorder, Recording};
     #[pymodule_export]

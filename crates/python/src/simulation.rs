@@ -20,6 +20,7 @@ use crate::error::{exception, refuse};
 use crate::gradient::Gradient;
 use crate::instrument::Instrument;
 use crate::moves::{of_each, together};
+use crate::recorded::Recorded;
 use crate::report::StepReport;
 use crate::start::{self, Arguments, Start};
 use crate::state::{State, fields_of};
@@ -347,6 +348,20 @@ impl Simulation {
     ) -> PyResult<Vec<Gradient>> {
         let moves = crate::moves::moves(&moves, None, self.pushed().len())?;
         self.gradients_of(py, (&moves, times_s.map(|times_s| times_s.0)), &by.0)
+    }
+
+    /// Carries out commands on a copy, an array as that of `run`, and returns what they led to as a Recorded, by which sums of it are
+    /// differentiated backwards: by any number of parameters and by the motions of all commands at once. `times_s` as for `gradients`.
+    ///
+    /// Raises what `gradients` raises.
+    #[pyo3(signature = (moves, *, times_s=None))]
+    fn recorded(&self, py: Python<'_>, moves: Numbers<'_>, times_s: Option<List<f64>>) -> PyResult<Recorded> {
+        let moves = crate::moves::moves(&moves, None, self.pushed().len())?;
+        let found = self.with(py, |simulation| {
+            let times_s = times_s.map_or_else(|| vec![simulation.time_s(); moves.len()], |times_s| times_s.0);
+            simulation.record(&moves, &times_s)
+        });
+        Ok(Recorded::new(found.map_err(exception)?))
     }
 
     /// As `gradients`, along one change of parameters together: a dictionary of words of `gradient`, each for one parameter, and how much of

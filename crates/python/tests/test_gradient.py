@@ -98,6 +98,39 @@ def test_a_change_together_costs_one_parameter_and_has_their_sum(vessel):
         simulation.gradients(moves, by=["EI[0]"], times_s=[1.0])
 
 
+def test_backwards_a_sum_has_the_derivatives_that_gradients_have(vessel):
+    simulation = inserted(vessel)
+    moves = np.array([[[1.3, 0.05]], [[1.0, -0.02]]])
+    by = ["hand", "EI[0]", "rest_u[0]", "wall"]
+    recorded, gradients = simulation.recorded(moves), simulation.gradients(moves, by=by)
+    assert len(recorded) == 2 and np.array_equal(recorded.positions_mm(), gradients[1].positions_mm)
+    assert recorded.report(0).solves == gradients[0].report.solves
+    weights = [{"tip": [0.5, -1.0, 0.3]}, {"tip": [1.0, 2.0, -0.7], "push_force": [20.0], "energy": [5.0]}]
+    pulled = recorded.vjp(weights, by=by)
+    pairs = zip(weights, gradients, strict=True)
+    expected = sum(gradient.vjp(of, weight) for own, gradient in pairs for of, weight in own.items())
+    assert pulled.by == gradients[0].by and pulled.one_sided.dtype == bool
+    np.testing.assert_allclose(pulled.values, expected, rtol=1e-4)
+    # The hands of the first command stay in the second one.
+    np.testing.assert_allclose(pulled.moves[0, 0], pulled.values[:2], rtol=1e-12)
+
+    def of_second(h, k):
+        there, changed = simulation.copy(), moves.copy()
+        changed[1, 0, k] += h
+        there.run(changed)
+        return np.dot([1.0, 2.0, -0.7], there.tip_mm)
+
+    alone = recorded.vjp([{}, {"tip": [1.0, 2.0, -0.7]}]).moves[1, 0]
+    for k in range(2):
+        difference = (of_second(1e-5, k) - of_second(-1e-5, k)) / 2e-5
+        assert abs(alone[k] - difference) < 1e-4 * abs(difference), k
+    for given, words in (([{"tip": [1.0]}], "3 numbers"), ([{"tips": [1.0]}], "must be"), ([{}] * 3, "2 commands")):
+        with pytest.raises(endowire.InputError, match=words):
+            recorded.vjp(given)
+    with pytest.raises(endowire.InputError, match="2 commands"):
+        recorded.report(2)
+
+
 def test_what_has_no_derivative_is_refused(vessel):
     simulation = inserted(vessel)
     gradient = simulation.gradient(**COMMAND, by=["advance"])

@@ -18,8 +18,7 @@ macro_rules! unrolled {
 pub(crate) mod ldlt;
 pub(crate) mod matrix;
 
-pub use ldlt::Factor;
-pub use ldlt::{FactorError, Inertia};
+pub use ldlt::{Factor, FactorError, Inertia};
 pub use matrix::{BandMatrix, Shift};
 
 #[cfg(test)]

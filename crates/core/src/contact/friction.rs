@@ -35,6 +35,7 @@ mod slider;
 pub(crate) use between::{Between, InnerFriction, Place};
 pub(in crate::contact) use coulomb::{Coulomb, FrictionDerivatives};
 pub(in crate::contact) use follow::unsettled;
+pub(crate) use moving::CarriedSlopes;
 pub use slider::NormalForce;
 pub(in crate::contact) use slider::Slider;
 

@@ -27,16 +27,12 @@ pub(crate) mod wall;
 
 pub use cache::ContactCache;
 pub(crate) use cache::KnownPoints;
-pub use distance::Distance;
-pub use distance::{Nearness, SmoothWall};
+pub use distance::{Distance, Nearness, SmoothWall};
 pub(crate) use drag::Drag;
-pub use friction::NormalForce;
-pub(crate) use friction::stick_mm;
-pub(crate) use friction::{Between, InnerFriction, Place};
-pub use friction::{Friction, HandMotion};
+pub(crate) use friction::{Between, CarriedSlopes, InnerFriction, Place, stick_mm};
+pub use friction::{Friction, HandMotion, NormalForce};
 pub use moved::MovedWall;
-pub use pairs::Touching;
-pub use pairs::{Capsule, SelfContact};
+pub use pairs::{Capsule, SelfContact, Touching};
 pub(crate) use pairs::{FrictionLaw, PairForce, Pressing, RodPlace};
 pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
@@ -44,11 +40,9 @@ pub use properties::{WallProperties, WallRegion};
 pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
 pub use regions::RegionMap;
-pub use surface::{ContactMesh, ContactSurface};
-pub use surface::{Deviation, Hint};
-pub(crate) use wall::Reaction;
+pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
 pub use wall::WallContact;
-pub(crate) use wall::least_force_n;
+pub(crate) use wall::{FrictionSlopes, PressingSlopes, Reaction, least_force_n};
 
 /// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;

@@ -19,6 +19,7 @@ mod friction;
 mod passing;
 mod reactions;
 mod reading;
+mod slopes;
 
 use super::cache::ContactCache;
 use super::point::{Contact, ContactPoint, Counters, Touch};
@@ -33,6 +34,7 @@ pub(super) use clear::Span;
 pub(super) use contacts::PointPlace;
 pub(crate) use reactions::Reaction;
 use reading::Reading;
+pub(crate) use slopes::{FrictionSlopes, PressingSlopes};
 
 /// Force scale of a device of this bending stiffness, N·mm², bent to this radius, mm, N.
 pub(crate) fn least_force_n(bending_nmm2: f64, bend_mm: f64) -> f64 {

@@ -18,9 +18,8 @@ mod winding;
 
 pub(crate) use file::FileTable;
 pub use file::{DeviceFile, Kind};
-pub use part::Part;
 pub(crate) use part::PartTable;
-pub use part::{Coat, CutError};
+pub use part::{Coat, CutError, Part};
 pub use soft_plane::SoftPlane;
 pub(crate) use stack::LENGTH_SLACK_MM;
 pub use stack::{Instrument, Stack, line_mm};

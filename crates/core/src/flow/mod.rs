@@ -36,8 +36,7 @@ mod tree;
 #[cfg(test)]
 pub(crate) use drag::drag_n_per_mm;
 pub use rings::Rings;
-pub use tree::FlowLink;
-pub use tree::{FlowGraph, FlowNode, check_place};
+pub use tree::{FlowGraph, FlowLink, FlowNode, check_place};
 
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;

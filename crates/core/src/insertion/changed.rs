@@ -58,12 +58,22 @@ impl Simulation {
 
     /// Derivatives of what commands would lead to until these times.
     fn derivatives(&self, (commands, times_s): Timed<'_>, by: &[Together]) -> Result<Vec<Gradient>> {
+        self.check_times((commands, times_s))?;
+        for together in by {
+            Parameter::check_each_once(together.iter().map(|(parameter, _)| parameter))?;
+        }
+        let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
+        self.method.gradients(&surroundings!(self, self.time_s), (commands, times_s), by, &checked)
+    }
+
+    /// Checks the times after commands.
+    ///
+    /// # Errors
+    /// Another number of times, and times that are not in their order.
+    pub(super) fn check_times(&self, (commands, times_s): Timed<'_>) -> Result<()> {
         if times_s.len() != commands.len() {
             let remedy = format!("there are {} commands: give one for each", commands.len());
             return Err(Error::parameter("times_s", format!("{} times", times_s.len()), remedy));
-        }
-        for together in by {
-            Parameter::check_each_once(together.iter().map(|(parameter, _)| parameter))?;
         }
         let mut last_s = self.time_s;
         for time_s in times_s {
@@ -74,8 +84,7 @@ impl Simulation {
             }
             last_s = *time_s;
         }
-        let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
-        self.method.gradients(&surroundings!(self, self.time_s), (commands, times_s), by, &checked)
+        Ok(())
     }
 
     /// The same simulation, in the same state, where parameters of the scene have other values; the moduli of regions of the wall
@@ -88,12 +97,12 @@ impl Simulation {
     pub fn changed(&self, values: &[(Parameter, f64)]) -> Result<Self> {
         Parameter::check_each_once(values.iter().map(|(parameter, _)| parameter))?;
         let mut parts = self.parts();
-        for (parameter, value) in values {
+        for (parameter, _) in values {
             if parameter.value(&parts)?.is_none() {
                 return Err(parameter.refused("it belongs to a command: move the hand"));
             }
-            parameter.set(&mut parts, *value)?;
         }
+        Parameter::set_all(values, &mut parts)?;
         let Parts { stack, wall: properties, sheath, fields } = parts;
         stack.check_sections()?;
         properties.check_outside_regions()?;

@@ -8,7 +8,7 @@ use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::field::{Field, Magnet, Weight};
 use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::methods::{Gradient, Parameter};
+use crate::methods::{Gradient, Parameter, Weights};
 use crate::random::{splitmix64, unit};
 use crate::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use crate::vessel::{Lumen, Resolution, SweptVessel, anatomy};
@@ -40,10 +40,10 @@ fn stack(several: bool) -> Stack {
 
 /// A vessel with instruments.
 #[derive(Debug, Clone, Copy)]
-struct Scene {
+pub(super) struct Scene {
     tree: &'static str,
     several: bool,
-    friction: f64,
+    pub(super) friction: f64,
     /// Whether the vessel moves, by a step in a tenth of a second.
     moves: bool,
 }
@@ -63,7 +63,7 @@ fn breathing(sheath: &Sheath) -> MotionMode {
     }
 }
 
-fn simulation(scene: Scene) -> Simulation {
+pub(super) fn simulation(scene: Scene) -> Simulation {
     let Scene { tree, several, friction, moves } = scene;
     let tree = anatomy::tree(tree).unwrap();
     let vessel = SweptVessel::new(tree, Resolution::EdgeMm(1.0)).unwrap();
@@ -91,7 +91,7 @@ fn simulation(scene: Scene) -> Simulation {
 }
 
 /// The time after the next command.
-fn then_s(simulation: &Simulation) -> f64 {
+pub(super) fn then_s(simulation: &Simulation) -> f64 {
     if simulation.displacement().is_some() { simulation.time_s() + 0.1 } else { simulation.time_s() }
 }
 
@@ -132,7 +132,7 @@ fn slopes(gradient: &Gradient, k: usize) -> Vec<f64> {
 }
 
 /// All parameters of instruments with two sections each.
-fn parameters(instruments: usize, friction: f64) -> Vec<Parameter> {
+pub(super) fn parameters(instruments: usize, friction: f64) -> Vec<Parameter> {
     let mut by = vec![Parameter::WallModulus];
     for axis in 0..3 {
         by.extend([Parameter::EntryPosition { axis }, Parameter::EntryDirection { axis }]);
@@ -171,13 +171,15 @@ fn half(parameter: Parameter) -> f64 {
 }
 
 /// Numbers that look random.
-struct Numbers(u64);
+pub(super) struct Numbers(pub(super) u64);
 
 /// Gradients against differences.
 #[derive(Default)]
 struct Compared {
     /// Ascending.
     errors: Vec<f64>,
+    /// The same of the linearised parts of recorded commands, of places and forces.
+    recorded: Vec<f64>,
     /// Those that were not compared, since contacts or parts of whole commands change within the difference.
     others: usize,
     states: usize,
@@ -192,6 +194,16 @@ impl Compared {
     fn at(&self, part: f64) -> f64 {
         self.errors[(part * (self.errors.len() - 1) as f64) as usize]
     }
+
+    /// The same of recorded commands.
+    fn recorded_at(&self, part: f64) -> f64 {
+        self.recorded[(part * (self.recorded.len() - 1) as f64) as usize]
+    }
+
+    fn sort(&mut self) {
+        self.errors.sort_by(f64::total_cmp);
+        self.recorded.sort_by(f64::total_cmp);
+    }
 }
 
 impl std::fmt::Display for Compared {
@@ -202,19 +214,23 @@ impl std::fmt::Display for Compared {
         write!(
             f,
             "{count} derivatives in {states} states, {others} not compared: errors 50 % {half:.1e}, 90 % {most:.1e}, 99 % \
-             {nearly_all:.1e}, largest {all:.1e}; a derivative costs {cost:.2} steps"
+             {nearly_all:.1e}, largest {all:.1e}; a derivative costs {cost:.2} steps; recorded: {:.1e}, {:.1e}, {:.1e}, {:.1e}",
+            self.recorded_at(0.5),
+            self.recorded_at(0.9),
+            self.recorded_at(0.99),
+            self.recorded_at(1.0)
         )
     }
 }
 
 impl Numbers {
     /// The next one, between these two.
-    fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
+    pub(super) fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
         self.0 += 1;
         low + (high - low) * unit(splitmix64(7, self.0))
     }
 
-    fn moves(&mut self, hands: usize) -> Vec<Move> {
+    pub(super) fn moves(&mut self, hands: usize) -> Vec<Move> {
         let each = (0..hands).map(|instrument| {
             let advance_mm = self.between([1.0, 3.0]) - 0.3 * instrument as f64;
             let rotate_rad = self.between([-0.2, 0.2]);
@@ -255,6 +271,7 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
             compared.steps_s += began.elapsed().as_secs_f64();
             (compared.count, compared.states) = (compared.count + by.len(), compared.states + 1);
             let counts = [gradient.report.contacts.len(), gradient.report.substeps as usize];
+            let recording = now.record(std::slice::from_ref(&moves), &[time_s]).unwrap();
             for (k, parameter) in by.iter().enumerate() {
                 let h = half(*parameter);
                 // Two central differences, and what both lead to without their errors of the second order.
@@ -272,14 +289,28 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
                 let size =
                     |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>().sqrt() * value;
                 let whole = size(&mut differences.clone());
-                let off = size(&mut differences.zip(slopes(&gradient, k)).map(|(a, b)| a - b));
+                let off = size(&mut differences.clone().zip(slopes(&gradient, k)).map(|(a, b)| a - b));
                 compared.errors.push(off / whole.max(1e-2));
+                let Weights { tip_mm, push_force_n, torque_nmm, .. } =
+                    recording.jvp(&[(*parameter, 1.0)]).unwrap().remove(0);
+                let forces = push_force_n.iter().zip(&torque_nmm).flat_map(|(push, torque)| [*push, *torque]);
+                let own = tip_mm.iter().copied().chain(forces);
+                let whole = size(&mut differences.clone().take(3 + 2 * hands));
+                let off = size(&mut differences.zip(own).map(|(a, b)| a - b));
+                if off > 1e-4 * whole.max(1e-2) {
+                    println!(
+                        "{parameter:?} after {k}: off by {:.1e}, from sides {:.1e}",
+                        off / whole.max(1e-2),
+                        compared.errors[compared.errors.len() - 1]
+                    );
+                }
+                compared.recorded.push(off / whole.max(1e-2));
             }
         }
         let time_s = then_s(&now);
         now.step_until(&moves, Some(time_s)).unwrap();
     }
-    compared.errors.sort_by(f64::total_cmp);
+    compared.sort();
 }
 
 /// Largest error of nine of ten derivatives, and of all, where nothing rubs; and with friction. Why that is not smaller is open: whole
@@ -288,7 +319,7 @@ const SMOOTH: [f64; 2] = [2e-6, 2e-5];
 const RUBBED: [f64; 2] = [1e-3, 2e-3];
 
 /// Scenes without friction, with it, with two instruments, and in a vessel that moves.
-const SCENES: [Scene; 5] = [
+pub(super) const SCENES: [Scene; 5] = [
     TUBE,
     Scene { tree: "aortic_arch", several: true, ..TUBE },
     Scene { friction: 0.2, ..TUBE },
@@ -320,12 +351,13 @@ fn gradients_in_two_hundred_states() {
         }
         println!("{scene:?}: {compared}");
         all.errors.extend(&compared.errors);
+        all.recorded.extend(&compared.recorded);
         (all.others, all.states) = (all.others + compared.others, all.states + compared.states);
         (all.gradients_s, all.steps_s) =
             (all.gradients_s + compared.gradients_s, all.steps_s + compared.steps_s);
         all.count += compared.count;
     }
-    all.errors.sort_by(f64::total_cmp);
+    all.sort();
     println!("all: {all}");
     assert!(all.states >= 200 && all.at(0.9) < RUBBED[0], "{all}");
 }
@@ -468,6 +500,13 @@ fn what_has_no_gradient_is_refused() {
     assert!(changed(Parameter::Radius { instrument: 0, section: 0 }, 0.3).contains("thicker"));
     assert!(changed(Parameter::EntryPosition { axis: 0 }, 1e3).contains("outside the vessel"));
     assert!(changed(Parameter::EntryDirection { axis: 2 }, -5.0).contains("backwards"));
+    // Whatever their order, components of a direction are those of one vector.
+    let turned = [(Parameter::EntryDirection { axis: 0 }, 0.1), (Parameter::EntryDirection { axis: 1 }, 0.2)];
+    let both =
+        [turned, [turned[1], turned[0]]].map(|turned| now.changed(&turned).unwrap().sheath().direction);
+    let mut along = now.sheath().direction;
+    (along.x, along.y) = (0.1, 0.2);
+    assert!(both[0] == both[1] && (both[0] - along.normalize()).norm() < 1e-15, "{both:?}");
     let there = now.changed(&[(Parameter::EntryDirection { axis: 0 }, 0.1)]).unwrap();
     assert!((there.sheath().direction.norm() - 1.0).abs() < 1e-15 && there.sheath().direction.x > 0.09);
     assert_eq!(there.shape().positions_mm, now.shape().positions_mm);

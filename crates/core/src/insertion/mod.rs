@@ -8,6 +8,9 @@ mod gradient_tests;
 mod mark;
 mod nodes;
 mod packing;
+mod recording;
+#[cfg(test)]
+mod reverse_tests;
 mod script;
 mod simulation;
 mod tally;
@@ -22,7 +25,10 @@ pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use nodes::nodes_from_tip;
 pub use packing::Packing;
-pub use script::{Condition, Inject, LineCourse, Until};
-pub use script::{Injection, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, script_commands};
+pub use recording::Recording;
+pub use script::{
+    Condition, Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
+    script_commands,
+};
 pub use simulation::Simulation;
 pub use tally::Tally;

@@ -1,8 +1,8 @@
 //! Derivatives of what a command leads to.
 
-use crate::Vec3;
-use crate::methods::{Energy, StepReport};
+use crate::methods::{Command, Energy, Parameter, StepReport, Surroundings};
 use crate::shape::Shape;
+use crate::{Result, Vec3};
 
 /// Derivatives of what a command leads to, from a state that is given.
 ///
@@ -46,4 +46,63 @@ pub struct Margin {
     pub least_force_n: f64,
     /// At least so far are points from the wall that do not touch it, mm. Infinite without any.
     pub least_gap_mm: f64,
+}
+
+/// What a command has led to.
+#[derive(Debug, Clone)]
+pub struct Passed {
+    /// Its report.
+    pub report: StepReport,
+    /// The centre line after it.
+    pub shape: Shape,
+    /// How far the next change of a contact is.
+    pub margin: Margin,
+}
+
+/// Weights of what a command leads to, in the sum of which a derivative is; those of an empty list are 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Weights {
+    /// Of the coordinates of the tip, per mm.
+    pub tip_mm: Vec3,
+    /// Of the nodes of the shape, per mm.
+    pub positions_mm: Vec<Vec3>,
+    /// Of the push force of each hand, per N.
+    pub push_force_n: Vec<f64>,
+    /// Of the torque of each hand, per N·mm.
+    pub torque_nmm: Vec<f64>,
+    /// Of the whole stored energy, per mJ.
+    pub energy_mj: f64,
+    /// Of the normal forces of the contacts of the report, per N.
+    pub contact_forces_n: Vec<f64>,
+}
+
+/// Derivatives of a sum of what commands lead to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pulled {
+    /// By each parameter, per unit of it.
+    pub by: Vec<f64>,
+    /// Whether each is that on one side only, where the mesh or a contact changes.
+    pub one_sided: Vec<bool>,
+    /// By the motion of each instrument's hand in each command, per mm, rad and unit of steering, where that was asked for.
+    pub hands: Vec<Vec<Command>>,
+}
+
+/// Commands that a method has recorded, to be differentiated backwards.
+pub trait Tape: Send + Sync {
+    /// What they led to, one after the other.
+    fn passed(&self) -> &[Passed];
+
+    /// Derivatives of the sum with the weights of each command by parameters, and by the hands in each command if that is asked for, in the
+    /// surroundings of the first command.
+    ///
+    /// # Errors
+    /// A parameter that does not exist, and weights of another number.
+    fn pull(&self, first: &Surroundings<'_>, weights: &[Weights], by: (&[Parameter], bool))
+    -> Result<Pulled>;
+
+    /// Changes of what each command leads to for small changes of parameters, in the order of their weights.
+    ///
+    /// # Errors
+    /// A parameter that does not exist.
+    fn push(&self, first: &Surroundings<'_>, along: &[(Parameter, f64)]) -> Result<Vec<Weights>>;
 }

@@ -12,12 +12,10 @@ mod state;
 
 pub use command::{Command, Move};
 pub use detached::DetachedCoil;
-pub use gradient::Margin;
-pub use gradient::{Gradient, Slope};
+pub use gradient::{Gradient, Margin, Passed, Pulled, Slope, Tape, Weights};
 pub use parameter::Parameter;
 pub(crate) use parameter::{Parts, Together};
-pub use report::{Energy, Jump};
-pub use report::{InstrumentReport, LateralForce, StepReport, WallForce};
+pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
 
@@ -172,6 +170,19 @@ pub trait Method: Send {
         _by: &[Vec<(Parameter, f64)>],
         _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
+        Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))
+    }
+
+    /// Carries out commands as [`Method::gradients`] does, from the state as it is, and records them; the state does not change.
+    ///
+    /// # Errors
+    /// As [`Method::gradients`], without parameters.
+    fn record(
+        &self,
+        _surroundings: &Surroundings<'_>,
+        _commands: Timed<'_>,
+        _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
+    ) -> Result<Box<dyn Tape>> {
         Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))
     }
 

@@ -310,11 +310,32 @@ impl Parameter {
         })
     }
 
-    /// Sets its value in parts that have it; one of a command has none.
+    /// Sets values in parts that have them; those of a command have none. The order does not matter: components of a direction are all set
+    /// before it is made of unit length.
     ///
     /// # Errors
     /// A direction or a field that cannot be.
-    pub(crate) fn set(&self, parts: &mut Parts, value: f64) -> Result<()> {
+    pub(crate) fn set_all(values: &[(Self, f64)], parts: &mut Parts) -> Result<()> {
+        let (mut along, mut turns) = (parts.sheath.direction, None);
+        for (parameter, value) in values {
+            match *parameter {
+                Self::EntryDirection { axis } => (along[axis], turns) = (*value, Some(parameter)),
+                _ => parameter.set(parts, *value)?,
+            }
+        }
+        let Some(parameter) = turns else { return Ok(()) };
+        let sheath = parts.sheath;
+        let direction = Sheath::new(sheath.position_mm, along)?.direction;
+        if direction.dot(&sheath.direction) <= 0.0 {
+            return Err(parameter.refused("the sheath would point backwards: give a smaller change"));
+        }
+        let bends_towards = Some(sheath.frame().transported_to(&direction).u);
+        parts.sheath = Sheath { direction, bends_towards, ..sheath };
+        Ok(())
+    }
+
+    /// Sets its value, which is not one of a direction.
+    fn set(&self, parts: &mut Parts, value: f64) -> Result<()> {
         if let Some(place) = self.instrument().zip(self.section()) {
             parts.stack.change_section(place, |section| match *self {
                 Self::BendingStiffness { .. } => section.bending_stiffness_nmm2 = value,
@@ -333,16 +354,6 @@ impl Parameter {
                 position_mm[axis] = value;
                 let moved = Sheath::new(position_mm, sheath.direction)?;
                 parts.sheath = Sheath { position_mm: moved.position_mm, ..sheath };
-            }
-            Self::EntryDirection { axis } => {
-                let mut along = sheath.direction;
-                along[axis] = value;
-                let direction = Sheath::new(sheath.position_mm, along)?.direction;
-                if direction.dot(&sheath.direction) <= 0.0 {
-                    return Err(self.refused("the sheath would point backwards: give a smaller change"));
-                }
-                let bends_towards = Some(sheath.frame().transported_to(&direction).u);
-                parts.sheath = Sheath { direction, bends_towards, ..sheath };
             }
             Self::Field { field, axis } => {
                 let mut fields = parts.fields.to_vec();

@@ -51,8 +51,7 @@ mod torsion;
 pub use assembly::Assembly;
 pub use clamp::Clamp;
 pub use couples::{Couple, Link};
-pub use element::Energy;
-pub use element::{ElementData, Material};
+pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
 pub use lagrangian::{element_energy, element_system};
 pub(crate) use lagrangian::{element_gradients, stored_energy};
@@ -64,10 +63,8 @@ pub use points::PointSum;
 pub(crate) use rim::beyond;
 pub(crate) use share::{shares, times};
 pub use state::RodState;
-pub use stencils::Stencils;
-pub use stencils::Triple;
-pub use supports::EndAngle;
-pub use supports::Supports;
+pub use stencils::{Stencils, Triple};
+pub use supports::{EndAngle, Supports};
 
 #[cfg(test)]
 mod derivative_tests;

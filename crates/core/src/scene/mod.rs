@@ -61,5 +61,4 @@ mod tables;
 
 pub use sac::SacSpec;
 pub use spec::{Scene, SceneOf};
-pub use tables::SheathSpec;
-pub use tables::{DeviceSpec, InstrumentSpec, VesselSpec};
+pub use tables::{DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};

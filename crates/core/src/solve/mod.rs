@@ -7,6 +7,7 @@
 pub(crate) mod contacts;
 pub(crate) mod external;
 mod factors;
+mod inverse;
 mod krylov;
 mod line_search;
 pub(crate) mod neighbourhood;
@@ -20,14 +21,12 @@ mod together;
 mod trial;
 mod unsymmetric;
 
-pub use external::{ContactMerit, Moved};
-pub use external::{Contacts, External, Sizes};
+pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
+pub(crate) use inverse::Inverse;
 pub(crate) use krylov::gmres;
 pub(crate) use neighbourhood::Neighbourhood;
 pub use newton::Newton;
-pub use report::NewtonOptions;
-pub use report::StepRecord;
-pub use report::{NewtonReport, StopReason};
+pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;
 pub(crate) use together::Together;
 

@@ -32,10 +32,8 @@ pub use case::{
 pub use continuation::PathPoint;
 pub use critical::Parameter;
 pub use loads::Loads;
-pub use problem::Solved;
-pub use problem::StaticProblem;
-pub use solution::{Energies, InstrumentSolution, Reactions};
-pub use solution::{Reaction, StaticSolution, TouchSolution};
+pub use problem::{Solved, StaticProblem};
+pub use solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
 
 #[cfg(test)]
 mod play_tests;

@@ -44,39 +44,33 @@ mod weld;
 pub(crate) mod yielding;
 
 pub use centreline::{CentrelineNode, CentrelineTree, Target};
-pub use check::OpeningReport;
 #[cfg(test)]
 use check::check_with;
-pub use check::{CheckReport, check, check_repaired};
+pub use check::{CheckReport, OpeningReport, check, check_repaired};
 pub use conditioning::{Conditioned, Conditioning, condition};
 pub use extract::{CentrelineBranch, CentrelineEnd, ExtractedCentreline};
 pub use files::{PatientAxes, SurfaceFrame};
 pub(crate) use generate::any_perpendicular;
 pub use generate::{GeneratedWall, Resolution};
 pub use hints::wall_hints;
-pub use labels::LabelEnd;
-pub use labels::{EndKind, Ends, LabelMap, LabelOptions, LabelReport, LabelSurface, Parts};
+pub use labels::{EndKind, Ends, LabelEnd, LabelMap, LabelOptions, LabelReport, LabelSurface, Parts};
 pub use links::CentrelineLink;
-pub use lumen::Lumen;
-pub use lumen::Meshed;
+pub use lumen::{Lumen, Meshed};
 pub use mesh::SurfaceMesh;
 pub(crate) use mesh::inward_vertex_normals;
 pub use motion::{Displacement, MotionMode, VesselMotion, Waveform};
 pub use opening::Opening;
-pub use path::CentrelinePath;
-pub use path::OnPath;
-pub use query::Nearest;
-pub use query::WallQuery;
+pub use path::{CentrelinePath, OnPath};
+pub use query::{Nearest, WallQuery};
 pub use recipe::{CentrelineRecipe, NoStore, WallRecipe, WallStore};
-pub use repairs::RepairKind;
-pub use repairs::{Repair, RepairMode, RepairOptions};
+pub use repairs::{Repair, RepairKind, RepairMode, RepairOptions};
 pub use sac::Sac;
-pub use survey::survey;
-pub use survey::{LumenReport, SeptaReport, StartReport, Survey};
+pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use swept::SweptVessel;
 pub(crate) use swept::{ClosestFrom, InTube, SweptField, Tube};
 pub(crate) use wall::NO_NEIGHBOUR;
-pub use wall::RepairReport;
-pub use wall::Wall;
-pub use yielding::{BeforeAfter, YieldingBranch, YieldingEnds, YieldingPreset, YieldingTether};
-pub use yielding::{Course, Landmark, Straightening, Stretch, YieldingSpec};
+pub use wall::{RepairReport, Wall};
+pub use yielding::{
+    BeforeAfter, Course, Landmark, Straightening, Stretch, YieldingBranch, YieldingEnds, YieldingPreset,
+    YieldingSpec, YieldingTether,
+};

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._endowire import Simulation
+from ._endowire import Recorded, Simulation
 from .errors import ComputationError, InputError
 from .fitting import numbers
 
@@ -56,6 +57,7 @@ class Response:
         if "hand" in self.by:
             raise InputError("by = 'hand': it stands for two: give 'advance' and 'rotate'")
         self.across_jumps = across_jumps
+        self._last: tuple[bytes, Recorded] | None = None
         # Words and kinds are asked for once, so that a wrong one is told here.
         self.start
         for one in self.of:
@@ -102,8 +104,54 @@ class Response:
             warnings.warn(f"derivatives by {self.by} are NaN: {error}", RuntimeWarning, stacklevel=2)
             found = self.numbers(values)
             return found, [np.full((len(one), len(self.by)), np.nan) for one in found]
-        sided = [name for name, is_one in zip(self.by, last.one_sided, strict=True) if is_one]
+        self._warn(last.one_sided)
+        return [numbers(last, of) for of in self.of], [last.of(of) for of in self.of]
+
+    def _warn(self, one_sided: NDArray[np.bool_]) -> None:
+        sided = [name for name, is_one in zip(self.by, one_sided, strict=True) if is_one]
         if sided:
             message = f"derivatives by {sided} hold on one side only: a contact opens or closes right there, or a node comes in"
-            warnings.warn(message, RuntimeWarning, stacklevel=2)
-        return [numbers(last, of) for of in self.of], [last.of(of) for of in self.of]
+            warnings.warn(message, RuntimeWarning, stacklevel=3)
+
+    def _recorded(self, values: ArrayLike) -> Recorded:
+        """The commands for these values, recorded; those of the last values are kept."""
+        key = np.asarray(values, dtype=float).tobytes()
+        last = self._last
+        if last is None or last[0] != key:
+            there, moves = self._at(values)
+            last = self._last = (key, there.recorded(moves))
+        return last[1]
+
+    def recorded(self, values: ArrayLike) -> list[NDArray[np.float64]]:
+        """As ``numbers``, of commands that are recorded for ``pull`` with the same values.
+
+        Raises what ``Simulation.recorded`` raises.
+        """
+        try:
+            recorded = self._recorded(values)
+        except ComputationError:
+            if self.across_jumps == "raise":
+                raise
+            return self.numbers(values)
+        state = SimpleNamespace(report=recorded.report(), positions_mm=recorded.positions_mm())
+        return [numbers(state, of) for of in self.of]
+
+    def pull(self, values: ArrayLike, weights: Sequence[ArrayLike]) -> NDArray[np.float64]:
+        """Derivatives in the parameters of the sum of the numbers of all kinds, each times its weight, shape (p,): by the reverse pass, whose
+        cost does not grow with the number of parameters. ``weights`` are of each kind, as many as its numbers.
+
+        Raises what ``Simulation.recorded`` and ``Recorded.vjp`` raise.
+        """
+        try:
+            recorded = self._recorded(values)
+        except ComputationError as error:
+            if self.across_jumps == "raise":
+                raise
+            warnings.warn(f"derivatives by {self.by} are NaN: {error}", RuntimeWarning, stacklevel=2)
+            return np.full(len(self.by), np.nan)
+        of_last: dict[str, NDArray[np.float64]] = {}
+        for of, weight in zip(self.of, weights, strict=True):
+            of_last[of] = of_last.get(of, 0.0) + np.asarray(weight, dtype=float)
+        pulled = recorded.vjp([*([{}] * (len(recorded) - 1)), of_last], by=self.by)
+        self._warn(pulled.one_sided)
+        return pulled.values

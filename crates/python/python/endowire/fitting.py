@@ -11,6 +11,7 @@ linear within it and the residuals are independent with the given sigma.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ SHOWN = 1e-6
 ENERGIES = ("bend", "twist", "wall", "field", "tail", "vessel")
 
 
-def numbers(state: Gradient | Simulation, of: str) -> NDArray[np.float64]:
+def numbers(state: Gradient | Simulation | SimpleNamespace, of: str) -> NDArray[np.float64]:
     """What a gradient or a simulation has of a kind that ``Gradient.of`` knows, as one row of numbers: the values that have these
     derivatives.
 

@@ -22,16 +22,17 @@ except ImportError as error:
 __all__ = ["function"]
 
 
-def _called(compute: Callable[[Any], list[np.ndarray[Any, Any]]], values: Any, shapes: list[tuple[int, ...]]) -> list[Any]:
-    """What a function of numpy gives: at once, or, while JAX traces, when the program runs, whose arrays have these shapes."""
+def _called(compute: Callable[..., list[np.ndarray[Any, Any]]], given: Sequence[Any], shapes: list[tuple[int, ...]]) -> list[Any]:
+    """What a function of numpy gives: at once, or, while JAX traces, when the program runs, whose arrays have these shapes and the type of
+    the first that is given."""
 
-    def cast(given: Any) -> list[np.ndarray[Any, Any]]:
-        return [np.asarray(one, dtype=values.dtype) for one in compute(np.asarray(given, dtype=float))]
+    def cast(*arrays: Any) -> list[np.ndarray[Any, Any]]:
+        return [np.asarray(one, dtype=given[0].dtype) for one in compute(*(np.asarray(one, dtype=float) for one in arrays))]
 
-    if not isinstance(values, jax.core.Tracer):
-        return [jax.numpy.asarray(one) for one in cast(values)]
-    told = [jax.ShapeDtypeStruct(shape, values.dtype) for shape in shapes]
-    return list(jax.pure_callback(cast, told, values, vmap_method="sequential"))
+    if not any(isinstance(one, jax.core.Tracer) for one in given):
+        return [jax.numpy.asarray(one) for one in cast(*given)]
+    told = [jax.ShapeDtypeStruct(shape, given[0].dtype) for shape in shapes]
+    return list(jax.pure_callback(cast, told, *given, vmap_method="sequential"))
 
 
 def function(
@@ -51,18 +52,17 @@ def function(
     """
     response = Response(simulation, moves, by, [of] if isinstance(of, str) else of, across_jumps)
     shapes: list[tuple[int, ...]] = [one.shape for one in response.numbers(response.start)]
-    slopes = [(*shape, len(response.by)) for shape in shapes]
 
     @jax.custom_vjp
     def respond(values: Any) -> tuple[Any, ...]:
-        return tuple(_called(response.numbers, values, shapes))
+        return tuple(_called(response.numbers, [values], shapes))
 
-    def forward(values: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        found = _called(lambda given: [one for part in response.linear(given) for one in part], values, shapes + slopes)
-        return tuple(found[: len(shapes)]), tuple(found[len(shapes) :])
+    def forward(values: Any) -> tuple[tuple[Any, ...], Any]:
+        return tuple(_called(response.recorded, [values], shapes)), values
 
-    def backward(found: tuple[Any, ...], weights: tuple[Any, ...]) -> tuple[Any]:
-        return (sum(one @ slope for one, slope in zip(weights, found, strict=True)),)
+    def backward(values: Any, weights: tuple[Any, ...]) -> tuple[Any]:
+        pulled = _called(lambda given, *all: [response.pull(given, all)], [values, *weights], [(len(response.by),)])
+        return (pulled[0],)
 
     respond.defvjp(forward, backward)
 

@@ -158,6 +158,11 @@ impl Between {
         &self.places
     }
 
+    /// Changes the angle from which a node slips by so much.
+    pub(crate) fn slip_from(&mut self, place: usize, by_rad: f64) {
+        self.places[place].from_rad += by_rad;
+    }
+
     /// Renews the force across the line of each node and the length it represents, N and mm; returns the change of
     /// couples relative to the largest.
     pub(crate) fn renew(&mut self, state: &RodState, forces: impl Fn(&Place) -> (f64, f64)) -> f64 {

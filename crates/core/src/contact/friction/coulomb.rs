@@ -113,6 +113,24 @@ impl Coulomb {
         })
     }
 
+    /// Derivatives of the friction force and moment of a slider, at this place and angle, in its normal.
+    pub(in crate::contact) fn by_normal(
+        &self,
+        slider: &Slider,
+        (x, angle): (&Vec3, f64),
+    ) -> (Matrix3<f64>, Vec3) {
+        let (slip, spin) = slider.slip(x, angle);
+        let (way, normal) = (x - slider.from_mm, slider.normal);
+        let (force, along) =
+            force_of_slip(self.largest_n(slider), &Matrix3::identity(), &slip, self.stick_mm);
+        let turn = slider.along.cross_matrix() * -slider.radius_mm;
+        let by_normal = turn * (angle - slider.from_rad)
+            - Matrix3::identity() * normal.dot(&way)
+            - normal * way.transpose();
+        let by_force = along * by_normal;
+        (by_force, by_force.tr_mul(&spin) + turn.tr_mul(&force))
+    }
+
     /// Lower and upper estimate of the energy dissipated in the step, mJ: with the normal forces of its start and of
     /// its end, at contacts with these places and angles.
     pub(in crate::contact) fn dissipated_mj<'a>(

@@ -10,6 +10,8 @@
 //!
 //! which is the rotation angle of G if G is a rotation about t; (A)^∨ is the vector with (A)^∨ × v = A v.
 
+use nalgebra::Matrix3;
+
 use super::slider::Slider;
 use crate::Vec3;
 use crate::vessel::Displacement;
@@ -33,5 +35,47 @@ impl Slider {
             *normal = (across * *normal).try_normalize(0.0).unwrap_or_default();
         }
         way_mm
+    }
+}
+
+/// Derivatives of where slip begins once the wall has moved, in where it began before.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CarriedSlopes {
+    /// Of the place, and in the place.
+    pub(crate) place: Matrix3<f64>,
+    /// Of the direction in the place and in the direction.
+    pub(crate) direction: [Matrix3<f64>; 2],
+    /// Of the angle in the place and in the direction.
+    pub(crate) spin: [Vec3; 2],
+}
+
+/// Step of differences of places, mm, and of directions.
+const STEP: [f64; 2] = [1e-4, 1e-6];
+
+impl CarriedSlopes {
+    /// Of a device at this place with this direction.
+    pub(crate) fn at(
+        (place, direction): (Vec3, Vec3),
+        (before, after): (&Displacement, &Displacement),
+    ) -> Self {
+        let carried = |place: Vec3, direction: Vec3| {
+            let mut slider = Slider::at((place, direction), (0.0, 0.0), 0.0);
+            slider.carry(before, after);
+            (slider.from_mm, slider.along, slider.from_rad)
+        };
+        let side = |kind: usize, axis: usize, sign: f64| {
+            let way = Vec3::ith(axis, sign * STEP[kind]);
+            if kind == 0 { carried(place + way, direction) } else { carried(place, direction + way) }
+        };
+        let column = |kind: usize, axis: usize| {
+            let (less, more, by) = (side(kind, axis, -1.0), side(kind, axis, 1.0), 0.5 / STEP[kind]);
+            ((more.0 - less.0) * by, (more.1 - less.1) * by, (more.2 - less.2) * by)
+        };
+        let [by_place, by_direction] = [0, 1].map(|kind| [0, 1, 2].map(|axis| column(kind, axis)));
+        Self {
+            place: Matrix3::from_columns(&by_place.map(|column| column.0)),
+            direction: [by_place, by_direction].map(|by| Matrix3::from_columns(&by.map(|column| column.1))),
+            spin: [by_place, by_direction].map(|by| Vec3::from(by.map(|column| column.2))),
+        }
     }
 }

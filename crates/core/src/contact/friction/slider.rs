@@ -13,11 +13,11 @@ pub(in crate::contact) struct Slider {
     /// The material point of the vessel there, if it has been carried along.
     pub(super) material: Option<Vec3>,
     /// θₐ: its material angle before the step.
-    pub(super) from_rad: f64,
+    pub(in crate::contact) from_rad: f64,
     /// Direction of the device; zero where spin causes no slip.
-    pub(super) along: Vec3,
+    pub(in crate::contact) along: Vec3,
     /// r, mm.
-    pub(super) radius_mm: f64,
+    pub(in crate::contact) radius_mm: f64,
     /// Normal of the surface. Zero if a recalled force has not met a base yet.
     pub(in crate::contact) normal: Vec3,
     /// N: normal force, scaled down where the coefficient is below its largest value.

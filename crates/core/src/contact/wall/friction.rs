@@ -42,6 +42,13 @@ impl WallContact<'_> {
         self.friction.law.hold();
     }
 
+    /// Drops what has no potential: friction and drag.
+    pub(crate) fn let_slip(&mut self) {
+        self.friction.law.coefficient = 0.0;
+        self.friction.between.clear();
+        self.drag = None;
+    }
+
     /// Normal forces of friction follow the contact forces again.
     pub(crate) fn release_friction(&mut self) {
         self.friction.release();

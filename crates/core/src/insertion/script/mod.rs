@@ -12,13 +12,10 @@ mod run;
 mod tests;
 mod until;
 
-pub use inject::Inject;
-pub use inject::Injection;
+pub use inject::{Inject, Injection};
 pub use line::ScriptLine;
-pub use run::LineCourse;
-pub use run::{ScriptCourse, ScriptRun, Step};
-pub use until::Met;
-pub use until::{Condition, Until};
+pub use run::{LineCourse, ScriptCourse, ScriptRun, Step};
+pub use until::{Condition, Met, Until};
 
 use super::simulation::check_command;
 use super::{Command, Move};

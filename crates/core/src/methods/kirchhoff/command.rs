@@ -18,7 +18,7 @@ use super::configuration::Start;
 use super::course::{Course, Next, Rest};
 use super::extrapolation::Correction;
 use super::hands::{lengths, line_advance_mm, set_motions};
-use super::nearby::Nearby;
+use super::nearby::Follows;
 use super::part::Effort;
 use super::report::Took;
 use super::state::{KirchhoffState, UnderWay};
@@ -92,7 +92,7 @@ impl<const C: usize> Workspace<C> {
         environment: &Environment<'_>,
         from: &KirchhoffState,
         (moves, solves): (&[Move], usize),
-        mut nearby: Option<&mut Nearby>,
+        mut beside: Option<&mut dyn Follows<C>>,
     ) -> Result<Driven> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
@@ -147,8 +147,8 @@ impl<const C: usize> Workspace<C> {
                     let line = next.state.material_line(there.wall());
                     let openings = surroundings.lumen.openings();
                     let goes_on = check_inside(openings, line, 0.0).and_then(|()| {
-                        let (beside, to) = (nearby.as_deref_mut(), (&*next.state, &way.target[..]));
-                        beside.map_or(Ok(()), |beside| {
+                        let to = (&*next.state, &way.target[..]);
+                        beside.as_mut().map_or(Ok(()), |beside| {
                             beside.follow(tools, &there, (was, passage), (attempt, &found), to)
                         })
                     });

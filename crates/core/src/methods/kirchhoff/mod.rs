@@ -105,7 +105,7 @@ use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching}
 use crate::device::{Stack, line_mm};
 use crate::field::FieldLoad;
 use crate::methods::{
-    Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings, Timed,
+    Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings, Tape, Timed,
 };
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, RodState, TWISTED};
@@ -490,6 +490,15 @@ impl<const C: usize> Method for Kirchhoff<C> {
         checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
     ) -> Result<Vec<Gradient>> {
         self.gradients_of(surroundings, (commands, by), checked)
+    }
+
+    fn record(
+        &self,
+        surroundings: &Surroundings<'_>,
+        commands: Timed<'_>,
+        checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
+    ) -> Result<Box<dyn Tape>> {
+        self.recorded(surroundings, commands, checked)
     }
 
     fn most_solves(&self, moves: &[Move]) -> Option<usize> {

@@ -51,6 +51,9 @@ use crate::rod::RodState;
 /// its compliance would lose their digits.
 pub(super) const LEAST: f64 = 1e-4;
 
+/// How many numbers a [`Twist`] has.
+pub(super) const TWIST: usize = 5;
+
 /// What holds a tail by friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) enum Grip {
@@ -87,6 +90,18 @@ impl Twist {
     pub(super) fn is_finite(&self) -> bool {
         let Self { mouth_rad, grip_rad, grip_mm, body_nmm, hand_nmm, .. } = self;
         [mouth_rad, grip_rad, grip_mm, body_nmm, hand_nmm].into_iter().all(|part| part.is_finite())
+    }
+
+    /// Its numbers, in whose changes a later part changes.
+    pub(super) fn numbers(&self) -> [f64; TWIST] {
+        [self.mouth_rad, self.grip_rad, self.grip_mm, self.body_nmm, self.hand_nmm]
+    }
+
+    /// The same with one of its numbers changed by so much.
+    pub(super) fn with(mut self, number: usize, by: f64) -> Self {
+        let Self { mouth_rad, grip_rad, grip_mm, body_nmm, hand_nmm, .. } = &mut self;
+        *[mouth_rad, grip_rad, grip_mm, body_nmm, hand_nmm][number] += by;
+        self
     }
 
     /// Angle, rad, of the material at this distance from the tip, in a tail that is `inserted_mm` long in the body.

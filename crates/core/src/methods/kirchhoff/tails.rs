@@ -48,6 +48,11 @@ impl Tails {
         held
     }
 
+    /// The tails, of each instrument one.
+    pub(super) fn each(&self) -> &[Tail] {
+        &self.each
+    }
+
     /// Whether any of them acts on the rod.
     pub(super) fn act(&self) -> bool {
         self.turning().next().is_some()

@@ -29,8 +29,7 @@ pub use map::LabelMap;
 use mask::Mask;
 use net::Net;
 pub use options::{Ends, LabelOptions, Parts};
-pub use report::LabelEnd;
-pub use report::LabelReport;
+pub use report::{LabelEnd, LabelReport};
 use smooth::Lattice;
 
 /// Half of the side of the box in which a vertex of the surface may be moved, in voxels.

@@ -25,11 +25,9 @@ mod mode;
 #[cfg(test)]
 mod tests;
 
-pub use displacement::Displacement;
-pub use displacement::Local;
+pub use displacement::{Displacement, Local};
 pub use fade::Around;
-pub use mode::Turn;
-pub use mode::{MotionMode, Waveform};
+pub use mode::{MotionMode, Turn, Waveform};
 
 use crate::error::number;
 use crate::{Error, Result, Vec3};

@@ -52,10 +52,8 @@ mod straightening;
 #[cfg(test)]
 mod tests;
 
-pub use spec::YieldingSpec;
-pub use spec::{YieldingBranch, YieldingEnds, YieldingPreset, YieldingTether};
-pub use straightening::BeforeAfter;
-pub use straightening::{Landmark, Straightening, Stretch};
+pub use spec::{YieldingBranch, YieldingEnds, YieldingPreset, YieldingSpec, YieldingTether};
+pub use straightening::{BeforeAfter, Landmark, Straightening, Stretch};
 
 use std::sync::Arc;
 

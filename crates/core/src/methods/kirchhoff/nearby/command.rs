@@ -14,16 +14,11 @@ use crate::shape::Shape;
 use crate::{Error, Result};
 
 impl<const C: usize> Kirchhoff<C> {
-    /// Derivatives of what commands lead to.
+    /// Checks that commands from here have derivatives.
     ///
     /// # Errors
-    /// As [`Method::gradients`](crate::methods::Method::gradients).
-    pub(in super::super) fn gradients_of(
-        &self,
-        surroundings: &Surroundings<'_>,
-        ((commands, times_s), by): (Timed<'_>, &[Together]),
-        checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
-    ) -> Result<Vec<Gradient>> {
+    /// A vessel that yields, loops that touch, detached coils, and earlier commands that are not done.
+    pub(super) fn check_differentiable(&self, surroundings: &Surroundings<'_>) -> Result<()> {
         if surroundings.course.is_some() {
             let remedy = "derivatives of a vessel that yields are not there: leave it out";
             return Err(Error::parameter("vessel.yielding", "given", remedy));
@@ -36,6 +31,20 @@ impl<const C: usize> Kirchhoff<C> {
             let remedy = "earlier commands are not done: finish them, or drop them with forget";
             return Err(Error::parameter("gradient", "behind", remedy));
         }
+        Ok(())
+    }
+
+    /// Derivatives of what commands lead to.
+    ///
+    /// # Errors
+    /// As [`Method::gradients`](crate::methods::Method::gradients).
+    pub(in super::super) fn gradients_of(
+        &self,
+        surroundings: &Surroundings<'_>,
+        ((commands, times_s), by): (Timed<'_>, &[Together]),
+        checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
+    ) -> Result<Vec<Gradient>> {
+        self.check_differentiable(surroundings)?;
         let mut surroundings = *surroundings;
         let environment = Environment::new(&surroundings, &self.surface, &self.options);
         let (mut state, mut report) = (Arc::clone(&self.state), StepReport::clone(&self.report));

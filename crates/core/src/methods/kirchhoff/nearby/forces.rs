@@ -8,7 +8,8 @@ use super::super::part::Effort;
 use super::super::search::{Beginning, Bounds, Lagged, Search};
 use super::super::state::KirchhoffState;
 use super::super::workspace::Tools;
-use super::{Acting, End, singular};
+use super::sparse::Sparse;
+use super::{Acting, End, STICKING, singular};
 use crate::methods::Sheath;
 use crate::methods::kirchhoff::Environment;
 use crate::rod::{ElementData, Frame, Layout, RodState};
@@ -192,21 +193,28 @@ pub(super) fn rows<const C: usize>(search: &Search<'_, '_, C>) -> Vec<f64> {
     assembly.residual.iter().zip(&assembly.correction).map(|(row, more)| row + more).collect()
 }
 
-/// Moves a rod to a sheath that is a little elsewhere: all of it by the motion of the mouth, and its first tangent into the direction.
+/// Moves a rod to a sheath that is a little elsewhere.
 fn enter<const C: usize>(elements: &[ElementData], sheath: &Sheath, rod: &mut RodState) {
+    if let Some(way) = entering::<C>(sheath, rod) {
+        let from = rod.clone();
+        rod.advance::<C>(elements, &from, &way, 1.0);
+    }
+}
+
+/// The way of a rod to a sheath that is a little elsewhere: all of it by the motion of the mouth, and its first tangent into the direction.
+pub(super) fn entering<const C: usize>(sheath: &Sheath, rod: &RodState) -> Option<Vec<f64>> {
     let shift = sheath.position_mm - rod.positions[0];
     let (a, b) = rod.frames[0].log(&sheath.direction);
     if shift.norm() + a.abs() + b.abs() <= ROUNDED {
-        return;
+        return None;
     }
-    let mut way = vec![0.0; Layout::<C>::dimension(elements.len())];
-    for node in 0..=elements.len() {
+    let mut way = vec![0.0; Layout::<C>::dimension(rod.elements())];
+    for node in 0..=rod.elements() {
         way[Layout::<C>.position(node)..][..3].copy_from_slice(shift.as_slice());
     }
     let tangent = Layout::<C>.tangent(0);
     (way[tangent], way[tangent + 1]) = (a, b);
-    let from = rod.clone();
-    rod.advance::<C>(elements, &from, &way, 1.0);
+    Some(way)
 }
 
 /// How the triads from which the spin of a rod is measured are turned against those of the slid device: Newton's steps from there turn a little
@@ -217,4 +225,58 @@ pub(super) fn spins(rod: &RodState, slid: &[Frame]) -> Vec<f64> {
         libm::atan2(back.dot(&slid.v), back.dot(&slid.u))
     });
     each.collect()
+}
+
+/// What forces that follow from the state have more than those that stay, by each unknown in turn: for those that depend on more than the
+/// place of a contact, as drag and forces between instruments do. Their spin is measured from these triads. And all forces by the angle
+/// from which each place between instruments slips.
+pub(super) fn lagging_everywhere<const C: usize>(
+    search: &mut Search<'_, '_, C>,
+    lagged: &Lagged<'_>,
+    triads: &[Frame],
+) -> [Sparse; 2] {
+    let base = search.state.clone();
+    let mut lagging = Sparse::default();
+    let unknowns = Layout::<C>.support(search.elements.len());
+    for unknown in 0..unknowns {
+        let mut way = vec![0.0; Layout::<C>::dimension(search.elements.len())];
+        way[unknown] = 1.0;
+        search.state.copy_from(&base);
+        search.contact.follow_depths();
+        search.assemble(lagged, false);
+        search.contact.hold_friction();
+        let stays = [-TURN_RAD, TURN_RAD].map(|part| {
+            go(search, &base, (&way, part), &[]);
+            search.assemble_once(false);
+            rows(search)
+        });
+        search.contact.follow_depths();
+        let follows = [-TURN_RAD, TURN_RAD].map(|part| {
+            go(search, &base, (&way, part), triads);
+            search.assemble(lagged, false);
+            rows(search)
+        });
+        for row in 0..unknowns {
+            let more = [0, 1].map(|side| follows[side][row] - stays[side][row]);
+            lagging.add(row, unknown, (more[1] - more[0]) / (2.0 * TURN_RAD));
+        }
+    }
+    search.state.copy_from(&base);
+    search.assemble(lagged, false);
+    let mut slipping = Sparse::default();
+    for place in 0..search.contact.between().places().len() {
+        let at = search.contact.between().places()[place];
+        let part = TURN_RAD.min(STICKING * at.stick_mm / at.radius_mm);
+        let sides = [-part, 2.0 * part].map(|by| {
+            search.contact.between().slip_from(place, by);
+            search.assemble(lagged, false);
+            rows(search)
+        });
+        search.contact.between().slip_from(place, -part);
+        for row in 0..unknowns {
+            slipping.add(row, place, (sides[1][row] - sides[0][row]) / (2.0 * part));
+        }
+    }
+    search.assemble(lagged, false);
+    [lagging, slipping]
 }

@@ -37,12 +37,19 @@
 //!
 //! Several parameters that change together, each so much, are one p: dx/dp is then the product of the Jacobian with these changes.
 //!
+//! Commands that are recorded (`recorded`, `reverse`) are linearised part by part in `linear`, where derivatives go in both directions.
+//!
 //! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
 //! anchored anew, has no derivative.
 
 mod command;
 mod forces;
+mod linear;
 mod read;
+mod recorded;
+mod remembered;
+mod reverse;
+mod sparse;
 
 use std::sync::Arc;
 
@@ -70,14 +77,20 @@ const STICKING: f64 = 3e-3;
 /// Scale of a field that is nought, T or N/mm.
 const WEAK_FIELD: f64 = 1e-3;
 
+/// A scene with other parameters.
+#[derive(Debug)]
+struct Scene {
+    parts: Parts,
+    /// Instruments from whose rest shape nodes follow, if that changes: nodes must not move with it.
+    nodes: Option<Stack>,
+}
+
 /// The scene and the state where one parameter is a little less, or more.
 #[derive(Debug)]
 struct Side {
     /// Change of the parameter.
     by: f64,
-    parts: Parts,
-    /// Instruments from whose rest shape nodes follow, if that changes: nodes must not move with it.
-    nodes: Option<Stack>,
+    scene: Scene,
     at: Configuration,
     /// At the end of the part that is followed.
     next: Configuration,
@@ -125,8 +138,8 @@ impl Nearby {
     ) -> Result<Self> {
         let at = || Configuration { mesh: from.mesh.clone(), state: Arc::new(from.state.clone()) };
         let side = |together: &Together, by: f64| {
-            let (parts, nodes) = changed(&environment.surroundings, together, by)?;
-            Ok::<Side, Error>(Side { by, parts, nodes, at: at(), next: at() })
+            let scene = Scene::new(&environment.surroundings, together, by)?;
+            Ok::<Side, Error>(Side { by, scene, at: at(), next: at() })
         };
         let mut sides = Vec::with_capacity(by.len());
         for together in by {
@@ -148,12 +161,58 @@ impl Nearby {
         Self { first: None, ..self }
     }
 
+    /// Derivatives at the end of the command.
+    pub(super) fn slopes(&self, end: &KirchhoffState) -> Vec<Slope> {
+        let all = self.sides.iter().zip(&self.cut);
+        all.map(|(sides, cut)| read::slope(sides, end, *cut)).collect()
+    }
+}
+
+/// What goes with the parts of a command.
+pub(super) trait Follows<const C: usize> {
     /// Follows an accepted part from `was`, to `end`, with the passage of a moving vessel; in the last one of a command, in which
     /// hands come to their target, forces and energies are read too.
     ///
     /// # Errors
     /// [`Error::Computation`] where there is no derivative.
-    pub(super) fn follow<const C: usize>(
+    fn follow(
+        &mut self,
+        tools: &mut Tools<C>,
+        environment: &Environment<'_>,
+        on: (Start<'_>, Option<Passage<'_>>),
+        solved: (Attempt<'_>, &Found),
+        to: (&KirchhoffState, &[Hand]),
+    ) -> Result<()>;
+}
+
+/// Checks that a part has a derivative.
+///
+/// # Errors
+/// A jump.
+fn check_smooth(attempt: &Attempt<'_>, found: &Found) -> Result<()> {
+    let jumps = attempt.part.effort == Effort::Flight || found.off > 1.0 || found.balance.is_set_free();
+    if jumps || found.slides > 0 || found.is_interrupted {
+        return Err(Error::Computation(
+            "gradient: the command passes a jump, where its result has no derivative: end it before, or begin behind".to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+/// A part that goes on from its own end.
+fn resumed(part: &Part<'_>, end: &KirchhoffState) -> UnderWay {
+    UnderWay {
+        part_mm: part.part_mm,
+        effort: part.effort,
+        state: end.clone(),
+        neighbourhood: Neighbourhood::default(),
+        shift: 0.0,
+        iterations: 0,
+    }
+}
+
+impl<const C: usize> Follows<C> for Nearby {
+    fn follow(
         &mut self,
         tools: &mut Tools<C>,
         environment: &Environment<'_>,
@@ -161,20 +220,8 @@ impl Nearby {
         (attempt, found): (Attempt<'_>, &Found),
         (end, target): (&KirchhoffState, &[Hand]),
     ) -> Result<()> {
-        let jumps = attempt.part.effort == Effort::Flight || found.off > 1.0 || found.balance.is_set_free();
-        if jumps || found.slides > 0 || found.is_interrupted {
-            return Err(Error::Computation(
-                "gradient: the command passes a jump, where its result has no derivative: end it before, or begin behind".to_owned(),
-            ));
-        }
-        let under_way = UnderWay {
-            part_mm: attempt.part.part_mm,
-            effort: attempt.part.effort,
-            state: end.clone(),
-            neighbourhood: Neighbourhood::default(),
-            shift: 0.0,
-            iterations: 0,
-        };
+        check_smooth(&attempt, found)?;
+        let under_way = resumed(&attempt.part, end);
         let part = Part { resumed: Some(&under_way), ..attempt.part };
         let mut end = End { state: end, spins: Vec::new() };
         let own = steered(environment.surroundings.stack, attempt.hands);
@@ -236,7 +283,7 @@ impl Nearby {
                 }
                 for side in sides.iter_mut().filter(|side| side.by != 0.0) {
                     side.by = by.copysign(side.by);
-                    (side.parts, side.nodes) = changed(&environment.surroundings, together, side.by)?;
+                    side.scene = Scene::new(&environment.surroundings, together, side.by)?;
                 }
             };
             for (side, hands) in sides.iter_mut().zip(&hands) {
@@ -262,12 +309,6 @@ impl Nearby {
         tools.friction.set_coefficient(environment.surroundings.properties.largest_friction());
         Ok(())
     }
-
-    /// Derivatives at the end of the command.
-    pub(super) fn slopes(&self, end: &KirchhoffState) -> Vec<Slope> {
-        let all = self.sides.iter().zip(&self.cut);
-        all.map(|(sides, cut)| read::slope(sides, end, *cut)).collect()
-    }
 }
 
 impl Side {
@@ -275,11 +316,29 @@ impl Side {
     fn with<T>(
         &self,
         environment: &Environment<'_>,
-        (hands, passage): (&[Hand], Option<Passage<'_>>),
+        on: (&[Hand], Option<Passage<'_>>),
         part: Part<'_>,
         what: impl FnOnce(&Acting<'_>, Environment<'_>) -> T,
     ) -> T {
-        let was = self.at.start();
+        self.scene.with(environment, (self.at.start(), on), part, what)
+    }
+}
+
+impl Scene {
+    /// The scene where parameters that change together have changed by so much.
+    fn new(surroundings: &Surroundings<'_>, together: &Together, by: f64) -> Result<Self> {
+        let (parts, nodes) = changed(surroundings, together, by)?;
+        Ok(Self { parts, nodes })
+    }
+
+    /// Calls `what` with this scene in a part from there, and with the environment in which its forces are read.
+    fn with<T>(
+        &self,
+        environment: &Environment<'_>,
+        (was, (hands, passage)): (Start<'_>, (&[Hand], Option<Passage<'_>>)),
+        part: Part<'_>,
+        what: impl FnOnce(&Acting<'_>, Environment<'_>) -> T,
+    ) -> T {
         let start = taken_along(was, passage);
         let Parts { stack, wall, sheath, fields } = &self.parts;
         let fields = &fields[..];
@@ -339,14 +398,15 @@ fn parts(surroundings: &Surroundings<'_>) -> Parts {
 fn changed(surroundings: &Surroundings<'_>, together: &Together, by: f64) -> Result<(Parts, Option<Stack>)> {
     let mut there = parts(surroundings);
     let mut nodes = there.clone();
+    let mut values = Vec::with_capacity(together.len());
     for (parameter, weight) in together {
-        let Some(value) = parameter.value(&nodes)? else { continue };
-        parameter.set(&mut there, value + weight * by)?;
-        if !matches!(parameter, Parameter::RestCurvature { .. }) {
-            parameter.set(&mut nodes, value + weight * by)?;
-        }
+        values.extend(parameter.value(&nodes)?.map(|value| (*parameter, value + weight * by)));
     }
-    let reshaped = together.iter().any(|(parameter, _)| matches!(parameter, Parameter::RestCurvature { .. }));
+    Parameter::set_all(&values, &mut there)?;
+    let count = values.len();
+    values.retain(|(parameter, _)| !matches!(parameter, Parameter::RestCurvature { .. }));
+    Parameter::set_all(&values, &mut nodes)?;
+    let reshaped = values.len() < count;
     Ok((there, reshaped.then_some(nodes.stack)))
 }
 

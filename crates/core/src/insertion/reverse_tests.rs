@@ -1,0 +1,177 @@
+//! The reverse pass against the forward one over the same parts, against gradients from sides, and its cost.
+
+use std::time::Instant;
+
+use super::gradient_tests::{Numbers, SCENES, parameters, simulation, then_s};
+use super::{Move, Recording, Simulation};
+use crate::Vec3;
+use crate::methods::{Parameter, Weights};
+
+/// A simulation after some commands, the next ones and their times.
+fn before(scene: usize, seed: u64, commands: usize) -> (Simulation, Vec<Vec<Move>>, Vec<f64>) {
+    let mut now = simulation(SCENES[scene]);
+    let mut numbers = Numbers(seed);
+    let hands = now.stack().instruments().len();
+    for _ in 0..14 {
+        let time_s = then_s(&now);
+        now.step_until(&numbers.moves(hands), Some(time_s)).unwrap();
+    }
+    let next: Vec<Vec<Move>> = (0..commands).map(|_| numbers.moves(hands)).collect();
+    let step_s = then_s(&now) - now.time_s();
+    let times_s = (1..=commands).map(|k| now.time_s() + step_s * k as f64).collect();
+    (now, next, times_s)
+}
+
+/// Weights of all that commands lead to.
+fn weights(recording: &Recording, instruments: usize) -> Vec<Weights> {
+    let mut numbers = Numbers(5);
+    let mut number = || numbers.between([-1.0, 1.0]);
+    let mut vector = || Vec3::new(number(), number(), number());
+    let each = recording.passed().iter().map(|passed| {
+        let mut list = |count: usize| (0..count).map(|_| vector().x).collect::<Vec<f64>>();
+        Weights {
+            push_force_n: list(instruments),
+            torque_nmm: list(instruments),
+            energy_mj: list(1)[0],
+            contact_forces_n: list(passed.report.contacts.len()),
+            tip_mm: vector(),
+            positions_mm: passed.shape.positions_mm.iter().map(|_| vector()).collect(),
+        }
+    });
+    each.collect()
+}
+
+/// The sum of numbers with their weights.
+fn sum(weights: &[Weights], numbers: &[Weights]) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let each = weights.iter().zip(numbers).map(|(a, b)| {
+        let places = a.positions_mm.iter().zip(&b.positions_mm).map(|(a, b)| a.dot(b)).sum::<f64>();
+        places
+            + a.tip_mm.dot(&b.tip_mm)
+            + a.energy_mj * b.energy_mj
+            + dot(&a.push_force_n, &b.push_force_n)
+            + dot(&a.torque_nmm, &b.torque_nmm)
+            + dot(&a.contact_forces_n, &b.contact_forces_n)
+    });
+    each.sum()
+}
+
+#[test]
+fn backwards_and_forwards_are_the_same() {
+    for scene in 0..SCENES.len() {
+        let (now, commands, times_s) = before(scene, 300 + scene as u64, 3);
+        let instruments = now.stack().instruments().len();
+        let by = parameters(instruments, SCENES[scene].friction);
+        let recording = now.record(&commands, &times_s).unwrap();
+        let weights = weights(&recording, instruments);
+        let back = recording.vjp(&weights, &by).unwrap();
+        let scale = back.by.iter().fold(0.0f64, |most, one| most.max(one.abs()));
+        for (parameter, back) in by.iter().zip(&back.by) {
+            let on = sum(&weights, &recording.jvp(&[(*parameter, 1.0)]).unwrap());
+            let off = (on - back).abs() / on.abs().max(1e-6 * scale);
+            println!("{scene} {parameter:?}: {on:.6e} {off:.1e}");
+            assert!(off < 1e-9, "{scene} {parameter:?}: {on} {back}");
+        }
+        // With other weights it is another one.
+        let fewer = recording.vjp_by(&weights[..2], &by).unwrap();
+        assert!(fewer.by.iter().zip(&back.by).any(|(a, b)| (a - b).abs() > 1e-3 * b.abs()));
+        assert!(fewer.hands.is_empty() && back.hands.len() == 3);
+        // The first command's hands are parameters too.
+        for (parameter, back) in by.iter().zip(&back.by) {
+            match *parameter {
+                Parameter::Advance { instrument } => {
+                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0)
+                }
+                Parameter::Rotation { instrument } => {
+                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1)
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+fn first(recording: &Recording, weights: &[Weights], instrument: usize) -> (f64, f64) {
+    let hand = recording.vjp(weights, &[]).unwrap().hands[0][instrument];
+    (hand.advance_mm, hand.rotate_rad)
+}
+
+/// A tube without friction, with it, and one that moves.
+const ALONE: [usize; 3] = [0, 2, 4];
+/// Gradients from sides are no nearer than this, relative to that of the tip, where the vessel moves.
+const OF_SIDES: f64 = 5e-3;
+
+#[test]
+fn backwards_it_is_the_gradient_of_the_commands() {
+    for scene in ALONE {
+        let (now, commands, times_s) = before(scene, 300 + scene as u64, 3);
+        let by = parameters(1, SCENES[scene].friction);
+        let recording = now.record(&commands, &times_s).unwrap();
+        let gradients = now.gradients_until(&commands, &times_s, &by).unwrap();
+        let mut alone = now.clone();
+        for ((moves, time_s), passed) in commands.iter().zip(&times_s).zip(recording.passed()) {
+            // Recorded or not, steps take the same.
+            assert_eq!(alone.step_until(moves, Some(*time_s)).unwrap(), &passed.report);
+        }
+        let slopes: Vec<Vec3> = gradients[2].slopes.iter().map(|slope| slope.tip_mm).collect();
+        let none = Weights::default();
+        let back = [0, 1, 2].map(|axis| {
+            let last = Weights { tip_mm: Vec3::ith(axis, 1.0), ..none.clone() };
+            recording.vjp_by(&[none.clone(), none.clone(), last], &by).unwrap().by
+        });
+        for (k, parameter) in by.iter().enumerate() {
+            let own = Vec3::new(back[0][k], back[1][k], back[2][k]);
+            // What hardly moves the tip has no digits in common.
+            if slopes[k].norm() > 1e-4 {
+                let off = (own - slopes[k]).norm() / slopes[k].norm();
+                assert!(off < OF_SIDES, "{scene} {parameter:?}: {own:?} {:?}", slopes[k]);
+            }
+        }
+        // One parameter is not another.
+        assert!((back[0][0] - slopes[1].x).abs() > 1e-3 * slopes[1].norm());
+    }
+}
+
+/// `cargo test -p endowire-core --lib what_a_reverse_pass_costs -- --ignored --nocapture`.
+#[test]
+#[ignore = "measures time"]
+fn what_a_reverse_pass_costs() {
+    for scene in 0..SCENES.len() {
+        let (now, commands, times_s) = before(scene, 300, 6);
+        let instruments = now.stack().instruments().len();
+        let by = parameters(instruments, SCENES[scene].friction);
+        let began = Instant::now();
+        let mut alone = now.clone();
+        for (moves, time_s) in commands.iter().zip(&times_s) {
+            alone.step_until(moves, Some(*time_s)).unwrap();
+        }
+        let steps_s = began.elapsed().as_secs_f64();
+        let began = Instant::now();
+        let recording = now.record(&commands, &times_s).unwrap();
+        let recorded_s = began.elapsed().as_secs_f64();
+        let weights: Vec<Weights> =
+            (0..6).map(|_| Weights { tip_mm: Vec3::x(), ..Weights::default() }).collect();
+        let cost = |by: &[Parameter], hands: bool| {
+            let began = Instant::now();
+            if hands {
+                recording.vjp(&weights, by).unwrap()
+            } else {
+                recording.vjp_by(&weights, by).unwrap()
+            };
+            began.elapsed().as_secs_f64() / steps_s
+        };
+        let costs =
+            [cost(&[], false), cost(&[Parameter::WallModulus], false), cost(&[], true), cost(&by, true)];
+        println!(
+            "{:?}: {:.1} ms a step, recorded {:.2}; none {:.2}, one parameter {:.2}, all hands {:.2}, with {} parameters {:.2} steps",
+            SCENES[scene],
+            1e3 * steps_s / 6.0,
+            recorded_s / steps_s,
+            costs[0],
+            costs[1],
+            costs[2],
+            by.len(),
+            costs[3]
+        );
+    }
+}
