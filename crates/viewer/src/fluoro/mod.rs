@@ -37,7 +37,7 @@ pub(crate) use sequence::{Afterglow, Sequence};
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};
 use crate::cpu::{DeviceCells, covered_by_half, layers_in_beam};
-use crate::device::RefinedDevice;
+use crate::device::{Layer, RefinedDevice};
 use crate::engine::PathEngine;
 use crate::material::Material;
 use crate::output::Mask;
@@ -314,9 +314,9 @@ impl Fluoroscope {
     fn cast(&mut self, devices: &[RefinedDevice]) -> Result<()> {
         self.devices.clear();
         for device in devices {
-            for (layer, pieces) in layers_in_beam(&self.c_arm, device) {
-                self.devices.add(layer.material.unwrap_or(self.default_material), &pieces);
-            }
+            let layers = layers_in_beam(&self.c_arm, device).into_iter();
+            let of = |(layer, pieces): (&Layer, _)| (layer.material.unwrap_or(self.default_material), pieces);
+            self.devices.add(&layers.map(of).collect::<Vec<_>>());
         }
         for (material, _) in &self.devices.maps()[self.device_lanes.len()..] {
             let lanes = self.beam.excess(*material, None)?;
