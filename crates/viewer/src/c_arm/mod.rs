@@ -129,14 +129,14 @@ impl CArm {
             (from_edge + 0.5).clamp(0.0, 1.0)
         };
         let corners = match self.corners_px > 0.0 {
-            true => (self.from_corner(at) + 0.5).clamp(0.0, 1.0),
+            true => (self.corner_px(at) + 0.5).clamp(0.0, 1.0),
             false => 1.0,
         };
         share(0) * share(1) * corners
     }
 
     /// Distance of a pixel coordinate to the blade across its corner, negative behind it.
-    fn from_corner(&self, at: [f64; 2]) -> f64 {
+    fn corner_px(&self, at: [f64; 2]) -> f64 {
         let half = self.opening_px.unwrap_or(self.size_px.map(|side| f64::from(side) / 2.0));
         let off = (0..2).map(|k| (at[k] - f64::from(self.size_px[k]) / 2.0).abs());
         (half[0] + half[1] - self.corners_px - off.sum::<f64>()) * std::f64::consts::FRAC_1_SQRT_2
@@ -148,7 +148,7 @@ impl CArm {
             let half = f64::from(self.size_px[k]) / 2.0;
             let open = self.opening_px.map_or(half, |opening| opening[k].min(half));
             (pixel[k] - half).abs() <= open
-        }) && (self.corners_px == 0.0 || self.from_corner(pixel) >= 0.0)
+        }) && (self.corners_px == 0.0 || self.corner_px(pixel) >= 0.0)
     }
 
     /// SID in pixels.

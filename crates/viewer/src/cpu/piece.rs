@@ -110,23 +110,25 @@ impl pulp::WithSimd for Lengths<'_> {
         let (from, step, across) = (slopes[u], 1.0 / view.focal_px(), slopes[v]);
         let (sod, square) = (view.sod_mm(), piece.radius * piece.radius);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        // Counted from where a ray is as deep as the first centre: near the piece, where squares do not cancel.
+        let depth = sod + start[2];
+        let heights = [0, 1].map(|plane| dot(planes[plane], start) - piece.offsets[plane]);
         for (k, length) in self.lengths.iter_mut().enumerate() {
             let direction = [from + k as f64 * step, across, 1.0];
-            let origin = [direction[0] * sod, direction[1] * sod, 0.0];
+            let q = [direction[0] * depth - start[0], across * depth - start[1], 0.0];
             let dd = dot(direction, direction);
-            let shift = dot([start[0] - origin[0], start[1] - origin[1], start[2]], direction) / dd;
-            let q = [0, 1, 2].map(|i| origin[i] - start[i] + direction[i] * shift);
             let (da, qa) = (dot(direction, axis), dot(q, axis));
             let a = dd - da * da;
             let b = dot(direction, q) - da * qa;
             let c = dot(q, q) - qa * qa - square;
             let root = (b * b - a * c).max(0.0).sqrt();
-            let (mut low, mut high) = ((-b - root) / a, (-b + root) / a);
+            let each = 1.0 / a;
+            let (mut low, mut high) = ((-b - root) * each, (-b + root) * each);
             for (plane, onwards) in [(0, true), (1, false)] {
-                let height = dot(planes[plane], origin) - piece.offsets[plane];
+                let height = dot(planes[plane], q) + heights[plane];
                 // Parallel to the plane, a ray crosses it infinitely far away; −0 becomes 0.
                 let rise = dot(planes[plane], direction) + 0.0;
-                let crossing = -height / rise - shift;
+                let crossing = -height / rise;
                 let enters = (rise >= 0.0) == onwards;
                 low = low.max(if enters { crossing } else { f64::NEG_INFINITY });
                 high = high.min(if enters { f64::INFINITY } else { crossing });

@@ -191,6 +191,9 @@ impl Fluoroscope {
     /// Computes the constant signals from their lengths.
     fn look(&mut self, spec: &ViewSpec) {
         let whole = self.primaries();
+        if let Some(moving) = &mut self.moving {
+            moving.rests(&whole);
+        }
         let of = |i: usize| {
             whole.iter().enumerate().map(|(pixel, v)| v[i] * self.c_arm.openness(pixel) as f32).collect()
         };

@@ -28,7 +28,7 @@ const PICTURES: [usize; 2] = [4, 2];
 #[derive(Debug)]
 pub(super) struct Moving {
     rhythm: Rhythm,
-    /// Logarithms of primary signal and energy at rest; empty before they are needed.
+    /// Logarithms of primary signal and energy at rest.
     rest: [Vec<f32>; 2],
     pictures: [[Option<Picture>; PICTURES[0]]; 2],
     /// Which pictures make up the current moment: of breath (0) or beat (1), number, weight.
@@ -37,13 +37,13 @@ pub(super) struct Moving {
     signal: Option<Signal>,
 }
 
-/// Differences of a picture from that at rest.
+/// A picture of a body that has moved.
 #[derive(Debug)]
 struct Picture {
-    /// Lengths of air on the rays through the middles of pixels, and on all rays.
+    /// Lengths of air on the rays through the middles of pixels.
     central: Vec<f32>,
+    /// Differences from rest: of lengths of air on all rays, and of logarithms of primary signal and energy.
     air: Vec<f32>,
-    /// Logarithms of primary signal and energy.
     ln: [Vec<f32>; 2],
 }
 
@@ -64,6 +64,11 @@ impl Moving {
         }))
     }
 
+    /// Keeps signal and energy of the unscattered photons at rest.
+    pub(super) fn rests(&mut self, primaries: &[[f32; 2]]) {
+        self.rest = logarithms(primaries);
+    }
+
     /// The signal of the current moment; `None` at rest.
     pub(super) fn signal(&self) -> Option<&Signal> {
         self.signal.as_ref()
@@ -78,6 +83,14 @@ impl Moving {
     fn at(&self, of: usize, number: usize) -> Option<&Picture> {
         self.pictures[of][number].as_ref()
     }
+}
+
+fn logarithms(primaries: &[[f32; 2]]) -> [Vec<f32>; 2] {
+    [0, 1].map(|i| {
+        let mut values: Vec<f32> = primaries.iter().map(|v| v[i].max(f32::MIN_POSITIVE)).collect();
+        ln_lanes(&mut values);
+        values
+    })
 }
 
 /// The pictures that a part of a breath or beat lies between, with their weights; that at rest counts as none.
@@ -129,24 +142,16 @@ impl Fluoroscope {
         if moving.at(of, number).is_some() {
             return Ok(());
         }
-        if moving.rest[0].is_empty() {
-            let rest = self.ln_primaries();
-            if let Some(moving) = &mut self.moving {
-                moving.rest = rest;
-            }
-        }
         let mut parts = [0.0; 2];
         parts[of] = (number + 1) as f64 / PICTURES[of] as f64;
-        let [rest, mesh] = [&body.lungs, &body.motion.moved(&body.lungs, parts)];
-        let mut central = air_of(setup, mesh, &self.c_arm, engine)?;
-        let rest = air_of(setup, rest, &self.c_arm, engine)?;
-        central.iter_mut().zip(rest).for_each(|(air, rest)| *air -= rest);
-        let air = finer(central.clone(), self.c_arm.size_px(), SUBRAYS);
+        let central = air_of(setup, &body.motion.moved(&body.lungs, parts), &self.c_arm, engine)?;
+        let mut air = finer(central.clone(), self.c_arm.size_px(), SUBRAYS);
+        air.iter_mut().zip(&self.anatomy.lung).for_each(|(air, rest)| *air -= rest);
         if let Some(moving) = &mut self.moving {
             moving.pictures[of][number] = Some(Picture { central, air, ln: Default::default() });
             moving.now = vec![(of, number, 1.0)];
         }
-        let mut ln = self.ln_primaries();
+        let mut ln = logarithms(&self.primaries());
         if let Some(moving) = &mut self.moving {
             for (ln, rest) in ln.iter_mut().zip(&moving.rest) {
                 ln.iter_mut().zip(rest).for_each(|(ln, rest)| *ln -= rest);
@@ -157,16 +162,6 @@ impl Fluoroscope {
             moving.now = vec![];
         }
         Ok(())
-    }
-
-    /// Logarithms of primary signal and energy of all pixels, without blades.
-    fn ln_primaries(&self) -> [Vec<f32>; 2] {
-        let whole = self.primaries();
-        [0, 1].map(|i| {
-            let mut values: Vec<f32> = whole.iter().map(|v| v[i].max(f32::MIN_POSITIVE)).collect();
-            ln_lanes(&mut values);
-            values
-        })
     }
 
     /// The signal of the current moment from its pictures.
@@ -198,12 +193,17 @@ impl Fluoroscope {
         }
     }
 
-    /// Adds what the current moment has more than rest to lengths of air on the rays through the middles of pixels.
+    /// Adds what the current moment has more than rest to lengths of air at rest on the rays through the middles of pixels.
     pub(crate) fn add_air(&self, lengths: &mut [f32]) {
         let Some(moving) = &self.moving else { return };
+        let rest = lengths.to_vec();
         for &(of, k, weight) in &moving.now {
             let Some(picture) = moving.at(of, k) else { continue };
-            lengths.iter_mut().zip(&picture.central).for_each(|(length, more)| *length += weight * more);
+            let moved = picture.central.iter().zip(&rest);
+            lengths
+                .iter_mut()
+                .zip(moved)
+                .for_each(|(length, (moved, rest))| *length += weight * (moved - rest));
         }
     }
 }
