@@ -347,7 +347,7 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 52] = [
+        let cases: [(&str, Spoil); 55] = [
             ("xray.edges", |s| s.xray.edges = 5.1),
             ("camera.force_n", |s| s.camera.force_n = Some(0.0)),
             ("size_px", |s| s.size_px = [0, 10]),
