@@ -34,7 +34,7 @@ use moving::Moving;
 use rays::Room;
 use scatter::Scatter;
 pub use sequence::FrameTime;
-pub(crate) use sequence::{Afterglow, Sequence};
+pub(crate) use sequence::{Afterglow, Sequence, UNSUBTRACTED_LN};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};

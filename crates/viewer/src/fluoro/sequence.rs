@@ -38,6 +38,8 @@ const ROADMAP_VESSEL: f32 = -0.4;
 /// −ln of signals, relative to that behind the body, that are white and black before subtraction: more than a detector
 /// tells apart.
 const UNSUBTRACTED_WINDOW: Window = [-8.0, 8.0];
+/// From white to black.
+pub(crate) const UNSUBTRACTED_LN: f64 = 16.0;
 
 /// Number and time of a frame. The number seeds its noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

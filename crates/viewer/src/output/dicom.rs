@@ -2,7 +2,7 @@
 //!
 //! The object follows the XA Image IOD (DICOM PS3.3, A.14), explicit VR little endian. Frames are as displayed, so
 //! their intensities have no physical meaning (`DISP`), and there is no modality LUT; subtracted ones are derived. A
-//! subtraction with its mask is stored as systems store it: the mask first, then the frames as they were read (`LOG`),
+//! subtraction with its mask is stored as systems store it: the mask first, then the frames as they were read (`LOG`, with the LUT to intensities),
 //! and the Mask Subtraction Sequence says which to subtract from which.
 //! Identifiers are hashes of pixels and geometry, so equal frames give equal files and different ones different
 //! identifiers; a simulation has no study date.
@@ -20,6 +20,7 @@ use endowire_core::{Error, Result};
 use super::{Image, Pace, PixelFormat};
 use crate::c_arm::CArm;
 use crate::fingerprint::fingerprint;
+use crate::fluoro::UNSUBTRACTED_LN;
 use crate::spec::{Mode, reference_mm};
 use crate::xray::{Exposure, Pulse};
 
@@ -359,6 +360,9 @@ fn pixels(object: &mut InMemDicomObject, frames: &[&Image], mask: Option<&Image>
         let [low, high] = open.fold([f64::MAX, 0.0], |[low, high], v| [low.min(v), high.max(v)]);
         if low < high { [low, high] } else { whole }
     });
+    if mask.is_some() {
+        sequence(object, tags::MODALITY_LUT_SEQUENCE, intensities(high));
+    }
     put(object, tags::WINDOW_CENTER, VR::DS, &decimal(f64::midpoint(low, high)));
     put(object, tags::WINDOW_WIDTH, VR::DS, &decimal(high - low));
     for (tag, value) in [
@@ -383,6 +387,19 @@ fn pixels(object: &mut InMemDicomObject, frames: &[&Image], mask: Option<&Image>
         }
         DataElement::new(tags::PIXEL_DATA, VR::OB, PrimitiveValue::U8(bytes.into()))
     });
+}
+
+/// The table from logarithms to intensities, relative to the brightest pixel.
+fn intensities(brightest: f64) -> InMemDicomObject {
+    let of = |k: u32| 65535.0 * libm::exp(UNSUBTRACTED_LN * (f64::from(k) - brightest) / 65535.0);
+    let values: Vec<u16> = (0..=65535).map(|k| of(k).min(65535.0).round() as u16).collect();
+    let mut table = InMemDicomObject::new_empty();
+    // As many entries as there are words, which the first number cannot say, from the word 0 on, of 16 bits.
+    let descriptor = PrimitiveValue::U16(SmallVec::from_slice(&[0, 0, 16]));
+    table.put(DataElement::new(tags::LUT_DESCRIPTOR, VR::US, descriptor));
+    put(&mut table, tags::MODALITY_LUT_TYPE, VR::LO, "US");
+    table.put(DataElement::new(tags::LUT_DATA, VR::OW, PrimitiveValue::U16(values.into())));
+    table
 }
 
 /// Pixels of a frame of 16 bits.

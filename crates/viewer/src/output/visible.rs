@@ -147,11 +147,12 @@ mod tests {
         for (depth, deviation) in [(900.0, 300.0), (300.0, 600.0)] {
             let (image, mask) = line(depth, deviation);
             let found = contrast_to_noise(&image, &mask, &none).unwrap();
-            assert!((found - depth / deviation).abs() < 0.2, "{found} {}", depth / deviation);
+            // More than two standard deviations of a mean of 64 pixels.
+            assert!((found - depth / deviation).abs() < 0.3, "{found} {}", depth / deviation);
         }
         // Counter-checks: what is not there, and what has no surroundings.
         let (image, mask) = line(0.0, 300.0);
-        assert!(contrast_to_noise(&image, &mask, &none).unwrap() < 0.2);
+        assert!(contrast_to_noise(&image, &mask, &none).unwrap() < 0.3);
         assert_eq!(contrast_to_noise(&image, &mask, &vec![true; 64 * 64]), None);
     }
 }
