@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Measures all methods on this machine and writes what was measured: BENCHMARKS.md, assets/pictures/compare.png and the tables
-# at the ends of docs/methods/*.md. No figure in them is typed.
+# Measures all methods on this machine and writes what was measured: BENCHMARKS.md and assets/pictures/compare.png.
+# No figure in them is typed.
 #
 #     benches/benchmarks.sh [--quick] [FOLDER]      (FOLDER relative to the repository)
 #
 # FOLDER (out/benchmarks/COMMIT if absent) keeps what was measured; a second run goes on from there. --quick runs the smallest
-# part of everything and writes FOLDER/BENCHMARKS.md and FOLDER/methods instead, to see that all works.
+# part of everything and writes FOLDER/BENCHMARKS.md instead, to see that all works.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 quick=
@@ -28,13 +28,12 @@ if [ -n "$quick" ]; then
   timing=(--methods all --nodes 20,50 --repeats 3 --limit-s 0.5)
   deformation=(--l-mm 3 --l-over-h 3)
   navigation=(--targets aorta)
-  pages=$out/methods picture=compare/compare.png methods=methods/README.md
-  mkdir -p "$pages"
-  cp docs/methods/*.md "$pages"
+  picture=compare/compare.png
 else
   compare=(--limit-s 15)
-  target=. pages=docs/methods picture=assets/pictures/compare.png methods=docs/methods/README.md
+  target=. picture=assets/pictures/compare.png
 fi
+methods=$(realpath --relative-to="$target" docs/methods/README.md)
 
 # A command, and what it says, kept once it has come to its end.
 measure() {
@@ -74,31 +73,3 @@ block() {
   printf '%s' "${parts:+$parts
 }"
 } > "$target/BENCHMARKS.md"
-
-# The rows of a method, as a table: what lies behind the comment in each page is written anew. The note is the last column and may hold
-# commas; those before it hold none.
-rows_of() {
-  awk -F, -v method="$1" '
-    function number(text, format) { return text == "" ? "–" : sprintf(format, text) }
-    NR > 1 && $2 == method {
-      note = $7; for (i = 8; i <= NF; i++) note = note "," $i
-      gsub(/^"|"$/, "", note); gsub(/""/, "\"", note); gsub(/\|/, "/", note)
-      unit = $1 ~ /^cantilever/ ? " L" : " mm"
-      printf "| %s | %s | %s | %s | %s | %s |\n", $1, $3, $4 == "" ? "–" : number($4, "%.1e") unit,
-        $5 == "" ? "–" : sprintf("%.3f", 1000 * $5), number($6, "%d"), note
-    }' "$out/compare/compare.csv"
-}
-for page in "$pages"/*.md; do
-  grep -q '^<!-- measured: ' "$page" || continue
-  names=$(sed -n 's/^<!-- measured: \(.*\) -->$/\1/p' "$page")
-  {
-    sed '/^<!-- measured: /q' "$page"
-    printf '## As measured\n%s\nThe command: `endowire compare %s`.\n' "$origin" "${compare[*]}"
-    for name in $names; do
-      [ -n "$(rows_of "$name")" ] || continue
-      printf '\n| %s | elements | error | time, ms | iterations | |\n|---|---|---|---|---|---|\n' "\`$name\`"
-      rows_of "$name"
-    done
-  } > "$page.part"
-  mv "$page.part" "$page"
-done

@@ -6,8 +6,8 @@ use std::path::Path;
 use endowire_core::{Error, Result, Vec3};
 use endowire_recording::table::{read_if_any, read_or};
 use endowire_recording::{
-    About, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, Outlet, PACKING, PackingRow, STEPS, SUMMARY,
-    StepRow,
+    About, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, Outlet, PACKING, PackingRow, Rows, STEPS,
+    SUMMARY, StepRow,
 };
 
 use crate::check;
@@ -24,9 +24,12 @@ const AGAIN: &str = "rows are missing, or are of another run: run the scene agai
 /// # Errors
 /// [`Error::Content`] naming a file that is missing or invalid, with the step, key and value.
 pub(crate) fn read_record(folder: &Path) -> Result<Record> {
-    let about = About::read_if_any(folder)?.unwrap_or_default();
-    let steps = steps(folder, &about)?;
-    let (instruments, mut hands) = hands(folder, &steps)?;
+    // Without a summary nothing says that the run has ended.
+    let unknown = || About { complete: Some(false), ..About::default() };
+    let about = About::read_if_any(folder)?.unwrap_or_else(unknown);
+    let rows = Rows::read(folder, &about)?;
+    let (instruments, mut hands) = hands(folder, rows.instruments)?;
+    let steps = steps(folder, rows.steps)?;
     let mut packing = packing(folder, &steps)?;
     let mut samples = Vec::with_capacity(steps.len());
     let table = folder.join(STEPS);
@@ -93,20 +96,11 @@ struct Step {
     time_s: f64,
 }
 
-/// The steps, one after another. A run that was killed may have recorded more of them than its summary counts, and no
-/// run fewer.
-fn steps(folder: &Path, about: &About) -> Result<Vec<Step>> {
+/// The steps, of which there is one at least.
+fn steps(folder: &Path, rows: Vec<StepRow>) -> Result<Vec<Step>> {
     let path = folder.join(STEPS);
-    let rows: Vec<StepRow> = read_or(&path, "give a session of endowire play or the folder of a run")?;
-    let Some(last) = rows.last().map(|last| last.step) else {
+    if rows.is_empty() {
         return refused(&path, "steps", "[]", "it has no step");
-    };
-    if let Some(pair) = rows.windows(2).find(|pair| pair[1].step != pair[0].step + 1) {
-        return refused(&path, "step", pair[1].step, &format!("comes after step {}", pair[0].step));
-    }
-    let is_complete = about.complete == Some(true);
-    if let Some(count) = about.steps.filter(|count| last < *count || is_complete && last > *count) {
-        return refused(&path, "step", last, &format!("is the last one, and {SUMMARY} counts {count} steps"));
     }
     let number = |column: &str, number: Option<f64>| {
         let lacking = || Error::content(&path, format!("has no column {column}: {AGAIN}"));
@@ -123,53 +117,28 @@ fn steps(folder: &Path, about: &About) -> Result<Vec<Step>> {
     rows.into_iter().map(step).collect()
 }
 
-/// Rows by the number of their step. A run that was killed may have rows of a step that it has not finished.
-fn by_step<T>(rows: Vec<T>, step: impl Fn(&T) -> usize, most: usize) -> BTreeMap<usize, Vec<T>> {
-    let mut all: BTreeMap<usize, Vec<T>> = BTreeMap::new();
-    for row in rows.into_iter().filter(|row| step(row) <= most) {
-        all.entry(step(&row)).or_default().push(row);
-    }
-    all
-}
-
 /// Hands by step.
 type Hands = BTreeMap<usize, Vec<Hand>>;
 
-/// Names and motions of the instruments, by step; none if there is no table of them, as in recordings of a single device
-/// by earlier versions.
-fn hands(folder: &Path, steps: &[Step]) -> Result<(Vec<String>, Hands)> {
+/// Names and motions of the instruments, by step; none if there is no table of them, as in what was written by hand.
+fn hands(folder: &Path, rows: Option<Vec<Vec<InstrumentRow>>>) -> Result<(Vec<String>, Hands)> {
     let path = folder.join(INSTRUMENTS);
-    let Some(rows) = read_if_any::<InstrumentRow>(&path)? else { return Ok((vec![], BTreeMap::new())) };
-    let most = steps.last().map_or(0, |step| step.row.step);
-    let mut rows = by_step(rows, |row| row.step, most);
-    let mut known: Option<Vec<String>> = None;
+    let rows = rows.unwrap_or_default();
+    let known = rows.first().into_iter().flatten().map(|row| row.instrument.clone()).collect();
     let (mut all, mut steered) = (BTreeMap::new(), vec![]);
-    for step in steps.iter().map(|step| &step.row.step) {
-        let rows = rows.remove(step).unwrap_or_default();
-        let names: Vec<String> = rows.iter().map(|row| row.instrument.clone()).collect();
-        let known = known.get_or_insert_with(|| names.clone());
-        if names.is_empty() || names != *known {
-            let but = match known.as_slice() {
-                [] => format!("{STEPS} has this step"),
-                known => format!("those of the steps before are [{}]", known.join(", ")),
-            };
-            let name = format!("{}.instrument", entry(*step));
-            return refused(&path, &name, format!("[{}]", names.join(", ")), &but);
-        }
+    for rows in &rows {
+        let Some(step) = rows.first().map(|row| row.step) else { continue };
         steered.resize(rows.len(), 0.0);
         let mut hands = Vec::with_capacity(rows.len());
         for (row, from) in rows.iter().zip(&mut steered) {
-            let entry = format!("{}.{}", entry(*step), row.instrument);
+            let entry = format!("{}.{}", entry(step), row.instrument);
             let hand = hand_from(row, from);
             in_table(&path, check::hand(&entry, &hand))?;
             hands.push(hand);
         }
-        all.insert(*step, hands);
+        all.insert(step, hands);
     }
-    match rows.first_key_value() {
-        Some((step, _)) => refused(&path, "step", step, &format!("is no step of {STEPS}")),
-        None => Ok((known.unwrap_or_default(), all)),
-    }
+    Ok((known, all))
 }
 
 /// How much of a sac coils fill, by step; nothing if there is no table of it.

@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_the_sum_that_defines_it() {
+    fn the_spectrum_is_the_sum_that_defines_it() {
         let values: Vec<f64> = (0..64).map(|k| (0.3 * f64::from(k * k)).sin() + 0.1 * f64::from(k)).collect();
         let amplitudes = amplitudes(&values);
         assert_eq!(amplitudes.len(), 33);

@@ -57,7 +57,10 @@ pub(crate) fn of_recording(
 
 /// Reads a recording; with its scene given, its summary may be damaged or missing.
 pub(crate) fn recording(folder: &Path, scene: Option<&Path>) -> Result<Recording, Failure> {
-    Ok(scene.map_or_else(|| Recording::read(folder), |scene| Recording::read_in(folder, scene))?)
+    let recording =
+        scene.map_or_else(|| Recording::read(folder), |scene| Recording::read_in(folder, scene))?;
+    tell_left_out(folder, recording.left_out());
+    Ok(recording)
 }
 
 /// Tables of a scene that decide how a run goes.
@@ -162,6 +165,13 @@ pub(crate) fn tell_found(path: &Path, scene: &Scene) {
 /// Top-level tables and keys of a scene file.
 const TOP: [&str; 9] =
     ["vessel", "device", "instrument", "sheath", "method", "script", "view", "seed", "name"];
+
+/// Tells what is not shown of a run that was killed.
+pub(crate) fn tell_left_out(folder: &Path, left_out: Option<&str>) {
+    if let Some(what) = left_out {
+        tell(format_args!("endowire: {}: {what}: read up to the last whole step", folder.display()));
+    }
+}
 
 /// Splits texts `KEY=VALUE` for frames into those of the scene, and those of its table `view`, whose keys are
 /// relative to that table. A key of one of several tables, as `injection[0].at_mm`, is set in the scene.

@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_went_otherwise_is_counted() {
+    fn history_counts_unconverged_steps_jumps_and_relaxations() {
         let report = |converged, jumped, relaxations| StepReport {
             converged,
             jumped,

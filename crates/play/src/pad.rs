@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn every_button_does_something_that_the_help_tells() {
+    fn every_gamepad_button_is_in_the_help() {
         let keys: BTreeSet<_> = Button::ALL.into_iter().filter_map(Button::key).collect();
         assert_eq!(keys.len(), Button::ALL.len() - 2, "bumpers have none, no two have one");
         assert!(PAD.iter().any(|(name, _)| name.contains("bumper")));

@@ -56,6 +56,15 @@ impl Gradient {
     }
 }
 
+/// Numbers of an array, all of them finite.
+fn finite(name: &str, array: &Numbers<'_>) -> PyResult<Vec<f64>> {
+    let list: Vec<f64> = array.as_array().iter().copied().collect();
+    match list.iter().position(|number| !number.is_finite()) {
+        Some(k) => Err(refuse(&format!("{name}[{k}]"), list[k], "must be a finite number")),
+        None => Ok(list),
+    }
+}
+
 #[pymethods]
 impl Gradient {
     /// The parameters.
@@ -102,9 +111,9 @@ impl Gradient {
 
     /// Derivatives in the parameters of the sum of these numbers times weights of the same count: the product vᵀJ, shape (p,).
     ///
-    /// Raises InputError for another count, and what `of` raises.
+    /// Raises InputError for another count, for numbers that are not finite, and what `of` raises.
     fn vjp<'py>(&self, py: Python<'py>, of: &str, v: Numbers<'_>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let weights: Vec<f64> = v.as_array().iter().copied().collect();
+        let weights = finite("v", &v)?;
         let rows = self.rows(of)?;
         let count = rows.first().map_or(weights.len(), Vec::len);
         if weights.len() != count {
@@ -116,9 +125,9 @@ impl Gradient {
 
     /// Changes of these numbers for small changes of the parameters, shape (p,): the product J dp, shape (k,).
     ///
-    /// Raises InputError for another count, and what `of` raises.
+    /// Raises InputError for another count, for numbers that are not finite, and what `of` raises.
     fn jvp<'py>(&self, py: Python<'py>, of: &str, dp: Numbers<'_>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let changes: Vec<f64> = dp.as_array().iter().copied().collect();
+        let changes = finite("dp", &dp)?;
         let rows = self.rows(of)?;
         if changes.len() != rows.len() {
             let remedy = format!("there are {} parameters", rows.len());

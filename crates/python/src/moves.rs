@@ -44,18 +44,6 @@ pub(crate) fn together(commands: impl Iterator<Item = Command>) -> Vec<Move> {
     commands.enumerate().map(|(instrument, command)| Move { instrument, command }).collect()
 }
 
-/// Refuses moves that are no numbers.
-pub(crate) fn check_finite(moves: &[Move]) -> PyResult<()> {
-    for Move { command: Command { advance_mm, rotate_rad, steer }, .. } in moves {
-        for (name, number) in [("advance_mm", *advance_mm), ("rotate_rad", *rotate_rad), ("steer", *steer)] {
-            if !number.is_finite() {
-                return Err(refuse(name, number, "must be a finite number"));
-            }
-        }
-    }
-    Ok(())
-}
-
 /// One number per instrument: a list, or a single number for a single instrument; zeros if absent.
 pub(crate) fn of_each(
     name: &str,

@@ -4,6 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use endowire_assess::Way;
 use endowire_core::insertion::Move;
+use endowire_recording::check_step;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -11,7 +12,6 @@ use crate::assess::check_within;
 use crate::document;
 use crate::error::{InputError, exception, refuse};
 use crate::interrupt::interruptible;
-use crate::moves::check_finite;
 use crate::simulation::Simulation;
 use crate::vessel::{Goal, Vessel};
 
@@ -135,11 +135,7 @@ impl Record {
 impl Record {
     /// Refuses a time before that of the last step, and moves that are no numbers.
     pub(crate) fn check(&self, time_s: f64, moves: &[Move]) -> PyResult<()> {
-        check_finite(moves)?;
         let last_s = self.lock().samples.last().map_or(0.0, |last| last.time_s);
-        if time_s >= last_s && time_s.is_finite() {
-            return Ok(());
-        }
-        Err(refuse("time_s", time_s, &format!("must be a time from that of the last step, {last_s} s, on")))
+        check_step(moves, time_s, last_s).map_err(exception)
     }
 }

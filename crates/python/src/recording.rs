@@ -1,6 +1,7 @@
 //! Recordings of runs: written beside a simulation, and read.
 
-use std::path::{Path, PathBuf};
+use std::ffi::CString;
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use endowire_core::Error;
@@ -8,10 +9,12 @@ use endowire_methods::Scene as SceneFile;
 use endowire_recording as recording;
 use endowire_recording::table::read_if_any;
 use endowire_recording::{
-    COILS, CoilRow, Column, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, PACKING, PLACES,
-    PackingRow, PlaceRow, Program, Provenance, STEPS, SUMMARY, StepRow, Summary, UnknownRow, VESSEL, schema,
+    COILS, CoilRow, Column, EndedBy, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, PACKING, PLACES,
+    PackingRow, PlaceRow, Program, Provenance, STEPS, SUMMARY, StepFailure, StepRow, Summary, UnknownRow,
+    VESSEL, schema,
 };
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeWarning, PySystemExit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::Serialize;
@@ -20,9 +23,8 @@ use serde_json::Value;
 
 use crate::arrays::{points, shown};
 use crate::document;
-use crate::error::{InputError, exception, refuse};
+use crate::error::{EndOfWay, InputError, exception, refuse};
 use crate::interrupt::interruptible;
-use crate::moves::check_finite;
 use crate::simulation::Simulation;
 
 /// This package, as it is named in recordings and rows of sweeps.
@@ -38,13 +40,26 @@ pub(crate) struct Recording {
 
 #[pymethods]
 impl Recording {
-    /// Reads the recording in a folder.
+    /// Reads the recording in a folder. What a run that was killed has not written whole is left out, and a RuntimeWarning says
+    /// so.
     ///
-    /// Raises InputError for a folder without one, and for files that are damaged.
+    /// Raises InputError for a folder without one, for files that are damaged, and for tables that are not of the same steps.
     #[new]
     fn new(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
         let read = interruptible(py, move || recording::Recording::read(&folder))?;
-        Ok(Self { inner: read.map_err(exception)? })
+        let inner = read.map_err(exception)?;
+        if let Some(what) = inner.left_out() {
+            let text = format!("{}: {what}: read up to the last whole step", inner.folder().display());
+            let text = CString::new(text).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &text, 1)?;
+        }
+        Ok(Self { inner })
+    }
+
+    /// What was left out because a run that was killed has not written it whole; None without any.
+    #[getter]
+    fn left_out(&self) -> Option<&str> {
+        self.inner.left_out()
     }
 
     /// Its folder.
@@ -75,15 +90,15 @@ impl Recording {
     ///
     /// Raises InputError for another name and for a damaged table.
     fn table<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
-        let folder = self.inner.folder();
+        let of = &self.inner;
         match name {
-            STEPS => columns::<StepRow>(py, folder, name, StepRow::COLUMNS),
-            INSTRUMENTS => columns::<InstrumentRow>(py, folder, name, InstrumentRow::COLUMNS),
-            INJECTIONS => columns::<InjectionRow>(py, folder, name, InjectionRow::COLUMNS),
-            COILS => columns::<CoilRow>(py, folder, name, CoilRow::COLUMNS),
-            VESSEL => columns::<UnknownRow>(py, folder, name, UnknownRow::COLUMNS),
-            PLACES => columns::<PlaceRow>(py, folder, name, PlaceRow::COLUMNS),
-            PACKING => columns::<PackingRow>(py, folder, name, PackingRow::COLUMNS),
+            STEPS => columns::<StepRow>(py, of, name, StepRow::COLUMNS),
+            INSTRUMENTS => columns::<InstrumentRow>(py, of, name, InstrumentRow::COLUMNS),
+            INJECTIONS => columns::<InjectionRow>(py, of, name, InjectionRow::COLUMNS),
+            COILS => columns::<CoilRow>(py, of, name, CoilRow::COLUMNS),
+            VESSEL => columns::<UnknownRow>(py, of, name, UnknownRow::COLUMNS),
+            PLACES => columns::<PlaceRow>(py, of, name, PlaceRow::COLUMNS),
+            PACKING => columns::<PackingRow>(py, of, name, PackingRow::COLUMNS),
             _ => {
                 let known: Vec<&str> = schema::TABLES.iter().map(|(name, _)| *name).collect();
                 Err(refuse("name", format!("{name:?}"), &format!("give one of {}", known.join(", "))))
@@ -156,17 +171,19 @@ impl Recording {
 /// Places and forces of contacts.
 type Contacts<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
-/// The columns of a table.
+/// The columns of a table of a recording, without rows of a step that was not written whole.
 fn columns<'py, T: DeserializeOwned + Serialize + Send + 'static>(
     py: Python<'py>,
-    folder: &Path,
+    of: &recording::Recording,
     name: &str,
     columns: &[Column],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let path = folder.join(name);
+    let path = of.folder().join(name);
     let rows = interruptible(py, move || read_if_any::<T>(&path))?.map_err(exception)?.unwrap_or_default();
     let rows: Result<Vec<Value>, _> = rows.iter().map(serde_json::to_value).collect();
-    let rows = rows.map_err(|e| InputError::new_err(format!("{name}: {e}")))?;
+    let mut rows = rows.map_err(|e| InputError::new_err(format!("{name}: {e}")))?;
+    let last = of.rows().last().map_or(0, |row| row.step as u64);
+    rows.retain(|row| row["step"].as_u64().is_none_or(|step| step <= last));
     let table = PyDict::new(py);
     for column in columns {
         let cells = rows.iter().map(|row| &row[column.name]);
@@ -195,7 +212,8 @@ struct Open {
     provenance: Provenance,
     scene: Option<(String, PathBuf)>,
     summary: Summary,
-    last_s: f64,
+    /// Whether the last step could not be written.
+    is_unwritten: bool,
 }
 
 impl Open {
@@ -247,7 +265,7 @@ impl Recorder {
             let scene = read.map(|(scene, file)| (scene.name, std::path::absolute(&file).unwrap_or(file)));
             let recorder = recording::Recorder::new(&folder, simulation)?;
             let summary = recorder.summary(&provenance, simulation);
-            let mut open = Open { recorder, provenance, scene, summary, last_s: 0.0 };
+            let mut open = Open { recorder, provenance, scene, summary, is_unwritten: false };
             open.summarise(simulation);
             open.checkpoint()?;
             Ok(open)
@@ -258,8 +276,8 @@ impl Recorder {
     /// Records the step that the simulation has just carried out, with its command as given to `Simulation.step`, which
     /// ended at `time_s` since the start.
     ///
-    /// Raises InputError for a time before that of the last step, for numbers that are not finite, for what cannot be
-    /// written, and after `close`; earlier steps are kept.
+    /// Raises InputError for a step that is not the next one of the same simulation, for a time before that of the last step,
+    /// for numbers that are not finite, for what cannot be written, and after `close`; earlier steps are kept.
     #[pyo3(signature = (simulation, time_s, advance_mm=None, rotate_rad=None, steer=None))]
     fn note(
         &self,
@@ -271,20 +289,17 @@ impl Recorder {
         steer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let moves = simulation.moves(advance_mm, rotate_rad, steer)?;
-        check_finite(&moves)?;
         let noted = simulation.with(py, |simulation| {
             let mut open = self.lock();
             let Some(open) = open.as_mut() else {
                 return Err(Error::content(&self.folder, "the recording is closed: begin another one"));
             };
-            if !(time_s >= open.last_s && time_s.is_finite()) {
-                let remedy = format!("must be a time from that of the last step, {} s, on", open.last_s);
-                return Err(Error::parameter("time_s", time_s, remedy));
-            }
-            open.recorder.record(&moves, time_s, simulation)?;
-            open.last_s = time_s;
-            open.summarise(simulation);
-            open.checkpoint()
+            let recorded = open.recorder.record(&moves, time_s, simulation).and_then(|()| {
+                open.summarise(simulation);
+                open.checkpoint()
+            });
+            open.is_unwritten = matches!(recorded, Err(Error::File { .. }));
+            recorded
         });
         noted.map_err(exception)
     }
@@ -293,11 +308,7 @@ impl Recorder {
     ///
     /// Raises InputError or ComputationError if it cannot be written.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
-        let closed = py.detach(|| match self.lock().take() {
-            Some(Open { recorder, mut summary, .. }) => recorder.finish(&mut summary),
-            None => Ok(()),
-        });
-        closed.map_err(exception)
+        self.end(py, |_| None)
     }
 
     /// The folder.
@@ -310,13 +321,55 @@ impl Recorder {
         slf
     }
 
-    #[pyo3(signature = (*_raised))]
-    fn __exit__(&self, py: Python<'_>, _raised: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.close(py)
+    /// As `close`; an exception that ends the `with` statement is told in the summary as what has ended the recording.
+    #[pyo3(signature = (kind=None, raised=None, trace=None))]
+    fn __exit__(
+        &self,
+        py: Python<'_>,
+        kind: Option<&Bound<'_, PyAny>>,
+        raised: Option<&Bound<'_, PyAny>>,
+        trace: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let _ = (kind, trace);
+        let Some(raised) = raised else { return self.close(py) };
+        let ended_by = ended_by(raised)?;
+        let name = raised.get_type().name()?;
+        let reason = format!("{name}: {}", raised.str()?);
+        self.end(py, |open| {
+            let kind = if open.is_unwritten { EndedBy::Unrecorded } else { ended_by };
+            Some(StepFailure { step: open.recorder.steps() + 1, reason, kind })
+        })
     }
 }
 
+/// What an exception has ended a recording by.
+fn ended_by(raised: &Bound<'_, PyAny>) -> PyResult<EndedBy> {
+    let py = raised.py();
+    if raised.is_instance_of::<PyKeyboardInterrupt>() || raised.is_instance_of::<PySystemExit>() {
+        return Ok(EndedBy::Interrupted);
+    }
+    if !raised.is_instance(&py.get_type::<EndOfWay>())? {
+        return Ok(EndedBy::Failed);
+    }
+    let known: String = raised.getattr("ended_by")?.extract()?;
+    Ok(serde_json::from_value(known.into()).unwrap_or(EndedBy::Failed))
+}
+
 impl Recorder {
+    /// Completes the recording; a failure has ended it if `failed` says so.
+    fn end(&self, py: Python<'_>, failed: impl FnOnce(&Open) -> Option<StepFailure> + Send) -> PyResult<()> {
+        let ended = py.detach(|| {
+            let Some(open) = self.lock().take() else { return Ok(()) };
+            let failure = failed(&open);
+            let Open { recorder, mut summary, .. } = open;
+            if let Some(failure) = failure {
+                summary.outcome = summary.outcome.failed(failure);
+            }
+            recorder.finish(&mut summary)
+        });
+        ended.map_err(exception)
+    }
+
     fn lock(&self) -> MutexGuard<'_, Option<Open>> {
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -32,7 +32,7 @@ def run_in(folder, scene, *, set=(), steps=STEPS):
     folder.mkdir(exist_ok=True)
     (folder / "steps.csv").write_text(steps)
     scene = endowire.assets_path() / "scenes" / scene
-    (folder / "summary.json").write_text(json.dumps({"scene_file": str(scene), "set": list(set)}))
+    (folder / "summary.json").write_text(json.dumps({"schema": 1, "scene_file": str(scene), "set": list(set)}))
     return folder
 
 

@@ -62,7 +62,7 @@ def test_derivatives_are_limits_of_differences(inserted):
     assert np.allclose(Response(inserted, MOVES, BY, ["shape"]).numbers([1.3, 5.0, 0.06])[0], plain.positions_mm.ravel(), atol=1e-9)
 
 
-def test_what_cannot_be_differentiated_is_told(inserted, jumping):
+def test_gradients_refuse_what_cannot_be_differentiated(inserted, jumping):
     for arguments, words in (
         ((MOVES, ["hand"], OF), "stands for two"),
         ((MOVES, ["rest[0]"], OF), "rest"),

@@ -32,7 +32,7 @@ def test_a_simulation_goes_on(simulation, copied):
     assert not np.array_equal(other.tip_mm, simulation.tip_mm)
 
 
-def test_a_simulation_of_several_keeps_what_it_was_told(vessel, wire):
+def test_pickled_instruments_keep_their_options(vessel, wire):
     catheter = endowire.Instrument(
         [{"length_mm": 250.0, "radius_mm": 0.9, "inner_radius_mm": 0.6, "bending_stiffness_nmm2": 30.0}]
     )

@@ -95,6 +95,9 @@ def test_wrong_input_is_named(vessel):
         ((MOVES, [Observed(0, "tips", np.zeros(3), 1.0)], ["EI[0]"]), "must be one of"),
         ((MOVES, [Observed(0, "tip", np.zeros(2), 1.0)], ["EI[0]"]), "2 numbers"),
         ((MOVES, [Observed(0, "points", np.zeros(3), 1.0)], ["EI[0]"]), "from_tip_mm"),
+        ((MOVES, [Observed(0, "tip", [0.0, np.nan, 0.0], 1.0)], ["EI[0]"]), "observed.value"),
+        ((MOVES, [Observed(0, "tip", np.zeros(3), 0.0)], ["EI[0]"]), "observed.sigma = 0.0"),
+        ((MOVES, tip, ["EI[0]", "EI[0]"]), "it occurs twice"),
         ((MOVES, [Observed(0, "points", np.zeros(3), 1.0, from_tip_mm=[9.0])], ["EI[0]"]), "inserted"),
         ((MOVES, [Observed(0, "pixels", np.zeros(2), 1.0, from_tip_mm=[0.0])], ["EI[0]"]), "3, 4"),
     ):

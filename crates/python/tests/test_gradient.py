@@ -107,9 +107,25 @@ def test_what_has_no_derivative_is_refused(vessel):
         (["catheter.EI[0]"], "did you mean"),
         (["friction"], "friction above 0"),
         (["steer"], "steered"),
+        (["field[0]"], r'^parameter = "field_x\[0\]": no field acts'),
+        (["EI[00]"], r'^parameter = "EI\[00\]": did you mean "EI\[0\]"'),
+        (["EI[0]", "advance", "EI[0]"], r'^parameter = "EI\[0\]": it occurs twice'),
+        (["rest[0]", "rest_v[0]"], r'^parameter = "rest_v\[0\]": it occurs twice'),
     ):
         with pytest.raises(endowire.InputError, match=named):
             simulation.gradient(**COMMAND, by=by)
+    # Other calls say the same, not that `gradient` was called.
+    with pytest.raises(endowire.InputError, match=r'^parameter = "EI\[7\]": it has 2 sections'):
+        simulation.changed({"EI[7]": 1.0})
+    with pytest.raises(endowire.InputError, match=r'^parameter = "advance": it belongs to a command'):
+        simulation.changed({"advance": 1.0})
+    with pytest.raises(endowire.InputError, match=r'^parameter = "EI\[7\]": it has 2 sections'):
+        simulation.jvp([[[1.0, 0.0]]], {"EI[7]": 1.0})
+    for wrong in (float("nan"), float("inf")):
+        with pytest.raises(endowire.InputError, match=r"v\[1\] = .*: must be a finite number"):
+            gradient.vjp("tip", [1.0, wrong, 0.0])
+        with pytest.raises(endowire.InputError, match=r"dp\[0\] = .*: must be a finite number"):
+            gradient.jvp("tip", [wrong])
     with pytest.raises(endowire.InputError, match="moves"):
         simulation.gradient(by=["advance"])
     with pytest.raises(endowire.InputError, match="shape"):

@@ -66,7 +66,7 @@ def test_a_seed_decides_everything_and_a_vector_does_what_single_ones_do(task):
     assert vector.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
 
 
-def test_one_that_fails_is_told_and_the_others_go_on(task):
+def test_a_failed_environment_is_truncated_and_the_others_go_on(task):
     vector = InsertionVectorEnv(task, 3)
     vector.reset(seed=1)
     actions = np.full((3, 1, 2), 0.3)

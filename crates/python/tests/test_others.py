@@ -126,7 +126,7 @@ def test_an_expert_acts_in_any_environment(kind):
     assert info["way_mm"][0] == pytest.approx(ways[0], abs=1e-3)
 
 
-def test_an_expert_is_told_where_it_cannot_act(task):
+def test_an_expert_refuses_other_environments(task):
     expert = policies.Steered("follow_path")
     with pytest.raises(ResetNeeded, match="reset comes before action"):
         policies.action(expert, InsertionEnv(task))

@@ -76,6 +76,84 @@ def test_what_is_refused(simulation, tmp_path):
         endowire.Recorder(simulation, tmp_path / "mine")
 
 
+def test_a_step_is_noted_once_and_in_turn(simulation, tmp_path):
+    recorder = endowire.Recorder(simulation, tmp_path / "out")
+    simulation.step(8.0, 0.1)
+    recorder.note(simulation, 1.0, 8.0, 0.1)
+    with pytest.raises(endowire.InputError, match=r"step 2 is not the next one.*16 mm.*and it is at 8 mm"):
+        recorder.note(simulation, 2.0, 8.0, 0.1)
+    gone_on = simulation.copy()
+    gone_on.run([[[8.0, 0.1]], [[8.0, 0.1]]])
+    with pytest.raises(endowire.InputError, match=r"16 mm.*and it is at 24 mm.*record each step once, right after it"):
+        recorder.note(gone_on, 2.0, 8.0, 0.1)
+    other = endowire.Simulation(endowire.Vessel.generate("straight_tube", triangles=2000), simulation.instruments)
+    other.run([[[8.0, 0.1]], [[8.0, 0.1]]])
+    with pytest.raises(endowire.InputError, match="has another vessel"):
+        recorder.note(other, 2.0, 8.0, 0.1)
+    simulation.step(8.0, 0.1)
+    recorder.note(simulation, 2.0, 8.0, 0.1)
+    recorder.close()
+    assert len(endowire.Recording(tmp_path / "out")) == 2
+
+
+@pytest.mark.parametrize(
+    ("raised", "ended_by"),
+    [(ValueError("mine"), "failed"), (KeyboardInterrupt(), "interrupted"), (None, "closed")],
+)
+def test_what_ended_a_recording_is_told(simulation, tmp_path, raised, ended_by):
+    def work():
+        with endowire.Recorder(simulation, tmp_path / "out") as recorder:
+            simulation.step(8.0)
+            recorder.note(simulation, 1.0, 8.0)
+            if raised is not None:
+                raise raised
+
+    if raised is None:
+        work()
+    else:
+        with pytest.raises(type(raised)):
+            work()
+    summary = endowire.Recording(tmp_path / "out").summary
+    assert (summary["complete"], summary["ended_by"], summary["converged"]) == (True, ended_by, raised is None)
+    if raised is not None:
+        assert summary["failure"]["step"] == 2 and summary["failure"]["reason"].startswith(type(raised).__name__)
+
+
+def test_the_end_of_the_way_is_told(tmp_path):
+    wire = endowire.Instrument.uniform(600.0, 0.4, 10.0)
+    simulation = endowire.Simulation(endowire.Vessel.generate("curved_tube", triangles=2000), wire)
+    with pytest.raises(endowire.EndOfWay) as raised, endowire.Recorder(simulation, tmp_path / "out") as recorder:
+        for step in range(60):
+            simulation.step(10.0)
+            recorder.note(simulation, step + 1.0, 10.0)
+    assert raised.value.ended_by == "left"
+    assert endowire.Recording(tmp_path / "out").summary["ended_by"] == "left"
+
+
+def test_tables_that_are_not_of_the_same_steps_are_refused(simulation, tmp_path):
+    record(simulation, tmp_path / "out")
+    table = tmp_path / "out" / "steps.csv"
+    lines = table.read_text().splitlines(keepends=True)
+    table.write_text("".join(lines[:2] + lines[3:]))
+    with pytest.raises(endowire.InputError, match=r"steps\.csv: line 3: step = 3: comes after step 1: rows are missing"):
+        endowire.Recording(tmp_path / "out")
+    table.write_text("".join(lines)[:-9])
+    with pytest.raises(endowire.InputError, match=r"steps\.csv: step = 4: is the last one"):
+        endowire.Recording(tmp_path / "out")
+    # The same is what a kill leaves.
+    summary = tmp_path / "out" / "summary.json"
+    whole = json.loads(summary.read_text())
+    summary.write_text(json.dumps({**whole, "complete": False, "steps": 3}))
+    with pytest.warns(RuntimeWarning, match=r"line 6 of steps\.csv is cut: read up to the last whole step"):
+        recording = endowire.Recording(tmp_path / "out")
+    assert len(recording) == 4 and recording.left_out.startswith("the row of line 6")
+    assert len(recording.steps["step"]) == len(recording.table("instruments.csv")["step"]) == 4
+    for text in ("[]", "{}"):
+        summary.write_text(text)
+        with pytest.raises(endowire.InputError, match=r"summary\.json: schema: .*recorded run"):
+            endowire.Recording(tmp_path / "out")
+
+
 KILLED = """
 import os, sys, endowire
 wire = endowire.Instrument.uniform(200.0, 0.4, 10.0)

@@ -31,7 +31,7 @@ def length_mm(path):
     return np.linalg.norm(np.diff(path[:, :3], axis=0), axis=1).sum()
 
 
-def test_a_way_takes_the_arm_that_it_is_told(ring, wire):
+def test_a_path_takes_the_given_arm_of_a_ring(ring, wire):
     assert ring.links == [(len(ring.centreline) - 1, EXIT)]
     straight, around = ring.path("end"), ring.path("end", via="far arm")
     assert length_mm(straight) == pytest.approx(130.0) and straight[:, 0].max() == 0.0

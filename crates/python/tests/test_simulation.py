@@ -7,7 +7,7 @@ import pytest
 import endowire
 
 
-def test_a_step_tells_what_is_seen_and_felt(simulation):
+def test_a_step_reports_shape_and_forces(simulation):
     simulation.run(np.tile([[2.0, 0.05]], (70, 1, 1)))
     report = simulation.step(1.0, rotate_rad=[0.1])
     assert report.converged and report.inserted_mm.shape == (1,)
@@ -26,7 +26,7 @@ def test_a_step_tells_what_is_seen_and_felt(simulation):
     assert np.array_equal(simulation.points_mm(simulation.from_tip_mm), simulation.positions_mm)
 
 
-def test_a_tick_has_a_fixed_cost_and_tells_what_it_leaves_over(simulation):
+def test_a_tick_has_a_fixed_cost_and_reports_what_is_behind(simulation):
     simulation.run(np.tile([[2.0, 0.05]], (60, 1, 1)))
     stepped = copy.deepcopy(simulation)
     stepped.step(1.0, 0.2)

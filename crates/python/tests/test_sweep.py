@@ -59,7 +59,7 @@ def test_shards_give_the_table_of_one_piece(path, tmp_path):
     assert (tmp_path / "merged.parquet").read_bytes() == told["table"].read_bytes()
 
 
-def test_what_does_not_fit_is_told(path, tmp_path):
+def test_sweep_refuses_wrong_shards_keys_and_records(path, tmp_path):
     with pytest.raises(endowire.InputError, match='shard = "3/2"'):
         endowire.sweep(path, tmp_path / "out", shard="3/2")
     with pytest.raises(endowire.InputError, match="8 of 8 runs|no rows"):

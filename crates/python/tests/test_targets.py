@@ -19,7 +19,7 @@ def begun(arch, target, length_mm=600.0, radius_mm=0.4, **parts):
     return env
 
 
-def test_a_target_out_of_reach_is_told_with_the_reason(arch):
+def test_a_target_out_of_reach_is_refused_with_the_reason(arch):
     carotid, far = targets.NamedTarget("left carotid"), targets.CentrelineTarget(150.0)
     begun(arch, carotid)
     begun(arch, far)

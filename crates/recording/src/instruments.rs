@@ -122,7 +122,7 @@ impl Lengths {
     /// Reads the lengths of the instruments of `stack` from the folder of a recording.
     ///
     /// # Errors
-    /// [`Error::Content`] for a table that is missing or cannot be read.
+    /// [`Error::Content`] for a table that is missing, cannot be read or is of other instruments.
     pub fn read(folder: &Path, stack: &Stack) -> Result<Self> {
         let steps = if stack.is_several() { Some(by_step(&folder.join(INSTRUMENTS), stack)?) } else { None };
         Ok(Self { folder: folder.to_path_buf(), steps })
@@ -147,7 +147,13 @@ impl Lengths {
 fn by_step(path: &Path, stack: &Stack) -> Result<BTreeMap<usize, Vec<f64>>> {
     let mut steps: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for row in table::read::<InstrumentRow>(path)? {
-        let Ok(index) = stack.find(&row.instrument) else { continue };
+        let Ok(index) = stack.find(&row.instrument) else {
+            let what = format!(
+                "step[{}].instrument = {:?}: is none of the scene: give the scene of the run (--scene)",
+                row.step, row.instrument
+            );
+            return Err(Error::content(path, what));
+        };
         steps.entry(row.step).or_insert_with(|| vec![0.0; stack.instruments().len()])[index] =
             row.inserted_mm;
     }

@@ -29,7 +29,7 @@
 //!
 //! let recording = Recording::read(folder)?;
 //! assert_eq!((recording.steps(), recording.shape(3)), (3, simulation.shape().clone()));
-//! assert_eq!(recording.rows()?[2].inserted_mm, 15.0);
+//! assert_eq!(recording.rows()[2].inserted_mm, 15.0);
 //! # std::fs::remove_dir_all(folder).unwrap();
 //! # Ok::<(), endowire_core::Error>(())
 //! ```
@@ -40,6 +40,7 @@ mod columns;
 mod folder;
 mod injections;
 mod instruments;
+mod next;
 pub mod npz;
 mod outcome;
 mod outlet;
@@ -47,6 +48,7 @@ mod packing;
 mod provenance;
 mod recorder;
 mod recording;
+mod rows;
 pub mod schema;
 pub mod seal;
 mod steps;
@@ -60,12 +62,14 @@ pub use columns::Column;
 pub use folder::{Among, Claim, FILMS, Replaced, frame_name, is_recording, lock_file, lock_folder};
 pub use injections::{INJECTIONS, InjectionRow};
 pub use instruments::{INSTRUMENTS, InstrumentRow, Lengths};
+pub use next::check_step;
 pub use outcome::{EndedBy, InstrumentOutcome, RunOutcome, StepFailure, UntilOutcome};
 pub use outlet::Outlet;
 pub use packing::{PACKING, Packed, PackingRow};
 pub use provenance::{Program, Provenance, hash_inputs};
 pub use recorder::{Recorder, start_mm};
 pub use recording::{Recording, WallContact};
-pub use steps::{STEPS, StepRow, read_steps, step_times};
+pub use rows::Rows;
+pub use steps::{STEPS, StepRow, read_steps};
 pub use summary::{About, Plane, SUMMARY, Summary, VERSION};
 pub use vessel::{PLACES, PlaceRow, RecordedVessel, UnknownRow, VESSEL};

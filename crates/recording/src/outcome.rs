@@ -85,7 +85,7 @@ pub enum EndedBy {
     Blocked,
     /// The tip has left the vessel and the region around it that is known.
     Left,
-    /// A step found no equilibrium or could not be carried out.
+    /// A step found no equilibrium or could not be carried out, or the program that moved the instruments failed.
     Failed,
     /// An interrupt.
     Interrupted,
@@ -149,6 +149,11 @@ impl RunOutcome {
     /// The outcome of `steps` steps of a program without a script, with the statistics `tally`.
     pub fn of_program(simulation: &Simulation, steps: usize, tally: Tally) -> Self {
         Self::now(simulation, (steps, steps), tally, None)
+    }
+
+    /// The same outcome, of a run that this failure has ended.
+    pub fn failed(self, failure: StepFailure) -> Self {
+        Self { converged: false, ended_by: Some(failure.kind), failure: Some(failure), ..self }
     }
 
     /// The state of a simulation as an outcome, without what a script says of it.

@@ -15,6 +15,7 @@ use crate::arrays::{SHAPES, ShapeArrays};
 use crate::coils::CoilTable;
 use crate::folder::{self, Among, Claim, FRAMES, Replaced};
 use crate::instruments::InstrumentTable;
+use crate::next::{Reached, check_step};
 use crate::outcome::{EndedBy, RunOutcome};
 use crate::packing::{Packed, PackingTable};
 use crate::provenance::Provenance;
@@ -42,6 +43,9 @@ pub struct Recorder {
     steps: usize,
     /// Of the steps that this recorder has recorded.
     tally: Tally,
+    /// End of the last step, s.
+    last_s: f64,
+    reached: Reached,
     start_mm: Option<Vec3>,
     coils: CoilTable,
     vessel: Option<VesselTables>,
@@ -90,6 +94,8 @@ impl Recorder {
             arrays,
             steps: 0,
             tally: Tally::default(),
+            last_s: 0.0,
+            reached: Reached::of(at),
             start_mm: Some(start_mm(at)),
             coils: CoilTable::new(folder),
             vessel,
@@ -127,7 +133,7 @@ impl Recorder {
         };
         let Some(kept) = kept else {
             return Err(refuse(format!(
-                "step {steps}, after which the state was saved, is not recorded there"
+                "step {steps}, after which the state was saved, is not recorded there with all steps before it"
             )));
         };
         let recording = if kept.rows > 0 { Some(Recording::read_first(folder, kept.rows)?) } else { None };
@@ -136,6 +142,13 @@ impl Recorder {
                 "step {steps} is recorded there with another shape than that of the state"
             )));
         }
+        let start_mm = match recording {
+            Some(_) => About::read(folder).ok().and_then(|about| about.start_mm),
+            None => Some(start_mm(at)),
+        };
+        let last_s = recording.as_ref().and_then(|recording| recording.rows().last()?.time_s);
+        // First, so that a kill in between leaves the recording of a run that was killed.
+        About::reopen(folder, steps)?;
         let start = || -> io::Result<_> {
             let arrays = match recording {
                 Some(_) => ShapeArrays::go_on(folder, kept.rows)?,
@@ -147,10 +160,6 @@ impl Recorder {
             Ok((table, InstrumentTable::go_on(folder, steps)?, arrays, vessel))
         };
         let (table, instruments, arrays, vessel) = start().map_err(|e| Error::file(folder, e))?;
-        let start_mm = match recording {
-            Some(_) => About::read(folder).ok().and_then(|about| about.start_mm),
-            None => Some(start_mm(at)),
-        };
         let recorder = Self {
             folder: folder.to_path_buf(),
             table,
@@ -159,6 +168,8 @@ impl Recorder {
             arrays,
             steps,
             tally: Tally::default(),
+            last_s: last_s.unwrap_or_default(),
+            reached: Reached::of(at),
             start_mm,
             coils: CoilTable::go_on(folder, at.stack(), steps)?,
             vessel,
@@ -183,9 +194,18 @@ impl Recorder {
     /// fails, earlier steps are kept.
     ///
     /// # Errors
-    /// [`Error::File`] for what cannot be written.
+    /// [`Error::File`] for what cannot be written, [`Error::Parameter`] for a time before that of the last step and numbers that
+    /// are not finite, [`Error::Content`] for a step that is not the next one of the same simulation: of another vessel or other
+    /// instruments, recorded already, or after steps that were not recorded.
     pub fn record(&mut self, moves: &[Move], time_s: f64, simulation: &Simulation) -> Result<()> {
         let step = self.steps + 1;
+        check_step(moves, time_s, self.last_s)?;
+        if let Some(what) = self.reached.not_next(moves, simulation) {
+            let text = format!(
+                "step {step} is not the next one of the simulation that is recorded: {what}: record each step once, right after it, with its moves"
+            );
+            return Err(Error::content(&self.folder, text));
+        }
         let row = StepRow::of(step, moves, time_s, simulation);
         // Written last, so that every step of the table is also in the arrays.
         let write_row = || {
@@ -203,6 +223,7 @@ impl Recorder {
         let pushed = self.arrays.push(simulation.shape(), simulation.report(), write_row);
         pushed.map_err(|error| Error::file(&self.folder, error))?;
         self.steps += 1;
+        (self.last_s, self.reached) = (time_s, Reached::of(simulation));
         self.tally.count(self.steps, simulation);
         Ok(())
     }
@@ -333,6 +354,7 @@ impl Kept {
     fn of(table: &[u8], steps: usize) -> Option<Self> {
         let mut bytes = 0;
         let mut rows = 0;
+        let mut before = None;
         for (index, line) in table.split_inclusive(|byte| *byte == b'\n').enumerate() {
             let whole = line.ends_with(b"\n");
             match (index, whole) {
@@ -340,6 +362,11 @@ impl Kept {
                 (0, _) => {}
                 _ => {
                     let step = step_of(line)?;
+                    // A step that is missing would move all later ones to other shapes.
+                    if before.is_some_and(|before| step != before + 1) {
+                        return None;
+                    }
+                    before = Some(step);
                     if step > steps {
                         // The recording began at the step of the saved state.
                         return (step == steps + 1).then_some(Self { rows, bytes });

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use endowire_core::Result;
 use endowire_core::insertion::{Move, Simulation};
-use endowire_core::{Error, Result};
 
 use crate::columns::columns;
-use crate::table::{self, GIVE};
+use crate::table;
 
 /// The table.
 pub const STEPS: &str = "steps.csv";
@@ -159,14 +159,4 @@ impl StepRow {
 /// [`Error::Content`] for a table that is missing, or has a row that is none.
 pub fn read_steps(folder: &Path) -> Result<Vec<StepRow>> {
     table::read(&folder.join(STEPS))
-}
-
-/// Numbers of the steps of a recording, with their end times, s.
-///
-/// # Errors
-/// As [`read_steps`], and a table without times.
-pub fn step_times(folder: &Path) -> Result<Vec<(usize, f64)>> {
-    let times = read_steps(folder)?.into_iter().map(|row| Some((row.step, row.time_s?)));
-    let lacking = || Error::content(&folder.join(STEPS), format!("has no column time_s; {GIVE}"));
-    times.collect::<Option<_>>().ok_or_else(lacking)
 }

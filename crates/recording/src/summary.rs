@@ -7,6 +7,7 @@ use endowire_core::file::whole;
 use endowire_core::insertion::Simulation;
 use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize, Serializer};
+use serde_json::Value;
 
 use crate::outcome::RunOutcome;
 use crate::packing::Packed;
@@ -130,12 +131,12 @@ fn path_text_if_any<S: Serializer>(path: &Option<PathBuf>, into: S) -> std::resu
     }
 }
 
-/// What readers of a recording need of summary.json; all of it may be missing in earlier versions and in what was
-/// written by hand.
+/// What readers of a recording need of summary.json; all but the version of the format may be missing in what was written by
+/// hand.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default)]
 pub struct About {
-    /// Version of the format; 0 before versions were told.
+    /// Version of the format; 0 where there is no summary.
     pub schema: u32,
     /// File of the scene.
     pub scene_file: Option<PathBuf>,
@@ -153,6 +154,9 @@ pub struct About {
     pub steps: Option<usize>,
     /// Number of steps without an equilibrium; 0 in recordings of versions that did not count them.
     pub unconverged_steps: usize,
+    /// Names of the instruments; empty in what was written by hand.
+    #[serde(skip)]
+    pub instruments: Vec<String>,
     /// Whether the run ended by itself. The key is missing in recordings of versions that packed the arrays only in
     /// that case.
     pub complete: Option<bool>,
@@ -170,8 +174,16 @@ impl About {
     /// [`Error::Content`] for a summary that is missing, is no such document, or is of a later version.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(SUMMARY);
-        let read = || -> io::Result<Self> { Ok(serde_json::from_slice(&std::fs::read(&path)?)?) };
-        let about = read().map_err(|e| Error::content(&path, format!("{e}; {GIVE}")))?;
+        let read = || -> io::Result<Value> { Ok(serde_json::from_slice(&std::fs::read(&path)?)?) };
+        let refused = |what: String| Error::content(&path, format!("{what}; {GIVE}"));
+        let document = read().map_err(|e| refused(e.to_string()))?;
+        if document.get("schema").is_none_or(|schema| schema.as_u64().is_none_or(|schema| schema == 0)) {
+            return Err(refused("schema: the version of the format, 1 or more, is missing".to_owned()));
+        }
+        let instruments = document["instruments"].as_array().into_iter().flatten();
+        let names = instruments.filter_map(|one| one["name"].as_str().map(str::to_owned)).collect();
+        let about: Self = serde_json::from_value(document).map_err(|e| refused(e.to_string()))?;
+        let about = Self { instruments: names, ..about };
         if about.schema > VERSION {
             let what = format!(
                 "schema = {}: a later version of the program has recorded this, and this one reads up to {VERSION}: read it with that",
@@ -180,6 +192,18 @@ impl About {
             return Err(Error::content(&path, what));
         }
         Ok(about)
+    }
+
+    /// Makes the summary in a folder, if there is one, that of a recording that goes on after step `steps`.
+    pub(crate) fn reopen(folder: &Path, steps: usize) -> Result<()> {
+        let path = folder.join(SUMMARY);
+        let reopened = || -> io::Result<()> {
+            let mut document: Value = serde_json::from_slice(&std::fs::read(&path)?)?;
+            (document["complete"], document["steps"]) = (false.into(), steps.into());
+            whole::write_bytes(&path, (serde_json::to_string_pretty(&document)? + "\n").as_bytes())
+        };
+        // A summary that is damaged is written anew with the next step.
+        if Self::read(folder).is_err() { Ok(()) } else { reopened().map_err(|e| Error::file(&path, e)) }
     }
 
     /// As [`Self::read`]; `None` if there is no summary.

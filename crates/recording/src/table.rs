@@ -95,13 +95,20 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
 /// # Errors
 /// As [`read`].
 pub fn read_or<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<Vec<T>> {
+    read_cut(path, remedy).map(|(rows, _)| rows)
+}
+
+/// As [`read_or`]; also tells whether an incomplete last row was dropped.
+pub(crate) fn read_cut<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<(Vec<T>, bool)> {
     let refused = |what: String| Error::content(path, format!("{what}; {remedy}"));
     let mut text = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
-    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
+    let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+    let is_cut = whole < text.len();
+    text.truncate(whole);
     let mut reader = csv::Reader::from_reader(text.as_slice());
     let columns = reader.headers().cloned().unwrap_or_default();
     let rows: std::result::Result<_, _> = reader.into_deserialize().collect();
-    rows.map_err(|error| refused(wrong_row(&error, &columns)))
+    Ok((rows.map_err(|error| refused(wrong_row(&error, &columns)))?, is_cut))
 }
 
 /// As [`read`]; `None` if there is no file.

@@ -10,7 +10,7 @@ use endowire_core::insertion::Simulation;
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::vessel::{Course, Displacement, Lumen, VesselMotion, WallStore};
-use endowire_core::{Result, Vec3};
+use endowire_core::{Error, Result, Vec3};
 use serde::de::DeserializeOwned;
 
 use crate::columns::columns;
@@ -115,7 +115,7 @@ impl RecordedVessel {
     /// Of the recording of a scene in `folder`, in this vessel.
     ///
     /// # Errors
-    /// [`Error::Content`](endowire_core::Error::Content) for a table that is missing or cannot be read; what is wrong with the scene.
+    /// [`Error::Content`] for a table that is missing, cannot be read or is of another vessel; what is wrong with the scene.
     pub fn read<M: MethodChoice + DeserializeOwned + Default>(
         folder: &Path,
         scene: &SceneOf<M>,
@@ -126,10 +126,21 @@ impl RecordedVessel {
         let Some(course) = scene.course(lumen, store)? else { return Ok(Self { motion, course: None }) };
         let path = folder.join(VESSEL);
         let mut steps = BySteps::new();
-        for row in table::read_if_any::<UnknownRow>(&path)?.unwrap_or_default() {
+        for row in table::read::<UnknownRow>(&path)? {
             steps.entry(row.step).or_default().push(Vec3::new(row.x_mm, row.y_mm, row.z_mm));
         }
         // The last step of a run that was killed may be incomplete.
+        let last = steps.keys().next_back().copied();
+        if let Some((step, unknowns)) =
+            steps.iter().find(|(step, unknowns)| Some(**step) != last && unknowns.len() != course.unknowns())
+        {
+            let what = format!(
+                "step = {step}: has {} unknowns, and the vessel of the scene {}: give the scene of the run (--scene)",
+                unknowns.len(),
+                course.unknowns()
+            );
+            return Err(Error::content(&path, what));
+        }
         steps.retain(|_, unknowns| unknowns.len() == course.unknowns());
         Ok(Self { motion, course: Some((Arc::new(course), steps)) })
     }

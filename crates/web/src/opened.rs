@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_subject_tells_round_by_round_what_it_needs_and_is_in_its_scene() {
+    fn a_subject_asks_for_its_files_in_rounds_and_opens_with_its_scene() {
         let path = "subjects/straight_tube.toml";
         let (files, rounds) = gathered(path);
         let all: Vec<String> = rounds.concat().iter().map(|one| one.display().to_string()).collect();

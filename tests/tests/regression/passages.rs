@@ -13,7 +13,7 @@ const SEEDS: [(u64, Passage); 5] = [
 ];
 
 #[test]
-fn what_is_said_is_what_is_done_and_of_others_it_is_not() {
+fn vessel_passable_agrees_with_simulations() {
     let rows: Vec<Row> = SEEDS.iter().map(|(seed, _)| Row::new(*seed).unwrap()).collect();
     for (row, (_, passage)) in rows.iter().zip(SEEDS) {
         assert_eq!((row.reported.passage, &row.against), (passage, &None), "{row}");

@@ -136,7 +136,7 @@ fn steps_of_the_papers_method_can_be_taken_again() {
 }
 
 #[test]
-fn what_a_state_holds_is_needed() {
+fn every_field_of_a_state_is_needed() {
     let mut simulation = start("curved_tube", with_friction(), wire(0.03), &kirchhoff());
     (0..60).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
     let text = serde_json::to_string(&simulation.state()).unwrap();

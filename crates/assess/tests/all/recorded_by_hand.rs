@@ -433,7 +433,7 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
         "instruments.csv" => HANDS.to_owned(),
         "injections.csv" => INJECTIONS.replace("device", "catheter"),
         "packing.csv" => PACKING.to_owned(),
-        _ => r#"{"steps": 3, "complete": true}"#.to_owned(),
+        _ => r#"{"schema": 1, "steps": 3, "complete": true}"#.to_owned(),
     };
     let files = ["steps.csv", "instruments.csv", "injections.csv", "packing.csv", "summary.json"];
     let read = |changed: &[(&str, String)]| {
@@ -452,7 +452,7 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
     };
     let cut = |name: &str, bytes: usize| whole(name)[..whole(name).len() - bytes].to_owned();
     // Killed while it wrote the last rows, of a step that its summary does not count yet.
-    let killed = ("summary.json", r#"{"steps": 2, "complete": false}"#.to_owned());
+    let killed = ("summary.json", r#"{"schema": 1, "steps": 2, "complete": false}"#.to_owned());
     let ends_at = |record: Record| record.samples.last().unwrap().tip_mm.unwrap().x;
     assert_eq!(ends_at(record), 50.0);
     assert_eq!(ends_at(read(&[killed.clone(), ("steps.csv", cut("steps.csv", 5))]).unwrap()), 6.0);
@@ -471,20 +471,24 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
         ("steps.csv", STEPS.replace("0.2,0,2\n", "-0.2,0,2\n"), "step[1].wall_force_n = -0.2: must be"),
         (
             "summary.json",
-            r#"{"steps": 2, "complete": true}"#.to_owned(),
+            r#"{"schema": 1, "steps": 2, "complete": true}"#.to_owned(),
             "step = 3: is the last one, and summary",
         ),
         (
             "instruments.csv",
             lines("instruments.csv", 5),
-            "step[3].instrument = []: those of the steps before are",
+            "step = 3: is missing from line 6 on, and steps.csv has it",
         ),
         (
             "instruments.csv",
             cut("instruments.csv", 5),
-            "step[3].instrument = [wire]: those of the steps before",
+            "step[3].instrument = [wire]: those of the run are [wire, catheter]",
         ),
-        ("instruments.csv", lines("instruments.csv", 1), "step[1].instrument = []: steps.csv has this step"),
+        (
+            "instruments.csv",
+            lines("instruments.csv", 1),
+            "step = 1: is missing from line 2 on, and steps.csv has it",
+        ),
         (
             "instruments.csv",
             HANDS.replace("5,5,0,0", "-5,5,0,0"),
@@ -561,9 +565,10 @@ fn the_folder_of_a_run_says_where_its_way_began_and_in_which_scene() {
         write("summary.json", summary);
         value(&assess(&Record::read(folder.path()).unwrap(), None), "tip_path_mm").unwrap()
     };
-    let without = length_mm(r#"{"scene_file": "a.toml", "steps": 3}"#);
+    let without = length_mm(r#"{"schema": 1, "scene_file": "a.toml", "steps": 3}"#);
     assert_eq!(without, 48.0);
-    let with = length_mm(r#"{"scene_file": "a.toml", "set": ["seed=2"], "start_mm": [7.0, 0.0, 0.0]}"#);
+    let with =
+        length_mm(r#"{"schema": 1, "scene_file": "a.toml", "set": ["seed=2"], "start_mm": [7.0, 0.0, 0.0]}"#);
     assert_eq!(with, 48.0 + 3.0, "3 mm in the first step");
     let session = SessionFile::read(folder.path()).unwrap();
     assert_eq!(

@@ -327,7 +327,7 @@ fn contrast_medium_counts_where_it_leaves_and_not_where_the_foremost_tip_is() {
 }
 
 #[test]
-fn it_ends_alike_tick_by_tick_and_whole() {
+fn an_exam_ends_alike_tick_by_tick_and_whole() {
     // Ticks of a tenth of a second; the tip comes to its target by itself, and rests are one sample.
     let mut record = Record { beam: Some(vec![beam(0.0, true)]), ..Record::default() };
     let mut followed = exam(subject(&[]).unwrap());

@@ -134,7 +134,7 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
 type Expected = (Fault, &'static [&'static str], &'static [&'static str], &'static [&'static str]);
 
 #[test]
-fn every_measure_tells_the_trainees_apart_that_it_should_and_no_others() {
+fn every_measure_separates_the_trainees_that_it_should_and_no_others() {
     let tree = anatomy::tree("aortic_arch").unwrap();
     let way = Way::to_target(&tree, "left carotid", 5.0).unwrap().unwrap();
     let group = |fault: Fault| -> Vec<Vec<Metric>> {

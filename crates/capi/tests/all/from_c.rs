@@ -105,7 +105,7 @@ fn the_program_of_the_guide_works() {
 }
 
 #[test]
-fn what_is_wrong_is_told_in_c_as_the_header_says() {
+fn errors_in_c_are_as_the_header_says() {
     let said = run("cc", &["-std=c99"], "tests/all/errors.c", &[&scene()]);
     let sizes = [
         size_of::<EndowireMove>(),

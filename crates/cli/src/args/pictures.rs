@@ -89,9 +89,9 @@ pub(crate) struct RenderArgs {
     /// Scene file of the run, if it is no longer where it was
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
-    /// First recorded step to draw
-    #[arg(long, default_value_t = 1, value_name = "STEP")]
-    pub(crate) from: usize,
+    /// First recorded step to draw; the first one if absent
+    #[arg(long, value_name = "STEP")]
+    pub(crate) from: Option<usize>,
     /// Last recorded step to draw; the last one if absent
     #[arg(long, value_name = "STEP")]
     pub(crate) to: Option<usize>,
@@ -150,15 +150,16 @@ pub(crate) struct DatasetArgs {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("form").args(["vtk", "gltf", "usd"]).required(true).multiple(true)))]
 pub(crate) struct ExportArgs {
     /// Folder of a recorded run
     pub(crate) dir: PathBuf,
     /// Folder for run.pvd, which lists the steps with their times, step_*.vtp (instruments as lines, contacts as points with their forces)
     /// and vessel.vtp; files of these names are replaced
-    #[arg(long, value_name = "DIR", required_unless_present_any = ["gltf", "usd"])]
+    #[arg(long, value_name = "DIR")]
     pub(crate) vtk: Option<PathBuf>,
     /// File .glb (glTF 2.0) with the run as an animation: instruments as tubes, the vessel, and the largest contact forces of each step as
-    /// arrows; of more than 500 steps as many as that, evenly spaced
+    /// arrows; of more than 500 steps as many as that, evenly spaced. A vessel that moves has keys until it is within 0.1 mm, or 2 million vertices
     #[arg(long, value_name = "FILE")]
     pub(crate) gltf: Option<PathBuf>,
     /// File .usda (USD) with the run as curves, the vessel as a mesh and contacts as points with their forces, with time samples

@@ -91,7 +91,7 @@ fn a_place_that_cannot_be_written_is_no_failure() {
 }
 
 #[test]
-fn what_cannot_be_made_is_reported_and_not_kept() {
+fn walls_that_cannot_be_made_are_reported_and_not_cached() {
     let folder = tempfile::tempdir().unwrap();
     let (tree, cache) = (tube(), cache(folder.path()));
     let wrong = WallRecipe::Generated { tree: &tree, resolution: Resolution::EdgeMm(-1.0) };

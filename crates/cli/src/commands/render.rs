@@ -4,7 +4,7 @@ use std::path::Path;
 
 use endowire_core::vessel::Lumen;
 use endowire_recording::{
-    InjectionRow, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils, step_times,
+    InjectionRow, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils,
 };
 use endowire_viewer::{ContactView, FrameTime, Moment, Seen, largest_force_n};
 
@@ -30,7 +30,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             args.dir.display()
         )));
     }
-    let times_s = step_times(&args.dir)?;
+    let times_s = recording.step_times()?;
     // A run that was resumed in a folder of its own begins after the steps before it.
     let earlier = times_s.first().map_or(0, |(first, _)| first.saturating_sub(1));
     let steps = wanted(args, &recording, earlier)?;
@@ -52,7 +52,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let seen = (path.as_path(), &scene);
     let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
-    let ended_s = |step: usize| time_s(&times_s, step, frame_s);
+    let ended_s = |step: usize| times_s[step - earlier - 1].1;
     // Either all frames show one step, or each frame shows its own step.
     let one = steps.len() == 1 && frames > 1;
     let moment = |k: usize| {
@@ -152,15 +152,13 @@ fn tell_of(args: &RenderArgs, recording: &Recording, path: &Path) -> Result<(), 
 fn wanted(args: &RenderArgs, recording: &Recording, earlier: usize) -> Result<Vec<usize>, Failure> {
     let recorded = earlier + recording.steps();
     let first = earlier + 1;
-    // What is not asked for otherwise begins with the first that was recorded.
-    let from = if args.from == 1 { first } else { args.from };
+    let from = args.from.unwrap_or(first);
     let to = args.to.unwrap_or(recorded);
     let last = to.min(recorded);
     let beyond = to > recorded && recording.about().is_complete();
     if args.to.is_some_and(|to| from > to) {
         return Err(Failure::Input(format!(
-            "--from {} --to {to}: the last step to draw comes before the first: give --to a step from {0} on",
-            args.from
+            "--from {from} --to {to}: the last step to draw comes before the first: give --to a step from {from} on"
         )));
     }
     if args.every == 0 {
@@ -168,8 +166,7 @@ fn wanted(args: &RenderArgs, recording: &Recording, earlier: usize) -> Result<Ve
     }
     if from < first || from > last || beyond {
         return Err(Failure::Input(format!(
-            "--from {} --to {to}: {} has steps {first} to {}",
-            args.from,
+            "--from {from} --to {to}: {} has steps {first} to {}",
             args.dir.display(),
             recorded
         )));
@@ -179,28 +176,4 @@ fn wanted(args: &RenderArgs, recording: &Recording, earlier: usize) -> Result<Ve
         steps.push(last);
     }
     Ok(steps)
-}
-
-/// End time of a step, s, in the time of its script. In a run that was killed, the last step may have no row; it is
-/// then assumed to be as long as the previous one.
-fn time_s(rows: &[(usize, f64)], step: usize, frame_s: f64) -> f64 {
-    match rows.binary_search_by_key(&step, |(number, _)| *number) {
-        Ok(row) => rows[row].1,
-        Err(_) => match rows {
-            [.., (_, before), (number, last)] => last + (last - before) * (step - number) as f64,
-            _ => step as f64 * frame_s,
-        },
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::time_s;
-
-    #[test]
-    fn steps_have_the_times_of_their_script() {
-        let rows = [(1, 0.5), (2, 1.0), (3, 1.25)];
-        assert_eq!([1, 2, 3, 4].map(|step| time_s(&rows, step, 0.1)), [0.5, 1.0, 1.25, 1.5]);
-        assert_eq!(time_s(&[], 1, 0.1), 0.1);
-    }
 }

@@ -115,11 +115,12 @@ fn a_record_of_other_instruments_than_its_scene_is_refused() {
     let mut renamed = document(&session);
     renamed["record"]["instruments"][1] = json!("sheath");
     std::fs::write(&session, renamed.to_string()).unwrap();
-    for (record, names) in [(&session, "wire, sheath"), (&out, "")] {
+    let renamed =
+        format!("{}: instruments = [wire, sheath]: the scene has [wire, catheter]", session.display());
+    let missing = "instruments.csv: is missing, and steps.csv needs it".to_owned();
+    for (record, reported) in [(&session, renamed), (&out, missing)] {
         for more in [&[][..], &with_subject] {
             let (code, said) = assess(record, more);
-            let reported =
-                format!("{}: instruments = [{names}]: the scene has [wire, catheter]", record.display());
             assert!(code == Some(2) && said.contains(&reported), "{said}");
         }
     }

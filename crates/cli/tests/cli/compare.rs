@@ -82,7 +82,7 @@ fn rows_pictures_and_the_front_are_written() {
 }
 
 #[test]
-fn what_is_there_is_not_run_again_and_what_is_not_is_added() {
+fn compare_goes_on_from_kept_rows() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let first = reported(&compare(out, &SMALL));

@@ -76,7 +76,7 @@ fn sessions_are_ordered_by_when_they_were_recorded_and_their_course_is_reported(
 }
 
 #[test]
-fn one_that_does_not_say_when_leaves_the_order_as_given() {
+fn a_session_without_a_date_leaves_the_order_as_given() {
     let folder = tempfile::tempdir().unwrap();
     let late = session(folder.path(), "late", 20.0, Some(9));
     let early = session(folder.path(), "early", 40.0, Some(1));

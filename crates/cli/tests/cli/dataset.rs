@@ -201,7 +201,7 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
 }
 
 #[test]
-fn what_varies_is_drawn_for_each_pose_and_told_with_its_pictures() {
+fn varied_values_are_drawn_for_each_pose_and_written_with_its_pictures() {
     let folder = tempfile::tempdir().unwrap();
     let spec = specification(folder.path(), "");
     let whole = std::fs::read_to_string(&spec).unwrap();

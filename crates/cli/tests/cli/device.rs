@@ -54,7 +54,7 @@ fn a_device_is_shown_part_by_part_with_sizes_in_every_unit() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_reported_in_one_line() {
+fn device_show_reports_errors_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let wire = "assets/devices/microwire_014.toml";
     let text = std::fs::read_to_string(workspace().join(wire)).unwrap();

@@ -140,6 +140,17 @@ fn a_vessel_that_moves_is_exported_where_it_is_at_the_end_of_each_step() {
     assert!(high[0] > 80.0 && high[1] > high[0] && (high[3] - 86.0).abs() < 1e-9, "{high:?}");
     let series = std::fs::read_to_string(out.join("run.pvd")).unwrap();
     assert!(series.contains("timestep=\"2\" part=\"1\" file=\"vessel_000004.vtp\""), "{series}");
+    // In one file it has as many keys as an error takes; the ending may be in any case.
+    let (run, glb) = (folder.path().join("run"), folder.path().join("RUN.GLB"));
+    let arguments = ["export".as_ref(), run.as_os_str(), "--gltf".as_ref(), glb.as_ref()];
+    let said = said(&endowire().args(arguments).output().unwrap());
+    let gltf::Gltf { document, .. } = gltf::Gltf::from_slice(&std::fs::read(&glb).unwrap()).unwrap();
+    let vessel = document.meshes().next().unwrap().primitives().next().unwrap();
+    let keys = vessel.morph_targets().count();
+    assert!(
+        (2..=4).contains(&keys) && said.contains(&format!("has {keys} keys, and between them it is")),
+        "{said}"
+    );
 }
 
 /// A run of the scene in a folder, exported to a file.
@@ -240,6 +251,47 @@ fn a_run_is_curves_with_time_samples() {
     assert!(positions.ends_with(&numbers) && numbers.len() > 30);
     assert!(text.contains("vector3f[] primvars:force_n.timeSamples"));
     let arguments = ["export".as_ref(), run.as_os_str(), "--usd".as_ref(), "a.txt".as_ref()];
-    let said = said(&endowire().args(arguments).output().unwrap());
-    assert!(said.contains("--usd a.txt: name a file .usda"), "{said}");
+    let reported = said(&endowire().args(arguments).output().unwrap());
+    assert!(reported.contains("--usd a.txt: name a file .usda"), "{reported}");
+    let reported = said(&endowire().args(["export".as_ref(), run.as_os_str()]).output().unwrap());
+    assert!(reported.contains("<--vtk <DIR>|--gltf <FILE>|--usd <FILE>>"), "{reported}");
+}
+
+#[test]
+fn tables_with_rows_that_are_missing_are_shown_up_to_a_kill_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (run, out) = exported(folder.path(), "--gltf", "run.glb");
+    let page = folder.path().join("page.html");
+    let (steps, summary) = (run.join("steps.csv"), run.join("summary.json"));
+    let [table, told] = [&steps, &summary].map(|path| std::fs::read_to_string(path).unwrap());
+    let usd = folder.path().join("run.usda");
+    let each = [
+        vec!["export".as_ref(), run.as_os_str(), "--gltf".as_ref(), out.as_ref()],
+        vec!["export".as_ref(), run.as_os_str(), "--usd".as_ref(), usd.as_ref()],
+        vec!["report".as_ref(), run.as_os_str(), "--out".as_ref(), page.as_ref()],
+        vec!["assess".as_ref(), run.as_os_str()],
+    ];
+    let all = |reported: &str, code: i32| {
+        for arguments in &each {
+            let output = endowire().args(arguments).output().unwrap();
+            let said = said(&output);
+            assert!(output.status.code() == Some(code) && said.contains(reported), "{arguments:?} {said}");
+        }
+    };
+    all("", 0);
+    let lines: Vec<&str> = table.split_inclusive('\n').collect();
+    std::fs::write(&steps, [&lines[..5], &lines[6..]].concat().concat()).unwrap();
+    all("steps.csv: line 6: step = 6: comes after step 4: rows are missing", 2);
+    std::fs::write(&steps, &table[..table.len() - 9]).unwrap();
+    all("steps.csv: step = 14: is the last one, and summary.json counts 15 steps", 2);
+    let killed =
+        told.replace("\"complete\": true", "\"complete\": false").replace("\"steps\": 15", "\"steps\": 0");
+    std::fs::write(&summary, &killed).unwrap();
+    all("the row of line 16 of steps.csv is cut: read up to the last whole step", 0);
+    // Killed before its first step.
+    std::fs::write(&steps, lines[0]).unwrap();
+    for arguments in &each[..3] {
+        let said = said(&endowire().args(arguments).output().unwrap());
+        assert!(said.contains("the run has recorded no step"), "{said}");
+    }
 }

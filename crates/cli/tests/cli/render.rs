@@ -338,6 +338,9 @@ fn a_run_that_was_resumed_in_another_folder_is_drawn_with_the_numbers_of_its_ste
     }
     let refused = endowire(&["render", &second, "--from", "2", "--to", "3", "--out", &drawn]);
     assert!(said(&refused).contains("has steps 4 to 6"), "{}", said(&refused));
+    // The first one that was recorded is not step 1, which can be asked for and is not there.
+    let refused = endowire(&["render", &second, "--from", "1", "--out", &drawn]);
+    assert!(said(&refused).contains("--from 1 --to 6: ") && said(&refused).contains("has steps 4 to 6"));
 }
 
 #[test]

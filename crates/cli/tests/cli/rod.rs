@@ -151,7 +151,7 @@ fn a_missing_case_is_named() {
 }
 
 #[test]
-fn verify_tells_every_row_and_counts_them() {
+fn verify_prints_and_counts_every_row() {
     // The stress tables take minutes; they are run by hand.
     let output = endowire(&["verify", "--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));

@@ -75,7 +75,7 @@ fn steps(out: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn what_is_set_is_as_if_the_file_had_it_and_is_reported() {
+fn set_is_as_if_the_file_had_the_value_and_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let file = scene(folder.path());
     let at = |name: &str| folder.path().join(name);

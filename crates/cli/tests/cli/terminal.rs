@@ -92,7 +92,7 @@ fn a_new_scene_of_an_unusual_vessel_runs_or_it_is_said_why_there_is_none() {
 }
 
 #[test]
-fn the_doctor_tells_what_is_used() {
+fn doctor_reports_what_is_used() {
     let with = |variable: &str, value: &str| {
         let mut command = endowire();
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env(variable, value);

@@ -108,7 +108,7 @@ fn columns_that_are_kept_have_the_bits_of_a_factorisation_from_the_beginning() {
 }
 
 #[test]
-fn what_is_no_number_is_reported() {
+fn sparse_factors_report_what_is_not_finite() {
     let (mut band, couplings) = random::<12>(6, 3);
     let mut shift = Shift::default();
     shift.reset(36);

@@ -47,7 +47,7 @@ impl Files for InMemory {
 
 /// What a file is instead of any input, if its first bytes leave no doubt: a pointer, a page or an archive that holds it.
 pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
-    const BEGINNINGS: [(&[u8], &str); 9] = [
+    const BEGINNINGS: [(&[u8], &str); 12] = [
         (b"version https://git-lfs", "is a pointer of Git LFS, not the file itself: fetch it (git lfs pull)"),
         (b"PK\x03\x04", "is a ZIP archive: unpack it, and name the file in it"),
         (b"PK\x05\x06", "is an empty ZIP archive"),
@@ -56,6 +56,9 @@ pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
         (b"Rar!\x1a\x07", "is a RAR archive: unpack it, and name the file in it"),
         (b"\xfd7zXZ\0", "is an xz archive: unpack it, and name the file in it"),
         (b"\x28\xb5\x2f\xfd", "is a zstd archive: unpack it, and name the file in it"),
+        (b"BZh", "is a bzip2 archive: unpack it, and name the file in it"),
+        (b"\x89PNG", "is a PNG picture, not the file that is meant"),
+        (b"glTF\x02", "is a binary glTF file, which is not read: export the surface as STL, OBJ or PLY"),
         (b"%PDF-", "is a PDF document, not the file that is meant"),
     ];
     let page = || {

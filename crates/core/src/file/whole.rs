@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_left_is_removed_and_what_is_being_written_is_not() {
+    fn temporary_files_left_behind_are_removed_and_those_in_use_are_not() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         for name in [".a.txt.xY3.part", ".a.txt.part", ".b.txt.xY3.part", "a.txt.part"] {

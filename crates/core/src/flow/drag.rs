@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_that_of_the_annulus_and_off_the_axis_that_of_a_series() {
+    fn drag_is_that_of_the_annulus_and_off_the_axis_that_of_a_series() {
         for (r, a) in [(5.0, 0.2), (2.0, 0.445), (1.0, 0.6)] {
             let annulus = 0.5 * PI * ((r * r - a * a) / f64::ln(r / a) - 2.0 * a * a);
             assert!((drag_n_per_mm(1.0, r, a, 0.0) / annulus - 1.0).abs() < 1e-12);

@@ -20,7 +20,7 @@ impl Simulation {
     /// their status, and [`Gradient::margin`] says how far the next change is.
     ///
     /// # Errors
-    /// As [`Simulation::step_together`]; a parameter that does not exist, a method other than `kirchhoff`, a vessel that yields, loops that
+    /// As [`Simulation::step_together`]; a parameter that does not exist or occurs twice, a method other than `kirchhoff`, a vessel that yields, loops that
     /// touch and detached coils ([`Error::Parameter`]); a command that passes a jump ([`Error::Computation`]).
     pub fn gradients(&self, commands: &[Vec<Move>], by: &[Parameter]) -> Result<Vec<Gradient>> {
         self.gradients_until(commands, &vec![self.time_s; commands.len()], by)
@@ -37,6 +37,7 @@ impl Simulation {
         times_s: &[f64],
         by: &[Parameter],
     ) -> Result<Vec<Gradient>> {
+        Parameter::check_each_once(by)?;
         let each: Vec<_> = by.iter().map(|parameter| vec![(*parameter, 1.0)]).collect();
         self.derivatives((commands, times_s), &each)
     }
@@ -59,14 +60,17 @@ impl Simulation {
     fn derivatives(&self, (commands, times_s): Timed<'_>, by: &[Together]) -> Result<Vec<Gradient>> {
         if times_s.len() != commands.len() {
             let remedy = format!("there are {} commands: give one for each", commands.len());
-            return Err(Error::parameter("gradient.times_s", format!("{} times", times_s.len()), remedy));
+            return Err(Error::parameter("times_s", format!("{} times", times_s.len()), remedy));
+        }
+        for together in by {
+            Parameter::check_each_once(together.iter().map(|(parameter, _)| parameter))?;
         }
         let mut last_s = self.time_s;
         for time_s in times_s {
             self.check_time(Some(*time_s))?;
             if *time_s < last_s {
                 let remedy = format!("must be in their order, {last_s} s come before it");
-                return Err(Error::parameter("gradient.times_s", time_s, remedy));
+                return Err(Error::parameter("times_s", time_s, remedy));
             }
             last_s = *time_s;
         }
@@ -79,9 +83,10 @@ impl Simulation {
     /// is elsewhere.
     ///
     /// # Errors
-    /// A parameter that does not exist there or belongs to a command, and a value that the scene could not have; an instrument that is
+    /// A parameter that does not exist there, occurs twice or belongs to a command, and a value that the scene could not have; an instrument that is
     /// a tenth thicker than all of those the wall was made for, or too thick for the vessel.
     pub fn changed(&self, values: &[(Parameter, f64)]) -> Result<Self> {
+        Parameter::check_each_once(values.iter().map(|(parameter, _)| parameter))?;
         let mut parts = self.parts();
         for (parameter, value) in values {
             if parameter.value(&parts)?.is_none() {

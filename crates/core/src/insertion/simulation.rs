@@ -371,6 +371,12 @@ impl Simulation {
         self.method.state().of_scene(self.scene.mark(), self.time_s)
     }
 
+    /// A number that stands for the scene: vessel and how it yields, wall, instruments and sheath. Simulations of the same scene
+    /// have the same number.
+    pub fn scene_number(&self) -> u64 {
+        self.scene.mark()
+    }
+
     /// Continues from a state of this scene: shape, report and all further steps are those of the simulation it was
     /// taken from, to the bit. After an error nothing has changed.
     ///

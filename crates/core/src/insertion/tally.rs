@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_went_wrong_is_reported_and_nothing_else() {
+    fn the_tally_remarks_on_what_went_wrong_and_nothing_else() {
         assert_eq!(Tally::default().remarks(60), None);
         let tally = Tally {
             unconverged_steps: 3,

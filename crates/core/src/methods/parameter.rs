@@ -143,12 +143,13 @@ impl Parameter {
         if let Some(of_place) = Self::of_place(word) {
             return Ok(of_place);
         }
-        let (instrument, rest) = match word.rsplit_once('.') {
-            Some((name, rest)) => (stack.find(name)?, rest),
+        // A full stop between brackets ends no name.
+        let (instrument, rest) = match word[..word.rfind('[').unwrap_or(word.len())].rfind('.') {
+            Some(end) => (stack.find(&word[..end])?, &word[end + 1..]),
             None => (0, word),
         };
         let numbered = rest.strip_suffix(']').and_then(|rest| rest.split_once('['));
-        let section = numbered.and_then(|(_, number)| number.parse().ok());
+        let section = numbered.and_then(|(_, digits)| number(digits));
         let curved = |section, direction| Self::RestCurvature { instrument, section, direction };
         Ok(match (numbered.map_or(rest, |(name, _)| name), section) {
             ("advance", None) => vec![Self::Advance { instrument }],
@@ -169,7 +170,7 @@ impl Parameter {
                     }
                     _ => format!("did you mean {nearest:?}?"),
                 };
-                return Err(Error::parameter("gradient.by", format!("{word:?}"), remedy));
+                return Err(Error::parameter(NAME, format!("{word:?}"), remedy));
             }
         })
     }
@@ -177,7 +178,7 @@ impl Parameter {
     /// The parameters that have x, y and z, of a word.
     fn of_place(word: &str) -> Option<Vec<Self>> {
         let (name, number) = match word.strip_suffix(']').and_then(|word| word.split_once('[')) {
-            Some((name, number)) => (name, Some(number.parse().ok()?)),
+            Some((name, digits)) => (name, Some(number(digits)?)),
             None => (word, None),
         };
         let (kind, axes) = match AXES.iter().position(|axis| name.ends_with(&format!("_{axis}"))) {
@@ -193,28 +194,48 @@ impl Parameter {
         Some(axes.map(of).collect())
     }
 
-    /// The word for it.
+    /// The word for it. An instrument that these do not have is named by its number.
     pub fn name(&self, stack: &Stack) -> String {
-        let of = |instrument: usize, word: String| match instrument {
-            0 => word,
-            _ => format!("{}.{word}", stack.instruments()[instrument].name),
-        };
+        let word = self.word();
+        match self.instrument() {
+            None | Some(0) => word,
+            Some(index) => match stack.instruments().get(index) {
+                Some(instrument) => format!("{}.{word}", instrument.name),
+                None => format!("{index}.{word}"),
+            },
+        }
+    }
+
+    /// The word for it, without the name of an instrument.
+    fn word(&self) -> String {
         match *self {
-            Self::Advance { instrument } => of(instrument, "advance".to_owned()),
-            Self::Rotation { instrument } => of(instrument, "rotate".to_owned()),
-            Self::Steering { instrument } => of(instrument, "steer".to_owned()),
-            Self::BendingStiffness { instrument, section } => of(instrument, format!("EI[{section}]")),
-            Self::TorsionalStiffness { instrument, section } => of(instrument, format!("GJ[{section}]")),
-            Self::RestCurvature { instrument, section, direction } => {
-                of(instrument, format!("rest_{}[{section}]", ["u", "v"][direction.min(1)]))
+            Self::Advance { .. } => "advance".to_owned(),
+            Self::Rotation { .. } => "rotate".to_owned(),
+            Self::Steering { .. } => "steer".to_owned(),
+            Self::BendingStiffness { section, .. } => format!("EI[{section}]"),
+            Self::TorsionalStiffness { section, .. } => format!("GJ[{section}]"),
+            Self::RestCurvature { section, direction, .. } => {
+                format!("rest_{}[{section}]", ["u", "v"][direction.min(1)])
             }
-            Self::Radius { instrument, section } => of(instrument, format!("radius[{section}]")),
+            Self::Radius { section, .. } => format!("radius[{section}]"),
             Self::EntryPosition { axis } => format!("entry_{}", AXES[axis.min(2)]),
             Self::EntryDirection { axis } => format!("direction_{}", AXES[axis.min(2)]),
             Self::Field { field, axis } => format!("field_{}[{field}]", AXES[axis.min(2)]),
             Self::WallModulus => "wall".to_owned(),
             Self::WallFriction => "friction".to_owned(),
         }
+    }
+
+    /// Refuses a parameter that occurs twice.
+    pub(crate) fn check_each_once<'a>(all: impl IntoIterator<Item = &'a Self>) -> Result<()> {
+        let mut known: Vec<&Self> = Vec::new();
+        for one in all {
+            if known.contains(&one) {
+                return Err(one.refused("it occurs twice: give it once"));
+            }
+            known.push(one);
+        }
+        Ok(())
     }
 
     /// Its value in a scene with these parts; none if it is one of a command.
@@ -340,8 +361,21 @@ impl Parameter {
 
     /// An error about it.
     pub(crate) fn refused(&self, remedy: impl Into<String>) -> Error {
-        Error::parameter("gradient.by", format!("{self:?}"), remedy.into())
+        let word = format!("{:?}", self.word());
+        let value = match self.instrument() {
+            None | Some(0) => word,
+            Some(index) => format!("{word} of instrument {index}"),
+        };
+        Error::parameter(NAME, value, remedy.into())
     }
+}
+
+/// What errors call a parameter: several calls take them, each under another name.
+const NAME: &str = "parameter";
+
+/// A number between brackets, as it is written by [`Parameter::name`].
+fn number(digits: &str) -> Option<usize> {
+    digits.parse().ok().filter(|number: &usize| number.to_string() == digits)
 }
 
 /// Axes of coordinates.
@@ -398,5 +432,27 @@ mod tests {
         assert!(refused("advanc").contains("\"advance\""), "{}", refused("advanc"));
         assert!(refused("field").contains("field[0]") && refused("entry_w").contains("entry"));
         assert!(refused("wier.advance").contains("wire"), "{}", refused("wier.advance"));
+        // A number is written in one way, and a full stop in it begins no name.
+        for word in ["EI[00]", "EI[+0]", "EI[0.0]", "EI[ 0]", "field[01]", "field_x[+1]", "wire.EI[1.0]"] {
+            let error = refused(word);
+            let kind = if word.contains("field") { "field" } else { "EI" };
+            assert!(error.starts_with(&format!("parameter = {word:?}: did you mean \"{kind}")), "{error}");
+        }
+    }
+
+    #[test]
+    fn errors_call_parameters_by_their_words() {
+        let device = Device::uniform(100.0, 0.3, 5.0).unwrap();
+        let named = |name: &str| Instrument { name: name.to_owned(), device: device.clone(), may_lead: true };
+        let stack = Stack::new(vec![named("wire"), named("catheter")]).unwrap();
+        let field = Parameter::Field { field: 0, axis: 0 };
+        assert_eq!(field.refused("no field acts").to_string(), "parameter = \"field_x[0]\": no field acts");
+        let other = Parameter::BendingStiffness { instrument: 2, section: 1 };
+        assert_eq!(other.refused("none").to_string(), "parameter = \"EI[1]\" of instrument 2: none");
+        assert_eq!(other.name(&stack), "2.EI[1]", "of no instrument there");
+        let first = Parameter::BendingStiffness { instrument: 0, section: 1 };
+        assert!(Parameter::check_each_once([&first, &other, &field]).is_ok());
+        let twice = Parameter::check_each_once([&first, &other, &first]).unwrap_err().to_string();
+        assert_eq!(twice, "parameter = \"EI[1]\": it occurs twice: give it once");
     }
 }

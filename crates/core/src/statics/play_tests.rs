@@ -72,7 +72,7 @@ fn a_wire_tilts_at_the_end_of_a_catheter_as_two_beams_do_at_any_length_of_elemen
 }
 
 #[test]
-fn without_play_nothing_changes_and_with_hardly_any_hardly_anything() {
+fn no_play_changes_nothing_and_little_play_changes_little() {
     let mut with = case(0.0, [0.04, 0.01], 70);
     let without = solved(&with);
     let text = serde_json::to_string(&with).unwrap();

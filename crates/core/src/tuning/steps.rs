@@ -30,6 +30,8 @@ pub struct StepTuning {
     /// Newton iterations allowed for a command per millimetre and per `work_rad`, including failed attempts, before it
     /// is relaxed. Relaxations go on after them, until the linear solves are used up.
     pub work: f64,
+    /// As many times more where the vessel's course yields: the device is sought again wherever that follows.
+    pub work_of_course: f64,
     /// Rotation that counts like a millimetre, rad.
     pub work_rad: f64,
     /// Change of the steering value that counts like a millimetre.
@@ -86,6 +88,7 @@ impl StepTuning {
         solves_per_mm: 100.0,
         solves_up_to_mm: 40.0,
         work: 280.0,
+        work_of_course: 4.0,
         work_rad: 0.1,
         work_steer: 0.05,
         work_of_one: 10,

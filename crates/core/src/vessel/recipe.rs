@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_wall_is_not_read_as_one() {
+    fn stored_walls_that_are_damaged_are_refused() {
         let written = serde_json::to_string(&tube()).unwrap();
         let odd = written.replacen("\"triangles\":[[", "\"triangles\":[[4000000,1,2],[", 1);
         assert_ne!(odd, written);

@@ -74,6 +74,8 @@ pub enum RepairKind {
     SheetInLumen,
     /// A part that overlapped another one, united with it.
     PartUnited,
+    /// A closed body or a sheet that stands in the wall, of which most is in the lumen, taken off it.
+    BodyInWall,
 }
 
 /// One repaired place, or one thing in the lumen.

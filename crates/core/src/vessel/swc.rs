@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_tree_is_refused_by_its_line() {
+    fn swc_files_that_are_no_tree_are_refused_by_line() {
         let root = "1 1 0 0 0 2 -1\n";
         for (rest, part) in [
             ("2 1 0 0 1 2\n", "line 2: 6 columns"),

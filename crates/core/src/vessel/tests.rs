@@ -275,7 +275,7 @@ fn a_vertex_that_no_triangle_uses_changes_no_tolerance() {
 }
 
 #[test]
-fn a_check_tells_how_wide_the_vessel_is_and_where_two_all_but_touch() {
+fn vessel_check_reports_width_and_walls_that_nearly_touch() {
     let tube = tube();
     let report = check(tube.mesh()).unwrap();
     let lumen = report.survey.lumen.unwrap();

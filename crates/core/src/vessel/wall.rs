@@ -89,8 +89,10 @@ pub struct RepairReport {
     pub bodies_in_lumen: usize,
     /// Sheets in the lumen, taken as thin walls with two sides.
     pub sheets_in_lumen: usize,
-    /// Parts that overlapped others and were united with them, and bodies that were taken off.
+    /// Parts that overlapped others and were united with them.
     pub parts_united: usize,
+    /// Closed bodies and sheets that stand in the wall, taken off the lumen.
+    pub bodies_in_wall: usize,
     /// What was repaired where, in the order of the work: everything counted above except merged or unused vertices,
     /// triangles without area, duplicates and turned triangles, which change no surface.
     pub repairs: Vec<Repair>,
@@ -115,6 +117,7 @@ impl RepairReport {
             self.bodies_in_lumen,
             self.sheets_in_lumen,
             self.parts_united,
+            self.bodies_in_wall,
         ];
         more.iter().all(|count| *count == 0) && !self.intersections_capped
     }
@@ -150,6 +153,11 @@ impl RepairReport {
                 self.parts_united,
                 RepairKind::PartUnited,
                 "parts that overlapped the rest without being joined, united with it",
+            ),
+            (
+                self.bodies_in_wall,
+                RepairKind::BodyInWall,
+                "bodies and sheets that stand in the wall, taken off the lumen",
             ),
             (self.holes_filled, RepairKind::HoleClosed, "holes and tears closed"),
             (kept, RepairKind::HoleKept, "holes left open as asked"),

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_stays_alone_and_equal_vertices_merge_without_a_tolerance() {
+    fn welding_leaves_vertices_that_are_not_finite_and_merges_equal_ones() {
         let far = Vec3::new(1e300, -1e300, 3.0);
         let nowhere = Vec3::new(0.0, f64::NAN, 0.0);
         let points = [Vec3::x(), nowhere, far, Vec3::x(), nowhere, far, Vec3::repeat(f64::INFINITY)];

@@ -161,7 +161,7 @@ fn a_script_rests_and_goes_on_with_the_same_bits() {
 }
 
 #[test]
-fn what_has_no_times_is_shown_as_fast_as_keys_move_and_what_is_not_there_is_refused() {
+fn scripts_without_times_are_shown_at_the_speed_of_keys_and_empty_ones_refused() {
     let mut session =
         self::session("[[script]]\ninstrument = \"catheter\"\nadvance_mm = 4.0\nstep_mm = 2.0\n");
     session.apply(&Input::Script {}).unwrap();

@@ -319,7 +319,7 @@ fn what_hands_inject_is_a_line_of_the_script_at_its_step_and_time() {
 }
 
 #[test]
-fn what_was_undone_is_done_again_with_the_same_bits_until_something_else_is_done() {
+fn redo_has_the_same_bits_until_something_else_is_done() {
     let (_, mut session) = session("arch_angiography.toml");
     let flowing = |session: &Session| session.snapshot().lab.fluoro().injection.len();
     let mut shapes = vec![session.simulation().shape().clone()];
@@ -400,7 +400,7 @@ fn a_tip_held_by_the_wall_is_that_which_medium_leaves() {
 }
 
 #[test]
-fn a_readout_tells_the_force_on_the_wall_that_is_limited() {
+fn the_readout_has_the_wall_force_that_is_limited() {
     let (_, mut session) = session("arch_innominate.toml");
     let several = (0..600).any(|_| {
         go(&mut session, "device", 60.0, 1);

@@ -56,7 +56,7 @@ fn score(subject: &str, plan: Plan, mm_per_s: f64, pace: f64) -> Score {
 }
 
 #[test]
-fn who_pushes_on_with_the_hook_against_the_wall_is_reported_from_who_turns_it_first() {
+fn scores_separate_pushing_a_hook_against_the_wall_from_turning_it_first() {
     // The hook is turned away from the branches before, then into the one that is meant. Who pushes too fast and too
     // far meanwhile has to come back, has been elsewhere or presses on the arch.
     for (subject, clean, pushing) in [

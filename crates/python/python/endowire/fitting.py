@@ -70,6 +70,10 @@ class Observed:
     def residual(self, gradient: Gradient) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Residuals, and their derivatives, shape (k, p)."""
         value = np.asarray(self.value, dtype=float).ravel()
+        if not np.isfinite(value).all():
+            raise InputError(f"observed.value = {value}: every number must be finite")
+        if not 0.0 < self.sigma < np.inf:
+            raise InputError(f"observed.sigma = {self.sigma}: must be a finite number above 0")
         computed, slopes = self._computed(gradient)
         if computed.shape != value.shape:
             raise InputError(f"observed.value has {value.size} numbers, and {self.of!r} {computed.size}")

@@ -299,15 +299,13 @@ fn insert(
 mod tests {
     use super::*;
     use crate::crossing::CrossingTest;
+    use crate::surfaces::surface::straight_tube;
     use crate::surfaces::{cells, surfaces_in};
-    use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, anatomy};
+    use endowire_core::vessel::{NoStore, Wall};
 
-    fn tube(sidecar: &str, closed: bool) -> Surface {
-        let made =
-            GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap();
+    fn tube(sidecar: &str, length_mm: f64) -> Surface {
         let folder = tempfile::tempdir().unwrap();
-        let mesh = if closed { made.wall.closed_mesh() } else { made.wall.mesh().clone() };
-        mesh.write(&folder.path().join("tube.ply")).unwrap();
+        straight_tube(length_mm).write(&folder.path().join("tube.ply")).unwrap();
         std::fs::write(folder.path().join("tube.toml"), sidecar).unwrap();
         Surface::read(&surfaces_in(folder.path()).unwrap()[0], &NoStore).unwrap()
     }
@@ -316,7 +314,7 @@ mod tests {
     fn a_tube_is_gone_through_left_refused_or_too_slow() {
         let row =
             |surface: &Surface, limit_s: f64| run(surface, &cells(1, false)[3], &NoStore, limit_s, &|| 0.5);
-        let surface = tube("length_mm = 30.0", false);
+        let surface = tube("length_mm = 30.0", 40.0);
         assert_eq!((surface.places.len(), surface.skipped.len()), (2, 0));
         let arrived = row(&surface, 1.0);
         assert_eq!(
@@ -328,14 +326,14 @@ mod tests {
         assert_eq!(arrived.name, "tube.ply 0.014 step1 el1 mu0.1 k100 turn0");
         assert_eq!(row(&surface, -1.0).message.unwrap(), "too slow: not done within -1 s");
 
-        let two = tube("device_radius_mm = [0.3, 4.5]", false);
+        let two = tube("device_radius_mm = [0.3, 4.5]", 40.0);
         assert_eq!(two.skipped, ["0.354 is too thick at the sheath"]);
         let left = row(&two, 1.0);
         assert_eq!(left.ending, Ending::Left, "{left:?}");
-        assert!(left.ending.is_good() && left.inserted_mm > 95.0);
+        assert!(left.ending.is_good() && left.inserted_mm > 35.0);
 
         let outside =
-            tube("device_radius_mm = 0.3\n[sheath]\nposition_mm = [9, 0, 0]\ndirection = [0, 0, 1]", false);
+            tube("device_radius_mm = 0.3\n[sheath]\nposition_mm = [9, 0, 0]\ndirection = [0, 0, 1]", 40.0);
         assert_eq!(row(&outside, 1.0).ending, Ending::Refused);
     }
 
@@ -344,7 +342,7 @@ mod tests {
     fn a_device_beyond_the_given_triangles_is_seen() {
         let start = "length_mm = 60.0\n[sheath]\nposition_mm = [0, 0, 1]\ndirection = [0, 0, 1]";
         let cell = cells(1, false)[3];
-        let whole = tube(start, false);
+        let whole = tube(start, 100.0);
         let free = run(&whole, &cell, &NoStore, 1e9, &|| 0.0);
         assert_eq!((free.ending, free.crossings, free.missing_mm), (Ending::Arrived, 0, 0.0));
         assert_eq!((free.missing_felt_mm, free.unreported), (0.0, 0));

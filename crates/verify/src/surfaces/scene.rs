@@ -65,11 +65,12 @@ impl Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surfaces::surface::straight_tube;
     use crate::surfaces::{cells, surfaces_in};
     use endowire_core::Vec3;
     use endowire_core::insertion::script_commands;
     use endowire_core::scene::Scene;
-    use endowire_core::vessel::{GeneratedWall, NoStore, PatientAxes, Resolution, SurfaceMesh, anatomy};
+    use endowire_core::vessel::{NoStore, PatientAxes, SurfaceMesh};
 
     /// A mesh in VTK's legacy format.
     fn vtk(mesh: &SurfaceMesh) -> String {
@@ -83,20 +84,18 @@ mod tests {
 
     #[test]
     fn the_scene_of_a_cell_is_the_cell() {
-        let made =
-            GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0)).unwrap();
+        let tube = straight_tube(30.0);
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("tube.vtk"), vtk(made.wall.mesh())).unwrap();
+        std::fs::write(folder.path().join("tube.vtk"), vtk(&tube)).unwrap();
         std::fs::write(folder.path().join("tube.toml"), "axes = \"RAS\"").unwrap();
         let surface = Surface::read(&surfaces_in(folder.path()).unwrap()[0], &NoStore).unwrap();
         // x and y of LPS have the opposite sign: front and back are swapped.
         let turned =
             |mesh: &SurfaceMesh| mesh.vertices_mm.iter().map(|v| Vec3::new(-v.x, -v.y, v.z)).collect();
-        let [given, there]: [Vec<Vec3>; 2] =
-            [turned(made.wall.mesh()), surface.wall.mesh().vertices_mm.clone()];
+        let [given, there]: [Vec<Vec3>; 2] = [turned(&tube), surface.wall.mesh().vertices_mm.clone()];
         let apart_mm =
             |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        assert!(apart_mm(&given, &there) < 1e-9 && apart_mm(&made.wall.mesh().vertices_mm, &there) > 1.0);
+        assert!(apart_mm(&given, &there) < 1e-9 && apart_mm(&tube.vertices_mm, &there) > 1.0);
         for cell in cells(surface.places.len(), false) {
             let path = folder.path().join("cell.toml");
             std::fs::write(&path, cell.scene(&surface).unwrap()).unwrap();

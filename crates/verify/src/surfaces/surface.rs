@@ -129,3 +129,17 @@ impl Surface {
         Ok(surface)
     }
 }
+
+/// A tube of radius 4 mm along z from the origin.
+#[cfg(test)]
+pub(super) fn straight_tube(length_mm: f64) -> SurfaceMesh {
+    use endowire_core::Vec3;
+    use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
+    let node = |z_mm: f64, parent: Option<usize>| CentrelineNode {
+        position_mm: Vec3::z() * z_mm,
+        radius_mm: 4.0,
+        parent,
+    };
+    let tree = CentrelineTree::new(vec![node(0.0, None), node(length_mm, Some(0))]).unwrap();
+    GeneratedWall::new(&tree, Resolution::EdgeMm(1.5)).unwrap().wall.mesh().clone()
+}

@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_straight_between_what_is_known_and_rests_beyond() {
+    fn the_tip_way_is_straight_between_known_places_and_rests_beyond() {
         let mut way = way();
         assert_eq!(way.at(1.5), None);
         assert_eq!(way.follow(1.2, at(1.0)), f64::NEG_INFINITY);
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_reported_twice_changes_nothing_and_another_run_begins_where_it_departs() {
+    fn a_repeated_tip_place_changes_nothing_and_another_run_begins_where_it_departs() {
         let mut way = way();
         for k in 0..10 {
             way.follow(1.0 + 0.1 * f64::from(k), at(f64::from(k)));

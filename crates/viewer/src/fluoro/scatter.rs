@@ -183,7 +183,7 @@ mod tests {
     use crate::spec::CArmSpec;
 
     #[test]
-    fn it_is_the_wanted_share_and_smooth() {
+    fn scatter_has_the_wanted_share_and_is_smooth() {
         let wall =
             SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::new(50.0, 0.0, 50.0)], triangles: vec![] };
         let spec = CArmSpec { pixel_mm: Some(0.5), ..CArmSpec::default() };

@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_is_lost_leaves_the_work_to_the_reference() {
+    fn a_lost_adapter_leaves_the_work_to_the_reference() {
         if crate::gpu::context::tests::opened().is_none() {
             return;
         }

@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_reported_before_anything_is() {
+    fn animation_file_names_are_checked_before_writing() {
         for name in ["a.mpg", "a", "a.avi"] {
             let reported = Animation::check_name(Path::new(name)).unwrap_err().to_string();
             assert!(reported.contains(name) && reported.contains(".gif"), "{reported}");

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_wanted_is_not_there() {
+    fn parts_of_the_body_can_be_left_out() {
         let spec =
             TorsoSpec { spine: false, ribs: false, lungs: false, electrodes: false, ..TorsoSpec::default() };
         let body = Body::new(&spec, &vessel());

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_the_exponential() {
+    fn exp_lanes_is_the_exponential() {
         for k in -8700..=8700 {
             let x = k as f32 / 100.0;
             let exact = f64::from(x).exp();
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_logarithm() {
+    fn ln_lanes_is_the_logarithm() {
         for k in -600..=600 {
             let x = 10.0_f64.powf(f64::from(k) / 100.0) as f32;
             let mut y = [x];

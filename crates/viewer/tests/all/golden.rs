@@ -214,7 +214,7 @@ impl Tolerance {
 }
 
 #[test]
-fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_lateral_is_not() {
+fn frames_of_the_adapter_are_the_stored_pictures_and_a_shifted_wire_is_not() {
     let Some(renderer) = on_gpu(&view(Mode::Fluoro), &wall("aortic_arch")) else { return };
     assert!(!renderer.backend().contains("CPU reference"), "{}", renderer.backend());
     let name = renderer.backend().to_owned();

@@ -118,7 +118,7 @@ fn beats_along(renderer: &Renderer, from_to: [Vec3; 2], left: [&[f32]; 2], paths
 type Sight = ([f64; 4], f64, [Vec3; 2]);
 
 #[test]
-fn it_is_so_in_other_fields_and_poses_at_the_edge_in_a_catheter_and_of_wound_wire() {
+fn wires_are_even_in_other_fields_poses_catheters_and_windings() {
     let whole = [Vec3::new(-60.0, 0.0, -21.0), Vec3::new(60.0, 0.0, 33.0)];
     let beyond = [Vec3::new(-60.0, 0.0, -20.0), Vec3::new(200.0, 0.0, 40.0)];
     let border = [Vec3::new(-60.0, 0.0, 92.4), Vec3::new(60.0, 0.0, 91.8)];

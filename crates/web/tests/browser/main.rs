@@ -300,7 +300,7 @@ fn drop_file(browser: &mut Browser, name: &str, bytes: &str) {
 }
 
 #[test]
-fn a_surface_is_dropped_and_entered_and_what_is_none_is_reported_in_the_cores_words() {
+fn a_dropped_surface_is_entered_and_other_files_are_refused_as_by_the_core() {
     let _alone = alone();
     let Some(mut browser) = Browser::open("", PHONE) else { return };
     browser.wait(READY);

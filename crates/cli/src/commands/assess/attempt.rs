@@ -6,7 +6,7 @@ use std::sync::Arc;
 use endowire_assess::{Metric, Record, Score, SessionFile, Subject, Way};
 use endowire_core::device::Stack;
 use endowire_methods::Scene;
-use endowire_recording::About;
+use endowire_recording::{About, Rows};
 
 use super::verified;
 use crate::args::AssessArgs;
@@ -94,6 +94,10 @@ pub(super) fn read(files: &[PathBuf]) -> Result<(Vec<Given<'_>>, Vec<&Path>), Fa
     let (mut sessions, mut left_out) = (vec![], vec![]);
     for file in files {
         let session = SessionFile::read(file)?;
+        if file.is_dir() {
+            let rows = Rows::read(file, &About::read(file)?)?;
+            scenes::tell_left_out(file, rows.left_out.as_deref());
+        }
         if session.record.is_empty() {
             left_out.push(file.as_path());
         } else {

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 
 use super::glb::Glb;
 use super::tube::{Joint, Tube, place, skin, tubes, upright};
-use super::{MOST_VESSEL_KEYS, Run, written};
+use super::vessel_keys::VesselKeys;
+use super::{Run, written};
 use crate::failure::Failure;
 use crate::output::{tell, whole};
 
@@ -29,19 +30,17 @@ const FORCE: usize = 2;
 /// Writes the file.
 pub(super) fn write(run: &Run, file: &Path) -> Result<(), Failure> {
     let keys = run.keys(MOST_KEYS);
-    if keys.is_empty() {
-        return Err(Failure::Input(format!("--gltf {}: the run has recorded no step", file.display())));
-    }
-    let bytes = document(run, &keys)?;
+    let vessel = VesselKeys::of(run);
+    let bytes = document(run, &keys, &vessel)?;
     whole::write_bytes(file, &bytes).map_err(|e| Failure::write(file, &e))?;
     if keys.len() < run.times.len() {
         tell(format_args!("endowire: {} of {} steps are keys of the animation", keys.len(), run.times.len()));
     }
-    written(keys.len(), file);
+    written(keys.len(), Some(&vessel), file);
     Ok(())
 }
 
-fn document(run: &Run, keys: &[(usize, f64)]) -> Result<Vec<u8>, Failure> {
+fn document(run: &Run, keys: &[(usize, f64)], vessel_keys: &VesselKeys) -> Result<Vec<u8>, Failure> {
     let mut glb = Glb::default();
     glb.materials = vec![
         json!({"name": "vessel", "alphaMode": "BLEND", "doubleSided": true,
@@ -54,7 +53,7 @@ fn document(run: &Run, keys: &[(usize, f64)]) -> Result<Vec<u8>, Failure> {
     let times_s: Vec<f32> = keys.iter().map(|(_, time_s)| *time_s as f32).collect();
     let times = glb.times(&times_s);
     let rows: Vec<usize> = keys.iter().map(|(row, _)| *row).collect();
-    let mut scene = vec![vessel(run, &mut glb)];
+    let mut scene = vec![vessel(run, &mut glb, &vessel_keys.keys)];
     for tube in tubes(run, &rows)? {
         scene.extend(body(run, &mut glb, &tube, times));
     }
@@ -68,7 +67,7 @@ fn flat(points: impl Iterator<Item = Vec3>) -> Vec<f32> {
 }
 
 /// The vessel; one that moves or yields is animated by differences from where it is at rest.
-fn vessel(run: &Run, glb: &mut Glb) -> usize {
+fn vessel(run: &Run, glb: &mut Glb, moved: &[(usize, f64)]) -> usize {
     let rest = run.vertices_mm(None);
     let positions = glb.places(&flat(rest.iter().map(place)));
     let mesh = run.wall.mesh();
@@ -85,7 +84,6 @@ fn vessel(run: &Run, glb: &mut Glb) -> usize {
         "attributes": {"POSITION": positions, "NORMAL": normals}, "indices": triangles, "material": VESSEL
     });
     let mut made = json!({"name": "vessel"});
-    let moved = if run.places.changes() { run.keys(MOST_VESSEL_KEYS) } else { vec![] };
     let targets: Vec<Value> = moved
         .iter()
         .map(|(row, _)| {

@@ -4,6 +4,7 @@ mod glb;
 mod gltf;
 mod tube;
 mod usd;
+mod vessel_keys;
 mod vtk;
 
 use std::path::Path;
@@ -13,10 +14,9 @@ use endowire_core::device::{Stack, line_mm};
 use endowire_core::insertion::Sheath;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Lumen, Wall};
-use endowire_recording::{
-    Left, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils, step_times,
-};
+use endowire_recording::{Left, Lengths, RecordedVessel, Recording, WallContact, coils_after, read_coils};
 
+use self::vessel_keys::VesselKeys;
 use crate::args::ExportArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -27,20 +27,22 @@ use crate::scenes;
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     for (file, ending, flag) in [(&args.gltf, "glb", "--gltf"), (&args.usd, "usda", "--usd")] {
         if let Some(file) = file
-            && file.extension().is_none_or(|found| found != ending)
+            && file.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending))
         {
             let text = format!("{flag} {}: name a file .{ending}", file.display());
             return Err(Failure::Input(text));
         }
     }
     let run = Run::read(args)?;
+    for (path, flag) in [(&args.vtk, "--vtk"), (&args.gltf, "--gltf"), (&args.usd, "--usd")] {
+        if let (Some(path), true) = (path, run.times.is_empty()) {
+            return Err(Failure::Input(format!("{flag} {}: the run has recorded no step", path.display())));
+        }
+    }
     args.vtk.as_deref().map_or(Ok(()), |folder| vtk::write(&run, folder))?;
     args.gltf.as_deref().map_or(Ok(()), |file| gltf::write(&run, file))?;
     args.usd.as_deref().map_or(Ok(()), |file| usd::write(&run, file))
 }
-
-/// Largest number of times at which a vessel that moves is written: it has all of its vertices at each.
-const MOST_VESSEL_KEYS: usize = 24;
 
 /// A recorded run in its scene.
 struct Run {
@@ -78,9 +80,7 @@ impl Run {
         let cache = Cache::new(&args.cache);
         let wall = scene.wall(&cache).map_err(in_scene)?;
         let sheath = scene.sheath(&wall).map_err(in_scene)?;
-        let mut times = step_times(&args.dir)?;
-        // A run that was killed may have written one of the two without the other.
-        times.truncate(recording.steps());
+        let times = recording.step_times()?;
         Ok(Self {
             lengths: Lengths::read(&args.dir, &stack)?,
             left: read_coils(&args.dir, &stack)?,
@@ -154,7 +154,10 @@ impl Run {
     }
 }
 
-/// Tells what was written.
-fn written(steps: usize, path: &Path) {
+/// Tells what was written, with keys of a vessel that moves.
+fn written(steps: usize, vessel: Option<&VesselKeys>, path: &Path) {
     tell(format_args!("{steps} steps and the vessel in {}", path.display()));
+    if let Some(text) = vessel.and_then(VesselKeys::text) {
+        tell(format_args!("{}: {text}", path.display()));
+    }
 }

@@ -5,15 +5,17 @@ use std::path::Path;
 
 use endowire_core::Vec3;
 
-use super::{Line, MOST_VESSEL_KEYS, Run, written};
+use super::vessel_keys::VesselKeys;
+use super::{Line, Run, written};
 use crate::failure::Failure;
 use crate::output::whole;
 
 /// Writes the file.
 pub(super) fn write(run: &Run, file: &Path) -> Result<(), Failure> {
-    let text = document(run)?;
+    let keys = VesselKeys::of(run);
+    let text = document(run, &keys)?;
     whole::write_bytes(file, text.as_bytes()).map_err(|e| Failure::write(file, &e))?;
-    written(run.times.len(), file);
+    written(run.times.len(), Some(&keys), file);
     Ok(())
 }
 
@@ -47,14 +49,14 @@ fn attribute(text: &mut String, name: &str, samples: &[(f64, String)], more: &st
     }
 }
 
-fn document(run: &Run) -> Result<String, Failure> {
+fn document(run: &Run, keys: &VesselKeys) -> Result<String, Failure> {
     let end_s = run.times.last().map_or(0.0, |(_, time_s)| *time_s);
     let mut text = format!(
         "#usda 1.0\n(\n    defaultPrim = \"run\"\n    doc = \"A run of endowire: millimetres, seconds, newtons\"\n    \
          metersPerUnit = 0.001\n    upAxis = \"Z\"\n    startTimeCode = 0\n    endTimeCode = {end_s}\n    \
          timeCodesPerSecond = 1\n)\n\ndef Xform \"run\"\n{{\n"
     );
-    vessel(run, &mut text);
+    vessel(run, &mut text, &keys.keys);
     let lines = run
         .rows()
         .map(|(row, _, time_s)| Ok((time_s, run.lines(row)?)))
@@ -70,7 +72,7 @@ fn document(run: &Run) -> Result<String, Failure> {
     Ok(text + "}\n")
 }
 
-fn vessel(run: &Run, text: &mut String) {
+fn vessel(run: &Run, text: &mut String, keys: &[(usize, f64)]) {
     let mesh = run.wall.mesh();
     let _ = write!(
         text,
@@ -82,12 +84,9 @@ fn vessel(run: &Run, text: &mut String) {
         list(mesh.triangles.iter().flatten()),
         points(&run.vertices_mm(None)),
     );
-    if run.places.changes() {
-        let places: Vec<(f64, String)> = run
-            .keys(MOST_VESSEL_KEYS)
-            .into_iter()
-            .map(|(row, time_s)| (time_s, points(&run.vertices_mm(Some(row)))))
-            .collect();
+    if !keys.is_empty() {
+        let place = |(row, time_s): &(usize, f64)| (*time_s, points(&run.vertices_mm(Some(*row))));
+        let places: Vec<(f64, String)> = keys.iter().map(place).collect();
         attribute(text, "point3f[] points", &places, "");
     }
     *text += "    }\n";

@@ -44,7 +44,7 @@ pub(super) fn write(run: &Run, folder: &Path) -> Result<(), Failure> {
     bar.finish_and_clear();
     let series = folder.join("run.pvd");
     write_series(&series, &files).map_err(|e| Failure::write(&series, &e))?;
-    written(files.len(), &series);
+    written(files.len(), None, &series);
     Ok(())
 }
 

@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn who_says_nothing_keeps_nobody_out() {
+    fn silent_connections_keep_nobody_out() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let silent = Arc::new(Silent::default());
         let mut ends: Vec<(TcpStream, TcpStream, Waiting)> = Vec::new();

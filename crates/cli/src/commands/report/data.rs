@@ -27,13 +27,13 @@ pub(super) fn collect(
     // Without a valid summary, the rest is still shown.
     let summary = std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let summary: Value = summary.unwrap_or(Value::Null);
-    let rows = recording.rows()?;
+    let rows = recording.rows();
     Ok(Run {
         instruments: stack.instruments().iter().map(|one| one.name.clone()).collect(),
         vessel: Vessel::of(vessel),
         steps: steps(folder, recording, stack)?,
-        events: events(&rows, &summary),
-        series: Series::of(&rows),
+        events: events(rows, &summary),
+        series: Series::of(rows),
         frames: frames(folder),
         setup: setup(scene, stack)?,
         others: vec![],
@@ -51,10 +51,11 @@ fn steps(folder: &Path, recording: &Recording, stack: &Stack) -> Result<Vec<Mome
     wanted
         .map(|step| {
             let shape = recording.shape(step);
-            let inserted_mm = lengths.after(step, &shape)?;
+            let number = recording.rows()[step - 1].step;
+            let inserted_mm = lengths.after(number, &shape)?;
             let contacts = recording.contacts(step);
             let contacts = contacts.iter().map(|contact| (contact.position_mm, contact.force_n));
-            Ok(Moment::new(step, &shape.positions_mm, &inserted_mm, contacts))
+            Ok(Moment::new(number, &shape.positions_mm, &inserted_mm, contacts))
         })
         .collect()
 }

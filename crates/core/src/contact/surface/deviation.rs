@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_sag_of_triangles_and_the_distance_of_another_tube() {
+    fn deviation_is_the_sag_of_triangles_and_the_distance_of_another_tube() {
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let given = tube(4.0);
         let surface = ContactMesh::new(&given, 0.2, &properties, &NoStore).unwrap();

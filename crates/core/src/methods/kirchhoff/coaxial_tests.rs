@@ -128,7 +128,7 @@ fn an_end_passes_through_the_mesh_without_a_jump_and_hands_feel_the_slope() {
 }
 
 #[test]
-fn the_largest_bend_of_an_element_is_told() {
+fn the_largest_bend_of_an_element_is_reported() {
     let simulation = both_in(120.0);
     let (reported_rad, seen_rad) =
         (simulation.report().largest_bend_rad, simulation.shape().largest_turn_rad());

@@ -75,7 +75,8 @@ impl<'a> Course<'a> {
         let (vessel_moves, fields_change) = (surroundings.moves(), surroundings.fields_change());
         let tuning = &environment.options.tuning.steps;
         let most = tuning.work_of_one.saturating_mul(environment.options.max_iterations);
-        let work = |travel_mm: f64| ((tuning.work * travel_mm) as usize).min(most);
+        let per_mm = tuning.work * surroundings.course.map_or(1.0, |_| tuning.work_of_course);
+        let work = |travel_mm: f64| ((per_mm * travel_mm) as usize).min(most);
         let travel_mm = way.travel_mm(tuning);
         let unfinished = from.unfinished.as_deref();
         let control = match unfinished {

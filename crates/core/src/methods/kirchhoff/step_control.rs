@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_is_halved_and_what_is_much_nearer_doubled() {
+    fn parts_are_halved_where_equilibria_are_far_and_doubled_where_near() {
         let mut control = control(10.0);
         assert_eq!(control.next(4.0), (Effort::Near, 4.0));
         assert!(!control.failed(4.0, FAR, &T));

@@ -37,6 +37,9 @@
 //! ```
 //!
 //! where P are the pulls on the device, Z = K⁻¹ P.
+//!
+//! Where the device is not found at the end of a step, or of a halving of ε, that was too long, and half of it is gone; not
+//! where the device has gone so far that it snaps.
 
 use std::convert::Infallible;
 use std::ops::Range;
@@ -66,6 +69,8 @@ const RISES: f64 = 0.5;
 /// A wider ε shrinks by this factor, from a solution that is this near, relative to the largest force.
 const NARROWS: f64 = 0.5;
 const NEAR_ENOUGH: f64 = 0.1;
+/// A step at whose end the device is not found is halved down to this part of it.
+const LEAST_PART: f64 = 0.25;
 /// Most sweeps for the eigenvalues of a stiffness, and the least magnitude that they are taken as, relative to the largest.
 const MOST_SWEEPS: usize = 1000;
 const LEAST_CURVATURE: f64 = 1e-7;
@@ -484,78 +489,101 @@ impl<const C: usize> Tools<C> {
         for _ in 0..MOST_ROUNDS {
             let Some(follows) = searched.follows.take() else { return searched };
             let before = rod.clone();
+            let was_mm = course.amplitudes_mm.clone();
             let stick_mm = self.friction.stick_mm();
-            if follows.stick_mm < stick_mm {
+            let mut next_stick_mm = follows.stick_mm.min(stick_mm);
+            if next_stick_mm < stick_mm {
                 // The energy along the last step was that of another friction.
                 line = None;
-                self.friction.stick_at(follows.stick_mm);
             }
             let back = line.as_mut().and_then(|line| line.back(&follows));
-            let part = back.unwrap_or_else(|| {
+            let whole = back.unwrap_or_else(|| {
                 let (turn, _) = RodState::largest_turn::<C>(elements, &before, &follows.way);
                 let part = (MOST_TURN_RAD / turn).min(1.0);
                 line = Some(Line::of(follows, &course.amplitudes_mm, part));
                 part
             });
             let Some(Line { step_mm, way, .. }) = &line else { return searched };
-            let amplitudes_mm: Vec<Vec3> =
-                course.amplitudes_mm.iter().zip(step_mm).map(|(from, step)| from + step * part).collect();
-            let way: Vec<f64> = way.iter().map(|value| value * part).collect();
-            let farthest_mm = part.abs() * step_mm.iter().map(Vec3::norm).fold(0.0, f64::max);
-            let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
-                return searched;
-            };
-            self.friction.go_with((&course.displacement, &moved));
-            let moved_mm = farthest_mm * moved.stretch();
-            (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
+            let farthest_mm = step_mm.iter().map(Vec3::norm).fold(0.0, f64::max);
             // What relaxes shrinks ε itself, from one solution to the next.
-            if widens && back.is_some() && searched.slides == 0 && stick_mm.is_finite() {
-                self.friction.stick_at(step_mm.iter().map(Vec3::norm).fold(stick_mm, f64::max));
+            let is_wider = widens && back.is_some() && searched.slides == 0 && stick_mm.is_finite();
+            if is_wider {
+                next_stick_mm = farthest_mm.max(stick_mm);
                 widens = false;
-                line = None;
             }
-            let there = environment.displaced(Some(&course.displacement));
-            let bounds = |effort: Effort, taken: (usize, usize)| Bounds {
-                effort,
-                most: match effort {
-                    Effort::Flight => limits.iterations.saturating_sub(taken.0),
-                    _ => limits.iterations.saturating_sub(taken.0).min(tuning.steps.following),
-                },
-                most_solves: limits.solves.saturating_sub(taken.1),
-                resumed: None,
-                moved_mm: Some(moved_mm),
-            };
-            let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
-                state.advance::<C>(elements, &before, &way, 1.0);
-                state.take_tensions::<C>(elements, &before, &way);
-                if contact.is_outside(elements, state) {
-                    state.copy_from(&before);
+            // Where the device was sought last on this step.
+            let (mut part, mut sought) = (1.0, 0.0);
+            let again = loop {
+                let gone = whole * part;
+                let amplitudes_mm: Vec<Vec3> =
+                    was_mm.iter().zip(step_mm).map(|(from, step)| from + step * gone).collect();
+                let Some(moved) = environment.surroundings.displacement(course.to, &amplitudes_mm) else {
+                    return searched;
+                };
+                self.friction.go_with((&course.displacement, &moved));
+                let moved_mm = (whole * (part - sought)).abs() * farthest_mm * moved.stretch();
+                (course.amplitudes_mm, course.displacement) = (amplitudes_mm, moved);
+                if next_stick_mm != stick_mm {
+                    self.friction.stick_at(next_stick_mm + (stick_mm - next_stick_mm) * (1.0 - part));
                 }
-                contact.rooms(elements, state, &mut guess.room_mm);
-                newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
-                Ok::<_, Infallible>(())
+                let way: Vec<f64> = way.iter().map(|value| value * gone).collect();
+                let there = environment.displaced(Some(&course.displacement));
+                let bounds = |effort: Effort, taken: (usize, usize)| Bounds {
+                    effort,
+                    most: match effort {
+                        Effort::Flight => limits.iterations.saturating_sub(taken.0),
+                        _ => limits.iterations.saturating_sub(taken.0).min(tuning.steps.following),
+                    },
+                    most_solves: limits.solves.saturating_sub(taken.1),
+                    resumed: None,
+                    moved_mm: Some(moved_mm),
+                };
+                let begin = |Beginning { newton, guess, contact, state, .. }: Beginning<'_, '_, C>| {
+                    state.advance::<C>(elements, &before, &way, 1.0);
+                    state.take_tensions::<C>(elements, &before, &way);
+                    if contact.is_outside(elements, state) {
+                        state.copy_from(&before);
+                    }
+                    contact.rooms(elements, state, &mut guess.room_mm);
+                    newton.neighbourhood.begin(state, &guess.room_mm, &tuning.newton);
+                    Ok::<_, Infallible>(())
+                };
+                let judged =
+                    Judged { course: Some((course, most_mm)), before: 0, may_snap: may_snap || is_flight };
+                let mut search = |effort: Effort, taken: (usize, usize)| {
+                    let bounds = bounds(effort, taken);
+                    let Ok(found) = self.with_search(
+                        &there,
+                        (mesh, stack, &mut *rod),
+                        bounds,
+                        begin,
+                        |search, lagged| search.searched(lagged, &judged, touches),
+                    );
+                    found
+                };
+                // With friction that follows; a device in flight may snap once more.
+                let again = search(Effort::Near, searched.taken);
+                let is_lost = again.wrong.is_some_and(|wrong| wrong != Lost::UnderWay);
+                if is_lost && is_flight {
+                    let taken = again.taken;
+                    let so_far = (searched.taken.0 + taken.0, searched.taken.1 + taken.1);
+                    let flown = search(Effort::Flight, so_far);
+                    searched.taken = so_far;
+                    break flown;
+                }
+                // One that has gone far is on its way to where it snaps.
+                if !is_lost || part <= LEAST_PART || again.off > 1.0 {
+                    break again;
+                }
+                // The end of a shorter step is nearer.
+                searched.taken = (searched.taken.0 + again.taken.0, searched.taken.1 + again.taken.1);
+                (sought, part) = (part, 0.5 * part);
             };
-            let judged =
-                Judged { course: Some((course, most_mm)), before: 0, may_snap: may_snap || is_flight };
-            let mut search = |effort: Effort, taken: (usize, usize)| {
-                let bounds = bounds(effort, taken);
-                let Ok(found) =
-                    self.with_search(&there, (mesh, stack, &mut *rod), bounds, begin, |search, lagged| {
-                        search.searched(lagged, &judged, touches)
-                    });
-                found
-            };
-            // With friction that follows; a device in flight may snap once more.
-            let again = search(Effort::Near, searched.taken);
-            let is_lost = again.wrong.is_some_and(|wrong| wrong != Lost::UnderWay);
-            let taken = again.taken;
-            searched = if is_flight && is_lost {
-                let so_far = (searched.taken.0 + taken.0, searched.taken.1 + taken.1);
-                let flown = search(Effort::Flight, so_far);
-                Searched { taken: so_far, ..searched }.then(flown)
-            } else {
-                searched.then(again)
-            };
+            line = line.filter(|_| !is_wider);
+            if let Some(line) = &mut line {
+                line.gone -= whole * (1.0 - part);
+            }
+            searched = searched.then(again);
         }
         let wrong = Some(Lost::Unsolved(StopReason::Unsettled, searched.found.residual));
         Searched { wrong, ..searched }

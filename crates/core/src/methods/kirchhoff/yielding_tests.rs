@@ -167,7 +167,7 @@ fn steps_of_any_size_end_at_the_same_place_and_states_go_on_to_the_bit() {
 }
 
 #[test]
-fn a_vessel_that_hardly_yields_is_one_whose_wall_alone_does() {
+fn a_very_stiff_course_gives_the_result_without_yielding() {
     let tree = winding((2.0, 120.0), 120.0, 1.5);
     let tip = |spec: Option<&YieldingSpec>| {
         let mut simulation = wire(&tree, spec, 50.0, wall(1.0, 0.0));

@@ -69,12 +69,13 @@ const COVER: f64 = 0.433;
 pub(super) struct Wanted {
     pub(super) deviation_mm: f64,
     pub(super) most_triangles: usize,
+    pub(super) least_radius_mm: f64,
 }
 
 /// Sets radius, limit and target length of all vertices. `curvature` is that of the surface so far, 1/mm, or empty at
 /// first. Returns whether target lengths had to be raised to limit the number of triangles.
 pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64], wanted: Wanted) -> bool {
-    let septum = cast(corners, reference, wanted.deviation_mm);
+    let septum = cast(corners, reference, wanted);
     let live: Vec<u32> = corners.live_vertices().collect();
     for &v in &live {
         let vertex = &mut corners.vertices[v as usize];
@@ -126,7 +127,7 @@ fn expected_triangles(corners: &Corners) -> f64 {
 }
 
 /// Sets all radii; returns the thickness of the septum behind each vertex, mm, infinite if none is near.
-fn cast(corners: &mut Corners, reference: &Reference, deviation_mm: f64) -> Vec<f64> {
+fn cast(corners: &mut Corners, reference: &Reference, wanted: Wanted) -> Vec<f64> {
     let count = corners.vertices.len();
     let live: Vec<u32> = corners.live_vertices().collect();
     let mut radius = vec![f64::NAN; count];
@@ -144,7 +145,9 @@ fn cast(corners: &mut Corners, reference: &Reference, deviation_mm: f64) -> Vec<
         if let Some(chord) = reference.cast(&start, &-vertex.normal, 1.0, skip_mm, size_mm) {
             radius[v as usize] = 0.5 * chord;
         }
-        if let Some(thick) = reference.cast(&start, &vertex.normal, -1.0, skip_mm, SEPTUM * deviation_mm) {
+        if let Some(thick) =
+            reference.cast(&start, &vertex.normal, -1.0, skip_mm, SEPTUM * wanted.deviation_mm)
+        {
             septum[v as usize] = thick;
         }
     }
@@ -155,7 +158,8 @@ fn cast(corners: &mut Corners, reference: &Reference, deviation_mm: f64) -> Vec<
     let mut sorted: Vec<f64> = live.iter().map(|&v| radius[v as usize]).filter(|r| r.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.5 * size_mm);
-    let least = (LEAST_RADIUS * median).max(1e-6 * size_mm).max(f64::MIN_POSITIVE);
+    let least =
+        (LEAST_RADIUS * median).max(wanted.least_radius_mm).max(1e-6 * size_mm).max(f64::MIN_POSITIVE);
     for &v in &live {
         let r = radius[v as usize];
         corners.vertices[v as usize].radius_mm = if r.is_finite() { r.max(least) } else { median.max(least) };

@@ -153,7 +153,7 @@ fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
 }
 
 #[test]
-fn many_branches_from_one_point_are_reported_apart_or_end_soon_with_the_grid_that_was_tried() {
+fn many_branches_from_one_point_are_meshed_or_refused_with_the_grid_that_was_tried() {
     let star = |count: u32, out_mm: f64| {
         let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
         rows.extend((0..count).map(|k| {

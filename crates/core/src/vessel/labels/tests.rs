@@ -217,7 +217,7 @@ fn map_of(map: &LabelMap, label: u16) -> LabelMap {
 }
 
 #[test]
-fn two_labels_are_one_vessel_and_parts_are_told() {
+fn two_labels_are_one_vessel_and_parts_are_reported() {
     let tube = |x: Vec3| (x.xy() - nalgebra::Vector2::new(10.3, 10.4)).norm() < 4.0;
     let mut map = map([21, 21, 41], [1.0; 3], |x| tube(x) && (x.z - 30.0).abs() > 2.0);
     let upper = |index: usize| index / (21 * 21) >= 15;
@@ -236,7 +236,7 @@ fn two_labels_are_one_vessel_and_parts_are_told() {
 }
 
 #[test]
-fn hollows_are_filled_and_told() {
+fn hollows_of_labels_are_filled_and_reported() {
     let centre = Vec3::repeat(10.2);
     let hollow = map([21; 3], [1.0; 3], |x| (3.0..8.0).contains(&(x - centre).norm()));
     let solid = map([21; 3], [1.0; 3], |x| (x - centre).norm() < 8.0);

@@ -16,7 +16,7 @@ use crate::vessel::{SurfaceMesh, WallQuery};
 
 /// Least thickness of a wall with two sides, mm, and longest edge of its mesh: a mesh that is made even for contact holds
 /// no thinner one, and devices would pass through.
-const THICK_MM: f64 = 0.5;
+pub(super) const THICK_MM: f64 = 0.5;
 const EDGE_MM: f64 = 0.6;
 /// Volume over area to the power of 3/2 (a ball: 0.094) below which a body is flat.
 const PLATE: f64 = 0.03;
@@ -51,6 +51,13 @@ impl LumenOf {
     /// Distance of a position in it from its wall, mm; 0 outside.
     pub(super) fn depth_mm(&self, x: &Vec3) -> f64 {
         self.query.nearest(x, f64::MAX).filter(|near| !near.rim).map_or(0.0, |near| near.distance_mm.max(0.0))
+    }
+
+    /// The greatest distance of a triangle of a piece, by its middle, from the wall around this lumen, mm.
+    pub(super) fn deepest_mm(&self, mesh: &SurfaceMesh, piece_of: &[u32], piece: usize) -> f64 {
+        let own = (0..piece_of.len()).filter(|t| piece_of[*t] as usize == piece);
+        let middle = |t: usize| mesh.corners(t).iter().sum::<Vec3>() / 3.0;
+        own.map(|t| self.depth_mm(&middle(t))).fold(0.0, f64::max)
     }
 
     /// How much of each of these pieces is in it, by some of their triangles.

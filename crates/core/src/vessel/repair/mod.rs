@@ -141,7 +141,7 @@ pub(super) fn cure(
         overlaps = Overlaps::find(mesh, edges.of(&mesh.triangles), &found);
     }
     if let Some(overlaps) = overlaps {
-        report.parts_united = overlaps.unite(mesh, noted)?;
+        (report.parts_united, report.bodies_in_wall) = overlaps.unite(mesh, noted)?;
         sliver::remove_degenerate(mesh, tolerance_mm);
         edges.changed();
         drop_unreferenced(mesh);
@@ -156,7 +156,11 @@ pub(super) fn cure(
     if cured.added > 0 {
         sliver::remove_degenerate(mesh, tolerance_mm);
     }
-    let made = report.triangles_added + dropped.bodies + dropped.sheets + report.parts_united;
+    let made = report.triangles_added
+        + dropped.bodies
+        + dropped.sheets
+        + report.parts_united
+        + report.bodies_in_wall;
     let pruned = if made > 0 {
         // Rare: two fillings that share a chord, a flip that met another, a part that touches one along an edge.
         sheets::prune(mesh, noted)

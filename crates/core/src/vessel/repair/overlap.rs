@@ -25,6 +25,8 @@ const DEEP: f64 = 0.25;
 const BEGINS: f64 = 0.5;
 /// Part of a cap that must be left for an opening.
 const OPEN: f64 = 0.5;
+/// Part of the volume of a closed piece that must be in a lumen for a body in the wall.
+const MOSTLY: f64 = 0.5;
 /// Number of pieces above which no rims are compared: a vessel in parts has fewer.
 const MOST_PIECES: usize = 64;
 
@@ -45,6 +47,14 @@ struct Piece {
     loops: usize,
     /// Whether it is closed, or ends as vessels end: a patch with a border is no part of a vessel.
     is_part: bool,
+}
+
+/// Pieces that were made one surface.
+struct United {
+    /// Without the caps of its openings.
+    surface: Closed,
+    /// Which of the pieces were taken off.
+    bodies: Vec<u32>,
 }
 
 impl Piece {
@@ -148,16 +158,16 @@ impl Overlaps {
         found.pairs.iter().copied().filter(|[a, b]| piece(*a) == piece(*b)).collect()
     }
 
-    /// Unites what overlaps, notes it, and returns the number of parts that were put to others.
+    /// Unites what overlaps, takes bodies in the wall off, notes both, and returns their numbers.
     ///
     /// # Errors
     /// [`Error::Mesh`] if parts cannot be united.
-    pub(super) fn unite(&self, mesh: &mut SurfaceMesh, noted: &mut Vec<Repair>) -> Result<usize> {
+    pub(super) fn unite(&self, mesh: &mut SurfaceMesh, noted: &mut Vec<Repair>) -> Result<(usize, usize)> {
         let mut sets = DisjointSets::new(self.pieces.len());
         self.pairs.iter().for_each(|(a, b)| sets.join(*a, *b));
         let (group_of, groups) = sets.number();
-        let mut parts = 0;
-        let mut gone = vec![false; self.pieces.len()];
+        let mut done_with: Vec<Option<RepairKind>> = vec![None; self.pieces.len()];
+        let mut is_gone = vec![false; self.pieces.len()];
         let mut added = Vec::new();
         for group in 0..groups as u32 {
             let members: Vec<u32> =
@@ -165,51 +175,63 @@ impl Overlaps {
             if members.len() < 2 {
                 continue;
             }
-            let united = self.united(mesh, &members).ok_or_else(|| self.refused(mesh, &members))?;
-            added.extend(united);
-            members.iter().for_each(|p| gone[*p as usize] = true);
-            parts += members.len() - 1;
+            let United { surface, bodies } =
+                self.united(mesh, &members).ok_or_else(|| self.refused(mesh, &members))?;
+            added.push(surface);
             // All but the largest were put to it.
             let main = members.iter().copied().max_by(|a, b| {
                 let area = |p: u32| self.pieces[p as usize].area_mm2;
                 area(*a).total_cmp(&area(*b)).then(b.cmp(a))
             });
-            let put = |t: usize| Some(self.piece_of[t]).filter(|p| members.contains(p) && Some(*p) != main);
-            noted.extend(of_groups(RepairKind::PartUnited, mesh, put));
+            for p in members {
+                let is_body = bodies.contains(&p);
+                let kind = if is_body { RepairKind::BodyInWall } else { RepairKind::PartUnited };
+                done_with[p as usize] = Some(kind).filter(|_| is_body || Some(p) != main);
+                is_gone[p as usize] = true;
+            }
         }
-        retain_numbered(&mut mesh.triangles, |t, _| !gone[self.piece_of[t] as usize]);
+        let number = |kind: RepairKind| {
+            let those = |t: usize| Some(self.piece_of[t]).filter(|p| done_with[*p as usize] == Some(kind));
+            of_groups(kind, mesh, those)
+        };
+        let (united, bodies) = (number(RepairKind::PartUnited), number(RepairKind::BodyInWall));
+        let counts = (united.len(), bodies.len());
+        noted.extend(united.into_iter().chain(bodies));
+        retain_numbered(&mut mesh.triangles, |t, _| !is_gone[self.piece_of[t] as usize]);
         for Closed { vertices_mm, triangles } in added {
             let first = mesh.vertices_mm.len() as u32;
             mesh.vertices_mm.extend(vertices_mm);
             mesh.triangles.extend(triangles.iter().map(|(triangle, _)| triangle.map(|v| v + first)));
         }
-        Ok(parts)
+        Ok(counts)
     }
 
-    /// The surface of some pieces united, without the caps of its openings; `None` if that fails.
-    fn united(&self, mesh: &SurfaceMesh, members: &[u32]) -> Option<Vec<Closed>> {
-        let is_cut = |p: &&u32| self.is_in_wall(mesh, **p, members);
-        let (bodies, vessels): (Vec<u32>, Vec<u32>) = members.iter().partition(|p| is_cut(p));
-        let mut vessels = vessels.iter().map(|p| Solid::new(&self.closed(mesh, *p, false)));
-        let first = vessels.next()??;
-        let whole = vessels.try_fold(first, |whole, next| whole.with(&next?))?;
-        let mut bodies = bodies.iter().map(|p| {
-            let turned = self.pieces[*p as usize].is_body();
-            Solid::new(&self.closed(mesh, *p, turned))
+    /// Some pieces as one surface; `None` if that fails.
+    ///
+    /// Vessels that end are united first, then closed pieces, the largest first: one of which most lies in what is there is
+    /// a body that stands in the wall, and is taken off at the end; any other is a part of the lumen, such as a sac.
+    fn united(&self, mesh: &SurfaceMesh, members: &[u32]) -> Option<United> {
+        let mut order = members.to_vec();
+        let volume_mm3 = |p: &u32| self.pieces[*p as usize].volume_mm3.abs();
+        let is_closed = |p: &u32| self.pieces[*p as usize].loops == 0;
+        order.sort_by(|a, b| {
+            is_closed(a).cmp(&is_closed(b)).then(volume_mm3(b).total_cmp(&volume_mm3(a))).then(a.cmp(b))
         });
-        let whole = bodies.try_fold(whole, |whole, next| whole.without(&next?))?;
-        Some(vec![self.opened(mesh, whole.triangles())])
-    }
-
-    /// Whether a closed piece stands in the wall of others: most of it is in their lumen.
-    fn is_in_wall(&self, mesh: &SurfaceMesh, piece: u32, members: &[u32]) -> bool {
-        let own = &self.pieces[piece as usize];
-        if own.is_body() {
-            return true;
+        let solid = |p: u32| Solid::new(&self.closed(mesh, p, self.pieces[p as usize].is_body()));
+        let mut whole = solid(*order.first()?)?;
+        let mut bodies = Vec::new();
+        for p in order.drain(1..) {
+            let next = solid(p)?;
+            let stands_in_wall = || whole.common_mm3(&next) >= MOSTLY * next.volume_mm3();
+            if is_closed(&p) && (self.pieces[p as usize].is_body() || stands_in_wall()) {
+                bodies.push((p, next));
+            } else {
+                whole = whole.with(&next)?;
+            }
         }
-        let others = |t: usize| self.piece_of[t] != piece && members.contains(&self.piece_of[t]);
-        let share = |lumen: LumenOf| lumen.shares_inside(mesh, &self.piece_of, &[piece as usize])[0];
-        own.loops == 0 && LumenOf::new(mesh, others).map_or(0.0, share) >= 0.5
+        let whole = bodies.iter().try_fold(whole, |whole, (_, body)| whole.without(body))?;
+        let surface = self.opened(mesh, whole.triangles());
+        Some(United { surface, bodies: bodies.into_iter().map(|(p, _)| p).collect() })
     }
 
     /// A piece closed by caps. Its triangles have their numbers in the mesh, those of caps the numbers beyond, by

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use super::shapes::{add, ball, tube};
+use super::shapes::{add, ball, disc, tube, turned_over};
 use crate::Vec3;
 use crate::vessel::{
     ExtractedCentreline, RepairKind, RepairMode, RepairOptions, Sac, SurfaceMesh, Wall, check,
@@ -104,7 +104,7 @@ fn a_body_in_the_wall_is_taken_off() {
         let wall = Wall::from_surface(&trunk_with(std::slice::from_ref(&body))).unwrap();
         let told = wall.report().notes();
         let is_within = off_mm + radius_mm < 4.9;
-        assert_eq!(wall.report().parts_united, usize::from(!is_within), "{told:?}");
+        assert_eq!(wall.report().bodies_in_wall, usize::from(!is_within), "{told:?}");
         assert_eq!(wall.report().pieces_dropped, 0, "{told:?}");
         assert!(
             wall.volume_mm3() < empty && wall.volume_mm3() > empty - body.signed_volume_mm3() - 1e-9,
@@ -120,4 +120,39 @@ fn vessels_that_graze_each_other_stay_two() {
     let wall = Wall::from_surface(&mesh).unwrap();
     assert_eq!((wall.report().parts_united, wall.report().components), (0, 2), "{:?}", wall.report().notes());
     assert!(!check(&mesh).unwrap().is_sound());
+}
+
+/// A plug or a membrane is drawn somewhat wider than its vessel.
+#[test]
+fn what_fills_a_vessel_and_sticks_out_through_its_wall_closes_it() {
+    let middle = Vec3::z() * 40.0;
+    let plug = |radius_mm: f64, axis: Vec3| {
+        let mut plug = tube(middle - axis * 8.0, middle + axis * 8.0, radius_mm, (24, 8));
+        for end in Wall::welded(&plug).unwrap().openings() {
+            end.close(&mut plug);
+        }
+        plug
+    };
+    let tilted = Vec3::new(0.3, 0.1, 1.0).normalize();
+    for (content, counts) in [
+        (plug(5.3, Vec3::z()), (0, 1)),
+        (plug(6.0, Vec3::z()), (0, 1)),
+        (turned_over(plug(5.6, tilted)), (0, 1)),
+        (disc(middle, Vec3::z(), 5.3, (0.0, 24)), (1, 1)),
+        (disc(middle, tilted, 6.0, (0.0, 24)), (1, 1)),
+    ] {
+        let wall = Wall::from_surface(&trunk_with(&[content])).unwrap();
+        let report = wall.report();
+        assert_eq!((report.sheets_in_lumen, report.bodies_in_wall), counts, "{:?}", report.notes());
+        assert_eq!((report.parts_united, report.pieces_dropped), (0, 0), "{:?}", report.notes());
+        assert!(!wall.contains(&middle).unwrap());
+        for side in [-1.0, 1.0] {
+            assert!(wall.contains(&(middle + Vec3::z() * side * 20.0)).unwrap());
+        }
+        assert_eq!((wall.openings().len(), report.components), (2, 2), "{:?}", report.notes());
+    }
+    // A patch on the wall is none of these.
+    let patch = disc(Vec3::new(4.9, 0.0, 40.0), Vec3::x(), 0.8, (0.0, 12));
+    let report = Wall::from_surface(&trunk_with(&[patch])).unwrap().report().clone();
+    assert_eq!((report.bodies_in_wall, report.sheets_in_lumen), (0, 0), "{:?}", report.notes());
 }

@@ -27,6 +27,8 @@ const SKIN: f64 = 0.15;
 /// Number of triangles of an inner piece tested for being inside, and how many must be.
 const ASKED: usize = 16;
 const INSIDE: f64 = 0.8;
+/// The same for sheets, of which the rest may stick out through the wall.
+const HALF: f64 = 0.5;
 
 /// Distance from the middle of an opening, in radii of it, within which a skin of its wall ends.
 const AT_OPENING: f64 = 1.2;
@@ -72,6 +74,12 @@ impl Piece {
     /// Whether its bounds meet those of another one.
     fn meets(&self, other: &Self) -> bool {
         (0..3).all(|k| self.bounds[0][k] <= other.bounds[1][k] && other.bounds[0][k] <= self.bounds[1][k])
+    }
+
+    /// Whether it may lie in the lumen of another one, by its bounds. A closed piece may stand in the wall, and a sheet may
+    /// stick out through it.
+    fn may_be_content_of(&self, vessel: &Self) -> bool {
+        if self.loops == 0 || self.sheet { self.meets(vessel) } else { self.may_be_in(vessel) }
     }
 
     /// Whether its bounds are within those of another one.
@@ -194,7 +202,7 @@ fn inner(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece], small: &[us
         let p = order[rank];
         let lies_in = |outer: &usize| {
             let (a, b) = (&pieces[p], &pieces[*outer]);
-            a.may_be_in(b) && is_inside(mesh, piece_of, p, *outer, a.triangles)
+            a.may_be_content_of(b) && is_inside(mesh, piece_of, p, *outer, a.triangles)
         };
         let vessels = order[..rank].iter().filter(|outer| inner[**outer].is_none());
         if vessels.into_iter().any(lies_in) {
@@ -205,16 +213,11 @@ fn inner(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece], small: &[us
     let stays = |p: usize| !pieces[p].gone && inner[p].is_none();
     let largest_mm2 = pieces.iter().map(|piece| piece.area_mm2).fold(0.0, f64::max);
     let vessels: Vec<usize> = (0..pieces.len()).filter(|p| stays(*p)).collect();
-    // A closed piece may stand in the wall.
-    let may_be = |p: usize, q: usize| match pieces[p].loops {
-        0 => pieces[p].meets(&pieces[q]),
-        _ => pieces[p].may_be_in(&pieces[q]),
-    };
     let near: Vec<usize> = small
         .iter()
         .copied()
         .filter(|p| pieces[*p].gone && !pieces[*p].is_debris(largest_mm2))
-        .filter(|p| vessels.iter().any(|q| may_be(*p, *q)))
+        .filter(|p| vessels.iter().any(|q| pieces[*p].may_be_content_of(&pieces[*q])))
         .collect();
     if near.is_empty() {
         return inner;
@@ -222,7 +225,12 @@ fn inner(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece], small: &[us
     let Some(lumen) = contents::LumenOf::new(mesh, |t| stays(piece_of[t] as usize)) else { return inner };
     let share = lumen.shares_inside(mesh, piece_of, &near);
     for (p, share) in near.into_iter().zip(share) {
-        if share >= INSIDE {
+        // Half of a sheet may stick out through the wall. One that is nearer to it than it gets thick is a patch on it.
+        let is_inner = match pieces[p].loops {
+            0 => share >= INSIDE,
+            _ => share >= HALF && lumen.deepest_mm(mesh, piece_of, p) > contents::THICK_MM / 2.0,
+        };
+        if is_inner {
             inner[p] = Some(kind_of(&pieces[p]));
         }
         // A body that stands in the wall, or a small sac, is united with the vessel later.

@@ -42,6 +42,17 @@ impl Solid {
         Self::usable(self.0.boolean_with_engine(&other.0, OpType::Subtract, BooleanEngine::Exact))
     }
 
+    /// The volume that both enclose, mm³; 0 if it could not be computed.
+    pub(super) fn common_mm3(&self, other: &Self) -> f64 {
+        let common = self.0.boolean_with_engine(&other.0, OpType::Intersect, BooleanEngine::Exact);
+        Self::usable(common).map_or(0.0, |common| common.volume_mm3())
+    }
+
+    /// The volume that it encloses, mm³.
+    pub(super) fn volume_mm3(&self) -> f64 {
+        self.0.volume()
+    }
+
     /// Its triangles, with the numbers of those that they are parts of.
     pub(super) fn triangles(&self) -> Closed {
         let mesh = self.0.get_mesh_gl64(-1);

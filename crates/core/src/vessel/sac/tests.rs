@@ -30,7 +30,7 @@ fn a_sac_is_the_ball_that_it_was_made_of_and_its_neck_is_narrow() {
 }
 
 #[test]
-fn the_neck_hardly_depends_on_the_mesh() {
+fn the_sac_neck_does_not_depend_on_the_mesh() {
     let ((coarse, whole_mm3), (fine, _)) =
         (measured("basilar_aneurysm", 0.6), measured("basilar_aneurysm", 0.35));
     assert!((coarse.neck_area_mm2 / fine.neck_area_mm2 - 1.0).abs() < 0.05, "{coarse:?} {fine:?}");

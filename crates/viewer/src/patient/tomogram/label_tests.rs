@@ -216,10 +216,17 @@ fn a_header_that_promises_what_the_file_lacks_takes_no_memory() {
         let message = read(&file, "short.nii.gz").unwrap_err();
         assert!(message.starts_with("short.nii.gz: ") && !message.contains('\n'), "{message}");
     }
+    assert!(read(&[], "empty.nii.gz").unwrap_err().contains("it is empty, or ends within its header"));
     // Cut in the middle of its compressed voxels.
     let whole = parts(&nifti(SIZE, &labels(), Kind::F64, [0.0, 0.0], &plain()), 1);
     let message = read(&whole[..whole.len() - whole.len() / 8], "cut.nii.gz").unwrap_err();
     assert!(message.starts_with("cut.nii.gz: is cut off: it holds fewer voxels"), "{message}");
+    // One that another byte of the checksum makes another file, and one with something behind it.
+    let mut damaged = whole.clone();
+    let checksum = damaged.len() - 8;
+    damaged[checksum] ^= 1;
+    assert!(read(&damaged, "damaged.nii.gz").unwrap_err().contains("does not fit its checksum"));
+    assert_eq!(read(&[whole.clone(), vec![0; 64]].concat(), "padded.nii.gz"), read(&whole, "whole.nii.gz"));
     bytes[42..44].copy_from_slice(&32_000_i16.to_le_bytes());
     let message = read(&bytes, "huge.nii").unwrap_err();
     assert!(message.contains("at most 268435456 are read"), "{message}");

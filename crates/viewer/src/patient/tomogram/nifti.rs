@@ -27,6 +27,9 @@ const SECOND_BYTES: usize = 540;
 const SECOND: &[u8] = b"n+2\0";
 const SECOND_OF_PAIR: &[u8] = b"ni2\0";
 
+/// What the library that decompresses says of bytes that are not those that were compressed.
+const CHECKSUM: &str = "checksum";
+
 /// Reads the Hounsfield units in a file of either format.
 ///
 /// # Errors
@@ -54,6 +57,12 @@ pub(super) struct Stored {
 /// Why the library cannot read a file, in words.
 fn reason(error: &NiftiError) -> String {
     match error {
+        NiftiError::Io(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+            "is no NIfTI volume: it is empty, or ends within its header; copy or download it again".into()
+        }
+        NiftiError::Io(error) if error.to_string().contains(CHECKSUM) => {
+            "is damaged: what it holds does not fit its checksum; copy or download it again".into()
+        }
         NiftiError::Io(error) => format!("is no NIfTI volume: {error}"),
         other => format!("is no NIfTI volume: {other}"),
     }
@@ -160,13 +169,25 @@ fn loaded(voxels: impl Read, header: &NiftiHeader) -> std::result::Result<InMemN
     let voxel = header.data_type()?.size_of() as u64;
     let bytes = header.dim[1..=dims].iter().fold(voxel, |product, n| product.saturating_mul(u64::from(*n)));
     let mut raw = Vec::new();
-    voxels.take(bytes).read_to_end(&mut raw)?;
+    let mut voxels = voxels.take(bytes);
+    voxels.read_to_end(&mut raw)?;
+    // The checksum of what was decompressed is looked at behind its last byte.
+    let end = voxels.into_inner().read(&mut [0]);
+    if let Err(error) = end
+        && error.to_string().contains(CHECKSUM)
+    {
+        return Err(error.into());
+    }
     InMemNiftiVolume::from_raw_data(header, raw)
 }
 
 /// What a file is in place of NIfTI, if its first bytes leave no doubt.
 fn named(path: &Path) -> std::result::Result<(), String> {
     const BEGINNING: u64 = 4096;
+    let header = path.with_extension("hdr");
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("img")) && header.is_file() {
+        return Err(format!("holds the voxels of a pair of files: give its header, {}", header.display()));
+    }
     let mut bytes = Vec::new();
     // Unreadable files are reported by the reader of the first format.
     let read = File::open(path).and_then(|file| file.take(BEGINNING).read_to_end(&mut bytes));
