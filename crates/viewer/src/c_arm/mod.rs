@@ -128,10 +128,8 @@ impl CArm {
             let from_edge = opening[k] - (at[k] - f64::from(self.size_px[k]) / 2.0).abs();
             (from_edge + 0.5).clamp(0.0, 1.0)
         };
-        let corners = match self.corners_px > 0.0 {
-            true => (self.corner_px(at) + 0.5).clamp(0.0, 1.0),
-            false => 1.0,
-        };
+        // Wholly open or closed: what is open in part is not displayed like its surroundings.
+        let corners = if self.corners_px > 0.0 && self.corner_px(at) < 0.0 { 0.0 } else { 1.0 };
         share(0) * share(1) * corners
     }
 

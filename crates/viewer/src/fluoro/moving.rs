@@ -21,8 +21,9 @@ use crate::scene::Setup;
 use crate::spec::Mode;
 use crate::xray::{LANES, exp_lanes, ln_lanes};
 
-/// Numbers of pictures of a breath and of a beat, besides that at rest: three and two millimetres apart as a rule.
-const PICTURES: [usize; 2] = [4, 2];
+/// Numbers of pictures of a breath and of a beat, besides that at rest: two and one millimetre apart as a rule. Half as
+/// many show borders twice.
+const PICTURES: [usize; 2] = [6, 4];
 
 /// The pictures of a body that moves.
 #[derive(Debug)]
