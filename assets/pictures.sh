@@ -18,6 +18,9 @@ endowire=$(realpath "$endowire")
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 
+# A body at rest, also in the middle of a breath.
+rests=(--set view.patient.torso.breath_mm=0 --set view.patient.torso.beat_mm=0)
+
 # Eight poses of each part of the body.
 if [ $# -eq 0 ]; then
   cargo run --release -p endowire-viewer --example poses -- "$to" 192
@@ -26,7 +29,7 @@ fi
 # README.md and chapter 0: the window after what that chapter has hands do.
 sed -n '/^```json file=hand.jsonl$/,/^```$/p' docs/guide/0-first-five-minutes.md | sed '/^```/d' >"$out/hand.jsonl"
 scene=$PWD/assets/scenes/arch_carotid.toml
-(cd "$out" && "$endowire" play "$scene" --headless --inputs hand.jsonl --record played.toml >/dev/null)
+(cd "$out" && "$endowire" play "$scene" --headless "${rests[@]}" --inputs hand.jsonl --record played.toml >/dev/null)
 cp "$out/play.png" "$to"
 
 # Chapter 1: the way of a catheter.
@@ -34,7 +37,7 @@ cp "$out/play.png" "$to"
   --to "right hepatic" --picture "$to"/passable.png >/dev/null
 
 # README.md: the last frames of a run.
-"$endowire" run assets/scenes/aortic_arch.toml --out "$out/arch" --quiet
+"$endowire" run assets/scenes/aortic_arch.toml "${rests[@]}" --out "$out/arch" --quiet
 for view in 3d fluoro; do
   cp "$(ls "$out"/arch/frames/step_*_$view.png | tail -n 1)" "$to"/aortic_arch_$view.png
 done
@@ -43,16 +46,16 @@ done
 draw() { # NAME OF THE FOLDER, OPTIONS
   "$endowire" fluoro assets/scenes/arch_angiography.toml --out "$out/$1" "${@:2}"
 }
-draw live --size 320 --mode fluoro --time -1 --count 8 --hold
+draw live "${rests[@]}" --size 320 --mode fluoro --time -1 --count 8 --hold
 cp "$out/live/frame_000007_fluoro.png" "$to"/arch_fluoro.png
 cp "$out/live/hold.png" "$to"/arch_hold.png
-draw cine --size 320 --mode cine --time 1.6
+draw cine "${rests[@]}" --size 320 --mode cine --time 1.6
 cp "$out/cine/frame_000000_fluoro.png" "$to"/arch_cine.png
 draw dsa --size 320 --mode dsa --time 1.6
 cp "$out/dsa/frame_000000_fluoro.png" "$to"/arch_dsa.png
 draw roadmap --size 320 --mode roadmap
 cp "$out/roadmap/frame_000000_fluoro.png" "$to"/arch_roadmap.png
-draw pair --size 320 --mode cine --time 1.6 --pose "RAO 30" --biplane 90
+draw pair "${rests[@]}" --size 320 --mode cine --time 1.6 --pose "RAO 30" --biplane 90
 cp "$out/pair/frame_000000_fluoro.png" "$to"/arch_pair_a.png
 cp "$out/pair/frame_000000_fluoro_b.png" "$to"/arch_pair_b.png
 draw turn --size 200 --mode dsa --time 1.4 --pose "RAO 60" --turn 120 --count 4

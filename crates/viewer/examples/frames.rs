@@ -110,9 +110,13 @@ fn main() -> Result<()> {
     spec.size_px = [256, 256];
     spec.bits = 16;
     let mut renderer = Renderer::new(&spec, &wall)?;
-    let mut series = Vec::new();
+    let (mut series, mut read, mut mask) = (Vec::new(), Vec::new(), None);
     for frame in 0..45 {
         series.extend(renderer.render_at(&devices, FrameTime { frame, time_s: frame as f64 / 15.0 })?.fluoro);
+        if let Some([taken, frame]) = renderer.unsubtracted() {
+            read.push(frame);
+            mask = mask.or(Some(taken));
+        }
     }
     if let (Some(first), Some(c_arm), Some(exposure)) =
         (series.first(), renderer.c_arm(), renderer.exposure())
@@ -127,10 +131,11 @@ fn main() -> Result<()> {
             exposure,
             pace: Pace::even(15.0),
             mode: Mode::Dsa,
+            mask: mask.as_ref(),
             contrast: true,
             description: "aortic arch",
         };
-        angiogram.write(folder.join("angiogram.dcm"), &series)?;
+        angiogram.write(folder.join("angiogram.dcm"), &read)?;
     }
 
     let spec = ViewSpec { size_px: [640, 640], views: vec![View::ThreeD], bits: 8, ..spec };

@@ -3,6 +3,8 @@
 //!
 //! `cargo run --profile dist -p endowire-viewer --example speed [FOLDER FOR THE SPHERES AS STL]`
 
+mod clock;
+
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use std::time::Instant;
@@ -13,6 +15,8 @@ use endowire_viewer::{
     Backend, CArmSpec, DevicePoint, DeviceView, FrameTime, InjectionSpec, Renderer, TorsoSpec, View,
     ViewSpec, XRaySpec,
 };
+
+use clock::{cpu_ms, mean_ms};
 
 const RADIUS_MM: f64 = 30.0;
 const FRAMES: u32 = 60;
@@ -40,28 +44,6 @@ fn sphere(rings: u32) -> SurfaceMesh {
         }
     }
     mesh
-}
-
-/// CPU time of this process in ms, of all its threads; the clock on the wall where the system does not tell.
-fn cpu_ms(start: Instant) -> f64 {
-    let nanoseconds = |path: std::path::PathBuf| {
-        let text = std::fs::read_to_string(path.join("schedstat")).ok()?;
-        text.split(' ').next()?.parse::<f64>().ok()
-    };
-    // The file of the process tells of its first thread alone.
-    let threads = std::fs::read_dir("/proc/self/task").ok();
-    let reported =
-        threads.map(|all| all.flatten().filter_map(|thread| nanoseconds(thread.path())).sum::<f64>());
-    reported.filter(|ns| *ns > 0.0).map_or(start.elapsed().as_secs_f64() * 1e3, |ns| ns / 1e6)
-}
-
-/// Mean CPU time of a job, ms: the system counts in steps of milliseconds, so many runs are counted together.
-fn mean_ms(mut job: impl FnMut(u32) -> Result<()>) -> Result<f64> {
-    job(0)?;
-    let start = Instant::now();
-    let before = cpu_ms(start);
-    (1..=FRAMES).try_for_each(&mut job)?;
-    Ok((cpu_ms(start) - before) / f64::from(FRAMES))
 }
 
 fn spec(side: u32) -> ViewSpec {
@@ -139,12 +121,13 @@ fn main() -> Result<()> {
                 })
                 .sum();
             // Another place of the C-arm each time: what stays is computed once.
-            let ms = mean_ms(|k| {
+            let ms = mean_ms(FRAMES, |k| {
                 let place = CArmSpec { primary_deg: f64::from(k), ..spec(side).c_arm };
                 renderer.turn_c_arm(&place)?;
                 renderer.path_lengths(&[]).map(drop)
             })?;
-            let whole_ms = mean_ms(|_| Renderer::new(&spec(side), &mesh)?.path_lengths(&[]).map(drop))?;
+            let whole_ms =
+                mean_ms(FRAMES, |_| Renderer::new(&spec(side), &mesh)?.path_lengths(&[]).map(drop))?;
             println!(
                 "sphere, {} triangles, {side}²: {ms:.2} ms CPU a frame, {whole_ms:.2} with its set-up, mean error {:.1e} mm",
                 mesh.triangles.len(),
@@ -172,7 +155,7 @@ fn main() -> Result<()> {
         let before = cpu_ms(start);
         let mut renderer = Renderer::new(&moving, &sphere(71))?;
         let pose_ms = cpu_ms(start) - before;
-        let ms = mean_ms(|k| {
+        let ms = mean_ms(FRAMES, |k| {
             let moment = FrameTime { frame: u64::from(k), time_s: 0.0 };
             renderer.render_at(&[wire(k)], moment).map(drop)
         })?;

@@ -71,7 +71,7 @@ pub use renderer::{Frames, Renderer};
 pub use shaft::SheathMouth;
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, ExposureSpec, FlowSpec, InjectionSpec, Mode,
-    PatientSpec, Pose, TorsoSpec, View, ViewSpec, XRaySpec,
+    PatientSpec, Pose, Shutter, TorsoSpec, View, ViewSpec, XRaySpec,
 };
 pub use three_d::{ContactView, largest_force_n};
 pub use xray::{Exposure, PathLengths, Pulse};

@@ -190,7 +190,8 @@ impl Renderer {
             }
             let fluoro = match &setup.c_arm {
                 Some(c_arm) => {
-                    let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
+                    let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
+                    scope.breathe(setup, Some(moment.time_s), paths)?;
                     let mut image = sequence.next(scope, &pulse, moment)?;
                     if setup.spec.c_arm.markers {
                         draw_markers(&mut image, c_arm.right_and_up());
@@ -351,6 +352,13 @@ impl Renderer {
     pub fn last_image_hold(&self) -> Option<Image> {
         let (scope, sequence) = self.fluoro.as_ref()?;
         sequence.hold(scope)
+    }
+
+    /// Mask and last frame of a subtraction as the detector read them, for [`crate::Angiogram::mask`]: 16 bits,
+    /// proportional to the logarithm of the signal. `None` in other modes, and before the first frame.
+    pub fn unsubtracted(&self) -> Option<[Image; 2]> {
+        let (scope, sequence) = self.fluoro.as_ref()?;
+        sequence.unsubtracted(scope)
     }
 
     /// Labels of a fluoroscopic frame of these devices, with contacts at the given positions.

@@ -10,6 +10,7 @@ use crate::contrast::Flow;
 use crate::cpu::{check_closed, check_drawable};
 use crate::device::{DeviceView, RefinedDevice};
 use crate::patient::Patient;
+use crate::shaft::Outside;
 use crate::spec::{View, ViewSpec};
 use crate::tails::Filled;
 use crate::three_d::Camera;
@@ -92,7 +93,16 @@ impl Setup {
     /// # Errors
     /// As [`RefinedDevice::all`].
     pub(crate) fn in_beam(&self, devices: &[DeviceView]) -> Result<Vec<RefinedDevice>> {
-        RefinedDevice::all_with_shafts(devices, self.spec.patient.is_given())
+        let middle =
+            |wall: &SurfaceMesh| wall.bounds_mm().map_or(0.0, |(low, high)| f64::midpoint(low.x, high.x));
+        let outside = match (&self.c_arm, self.spec.patient.is_given()) {
+            (Some(c_arm), false) => Outside::Air { beam: c_arm.beam() },
+            _ => {
+                let spine_mm = self.spec.patient.torso.as_ref().and_then(|torso| torso.spine_mm);
+                Outside::Patient { middle_mm: spine_mm.map_or_else(|| middle(&self.wall), |[x, _]| x) }
+            }
+        };
+        RefinedDevice::all_with_shafts(devices, outside)
     }
 
     /// A set-up with a closed wall, filled with blood to its ends.

@@ -103,6 +103,9 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
         let turn = other["primary_deg"].as_f64().unwrap() - image["primary_deg"].as_f64().unwrap();
         assert!((turn.abs() - 90.0).abs() < 1e-9 && other["step"] == image["step"]);
         assert!(other["camera_matrix"] != image["camera_matrix"]);
+        assert_eq!(other["pose"], image["pose"]);
+        // One vessel alone is for training.
+        assert_eq!(image["split"], "train");
     }
     let annotations = document["annotations"].as_array().unwrap();
     let categories = document["categories"].as_array().unwrap();
@@ -121,6 +124,12 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
         assert_eq!(category.get("keypoints"), tip.as_ref());
         assert_eq!(category.get("skeleton").is_some(), tip.is_some());
     }
+    let poses: BTreeSet<u64> = images.iter().map(|image| image["pose"].as_u64().unwrap()).collect();
+    assert!(poses.len() > 1 && images.len() % poses.len() == 0, "{poses:?}");
+    // What is large and dense is seen, and no label stands out by more than pictures have of grey levels.
+    let seen: Vec<f64> = annotations.iter().filter_map(|row| row["visible"].as_f64()).collect();
+    assert!(seen.len() * 10 > annotations.len() * 9 && seen.iter().all(|cnr| (0.0..256.0).contains(cnr)));
+    assert!(seen.iter().any(|cnr| *cnr > 1.0) && seen.iter().any(|cnr| *cnr < 1.0), "{seen:?}");
     for row in annotations {
         let counts: Vec<u64> =
             row["segmentation"]["counts"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();

@@ -20,8 +20,10 @@ const FINE: (&str, &str) = ("bits", "16");
 const NEAR: (&str, &str) = ("c_arm.field_mm", "50.0");
 const MIDDLE: (&str, &str) = ("c_arm.isocentre_mm", "[0.0, 0.0, 15.0]");
 
+const CHEST: (&str, &str) = ("c_arm.field_mm", "500.0");
+
 /// All keys. Pictures of all backends are the same; one that there is not is refused, and so is a file that is missing.
-static KEYS: [Key; 80] = [
+static KEYS: [Key; 85] = [
     ("size_px", &[], "[40, 30]"),
     ("views", &[], "[\"fluoro\"]"),
     ("every", &[], "3"),
@@ -39,6 +41,7 @@ static KEYS: [Key; 80] = [
     ("c_arm.magnification", &[], "1.5"),
     ("c_arm.rotation_deg", &[], "25.0"),
     ("c_arm.collimation_mm", &[("c_arm.field_mm", "150.0")], "[80.0, 70.0]"),
+    ("c_arm.shutter", &[], "\"octagon\""),
     ("c_arm.markers", &[], "true"),
     ("c_arm.isocentre_mm", &[], "[5.0, 10.0, 60.0]"),
     ("xray.mode", &[NOISE], "\"cine\""),
@@ -73,6 +76,10 @@ static KEYS: [Key; 80] = [
     ("patient.torso.ribs", &[BODY], "false"),
     ("patient.torso.lungs", &[BODY], "false"),
     ("patient.torso.electrodes", &[BODY, FINE, ("c_arm.field_mm", "600.0")], "false"),
+    ("patient.torso.table_mm", &[BODY, FINE, ("c_arm.field_mm", "600.0")], "250.0"),
+    ("patient.torso.breath_mm", &[BODY, FINE, CHEST, ("patient.torso.breath_s", "1.0")], "0.0"),
+    ("patient.torso.breath_s", &[BODY, FINE, CHEST], "1.0"),
+    ("patient.torso.beat_mm", &[BODY, FINE, CHEST, ("flow.heart_rate_per_min", "40.0")], "15.0"),
     ("flow.tree", &[], "\"MISSING.csv\""),
     ("flow.inlet_mm", &[], "[0.0, 0.0, 80.0]"),
     ("flow.inflow_ml_per_s", &[], "5.0"),

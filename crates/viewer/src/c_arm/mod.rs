@@ -49,6 +49,8 @@ pub struct CArm {
     rotation_deg: f64,
     /// Half width and height between the collimator blades, pixels.
     opening_px: Option<[f64; 2]>,
+    /// Side of the corners of the opening that are cut off, pixels.
+    corners_px: f64,
 }
 
 impl CArm {
@@ -112,6 +114,7 @@ impl CArm {
             pixel_mm: self.pixel_mm / factor_f,
             size_px: self.size_px.map(|n| n * factor),
             opening_px,
+            corners_px: self.corners_px * factor_f,
             ..self.clone()
         }
     }
@@ -125,7 +128,16 @@ impl CArm {
             let from_edge = opening[k] - (at[k] - f64::from(self.size_px[k]) / 2.0).abs();
             (from_edge + 0.5).clamp(0.0, 1.0)
         };
-        share(0) * share(1)
+        // Wholly open or closed: what is open in part is not displayed like its surroundings.
+        let corners = if self.corners_px > 0.0 && self.corner_px(at) < 0.0 { 0.0 } else { 1.0 };
+        share(0) * share(1) * corners
+    }
+
+    /// Distance of a pixel coordinate to the blade across its corner, negative behind it.
+    fn corner_px(&self, at: [f64; 2]) -> f64 {
+        let half = self.opening_px.unwrap_or(self.size_px.map(|side| f64::from(side) / 2.0));
+        let off = (0..2).map(|k| (at[k] - f64::from(self.size_px[k]) / 2.0).abs());
+        (half[0] + half[1] - self.corners_px - off.sum::<f64>()) * std::f64::consts::FRAC_1_SQRT_2
     }
 
     /// Whether a pixel coordinate is on the detector and between the blades.
@@ -134,7 +146,7 @@ impl CArm {
             let half = f64::from(self.size_px[k]) / 2.0;
             let open = self.opening_px.map_or(half, |opening| opening[k].min(half));
             (pixel[k] - half).abs() <= open
-        })
+        }) && (self.corners_px == 0.0 || self.corner_px(pixel) >= 0.0)
     }
 
     /// SID in pixels.
@@ -215,6 +227,11 @@ impl CArm {
         self.sod_mm + self.in_beam(point_mm).z
     }
 
+    /// Direction of the central ray.
+    pub(crate) fn beam(&self) -> Vec3 {
+        self.axes[2]
+    }
+
     /// The point that is fixed under all rotations.
     pub fn isocentre_mm(&self) -> Vec3 {
         self.isocentre_mm
@@ -233,6 +250,11 @@ impl CArm {
     /// Width and height between the blades in pixels, if there are any.
     pub fn opening_px(&self) -> Option<[f64; 2]> {
         self.opening_px.map(|half| half.map(|n| 2.0 * n))
+    }
+
+    /// Side of the corners of the opening that are cut off, pixels; 0 for a rectangle.
+    pub fn corners_px(&self) -> f64 {
+        self.corners_px
     }
 
     /// Source to detector.

@@ -4,10 +4,13 @@ use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 
 use super::CArm;
-use crate::spec::{CArmSpec, PITCH_MM};
+use crate::spec::{CArmSpec, PITCH_MM, Shutter};
 
 /// Fraction of the half frame filled by the vessel if the pixel pitch is chosen automatically.
 pub(super) const FILL: f64 = 0.92;
+/// Side of the corners that are cut off a square for a regular octagon, in halves of its side: 2 − √2.
+const OCTAGON: f64 = 2.0 - std::f64::consts::SQRT_2;
+
 impl CArm {
     /// Positions a C-arm; what `spec` leaves open is chosen so that `wall` fills the frame.
     ///
@@ -32,6 +35,7 @@ impl CArm {
             angles_deg,
             rotation_deg: spec.rotation_deg,
             opening_px: None,
+            corners_px: 0.0,
         };
         for vertex in &wall.vertices_mm {
             arm.check_between(vertex)?;
@@ -44,6 +48,12 @@ impl CArm {
         arm.pixel_mm = whole / spec.magnification;
         check_pitch(spec, size_px, arm.pixel_mm)?;
         arm.opening_px = spec.collimation_mm.map(|sides| sides.map(|side| side / 2.0 / arm.pixel_mm));
+        if spec.shutter == Shutter::Octagon {
+            let field = size_px.map(|side| f64::from(side) / 2.0);
+            let half = arm.opening_px.map_or(field, |open| [0, 1].map(|k| open[k].min(field[k])));
+            arm.opening_px = Some(half);
+            arm.corners_px = OCTAGON * half[0].min(half[1]);
+        }
         Ok(arm)
     }
 

@@ -3,7 +3,7 @@ use endowire_core::vessel::SurfaceMesh;
 
 use super::CArm;
 use super::place::FILL;
-use crate::spec::CArmSpec;
+use crate::spec::{CArmSpec, Shutter};
 
 fn arm(primary_deg: f64, secondary_deg: f64) -> CArm {
     let wall = SurfaceMesh {
@@ -119,4 +119,25 @@ fn a_vessel_beyond_the_source_or_the_detector_is_refused() {
     let spec = CArmSpec { isocentre_mm: Some([0.0; 3]), ..CArmSpec::default() };
     let error = CArm::new(&spec, [64, 64], &far).unwrap_err().to_string();
     assert!(error.contains("between source and detector"), "{error}");
+}
+
+#[test]
+fn an_octagon_leaves_its_area_open_and_a_rectangle_all() {
+    let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(40.0)], triangles: vec![] };
+    let open = |shutter: Shutter, collimation_mm: Option<[f64; 2]>| {
+        let spec = CArmSpec { shutter, collimation_mm, pixel_mm: Some(0.5), ..CArmSpec::default() };
+        let arm = CArm::new(&spec, [200, 200], &wall).unwrap();
+        let sum = (0..200 * 200).map(|pixel| arm.openness(pixel)).sum::<f64>();
+        let seen =
+            (0..200 * 200).filter(|i| arm.sees([f64::from(i % 200) + 0.5, f64::from(i / 200) + 0.5])).count();
+        assert!((sum - seen as f64).abs() < 0.005 * sum, "{sum} {seen}");
+        sum
+    };
+    let side = 200.0_f64;
+    // 2 (√2 − 1) of a square.
+    let octagon = 2.0 * (std::f64::consts::SQRT_2 - 1.0);
+    assert!((open(Shutter::Octagon, None) / (side * side * octagon) - 1.0).abs() < 1e-3);
+    let half = open(Shutter::Octagon, Some([50.0, 50.0]));
+    assert!((half / (100.0 * 100.0 * octagon) - 1.0).abs() < 5e-3, "{half}");
+    assert_eq!(open(Shutter::Rectangle, None), side * side);
 }

@@ -23,8 +23,10 @@
 //! with the depths z₀ and z₁ of its ends.
 
 use endowire_core::Vec3;
+use rustc_hash::FxHashMap;
 
-use super::piece::chord;
+use super::band::Band;
+use super::piece::{Row, chord};
 use super::raster::span;
 use crate::c_arm::CArm;
 use crate::device::Piece;
@@ -75,29 +77,49 @@ impl DeviceCells {
         self.maps.iter_mut().for_each(|map| map.1.clear());
     }
 
-    /// Adds the signed lengths inside pieces of a material, in beam coordinates.
-    pub(crate) fn add(&mut self, material: Material, pieces: &[(Piece, f64)]) {
-        let of_material = match self.maps.iter().position(|map| map.0 == material) {
-            Some(known) => known,
-            None => {
-                self.maps.push((material, vec![[0.0; CELLS]; self.pixels.len()]));
-                self.maps.len() - 1
-            }
-        };
-        let Self { view, width, places, pixels, maps } = self;
-        for (piece, sign) in pieces {
-            cast(view, piece, |[x, y], length| {
-                let across = ACROSS as usize;
-                let pixel = y / across * *width + x / across;
+    /// Adds the signed lengths inside the pieces of each material, in beam coordinates.
+    pub(crate) fn add(&mut self, layers: &[(Material, Vec<(Piece, f64)>)]) {
+        let mut lengths = vec![];
+        for Shared { piece, parts } in self.shared(layers) {
+            let Self { view, width, places, pixels, maps } = self;
+            // Not a variable, by which a closure would divide.
+            const ACROSS_PX: usize = ACROSS as usize;
+            cast(view, &piece, &mut lengths, |[x, y], length| {
+                let pixel = y / ACROSS_PX * *width + x / ACROSS_PX;
                 if places[pixel] == 0 {
                     pixels.push(pixel as u32);
                     places[pixel] = pixels.len() as u32;
                     maps.iter_mut().for_each(|map| map.1.push([0.0; CELLS]));
                 }
-                let cell = y % across * across + x % across;
-                maps[of_material].1[places[pixel] as usize - 1][cell] += (sign * length) as f32;
+                let (place, cell) = (places[pixel] as usize - 1, y % ACROSS_PX * ACROSS_PX + x % ACROSS_PX);
+                for (of_material, sign) in &parts {
+                    maps[*of_material].1[place][cell] += (sign * length) as f32;
+                }
             });
         }
+    }
+
+    /// The pieces of all layers, each once: a core and the tube around it have the boundary between them in common.
+    fn shared(&mut self, layers: &[(Material, Vec<(Piece, f64)>)]) -> Vec<Shared> {
+        let mut all: Vec<Shared> = vec![];
+        let mut known: FxHashMap<[u64; 8], usize> = FxHashMap::default();
+        for (material, pieces) in layers {
+            let of_material = match self.maps.iter().position(|map| map.0 == *material) {
+                Some(known) => known,
+                None => {
+                    self.maps.push((*material, vec![[0.0; CELLS]; self.pixels.len()]));
+                    self.maps.len() - 1
+                }
+            };
+            for (piece, sign) in pieces {
+                let index = *known.entry(piece.key()).or_insert(all.len());
+                if index == all.len() {
+                    all.push(Shared { piece: *piece, parts: vec![] });
+                }
+                all[index].parts.push((of_material, *sign));
+            }
+        }
+        all
     }
 
     /// The touched pixels, in the order in which they were touched.
@@ -128,66 +150,21 @@ impl DeviceCells {
     }
 }
 
+/// A piece, and the materials whose lengths it is a part of, with its signs.
+struct Shared {
+    piece: Piece,
+    parts: Vec<(usize, f64)>,
+}
+
 /// The quarter of a pixel that contains a cell, in the order of the 2 × 2 rays.
 pub(crate) fn quarter(cell: usize) -> usize {
     let (across, half) = (ACROSS as usize, ACROSS as usize / 2);
     cell / across / half * 2 + cell % across / half
 }
 
-/// Where a piece is in the image, in lines of cells: rows where it is vertical, otherwise columns.
-struct Band {
-    /// Projected centres of its ends.
-    ends: [[f64; 2]; 2],
-    /// Distance from them beyond which it is not visible; infinite for a piece that reaches behind the source.
-    outer: f64,
-    /// The coordinate along lines, and the one across them.
-    u: usize,
-    v: usize,
-}
-
-/// Distance from the projected axis of a piece beyond which it is not visible, pixels; infinite for a piece that reaches
-/// behind the source.
-pub(super) fn outer_px(view: &CArm, piece: &Piece) -> f64 {
-    let reach = piece.reach();
-    let near = view.sod_mm() + piece.start.z.min(piece.end.z) - reach;
-    // A sphere beside the axis of the beam is projected to an ellipse.
-    if near > 0.0 { 1.05 * reach * view.focal_px() / near } else { f64::INFINITY }
-}
-
-impl Band {
-    fn new(view: &CArm, piece: &Piece) -> Self {
-        let ends = [&piece.start, &piece.end].map(|at| view.pixel_of(at));
-        let outer = outer_px(view, piece);
-        let run = [0, 1].map(|k| (ends[1][k] - ends[0][k]).abs());
-        let (u, v) = if run[1] >= run[0] { (0, 1) } else { (1, 0) };
-        Self { ends, outer, u, v }
-    }
-
-    /// The first and the last position across lines at which it may be visible.
-    fn lines(&self) -> [f64; 2] {
-        let [a, b] = self.ends.map(|end| end[self.v]);
-        [a.min(b) - self.outer, a.max(b) + self.outer]
-    }
-
-    /// The same along the line at a position across them.
-    fn along(&self, across: f64) -> [f64; 2] {
-        let Self { ends, u, v, .. } = *self;
-        let part = ((across - ends[0][v]) / (ends[1][v] - ends[0][v])).clamp(0.0, 1.0);
-        let middle = if part.is_nan() { ends[0][u] } else { ends[0][u] + part * (ends[1][u] - ends[0][u]) };
-        // Lines meet the piece at 45° or more.
-        let reach = 1.5 * self.outer + 1.0;
-        [middle - reach, middle + reach]
-    }
-
-    /// A position from those along and across lines.
-    fn place(&self, along: f64, across: f64) -> [f64; 2] {
-        if self.u == 0 { [along, across] } else { [across, along] }
-    }
-}
-
 /// Calls `visit(cell, length_mm)` for every cell of `view` in which `piece` is visible, possibly with several parts
-/// of its length.
-fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
+/// of its length; `lengths` is room for those of a line.
+fn cast(view: &CArm, piece: &Piece, lengths: &mut Vec<f64>, mut visit: impl FnMut([usize; 2], f64)) {
     let size = view.size_px();
     let band = Band::new(view, piece);
     if let Some(end_on) = EndOn::new(view, piece, &band) {
@@ -195,6 +172,7 @@ fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
     }
     let [low, high] = band.lines();
     let mean_radius = mean_radius(piece);
+    let arch = pulp::Arch::new();
     for line in span(low, high, size[band.v]) {
         let across = line as f64 + 0.5;
         let [first, last] = band.along(across);
@@ -205,18 +183,25 @@ fn cast(view: &CArm, piece: &Piece, mut visit: impl FnMut([usize; 2], f64)) {
         let place = |along: f64| band.place(along, across);
         let first = cells.start as f64;
         let (from, sine) = off_axis(view, piece, place(first));
-        let (to, _) = off_axis(view, piece, place(cells.end as f64));
+        let (to, sine_to) = off_axis(view, piece, place(cells.end as f64));
         let step = (to - from) / cells.len() as f64;
-        let plain = sine < LEAST_SINE || step.abs() < NARROW * mean_radius;
-        for cell in cells {
-            let length = if plain {
-                length(view, piece, place(cell as f64 + 0.5))
-            } else {
-                let at = from + (cell as f64 - first) * step;
+        let is_oblique = sine >= LEAST_SINE;
+        lengths.clear();
+        if is_oblique && step.abs() >= NARROW * mean_radius {
+            lengths.extend((0..cells.len()).map(|k| {
+                let at = from + k as f64 * step;
                 mean_length(mean_radius, [at, at + step], |part| {
-                    length(view, piece, place(cell as f64 + part))
+                    length(view, piece, place(first + k as f64 + part))
                 })
-            };
+            }));
+        } else if is_oblique && sine_to >= LEAST_SINE && piece.slope == 0.0 {
+            lengths.resize(cells.len(), 0.0);
+            let row = Row { view, piece, along: band.u, first: place(first + 0.5) };
+            arch.dispatch(row.into(lengths));
+        } else {
+            lengths.extend(cells.clone().map(|cell| length(view, piece, place(cell as f64 + 0.5))));
+        }
+        for (cell, &length) in cells.zip(lengths.iter()) {
             if length > 0.0 {
                 visit(if band.u == 0 { [cell, line] } else { [line, cell] }, length);
             }
@@ -262,7 +247,7 @@ impl EndOn {
         let [low, high] = band.lines();
         let (share, fewest) = RAYS_END_ON;
         let spacing = share * self.radius;
-        let length = high - low - 2.0 * (band.outer - self.radius);
+        let length = (band.ends[1][band.v] - band.ends[0][band.v]).abs() + 2.0 * self.radius;
         // Numbers of rays across a cell.
         let rays = (1.0 / spacing).ceil();
         let lines = (1.0 / spacing.max(length / fewest)).ceil();

@@ -12,7 +12,7 @@ use std::ops::Range;
 use endowire_core::Vec3;
 
 use crate::c_arm::CArm;
-use crate::cpu::cells::outer_px;
+use crate::cpu::band::outer_px;
 use crate::cpu::devices::pixels_of;
 use crate::cpu::piece::chord;
 use crate::device::Piece;

@@ -1,5 +1,6 @@
 //! Frames without any adapter: the exact fluoroscopic reference and a software rasteriser for the 3D view.
 
+mod band;
 mod cells;
 mod coverage;
 mod devices;

@@ -18,7 +18,7 @@ use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::material::Material;
-use crate::shaft::SheathMouth;
+use crate::shaft::{Outside, SheathMouth};
 pub(crate) use piece::{Piece, pieces};
 
 /// Largest distance of a piece's chord from the curve, in radii.
@@ -128,9 +128,9 @@ impl DeviceView {
 
     /// The refined shaft outside the sheath, from far to near, with its device's `first` point as the last; empty
     /// without a sheath.
-    fn shaft(&self, first: &DevicePoint, in_patient: bool) -> Result<Vec<DevicePoint>> {
+    fn shaft(&self, first: &DevicePoint, outside: Outside) -> Result<Vec<DevicePoint>> {
         let Some(mouth) = &self.sheath else { return Ok(vec![]) };
-        let mut points = mouth.shaft(first.radius_mm, in_patient);
+        let mut points = mouth.shaft(first.radius_mm, outside);
         // While it moves during a pulse, a device may begin a little inside the sheath.
         let within_mm = (mouth.position_mm - first.position_mm).norm();
         while points.last().is_some_and(|p| (p.position_mm - mouth.position_mm).norm() < within_mm + 1.0) {
@@ -261,12 +261,12 @@ impl RefinedDevice {
     ///
     /// # Errors
     /// As [`Self::all`], and for a sheath that is not finite.
-    pub(crate) fn all_with_shafts(devices: &[DeviceView], in_patient: bool) -> Result<Vec<Self>> {
+    pub(crate) fn all_with_shafts(devices: &[DeviceView], around: Outside) -> Result<Vec<Self>> {
         let mut refined = Vec::with_capacity(devices.len());
         for device in devices {
             let mut points = device.refined()?;
             let Some(first) = points.first().copied() else { continue };
-            let shaft = device.shaft(&first, in_patient)?;
+            let shaft = device.shaft(&first, around)?;
             let outside = shaft.len().saturating_sub(1);
             if outside == 0 {
                 refined.push(Self::cut(points, device)?);

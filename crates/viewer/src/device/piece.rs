@@ -35,6 +35,22 @@ impl Piece {
         self.largest * self.mitre
     }
 
+    /// Its largest radius.
+    pub(crate) fn largest_radius(&self) -> f64 {
+        self.largest
+    }
+
+    /// How far its mitres reach beyond the centres of its ends, along its axis.
+    pub(crate) fn beyond_mm(&self) -> f64 {
+        self.largest * (self.mitre * self.mitre - 1.0).max(0.0).sqrt()
+    }
+
+    /// What tells pieces of a centre line from each other: their place and radius.
+    pub(crate) fn key(&self) -> [u64; 8] {
+        let [a, b] = [&self.start, &self.end];
+        [a.x, a.y, a.z, b.x, b.y, b.z, self.radius, self.slope].map(f64::to_bits)
+    }
+
     /// Radius in its middle.
     pub(crate) fn middle_radius(&self) -> f64 {
         if self.slope == 0.0 {

@@ -94,11 +94,11 @@ impl Anatomy {
         self.body[ray] > 0.0
     }
 
-    /// Lengths in tissue, bone, lung and lumen.
+    /// Lengths in tissue, bone, lung, with this much more of it, and lumen.
     #[inline]
-    pub(crate) fn at(&self, ray: usize) -> [f32; 4] {
+    pub(crate) fn at(&self, ray: usize, more_air_mm: f32) -> [f32; 4] {
         let at = |map: &[f32]| if map.is_empty() { 0.0 } else { map[ray] };
-        let [bone, lung, lumen] = [at(&self.bone), at(&self.lung), self.lumen[ray]];
+        let [bone, lung, lumen] = [at(&self.bone), at(&self.lung) + more_air_mm, self.lumen[ray]];
         [(self.body[ray] - bone - lung - lumen).max(0.0), bone, lung, lumen]
     }
 
@@ -125,7 +125,7 @@ impl Anatomy {
             for x in width / 3..(2 * width).div_ceil(3) {
                 let ray = y * width + x;
                 if self.is_body(ray) {
-                    depths.push(self.at(ray).iter().zip(factors).map(|(l, f)| l * f).sum::<f32>());
+                    depths.push(self.at(ray, 0.0).iter().zip(factors).map(|(l, f)| l * f).sum::<f32>());
                 }
             }
         }
@@ -159,17 +159,27 @@ fn filled(setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<(Ve
 /// Lengths in the air of a generated body, at its displacement.
 fn air(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
     let Some(mesh) = setup.air_now() else { return Ok(vec![]) };
+    Ok(finer(air_of(setup, mesh, c_arm, engine)?, c_arm.size_px(), rays))
+}
+
+/// Lengths of the central rays of pixels in the air of a generated body with this surface.
+pub(super) fn air_of(
+    setup: &Setup,
+    mesh: &SurfaceMesh,
+    c_arm: &CArm,
+    engine: &mut dyn PathEngine,
+) -> Result<Vec<f32>> {
     let mut air = cast(mesh, c_arm, engine)?;
     // Vessels of a lung overlap where they divide.
     air.iter_mut().for_each(|length| *length = length.max(0.0));
     if let Patient::Torso(body) = &*setup.patient {
         body.texture.apply(Of::Lung, &mut air, c_arm);
     }
-    Ok(finer(air, c_arm.size_px(), rays))
+    Ok(air)
 }
 
 /// A map with `rays` × `rays` values per pixel, bilinear between pixel centres.
-fn finer(map: Vec<f32>, size_px: [u32; 2], rays: u32) -> Vec<f32> {
+pub(super) fn finer(map: Vec<f32>, size_px: [u32; 2], rays: u32) -> Vec<f32> {
     if rays == 1 || map.is_empty() {
         return map;
     }

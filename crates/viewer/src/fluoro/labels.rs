@@ -51,6 +51,24 @@ fn seen(c_arm: &CArm, point: &Vec3) -> Option<[f64; 2]> {
     c_arm.is_between(&c_arm.in_beam(point)).then(|| c_arm.project(point))
 }
 
+/// The last part of a line that is in the picture, from its edge on.
+fn within(line: &[[f64; 2]], size_px: [u32; 2]) -> Vec<[f64; 2]> {
+    let size = size_px.map(f64::from);
+    let is_in = |at: &[f64; 2]| (0..2).all(|k| (0.0..=size[k]).contains(&at[k]));
+    let Some(last_out) = line.iter().rposition(|at| !is_in(at)) else { return line.to_vec() };
+    let Some(&first_in) = line.get(last_out + 1) else { return vec![] };
+    let out = line[last_out];
+    // The largest part of the way outwards that stays in.
+    let part = (0..2).map(|k| {
+        let run = out[k] - first_in[k];
+        let side = if run > 0.0 { size[k] } else { 0.0 };
+        if run == 0.0 { 1.0 } else { ((side - first_in[k]) / run).clamp(0.0, 1.0) }
+    });
+    let part = part.fold(1.0, f64::min);
+    let edge = [0, 1].map(|k| first_in[k] + part * (out[k] - first_in[k]));
+    std::iter::once(edge).chain(line[last_out + 1..].iter().copied()).collect()
+}
+
 fn device_label(
     setup: &Setup,
     c_arm: &CArm,
@@ -78,7 +96,8 @@ fn device_label(
     }
     // The mouth belongs to both.
     let shaft = shaft.iter().chain(points.first().filter(|_| !shaft.is_empty()));
-    let shaft_px = shaft.filter_map(|p| seen(c_arm, &p.position_mm)).collect();
+    let shaft: Vec<[f64; 2]> = shaft.filter_map(|p| seen(c_arm, &p.position_mm)).collect();
+    let shaft_px = within(&shaft, c_arm.size_px());
     let shown = points.iter().map(|p| p.position_mm).filter_map(|p| Some((seen(c_arm, &p)?, p)));
     let (centre_line_px, places): (Vec<[f64; 2]>, Vec<Vec3>) = shown.unzip();
     let tip = points.last().map(|p| p.position_mm);
@@ -95,4 +114,17 @@ fn device_label(
         parts,
         mask,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_comes_into_the_picture_begins_at_its_edge() {
+        let line = [[5.0, 5.0], [50.0, 300.0], [50.0, 100.0], [40.0, 60.0]];
+        assert_eq!(within(&line, [100, 120]), [[50.0, 120.0], [50.0, 100.0], [40.0, 60.0]]);
+        assert_eq!(within(&line[2..], [100, 120]), line[2..]);
+        assert!(within(&line[..2], [100, 120]).is_empty());
+    }
 }

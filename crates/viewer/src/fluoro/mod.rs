@@ -17,6 +17,7 @@
 mod anatomy;
 mod display;
 mod labels;
+mod moving;
 mod rays;
 mod scatter;
 mod sequence;
@@ -29,15 +30,16 @@ use rayon::prelude::*;
 
 pub(crate) use anatomy::Anatomy;
 pub(crate) use labels::labels;
+use moving::Moving;
 use rays::Room;
 use scatter::Scatter;
 pub use sequence::FrameTime;
-pub(crate) use sequence::{Afterglow, Sequence};
+pub(crate) use sequence::{Afterglow, Sequence, UNSUBTRACTED_LN};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};
 use crate::cpu::{DeviceCells, covered_by_half, layers_in_beam};
-use crate::device::RefinedDevice;
+use crate::device::{Layer, RefinedDevice};
 use crate::engine::PathEngine;
 use crate::material::Material;
 use crate::output::Mask;
@@ -94,6 +96,8 @@ pub(crate) struct Fluoroscope {
     /// Material of devices that specify none.
     default_material: Material,
     pub(crate) still: Still,
+    /// The body's own motion.
+    moving: Option<Moving>,
     /// Pixels that show the vessel, once requested.
     vessel: Option<Mask>,
     /// Lengths inside devices, none between frames.
@@ -175,6 +179,7 @@ impl Fluoroscope {
             contrast,
             default_material: spec.xray.device_material,
             still: Still { signal: dark, scatter },
+            moving: Moving::new(setup)?,
             vessel: None,
             devices: DeviceCells::new(c_arm),
             device_lanes: vec![],
@@ -185,10 +190,10 @@ impl Fluoroscope {
 
     /// Computes the constant signals from their lengths.
     fn look(&mut self, spec: &ViewSpec) {
-        let whole = (0..self.pixels()).into_par_iter().with_min_len(FEWEST_PIXELS);
-        let whole =
-            whole.map_init(Room::default, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
-        let whole: Vec<[f32; 2]> = whole.collect();
+        let whole = self.primaries();
+        if let Some(moving) = &mut self.moving {
+            moving.rests(&whole);
+        }
         let of = |i: usize| {
             whole.iter().enumerate().map(|(pixel, v)| v[i] * self.c_arm.openness(pixel) as f32).collect()
         };
@@ -196,6 +201,12 @@ impl Fluoroscope {
         let scatter = Scatter::new(&signal, &self.c_arm, spec.detector.scatter_fraction);
         scatter.add_still(&mut signal);
         self.still = Still { signal, scatter };
+    }
+
+    /// Signal and energy of the unscattered photons of all pixels, without blades and devices.
+    fn primaries(&self) -> Vec<[f32; 2]> {
+        let whole = (0..self.pixels()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        whole.map_init(Room::default, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room)).collect()
     }
 
     /// Whether a pixel shows the body, and no blade.
@@ -218,6 +229,7 @@ impl Fluoroscope {
     pub(crate) fn move_vessel(&mut self, setup: &Setup, engine: &mut dyn PathEngine) -> Result<()> {
         self.anatomy = Arc::new(self.anatomy.moved(setup, &self.c_arm, SUBRAYS, engine)?);
         self.vessel = None;
+        self.moving = Moving::new(setup)?;
         if let Some(flow) = &setup.flow {
             let shares = Shares::new(flow, &self.c_arm, &setup.filled_now().surface, setup.displacement());
             self.contrast = Some(ContrastMap::new(flow, Arc::new(shares), setup.displacement()));
@@ -314,9 +326,9 @@ impl Fluoroscope {
     fn cast(&mut self, devices: &[RefinedDevice]) -> Result<()> {
         self.devices.clear();
         for device in devices {
-            for (layer, pieces) in layers_in_beam(&self.c_arm, device) {
-                self.devices.add(layer.material.unwrap_or(self.default_material), &pieces);
-            }
+            let layers = layers_in_beam(&self.c_arm, device).into_iter();
+            let of = |(layer, pieces): (&Layer, _)| (layer.material.unwrap_or(self.default_material), pieces);
+            self.devices.add(&layers.map(of).collect::<Vec<_>>());
         }
         for (material, _) in &self.devices.maps()[self.device_lanes.len()..] {
             let lanes = self.beam.excess(*material, None)?;
@@ -403,7 +415,8 @@ impl Fluoroscope {
 
     /// Adds pixels touched by devices and those with contrast medium, both ascending, to the static signal.
     fn draw(&self, still: &Still, pixels: &[u32], medium: &[Medium]) -> Signal {
-        let mut now = still.signal.clone();
+        let base = self.moving.as_ref().and_then(Moving::signal).unwrap_or(&still.signal);
+        let mut now = base.clone();
         let mut lost = Vec::with_capacity(medium.len());
         let anew = merged(pixels, medium);
         let drawn =
@@ -423,7 +436,7 @@ impl Fluoroscope {
             let pixel = pixel as usize;
             let scattered = still.scatter.still(pixel);
             if more.is_some() {
-                let before = [still.signal.signal[pixel], still.signal.energy[pixel]];
+                let before = [base.signal[pixel], base.energy[pixel]];
                 lost.push((pixel, std::array::from_fn(|i| primary[i] + scattered[i] - before[i])));
             }
             now.signal[pixel] = primary[0] + scattered[0];

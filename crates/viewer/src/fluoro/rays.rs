@@ -138,7 +138,8 @@ impl Fluoroscope {
     /// Lengths of a ray in the static anatomy without devices, as required by [`Beam::add`](crate::xray::Beam::add).
     #[inline]
     pub(super) fn layers(&self, ray: usize, [fraction, tissue_mm]: [f32; 2]) -> [f32; 5] {
-        let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
+        let more_air_mm = self.moving.as_ref().map_or(0.0, |moving| moving.more_air(ray));
+        let [tissue, bone, lung, lumen] = self.anatomy.at(ray, more_air_mm);
         let medium = lumen * fraction - self.anatomy.faded(ray) * self.fraction + tissue_mm;
         [tissue - self.beam.reference_mm(), bone, lung, lumen, medium]
     }

@@ -35,6 +35,12 @@ const FAINTEST: f32 = 0.3;
 const ROADMAP_WINDOW: Window = [-0.55, 0.55];
 const ROADMAP_VESSEL: f32 = -0.4;
 
+/// −ln of signals, relative to that behind the body, that are white and black before subtraction: more than a detector
+/// tells apart.
+const UNSUBTRACTED_WINDOW: Window = [-8.0, 8.0];
+/// From white to black.
+pub(crate) const UNSUBTRACTED_LN: f64 = 16.0;
+
 /// Number and time of a frame. The number seeds its noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameTime {
@@ -65,6 +71,8 @@ pub(crate) struct Sequence {
     edges: [f64; 2],
     /// Subtracted from −ln of each frame: the stored mask or angiogram, or shading.
     mask: Option<Vec<f32>>,
+    /// −ln of the last frame of a subtraction, before its mask is subtracted.
+    unsubtracted: Vec<f32>,
     /// Weighted mean of the last frames, the newest weighing most.
     held: Vec<f32>,
     /// Signal of the last mask, and of that at the previous position of the C-arm.
@@ -137,6 +145,7 @@ impl Sequence {
             edges: [spec.xray.edges, EDGES_MM / c_arm.pixel_mm()],
             last_s: None,
             mask,
+            unsubtracted: vec![],
             held: vec![],
             mask_read: vec![],
             mask_before: vec![],
@@ -179,6 +188,9 @@ impl Sequence {
         self.last_s = Some(moment.time_s);
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
+        if self.mode == Mode::Dsa {
+            self.unsubtracted.clone_from(&values);
+        }
         if let Some(mask) = &self.mask {
             values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
         }
@@ -193,6 +205,16 @@ impl Sequence {
     /// The mean of the last frames, the newest weighing most; `None` before the first.
     pub(crate) fn hold(&self, fluoroscope: &Fluoroscope) -> Option<Image> {
         (!self.held.is_empty()).then(|| self.shown(self.held.clone(), fluoroscope))
+    }
+
+    /// Mask and last frame of a subtraction as they were read: 16 bits, of the logarithm of the signal.
+    pub(crate) fn unsubtracted(&self, fluoroscope: &Fluoroscope) -> Option<[Image; 2]> {
+        let mask = self.mask.as_ref().filter(|mask| mask.len() == self.unsubtracted.len())?;
+        Some([mask, &self.unsubtracted].map(|values| {
+            let mut values = values.clone();
+            self.shutter.iter().for_each(|&pixel| values[pixel as usize] = f32::INFINITY);
+            picture(&values, UNSUBTRACTED_WINDOW, fluoroscope.c_arm.size_px(), 16, false)
+        }))
     }
 
     fn shown(&self, mut values: Vec<f32>, fluoroscope: &Fluoroscope) -> Image {

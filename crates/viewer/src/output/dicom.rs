@@ -1,7 +1,9 @@
 //! X-ray angiographic images as DICOM: one multi-frame file per plane, with the geometry of the C-arm.
 //!
 //! The object follows the XA Image IOD (DICOM PS3.3, A.14), explicit VR little endian. Frames are as displayed, so
-//! their intensities have no physical meaning (`DISP`), and there is no modality LUT; subtracted ones are derived.
+//! their intensities have no physical meaning (`DISP`), and there is no modality LUT; subtracted ones are derived. A
+//! subtraction with its mask is stored as systems store it: the mask first, then the frames as they were read (`LOG`, with the LUT to intensities),
+//! and the Mask Subtraction Sequence says which to subtract from which.
 //! Identifiers are hashes of pixels and geometry, so equal frames give equal files and different ones different
 //! identifiers; a simulation has no study date.
 
@@ -18,6 +20,7 @@ use endowire_core::{Error, Result};
 use super::{Image, Pace, PixelFormat};
 use crate::c_arm::CArm;
 use crate::fingerprint::fingerprint;
+use crate::fluoro::UNSUBTRACTED_LN;
 use crate::spec::{Mode, reference_mm};
 use crate::xray::{Exposure, Pulse};
 
@@ -34,6 +37,9 @@ pub struct Angiogram<'a> {
     pub pace: Pace,
     /// The display mode.
     pub mode: Mode,
+    /// The mask of frames that are not subtracted, both of [`crate::Renderer::unsubtracted`]; `None`: frames are as
+    /// displayed.
+    pub mask: Option<&'a Image>,
     /// Whether contrast medium is injected.
     pub contrast: bool,
     /// Name of the series.
@@ -71,7 +77,9 @@ impl Angiogram<'_> {
         let first =
             frames.first().ok_or_else(|| Error::parameter("frames", 0, "a file needs at least one"))?;
         let shape = |i: &Image| (i.width(), i.height(), i.format());
-        if first.format() == PixelFormat::Rgba8 || frames.iter().any(|f| shape(f) != shape(first)) {
+        if first.format() == PixelFormat::Rgba8
+            || self.mask.iter().copied().chain(frames).any(|f| shape(f) != shape(first))
+        {
             return Err(Error::parameter(
                 "frames",
                 format!("{:?}", shape(first)),
@@ -103,28 +111,31 @@ impl Angiogram<'_> {
             .chain(self.pace.intervals_s().iter().copied())
             .flat_map(f64::to_le_bytes);
         let size = frames.first().map_or([0; 2], |f| [f.width(), f.height()]);
+        let frames = || self.mask.into_iter().chain(frames);
         let reported = numbers
             .chain(self.c_arm.fingerprint().to_le_bytes())
             .chain(size.into_iter().flat_map(u32::to_le_bytes))
             .chain([self.mode as u8, u8::from(self.contrast)])
             .chain(self.description.bytes());
-        fingerprint(frames.iter().flat_map(|f| f.data().iter().copied()).chain(reported))
+        fingerprint(frames().flat_map(|f| f.data().iter().copied()).chain(reported))
     }
 
     fn object(&self, frames: &[Image], first: &Image, plane: Plane) -> InMemDicomObject {
         let own = self.content(frames);
         let mut object = InMemDicomObject::new_empty();
         identify(&mut object, own, plane);
-        self.describe(&mut object, plane);
-        self.place(&mut object, first, frames.len());
-        self.time(&mut object, frames.len());
-        pixels(&mut object, frames, first);
+        let all: Vec<&Image> = self.mask.into_iter().chain(frames).collect();
+        self.describe(&mut object, plane, all.len());
+        self.place(&mut object, first, all.len());
+        self.time(&mut object, all.len());
+        pixels(&mut object, &all, self.mask);
         object
     }
 
     /// Patient, study, series, equipment, image, contrast medium.
-    fn describe(&self, object: &mut InMemDicomObject, plane: Plane) {
-        let origin = if self.mode == Mode::Dsa { "DERIVED" } else { "ORIGINAL" };
+    fn describe(&self, object: &mut InMemDicomObject, plane: Plane, frames: usize) {
+        let is_subtracted = self.mode == Mode::Dsa && self.mask.is_none();
+        let origin = if is_subtracted { "DERIVED" } else { "ORIGINAL" };
         let (planes, number) = match plane {
             Plane::Single => ("SINGLE PLANE", "1"),
             Plane::A(_) => ("BIPLANE A", "1"),
@@ -154,7 +165,19 @@ impl Angiogram<'_> {
         ] {
             put(object, tag, vr, value);
         }
-        if self.mode == Mode::Dsa {
+        if self.mask.is_some() {
+            let mut mask = InMemDicomObject::new_empty();
+            put(&mut mask, tags::MASK_OPERATION, VR::CS, "AVG_SUB");
+            let last = u16::try_from(frames).unwrap_or(u16::MAX);
+            for (tag, numbers) in [
+                (tags::APPLICABLE_FRAME_RANGE, SmallVec::from_slice(&[2, last])),
+                (tags::MASK_FRAME_NUMBERS, SmallVec::from_slice(&[1])),
+            ] {
+                mask.put(DataElement::new(tag, VR::US, PrimitiveValue::U16(numbers)));
+            }
+            sequence(object, tags::MASK_SUBTRACTION_SEQUENCE, mask);
+            put(object, tags::RECOMMENDED_VIEWING_MODE, VR::CS, "SUB");
+        } else if is_subtracted {
             put(object, tags::DERIVATION_DESCRIPTION, VR::ST, "ln(mask) - ln(frame)");
             let mut mask = InMemDicomObject::new_empty();
             put(&mut mask, tags::MASK_OPERATION, VR::CS, "NONE");
@@ -232,6 +255,20 @@ impl Angiogram<'_> {
             &decimal(self.area_dose_dgycm2(frames)),
         );
         let Some(opening) = self.c_arm.opening_px() else { return };
+        let corners = self.c_arm.corners_px();
+        if corners > 0.0 {
+            put(object, tags::COLLIMATOR_SHAPE, VR::CS, "POLYGONAL");
+            let middle = [first.width(), first.height()].map(|n| f64::from(n) / 2.0);
+            let [w, h] = opening.map(|n| n / 2.0);
+            let [u, v] = [w - corners, h - corners];
+            let vertices = [[-u, -h], [u, -h], [w, -v], [w, v], [u, h], [-u, h], [-w, v], [-w, -v]];
+            let at = |[x, y]: [f64; 2]| {
+                [middle[1] + y, middle[0] + x].map(|n| (n.round() + 1.0).max(1.0).to_string()).join("\\")
+            };
+            let vertices = vertices.map(at).join("\\");
+            put(object, tags::VERTICES_OF_THE_POLYGONAL_COLLIMATOR, VR::IS, &vertices);
+            return;
+        }
         let size = [first.width(), first.height()].map(f64::from);
         let edge = |k: usize, sign: f64| {
             (size[k] / 2.0 + sign * opening[k] / 2.0).clamp(0.0, size[k]).round().to_string()
@@ -254,8 +291,10 @@ impl Angiogram<'_> {
         let open_px = self.c_arm.opening_px().map_or(size_px, |open| [0, 1].map(|k| open[k].min(size_px[k])));
         let nearer = reference_mm(self.c_arm.sod_mm()) / self.c_arm.sid_mm();
         let sides_cm = open_px.map(|n| n * self.c_arm.pixel_mm() * nearer / 10.0);
+        let corners_cm = self.c_arm.corners_px() * self.c_arm.pixel_mm() * nearer / 10.0;
+        let area_cm2 = sides_cm[0] * sides_cm[1] - 2.0 * corners_cm * corners_cm;
         // 1 dGy = 10⁸ nGy.
-        frames as f64 * self.exposure.entrance_ngy * 1e-8 * sides_cm[0] * sides_cm[1]
+        frames as f64 * self.exposure.entrance_ngy * 1e-8 * area_cm2
     }
 
     /// Cine and multi-frame.
@@ -268,7 +307,7 @@ impl Angiogram<'_> {
             put(object, tags::CINE_RATE, VR::IS, &rate);
             put(object, tags::RECOMMENDED_DISPLAY_FRAME_RATE, VR::IS, &rate);
         }
-        let time = match increments(self.pace.intervals_s()) {
+        let time = match increments(self.mask.map(|_| self.pace.mean_s()), self.pace.intervals_s()) {
             Some(increments) => {
                 put(object, tags::FRAME_TIME_VECTOR, VR::DS, &increments);
                 tags::FRAME_TIME_VECTOR
@@ -307,14 +346,25 @@ fn identify(object: &mut InMemDicomObject, own: u128, plane: Plane) {
     }
 }
 
-/// Pixels, and the window that displays them unchanged.
-fn pixels(object: &mut InMemDicomObject, frames: &[Image], first: &Image) {
+/// Pixels, and the window that displays them unchanged, or all that is in a mask.
+fn pixels(object: &mut InMemDicomObject, frames: &[&Image], mask: Option<&Image>) {
+    let Some(first) = frames.first() else { return };
     let sixteen = first.format() == PixelFormat::Gray16;
     let bits: u16 = if sixteen { 16 } else { 8 };
     put(object, tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "MONOCHROME2");
-    put(object, tags::PIXEL_INTENSITY_RELATIONSHIP, VR::CS, "DISP");
-    put(object, tags::WINDOW_CENTER, VR::DS, &decimal(f64::from(1_u32 << (bits - 1))));
-    put(object, tags::WINDOW_WIDTH, VR::DS, &decimal(f64::from(1_u32 << bits)));
+    put(object, tags::PIXEL_INTENSITY_RELATIONSHIP, VR::CS, if mask.is_some() { "LOG" } else { "DISP" });
+    let whole = [0.0, f64::from(1_u32 << bits)];
+    let [low, high] = mask.map_or(whole, |mask| {
+        // What is behind blades is 0.
+        let open = words(mask).filter(|word| *word > 0).map(f64::from);
+        let [low, high] = open.fold([f64::MAX, 0.0], |[low, high], v| [low.min(v), high.max(v)]);
+        if low < high { [low, high] } else { whole }
+    });
+    if mask.is_some() {
+        sequence(object, tags::MODALITY_LUT_SEQUENCE, intensities(high));
+    }
+    put(object, tags::WINDOW_CENTER, VR::DS, &decimal(f64::midpoint(low, high)));
+    put(object, tags::WINDOW_WIDTH, VR::DS, &decimal(high - low));
     for (tag, value) in [
         (tags::SAMPLES_PER_PIXEL, 1),
         (tags::ROWS, first.height() as u16),
@@ -327,8 +377,7 @@ fn pixels(object: &mut InMemDicomObject, frames: &[Image], first: &Image) {
         object.put(DataElement::new(tag, VR::US, PrimitiveValue::from(value)));
     }
     object.put(if sixteen {
-        let words = frames.iter().flat_map(|f| f.data().chunks_exact(2));
-        let words = words.map(|b| u16::from_be_bytes([b[0], b[1]])).collect::<Vec<_>>();
+        let words = frames.iter().flat_map(|frame| words(frame)).collect::<Vec<_>>();
         DataElement::new(tags::PIXEL_DATA, VR::OW, PrimitiveValue::U16(words.into()))
     } else {
         let mut bytes: Vec<u8> = frames.iter().flat_map(|f| f.data().iter().copied()).collect();
@@ -338,6 +387,24 @@ fn pixels(object: &mut InMemDicomObject, frames: &[Image], first: &Image) {
         }
         DataElement::new(tags::PIXEL_DATA, VR::OB, PrimitiveValue::U8(bytes.into()))
     });
+}
+
+/// The table from logarithms to intensities, relative to the brightest pixel.
+fn intensities(brightest: f64) -> InMemDicomObject {
+    let of = |k: u32| 65535.0 * libm::exp(UNSUBTRACTED_LN * (f64::from(k) - brightest) / 65535.0);
+    let values: Vec<u16> = (0..=65535).map(|k| of(k).min(65535.0).round() as u16).collect();
+    let mut table = InMemDicomObject::new_empty();
+    // As many entries as there are words, which the first number cannot say, from the word 0 on, of 16 bits.
+    let descriptor = PrimitiveValue::U16(SmallVec::from_slice(&[0, 0, 16]));
+    table.put(DataElement::new(tags::LUT_DESCRIPTOR, VR::US, descriptor));
+    put(&mut table, tags::MODALITY_LUT_TYPE, VR::LO, "US");
+    table.put(DataElement::new(tags::LUT_DATA, VR::OW, PrimitiveValue::U16(values.into())));
+    table
+}
+
+/// Pixels of a frame of 16 bits.
+fn words(frame: &Image) -> impl Iterator<Item = u16> {
+    frame.data().chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]]))
 }
 
 fn put(object: &mut InMemDicomObject, tag: Tag, vr: VR, value: &str) {
@@ -352,11 +419,11 @@ fn uid(number: u128) -> String {
     format!("2.25.{number}")
 }
 
-/// Times of frames after the previous one, ms: 0 for the first. `None` for equally spaced frames, or if there are too
-/// many for the element.
-fn increments(intervals_s: &[f64]) -> Option<String> {
+/// Times of frames after the previous one, ms: 0 for the first, and that of the second after a mask before it. `None` for
+/// equally spaced frames, or if there are too many for the element.
+fn increments(after_mask_s: Option<f64>, intervals_s: &[f64]) -> Option<String> {
     // To the microsecond.
-    let each = intervals_s.iter().map(|interval| decimal((1e6 * interval).round() / 1e3));
+    let each = after_mask_s.iter().chain(intervals_s).map(|interval| decimal((1e6 * interval).round() / 1e3));
     let all = std::iter::once("0".to_owned()).chain(each).collect::<Vec<_>>().join("\\");
     (!intervals_s.is_empty() && all.len() < usize::from(u16::MAX)).then_some(all)
 }

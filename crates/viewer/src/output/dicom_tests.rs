@@ -4,7 +4,7 @@ use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
 use super::*;
-use crate::spec::CArmSpec;
+use crate::spec::{CArmSpec, Shutter};
 
 #[test]
 fn geometry_and_pixels_read_back() {
@@ -46,6 +46,7 @@ fn angiogram(c_arm: &CArm, mode: Mode) -> Angiogram<'_> {
         exposure: Exposure { kvp: 80.0, dose_ngy: 30.0, entrance_ngy: 9000.0, tissue_mm: 200.0, pulse: None },
         pace: Pace::even(12.5),
         mode,
+        mask: None,
         contrast: mode == Mode::Dsa,
         description: "test",
     }
@@ -60,6 +61,12 @@ fn arm(primary_deg: f64, rotation_deg: f64) -> CArm {
         collimation_mm: Some([3.0, 5.0]),
         ..CArmSpec::default()
     };
+    CArm::new(&spec, [16, 16], &wall).unwrap()
+}
+
+fn octagon() -> CArm {
+    let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(10.0)], triangles: vec![] };
+    let spec = CArmSpec { pixel_mm: Some(0.3), shutter: Shutter::Octagon, ..CArmSpec::default() };
     CArm::new(&spec, [16, 16], &wall).unwrap()
 }
 
@@ -112,6 +119,26 @@ fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
     assert!(read.element(tags::FRAME_TIME_VECTOR).is_err() && float(tags::FRAME_TIME) == 80.0);
     assert_eq!((float(tags::X_RAY_TUBE_CURRENT), float(tags::EXPOSURE_INU_AS)), (123.0, 926.0));
     paths.push(turning);
+    // A mask before its frames, in an octagon.
+    let masked = folder.path().join("masked.dcm");
+    let sixteen = frames(PixelFormat::Gray16);
+    let octagon = octagon();
+    let subtraction = Angiogram { mask: Some(&sixteen[0]), ..angiogram(&octagon, Mode::Dsa) };
+    subtraction.write(&masked, &sixteen[1..]).unwrap();
+    let read = dicom_object::open_file(&masked).unwrap();
+    let text = |tag| read.element(tag).unwrap().to_str().unwrap().trim().to_owned();
+    assert_eq!(text(tags::RECOMMENDED_VIEWING_MODE), "SUB");
+    assert_eq!(text(tags::PIXEL_INTENSITY_RELATIONSHIP), "LOG");
+    assert!(text(tags::IMAGE_TYPE).starts_with("ORIGINAL"));
+    assert_eq!(text(tags::NUMBER_OF_FRAMES), "3");
+    assert_eq!(text(tags::COLLIMATOR_SHAPE), "POLYGONAL");
+    let items = read.element(tags::MASK_SUBTRACTION_SEQUENCE).unwrap().items().unwrap();
+    let numbers = |tag| items[0].element(tag).unwrap().to_multi_int::<u16>().unwrap();
+    assert_eq!(numbers(tags::MASK_FRAME_NUMBERS), [1]);
+    assert_eq!(numbers(tags::APPLICABLE_FRAME_RANGE), [2, 3]);
+    let stored = read.element(tags::PIXEL_DATA).unwrap().to_multi_int::<u16>().unwrap();
+    assert_eq!(stored[..256], words(&sixteen[0]).collect::<Vec<_>>());
+    paths.push(masked);
     // Unequally spaced frames, and less than one per second.
     let uneven = folder.path().join("uneven.dcm");
     let pace = Pace::of(&[1.0, 2.2, 5.2], 15.0);

@@ -41,8 +41,8 @@ pub struct DeviceLabel {
     pub centre_line_mm: Vec<[f64; 3]>,
     /// Their depths from the source along the central ray.
     pub depth_mm: Vec<f64>,
-    /// The projected shaft outside the vessel, the sheath's mouth last: it is in the picture and in the masks, and is
-    /// not simulated. Empty without a sheath.
+    /// The projected shaft outside the vessel, from the picture's edge to the sheath's mouth: it is in the picture and in
+    /// the masks, and is not simulated. Empty without a sheath, and where the mouth is outside the picture.
     pub shaft_px: Vec<[f64; 2]>,
     /// The projected tip; absent if it is not between source and detector.
     pub tip_px: Option<[f64; 2]>,

@@ -8,6 +8,7 @@ mod image;
 mod labels;
 mod mask;
 mod pace;
+mod visible;
 
 pub use animation::Animation;
 pub use dicom::Angiogram;

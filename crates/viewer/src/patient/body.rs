@@ -7,6 +7,7 @@
 use endowire_core::vessel::SurfaceMesh;
 
 use super::loft::loft;
+use super::motion::BodyMotion;
 use super::texture::Texture;
 use super::trunk::Trunk;
 use crate::spec::TorsoSpec;
@@ -24,6 +25,7 @@ pub(crate) struct Body {
     pub(crate) marrow: SurfaceMesh,
     pub(crate) lungs: SurfaceMesh,
     pub(crate) texture: Texture,
+    pub(crate) motion: BodyMotion,
 }
 
 impl Body {
@@ -33,7 +35,7 @@ impl Body {
     /// A body around a vessel with this wall.
     pub(crate) fn new(spec: &TorsoSpec, wall: &SurfaceMesh) -> Self {
         let trunk = Trunk::new(spec, wall);
-        let mut body = Self { texture: trunk.texture(), ..Self::default() };
+        let mut body = Self { texture: trunk.texture(), motion: trunk.motion(spec), ..Self::default() };
         loft(&mut body.skin, &trunk.skin());
         for (mesh, inset) in [(&mut body.bones, 0.0), (&mut body.marrow, CORTEX_MM)] {
             if spec.spine {
@@ -49,6 +51,9 @@ impl Body {
         }
         if spec.electrodes {
             trunk.electrodes(&mut body.bones);
+        }
+        if let Some(width_mm) = spec.table_mm {
+            trunk.table(width_mm, &mut body.skin, &mut body.bones);
         }
         if spec.lungs {
             trunk.air(&mut body.lungs);

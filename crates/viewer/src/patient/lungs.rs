@@ -11,7 +11,9 @@ use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
 use super::loft::{ellipsoid, ellipsoid_of, hollow, loft, smooth, tube};
+use super::motion::BodyMotion;
 use super::trunk::{Trunk, step};
+use crate::spec::TorsoSpec;
 
 /// Radius over which limits are blended, mm.
 const BLEND_MM: f64 = 9.0;
@@ -67,6 +69,21 @@ struct Lung<'a> {
     widest: f64,
     /// Height of the diaphragm's dome.
     dome: f64,
+}
+
+impl Trunk {
+    /// How the heart that the lungs leave room for, and the diaphragm, move.
+    pub(super) fn motion(&self, spec: &TorsoSpec) -> BodyMotion {
+        let [half, at] = HEART_MM;
+        BodyMotion {
+            breath_mm: spec.breath_mm,
+            beat_mm: spec.beat_mm,
+            diaphragm: self.diaphragm,
+            apex: self.apex,
+            heart: Vec3::new(self.spine[0] + at[0], self.middle_y - at[1], self.diaphragm + at[2]),
+            heart_half_mm: half.into(),
+        }
+    }
 }
 
 impl Lung<'_> {

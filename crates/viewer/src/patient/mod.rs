@@ -6,8 +6,10 @@ mod electrodes;
 mod head;
 mod loft;
 mod lungs;
+mod motion;
 mod pelvis;
 mod spine;
+mod table;
 mod texture;
 mod thorax;
 mod tomogram;
@@ -17,6 +19,7 @@ use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result};
 
 pub(crate) use body::Body;
+pub(crate) use motion::Rhythm;
 pub(crate) use texture::Of;
 pub(crate) use tomogram::Volume;
 pub use tomogram::read_label_map;

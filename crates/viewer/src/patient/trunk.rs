@@ -91,6 +91,16 @@ impl Trunk {
         }
     }
 
+    /// Posterior coordinate of the back.
+    pub(super) fn back_y(&self) -> f64 {
+        self.spine[1] + BACK_MM
+    }
+
+    /// Heights of its lower end and of the top of the head.
+    pub(super) fn heights(&self) -> [f64; 2] {
+        [self.bottom, self.apex + NECK_ABOVE_MM[1] + HEAD_MM[0]]
+    }
+
     /// The texture of its tissues.
     pub(super) fn texture(&self) -> Texture {
         Texture { spine_mm: self.spine, middle_mm: [self.spine[0], self.middle_y] }
@@ -174,7 +184,7 @@ impl Trunk {
     pub(super) fn skin(&self) -> Vec<Vec<Vec3>> {
         const RINGS: usize = 110;
         const SIDES: usize = 72;
-        let top = self.apex + NECK_ABOVE_MM[1] + HEAD_MM[0];
+        let [_, top] = self.heights();
         let straight = self.diaphragm - 200.0;
         let heights = std::iter::once(self.bottom)
             .chain((0..=RINGS).map(|k| straight + (top - straight) * k as f64 / RINGS as f64));

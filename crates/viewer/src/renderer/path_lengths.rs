@@ -41,11 +41,15 @@ impl Renderer {
             })?);
         }
         let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro, kept| {
-            let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
+            let (scope, _, paths) = prepared(setup, engines, fluoro, kept)?;
+            scope.breathe(setup, time_s, paths)?;
             let maps = scope.inside_devices(&devices)?;
             Ok((maps, injected(setup, scope, &devices, time_s)))
         })?;
-        let Anatomy { body, bone, lung, lumen, faded } = self.central.clone().unwrap_or_default();
+        let Anatomy { body, bone, mut lung, lumen, faded } = self.central.clone().unwrap_or_default();
+        if let Some((scope, _)) = &self.fluoro {
+            scope.add_air(&mut lung);
+        }
         let fraction = self.setup.spec.xray.contrast_fraction as f32;
         let mut contrast_mm = vec![];
         if fraction > 0.0 || !injected.is_empty() {
@@ -82,7 +86,8 @@ impl Renderer {
     pub fn transmission_at(&mut self, devices: &[DeviceView], time_s: f64) -> Result<Vec<f32>> {
         let devices = self.setup.in_beam(devices)?;
         self.with_fallback(|setup, engines, fluoro, kept| {
-            let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
+            let (scope, _, paths) = prepared(setup, engines, fluoro, kept)?;
+            scope.breathe(setup, Some(time_s), paths)?;
             let medium = injected(setup, scope, &devices, Some(time_s));
             scope.transmitted(&devices, &medium)
         })

@@ -41,6 +41,16 @@ pub struct TorsoSpec {
     pub lungs: bool,
     /// Electrodes of an ECG on the chest, with their leads.
     pub electrodes: bool,
+    /// Width of the table that the body lies on, 200 to 1000: a plate of carbon fibre between two rails of aluminium.
+    /// Absent: no table.
+    pub table_mm: Option<f64>,
+    /// How far the diaphragm goes down with each breath, 0 (held) to 40. It begins to breathe in at time zero. A
+    /// vessel that moves takes the body along instead (`[[vessel.motion]]`), and subtractions hold the breath.
+    pub breath_mm: f64,
+    /// Duration of a breath, 1 to 60.
+    pub breath_s: f64,
+    /// How far the borders of the heart go in with each beat, 0 to 15; it beats at `flow.heart_rate_per_min`.
+    pub beat_mm: f64,
 }
 
 impl Default for TorsoSpec {
@@ -54,6 +64,10 @@ impl Default for TorsoSpec {
             ribs: true,
             lungs: true,
             electrodes: true,
+            table_mm: None,
+            breath_mm: 12.0,
+            breath_s: 4.0,
+            beat_mm: 4.0,
         }
     }
 }
@@ -81,8 +95,18 @@ impl PatientSpec {
         if let Some(torso) = &self.torso {
             finite_within("view.patient.torso.width_mm", torso.width_mm, [100.0, 800.0])?;
             finite_within("view.patient.torso.depth_mm", torso.depth_mm, [80.0, 600.0])?;
+            for (key, value, range) in [
+                ("breath_mm", torso.breath_mm, [0.0, 40.0]),
+                ("breath_s", torso.breath_s, [1.0, 60.0]),
+                ("beat_mm", torso.beat_mm, [0.0, 15.0]),
+            ] {
+                finite_within(&format!("view.patient.torso.{key}"), value, range)?;
+            }
             for x in torso.spine_mm.into_iter().flatten() {
                 finite_within("view.patient.torso.spine_mm", x, COORDINATE_MM)?;
+            }
+            if let Some(width) = torso.table_mm {
+                finite_within("view.patient.torso.table_mm", width, [200.0, 1000.0])?;
             }
             if let Some(z) = torso.diaphragm_mm {
                 finite_within("view.patient.torso.diaphragm_mm", z, COORDINATE_MM)?;

@@ -34,6 +34,8 @@ pub struct CArmSpec {
     /// Collimation: width and height of the opening between the blades, at the detector, each 0.01 to 100,000.
     /// Absent: the whole field.
     pub collimation_mm: Option<[f64; 2]>,
+    /// Shape of the opening: `rectangle`, or `octagon`, whose corners are cut off, with or without `collimation_mm`.
+    pub shutter: Shutter,
     /// Whether letters at the borders of the image show directions: L left, R right, H head, F feet, A front, P back.
     pub markers: bool,
     /// Centre of rotation, in the middle of the frame, each coordinate -100,000 to 100,000; absent: the centre of the
@@ -55,10 +57,22 @@ impl Default for CArmSpec {
             magnification: 1.0,
             rotation_deg: 0.0,
             collimation_mm: None,
+            shutter: Shutter::Rectangle,
             markers: false,
             isocentre_mm: None,
         }
     }
+}
+
+/// Shape of the opening between the blades.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shutter {
+    /// Two pairs of blades.
+    #[default]
+    Rectangle,
+    /// Two more across the corners: a regular octagon where the opening is a square.
+    Octagon,
 }
 
 /// Distance of the patient entrance reference point before the isocentre, mm (IEC 60601-2-43).

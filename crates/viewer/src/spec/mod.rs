@@ -12,7 +12,7 @@ use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 pub use anatomy::{CtSpec, FlowSpec, InjectionSpec, PatientSpec, TorsoSpec};
-pub use c_arm::{CArmSpec, Pose};
+pub use c_arm::{CArmSpec, Pose, Shutter};
 pub(crate) use c_arm::{PITCH_MM, reference_mm};
 pub use exposure::ExposureSpec;
 pub use xray::{DetectorSpec, Mode, XRaySpec};
@@ -347,7 +347,7 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 52] = [
+        let cases: [(&str, Spoil); 55] = [
             ("xray.edges", |s| s.xray.edges = 5.1),
             ("camera.force_n", |s| s.camera.force_n = Some(0.0)),
             ("size_px", |s| s.size_px = [0, 10]),
@@ -382,6 +382,15 @@ mod tests {
             }),
             ("torso.width_mm", |s| {
                 s.patient.torso = Some(TorsoSpec { width_mm: f64::NAN, ..TorsoSpec::default() });
+            }),
+            ("torso.breath_mm", |s| {
+                s.patient.torso = Some(TorsoSpec { breath_mm: 41.0, ..TorsoSpec::default() });
+            }),
+            ("torso.breath_s", |s| {
+                s.patient.torso = Some(TorsoSpec { breath_s: 0.0, ..TorsoSpec::default() });
+            }),
+            ("torso.table_mm", |s| {
+                s.patient.torso = Some(TorsoSpec { table_mm: Some(1e300), ..TorsoSpec::default() });
             }),
             ("bits", |s| s.bits = 12),
             ("azimuth_deg", |s| s.camera.azimuth_deg = Some(f64::NAN)),

@@ -13,7 +13,7 @@ mod spectrum;
 pub(crate) use beam::{Beam, Lanes};
 pub(crate) use blur::Blur;
 pub(crate) use detector::Detector;
-pub(crate) use exp::{LANES, ln_lanes};
+pub(crate) use exp::{LANES, exp_lanes, ln_lanes};
 pub(crate) use exposure::check as check_exposure;
 pub use exposure::{Exposure, Pulse};
 pub use path::PathLengths;

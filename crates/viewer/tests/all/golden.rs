@@ -27,7 +27,8 @@ fn view(mode: Mode) -> ViewSpec {
         ..ViewSpec::default()
     };
     view.c_arm.pose = Some("LAO 40".parse().unwrap());
-    view.patient.torso = Some(TorsoSpec::default());
+    // At rest at any time.
+    view.patient.torso = Some(TorsoSpec { breath_mm: 0.0, beat_mm: 0.0, ..TorsoSpec::default() });
     with_injection(view, "aortic_arch", [-38.4, -54.8, 136.0], mode)
 }
 
@@ -151,7 +152,13 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
 
     // A thick patient: more voltage, less contrast.
     let mut thick = view(Mode::Fluoro);
-    thick.patient.torso = Some(TorsoSpec { width_mm: 480.0, depth_mm: 450.0, ..TorsoSpec::default() });
+    thick.patient.torso = Some(TorsoSpec {
+        width_mm: 480.0,
+        depth_mm: 450.0,
+        breath_mm: 0.0,
+        beat_mm: 0.0,
+        ..TorsoSpec::default()
+    });
     (thick.xray.pulse_ms, thick.exposure) = (8.0, (!twin).then(ExposureSpec::default));
     add("exposure", frame(&mut Renderer::new(&thick, &wall("aortic_arch")).unwrap(), 0.0, 3));
 

@@ -126,6 +126,36 @@ fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
     assert_eq!(renderer.path_lengths(&[]).unwrap().lung_mm, rest.lung_mm);
 }
 
+#[test]
+fn a_body_breathes_in_live_pictures_by_as_much_as_it_is_told_and_rests_in_subtractions_and_when_held() {
+    let renderer = |mode: Mode, breath_mm: f64| {
+        let mut view = view(mode);
+        view.patient.torso =
+            Some(TorsoSpec { diaphragm_mm: Some(60.0), breath_mm, beat_mm: 0.0, ..TorsoSpec::default() });
+        view.c_arm.isocentre_mm = Some([0.0, 0.0, 60.0]);
+        Renderer::new(&view, &vessel()).unwrap()
+    };
+    let picture = |renderer: &mut Renderer, time_s: f64| {
+        renderer.render_at(&[], FrameTime { frame: 0, time_s }).unwrap().fluoro.unwrap()
+    };
+    // A breath of four seconds is in at two.
+    let mut live = renderer(Mode::Fluoro, 10.0);
+    let [rest, now] = [0.0, 2.0].map(|time_s| live.path_lengths_at(&[], time_s).unwrap());
+    assert_eq!((&now.bone_mm, &now.body_mm), (&rest.bone_mm, &rest.body_mm));
+    let lowest = |of: &[f32]| (0..160).rposition(|y| of[y * 160 + 30] > 5.0).unwrap() as f64;
+    let c_arm = live.c_arm().unwrap();
+    let [from, to] = [60.0, 50.0].map(|z| c_arm.project(&Vec3::new(0.0, 0.0, z))[1]);
+    let shift = lowest(&now.lung_mm) - lowest(&rest.lung_mm);
+    assert!((shift - (to - from)).abs() < 2.0, "{shift} {}", to - from);
+    assert_ne!(picture(&mut live, 2.0), picture(&mut live, 0.0));
+    assert_eq!(live.path_lengths_at(&[], 4.0).unwrap().lung_mm, rest.lung_mm);
+    // Counter-checks.
+    let mut held = renderer(Mode::Fluoro, 0.0);
+    assert_eq!(held.path_lengths_at(&[], 2.0).unwrap().lung_mm, rest.lung_mm);
+    let mut subtracted = renderer(Mode::Dsa, 10.0);
+    assert_eq!(subtracted.path_lengths_at(&[], 2.0).unwrap().lung_mm, rest.lung_mm);
+}
+
 /// A NIfTI-1 file of 40³ voxels of 4 mm about the origin: a ball of water with a core of bone, in air.
 fn ball_of_water(path: &std::path::Path) {
     let mut bytes = vec![0_u8; 352];

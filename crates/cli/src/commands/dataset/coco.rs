@@ -1,6 +1,7 @@
 //! Annotations in COCO format (Lin et al., ECCV 2014): images, categories, and masks as uncompressed run lengths.
 
-use endowire_viewer::{DeviceLabel, Labels, Mask, Pushed};
+use endowire_core::Result;
+use endowire_viewer::{DeviceLabel, Image, Labels, Mask, Pushed};
 use serde::{Deserialize, Serialize};
 
 /// Category of a mask.
@@ -44,6 +45,12 @@ pub(super) fn categories() -> [Category; 5] {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct ImageRow {
     pub(super) id: usize,
+    /// Number of the pose: pictures of a pose have C-arm, body and noise in common.
+    #[serde(default)]
+    pub(super) pose: usize,
+    /// `train`, `val` or `test`, by anatomy; known when all is joined.
+    #[serde(default)]
+    pub(super) split: String,
     pub(super) file_name: String,
     pub(super) arrays: String,
     pub(super) width: u32,
@@ -109,6 +116,9 @@ pub(super) struct Annotation {
     num_keypoints: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     tip_mm: Option<[f64; 3]>,
+    /// Contrast to noise in the picture; null where nothing surrounds it.
+    #[serde(default)]
+    visible: Option<f64>,
 }
 
 /// Height and width, and run lengths in column order.
@@ -126,36 +136,40 @@ const MOST: usize = 1000;
 ///
 /// `drawn` are the indices and names of the instruments that the devices are, or were before they were detached.
 pub(super) fn annotations(
-    image: usize,
+    (image, picture): (usize, &Image),
     labels: &Labels,
     pushed: &Pushed,
     drawn: &[(usize, &str)],
-) -> Vec<Annotation> {
+) -> Result<Vec<Annotation>> {
     let mut rows = Vec::new();
-    let mut add = |category_id: u32, mask: &Mask, finish: &dyn Fn(&mut Annotation)| {
-        let (Some(bbox), true) = (mask.bounds(), rows.len() < MOST) else { return };
-        let [width, height] = mask.size_px();
-        let segmentation = RunLengths { size: [height, width], counts: mask.run_lengths() };
-        let mut row = Annotation {
-            id: image * MOST + rows.len() + 1,
-            image_id: image,
-            category_id,
-            iscrowd: 0,
-            area: mask.pixels().len(),
-            bbox,
-            segmentation,
-            instrument: None,
-            material: None,
-            part: None,
-            keypoints: None,
-            num_keypoints: None,
-            tip_mm: None,
+    let devices: Vec<&Mask> = labels.devices.iter().map(|device| &device.mask).collect();
+    let mut add =
+        |category_id: u32, mask: &Mask, seen: &Mask, finish: &dyn Fn(&mut Annotation)| -> Result<()> {
+            let (Some(bbox), true) = (mask.bounds(), rows.len() < MOST) else { return Ok(()) };
+            let [width, height] = mask.size_px();
+            let segmentation = RunLengths { size: [height, width], counts: mask.run_lengths() };
+            let mut row = Annotation {
+                id: image * MOST + rows.len() + 1,
+                image_id: image,
+                category_id,
+                iscrowd: 0,
+                area: mask.pixels().len(),
+                bbox,
+                segmentation,
+                instrument: None,
+                material: None,
+                part: None,
+                keypoints: None,
+                num_keypoints: None,
+                tip_mm: None,
+                visible: seen.contrast_to_noise(picture, &devices)?,
+            };
+            finish(&mut row);
+            rows.push(row);
+            Ok(())
         };
-        finish(&mut row);
-        rows.push(row);
-    };
     if let Some(vessel) = &labels.vessel {
-        add(VESSEL, vessel, &|_| {});
+        add(VESSEL, vessel, &vessel.without(&devices)?, &|_| {})?;
     }
     for (device, &(instrument, name)) in labels.devices.iter().zip(drawn) {
         let category = if pushed.is_coil(instrument) {
@@ -165,21 +179,21 @@ pub(super) fn annotations(
         } else {
             CATHETER
         };
-        add(category, &device.mask, &|row| {
+        add(category, &device.mask, &device.mask, &|row| {
             row.instrument = Some(name.to_owned());
             let tip = keypoint(device, labels.size_px);
             (row.keypoints, row.num_keypoints) = (Some(tip), Some(u32::from(tip[2] > 0.0)));
             row.tip_mm = device.tip_mm;
-        });
+        })?;
         for part in &device.parts {
-            add(PART, &part.mask, &|row| {
+            add(PART, &part.mask, &part.mask, &|row| {
                 row.instrument = Some(name.to_owned());
                 row.part = pushed.part_name(instrument, part.number).map(str::to_owned);
                 row.material = Some(part.material.name().to_owned());
-            });
+            })?;
         }
     }
-    rows
+    Ok(rows)
 }
 
 /// The tip as a keypoint, if it is in the picture.

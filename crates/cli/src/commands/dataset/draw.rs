@@ -16,6 +16,7 @@ pub(super) enum What {
     Width,
     Scatter,
     Contrast,
+    Split,
 }
 
 /// Random numbers for a place in a dataset.

@@ -9,6 +9,7 @@ mod course;
 mod draw;
 mod shot;
 mod spec;
+mod split;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -28,6 +29,7 @@ use coco::{Annotation, Category, ImageRow, categories};
 use course::Course;
 use shot::Part;
 use spec::{NOT_DRAWN, Spec};
+use split::splits;
 
 /// Annotations of all pictures.
 #[derive(Debug, Serialize)]
@@ -110,7 +112,10 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     bar.finish_and_clear();
     let drawing_time_s = start.elapsed().as_secs_f64();
 
-    let unconverged = join(folder, shots, &provenance).map_err(Failure::into_computation)?;
+    let of_scene = splits(&vessels(args, &spec)?, spec.seed);
+    let poses_of_scene = spec.devices.len().max(1) * spec.poses;
+    let split = |shot: usize| of_scene[shot / poses_of_scene];
+    let unconverged = join(folder, shots, &provenance, split).map_err(Failure::into_computation)?;
     let each = spec.moments * spec.views();
     let drawn = open.len() * each;
     let written = Written {
@@ -146,6 +151,18 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+/// The vessel of each scene, by the file that it is made of.
+fn vessels(args: &DatasetArgs, spec: &Spec) -> Result<Vec<String>, Failure> {
+    // Settings of parts refer to devices, which are no anatomy.
+    let settings = if spec.devices.is_empty() { args.set.set.as_slice() } else { &[] };
+    let vessel = |file: &PathBuf| {
+        let scene = scenes::read(file, settings)?;
+        let of = scene.vessel.file.as_ref().or(scene.vessel.tree.as_ref());
+        Ok(of.map_or_else(|| file.clone(), |of| scene.resolve(of)).display().to_string())
+    };
+    spec.scenes.iter().map(vessel).collect()
 }
 
 /// Provenance of the dataset.
@@ -227,13 +244,20 @@ fn taken(folder: &Path) -> Option<PathBuf> {
 }
 
 /// Writes the annotations of all shots; returns the number of pictures of steps that did not converge.
-fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<usize, Failure> {
+fn join(
+    folder: &Path,
+    shots: usize,
+    provenance: &Provenance,
+    split: impl Fn(usize) -> &'static str,
+) -> Result<usize, Failure> {
     let info = Info { description: "endowire: simulated fluoroscopy", provenance: provenance.clone() };
     let mut document = Document { info, images: vec![], categories: categories(), annotations: vec![] };
-    for path in (0..shots).map(|shot| shot::list(folder, shot)) {
-        let part = Part::read(&path).ok_or_else(|| {
+    for shot in 0..shots {
+        let path = shot::list(folder, shot);
+        let mut part = Part::read(&path).ok_or_else(|| {
             Failure::Computation(format!("{}: is not there any more; run the command again", path.display()))
         })?;
+        part.images.iter_mut().for_each(|image| split(shot).clone_into(&mut image.split));
         document.images.extend(part.images);
         document.annotations.extend(part.annotations);
     }

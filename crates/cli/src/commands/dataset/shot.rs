@@ -87,10 +87,12 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
             image.write_png(folder.join(&file_name))?;
             let path = folder.join(&arrays);
             write_arrays(&path, &label_arrays(&labels)).map_err(|e| Failure::write(&path, &e))?;
-            part.annotations.extend(annotations(id, &labels, &pushed, &drawn));
+            part.annotations.extend(annotations((id, &image), &labels, &pushed, &drawn)?);
             let angles = view.c_arm.angles_deg();
             part.images.push(ImageRow {
                 id,
+                pose: shot,
+                split: String::new(),
                 file_name,
                 arrays,
                 width: image.width(),

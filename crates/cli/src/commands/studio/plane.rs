@@ -20,8 +20,9 @@ pub(super) struct Plane {
     exposure: Option<Exposure>,
     /// Devices in the first frame, which the masks of a rotating C-arm show.
     first: Option<Vec<DeviceView>>,
-    /// Its frames, if they are kept.
+    /// Its frames, if they are kept, and the mask of those that are not subtracted yet.
     series: Vec<Image>,
+    mask: Option<Image>,
 }
 
 impl Plane {
@@ -31,7 +32,16 @@ impl Plane {
         let plane = |(spec, ending): (ViewSpec, &'static str)| {
             let renderer = Renderer::of_wall(&spec, wall)?;
             let arm = renderer.c_arm().cloned();
-            Ok(Self { ending, renderer, start: spec.c_arm, arm, exposure: None, first: None, series: vec![] })
+            Ok(Self {
+                ending,
+                renderer,
+                start: spec.c_arm,
+                arm,
+                exposure: None,
+                first: None,
+                series: vec![],
+                mask: None,
+            })
         };
         spec.planes().into_iter().zip(endings).map(plane).collect()
     }
@@ -48,10 +58,18 @@ impl Plane {
         }
     }
 
-    /// Keeps a frame for DICOM.
+    /// Keeps a frame for DICOM; of a subtraction, what was read with its mask, unless the C-arm turns, where each
+    /// frame has its own.
     pub(super) fn keep(&mut self, frame: Image) {
         self.exposure = self.exposure.or(self.renderer.exposure());
-        self.series.push(frame);
+        let still = self.first.is_none();
+        match self.renderer.unsubtracted().filter(|_| still) {
+            Some([mask, read]) => {
+                self.mask.get_or_insert(mask);
+                self.series.push(read);
+            }
+            None => self.series.push(frame),
+        }
     }
 
     /// DICOM attributes of the frames, which rotate by `turn_deg` from one to the next.
@@ -64,6 +82,7 @@ impl Plane {
             exposure: self.exposure.ok_or_else(none)?,
             pace: pace.clone(),
             mode: spec.xray.mode,
+            mask: self.mask.as_ref(),
             contrast: !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0,
             description: "endowire",
         })
