@@ -125,7 +125,7 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
         assert_eq!(category.get("skeleton").is_some(), tip.is_some());
     }
     let poses: BTreeSet<u64> = images.iter().map(|image| image["pose"].as_u64().unwrap()).collect();
-    assert!(poses.len() > 1 && images.len() % poses.len() == 0, "{poses:?}");
+    assert!(poses.len() > 1 && images.len().is_multiple_of(poses.len()), "{poses:?}");
     // What is large and dense is seen, and no label stands out by more than pictures have of grey levels.
     let seen: Vec<f64> = annotations.iter().filter_map(|row| row["visible"].as_f64()).collect();
     assert!(seen.len() * 10 > annotations.len() * 9 && seen.iter().all(|cnr| (0.0..256.0).contains(cnr)));

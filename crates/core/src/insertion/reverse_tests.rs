@@ -80,10 +80,10 @@ fn backwards_and_forwards_are_the_same() {
         for (parameter, back) in by.iter().zip(&back.by) {
             match *parameter {
                 Parameter::Advance { instrument } => {
-                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0)
+                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0);
                 }
                 Parameter::Rotation { instrument } => {
-                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1)
+                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1);
                 }
                 _ => {}
             }
