@@ -17,7 +17,7 @@ use crate::report::StepReport;
 /// number of parameters, at the cost of a part of a step. `len` is the number of commands.
 #[pyclass(frozen, module = "endowire", name = "Recorded")]
 pub(crate) struct Recorded {
-    inner: Mutex<insertion::Recording>,
+    inner: Mutex<insertion::Recorded>,
     passed: Vec<methods::Passed>,
 }
 
@@ -29,7 +29,7 @@ pub(crate) struct Pulled {
 }
 
 impl Recorded {
-    pub(crate) fn new(inner: insertion::Recording) -> Self {
+    pub(crate) fn new(inner: insertion::Recorded) -> Self {
         let passed = inner.passed().to_vec();
         Self { inner: Mutex::new(inner), passed }
     }

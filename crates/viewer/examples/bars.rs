@@ -29,10 +29,13 @@ const BREATH: u32 = 60;
 const COIL_MM: f64 = 1000.0;
 const SAC_MM: f64 = 5.0;
 
+/// Measures the time of a picture, ms.
+type Measured = fn() -> Result<f64>;
+
 fn main() -> Result<ExitCode> {
     let wanted = std::env::args().nth(1).unwrap_or_default();
     let mut held = true;
-    let bars: [(&str, f64, fn() -> Result<f64>); 4] = [
+    let bars: [(&str, f64, Measured); 4] = [
         ("a new pose, body and medium that flows", NEW_POSE_MS, new_pose_ms),
         ("a device that moves in a body that breathes", MOVING_DEVICE_MS, || moving_device_ms(BREATH)),
         ("the same in its first breath", FIRST_BREATH_MS, || moving_device_ms(0)),

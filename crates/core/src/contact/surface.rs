@@ -132,7 +132,7 @@ impl ContactSurface {
         store: &dyn WallStore,
         tuning: &ContactTuning,
     ) -> Result<Self> {
-        let mesh = ContactMesh::tuned(wall, (thinnest_mm, thickest_mm), properties, store, tuning)?;
+        let mesh = ContactMesh::tuned(wall, thickest_mm, properties, store, tuning)?;
         let (reach_mm, source) = (mesh.reach_mm, Source::Mesh(Box::new(mesh)));
         Ok(Self { source, thinnest_mm, reach_mm, tuning: *tuning })
     }

@@ -8,7 +8,7 @@ mod gradient_tests;
 mod mark;
 mod nodes;
 mod packing;
-mod recording;
+mod recorded;
 #[cfg(test)]
 mod reverse_tests;
 mod script;
@@ -25,7 +25,7 @@ pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use nodes::nodes_from_tip;
 pub use packing::Packing;
-pub use recording::Recording;
+pub use recorded::Recorded;
 pub use script::{
     Condition, Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
     script_commands,

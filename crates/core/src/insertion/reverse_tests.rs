@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::gradient_tests::{Numbers, SCENES, parameters, simulation, then_s};
-use super::{Move, Recording, Simulation};
+use super::{Move, Recorded, Simulation};
 use crate::Vec3;
 use crate::methods::{Parameter, Weights};
 
@@ -23,7 +23,7 @@ fn before(scene: usize, seed: u64, commands: usize) -> (Simulation, Vec<Vec<Move
 }
 
 /// Weights of all that commands lead to.
-fn weights(recording: &Recording, instruments: usize) -> Vec<Weights> {
+fn weights(recording: &Recorded, instruments: usize) -> Vec<Weights> {
     let mut numbers = Numbers(5);
     let mut number = || numbers.between([-1.0, 1.0]);
     let mut vector = || Vec3::new(number(), number(), number());
@@ -91,7 +91,7 @@ fn backwards_and_forwards_are_the_same() {
     }
 }
 
-fn first(recording: &Recording, weights: &[Weights], instrument: usize) -> (f64, f64) {
+fn first(recording: &Recorded, weights: &[Weights], instrument: usize) -> (f64, f64) {
     let hand = recording.vjp(weights, &[]).unwrap().hands[0][instrument];
     (hand.advance_mm, hand.rotate_rad)
 }

@@ -245,9 +245,10 @@ fn a_step_that_is_not_the_next_one_of_the_simulation_is_refused() {
     recorder.record(&moves, 2.0, &simulation.clone()).unwrap();
     assert_eq!(recorder.steps(), 2);
     // Motion that was left over belongs to the hands until it is dropped.
-    simulation.tick(&moves, 1, None).unwrap();
+    let far = [Move { instrument: 0, command: Command::advance(120.0) }];
+    simulation.tick(&far, 1, None).unwrap();
     assert!(simulation.report().is_under_way());
-    recorder.record(&moves, 3.0, &simulation).unwrap();
+    recorder.record(&far, 3.0, &simulation).unwrap();
     simulation.forget();
     step(&mut simulation);
     recorder.record(&moves, 4.0, &simulation).unwrap();

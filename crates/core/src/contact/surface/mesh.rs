@@ -38,46 +38,38 @@ const OVER: (u32, f64) = (6, 0.5);
 /// Coverage below which the flat triangles contribute.
 const COVERED: f64 = 0.15;
 
-/// `wall` as a uniform mesh for devices down to this radius, mm, or unchanged if it is to be felt as it is meshed.
-fn even<'a>(
-    wall: &'a Wall,
-    thinnest_mm: f64,
-    properties: &WallProperties,
-    store: &dyn WallStore,
-) -> Result<Cow<'a, Wall>> {
+/// `wall` as a uniform mesh, or unchanged if it is to be felt as it is meshed.
+fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
     if properties.deviation_mm == 0.0 {
         return Ok(Cow::Borrowed(wall));
     }
-    // A power of two: devices that are about as thick share a stored mesh.
-    let least_radius_mm = libm::ldexp(1.0, libm::ilogb(thinnest_mm));
-    let options =
-        Conditioning { deviation_mm: properties.deviation_mm, least_radius_mm, ..Conditioning::default() };
+    let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
     store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
 }
 
 impl ContactMesh {
-    /// Prepares `wall` for devices of this radius, mm, with its uniform mesh from `store`.
+    /// Prepares `wall` for devices up to this radius, mm, with its uniform mesh from `store`.
     ///
     /// # Errors
     /// If the wall has no triangles left to query.
     pub fn new(
         wall: &Wall,
-        radius_mm: f64,
+        thickest_mm: f64,
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        Self::tuned(wall, (radius_mm, radius_mm), properties, store, &ContactTuning::DEFAULT)
+        Self::tuned(wall, thickest_mm, properties, store, &ContactTuning::DEFAULT)
     }
 
-    /// As [`Self::new`], for devices with these smallest and largest radii, mm, with these numbers.
+    /// As [`Self::new`], with these numbers.
     pub(super) fn tuned(
         wall: &Wall,
-        (thinnest_mm, thickest_mm): (f64, f64),
+        thickest_mm: f64,
         properties: &WallProperties,
         store: &dyn WallStore,
         tuning: &ContactTuning,
     ) -> Result<Self> {
-        let surface = extended(&*even(wall, thinnest_mm, properties, store)?, thickest_mm);
+        let surface = extended(&*even(wall, properties, store)?, thickest_mm);
         let surface = Wall::welded(&surface)?;
         let smooth = SmoothWall::new(&surface, thickest_mm);
         let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };

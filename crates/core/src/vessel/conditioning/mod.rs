@@ -58,33 +58,23 @@ pub struct Conditioning {
     pub deviation_mm: f64,
     /// Target for the largest number of triangles; edges get longer instead.
     pub most_triangles: usize,
-    /// Radius, mm, of the thinnest device: no device is in a narrower passage, which is meshed as if it were that wide. 0 for any device.
-    pub least_radius_mm: f64,
 }
 
 impl Default for Conditioning {
     fn default() -> Self {
-        Self { deviation_mm: 0.1, most_triangles: 400_000, least_radius_mm: 0.0 }
+        Self { deviation_mm: 0.1, most_triangles: 400_000 }
     }
 }
 
 impl Conditioning {
     fn wanted(&self) -> Wanted {
-        Wanted {
-            deviation_mm: self.deviation_mm,
-            most_triangles: self.most_triangles,
-            least_radius_mm: self.least_radius_mm,
-        }
+        Wanted { deviation_mm: self.deviation_mm, most_triangles: self.most_triangles }
     }
 
     fn check(&self) -> Result<()> {
         if !(self.deviation_mm > 0.0 && self.deviation_mm.is_finite()) {
             let remedy = "must be positive: how far the wall may be moved, in mm";
             return Err(Error::parameter("deviation_mm", self.deviation_mm, remedy));
-        }
-        if !(self.least_radius_mm >= 0.0 && self.least_radius_mm.is_finite()) {
-            let remedy = "must be 0 or positive: the radius of the thinnest device, in mm";
-            return Err(Error::parameter("least_radius_mm", self.least_radius_mm, remedy));
         }
         if self.most_triangles == 0 {
             return Err(Error::parameter("most_triangles", 0, "must be positive"));

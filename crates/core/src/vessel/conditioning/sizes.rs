@@ -61,6 +61,8 @@ const RAYS: usize = 20_000;
 const SKIP: f64 = 1e-5;
 /// Smallest radius relative to the median of all: a smaller chord is that of a fold.
 const LEAST_RADIUS: f64 = 0.3;
+/// Radius below which no device passes, mm: a narrower passage, as beside a plug or a membrane, is meshed as if it were that wide.
+const LEAST_RADIUS_MM: f64 = 0.125;
 /// Triangles of edge h cover √3/4 h² each.
 const COVER: f64 = 0.433;
 
@@ -69,7 +71,6 @@ const COVER: f64 = 0.433;
 pub(super) struct Wanted {
     pub(super) deviation_mm: f64,
     pub(super) most_triangles: usize,
-    pub(super) least_radius_mm: f64,
 }
 
 /// Sets radius, limit and target length of all vertices. `curvature` is that of the surface so far, 1/mm, or empty at
@@ -158,8 +159,7 @@ fn cast(corners: &mut Corners, reference: &Reference, wanted: Wanted) -> Vec<f64
     let mut sorted: Vec<f64> = live.iter().map(|&v| radius[v as usize]).filter(|r| r.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.5 * size_mm);
-    let least =
-        (LEAST_RADIUS * median).max(wanted.least_radius_mm).max(1e-6 * size_mm).max(f64::MIN_POSITIVE);
+    let least = (LEAST_RADIUS * median).max(LEAST_RADIUS_MM).max(1e-6 * size_mm).max(f64::MIN_POSITIVE);
     for &v in &live {
         let r = radius[v as usize];
         corners.vertices[v as usize].radius_mm = if r.is_finite() { r.max(least) } else { median.max(least) };

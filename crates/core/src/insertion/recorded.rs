@@ -9,7 +9,7 @@ use crate::{Error, Result};
 ///
 /// A sum of what they lead to, each number with a weight, is differentiated by the reverse pass: at the cost of a part of a step, whatever the
 /// number of parameters.
-pub struct Recording {
+pub struct Recorded {
     simulation: Simulation,
     tape: Box<dyn Tape>,
 }
@@ -23,18 +23,18 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::gradients_until`], but those of parameters; no command.
-    pub fn record(&self, commands: &[Vec<Move>], times_s: &[f64]) -> Result<Recording> {
+    pub fn record(&self, commands: &[Vec<Move>], times_s: &[f64]) -> Result<Recorded> {
         self.check_times((commands, times_s))?;
         if commands.is_empty() {
             return Err(Error::parameter("record.commands", 0, "give one or more"));
         }
         let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
         let tape = self.method.record(&surroundings!(self, self.time_s), (commands, times_s), &checked)?;
-        Ok(Recording { simulation: self.clone(), tape })
+        Ok(Recorded { simulation: self.clone(), tape })
     }
 }
 
-impl Recording {
+impl Recorded {
     /// What the commands led to, one after the other.
     pub fn passed(&self) -> &[Passed] {
         self.tape.passed()
@@ -54,10 +54,10 @@ impl Recording {
         self.pull(weights, by, true)
     }
 
-    /// As [`Recording::vjp`], without the derivatives by the hands of commands after the first, of which [`Pulled::hands`] is empty.
+    /// As [`Recorded::vjp`], without the derivatives by the hands of commands after the first, of which [`Pulled::hands`] is empty.
     ///
     /// # Errors
-    /// As [`Recording::vjp`].
+    /// As [`Recorded::vjp`].
     pub fn vjp_by(&self, weights: &[Weights], by: &[Parameter]) -> Result<Pulled> {
         self.pull(weights, by, false)
     }
@@ -76,7 +76,7 @@ impl Recording {
     /// Changes of what each command leads to for small changes of parameters, each so much: the product J dp, in the order of weights.
     ///
     /// # Errors
-    /// As [`Recording::vjp`].
+    /// As [`Recorded::vjp`].
     pub fn jvp(&self, along: &[(Parameter, f64)]) -> Result<Vec<Weights>> {
         Parameter::check_each_once(along.iter().map(|(parameter, _)| parameter))?;
         let simulation = &self.simulation;
