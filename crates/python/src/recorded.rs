@@ -90,7 +90,7 @@ impl Recorded {
     /// The report of command `k`, counted from the end if negative.
     ///
     /// Raises InputError for a command that there is not.
-    #[pyo3(signature = (k=-1))]
+    #[pyo3(signature = (k=-1), text_signature = "($self, k=-1)")]
     fn report(&self, k: isize) -> PyResult<StepReport> {
         Ok(StepReport::new(self.passed(k)?.report.clone()))
     }
@@ -98,7 +98,7 @@ impl Recorded {
     /// Positions of the nodes after command `k`, mm, shape (n, 3).
     ///
     /// Raises InputError for a command that there is not.
-    #[pyo3(signature = (k=-1))]
+    #[pyo3(signature = (k=-1), text_signature = "($self, k=-1)")]
     fn positions_mm<'py>(&self, py: Python<'py>, k: isize) -> PyResult<Bound<'py, PyArray2<f64>>> {
         points(py, self.passed(k)?.shape.positions_mm.iter().copied())
     }

@@ -61,8 +61,8 @@ const RAYS: usize = 20_000;
 const SKIP: f64 = 1e-5;
 /// Smallest radius relative to the median of all: a smaller chord is that of a fold.
 const LEAST_RADIUS: f64 = 0.3;
-/// Radius below which no device passes, mm: a narrower passage, as beside a plug or a membrane, is meshed as if it were that wide.
-const LEAST_RADIUS_MM: f64 = 0.125;
+/// Radius that few devices pass, mm: a narrower passage, as beside a plug or a membrane, is meshed as if it were that wide.
+const LEAST_RADIUS_MM: f64 = 0.2;
 /// Triangles of edge h cover √3/4 h² each.
 const COVER: f64 = 0.433;
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy, check};
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall, anatomy, check};
 
 fn conditioned(mesh: &SurfaceMesh) -> Conditioned<'_> {
     condition(mesh, &Conditioning::default()).unwrap()
@@ -192,17 +192,27 @@ fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
     mesh
 }
 
-#[test]
-fn passages_that_no_device_enters_are_meshed_as_wider_ones() {
-    // A box in a box: a gap on one side, and room on the others.
-    let count = |gap_mm: f64| {
-        let mut inner = cuboid(Vec3::new(gap_mm, 3.0, 3.0), Vec3::new(5.0, 5.0, 5.0), 1.5);
-        inner.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        let both = joined(&cuboid(Vec3::zeros(), Vec3::new(12.0, 11.0, 11.0), 2.0), &inner);
-        conditioned(&both).mesh.triangles.len() as f64
+/// A closed tube along z from `from_mm` on.
+fn closed_tube(from_mm: f64, length_mm: f64, radius_mm: f64) -> SurfaceMesh {
+    let node = |z_mm: f64, parent: Option<usize>| CentrelineNode {
+        position_mm: Vec3::z() * z_mm,
+        radius_mm,
+        parent,
     };
-    let [tight, tighter, wide] = [0.12, 0.06, 0.5].map(count);
-    assert!((tighter / tight - 1.0).abs() < 0.2 && wide < 0.8 * tight, "{tighter} {tight} {wide}");
+    let tree = CentrelineTree::new(vec![node(from_mm, None), node(from_mm + length_mm, Some(0))]).unwrap();
+    GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap().wall.closed_mesh()
+}
+
+#[test]
+fn passages_that_few_devices_pass_are_meshed_as_wider_ones() {
+    let count = |gap_mm: f64| {
+        let mut plug = closed_tube(6.0, 5.0, 2.0 - gap_mm);
+        plug.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        conditioned(&joined(&closed_tube(0.0, 16.0, 2.0), &plug)).mesh.triangles.len()
+    };
+    let counts = [0.1, 0.2, 0.3].map(count);
+    let (least, most) = (counts[0].min(counts[1]).min(counts[2]), counts[0].max(counts[1]).max(counts[2]));
+    assert!(most < 2 * least, "{counts:?}");
 }
 
 #[test]
