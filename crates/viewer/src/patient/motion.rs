@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_breath_is_in_half_way_and_a_held_one_never() {
-        let torso = TorsoSpec::default();
+        let torso = TorsoSpec { beat_mm: 4.0, ..TorsoSpec::default() };
         let rhythm = Rhythm::new(&torso, &FlowSpec::default()).unwrap();
         let half_s = torso.breath_s / 2.0;
         assert!((rhythm.parts(half_s)[0] - 1.0).abs() < 1e-12);

@@ -49,7 +49,8 @@ pub struct TorsoSpec {
     pub breath_mm: f64,
     /// Duration of a breath, 1 to 60.
     pub breath_s: f64,
-    /// How far the borders of the heart go in with each beat, 0 to 15; it beats at `flow.heart_rate_per_min`.
+    /// How far the borders of the heart go in with each beat, 0 (it rests) to 15; it beats at `flow.heart_rate_per_min`. Together with a breath
+    /// its border shows lines: the two motions are drawn one beside the other.
     pub beat_mm: f64,
 }
 
@@ -67,7 +68,7 @@ impl Default for TorsoSpec {
             table_mm: None,
             breath_mm: 12.0,
             breath_s: 4.0,
-            beat_mm: 4.0,
+            beat_mm: 0.0,
         }
     }
 }

@@ -91,6 +91,9 @@ fn text_goes_on_where_its_lines_end() {
     // The end of a comment does not belong to the next line.
     is_read("a.obj", OBJ.replace("# a square", "# C:\\scans\\").as_bytes());
     is_read("a.ply", PLY.replace("0 0 0\n1 0 0\n1 1 0.5\n", "0 0 0 1 0\n0 1 1\n0.5 ").as_bytes());
+    let facet =
+        "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    is_refused("a.stl", format!("solid a\n{facet}{}", &facet[..30]).as_bytes(), "cut off");
     is_refused("a.obj", OBJ.replace("4\n", "4 \\\n").trim_end().as_bytes(), "cut off");
     // A wrong number of values must be detected.
     is_refused("a.ply", PLY.replace("0 0 0\n1 0 0\n", "0 0 0 1\n0 0\n9 ").as_bytes(), "line ");

@@ -82,6 +82,7 @@ fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
     let (mut faces, mut axes) = (Faces::default(), ToldAxes::default());
     // Number of vertices before those of the current facet.
     let mut facet: Option<usize> = None;
+    let mut is_open = false;
     for (number, line) in lines(text) {
         let mut words = line.split_whitespace().peekable();
         while let Some(word) = words.next() {
@@ -93,7 +94,10 @@ fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
                 return Err(format!(
                     "line {number}: a facet begins before the last one is closed by endfacet; mend it"
                 ));
+            } else if is("facet") {
+                is_open = true;
             } else if is("endfacet") {
+                is_open = false;
                 let first = facet.take().unwrap_or(mesh.vertices_mm.len());
                 faces.push(first as i64..mesh.vertices_mm.len() as i64, number);
             } else if is("solid") || is("endsolid") {
@@ -104,7 +108,7 @@ fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
             }
         }
     }
-    if facet.is_some() {
+    if facet.is_some() || is_open {
         return Err("the last facet is not closed: the file is cut off".into());
     }
     faces.fill(&mut mesh, |number| format!("line {number}"))?;

@@ -20,8 +20,18 @@ pub(super) const THICK_MM: f64 = 0.5;
 const EDGE_MM: f64 = 0.6;
 /// Volume over area to the power of 3/2 (a ball: 0.094) below which a body is flat.
 const PLATE: f64 = 0.03;
-/// Number of triangles of a piece that are asked for being in the lumen.
-const ASKED: usize = 16;
+/// Most triangles of a piece that are asked for being in the lumen.
+const ASKED: usize = 64;
+/// Part of the number of triangles from one that is asked to the next: the golden ratio, of which no multiple is near a whole number.
+/// Triangles are often in rows, and one of every few rows would be asked at the same place of it.
+const STRIDE: f64 = 0.618_033_988_749_894_9;
+
+/// The numbers of some of so many triangles, spread evenly.
+pub(super) fn some_of(count: usize) -> impl Iterator<Item = usize> {
+    let asked = count.min(ASKED);
+    (0..asked)
+        .map(move |k| if asked == count { k } else { ((k as f64 * STRIDE).fract() * count as f64) as usize })
+}
 
 /// What a piece in the lumen is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,11 +80,9 @@ impl LumenOf {
         }
         let share = |piece: &usize| {
             let all = &triangles[piece];
-            let every = (all.len() / ASKED).max(1);
-            let asked: Vec<usize> = all.iter().copied().skip(every / 2).step_by(every).collect();
             let middle = |t: usize| mesh.corners(t).iter().sum::<Vec3>() / 3.0;
-            let inside = asked.iter().filter(|t| self.holds(&middle(**t))).count();
-            inside as f64 / asked.len().max(1) as f64
+            let inside = some_of(all.len()).filter(|k| self.holds(&middle(all[*k]))).count();
+            inside as f64 / some_of(all.len()).count().max(1) as f64
         };
         pieces.iter().map(share).collect()
     }

@@ -215,8 +215,9 @@ impl Overlaps {
 
     /// Some pieces as one surface; `None` if that fails.
     ///
-    /// Vessels that end are united first, then closed pieces, the largest first: one of which most lies in what is there is
-    /// a body that stands in the wall, and is taken off at the end; any other is a part of the lumen, such as a sac.
+    /// Vessels that end are united first, then closed pieces, the largest first: one of which most lies in what is there, or
+    /// that is a ring, is a body that stands in the wall, and is taken off at the end; any other is a part of the lumen, such as
+    /// a sac.
     fn united(&self, mesh: &SurfaceMesh, members: &[u32]) -> Option<United> {
         let mut order = members.to_vec();
         let volume_mm3 = |p: &u32| self.pieces[*p as usize].volume_mm3.abs();
@@ -224,12 +225,13 @@ impl Overlaps {
         order.sort_by(|a, b| {
             is_closed(a).cmp(&is_closed(b)).then(volume_mm3(b).total_cmp(&volume_mm3(a))).then(a.cmp(b))
         });
-        let solid = |p: u32| Solid::new(&self.closed(mesh, p, self.pieces[p as usize].is_body()));
-        let mut whole = solid(*order.first()?)?;
+        let closed = |p: u32| self.closed(mesh, p, self.pieces[p as usize].is_body());
+        let mut whole = Solid::new(&closed(*order.first()?))?;
         let mut bodies = Vec::new();
         for p in order.drain(1..) {
-            let next = solid(p)?;
-            let stands_in_wall = || whole.common_mm3(&next) >= MOSTLY * next.volume_mm3();
+            let piece = closed(p);
+            let next = Solid::new(&piece)?;
+            let stands_in_wall = || piece.is_ring() || whole.common_mm3(&next) >= MOSTLY * next.volume_mm3();
             if is_closed(&p) && (self.pieces[p as usize].is_body() || stands_in_wall()) {
                 bodies.push((p, next));
             } else {

@@ -114,6 +114,38 @@ fn a_body_in_the_wall_is_taken_off() {
     }
 }
 
+/// Rings that pierce the wall all round are no parts of the lumen, however much of them is outside.
+#[test]
+fn rings_in_the_wall_are_taken_off() {
+    let ring = |around_mm: f64, radius_mm: f64| {
+        let (around, across) = (32, 12);
+        let at = |i: usize, j: usize| {
+            let [a, b] =
+                [(i, around), (j, across)].map(|(k, of)| std::f64::consts::TAU * k as f64 / of as f64);
+            let out = around_mm + radius_mm * b.cos();
+            Vec3::new(out * a.cos(), out * a.sin(), 40.0 + radius_mm * b.sin())
+        };
+        let vertices_mm = (0..around).flat_map(|i| (0..across).map(move |j| at(i, j))).collect();
+        let number = |i: usize, j: usize| (across * (i % around) + j % across) as u32;
+        let square = |i: usize, j: usize| {
+            let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        };
+        let triangles = (0..around).flat_map(|i| (0..across).flat_map(move |j| square(i, j))).collect();
+        SurfaceMesh { vertices_mm, triangles }
+    };
+    let empty = Wall::from_surface(&trunk_with(&[])).unwrap().volume_mm3();
+    for (around_mm, radius_mm) in [(4.6, 0.6), (4.9, 0.6), (5.1, 0.8), (5.0, 2.0), (5.5, 1.5)] {
+        let wall = Wall::from_surface(&trunk_with(&[ring(around_mm, radius_mm)])).unwrap();
+        let report = wall.report();
+        assert_eq!((report.bodies_in_wall, report.parts_united), (1, 0), "{around_mm}: {:?}", report.notes());
+        assert_eq!(report.pieces_dropped, 0, "{around_mm}: {:?}", report.notes());
+        assert!(wall.volume_mm3() < 0.998 * empty, "{around_mm}");
+        assert!(!wall.contains(&Vec3::new(around_mm.min(4.9), 0.0, 40.0)).unwrap(), "{around_mm}");
+        assert!(wall.contains(&(Vec3::z() * 40.0)).unwrap(), "{around_mm}");
+    }
+}
+
 #[test]
 fn vessels_that_graze_each_other_stay_two() {
     let mesh = trunk_with(&[branch([-40.0, 6.8, 40.0], [40.0, 6.8, 40.0], 2.0)]);

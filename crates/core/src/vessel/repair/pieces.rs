@@ -24,8 +24,7 @@ const SHEET: f64 = 0.3;
 const FEWEST: usize = 8;
 /// Smallest ratio of the areas of the inner and the outer skin.
 const SKIN: f64 = 0.15;
-/// Number of triangles of an inner piece tested for being inside, and how many must be.
-const ASKED: usize = 16;
+/// Part of the triangles of an inner piece that must be inside, of those that are asked.
 const INSIDE: f64 = 0.8;
 /// The same for sheets, of which the rest may stick out through the wall.
 const HALF: f64 = 0.5;
@@ -103,7 +102,7 @@ pub(in crate::vessel) fn nested_and_apart(mesh: &SurfaceMesh, table: &EdgeTable)
     order.truncate(MOST);
     let lies_in = |inner: usize, outer: usize| {
         let (a, b) = (&pieces[inner], &pieces[outer]);
-        a.may_be_in(b) && is_inside(mesh, &piece_of, inner, outer, a.triangles)
+        a.may_be_in(b) && is_inside(mesh, &piece_of, inner, outer)
     };
     let closed: Vec<usize> = (1..order.len()).filter(|rank| pieces[order[*rank]].loops == 0).collect();
     let is_nested = |rank: &&usize| order[..**rank].iter().any(|outer| lies_in(order[**rank], *outer));
@@ -202,7 +201,7 @@ fn inner(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece], small: &[us
         let p = order[rank];
         let lies_in = |outer: &usize| {
             let (a, b) = (&pieces[p], &pieces[*outer]);
-            a.may_be_content_of(b) && is_inside(mesh, piece_of, p, *outer, a.triangles)
+            a.may_be_content_of(b) && is_inside(mesh, piece_of, p, *outer)
         };
         let vessels = order[..rank].iter().filter(|outer| inner[**outer].is_none());
         if vessels.into_iter().any(lies_in) {
@@ -299,7 +298,7 @@ fn drop_skins(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], pieces: &
             alike
                 && b.may_be_in(a)
                 && reaches_openings(mesh, table, piece_of, inner, outer)
-                && is_inside(mesh, piece_of, inner, outer, b.triangles)
+                && is_inside(mesh, piece_of, inner, outer)
         });
         if holds {
             pieces[outer].gone = true;
@@ -331,16 +330,16 @@ fn reaches_openings(
 }
 
 /// Whether most of piece `inner` is inside piece `outer`, closed by its caps.
-fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize, triangles: usize) -> bool {
+fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize) -> bool {
     let of = |p: usize| (0..piece_of.len()).filter(move |t| piece_of[*t] as usize == p);
     let mut shell = SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: Vec::new() };
     shell.triangles.extend(of(outer).map(|t| mesh.triangles[t]));
     let openings = opening::boundary(&shell, &EdgeTable::new(&shell.triangles)).openings;
     let caps: Vec<[Vec3; 3]> = openings.iter().flat_map(|o| o.cap(&shell).collect::<Vec<_>>()).collect();
-    let every = (triangles / ASKED).max(1);
+    let own: Vec<usize> = of(inner).collect();
     let (mut asked, mut within) = (0.0, 0.0);
-    for t in of(inner).skip(every / 2).step_by(every) {
-        let at = mesh.corners(t).iter().sum::<Vec3>() / 3.0;
+    for k in contents::some_of(own.len()) {
+        let at = mesh.corners(own[k]).iter().sum::<Vec3>() / 3.0;
         asked += 1.0;
         within += f64::from(u8::from(inside::winding(&shell, &caps, &at).abs() > 0.5));
     }
