@@ -94,7 +94,8 @@ fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
                 return Err(format!(
                     "line {number}: a facet begins before the last one is closed by endfacet; mend it"
                 ));
-            } else if is("facet") {
+            } else if is("facet") && words.peek().is_some_and(|word| word.eq_ignore_ascii_case("normal")) {
+                // Otherwise it may be a word of a name.
                 is_open = true;
             } else if is("endfacet") {
                 is_open = false;
