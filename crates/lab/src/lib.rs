@@ -1,5 +1,5 @@
 //! The laboratory: reference cases with exact or independently computed solutions (`endowire verify`), methods [compared](compare) with
-//! each other, [bench] tests of devices, and studies of [evidence].
+//! each other, [bench](mod@bench) tests of devices, and studies of [evidence].
 //!
 //! Each case is data and a function, independent of the solver's results. Further modules are the [`stress`] tests of
 //! rods and of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]) and

@@ -156,7 +156,7 @@ impl StepRow {
 /// The rows of the table of a recording.
 ///
 /// # Errors
-/// [`Error::Content`] for a table that is missing, or has a row that is none.
+/// [`Error::Content`](endowire_core::Error::Content) for a table that is missing, or has a row that is none.
 pub fn read_steps(folder: &Path) -> Result<Vec<StepRow>> {
     table::read(&folder.join(STEPS))
 }

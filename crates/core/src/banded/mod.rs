@@ -1,6 +1,6 @@
 //! Matrices that couple only neighbouring nodes, and their factorisations.
 //!
-//! [`matrix`] holds symmetric block tridiagonal matrices; [`ldlt`] factors them without pivoting and reports their
+//! `matrix` holds symmetric block tridiagonal matrices; `ldlt` factors them without pivoting and reports their
 //! inertia.
 
 /// Repeats a block for every index below `$end` ≤ 12 at compile time: loops whose bounds depend on another index

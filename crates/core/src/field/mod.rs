@@ -19,7 +19,7 @@
 //!
 //! where derivatives by the tangent do not assume unit length: |r′| = 1 holds only to the order of the element.
 //!
-//! [`FieldLoad`] is the energy that a solver takes: `Simulation` and `StaticProblem` construct it themselves.
+//! `FieldLoad` is the energy that a solver takes: `Simulation` and `StaticProblem` construct it themselves.
 
 mod load;
 mod magnet;

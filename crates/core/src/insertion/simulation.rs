@@ -155,7 +155,7 @@ impl Simulation {
     /// The linear solves ([`StepReport::solves`]) after which a command of these moves ends, done or not, with what
     /// earlier ones have left over ([`StepReport::behind`]); a tick ends after its own, if those are fewer. The Newton
     /// iteration in progress is finished. They follow from the motion alone
-    /// ([`StepTuning::most_solves`](crate::tuning::StepTuning::most_solves)). `None` for methods other than
+    /// (`StepTuning::most_solves`). `None` for methods other than
     /// `kirchhoff`, whose commands always go to their end.
     pub fn most_solves(&self, moves: &[Move]) -> Option<usize> {
         self.method.most_solves(moves)

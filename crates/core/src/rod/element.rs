@@ -212,7 +212,7 @@ pub(super) fn angles<S: Simd>(a: &[Lanes<S>; 3], p: &Point) -> (Lanes<S>, Lanes<
 }
 
 /// Gradient and upper triangle of the Hessian in the unknowns of the element's nodes, in the order of
-/// [`super::layout`]. N and b at the first node belong to the element before and stay empty. `T` is one number, or
+/// `super::layout`. N and b at the first node belong to the element before and stay empty. `T` is one number, or
 /// one per lane for elements side by side.
 #[derive(Debug, Clone)]
 pub struct ElementSystem<const C: usize, T = f64> {

@@ -31,7 +31,7 @@ pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> E
 }
 
 /// The element's Lagrangian with derivatives. The Hessian is computed only if `HESSIAN` is set, with the augmentation
-/// `gamma` (γ in [`super::assembly`]; 0 gives the Hessian of the Lagrangian itself).
+/// `gamma` (γ in `super::assembly`; 0 gives the Hessian of the Lagrangian itself).
 pub fn element_system<const C: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,

@@ -8,7 +8,7 @@
 //!   ½∫EI |r′×r″|²/|r′|⁵ ds · ∫|r′| ds / h                      bending (`bending`)
 //!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature (`torsion`)
 //!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist (`torsion`)
-//!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
+//!   + Σ N c − ½ D N²                                          axial (`lagrangian`)
 //!
 //! where coaxial instruments i share the centre line, EI is the sum of their stiffnesses, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂)
 //! turns with the angle of each: Σ ½EIᵢ|t′ − κᵢ⁰|² (Dupont, Lock, Itkowitz and Butler, IEEE Trans. Robotics 26(2),

@@ -464,7 +464,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// the scene has no centre line, it is computed, and stored in `store`.
     ///
     /// # Errors
-    /// As [`Script::new`], [`SceneOf::inserted_mm`], [`SceneOf::centreline`] and, if a coil is detached,
+    /// As [`Script::new`], `SceneOf::inserted_mm`, [`SceneOf::centreline`] and, if a coil is detached,
     /// [`MethodChoice::check_detach`].
     pub fn steps(&self, stack: &Stack, store: &dyn WallStore) -> Result<Script> {
         self.steps_of(&self.script, stack, store)
@@ -508,7 +508,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// The simulation at the start, with walls from `store`: only the initial lengths of instruments are inserted.
     ///
     /// # Errors
-    /// As [`SceneOf::wall`], [`SceneOf::stack`], [`SceneOf::sheath`], [`SceneOf::inserted_mm`], [`Simulation::step_together`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
+    /// As [`SceneOf::wall`], [`SceneOf::stack`], [`SceneOf::sheath`], `SceneOf::inserted_mm`, [`Simulation::step_together`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
     pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
         let lumen = self.lumen(store)?;
         let hints = |error| match &error {

@@ -1,6 +1,6 @@
 //! Newton's method on the rod's potential energy, with globalisation.
 //!
-//! [`newton`] is the iteration, [`report`] its options and results. An iteration consists of inertia and shift, step,
+//! `newton` is the iteration, `report` its options and results. An iteration consists of inertia and shift, step,
 //! line search and stopping criterion, one file each; further files hold the size of a residual, the trial state,
 //! contacts within a step, the descent from saddle points, and unsymmetric stiffness.
 

@@ -1,6 +1,6 @@
 //! Numbers of friction.
 
-/// How Coulomb's law is regularised, and when its normal forces are renewed ([`crate::contact::friction`]).
+/// How Coulomb's law is regularised, and when its normal forces are renewed (`crate::contact::friction`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionTuning {
     /// Slip below which a point sticks, as a fraction of the hand's motion, or of the device's radius if the hand rests:

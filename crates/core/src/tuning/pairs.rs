@@ -1,6 +1,6 @@
 //! Numbers of contact of rods with themselves and each other.
 
-/// How pairs of points in contact are sought, and what their gap is ([`crate::contact::pairs`]).
+/// How pairs of points in contact are sought, and what their gap is (`crate::contact::pairs`).
 ///
 /// Distances in touching distances are relative to the sum of both radii.
 #[derive(Debug, Clone, Copy, PartialEq)]

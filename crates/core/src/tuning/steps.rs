@@ -20,7 +20,7 @@ pub struct StepTuning {
     pub nearer: f64,
     /// Largest number of sub-steps of one command.
     pub substep_limit: usize,
-    /// Linear solves of a command, whatever its motion; see [`most_solves`](Self::most_solves), of which this is the
+    /// Linear solves of a command, whatever its motion; see `most_solves`, of which this is the
     /// first term. If it is `usize::MAX`, a command is not bounded.
     pub solves: usize,
     /// Further ones per millimetre and per `work_rad` of its motion.

@@ -164,10 +164,10 @@ pub(crate) fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) ->
     check_repaired(surface, unit_mm, septum_mm, &RepairOptions::default())
 }
 
-/// As [`check_with`], with other choices of what is repaired.
+/// As `check_with`, with other choices of what is repaired.
 ///
 /// # Errors
-/// As [`check_with`] and [`Wall::repaired`].
+/// As `check_with` and [`Wall::repaired`].
 pub fn check_repaired(
     surface: &SurfaceMesh,
     unit_mm: f64,
