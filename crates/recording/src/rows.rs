@@ -18,7 +18,7 @@ use crate::vessel::{PLACES, PlaceRow, UnknownRow, VESSEL};
 /// The remedy for tables that do not fit each other.
 pub(crate) const AGAIN: &str = "rows are missing, or are of another run: run the scene again (endowire run)";
 
-/// Longer lists of instruments, places or unknowns are told in short.
+/// Longer lists of instruments, places or unknowns are shortened in messages.
 const MOST_LISTED: usize = 12;
 
 /// Rows of the tables of a recording, of the same steps.

@@ -98,7 +98,7 @@ pub fn read_or<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<Vec<T>>
     read_cut(path, remedy).map(|(rows, _)| rows)
 }
 
-/// As [`read_or`]; also tells whether an incomplete last row was dropped.
+/// As [`read_or`]; also whether an incomplete last row was dropped.
 pub(crate) fn read_cut<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<(Vec<T>, bool)> {
     let refused = |what: String| Error::content(path, format!("{what}; {remedy}"));
     let mut text = std::fs::read(path).map_err(|error| refused(error.to_string()))?;

@@ -26,11 +26,18 @@ const ASKED: usize = 64;
 /// Triangles are often in rows, and one of every few rows would be asked at the same place of it.
 const STRIDE: f64 = 0.618_033_988_749_894_9;
 
-/// The numbers of some of so many triangles, spread evenly.
-pub(super) fn some_of(count: usize) -> impl Iterator<Item = usize> {
+/// The share of these triangles whose middles are where `is_there` holds, by some of them that are spread evenly.
+pub(super) fn share_of(mesh: &SurfaceMesh, triangles: &[usize], is_there: impl Fn(&Vec3) -> bool) -> f64 {
+    let count = triangles.len();
     let asked = count.min(ASKED);
-    (0..asked)
-        .map(move |k| if asked == count { k } else { ((k as f64 * STRIDE).fract() * count as f64) as usize })
+    let spread =
+        |k: usize| if asked == count { k } else { ((k as f64 * STRIDE).fract() * count as f64) as usize };
+    let there = (0..asked).filter(|k| is_there(&middle(mesh, triangles[spread(*k)]))).count();
+    there as f64 / asked.max(1) as f64
+}
+
+fn middle(mesh: &SurfaceMesh, triangle: usize) -> Vec3 {
+    mesh.corners(triangle).iter().sum::<Vec3>() / 3.0
 }
 
 /// What a piece in the lumen is.
@@ -66,8 +73,7 @@ impl LumenOf {
     /// The greatest distance of a triangle of a piece, by its middle, from the wall around this lumen, mm.
     pub(super) fn deepest_mm(&self, mesh: &SurfaceMesh, piece_of: &[u32], piece: usize) -> f64 {
         let own = (0..piece_of.len()).filter(|t| piece_of[*t] as usize == piece);
-        let middle = |t: usize| mesh.corners(t).iter().sum::<Vec3>() / 3.0;
-        own.map(|t| self.depth_mm(&middle(t))).fold(0.0, f64::max)
+        own.map(|t| self.depth_mm(&middle(mesh, t))).fold(0.0, f64::max)
     }
 
     /// How much of each of these pieces is in it, by some of their triangles.
@@ -78,13 +84,7 @@ impl LumenOf {
                 of_piece.push(t);
             }
         }
-        let share = |piece: &usize| {
-            let all = &triangles[piece];
-            let middle = |t: usize| mesh.corners(t).iter().sum::<Vec3>() / 3.0;
-            let inside = some_of(all.len()).filter(|k| self.holds(&middle(all[*k]))).count();
-            inside as f64 / some_of(all.len()).count().max(1) as f64
-        };
-        pieces.iter().map(share).collect()
+        pieces.iter().map(|piece| share_of(mesh, &triangles[piece], |x| self.holds(x))).collect()
     }
 }
 

@@ -228,7 +228,7 @@ impl Overlaps {
         let closed = |p: u32| self.closed(mesh, p, self.pieces[p as usize].is_body());
         let mut whole = Solid::new(&closed(*order.first()?))?;
         let mut bodies = Vec::new();
-        for p in order.drain(1..) {
+        for &p in &order[1..] {
             let piece = closed(p);
             let next = Solid::new(&piece)?;
             let stands_in_wall = || piece.is_ring() || whole.common_mm3(&next) >= MOSTLY * next.volume_mm3();

@@ -337,11 +337,6 @@ fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize) -
     let openings = opening::boundary(&shell, &EdgeTable::new(&shell.triangles)).openings;
     let caps: Vec<[Vec3; 3]> = openings.iter().flat_map(|o| o.cap(&shell).collect::<Vec<_>>()).collect();
     let own: Vec<usize> = of(inner).collect();
-    let (mut asked, mut within) = (0.0, 0.0);
-    for k in contents::some_of(own.len()) {
-        let at = mesh.corners(own[k]).iter().sum::<Vec3>() / 3.0;
-        asked += 1.0;
-        within += f64::from(u8::from(inside::winding(&shell, &caps, &at).abs() > 0.5));
-    }
-    within >= INSIDE * asked
+    let is_within = |x: &Vec3| inside::winding(&shell, &caps, x).abs() > 0.5;
+    contents::share_of(mesh, &own, is_within) >= INSIDE
 }
