@@ -13,7 +13,7 @@ use endowire_core::{Error, Result, Vec3};
 use endowire_lab::surfaces::Sidecar;
 use endowire_methods::Scene;
 use endowire_sweep::Sweep;
-use endowire_viewer::{CtSpec, Renderer, View, ViewSpec, read_label_map};
+use endowire_viewer::{Backend, CtSpec, Renderer, View, ViewSpec, read_label_map};
 
 fn surface(bytes: &[u8], name: &str) -> Result<()> {
     SurfaceMesh::from_bytes(bytes, Path::new(name), 1.0).map(drop)
@@ -191,7 +191,8 @@ pub fn slices(bytes: &[u8]) -> Result<()> {
 }
 
 fn rays_through(file: &Path) -> Result<()> {
-    let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [16, 12], ..ViewSpec::default() };
+    let (views, backend) = (vec![View::Fluoro], Backend::Cpu);
+    let mut spec = ViewSpec { views, backend, size_px: [16, 12], ..ViewSpec::default() };
     spec.patient.ct = Some(CtSpec { file: file.into(), offset_mm: [0.0; 3] });
     let wall = SurfaceMesh::cuboid(Vec3::zeros(), Vec3::repeat(10.0), 10.0);
     Renderer::new(&spec, &wall).and_then(|mut renderer| renderer.path_lengths(&[]).map(drop))

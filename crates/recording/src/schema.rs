@@ -50,7 +50,7 @@ const KEYS: &[(&str, &str, &str)] = &[
     ("first_unconverged_step", "integer?", "The first of them."),
     ("jumps", "integer", "Number of steps with a jump."),
     ("relaxations", "integer", "Relaxations of all steps."),
-    ("max_imbalance", "number", "Largest imbalance of any step."),
+    ("max_imbalance", "number", "Largest imbalance of any step after which the device lies still."),
     ("max_penetration_mm", "number", "Deepest penetration of the wall in any step."),
     ("max_wall_force", "object", "Largest wall forces of any step: sum_n, largest_n and tip_n."),
     ("max_turn_deg", "number", "Largest angle by which an element bends in any step."),

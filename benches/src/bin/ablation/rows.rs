@@ -36,7 +36,7 @@ const FAR: f64 = 1e30;
 type Group = (&'static str, Vec<(String, fn(&mut Tuning))>);
 
 #[allow(clippy::too_many_lines, reason = "a table")]
-fn groups() -> [Group; 14] {
+fn groups() -> [Group; 15] {
     [
         (
             "Parts of a command",
@@ -70,6 +70,22 @@ fn groups() -> [Group; 14] {
                 without!("a solution that takes many iterations", steps.most_near = 500),
                 other!(steps.most_near = 30),
                 other!(steps.most_near = 120),
+            ],
+        ),
+        (
+            "A course that yields",
+            vec![
+                without!("steps that go back", course.rises = FAR),
+                other!(course.rises = 0.1),
+                without!("steps that are halved", course.least_part = 1.0),
+                other!(course.least_part = 0.0625),
+                other!(course.narrows = 0.25),
+                other!(course.near_enough = 0.01),
+                other!(course.most_radii = 1.0),
+                other!(course.most_radii = 4.0),
+                other!(course.most_turn_rad = 0.1),
+                other!(course.most_turn_rad = 1.0),
+                without!("more work where the course yields", steps.work_of_course = 1.0),
             ],
         ),
         ("The prediction", vec![without!("what the last step changed", steps.repeats = false)]),

@@ -20,7 +20,8 @@ pub struct Tally {
     pub jumps: usize,
     /// Relaxations of all steps ([`StepReport::relaxations`](super::StepReport::relaxations)).
     pub relaxations: u64,
-    /// Largest imbalance of any step ([`StepReport::imbalance`](super::StepReport::imbalance)).
+    /// Largest imbalance of any step after which the device lies still
+    /// ([`StepReport::imbalance`](super::StepReport::imbalance)).
     pub max_imbalance: f64,
     /// Deepest penetration of the wall in any step, mm.
     pub max_penetration_mm: f64,
@@ -55,8 +56,8 @@ impl Tally {
         self.ends_under_way = report.is_under_way();
         self.jumps += usize::from(report.jumped);
         self.relaxations += u64::from(report.relaxations);
-        // A tally is written as JSON, which has no infinite numbers.
-        if report.imbalance.is_finite() {
+        // Under way forces need not balance. A tally is written as JSON, which has no infinite numbers.
+        if report.imbalance.is_finite() && !report.is_under_way() {
             self.max_imbalance = self.max_imbalance.max(report.imbalance);
         }
         self.max_penetration_mm = self.max_penetration_mm.max(report.max_penetration_mm);

@@ -10,6 +10,7 @@
 //! one and measures what becomes of hard insertions.
 
 mod contact;
+mod course;
 mod friction;
 mod mesh;
 mod newton;
@@ -18,6 +19,7 @@ mod passage;
 mod steps;
 
 pub use contact::ContactTuning;
+pub use course::CourseTuning;
 pub use friction::FrictionTuning;
 pub use mesh::MeshTuning;
 pub use newton::NewtonTuning;
@@ -30,6 +32,8 @@ pub use steps::StepTuning;
 pub struct Tuning {
     /// Parts of a command and of a tick, and what is accepted as the next equilibrium.
     pub steps: StepTuning,
+    /// The course of a vessel that yields.
+    pub course: CourseTuning,
     /// Newton's method.
     pub newton: NewtonTuning,
     /// Elements and contact points.

@@ -276,7 +276,8 @@ impl<'a> Course<'a> {
 
     /// Writes what is left into the new state, and returns what the command took.
     pub(super) fn end(self, way: &Way, work: Work, state: &mut KirchhoffState) -> Took {
-        let took = Took { sum: self.sum, work, converged: self.balanced };
+        // A device on its way is in no equilibrium, however small its forces are.
+        let took = Took { sum: self.sum, work, converged: self.balanced && self.flight.is_none() };
         self.rest(way).write(state);
         took
     }

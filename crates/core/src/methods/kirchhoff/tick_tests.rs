@@ -1,7 +1,7 @@
 //! Ticks of fixed cost follow steps.
 
 use crate::device::{Device, Instrument, Section, Stack};
-use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
+use crate::insertion::{Command, Move, Sheath, Simulation, Tally, WallProperties};
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::methods::{State, StepReport};
 use crate::random::{splitmix64, unit};
@@ -258,12 +258,16 @@ fn a_snap_counts_as_well_and_is_seen_on_its_way() {
     let (mut bounded, mut free) = (whipping(flights(10)), flying.clone());
     bounded.restore(&flying.state()).unwrap();
     assert_eq!(bounded.most_solves(&[]), Some(10));
+    let mut tally = Tally::default();
+    tally.count(1, &flying);
+    assert!(flying.report().imbalance > 0.0 && tally.max_imbalance == 0.0 && tally.ends_under_way);
     let all = free.step_together(&[]).unwrap();
     assert!(all.solves as usize > 10 + ITERATION && all.behind.is_empty() && all.jumped, "{}", all.solves);
     let (mut steps, mut jumps) = (0, 0);
     while bounded.report().is_under_way() && steps < 400 {
         let report = bounded.step_together(&[]).unwrap();
         assert!(report.solves as usize <= 10 + ITERATION, "{}", report.solves);
+        assert_ne!(report.converged, report.is_under_way());
         (steps, jumps) = (steps + 1, jumps + usize::from(report.jumped));
     }
     assert!((2..400).contains(&steps) && jumps == 1, "{steps} {jumps}");
