@@ -20,10 +20,14 @@
 //! feel it, and it changes the axial force: around a bend by e^{μφ}, the capstan equation, where everything slips.
 //! Normal forces at a node are found together with it, from the tip on.
 
+use super::environment::Environment;
+use super::hands::steered;
 use super::inner_friction::{pair, radius_mm};
 use super::material::element;
 use super::mesh::Mesh;
+use super::meshed;
 use super::rims::Pressed;
+use super::state::KirchhoffState;
 use crate::Vec3;
 use crate::contact::InnerFriction;
 use crate::device::{Stack, line_mm};
@@ -69,6 +73,29 @@ pub(super) struct Line<'a> {
     pub(super) inner_friction: &'a [InnerFriction],
     /// Largest number of iterations for the axial force behind a node and the friction there.
     pub(super) rounds: usize,
+}
+
+/// The forces across the line in a state on an instrument and all inside it from those outside, node by node; it is not the
+/// outermost.
+pub(super) fn lateral_forces_in<const C: usize>(
+    environment: &Environment<'_>,
+    state: &KirchhoffState,
+    instrument: usize,
+) -> Vec<LateralForce> {
+    let KirchhoffState { hands, rod, inner_friction, touches, .. } = state;
+    let mut mesh = Mesh::default();
+    meshed(environment, hands, &mut mesh);
+    let on_line = touches.iter().take_while(|(point, _)| *point < mesh.points.len());
+    let pressing: Vec<_> = on_line.map(|(point, touch)| (*point, touch.contact.total_n())).collect();
+    let line = Line {
+        stack: &steered(environment.surroundings.stack, hands),
+        mesh: &mesh,
+        rod,
+        pressing: &pressing,
+        inner_friction,
+        rounds: environment.options.tuning.friction.lateral_rounds,
+    };
+    lateral_forces::<C>(&line, instrument)
 }
 
 impl Line<'_> {

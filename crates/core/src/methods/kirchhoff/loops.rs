@@ -1,7 +1,11 @@
 //! Contact between loops of the device.
 
+use super::environment::Environment;
+use super::joined::{Joined, join};
 use super::mesh::Mesh;
-use crate::contact::{Capsule, HandMotion};
+use super::meshed;
+use super::state::KirchhoffState;
+use crate::contact::{Capsule, HandMotion, SelfContact, Touching};
 use crate::device::{Device, Stack};
 use crate::rod::ElementData;
 
@@ -27,6 +31,22 @@ pub(super) fn advances_mm<'a>(
     let outermost = |middle_mm: f64| stack.outermost_instrument(&mesh.inserted_mm, middle_mm).unwrap_or(0);
     let on_line = middles(mesh).map(move |middle_mm| motions[outermost(middle_mm)].advance_mm());
     on_line.chain(std::iter::repeat(0.0)).take(mesh.elements.len())
+}
+
+/// Where loops, and detached coils, touch in a state.
+pub(super) fn touching(environment: &Environment<'_>, state: &KirchhoffState) -> Vec<Touching> {
+    let mut mesh = Mesh::default();
+    meshed(environment, &state.hands, &mut mesh);
+    let mut joined = Joined::default();
+    let (options, surroundings) = (environment.options, &environment.surroundings);
+    let modulus = surroundings.properties.modulus_n_per_mm2;
+    joined.renew(&state.coils, surroundings.stack, options.fineness(), modulus);
+    joined.add_to(&mut mesh);
+    let mut rod = state.rod.clone();
+    join(&mut rod, &state.coils);
+    let mut loops = SelfContact::tuned(&options.tuning);
+    loops.renew(&mesh.elements, capsules(&mesh, surroundings.stack).chain(joined.capsules()));
+    loops.touching_at(&mesh.elements, &rod)
 }
 
 /// Distances of the middles of elements from the tip, mm.

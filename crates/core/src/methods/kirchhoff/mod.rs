@@ -49,6 +49,7 @@ mod detach;
 mod detach_tests;
 #[cfg(test)]
 mod drag_tests;
+mod environment;
 mod extrapolation;
 mod guess;
 mod hands;
@@ -101,23 +102,22 @@ pub use state::KirchhoffState;
 
 use std::sync::Arc;
 
-use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
-use crate::device::{Stack, line_mm};
-use crate::field::FieldLoad;
+use crate::contact::{ContactSurface, Counters, Touching};
+use crate::device::line_mm;
 use crate::methods::{
     Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings, Tape, Timed,
 };
 use crate::methods::{Content, Method, MethodChoice, State};
-use crate::rod::{Layout, PLAIN, RodState, TWISTED};
+use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
-use crate::vessel::{Displacement, WallStore};
+use crate::vessel::WallStore;
 use crate::{Error, Result, Vec3};
 use coaxial::Nodes;
 use command::Driven;
 use configuration::Start;
+use environment::Environment;
 use hands::{Hand, lengths, steered};
-use joined::{FreeCoil, Joined, join};
-use lateral::Line;
+use joined::FreeCoil;
 use report::Took;
 use state::Belongs;
 use workspace::Workspace;
@@ -157,15 +157,6 @@ impl MethodChoice for KirchhoffOptions {
     }
 }
 
-/// Largest tolerance: a larger residual does not indicate an equilibrium.
-const LARGEST_TOLERANCE: f64 = 1e-2;
-/// Largest spacing of contact points: beyond it most of a device would have no contact.
-const LARGEST_CONTACT_SPACING_RADII: f64 = 10.0;
-/// Largest number of contact points of all instruments: hundreds of bytes each.
-const POINT_LIMIT: usize = 1_000_000;
-/// Largest number of elements of a device: some kilobytes each.
-const ELEMENT_LIMIT: f64 = 100_000.0;
-
 /// The exact rod as an insertion method, with or without material angles.
 pub(crate) struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
@@ -181,123 +172,17 @@ pub(crate) struct Kirchhoff<const C: usize> {
     workspace: Option<Box<Workspace<C>>>,
 }
 
-/// Inputs of a step that it does not change.
-#[derive(Clone, Copy)]
-struct Environment<'a> {
-    surroundings: Surroundings<'a>,
-    surface: &'a ContactSurface,
-    options: &'a KirchhoffOptions,
-    /// Displacement of the vessel; `None` if it never moves.
-    displacement: Option<&'a Displacement>,
-    /// How far the step has gone into the fields after it, 0 to 1.
-    fields_part: f64,
-}
-
-impl<'a> Environment<'a> {
-    /// For a vessel at rest.
-    fn new(
-        surroundings: &Surroundings<'a>,
-        surface: &'a ContactSurface,
-        options: &'a KirchhoffOptions,
-    ) -> Self {
-        Self { surroundings: *surroundings, surface, options, displacement: None, fields_part: 1.0 }
-    }
-
-    /// The same environment with the vessel displaced.
-    fn displaced<'b>(&self, displacement: Option<&'b Displacement>) -> Environment<'b>
-    where
-        'a: 'b,
-    {
-        Environment { displacement, ..*self }
-    }
-
-    /// The same with the instruments as they are steered.
-    fn steered<'b>(&self, stack: &'b Stack) -> Environment<'b>
-    where
-        'a: 'b,
-    {
-        let surroundings = Surroundings { device: stack.first(), stack, ..self.surroundings };
-        Environment { surroundings, ..*self }
-    }
-
-    /// The same after this part of the way into the fields after the step.
-    fn with_fields_at(self, fields_part: f64) -> Self {
-        Self { fields_part, ..self }
-    }
-
-    /// What fields do to a line; none where there are none.
-    fn field_load(&self, mesh: &Mesh) -> Option<FieldLoad<'a>> {
-        let mut fields = self.surroundings.fields_at(self.fields_part).peekable();
-        fields.peek()?;
-        Some(FieldLoad::new(fields, &mesh.from_tip_mm, &mesh.inserted_mm))
-    }
-
-    /// Energy of a line in the fields, mJ.
-    fn field_mj(&self, mesh: &Mesh, rod: &RodState) -> f64 {
-        self.field_load(mesh).map_or(0.0, |load| load.energy_mj(&mesh.elements, rod))
-    }
-
-    /// Whether anything rubs: on the wall, or loops on each other.
-    fn has_friction(&self) -> bool {
-        self.surroundings.properties.has_friction() || self.options.self_friction > 0.0
-    }
-
-    /// The wall at its displacement.
-    fn wall(&self) -> MovedWall<'a> {
-        MovedWall::new(self.surface, self.displacement)
-    }
-}
-
 impl<const C: usize> Kirchhoff<C> {
     /// The method with nothing inserted; the uniform mesh of the wall comes from `store`.
     ///
     /// # Errors
-    /// An element length that is not positive or leads to too many elements.
+    /// Options that are out of range or not possible together.
     pub(crate) fn new(
         options: KirchhoffOptions,
         surroundings: &Surroundings<'_>,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let length_mm = surroundings.stack.length_mm();
-        crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
-        crate::error::in_range("method.tolerance", options.tolerance, LARGEST_TOLERANCE)?;
-        let spacing_radii = options.contact_spacing_radii;
-        crate::error::in_range("method.contact_spacing_radii", spacing_radii, LARGEST_CONTACT_SPACING_RADII)?;
-        if length_mm / options.element_mm > ELEMENT_LIMIT {
-            return Err(Error::parameter(
-                "method.element_mm",
-                options.element_mm,
-                format!(
-                    "cuts the device of {length_mm} mm into {:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
-                     longer elements or a shorter device",
-                    length_mm / options.element_mm
-                ),
-            ));
-        }
-        let points: usize =
-            surroundings.stack.devices().map(|device| options.fineness().points(device)).sum();
-        if points > POINT_LIMIT {
-            let remedy = format!(
-                "makes {points} contact points along the device, and more than {POINT_LIMIT} take gigabytes: allow them farther apart"
-            );
-            return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, remedy));
-        }
-        if options.self_contact {
-            crate::contact::pairs::check_built("method.self_contact = true")?;
-        }
-        if options.self_contact && surroundings.motion.is_some() {
-            let remedy =
-                "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
-            return Err(Error::parameter("method.self_contact", true, remedy));
-        }
-        crate::contact::check_friction("method.self_friction", options.self_friction)?;
-        if options.self_friction > 0.0 && !options.self_contact {
-            let remedy = "nothing touches itself that could rub: set method.self_contact = true as well";
-            return Err(Error::parameter("method.self_friction", options.self_friction, remedy));
-        }
-        if options.max_iterations == 0 {
-            return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
-        }
+        options.check(surroundings)?;
         let state = KirchhoffState::at(surroundings, Layout::<C>::ANGLES > 0);
         let report = StepReport {
             converged: true,
@@ -549,42 +434,18 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
-        let KirchhoffState { hands, rod, inner_friction, touches, .. } = &*self.state;
-        if instrument + 1 >= hands.len() {
+        if instrument + 1 >= self.state.hands.len() {
             return vec![LateralForce::default(); self.shape.len()];
         }
         let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut mesh = Mesh::default();
-        meshed(&environment, hands, &mut mesh);
-        let on_line = touches.iter().take_while(|(point, _)| *point < mesh.points.len());
-        let pressing: Vec<_> = on_line.map(|(point, touch)| (*point, touch.contact.total_n())).collect();
-        let line = Line {
-            stack: &steered(surroundings.stack, hands),
-            mesh: &mesh,
-            rod,
-            pressing: &pressing,
-            inner_friction,
-            rounds: self.options.tuning.friction.lateral_rounds,
-        };
-        lateral::lateral_forces::<C>(&line, instrument)
+        lateral::lateral_forces_in::<C>(&environment, &self.state, instrument)
     }
 
     fn touching(&self, surroundings: &Surroundings<'_>) -> Vec<Touching> {
         if !self.options.self_contact {
             return Vec::new();
         }
-        let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut mesh = Mesh::default();
-        meshed(&environment, &self.state.hands, &mut mesh);
-        let mut joined = Joined::default();
-        let Surroundings { stack, properties, .. } = surroundings;
-        joined.renew(&self.state.coils, stack, self.options.fineness(), properties.modulus_n_per_mm2);
-        joined.add_to(&mut mesh);
-        let mut rod = self.state.rod.clone();
-        join(&mut rod, &self.state.coils);
-        let mut loops = SelfContact::tuned(&self.options.tuning);
-        loops.renew(&mesh.elements, loops::capsules(&mesh, stack).chain(joined.capsules()));
-        loops.touching_at(&mesh.elements, &rod)
+        loops::touching(&Environment::new(surroundings, &self.surface, &self.options), &self.state)
     }
 
     fn state(&self) -> State {

@@ -3,7 +3,18 @@
 use serde::{Deserialize, Serialize};
 
 use super::mesh::Fineness;
+use crate::methods::Surroundings;
 use crate::tuning::Tuning;
+use crate::{Error, Result};
+
+/// Largest tolerance: a larger residual does not indicate an equilibrium.
+const LARGEST_TOLERANCE: f64 = 1e-2;
+/// Largest spacing of contact points: beyond it most of a device would have no contact.
+const LARGEST_CONTACT_SPACING_RADII: f64 = 10.0;
+/// Largest number of contact points of all instruments: hundreds of bytes each.
+const POINT_LIMIT: usize = 1_000_000;
+/// Largest number of elements of a device: some kilobytes each.
+const ELEMENT_LIMIT: f64 = 100_000.0;
 
 /// Accuracy of equilibria: `method.accuracy` sets element length, spacing of contact points and tolerance together.
 ///
@@ -96,6 +107,54 @@ impl KirchhoffOptions {
             self_friction: 0.0,
             tuning: Tuning::default(),
         }
+    }
+
+    /// Checks them for a device in its surroundings.
+    ///
+    /// # Errors
+    /// An element length that is not positive or leads to too many elements, and other values that are out of range or not
+    /// possible together.
+    pub(super) fn check(&self, surroundings: &Surroundings<'_>) -> Result<()> {
+        let length_mm = surroundings.stack.length_mm();
+        crate::error::in_range("method.element_mm", self.element_mm, length_mm)?;
+        crate::error::in_range("method.tolerance", self.tolerance, LARGEST_TOLERANCE)?;
+        let spacing_radii = self.contact_spacing_radii;
+        crate::error::in_range("method.contact_spacing_radii", spacing_radii, LARGEST_CONTACT_SPACING_RADII)?;
+        if length_mm / self.element_mm > ELEMENT_LIMIT {
+            return Err(Error::parameter(
+                "method.element_mm",
+                self.element_mm,
+                format!(
+                    "cuts the device of {length_mm} mm into {:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
+                     longer elements or a shorter device",
+                    length_mm / self.element_mm
+                ),
+            ));
+        }
+        let points: usize = surroundings.stack.devices().map(|device| self.fineness().points(device)).sum();
+        if points > POINT_LIMIT {
+            let remedy = format!(
+                "makes {points} contact points along the device, and more than {POINT_LIMIT} take gigabytes: allow them farther apart"
+            );
+            return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, remedy));
+        }
+        if self.self_contact {
+            crate::contact::pairs::check_built("method.self_contact = true")?;
+        }
+        if self.self_contact && surroundings.motion.is_some() {
+            let remedy =
+                "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
+            return Err(Error::parameter("method.self_contact", true, remedy));
+        }
+        crate::contact::check_friction("method.self_friction", self.self_friction)?;
+        if self.self_friction > 0.0 && !self.self_contact {
+            let remedy = "nothing touches itself that could rub: set method.self_contact = true as well";
+            return Err(Error::parameter("method.self_friction", self.self_friction, remedy));
+        }
+        if self.max_iterations == 0 {
+            return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
+        }
+        Ok(())
     }
 
     /// The resolution of the mesh.
