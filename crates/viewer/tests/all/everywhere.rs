@@ -47,9 +47,9 @@ fn coil() -> DeviceView {
 fn scenes() -> Vec<(&'static str, &'static str, ViewSpec, Vec<DeviceView>)> {
     const ARCH: [f64; 3] = [-38.4, -54.8, 136.0];
     let arch = |side, pose| with_body(view(side, pose));
-    let mut blades = arch(384, "AP");
+    let mut blades = arch(256, "AP");
     blades.c_arm.collimation_mm = Some([70.0, 110.0]);
-    let mut near = view(512, "RAO 30");
+    let mut near = view(384, "RAO 30");
     near.c_arm.magnification = 4.0;
     let mut filled = view(256, "LAO 40");
     filled.xray.contrast_fraction = 0.3;
@@ -57,24 +57,24 @@ fn scenes() -> Vec<(&'static str, &'static str, ViewSpec, Vec<DeviceView>)> {
     sixteen.bits = 16;
     vec![
         ("arch", "aortic_arch", arch(128, "LAO 40"), vec![wire()]),
-        ("arch", "aortic_arch", arch(512, "LAO 40"), vec![wire()]),
-        ("arch", "aortic_arch", arch(1024, "RAO 30 CAU 30"), vec![wire()]),
+        ("arch", "aortic_arch", arch(320, "LAO 40"), vec![wire()]),
+        ("arch", "aortic_arch", arch(640, "RAO 30 CAU 30"), vec![wire()]),
         ("lateral, 16 bits", "aortic_arch_iii", sixteen, vec![wire()]),
-        ("liver", "hepatic", arch(384, "AP"), vec![]),
+        ("liver", "hepatic", arch(256, "AP"), vec![]),
         ("no body, near", "hepatic", near, vec![]),
         ("filled", "aortic_arch_ii", filled, vec![wire()]),
-        ("coil", "aortic_arch", arch(384, "LAO 40"), vec![coil()]),
+        ("coil", "aortic_arch", arch(256, "LAO 40"), vec![coil()]),
         ("blades", "aortic_arch", blades, vec![wire()]),
         (
             "cine",
             "aortic_arch",
-            with_injection(arch(384, "LAO 40"), "aortic_arch", ARCH, Mode::Cine),
+            with_injection(arch(256, "LAO 40"), "aortic_arch", ARCH, Mode::Cine),
             vec![wire()],
         ),
         (
             "DSA",
             "aortic_arch",
-            with_injection(arch(384, "LAO 40"), "aortic_arch", ARCH, Mode::Dsa),
+            with_injection(arch(256, "LAO 40"), "aortic_arch", ARCH, Mode::Dsa),
             vec![wire()],
         ),
         (
