@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use endowire_core::contact::{ContactSurface, SmoothWall};
+use endowire_core::contact::{ContactSurface, WallReader};
 use endowire_core::device::{Device, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
@@ -45,21 +45,28 @@ fn queries(c: &mut Criterion) {
     let Ok(query) = WallQuery::new(&made.wall) else { return };
     let mesh = made.wall.mesh();
     let step = (mesh.triangles.len() / 300).max(1);
-    let places: Vec<(Vec3, u32)> = (0..mesh.triangles.len())
+    let places: Vec<Vec3> = (0..mesh.triangles.len())
         .step_by(step)
         .map(|index| {
             let [a, b, d] = mesh.corners(index);
-            let triangle = index as u32;
-            ((a + b + d) / 3.0 + query.inward_normal(triangle) * RADIUS_MM, triangle)
+            (a + b + d) / 3.0 + query.inward_normal(index as u32) * RADIUS_MM
         })
         .collect();
-    let smooth = SmoothWall::new(&made.wall, RADIUS_MM);
+    let properties = WallProperties::default();
+    let Ok(felt) = ContactSurface::new(&made.wall, (RADIUS_MM, RADIUS_MM), &properties, &NoStore) else {
+        return;
+    };
     let mut group = c.benchmark_group(format!("{} contact queries", places.len()));
     group.bench_function("nearest", |b| {
-        b.iter(|| places.iter().filter(|(x, _)| query.nearest(black_box(x), 3.0).is_some()).count());
+        b.iter(|| places.iter().filter(|x| query.nearest(black_box(x), 3.0).is_some()).count());
     });
     group.bench_function("smooth distance with derivatives", |b| {
-        b.iter(|| places.iter().filter_map(|(x, t)| black_box(smooth.distance(black_box(x), *t))).count());
+        let mut reader = WallReader::new(&felt);
+        b.iter(|| {
+            for x in &places {
+                black_box(reader.read(&felt, black_box(x), 3.0));
+            }
+        });
     });
     group.finish();
 }

@@ -1,87 +1,49 @@
-//! The rod: one element, assembly, factorisation and whole solves against the number of elements. The whole solve is the
-//! cantilever PL²/EI = 10 from straight in one step; its tip error is printed beside the time.
+//! The rod: whole solves against the number of elements: the cantilever PL²/EI = 10 from straight in one step. Its tip
+//! error is printed beside the time. One element, assembly and factorisation are timed by core's test
+//! `an_iteration_costs_a_few_factorisations_and_is_linear_in_the_elements`.
 #![allow(missing_docs, reason = "the macros of criterion expand to undocumented items")]
+
+use std::hint::black_box;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
-use endowire_core::banded::{BandMatrix, Factor};
-use endowire_core::rod::element::ElementSystem;
-use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
-use endowire_core::rod::{element_energy, element_system};
-use endowire_core::solve::{Newton, NewtonOptions};
-use endowire_tests::bent_rod::{bent, clamp, elements, system, tip_load};
-use std::hint::black_box;
+use endowire_core::statics::{StaticCase, StaticProblem};
 
 const SIZES: [usize; 6] = [8, 32, 128, 300, 512, 1024];
 
-fn element(c: &mut Criterion) {
-    let (elements, state) = bent(4, true);
-    let s = state.element::<TWISTED>(1);
-    let mut group = c.benchmark_group("element");
-    group.bench_function("energy", |b| b.iter(|| element_energy::<PLAIN>(&elements[1], black_box(&s))));
-    group.bench_function("energy twisted", |b| {
-        b.iter(|| element_energy::<TWISTED>(&elements[1], black_box(&s)));
-    });
-    let mut plain = ElementSystem::<PLAIN>::zeros();
-    group.bench_function("system", |b| {
-        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), 1.0, &mut plain));
-    });
-    let mut full = ElementSystem::<TWISTED>::zeros();
-    group.bench_function("system twisted", |b| {
-        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), 1.0, &mut full));
-    });
-    group.finish();
+/// The cantilever, which twists if it is pre-curved.
+fn cantilever(elements: usize, is_curved: bool) -> StaticProblem {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/cases/tip_force.toml");
+    let mut case = StaticCase::from_file(&path).expect("an example case is valid");
+    case.rod.elements = elements;
+    if is_curved {
+        case.rod.section[0].rest_curvature = [1.0, 0.0];
+        case.rod.section[0].gj = Some(0.77);
+    }
+    StaticProblem::new(&case).expect("an example case is valid")
 }
 
-fn assembly<const C: usize>(c: &mut Criterion, name: &str) {
-    let mut group = c.benchmark_group(format!("assembly{name}"));
-    for n in SIZES {
-        let (elements, state, mut newton) = system::<C>(n);
-        let mut loads = tip_load(n);
-        group.bench_function(BenchmarkId::from_parameter(n), |b| {
-            b.iter(|| newton.assemble(&elements, &clamp(), &mut loads, black_box(&state)));
-        });
-    }
-    group.finish();
-    let mut group = c.benchmark_group(format!("factor and solve{name}"));
-    for n in SIZES {
-        let (_, _, newton) = system::<C>(n);
-        let matrix: &BandMatrix<C> = &newton.assembly.matrix;
-        let mut factor = Factor::new(matrix.dimension());
-        let mut b0 = vec![0.0; matrix.dimension()];
-        group.bench_function(BenchmarkId::from_parameter(n), |b| {
-            b.iter(|| {
-                b0.copy_from_slice(&newton.assembly.residual);
-                factor.factor_solve(black_box(matrix), &mut b0)
-            });
-        });
-    }
-    group.finish();
-}
-
-fn solve<const C: usize>(c: &mut Criterion, name: &str) {
+fn solve(c: &mut Criterion, is_curved: bool) {
+    let name = if is_curved { ", twisted" } else { "" };
     let mut group = c.benchmark_group(format!("newton iteration{name}"));
     for n in SIZES {
-        let elements = elements(n, Layout::<C>::ANGLES > 0);
-        let frame = Frame::new(Vec3::x(), Some(Vec3::y()));
-        let start = RodState::straight(&elements, Vec3::zeros(), frame);
-        let mut newton = Newton::<C>::new(n);
-        let mut state = start.clone();
-        let options = NewtonOptions::default();
-        let report = newton.solve(&elements, &mut clamp(), &mut tip_load(n), &mut state, &options);
-        if Layout::<C>::ANGLES == 0 {
-            let error = (state.positions[n] - Vec3::new(1.0 - 0.554995597754, -0.810609024880, 0.0)).norm();
-            println!("{n} elements: tip error {error:.1e}, {} iterations", report.iterations);
+        let problem = cantilever(n, is_curved);
+        let solved = problem.solve().expect("an example case has an equilibrium");
+        if !is_curved {
+            let error =
+                (Vec3::from(solved.tip) - Vec3::new(1.0 - 0.554995597754, -0.810609024880, 0.0)).norm();
+            println!("{n} elements: tip error {error:.1e}, {} iterations", solved.iterations);
         }
         // Time of a whole solve over its iterations.
-        let count = report.iterations as u32;
+        let count = solved.iterations as u32;
         group.bench_function(BenchmarkId::from_parameter(n), |b| {
             b.iter_custom(|rounds| {
-                let mut sum = std::time::Duration::ZERO;
+                let mut sum = Duration::ZERO;
                 for _ in 0..rounds {
-                    state.copy_from(&start);
-                    let clock = std::time::Instant::now();
-                    black_box(newton.solve(&elements, &mut clamp(), &mut tip_load(n), &mut state, &options));
+                    let clock = Instant::now();
+                    let _ = black_box(problem.solve_state());
                     sum += clock.elapsed();
                 }
                 sum / count
@@ -92,11 +54,8 @@ fn solve<const C: usize>(c: &mut Criterion, name: &str) {
 }
 
 fn all(c: &mut Criterion) {
-    element(c);
-    assembly::<PLAIN>(c, "");
-    assembly::<TWISTED>(c, ", twisted");
-    solve::<PLAIN>(c, "");
-    solve::<TWISTED>(c, ", twisted");
+    solve(c, false);
+    solve(c, true);
 }
 
 criterion_group! {

@@ -1,6 +1,5 @@
 //! Shared helpers of the workspace tests.
 
-pub mod bent_rod;
 pub mod damage;
 pub mod passages;
 pub mod phantom;

@@ -5,29 +5,18 @@
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::rod::{PLAIN, TWISTED};
-use endowire_core::solve::{Newton, NewtonOptions};
 use endowire_core::statics::{StaticCase, StaticProblem};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use std::path::Path;
 
-/// Allocations and iterations of a solve of an example case with memory that one solve has warmed.
-fn solve<const C: usize>(problem: &StaticProblem, max_iterations: usize) -> (u64, usize) {
-    let mut newton = Newton::<C>::new(problem.elements.len());
-    let mut last = (0, 0);
-    for _ in 0..2 {
-        let (mut state, mut supports) = (problem.initial.clone(), problem.supports.clone());
-        let mut loads = problem.loads.clone();
-        supports.begin(&state);
-        let options = NewtonOptions { max_iterations, ..problem.options };
-        let mut iterations = 0;
-        let counted = allocation_counter::measure(|| {
-            let report = newton.solve(&problem.elements, &mut supports, &mut loads, &mut state, &options);
-            iterations = report.iterations;
-        });
-        last = (counted.count_total, iterations);
-    }
-    last
+/// Allocations and iterations of a solve of an example case.
+fn solve(problem: &StaticProblem) -> (u64, usize) {
+    let mut solved = None;
+    let counted = allocation_counter::measure(|| solved = problem.solve_state().ok());
+    (
+        counted.count_total,
+        problem.solution(&solved.expect("an example case has a torsion stiffness")).iterations,
+    )
 }
 
 #[test]
@@ -36,18 +25,15 @@ fn nothing_is_allocated_per_iteration() {
     for name in ["tip_force", "column", "end_moment", "follower", "pinned", "clamped_turned", "bend_45"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../assets/cases/{name}.toml"));
         let case = StaticCase::from_file(&path).expect("an example case is valid");
-        let problem = StaticProblem::new(&case).expect("an example case is valid");
-        let count = |limit| {
-            if problem.angles > 0 {
-                solve::<TWISTED>(&problem, limit)
-            } else {
-                solve::<PLAIN>(&problem, limit)
-            }
-        };
-        let (few, two) = count(2);
-        let (many, all) = count(500);
+        let mut problem = StaticProblem::new(&case).expect("an example case is valid");
+        // What a solve sets up is allocated once, whatever it takes.
+        let allocations = [2, 500].map(|most| {
+            problem.limit_iterations(most);
+            solve(&problem)
+        });
+        let [(few, two), (many, all)] = allocations;
         assert!(all > two, "{name}: {all} iterations");
-        assert_eq!((few, many), (0, 0), "{name}: allocations of {two} and {all} iterations");
+        assert_eq!(few, many, "{name}: allocations of {two} and {all} iterations");
     }
 }
 

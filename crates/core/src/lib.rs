@@ -38,7 +38,7 @@
 //! | [`methods`] | your own method behind [`Method`](methods::Method) |
 //! | [`device`], [`vessel`], [`flow`], [`scene`] | devices from data sheets; surfaces, their checks and repair; blood; scene files |
 //! | [`statics`] | static problems of rods without a vessel |
-//! | [`rod`], [`solve`], [`contact`], [`banded`] | elements, Newton's method, walls and loops: your own solver |
+//! | [`contact`] | the wall as devices feel it: your own method |
 //! | [`insertion`] | scripts, batches and tallies of insertions |
 //!
 //! Features, all of them on; with none a device in a vessel needs half of the crates. What needs one that is off is an [`Error::Feature`] that names it:
@@ -55,10 +55,10 @@
 // Results are bit-identical on every machine: functions whose rounding depends on the platform are disallowed.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-pub mod banded;
+mod banded;
 pub mod contact;
 pub mod control;
-pub(crate) mod coupled;
+mod coupled;
 pub mod device;
 pub mod error;
 pub mod field;
@@ -71,10 +71,10 @@ mod parallel;
 pub mod passable;
 mod products;
 pub mod random;
-pub mod rod;
+mod rod;
 pub mod scene;
 pub mod shape;
-pub mod solve;
+mod solve;
 pub mod statics;
 mod text;
 pub mod tuning;

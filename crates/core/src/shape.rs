@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::rod::Frame;
+
 use crate::Vec3;
 use crate::rod::quadrature::hermite;
 

@@ -2,9 +2,10 @@
 
 use super::Row;
 use super::insertion::Tube;
-use super::test_rod::{Setup, TestRod};
+
 use endowire_core::insertion::WallProperties;
-use endowire_core::rod::Frame;
+use endowire_core::shape::Frame;
+use endowire_core::statics::{WallRod, WallRodSpec};
 use endowire_core::{Result, Vec3};
 use std::f64::consts::PI;
 
@@ -39,7 +40,7 @@ pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f
     };
     let wall = tube.wall(0.5, edge_mm)?;
     let length = 2.0 * STRAIGHT + PI * BEND - 5.0;
-    let setup = Setup {
+    let setup = WallRodSpec {
         length,
         bending: BENDING,
         radius: RADIUS,
@@ -48,9 +49,9 @@ pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f
     };
     let first = Frame::new(Vec3::x(), Some(Vec3::y()));
     let along = |s: f64| first.transported(((s - STRAIGHT) / BEND).clamp(0.0, PI), 0.0);
-    let mut rod = TestRod::on_wall(&wall, properties, &setup, Vec3::zeros(), along)?;
+    let mut rod = WallRod::on_wall(&wall, properties, &setup, Vec3::zeros(), along)?;
     rod.tolerance = 1e-8;
-    rod.loads.forces = vec![(rod.elements().len(), Vec3::x() * -PULL)];
+    rod.loads.forces = vec![(rod.elements(), Vec3::x() * -PULL)];
     // First in equilibrium without friction, then drawn.
     rod.solve()?;
     rod.slide(properties.largest_friction(), -DRAWN)?;

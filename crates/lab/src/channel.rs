@@ -1,8 +1,8 @@
 //! A rod between flat walls.
 
-use super::test_rod::{Setup, TestRod};
 use endowire_core::insertion::{WallProperties, WallRegion};
-use endowire_core::rod::Frame;
+use endowire_core::shape::Frame;
+use endowire_core::statics::{WallRod, WallRodSpec};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 
@@ -13,17 +13,17 @@ const PLATES: f64 = 1e3;
 ///
 /// Two rigid plates without clearance hold the nodes in the plane z = 0: between flat walls alone a buckled rod could
 /// turn about its axis and escape. In the plane they have no effect.
-pub(super) fn channel(setup: &Setup, heights: [f64; 2]) -> Result<TestRod> {
+pub(super) fn channel(setup: &WallRodSpec, heights: [f64; 2]) -> Result<WallRod> {
     with_regions(setup, heights, 0.25 * setup.length, Vec::new())
 }
 
 /// The same with `region`s in walls whose triangles have sides of about `cell`.
 pub(super) fn with_regions(
-    setup: &Setup,
+    setup: &WallRodSpec,
     [floor, ceiling]: [f64; 2],
     cell: f64,
     region: Vec<WallRegion>,
-) -> Result<TestRod> {
+) -> Result<WallRod> {
     let (length, radius) = (setup.length, setup.radius);
     // So far away that the box's edges have no effect: each of three steps (the edge is moved in, vertices reach it,
     // points reach these vertices) extends over at most a diagonal and a half of a cell.
@@ -39,8 +39,8 @@ pub(super) fn with_regions(
         ..WallProperties::default()
     };
     let straight = Frame::new(Vec3::x(), Some(Vec3::y()));
-    let mut rod = TestRod::on_wall(&wall, &properties, setup, Vec3::zeros(), |_| straight)?;
-    let h = rod.elements()[0].length;
+    let mut rod = WallRod::on_wall(&wall, &properties, setup, Vec3::zeros(), |_| straight)?;
+    let h = rod.element_length(0);
     rod.plates = PLATES * setup.bending / (h * h * h);
     Ok(rod)
 }

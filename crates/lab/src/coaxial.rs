@@ -1,12 +1,14 @@
 //! Part D: several coaxial instruments on one centre line.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use nalgebra::Matrix3;
 
 use super::planar::tip_error;
 use super::{Row, at_end, section, unit_rod};
-use endowire_core::rod::quadrature::{GAUSS, hermite};
-use endowire_core::rod::{Clamp, ElementData, Frame, PLAIN, PointSum, RodState, Stencils};
-use endowire_core::solve::{External, Newton};
+use endowire_core::field::{EnergyDensity, Field, MaterialPoint};
+use endowire_core::shape::Frame;
 use endowire_core::statics::{Instrument, LoadKind, Parameter, Section, StaticCase, StaticProblem};
 use endowire_core::{Error, Result, Vec3};
 
@@ -93,13 +95,11 @@ impl Pair {
         self.problem.initial.angles[0] = hand.to_radians();
         let solved = self.problem.solve_state()?;
         self.problem.initial = before;
-        if !solved.report.converged {
-            return Err(Error::Computation(format!(
-                "D2: no equilibrium at {hand}°: {}",
-                solved.report.reason
-            )));
+        let report = self.problem.solution(&solved);
+        if !report.converged {
+            return Err(Error::Computation(format!("D2: no equilibrium at {hand}°: {}", report.stop)));
         }
-        self.iterations = solved.report.iterations;
+        self.iterations = report.iterations;
         self.problem.initial = solved.state;
         let state = &self.problem.initial;
         let tip = state.elements();
@@ -205,7 +205,8 @@ pub(super) fn curved_in_straight() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// A close-fitting channel along a circle of this radius about (0, radius, 0), with ½ k d² per length.
+/// A close-fitting channel along a circle of this radius about (0, radius, 0), with ½ k d² per length of the innermost.
+#[derive(Debug)]
 struct Channel {
     radius: f64,
     stiffness: f64,
@@ -224,71 +225,41 @@ impl Channel {
         let gradient = (normal * off + Vec3::z() * x.z) * self.stiffness;
         (0.5 * self.stiffness * (off * off + x.z * x.z), gradient, hessian)
     }
-
-    /// Iterates over its quadrature points: element, ξ, weight, and energy there.
-    fn points(
-        &self,
-        elements: &[ElementData],
-        state: &RodState,
-        mut to: impl FnMut(usize, f64, f64, (f64, Vec3, Matrix3<f64>)),
-    ) {
-        for (e, data) in elements.iter().enumerate() {
-            for point in &GAUSS {
-                let [w0, s0, w1, s1] = hermite(point.xi);
-                let bend = state.frames[e].t * s0 + state.frames[e + 1].t * s1;
-                let x = state.positions[e] * w0 + state.positions[e + 1] * w1 + bend * data.length;
-                to(e, point.xi, point.weight * data.length, self.at(&x));
-            }
-        }
-    }
 }
 
-impl External for Channel {
-    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        let mut sums = vec![PointSum::default(); elements.len()];
-        self.points(elements, state, |e, xi, weight, (value, gradient, hessian)| {
-            into.add_value(weight * value);
-            sums[e].add(xi, &(gradient * weight), Some(&(hessian * weight)));
-        });
-        for (e, sum) in sums.iter().enumerate() {
-            into.add_points(state, &elements[e], e, sum);
-        }
+impl Field for Channel {
+    fn acts_on(&self, instrument: usize) -> Range<f64> {
+        if instrument == 0 { 0.0..f64::INFINITY } else { 0.0..0.0 }
     }
 
-    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
-        let mut sum = 0.0;
-        self.points(elements, state, |_, _, weight, (value, ..)| sum += weight * value);
-        sum
+    fn density(&self, point: &MaterialPoint) -> EnergyDensity {
+        let (value, by_position, by_positions) = self.at(&point.position_mm);
+        EnergyDensity { value, by_position, by_positions, ..EnergyDensity::default() }
     }
 }
 
 /// D4: straight instruments in a close-fitting arc.
 pub(super) fn straight_in_arc() -> Result<Vec<Row>> {
     const RADIUS: f64 = 1.25;
-    let mut channel = Channel { radius: RADIUS, stiffness: 1e8 };
+    let channel: Arc<dyn Field> = Arc::new(Channel { radius: RADIUS, stiffness: 1e8 });
     let instruments =
         vec![straight("inner", 1.2, 0.4), straight("middle", 0.8, 1.0), straight("outer", 0.5, 2.0)];
     let stiffness: Vec<f64> = instruments.iter().map(|i| i.section[0].ei).collect();
-    let problem = StaticProblem::new(&stack(384, instruments))?;
-    let elements = &problem.elements;
+    let mut problem = StaticProblem::new(&stack(384, instruments))?;
     let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
-    for (e, data) in elements.iter().enumerate() {
-        frames.push(frames[e].transported(data.length / RADIUS, 0.0));
+    for (e, length) in problem.element_lengths().enumerate() {
+        frames.push(frames[e].transported(length / RADIUS, 0.0));
     }
-    let mut state = RodState::from_frames(elements, Vec3::zeros(), frames);
-    let mut supports = problem.supports.clone();
-    let mut newton = Newton::<PLAIN>::new(elements.len());
-    let report = newton.solve(elements, &mut supports, &mut channel, &mut state, &problem.options);
-    if !report.converged {
-        return Err(Error::Computation(format!("D4: {}", report.reason)));
+    problem.lay(Vec3::zeros(), frames);
+    let solved = problem.solution(&problem.solve_in(&[channel])?);
+    if !solved.converged {
+        return Err(Error::Computation(format!("D4: {}", solved.stop)));
     }
-    let clamp = Clamp::new::<PLAIN>(&newton.start_residual, &state);
-    let hands = problem.hands::<PLAIN>(&state, &supports, &mut channel, &clamp);
-    let names = ["inner", "middle", "outer"];
-    let rows = hands.iter().zip(stiffness).zip(names).map(|(((force, _), ei), name)| {
+    let rows = solved.instruments.iter().zip(stiffness).map(|(instrument, ei)| {
         let expected = 0.5 * ei / (RADIUS * RADIUS);
-        let quantity = format!("push force of the {name}");
-        Row::relative("D4 384 elements", &quantity, force.unwrap_or(f64::NAN), expected, 1e-4)
+        let quantity = format!("push force of the {}", instrument.name);
+        let force = instrument.push_force.unwrap_or(f64::NAN);
+        Row::relative("D4 384 elements", &quantity, force, expected, 1e-4)
     });
     Ok(rows.collect())
 }

@@ -1,9 +1,9 @@
 //! Part C on flat walls: the elastica in a channel, and the compliant wall.
 
 use super::channel::channel;
-use super::test_rod::{Setup, TestRod};
+
 use super::{Row, observed_order};
-use endowire_core::rod::RodState;
+use endowire_core::statics::{WallRod, WallRodSpec};
 use endowire_core::{Error, Result, Vec3};
 use std::f64::consts::PI;
 
@@ -27,27 +27,27 @@ struct Squeezed {
 
 /// C2: a clamped-clamped rod of length and stiffness 1 under an axial load between walls. By symmetry this is its
 /// first half: clamped at one end, guided at the other, which is the middle.
-struct Elastica(TestRod);
+struct Elastica(WallRod);
 
 impl Elastica {
     /// `elements` on the whole length.
     fn new(elements: usize, modulus: f64) -> Result<Self> {
         let (half, wall) = (elements / 2, HEIGHT + RADIUS);
-        let setup = Setup { length: 0.5, bending: 1.0, radius: RADIUS, elements: half, modulus };
+        let setup = WallRodSpec { length: 0.5, bending: 1.0, radius: RADIUS, elements: half, modulus };
         let mut channel = channel(&setup, [-wall, wall])?;
         channel.supports.end_tangent = Some(Vec3::x());
         // The first buckling mode, nearly as high as the channel.
         let first = channel.state.frames[0];
         let slope = |i: usize| 0.9 * PI * HEIGHT * (PI * i as f64 / half as f64).sin();
         let frames = (0..=half).map(|i| first.transported(slope(i), 0.0)).collect();
-        channel.state = RodState::from_frames(channel.elements(), Vec3::zeros(), frames);
+        channel.lay(Vec3::zeros(), frames);
         Ok(Self(channel))
     }
 
     /// The equilibrium under `load`, starting from the last one.
     fn at(&mut self, load: f64) -> Result<Squeezed> {
         let Self(channel) = self;
-        let half = channel.elements().len();
+        let half = channel.elements();
         channel.loads.forces = vec![(half, Vec3::x() * -load)];
         channel.solve()?;
         let clamp = channel.clamp();
@@ -105,7 +105,7 @@ impl Elastica {
 }
 
 /// Sum of the wall's forces on the rod.
-fn wall_force(rod: &mut TestRod) -> Vec3 {
+fn wall_force(rod: &mut WallRod) -> Vec3 {
     rod.touches().iter().map(|(_, touch)| touch.contact.normal * touch.contact.force_n).sum()
 }
 
@@ -161,8 +161,8 @@ pub(crate) const MODULUS: f64 = 1.0;
 const PRESSED: f64 = 0.02;
 
 /// C6: a rod pressed into a soft floor by its weight, with `elements` in `length` mm.
-fn pressed(elements: usize, length: f64) -> Result<TestRod> {
-    let setup = Setup { length, bending: BENDING, radius: WIRE_RADIUS, elements, modulus: MODULUS };
+fn pressed(elements: usize, length: f64) -> Result<WallRod> {
+    let setup = WallRodSpec { length, bending: BENDING, radius: WIRE_RADIUS, elements, modulus: MODULUS };
     let mut channel = channel(&setup, [PRESSED - WIRE_RADIUS, 10.0])?;
     channel.loads.distributed = vec![(0, elements, Vec3::y() * -(MODULUS * PRESSED))];
     Ok(channel)

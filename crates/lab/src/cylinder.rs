@@ -3,8 +3,9 @@
 
 use super::Row;
 use super::contact::falling;
-use super::test_rod::{Setup, TestRod};
-use endowire_core::rod::{Frame, PLAIN, element_energy};
+
+use endowire_core::shape::Frame;
+use endowire_core::statics::{WallRod, WallRodSpec};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
@@ -59,7 +60,7 @@ struct Fineness {
 /// otherwise free, so no moment about the cylinder's axis acts. The influence of the ends decays by a factor of 10⁴
 /// per turn.
 struct Helix {
-    rod: TestRod,
+    rod: WallRod,
     turns: usize,
     per_turn: usize,
 }
@@ -89,10 +90,10 @@ impl Helix {
         let sine = angle.sin();
         let length = TAU / sine * turns as f64;
         let (modulus, elements) = (hardness * sine.powi(4), per_turn * turns);
-        let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus };
+        let setup = WallRodSpec { length, bending: 1.0, radius: RADIUS, elements, modulus };
         let start = on_helix(0.0, angle).0;
         let shape = |s: f64| Frame::new(on_helix(s * sine, angle).1, None);
-        let mut rod = TestRod::new(&cylinder(length, around)?, &setup, start, shape)?;
+        let mut rod = WallRod::new(&cylinder(length, around)?, &setup, start, shape)?;
         rod.tolerance = 1e-8;
         rod.loads.forces = vec![(elements, Vec3::x() * -thrust(sine * sine))];
         rod.solve()?;
@@ -101,7 +102,7 @@ impl Helix {
 
     /// Arc lengths where turn `k` starts and ends, just before the nodes there.
     fn range(&self, k: usize) -> [f64; 2] {
-        let h = self.rod.elements()[0].length;
+        let h = self.rod.element_length(0);
         [k, k + 1].map(|k| h * ((self.per_turn * k) as f64 - 1e-6))
     }
 
@@ -112,16 +113,14 @@ impl Helix {
         let touches = self.rod.touches();
         let inside = touches.iter().filter(|(s, _)| *s > from && *s < to);
         let force: f64 = inside.map(|(_, touch)| touch.contact.force_n).sum();
-        let (elements, state) = (self.rod.elements(), &self.rod.state);
+        let (rod, state) = (&self.rod, &self.rod.state);
         let range = self.per_turn * k..self.per_turn * (k + 1);
         let mean =
             |value: &dyn Fn(usize) -> f64| range.clone().map(value).sum::<f64>() / self.per_turn as f64;
         Turn {
             sine2: mean(&|i| 1.0 - state.frames[i].t.x.powi(2)),
             pressure: force / (to - from),
-            bending: mean(&|e| {
-                element_energy::<PLAIN>(&elements[e], &state.element::<PLAIN>(e)).bend / elements[e].length
-            }),
+            bending: mean(&|e| rod.bending_energy(e) / rod.element_length(e)),
             shortening: 1.0 - (state.positions[range.end].x - state.positions[range.start].x) / (to - from),
             height: 1.0 + mean(&|i| state.positions[i].y),
         }
@@ -190,11 +189,11 @@ pub(crate) struct Lying {
 pub(crate) fn snaking(rod: Lying) -> Result<f64> {
     let Lying { half_waves, around, weight, modulus } = rod;
     let (length, elements) = (half_waves * PI, (PER_HALF_WAVE * half_waves) as usize);
-    let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus };
+    let setup = WallRodSpec { length, bending: 1.0, radius: RADIUS, elements, modulus };
     // As deep as its weight presses it.
     let start = Vec3::y() * -(1.0 + weight / modulus);
     let along = Frame::new(Vec3::x(), None);
-    let mut rod = TestRod::new(&cylinder(length, around)?, &setup, start, |_| along)?;
+    let mut rod = WallRod::new(&cylinder(length, around)?, &setup, start, |_| along)?;
     rod.loads.distributed = vec![(0, elements, Vec3::y() * -weight)];
     rod.supports.start_tangent = false;
     rod.supports.end_directions = vec![Vec3::y(), Vec3::z()];

@@ -6,6 +6,7 @@
 //! of any size ([`sequences`]), random deployments of coils ([`deployments`]), insertions into the [`surfaces`] of a
 //! folder, and the exact test for a device that [crosses](crossing) its wall.
 
+pub mod ablation;
 pub mod bench;
 mod capstan;
 mod capstan_within;
@@ -19,7 +20,9 @@ mod cylinder;
 pub mod deployments;
 mod ends;
 pub mod evidence;
+pub mod experiment;
 mod flow_drag;
+pub mod hard;
 mod insertion;
 pub mod insertion_stress;
 pub mod instrument_stress;
@@ -34,7 +37,6 @@ mod spatial;
 pub mod stress;
 pub mod studies;
 pub mod surfaces;
-mod test_rod;
 mod turned_within;
 mod whip;
 

@@ -14,8 +14,9 @@ use super::Row;
 use super::capstan::{BEND, PLAY, RADIUS, STRAIGHT, drawn, rigid};
 use super::channel::with_regions;
 use super::contact::falling;
-use super::test_rod::Setup;
+
 use endowire_core::insertion::{WallProperties, WallRegion};
+use endowire_core::statics::WallRodSpec;
 use endowire_core::{Result, Vec3};
 
 /// EI of the rod in N·mm², its radius and half its length in mm, moduli left and right in N/mm².
@@ -45,7 +46,7 @@ fn on_two(moduli: [f64; 2], transition_mm: f64) -> Result<OnTwo> {
         modulus_n_per_mm2: Some(moduli[1]),
         friction: None,
     };
-    let setup = Setup {
+    let setup = WallRodSpec {
         length: 2.0 * HALF,
         bending: BENDING,
         radius: WIRE_RADIUS,

@@ -2,7 +2,7 @@
 
 use super::planar::{CRITICAL_DIGITS, DIGITS, tip_error};
 use super::{Row, at_end, observed_order, section, unit_rod};
-use endowire_core::rod::{Frame, RodState};
+use endowire_core::shape::Frame;
 use endowire_core::statics::{EndKind, Initial, LoadKind, Parameter, StartKind, StaticCase, StaticProblem};
 use endowire_core::{Result, Vec3};
 use std::f64::consts::{FRAC_PI_4, PI};
@@ -150,7 +150,7 @@ pub(super) fn localised() -> Result<Vec<Row>> {
             .enumerate()
             .map(|(i, f)| if i == 0 { first } else { f })
             .collect();
-        problem.initial = RodState::from_frames(&problem.elements, Vec3::zeros(), frames);
+        problem.lay(Vec3::zeros(), frames);
         let s = problem.solve()?.checked()?;
         let name = format!("B4 m={m}, {elements} elements");
         let end = &s.reactions.end;

@@ -1,7 +1,7 @@
 //! Numerical stress tests, run by `endowire verify --stress`. Every case must converge, or report what failed.
 
 use super::{at_end, section, unit_rod};
-use endowire_core::rod::{Frame, RodState};
+use endowire_core::shape::Frame;
 use endowire_core::statics::{LoadKind, StaticCase, StaticProblem};
 use endowire_core::{Error, Result, Vec3};
 use serde::Serialize;
@@ -82,7 +82,7 @@ impl StressCase {
         };
         match solved {
             Ok((problem, solved)) => {
-                let report = &solved.report;
+                let report = problem.solution(&solved);
                 let next_bend = problem.next_bend(&solved);
                 StressRow {
                     name: self.name.clone(),
@@ -91,9 +91,9 @@ impl StressCase {
                     iterations: report.iterations,
                     residual: report.residual,
                     next_bend,
-                    monotone: solved.monotone,
-                    stop: report.reason.to_string(),
-                    pass: report.converged && report.stable && solved.monotone && next_bend < SETTLED,
+                    monotone: report.monotone,
+                    stop: report.stop.clone(),
+                    pass: report.converged && report.stable && report.monotone && next_bend < SETTLED,
                 }
             }
             Err(error) => StressRow::refused(&self.name, &error),
@@ -175,7 +175,7 @@ pub fn cases() -> Vec<StressCase> {
                     let last = frames[i];
                     frames.push(last.transported(turn * noise(), turn * noise()));
                 }
-                problem.initial = RodState::from_frames(&problem.elements, Vec3::zeros(), frames);
+                problem.lay(Vec3::zeros(), frames);
             }
             rows.push(row);
         }

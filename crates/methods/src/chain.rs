@@ -1,7 +1,7 @@
 //! A device as a chain of nodes, and the loads on it.
 
 use endowire_core::Vec3;
-use endowire_core::rod::Frame;
+use endowire_core::shape::Frame;
 use nalgebra::Rotation3;
 
 /// The segments of a clamped chain. Node 0 is the clamp, segment i (from 0) is between nodes i and i + 1.

@@ -2,27 +2,26 @@
 //! --nocapture`.
 
 use std::hint::black_box;
+use std::path::Path;
 use std::time::Instant;
 
 use endowire_core::Vec3;
-use endowire_core::banded::Factor;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::rod::{Layout, PLAIN, TWISTED};
+use endowire_core::statics::{StaticCase, StaticProblem};
 use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
-use endowire_tests::bent_rod::system;
 
-/// Seconds of one banded factorisation and solve of `n` elements, median of many.
-fn factor_and_solve<const C: usize>(n: usize) -> f64 {
-    let (_, _, newton) = system::<C>(n);
-    let mut factor = Factor::new(Layout::<C>::dimension(n));
-    let mut b = newton.assembly.residual.clone();
-    median((0..301).map(|_| {
-        b.copy_from_slice(&newton.assembly.residual);
+/// Seconds of one iteration of a free rod of `n` elements under a load at its tip, median of many solves.
+fn free_iteration(n: usize) -> f64 {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/cases/tip_force.toml");
+    let mut case = StaticCase::from_file(&path).unwrap();
+    case.rod.elements = n;
+    let problem = StaticProblem::new(&case).unwrap();
+    median((0..31).map(|_| {
         let clock = Instant::now();
-        factor.factor_solve(black_box(&newton.assembly.matrix), &mut b).unwrap();
-        clock.elapsed().as_secs_f64()
+        let solved = black_box(problem.solve_state().unwrap());
+        clock.elapsed().as_secs_f64() / problem.solution(&solved).iterations as f64
     }))
 }
 
@@ -61,7 +60,7 @@ struct Cost {
     p99_s: f64,
     total_s_per_mm: f64,
     iterations: f64,
-    /// Cost of an iteration over that of one factorisation and solve and as many queries as there are elements.
+    /// Cost of an iteration over that of one of a free rod and as many queries as there are elements.
     ratio: f64,
     tip_mm: Vec3,
 }
@@ -92,12 +91,7 @@ fn cost(case: &Case) -> Cost {
         iterations.push(f64::from(report.iterations));
     }
     let elements = simulation.shape().positions_mm.len() - 1;
-    let solve = if case.friction > 0.0 {
-        factor_and_solve::<TWISTED>(elements)
-    } else {
-        factor_and_solve::<PLAIN>(elements)
-    };
-    let unit = solve + queries(&query, &simulation.shape().positions_mm[1..]);
+    let unit = free_iteration(elements) + queries(&query, &simulation.shape().positions_mm[1..]);
     let mut sorted = seconds.clone();
     sorted.sort_by(f64::total_cmp);
     let median_s = sorted[count / 2];
@@ -131,7 +125,7 @@ fn a_step_in_the_arch_costs_a_few_solves_and_does_not_depend_on_the_mesh() {
         for (triangles, c) in [(20_000, &coarse), (200_000, &fine)] {
             println!(
                 "friction {friction}, {triangles} triangles, 300 elements: median {:.0} µs, p99 / median {:.1}, {} iterations, \
-                 iteration / (factor and solve + 300 queries) {:.2}",
+                 iteration / (a free rod's + 300 queries) {:.2}",
                 1e6 * c.median_s,
                 c.p99_s / c.median_s,
                 c.iterations,

@@ -21,7 +21,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Numbers of positive, negative and zero eigenvalues (zero: the factorisation met a zero pivot and stopped).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Inertia {
+pub(crate) struct Inertia {
     /// Positive pivots.
     pub positive: usize,
     /// Negative pivots.
@@ -30,7 +30,7 @@ pub struct Inertia {
 
 /// Why a factorisation stopped.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum FactorError {
+pub(crate) enum FactorError {
     /// A pivot is exactly zero: the leading block up to this row is singular.
     #[error("zero pivot in row {row}")]
     ZeroPivot {
@@ -47,7 +47,7 @@ pub enum FactorError {
 
 /// An LDLᵀ factorisation; its memory is reused.
 #[derive(Debug, Clone)]
-pub struct Factor<const C: usize> {
+pub(crate) struct Factor<const C: usize> {
     /// Rows like those of the matrix: the inverse pivot on the diagonal, and right of it the column of L below the
     /// diagonal. One extra block of zeros, so that the kernel needs no special case for the last block.
     rows: Vec<[f64; C]>,
@@ -57,7 +57,7 @@ pub struct Factor<const C: usize> {
 
 impl<const C: usize> Factor<C> {
     /// Allocates for matrices of this dimension.
-    pub fn new(dimension: usize) -> Self {
+    pub(crate) fn new(dimension: usize) -> Self {
         Self { rows: vec![[0.0; C]; dimension + C / 2], dimension, inertia: Inertia::default() }
     }
 
@@ -89,7 +89,12 @@ impl<const C: usize> Factor<C> {
 
     /// Factors `matrix` and replaces `b` by the solution of `A x = b`; the forward solve is fused with the
     /// factorisation. On an error `b` is overwritten with garbage.
-    pub fn factor_solve(&mut self, matrix: &BandMatrix<C>, b: &mut [f64]) -> Result<Inertia, FactorError> {
+    #[cfg(test)]
+    pub(crate) fn factor_solve(
+        &mut self,
+        matrix: &BandMatrix<C>,
+        b: &mut [f64],
+    ) -> Result<Inertia, FactorError> {
         let inertia = self.eliminate::<true>(matrix, None, b)?;
         Arch::new().dispatch(Solve::<C, false> { factor: self, b });
         Ok(inertia)

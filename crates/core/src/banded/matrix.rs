@@ -5,7 +5,7 @@
 /// A row of the upper triangle holds `C` numbers: the columns of its own block and of the next. Those left of the
 /// diagonal are zero.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BandMatrix<const C: usize> {
+pub(crate) struct BandMatrix<const C: usize> {
     pub(super) rows: Vec<[f64; C]>,
 }
 
@@ -20,7 +20,7 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Number of rows.
-    pub fn dimension(&self) -> usize {
+    pub(crate) fn dimension(&self) -> usize {
         self.rows.len()
     }
 
@@ -100,7 +100,8 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Adds `factor` times a shift.
-    pub fn add_shift(&mut self, shift: &Shift, factor: f64) {
+    #[cfg(test)]
+    pub(crate) fn add_shift(&mut self, shift: &Shift, factor: f64) {
         for (i, row) in self.rows.iter_mut().enumerate() {
             shift.add_to(i, factor, row);
         }
@@ -110,7 +111,7 @@ impl<const C: usize> BandMatrix<C> {
 /// A matrix that is added to another before it is factored: a diagonal, and one entry per row in the same column of
 /// the next block.
 #[derive(Debug, Clone, Default)]
-pub struct Shift {
+pub(crate) struct Shift {
     /// Entries of the diagonal.
     pub diagonal: Vec<f64>,
     /// Entries between a row and the same row of the next block.

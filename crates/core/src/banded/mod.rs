@@ -18,8 +18,8 @@ macro_rules! unrolled {
 pub(crate) mod ldlt;
 pub(crate) mod matrix;
 
-pub use ldlt::{Factor, FactorError, Inertia};
-pub use matrix::{BandMatrix, Shift};
+pub(crate) use ldlt::{Factor, FactorError, Inertia};
+pub(crate) use matrix::{BandMatrix, Shift};
 
 #[cfg(test)]
 mod tests;

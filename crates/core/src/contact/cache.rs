@@ -96,7 +96,7 @@ impl TakenReading {
 
 /// Memory of all contact points of a device in a step.
 #[derive(Debug, Clone)]
-pub struct ContactCache {
+pub(crate) struct ContactCache {
     pub(super) points: Vec<KnownPoint>,
     /// The points element by element.
     pub(super) spans: Vec<Span>,
@@ -166,7 +166,7 @@ impl KnownPoints {
 
 impl ContactCache {
     /// An empty cache for `surface`.
-    pub fn new(surface: &ContactSurface) -> Self {
+    pub(crate) fn new(surface: &ContactSurface) -> Self {
         Self {
             points: Vec::new(),
             spans: Vec::new(),

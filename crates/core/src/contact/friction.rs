@@ -36,7 +36,7 @@ pub(crate) use between::{Between, InnerFriction, Place};
 pub(in crate::contact) use coulomb::{Coulomb, FrictionDerivatives};
 pub(in crate::contact) use follow::unsettled;
 pub(crate) use moving::CarriedSlopes;
-pub use slider::NormalForce;
+pub(crate) use slider::NormalForce;
 pub(in crate::contact) use slider::Slider;
 
 use super::ContactPoint;
@@ -51,7 +51,7 @@ const LEAST_STICK_MM: f64 = 1e-8;
 
 /// Friction at all contact points of a device in one step.
 #[derive(Debug, Clone, Default)]
-pub struct Friction {
+pub(crate) struct Friction {
     pub(in crate::contact) law: Coulomb,
     /// One for each contact point; none without friction.
     pub(in crate::contact) sliders: Vec<Slider>,
@@ -61,7 +61,7 @@ pub struct Friction {
 
 /// Motion of a hand in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HandMotion {
+pub(crate) struct HandMotion {
     /// Length inserted before, mm.
     pub from_mm: f64,
     /// Length inserted after, mm.
@@ -86,7 +86,7 @@ impl HandMotion {
 
 impl Friction {
     /// Friction of coefficient μ ≥ 0; 0 disables it.
-    pub fn new(coefficient: f64) -> Self {
+    pub(crate) fn new(coefficient: f64) -> Self {
         Self::tuned(coefficient, &FrictionTuning::DEFAULT)
     }
 
@@ -126,7 +126,7 @@ impl Friction {
     ///
     /// `before` are the points of the last equilibrium and `forces` the normal forces on them, the first estimate.
     /// `hands` are the motions of all instruments: a point slips by the motion of its own.
-    pub fn begin(
+    pub(crate) fn begin(
         &mut self,
         elements: &[ElementData],
         state: &RodState,

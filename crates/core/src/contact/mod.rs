@@ -1,4 +1,7 @@
 //! Contact of a device with the wall and with itself: distance, energy, friction.
+//!
+//! What is public is for methods of one's own: the wall as devices feel it ([`ContactSurface`], [`WallReader`]), its
+//! [properties](WallProperties), and where a line has left the vessel ([`extension`]).
 
 mod cache;
 pub(crate) mod distance;
@@ -25,24 +28,25 @@ mod set;
 pub(crate) mod surface;
 pub(crate) mod wall;
 
-pub use cache::ContactCache;
-pub(crate) use cache::KnownPoints;
-pub use distance::{Distance, Nearness, SmoothWall};
-pub(crate) use drag::Drag;
-pub(crate) use friction::{Between, CarriedSlopes, InnerFriction, Place, stick_mm};
-pub use friction::{Friction, HandMotion, NormalForce};
+pub use distance::Nearness;
 pub use moved::MovedWall;
-pub use pairs::{Capsule, SelfContact, Touching};
-pub(crate) use pairs::{FrictionLaw, PairForce, Pressing, RodPlace};
-pub use point::{Contact, ContactPoint, Counters, Touch};
-pub use potential::WallPotential;
+pub use pairs::Touching;
+pub use point::{Contact, Counters, Touch};
 pub use properties::{WallProperties, WallRegion};
-pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
-pub use regions::RegionMap;
-pub use surface::{ContactMesh, ContactSurface, Deviation, Hint};
-pub use wall::WallContact;
-pub(crate) use wall::{FrictionSlopes, PressingSlopes, Reaction, least_force_n};
+pub use surface::{ContactMesh, ContactSurface};
+
+pub(crate) use cache::{ContactCache, KnownPoints};
+pub(crate) use distance::{Distance, SmoothWall};
+pub(crate) use drag::Drag;
+pub(crate) use friction::{
+    Between, CarriedSlopes, Friction, HandMotion, InnerFriction, NormalForce, Place, stick_mm,
+};
+pub(crate) use pairs::{Capsule, FrictionLaw, PairForce, Pressing, RodPlace, SelfContact};
+pub(crate) use point::ContactPoint;
+pub(crate) use potential::WallPotential;
+pub(crate) use properties::{check_friction, check_valve};
+pub(crate) use wall::{FrictionSlopes, PressingSlopes, Reaction, WallContact, least_force_n};
 
 /// Rounding error of a distance, in units of a coordinate's rounding.
 const ROUNDING: f64 = 4.0;

@@ -9,7 +9,7 @@ use crate::rod::{ElementData, RodState};
 
 /// A point of the device at which contact with the wall is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContactPoint {
+pub(crate) struct ContactPoint {
     /// Element and local coordinate 0…1.
     pub element: usize,
     /// Local coordinate in the element.

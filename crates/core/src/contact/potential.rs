@@ -13,7 +13,7 @@
 
 /// Wall energy per length at one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WallPotential {
+pub(crate) struct WallPotential {
     /// Foundation modulus k, N/mm².
     pub modulus_n_per_mm2: f64,
     /// Outer radius r of the device, mm.

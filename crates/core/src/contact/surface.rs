@@ -15,7 +15,6 @@ use super::regions::{RegionMap, Stiffness};
 use crate::tuning::ContactTuning;
 use crate::vessel::{ClosestFrom, Lumen, SweptField, Wall, WallStore};
 use crate::{Result, Vec3};
-pub use deviation::Deviation;
 pub use mesh::ContactMesh;
 
 /// Reach of the queries of a device's points, mm, given its largest radius and by how much the smooth wall may lie
@@ -46,7 +45,7 @@ enum Source {
 
 /// Where to seek the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Hint {
+pub(crate) enum Hint {
     /// Through space, for a point whose nearest piece is this one or close to it.
     Near(u32),
     /// Along the wall, for a point that has sunk into it at this piece.

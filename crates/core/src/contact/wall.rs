@@ -42,7 +42,7 @@ pub(crate) fn least_force_n(bending_nmm2: f64, bend_mm: f64) -> f64 {
 }
 
 /// The wall's energy along a device.
-pub struct WallContact<'a> {
+pub(crate) struct WallContact<'a> {
     surface: MovedWall<'a>,
     points: &'a [ContactPoint],
     /// Moment of the softest piece in the gentlest relevant bend, N·mm.
@@ -59,7 +59,7 @@ pub struct WallContact<'a> {
 impl<'a> WallContact<'a> {
     /// The wall's energy at `points` (tip first), with knowledge from earlier steps. `softest_nmm2` is the device's
     /// smallest bending stiffness.
-    pub fn new(
+    pub(crate) fn new(
         surface: impl Into<MovedWall<'a>>,
         points: &'a [ContactPoint],
         cache: &'a mut ContactCache,
@@ -208,7 +208,12 @@ impl<'a> WallContact<'a> {
     }
 
     /// Contact at point `index` at a state, if it presses on the wall.
-    pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
+    pub(crate) fn touch(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        index: usize,
+    ) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
         let material = self.material_at(index, &x);

@@ -38,7 +38,7 @@ pub(crate) struct RankOne {
 
 /// Matrix, residual and energy at one state. External energies are added through its [`Stencils`](super::Stencils).
 #[derive(Debug, Clone)]
-pub struct Assembly<const C: usize> {
+pub(crate) struct Assembly<const C: usize> {
     /// The augmented matrix.
     pub matrix: BandMatrix<C>,
     /// Blocks of the matrix outside its band, which couple nodes in contact.
@@ -150,7 +150,7 @@ impl<const C: usize> Assembly<C> {
     /// Sets `shift` to ∫|δr′|² (and ∫δθ²) of a rod whose rows in `held` are held: the stiffness of a uniform unit
     /// tension. It removes negative curvature due to compression, the commonest kind. It also acts across the gap
     /// between two rods, so that the shift keeps an unsupported rod in place.
-    pub fn unit_shift(elements: &[ElementData], held: &[Option<usize>], shift: &mut Shift) {
+    pub(crate) fn unit_shift(elements: &[ElementData], held: &[Option<usize>], shift: &mut Shift) {
         let l = Layout::<C>;
         shift.reset(Layout::<C>::dimension(elements.len()));
         for (e, data) in elements.iter().enumerate() {

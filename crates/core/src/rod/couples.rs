@@ -16,7 +16,7 @@ pub(crate) const PLACES: usize = 8;
 
 /// Derivatives of an energy of two points.
 #[derive(Debug, Clone, Copy)]
-pub struct Couple {
+pub(crate) struct Couple {
     /// The element of the first point.
     pub first: usize,
     /// The element of the second point.
@@ -32,7 +32,7 @@ pub struct Couple {
 
 /// A spring that is linear in the unknowns, between two points of the centre line.
 #[derive(Debug, Clone, Copy)]
-pub struct Link {
+pub(crate) struct Link {
     /// The elements of both points.
     pub elements: [usize; 2],
     /// Weights of the eight in the difference of the points, first minus second.

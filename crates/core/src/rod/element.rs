@@ -139,7 +139,7 @@ pub struct ElementState {
 
 /// Stored energy by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Energy<T = f64> {
+pub(crate) struct Energy<T = f64> {
     /// Bending, ½∫(κ − κ⁰)ᵀB(κ − κ⁰) ds.
     pub bend: T,
     /// Twist, ½∫GJ(τ − τ⁰)² ds.
@@ -215,7 +215,7 @@ pub(super) fn angles<S: Simd>(a: &[Lanes<S>; 3], p: &Point) -> (Lanes<S>, Lanes<
 /// `super::layout`. N and b at the first node belong to the element before and stay empty. `T` is one number, or
 /// one per lane for elements side by side.
 #[derive(Debug, Clone)]
-pub struct ElementSystem<const C: usize, T = f64> {
+pub(crate) struct ElementSystem<const C: usize, T = f64> {
     /// Gradient of the Lagrangian; the last entry is the constraint c − D N.
     pub gradient: [T; C],
     /// Hessian, upper triangle; the last column is that of N.
@@ -228,7 +228,7 @@ pub struct ElementSystem<const C: usize, T = f64> {
 
 impl<const C: usize> ElementSystem<C> {
     /// All zero.
-    pub const fn zeros() -> Self {
+    pub(crate) const fn zeros() -> Self {
         Self::filled(0.0)
     }
 }

@@ -23,7 +23,7 @@ use super::torsion::TwistValue;
 use pulp::{Arch, Scalar, Simd, WithSimd, bytemuck};
 
 /// The element's energy alone, where two neighbouring nodes have `C` unknowns.
-pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> Energy {
+pub(crate) fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> Energy {
     if let Some(energy) = rim_energy::<C>(data, s) {
         return energy;
     }
@@ -32,7 +32,7 @@ pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> E
 
 /// The element's Lagrangian with derivatives. The Hessian is computed only if `HESSIAN` is set, with the augmentation
 /// `gamma` (γ in `super::assembly`; 0 gives the Hessian of the Lagrangian itself).
-pub fn element_system<const C: usize, const HESSIAN: bool>(
+pub(crate) fn element_system<const C: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,
     gamma: f64,

@@ -13,24 +13,24 @@
 //! identity.
 
 /// Number of unknowns of two neighbouring nodes without angles.
-pub const PLAIN: usize = 12;
+pub(crate) const PLAIN: usize = 12;
 /// Number of unknowns of two neighbouring nodes with one set of angles.
-pub const TWISTED: usize = 16;
+pub(crate) const TWISTED: usize = 16;
 /// Largest number of sets of angles.
 pub(crate) const MAX_ANGLES: usize = 3;
 
 /// Row numbers of the unknowns where two neighbouring nodes have `C` = 12 + 4k of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Layout<const C: usize>;
+pub(crate) struct Layout<const C: usize>;
 
 impl<const C: usize> Layout<C> {
     /// Number of sets of angles, k.
-    pub const ANGLES: usize = (C - PLAIN) / 4;
+    pub(crate) const ANGLES: usize = (C - PLAIN) / 4;
     /// Unknowns per node.
     pub(crate) const BLOCK: usize = C / 2;
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
-    pub const fn dimension(elements: usize) -> usize {
+    pub(crate) const fn dimension(elements: usize) -> usize {
         Self::BLOCK * (elements + 2)
     }
 

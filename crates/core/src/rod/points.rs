@@ -15,7 +15,7 @@ use crate::field::EnergyDensity;
 
 /// Gradients and Hessians of energies of points of one element.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct PointSum {
+pub(crate) struct PointSum {
     /// Gradients in x₀, h t₀, x₁ and h t₁.
     forces: [Vec3; 4],
     /// Hessians in pairs of these, i ≤ j; the other entries are zero.
@@ -40,7 +40,7 @@ impl PointSum {
     }
 
     /// Adds an energy of the point at ξ from its gradient and, if wanted, Hessian in the position of that point.
-    pub fn add(&mut self, xi: f64, gradient: &Vec3, hessian: Option<&Matrix3<f64>>) {
+    pub(crate) fn add(&mut self, xi: f64, gradient: &Vec3, hessian: Option<&Matrix3<f64>>) {
         self.felt = true;
         let c = hermite(xi);
         for i in 0..4 {

@@ -11,7 +11,7 @@ use std::ops::{Add, Mul};
 
 /// Weights of (e, t₀, t₁) in y and z, and of (θ₀, θ₁, b) in the angle, at one point of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Position in the element, 0 to 1.
     pub xi: f64,
     /// Quadrature weight; the weights sum to 1.
@@ -55,12 +55,12 @@ const OUTER: f64 = 0.387_298_334_620_741_7;
 
 /// The three-point Gauss rule on [0, 1], exact for polynomials of degree 5: one more than the squared curvature of an
 /// initially straight element needs, and enough for order 4 where the element is strongly bent.
-pub const GAUSS: [Point; 3] =
+pub(crate) const GAUSS: [Point; 3] =
     [Point::at(0.5 - OUTER, 5.0 / 18.0), Point::at(0.5, 8.0 / 18.0), Point::at(0.5 + OUTER, 5.0 / 18.0)];
 
 /// Weights of (x₀, h t₀, x₁, h t₁) in the centre line at ξ.
 #[inline]
-pub fn hermite(xi: f64) -> [f64; 4] {
+pub(crate) fn hermite(xi: f64) -> [f64; 4] {
     let (a, b) = (xi, 1.0 - xi);
     [b * b * (1.0 + 2.0 * a), a * b * b, a * a * (1.0 + 2.0 * b), -a * a * b]
 }

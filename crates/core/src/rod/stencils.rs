@@ -11,7 +11,7 @@ use crate::Vec3;
 
 /// Three unknowns of a node that are addressed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Triple {
+pub(crate) enum Triple {
     /// The position of the node.
     Position,
     /// Rotations of the tangent along u and v of its triad, and the material angle.
@@ -20,7 +20,7 @@ pub enum Triple {
 
 /// A sum of energies, each given by value, gradient and Hessian in a few unknowns. Gradients are minus the forces on
 /// the rod. Terms in a material angle are dropped where the rod has none.
-pub trait Stencils {
+pub(crate) trait Stencils {
     /// Whether Hessians are wanted beside gradients; if not, they are ignored.
     fn wants_hessian(&self) -> bool;
 

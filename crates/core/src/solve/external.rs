@@ -4,7 +4,7 @@ use crate::Vec3;
 use crate::rod::{ElementData, RodState, Stencils};
 
 /// Motion of the rod in a step.
-pub trait Moved {
+pub(crate) trait Moved {
     /// Displacement, mm, and rotation, rad, of the point at ξ of an element, on the instrument in a set of angles.
     fn point(&self, place: (usize, f64, usize)) -> (Vec3, f64);
 
@@ -25,7 +25,7 @@ pub trait Moved {
 ///
 /// Lagged quantities, such as the normal forces that friction follows, are renewed only when a base is linearised, so
 /// that one step lowers one energy.
-pub trait External {
+pub(crate) trait External {
     /// Adds value, gradient and Hessian at a state, which becomes the base.
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils);
 
@@ -61,7 +61,7 @@ pub trait External {
 
 /// Magnitudes of forces at the base.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Sizes {
+pub(crate) struct Sizes {
     /// The largest force, N; the residual is relative to it.
     pub force_n: f64,
     /// The largest moment, N·mm; the residual is relative to it.
@@ -71,7 +71,7 @@ pub struct Sizes {
 }
 
 /// Forces that push and never pull, as unknowns beside the rod's shape, and their response to a step.
-pub trait Contacts {
+pub(crate) trait Contacts {
     /// Stores a step from the base that solves the assembled system.
     fn predict(&mut self, elements: &[ElementData], base: &RodState, moved: &dyn Moved);
 
@@ -109,7 +109,7 @@ pub trait Contacts {
 
 /// Contribution of contacts to the merit at the base.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct ContactMerit {
+pub(crate) struct ContactMerit {
     /// Added to the energy, mJ.
     pub excess_mj: f64,
     /// Added to the slope of the energy along the step, mJ.

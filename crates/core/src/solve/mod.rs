@@ -21,14 +21,15 @@ mod together;
 mod trial;
 mod unsymmetric;
 
-pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
+pub(crate) use external::{ContactMerit, Contacts, External, Moved, Sizes};
 pub(crate) use inverse::Inverse;
 pub(crate) use krylov::gmres;
 pub(crate) use neighbourhood::Neighbourhood;
-pub use newton::Newton;
-pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
-pub use residual::ResidualSize;
+pub(crate) use newton::Newton;
+pub(crate) use report::{NewtonOptions, NewtonReport, StopReason};
 pub(crate) use together::Together;
 
 #[cfg(test)]
 pub(crate) mod newton_tests;
+#[cfg(test)]
+mod speed_tests;

@@ -31,7 +31,7 @@ const STEPS: usize = 1024;
 
 /// Newton's method and its memory, for rods of one size. Iterations do not allocate.
 #[derive(Debug, Clone)]
-pub struct Newton<const C: usize> {
+pub(crate) struct Newton<const C: usize> {
     /// The system at the current state.
     pub assembly: Assembly<C>,
     /// Residual rows of the first two nodes before the first node was held: its reactions.
@@ -57,7 +57,7 @@ pub struct Newton<const C: usize> {
 
 impl<const C: usize> Newton<C> {
     /// Allocates for a rod of `elements` elements.
-    pub fn new(elements: usize) -> Self {
+    pub(crate) fn new(elements: usize) -> Self {
         let n = Layout::<C>::dimension(elements);
         Self {
             assembly: Assembly::new(elements),
@@ -101,7 +101,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Assembles the whole system at `state`.
-    pub fn assemble(
+    pub(crate) fn assemble(
         &mut self,
         elements: &[ElementData],
         supports: &Supports,
@@ -142,7 +142,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Moves `state` to an equilibrium; residual, energies and reactions are assembled there.
-    pub fn solve(
+    pub(crate) fn solve(
         &mut self,
         elements: &[ElementData],
         supports: &mut Supports,

@@ -5,7 +5,7 @@ use crate::tuning::NewtonTuning;
 
 /// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NewtonOptions {
+pub(crate) struct NewtonOptions {
     /// Largest number of iterations (steps).
     pub max_iterations: usize,
     /// Largest number of linear solves, including those for contacts and shifts within iterations. No iteration
@@ -37,7 +37,7 @@ impl Default for NewtonOptions {
 
 /// Why Newton's method stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopReason {
+pub(crate) enum StopReason {
     /// The residual is below its tolerance.
     Converged,
     /// The residual is as small as rounding permits on this mesh.
@@ -77,7 +77,7 @@ impl std::fmt::Display for StopReason {
 
 /// One accepted step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StepRecord {
+pub(crate) struct StepRecord {
     /// Change of the potential energy.
     pub energy_change: f64,
     /// Change of the merit: the energy, plus the weighted errors of the end conditions.
@@ -94,7 +94,7 @@ pub struct StepRecord {
 
 /// How a solution was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NewtonReport {
+pub(crate) struct NewtonReport {
     /// Steps taken.
     pub iterations: usize,
     /// Linear solves taken.

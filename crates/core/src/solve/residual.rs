@@ -7,7 +7,7 @@ use crate::rod::{ElementData, Layout, RodState, Supports};
 
 /// Size of a residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ResidualSize {
+pub(crate) struct ResidualSize {
     /// Largest unbalanced force or moment at a node, relative to the largest in the rod, its loads and supports.
     pub relative: f64,
     /// Whether every row is below its tolerance.

@@ -22,7 +22,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Factors the assembled matrix with the regularisation, for the inverse.
-    pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
+    pub(crate) fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
         self.inertia(elements, supports, self.regularisation(elements))
     }
 

@@ -21,21 +21,21 @@ const TWIST_MATTERS: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct StaticProblem {
     /// The mesh.
-    pub elements: Vec<ElementData>,
+    pub(crate) elements: Vec<ElementData>,
     /// Supports of the ends.
-    pub supports: Supports,
+    pub(crate) supports: Supports,
     /// Loads.
-    pub loads: Loads,
+    pub(crate) loads: Loads,
     /// Contact between loops of the rod, if modelled.
-    pub touching: Option<SelfContact>,
+    pub(crate) touching: Option<SelfContact>,
     /// Initial shape.
     pub initial: RodState,
     /// Number of sets of angles: none where nothing twists.
-    pub angles: usize,
+    pub(crate) angles: usize,
     /// Options of Newton's method.
-    pub options: NewtonOptions,
+    pub(crate) options: NewtonOptions,
     /// Number of load steps.
-    pub load_steps: usize,
+    pub(crate) load_steps: usize,
     gj_given: bool,
     /// The section at the start of a single rod.
     first: Option<Section>,
@@ -49,21 +49,21 @@ pub struct Solved {
     /// Final state.
     pub state: RodState,
     /// Supports with their multipliers.
-    pub supports: Supports,
+    pub(crate) supports: Supports,
     /// Report of the last load step; its iterations are those of all load steps.
-    pub report: NewtonReport,
+    pub(crate) report: NewtonReport,
     /// Whether every accepted step of every load step lowered the energy.
-    pub monotone: bool,
+    pub(crate) monotone: bool,
     /// Elastic energies.
-    pub energy: Energies,
+    pub(crate) energy: Energies,
     /// Reaction at the start.
-    pub start: Reaction,
+    pub(crate) start: Reaction,
     /// As in [`StaticSolution::push_force`].
-    pub push_force: Option<f64>,
+    pub(crate) push_force: Option<f64>,
     /// Self-contacts of the rod.
-    pub touching: Vec<Touching>,
+    pub(crate) touching: Vec<Touching>,
     /// Push force and torque of each of several instruments, as in [`InstrumentSolution`].
-    pub instruments: Vec<(Option<f64>, f64)>,
+    pub(crate) instruments: Vec<(Option<f64>, f64)>,
 }
 
 impl StaticProblem {
@@ -154,14 +154,35 @@ impl StaticProblem {
         Ok(self.solution(&solved))
     }
 
+    /// Lengths of the elements, from the start on.
+    pub fn element_lengths(&self) -> impl Iterator<Item = f64> + '_ {
+        self.elements.iter().map(|element| element.length)
+    }
+
+    /// Begins from a shape: from `start` on, with the frames of the nodes.
+    pub fn lay(&mut self, start: Vec3, frames: Vec<Frame>) {
+        self.initial = RodState::from_frames(&self.elements, start, frames);
+    }
+
+    /// Most iterations of a solve.
+    pub fn limit_iterations(&mut self, most: usize) {
+        self.options.max_iterations = most;
+    }
+
     /// Solves from the initial shape and returns the state.
+    ///
+    /// # Errors
+    /// A rod that twists without a torsion stiffness.
     pub fn solve_state(&self) -> Result<Solved> {
         self.solve_in(&[])
     }
 
     /// The same in fields, whose units of length and energy are those of the case. They act in full in all load steps, and are no part of the energies of the
     /// solution.
-    pub(crate) fn solve_in(&self, fields: &[Arc<dyn Field>]) -> Result<Solved> {
+    ///
+    /// # Errors
+    /// See [`StaticProblem::solve_state`].
+    pub fn solve_in(&self, fields: &[Arc<dyn Field>]) -> Result<Solved> {
         let solved = by_angles!(self.angles, self.run(fields));
         let energy = &solved.energy;
         if self.angles > 0
@@ -275,14 +296,18 @@ impl StaticProblem {
             let rest = frame.u * first.rest_curvature[0] + frame.v * first.rest_curvature[1];
             clamp.push_force(&frame.t, first.ei, first.gj.unwrap_or(ASSUMED_GJ_RATIO * first.ei), &rest)
         });
-        let instruments = self.hands::<C>(&state, &supports, &mut loads, &clamp);
+        let instruments = {
+            let mut untouched = None;
+            let mut outside = outside(&mut loads, &mut untouched, field.as_mut());
+            self.hands::<C>(&state, &supports, &mut outside, &clamp)
+        };
         let touching = touching.map_or_else(Vec::new, |touching| touching.touching(&self.elements, &state));
         Solved { state, supports, report, monotone, energy, start, push_force, touching, instruments }
     }
 
     /// Push force and torque of each of several instruments at an equilibrium with these external energies, as in
     /// [`InstrumentSolution`]; empty for a single rod.
-    pub fn hands<const C: usize>(
+    fn hands<const C: usize>(
         &self,
         state: &RodState,
         supports: &Supports,
@@ -329,7 +354,7 @@ impl StaticProblem {
     }
 
     /// The solution of a solved state.
-    pub(crate) fn solution(&self, solved: &Solved) -> StaticSolution {
+    pub fn solution(&self, solved: &Solved) -> StaticSolution {
         let state = &solved.state;
         let n = self.elements.len();
         let frame = &state.frames[n];

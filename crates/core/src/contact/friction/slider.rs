@@ -30,7 +30,7 @@ pub(in crate::contact) struct Slider {
 
 /// Normal force on a contact point at an equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct NormalForce {
+pub(crate) struct NormalForce {
     /// Normal of the wall, into the lumen.
     pub(super) normal: Vec3,
     /// Force, scaled down where the coefficient is below its largest value, N.

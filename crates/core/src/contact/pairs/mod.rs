@@ -51,7 +51,7 @@ use tree::Tree;
 
 /// The surface of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Capsule {
+pub(crate) struct Capsule {
     /// Radius of the rod, mm.
     pub radius_mm: f64,
     /// k: force per length and depth, N/mm².
@@ -123,7 +123,7 @@ pub(crate) struct PairCounters {
 
 /// Contact energy of rods with themselves and each other, with knowledge kept between calls.
 #[derive(Debug, Clone, Default)]
-pub struct SelfContact {
+pub(crate) struct SelfContact {
     capsules: Vec<Capsule>,
     sites: Vec<Site>,
     /// First site of each element, and one past the last.

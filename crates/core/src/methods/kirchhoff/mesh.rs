@@ -25,7 +25,7 @@ pub(super) const MOST_POINTS: usize = 64;
 
 /// Resolution of a device's mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fineness {
+pub(crate) struct Fineness {
     /// Length of elements, mm.
     pub element_mm: f64,
     /// Largest spacing of contact points, in radii of the device.
@@ -57,7 +57,7 @@ impl Fineness {
     }
 
     /// Elements of this length, with contact points dense enough for any crest.
-    pub fn of_elements(element_mm: f64) -> Self {
+    pub(crate) fn of_elements(element_mm: f64) -> Self {
         let contact_spacing_radii = KirchhoffOptions::of(Accuracy::Fast).contact_spacing_radii;
         Self { element_mm, contact_spacing_radii, tuning: MeshTuning::DEFAULT }
     }
@@ -65,7 +65,7 @@ impl Fineness {
 
 /// Elements and contact points of an inserted length.
 #[derive(Debug, Clone, Default)]
-pub struct Mesh {
+pub(crate) struct Mesh {
     /// Arc length from the tip of every node, mm, sheath first.
     pub from_tip_mm: Vec<f64>,
     /// Elements, sheath first.
@@ -147,7 +147,13 @@ impl Mesh {
     }
 
     /// Meshes `inserted_mm` (above 0) of `device`; for its nodes see `stretches.rs`.
-    pub fn build(&mut self, device: &Device, inserted_mm: f64, fineness: Fineness, modulus_n_per_mm2: f64) {
+    pub(crate) fn build(
+        &mut self,
+        device: &Device,
+        inserted_mm: f64,
+        fineness: Fineness,
+        modulus_n_per_mm2: f64,
+    ) {
         self.build_points(device, inserted_mm, fineness, modulus_n_per_mm2);
         self.flush_mm = fineness.flush_mm();
         self.inserted_mm.clear();

@@ -96,7 +96,7 @@ mod yielding;
 #[cfg(test)]
 mod yielding_tests;
 
-pub use mesh::{Fineness, Mesh};
+pub(crate) use mesh::{Fineness, Mesh};
 pub use options::{Accuracy, KirchhoffOptions};
 pub use state::KirchhoffState;
 

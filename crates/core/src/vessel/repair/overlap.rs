@@ -37,6 +37,13 @@ pub(super) struct Closed {
     pub(super) triangles: Vec<([u32; 3], u32)>,
 }
 
+impl Closed {
+    /// Whether it has a handle, as a ring: by Euler's characteristic V − E + F, of 2 without, with 3 F edges for every two triangles.
+    pub(super) fn is_ring(&self) -> bool {
+        2 * self.vertices_mm.len() < self.triangles.len() + 4
+    }
+}
+
 /// The pieces of a mesh, and which of them overlap.
 pub(super) struct Overlaps {
     piece_of: Vec<u32>,

@@ -1,13 +1,11 @@
 //! `endowire experiment`: the four experiments of Li et al. 2011, and coils in an aneurysm.
 
 mod camera;
-mod catalogue;
 mod coil;
 mod deformation;
 mod lines;
 mod looping;
 mod navigation;
-mod straight;
 mod timing;
 
 use std::path::Path;

@@ -4,11 +4,11 @@ use endowire_core::tuning::Tuning;
 use endowire_core::{Error, Result};
 
 /// A change of one number, or of the few that make up a mechanism.
-pub(crate) struct Row {
+pub(super) struct Row {
     /// The part of the solver that it belongs to.
-    pub(crate) group: &'static str,
-    pub(crate) name: String,
-    pub(crate) change: fn(&mut Tuning),
+    pub(super) group: &'static str,
+    pub(super) name: String,
+    pub(super) change: fn(&mut Tuning),
 }
 
 /// A mechanism without which scenes are run, and what switches it off.
@@ -323,7 +323,7 @@ fn groups() -> [Group; 15] {
 ///
 /// # Errors
 /// A row that changes nothing, or has the name of another.
-pub(crate) fn all() -> Result<Vec<Row>> {
+pub(super) fn all() -> Result<Vec<Row>> {
     let mut rows: Vec<Row> = Vec::new();
     for (group, of_group) in groups() {
         for (name, change) in of_group {

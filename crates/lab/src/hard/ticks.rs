@@ -7,7 +7,7 @@ use endowire_core::insertion::{Command, Move, Simulation};
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
 
-use crate::course::Course;
+use super::course::Course;
 
 /// Devices of the assets.
 const DEVICES: [&str; 2] = ["wire_035_shaped", "wire_035_hooked"];
@@ -25,12 +25,12 @@ const FEW: usize = 8;
 /// Largest distance of tips without a jump that both report, mm.
 const APART_MM: f64 = 0.5;
 
-fn simulation(device: &str, friction: f64) -> Result<Simulation> {
+fn simulation(repository: &Path, device: &str, friction: f64) -> Result<Simulation> {
     let text = format!(
         "[vessel]\ntree = \"vessels/aortic_arch.csv\"\nedge_mm = 3.0\n[vessel.wall]\nmodulus_n_per_mm2 = 1.0\nfriction = {friction}\n\
          [device]\nfile = \"devices/{device}.toml\"\n[sheath]\nopening = 1\n[method]\nname = \"kirchhoff\"\n"
     );
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scene.toml");
+    let assets = repository.join("assets/scene.toml");
     Scene::from_toml(&text, &assets)?.simulation(&NoStore)
 }
 
@@ -43,14 +43,14 @@ fn tick(course: &mut Course, moves: &[Move], solves: usize) {
 }
 
 /// Courses in which ticks are not steps, or end elsewhere than small steps without a reported jump.
-pub(crate) fn ticks(only: Option<&str>) -> Result<usize> {
-    println!(
+pub(super) fn ticks(repository: &Path, only: Option<&str>, say: &mut dyn FnMut(String)) -> Result<usize> {
+    say(format!(
         "device             friction  ticks = steps  apart mm: steps  few solves  jumps: steps  ticks  few  small"
-    );
+    ));
     let mut wrong = 0;
     for device in DEVICES.iter().filter(|name| only.is_none_or(|only| name.contains(only))) {
         for friction in FRICTIONS {
-            let start = simulation(device, friction)?;
+            let start = simulation(repository, device, friction)?;
             let [mut stepping, mut ticking, mut few, mut small] =
                 [(); 4].map(|()| Course::new(start.clone()));
             for k in 0..COMMANDS {
@@ -70,7 +70,7 @@ pub(crate) fn ticks(only: Option<&str>) -> Result<usize> {
             let stays =
                 apart_mm.iter().zip(is_reported).all(|(mm, is_reported)| *mm <= APART_MM || is_reported);
             wrong += usize::from(!(same && stays));
-            println!(
+            say(format!(
                 "{device:18} {friction:8.1} {:>14} {:16.3} {:11.3} {:13} {:6} {:4} {:6}",
                 if same { "yes" } else { "NO" },
                 apart_mm[0],
@@ -79,7 +79,7 @@ pub(crate) fn ticks(only: Option<&str>) -> Result<usize> {
                 ticking.jumps,
                 few.jumps,
                 small.jumps
-            );
+            ));
         }
     }
     Ok(wrong)

@@ -2,37 +2,37 @@
 
 use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use endowire_core::methods::OwnMethod;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::{CentrelineRecipe, CentrelineTree, Lumen, NoStore, Wall, WallRecipe, WallStore};
 use endowire_core::{Error, Result, Vec3};
-use endowire_lab::sequences::APART_MM;
 
-use crate::rows::Row;
+use super::rows::Row;
+use crate::sequences::APART_MM;
 
 /// What a scene took, and where it ended.
 #[derive(Debug, Clone)]
-pub(crate) struct Outcome {
-    pub(crate) iterations: u64,
+pub(super) struct Outcome {
+    pub(super) iterations: u64,
     /// Linear solves: factorisations.
-    pub(crate) solves: u64,
-    pub(crate) seconds: f64,
-    pub(crate) jumps: usize,
+    pub(super) solves: u64,
+    pub(super) seconds: f64,
+    pub(super) jumps: usize,
     /// Commands that ended without an equilibrium.
-    pub(crate) unbalanced: usize,
-    pub(crate) tip_mm: Vec3,
+    pub(super) unbalanced: usize,
+    pub(super) tip_mm: Vec3,
     /// The error that ended it.
-    pub(crate) end: Option<String>,
+    pub(super) end: Option<String>,
 }
 
 /// A scene of `benches/hard`.
-pub(crate) struct Hard {
-    pub(crate) name: String,
+pub(super) struct Hard {
+    pub(super) name: String,
     /// How far tips may be apart at its end, mm.
-    pub(crate) apart_mm: f64,
+    pub(super) apart_mm: f64,
     path: PathBuf,
     scene: Scene,
     walls: Option<(Lumen, Felt)>,
@@ -61,19 +61,19 @@ impl WallStore for Felt {
 }
 
 /// All scenes of `benches/hard`, by name.
-pub(crate) fn all() -> Result<Vec<Hard>> {
+pub(super) fn all(repository: &Path) -> Result<Vec<Hard>> {
     let read = |path: PathBuf| {
         let scene = Scene::read(&path)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let apart_mm = APART_MM[usize::from(scene.vessel.wall.friction > 0.0)];
         Ok(Hard { name, apart_mm, path, scene, walls: None })
     };
-    endowire_benches::hard_scenes()?.into_iter().map(read).collect()
+    crate::hard::scenes(repository)?.into_iter().map(read).collect()
 }
 
 impl Hard {
     /// Makes the walls, once.
-    pub(crate) fn prepare(&mut self) -> Result<()> {
+    pub(super) fn prepare(&mut self) -> Result<()> {
         if self.walls.is_none() {
             // A script with a mistake ends here, not as a scene that fails.
             self.scene.steps(&self.scene.stack()?, &NoStore)?;
@@ -83,7 +83,7 @@ impl Hard {
     }
 
     /// Carries out its script with the numbers of a row, within a time.
-    pub(crate) fn run(&self, row: Option<&Row>, limit_s: Option<f64>) -> Result<Outcome> {
+    pub(super) fn run(&self, row: Option<&Row>, limit_s: Option<f64>) -> Result<Outcome> {
         let Some((lumen, felt)) = &self.walls else {
             return Err(Error::parameter("scene", self.name.as_str(), "prepare it first"));
         };

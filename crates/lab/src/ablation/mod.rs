@@ -1,29 +1,18 @@
 //! What each mechanism of the solver, and each of its numbers, brings: hard scenes without it, or with another value, over
 //! those with all of them as they are.
 //!
-//! ```sh
-//! cargo run --release -p endowire-benches --bin ablation                     # all rows in all scenes; writes the table
-//! cargo run --release -p endowire-benches --bin ablation -- PATTERN          # rows with this in their name; prints it
-//! cargo run --release -p endowire-benches --bin ablation -- --scenes A,B    # scenes with one of these in their name; writes it
-//! cargo run --release -p endowire-benches --bin ablation -- --print          # prints it in place of writing it
-//! cargo run --release -p endowire-benches --bin ablation -- --measured       # prints what is measured so far
-//! cargo run --release -p endowire-benches --bin ablation -- --repeats N      # times are the smallest of N runs
-//! cargo run --release -p endowire-benches --bin ablation -- --rows           # prints the rows
-//! ```
-//!
 //! A row (`rows.rs`) changes one number of [`Tuning`](endowire_core::tuning::Tuning). A scene of `benches/hard` is run in
 //! turn with all numbers as they are and with the row's. The table is written at the end of BENCHMARKS.md.
 //!
 //! Results are kept in `target/ablation`, in a folder for each commit, a file for each row, a line for each scene: a run
 //! that was killed goes on where it was. With uncommitted changes it begins anew.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a table is what it is for")]
 
 mod results;
 mod rows;
 mod scenes;
 mod table;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use endowire_core::{Error, Result};
 
@@ -43,9 +32,9 @@ struct Arguments {
 }
 
 impl Arguments {
-    fn read() -> Result<Self> {
+    fn read(arguments: &[String]) -> Result<Self> {
         let mut reported = Self { repeats: 1, ..Self::default() };
-        let mut words = std::env::args().skip(1);
+        let mut words = arguments.iter().cloned();
         while let Some(word) = words.next() {
             let mut value = || {
                 let remedy = "say which after it";
@@ -81,9 +70,12 @@ impl Arguments {
     }
 }
 
-/// The root of the repository.
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+/// Where lines go: those of the table, and how far it is.
+pub struct Told<'a> {
+    /// Lines of what was asked for.
+    pub say: &'a mut dyn FnMut(String),
+    /// What is being run.
+    pub note: &'a mut dyn FnMut(String),
 }
 
 /// Whether a name has a pattern in it, or one of several with commas between.
@@ -92,12 +84,12 @@ fn has(name: &str, patterns: Option<&str>) -> bool {
 }
 
 /// Runs a scene with all numbers as they are and with those of a row, in turn; of each the fastest run.
-fn pair(scene: &Hard, row: &Row, repeats: usize) -> Result<Measured> {
+fn pair(scene: &Hard, row: &Row, repeats: usize, note: &mut dyn FnMut(String)) -> Result<Measured> {
     let mut measured: Option<Measured> = None;
     for _ in 0..repeats {
         let whole = scene.run(None, None)?;
         if let Some(end) = &whole.end {
-            eprintln!("{} ends as it is: {end}", scene.name);
+            note(format!("{} ends as it is: {end}", scene.name));
         }
         let limit_s = SLOWER * whole.seconds + GRACE_S;
         let changed = scene.run(Some(row), Some(limit_s))?;
@@ -117,18 +109,23 @@ const SLOWER: f64 = 20.0;
 /// See [`SLOWER`].
 const GRACE_S: f64 = 10.0;
 
-fn main() -> Result<()> {
-    let reported = Arguments::read()?;
+/// Runs what `arguments` ask for, with the scenes of the repository, and prints or writes the table.
+///
+/// # Errors
+/// Arguments that are not known, and files that cannot be read or written.
+pub fn run(arguments: &[String], repository: &Path, told: Told<'_>) -> Result<()> {
+    let Told { say, note } = told;
+    let reported = Arguments::read(arguments)?;
     let mut rows = rows::all()?;
     rows.retain(|row| has(&row.name, reported.rows.as_deref()));
     if reported.lists {
-        rows.iter().for_each(|row| println!("{}: {}", row.group, row.name));
+        rows.iter().for_each(|row| say(format!("{}: {}", row.group, row.name)));
         return Ok(());
     }
-    let mut hard = scenes::all()?;
+    let mut hard = scenes::all(repository)?;
     let all = hard.len();
     hard.retain(|scene| has(&scene.name, reported.scenes.as_deref()));
-    let results = Results::of_this_commit(&root(), reported.is_measured)?;
+    let results = Results::of_this_commit(repository, reported.is_measured)?;
     if !reported.is_measured {
         for (k, row) in rows.iter().enumerate() {
             let known = results.of(row)?;
@@ -136,18 +133,18 @@ fn main() -> Result<()> {
                 if known.contains_key(&scene.name) {
                     continue;
                 }
-                eprintln!("{}/{} {}: {}", k + 1, rows.len(), row.name, scene.name);
+                note(format!("{}/{} {}: {}", k + 1, rows.len(), row.name, scene.name));
                 scene.prepare()?;
-                results.keep(row, &scene.name, &pair(scene, row, reported.repeats)?)?;
+                results.keep(row, &scene.name, &pair(scene, row, reported.repeats, note)?)?;
             }
         }
     }
     let lines = rows.iter().map(|row| Ok((row, results.of(row)?))).collect::<Result<Vec<_>>>()?;
     let table = table::table(&lines, &hard);
     if reported.writes() {
-        table::write(&root().join("BENCHMARKS.md"), &results.commit, (hard.len(), all), &table)?;
+        table::write(&repository.join("BENCHMARKS.md"), &results.commit, (hard.len(), all), &table)?;
     } else {
-        println!("{table}");
+        say(table);
     }
     Ok(())
 }

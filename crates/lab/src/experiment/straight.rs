@@ -4,16 +4,15 @@
 //! The paper's method has neither rest shape nor twist, so its wire can only be pushed and pulled. It should end
 //! where a straight wire of the exact rod ends.
 
-use std::path::Path;
 use std::time::Instant;
 
+use endowire_core::Result;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::vessel::{CentrelinePath, GeneratedWall};
 
-use super::navigation::{Anatomy, Row, camera};
-use crate::failure::Failure;
-use endowire_lab::compare::candidate;
+use super::navigation::{Anatomy, Row};
+use crate::compare::candidate;
 
 /// The paper's method and ours, with their segment lengths, mm. In the paper's method only nodes touch the wall, so
 /// that segments must be as short as the crests at forks.
@@ -39,11 +38,7 @@ struct Wire {
 }
 
 impl Wire {
-    fn new(
-        anatomy: &Anatomy,
-        made: &GeneratedWall,
-        (method, element_mm): (&str, f64),
-    ) -> Result<Self, Failure> {
+    fn new(anatomy: &Anatomy, made: &GeneratedWall, (method, element_mm): (&str, f64)) -> Result<Self> {
         let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0)?;
         let radius_mm = anatomy.radius_mm;
         let wire = Device::new(vec![
@@ -91,7 +86,7 @@ impl Wire {
 }
 
 /// Both wires at the end of their way.
-pub(super) struct Straight {
+pub struct Straight {
     wires: [Wire; 2],
     /// Distance between their tips where the first of them ends, and the largest distance before, mm.
     apart_mm: f64,
@@ -100,7 +95,10 @@ pub(super) struct Straight {
 
 impl Straight {
     /// Pushes both wires by the same commands until the first has ended, and then the other to its end.
-    pub(super) fn push(anatomy: &Anatomy, made: &GeneratedWall) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    /// A wire that cannot be set up.
+    pub fn push(anatomy: &Anatomy, made: &GeneratedWall) -> Result<Self> {
         let mut wires = [Wire::new(anatomy, made, METHODS[0])?, Wire::new(anatomy, made, METHODS[1])?];
         let (mut apart_mm, mut largest_apart_mm) = (0.0, 0.0f64);
         for _ in 0..(MOST_MM / STEP_MM) as usize {
@@ -115,15 +113,12 @@ impl Straight {
         Ok(Self { wires, apart_mm, largest_apart_mm })
     }
 
-    /// The rows of a target, which ends in the opening `end`; draws frames of the wires that arrive.
-    pub(super) fn rows(
+    /// The rows of a target, which ends in the opening `end`, each with the insertion it is of.
+    pub fn rows(
         &self,
         (anatomy, target, end): (&Anatomy, &'static str, usize),
         path: &CentrelinePath,
-        made: &GeneratedWall,
-        out: Option<&Path>,
-        frames: &mut Vec<std::path::PathBuf>,
-    ) -> Result<Vec<Row>, Failure> {
+    ) -> Vec<(Row, &Simulation)> {
         let mut rows = Vec::new();
         for (wire, (method, _)) in self.wires.iter().zip(METHODS) {
             let instruments = "straight wire, not turned".to_owned();
@@ -150,13 +145,8 @@ impl Straight {
                         .to_owned()
                 }
             };
-            if let Some(folder) = out.filter(|_| row.success) {
-                let mut camera = camera(folder, anatomy, &format!("{target}_{method}"), made)?;
-                camera.take(&wire.simulation)?;
-                frames.extend(camera.frames);
-            }
-            rows.push(row);
+            rows.push((row, &wire.simulation));
         }
-        Ok(rows)
+        rows
     }
 }

@@ -1,11 +1,51 @@
 //! The speed bars of the rod, least of many runs. Timing: run by hand, alone, with `--release -- --ignored --nocapture`.
 
-use endowire_core::Vec3;
-use endowire_core::banded::Factor;
-use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
-use endowire_core::solve::{Newton, NewtonOptions};
-use endowire_tests::bent_rod::{bent, clamp, elements, make_regular, tip_load};
 use std::time::Instant;
+
+use super::{Newton, NewtonOptions};
+use crate::Vec3;
+use crate::banded::{Factor, Shift};
+use crate::rod::{Assembly, ElementData, Frame, Layout, Material, PLAIN, RodState, Supports, TWISTED};
+use crate::statics::Loads;
+
+/// `n` equal elements of EI = 1 in all; pre-curved if `twisted`.
+fn elements(n: usize, twisted: bool) -> Vec<ElementData> {
+    let material = Material {
+        bending: [1.0; 3],
+        torsion: [0.77; 3],
+        rest_curvature: [[if twisted { 1.0 } else { 0.0 }, 0.0]; 3],
+        ..Material::NONE
+    };
+    vec![ElementData::of(1.0 / n as f64, material); n]
+}
+
+/// The elements, bent and twisted evenly.
+fn bent(n: usize, twisted: bool) -> (Vec<ElementData>, RodState) {
+    let elements = elements(n, twisted);
+    let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
+    for i in 0..n {
+        frames.push(frames[i].transported(1.5 / n as f64, 0.4 / n as f64));
+    }
+    let state = RodState::from_frames(&elements, Vec3::zeros(), frames);
+    (elements, state)
+}
+
+/// The start is clamped.
+fn clamp() -> Supports {
+    Supports { start_tangent: true, start_angles: [true; 3], ..Supports::default() }
+}
+
+/// PL²/EI = 10 across the end.
+fn tip_load(n: usize) -> Loads {
+    Loads { forces: vec![(n, Vec3::new(0.0, -10.0, 0.0))], ..Loads::default() }
+}
+
+/// Shifts what was assembled.
+fn make_regular<const C: usize>(elements: &[ElementData], newton: &mut Newton<C>) {
+    let mut shift = Shift::default();
+    Assembly::<C>::unit_shift(elements, &clamp().held::<C>(), &mut shift);
+    newton.assembly.matrix.add_shift(&shift, 50.0);
+}
 
 /// Seconds of (assembly, factor and solve) for `n` elements.
 fn measure<const C: usize>(n: usize, rounds: usize) -> (f64, f64) {

@@ -6,9 +6,9 @@ use endowire_core::Result;
 use endowire_core::insertion::{Command, Move, Simulation};
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
-use endowire_lab::sequences::APART_MM;
 
-use crate::course::Course;
+use super::course::Course;
+use crate::sequences::APART_MM;
 
 /// Scenes and how much of them is inserted, mm.
 const SCENES: [(&str, f64); 4] =
@@ -37,17 +37,17 @@ impl Sum {
         self.seconds += course.seconds;
     }
 
-    fn print(&self, what: &str) {
+    fn print(&self, what: &str, say: &mut dyn FnMut(String)) {
         let Self { commands, iterations, flights, unconverged, seconds } = self;
-        println!(
+        say(format!(
             "{what}: {commands} commands, {iterations} iterations, {flights} flights, {unconverged} without an equilibrium, {seconds:.1} s"
-        );
+        ));
     }
 }
 
 /// The start of a scene of the assets with this coefficient of friction.
-fn scene(name: &str, friction: f64) -> Result<Simulation> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../assets/scenes/{name}.toml"));
+fn scene(repository: &Path, name: &str, friction: f64) -> Result<Simulation> {
+    let path = repository.join(format!("assets/scenes/{name}.toml"));
     let mut scene = Scene::read(&path)?;
     scene.vessel.wall.friction = friction;
     scene.simulation(&NoStore)
@@ -71,12 +71,12 @@ fn insert(start: &Simulation, turn_rad: f64, total_mm: f64, step_mm: f64) -> Cou
 }
 
 /// Insertions that end elsewhere in silence.
-pub(crate) fn turned(only: Option<&str>) -> Result<usize> {
+pub(super) fn turned(repository: &Path, only: Option<&str>, say: &mut dyn FnMut(String)) -> Result<usize> {
     let mut silent = 0;
     let mut sums: [Sum; STEPS_MM.len() + 1] = Default::default();
     for (name, total_mm) in SCENES.iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {
         for (friction, most_mm) in [0.0, 0.1].into_iter().zip(APART_MM) {
-            let start = scene(name, friction)?;
+            let start = scene(repository, name, friction)?;
             for degrees in (0..360).step_by(30) {
                 let turn_rad = f64::from(degrees).to_radians();
                 let small = insert(&start, turn_rad, *total_mm, SMALL_MM);
@@ -92,15 +92,15 @@ pub(crate) fn turned(only: Option<&str>) -> Result<usize> {
                     silent += usize::from(!reported);
                     let how = if reported { "both tell a jump" } else { "in silence" };
                     let failed = course.end.or(small.end.clone()).unwrap_or_default();
-                    println!(
+                    say(format!(
                         "{name}, μ {friction}, {degrees}°, {step_mm} mm: {apart_mm:.3} mm apart, {how} {failed}"
-                    );
+                    ));
                 }
             }
         }
     }
     for (step_mm, sum) in [SMALL_MM].into_iter().chain(STEPS_MM).zip(&sums) {
-        sum.print(&format!("{step_mm} mm"));
+        sum.print(&format!("{step_mm} mm"), say);
     }
     Ok(silent)
 }

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use endowire_core::{Error, Result};
-use endowire_lab::sequences::APART_MM;
 
-use crate::results::Measured;
-use crate::rows::Row;
-use crate::scenes::Hard;
+use super::results::Measured;
+use super::rows::Row;
+use super::scenes::Hard;
+use crate::sequences::APART_MM;
 
 /// Heading of the part of BENCHMARKS.md that is written.
 const HEADING: &str = "## What each part brings";
@@ -98,7 +98,7 @@ impl<'a> Sum<'a> {
 }
 
 /// The table of rows in these scenes.
-pub(crate) fn table(rows: &[(&Row, BTreeMap<String, Measured>)], scenes: &[Hard]) -> String {
+pub(super) fn table(rows: &[(&Row, BTreeMap<String, Measured>)], scenes: &[Hard]) -> String {
     let mut lines = Vec::new();
     let mut group = "";
     for (row, measured) in rows {
@@ -120,12 +120,12 @@ pub(crate) fn table(rows: &[(&Row, BTreeMap<String, Measured>)], scenes: &[Hard]
 }
 
 /// Writes the table of so many of all scenes at the end of the document, in place of the one that is there.
-pub(crate) fn write(path: &Path, commit: &str, (scenes, all): (usize, usize), table: &str) -> Result<()> {
+pub(super) fn write(path: &Path, commit: &str, (scenes, all): (usize, usize), table: &str) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::file(path, error))?;
     let before = text.split(HEADING).next().unwrap_or_default().trim_end();
     let reported = format!(
         "Written by `cargo run --release -p endowire-benches --bin ablation` from commit {commit}: {scenes} of the {all} scenes \
-         of `benches/hard` without a mechanism of the solver, or with another number (`benches/src/bin/ablation/rows.rs`), over \
+         of `benches/hard` without a mechanism of the solver, or with another number (`crates/lab/src/ablation/rows.rs`), over \
          those with all as they are. Ratios of sums of Newton iterations, of factorisations and of time, each scene run in \
          turn with and without; the scene with the largest ratio of iterations; scenes whose tip ends more than {} mm \
          elsewhere ({} mm with friction), in which more commands end without an equilibrium, and which end in an error \

@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
+use endowire_core::Result;
 use endowire_core::control::{Controller, FollowPath, Follower, SearchAhead, Team};
 use endowire_core::device::{DeviceFile, Instrument, Stack};
 use endowire_core::vessel::CentrelineTree;
 
-use crate::failure::Failure;
-
 /// End of a stage.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum Until {
     /// The tip is at most this far before the end of the way, mm.
     BeforeTarget(f64),
@@ -18,6 +17,7 @@ pub(super) enum Until {
 }
 
 /// A stage: the leading instrument, the followers with their distances behind it (mm), and its end.
+#[derive(Debug)]
 pub(super) struct Stage {
     lead: usize,
     followers: &'static [(usize, f64)],
@@ -27,11 +27,15 @@ pub(super) struct Stage {
 }
 
 /// A vessel, instruments from the innermost outwards, and the stages of the procedure.
-pub(super) struct Procedure {
-    pub(super) anatomy: &'static str,
-    pub(super) targets: &'static [&'static str],
+#[derive(Debug)]
+pub struct Procedure {
+    /// The built-in anatomy.
+    pub anatomy: &'static str,
+    /// Targets in it.
+    pub targets: &'static [&'static str],
     devices: &'static [&'static str],
-    pub(super) element_mm: f64,
+    /// Length of elements, mm.
+    pub element_mm: f64,
     pub(super) stages: Vec<Stage>,
 }
 
@@ -69,7 +73,7 @@ fn coaxial() -> Vec<Stage> {
 
 /// All vessels with their instruments and targets. Branches from the ascending part of the arch are hooked with a
 /// Simmons catheter, since a wire from below would have to turn back.
-pub(super) fn procedures() -> Vec<Procedure> {
+pub fn procedures() -> Vec<Procedure> {
     let vertebral = |anatomy, targets| Procedure {
         anatomy,
         targets,
@@ -103,16 +107,19 @@ pub(super) fn procedures() -> Vec<Procedure> {
 
 impl Procedure {
     /// The instruments, read from the files in a folder.
-    pub(super) fn stack(&self, folder: &Path) -> Result<Stack, Failure> {
+    ///
+    /// # Errors
+    /// A file that is missing, or whose device does not go over the one within it.
+    pub fn stack(&self, folder: &Path) -> Result<Stack> {
         let each = self.devices.iter().map(|name| {
             let device = DeviceFile::read(&folder.join(format!("{name}.toml")))?.device;
             Ok(Instrument { name: (*name).to_owned(), device, may_lead: true })
         });
-        Ok(Stack::new(each.collect::<Result<_, Failure>>()?)?)
+        Stack::new(each.collect::<Result<_>>()?)
     }
 
     /// Names of the instruments, for the table.
-    pub(super) fn instruments(&self) -> String {
+    pub fn instruments(&self) -> String {
         self.devices.join(" + ")
     }
 }
@@ -123,7 +130,7 @@ impl Stage {
         &self,
         tree: &CentrelineTree,
         target: &str,
-    ) -> Result<Option<Box<dyn Controller>>, Failure> {
+    ) -> Result<Option<Box<dyn Controller>>> {
         let to = match self.until {
             Until::Before(on_the_way, _) => on_the_way,
             Until::BeforeTarget(_) => target,

@@ -8,18 +8,18 @@ use std::process::Command;
 
 use endowire_core::{Error, Result, Vec3};
 
-use crate::rows::Row;
-use crate::scenes::Outcome;
+use super::rows::Row;
+use super::scenes::Outcome;
 
 /// A scene with all numbers as they are and with those of a row.
-pub(crate) struct Measured {
-    pub(crate) whole: Outcome,
-    pub(crate) changed: Outcome,
+pub(super) struct Measured {
+    pub(super) whole: Outcome,
+    pub(super) changed: Outcome,
 }
 
 /// The folder of a commit.
-pub(crate) struct Results {
-    pub(crate) commit: String,
+pub(super) struct Results {
+    pub(super) commit: String,
     folder: PathBuf,
 }
 
@@ -33,7 +33,7 @@ fn git(root: &Path, arguments: &[&str]) -> Result<String> {
 impl Results {
     /// Those of the commit of the working tree; with uncommitted changes, only those that this run makes, unless they are
     /// only to be read.
-    pub(crate) fn of_this_commit(root: &Path, is_read: bool) -> Result<Self> {
+    pub(super) fn of_this_commit(root: &Path, is_read: bool) -> Result<Self> {
         let mut commit = git(root, &["rev-parse", "--short", "HEAD"])?;
         let what = ["status", "--porcelain", "--", "crates", "benches", "assets", "Cargo.toml", "Cargo.lock"];
         let is_changed = !git(root, &what)?.is_empty();
@@ -55,7 +55,7 @@ impl Results {
     }
 
     /// What is known of a row, by scene. A line that a kill has cut short is none.
-    pub(crate) fn of(&self, row: &Row) -> Result<BTreeMap<String, Measured>> {
+    pub(super) fn of(&self, row: &Row) -> Result<BTreeMap<String, Measured>> {
         let path = self.path(row);
         if !path.exists() {
             return Ok(BTreeMap::new());
@@ -66,7 +66,7 @@ impl Results {
     }
 
     /// Keeps a scene of a row.
-    pub(crate) fn keep(&self, row: &Row, scene: &str, measured: &Measured) -> Result<()> {
+    pub(super) fn keep(&self, row: &Row, scene: &str, measured: &Measured) -> Result<()> {
         let path = self.path(row);
         let mut text = String::from(scene);
         [&measured.whole, &measured.changed].into_iter().for_each(|outcome| write(outcome, &mut text));

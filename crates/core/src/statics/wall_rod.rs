@@ -1,50 +1,51 @@
-//! A rod in equilibrium with walls and loads, without an insertion: the test bench of the contact cases.
+//! A rod in equilibrium with walls and loads, without an insertion.
 
-use endowire_core::contact::Touch;
-use endowire_core::contact::{ContactCache, ContactSurface, Friction, HandMotion, WallContact};
-use endowire_core::device::Device;
-use endowire_core::insertion::WallProperties;
-use endowire_core::methods::kirchhoff::{Fineness, Mesh};
-use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
-use endowire_core::solve::{Contacts, External, Newton, NewtonOptions, Sizes};
-use endowire_core::statics::Loads;
-use endowire_core::vessel::{NoStore, Wall};
-use endowire_core::{Error, Result, Vec3};
 use nalgebra::Matrix3;
 
-/// Parameters of the bench.
+use super::Loads;
+use crate::contact::{
+    ContactCache, ContactPoint, ContactSurface, Friction, HandMotion, Touch, WallContact, WallProperties,
+};
+use crate::device::Device;
+use crate::methods::kirchhoff::{Fineness, Mesh};
+use crate::rod::{Clamp, ElementData, Frame, PLAIN, RodState, Stencils, Supports, element_energy};
+use crate::solve::{Contacts, External, Newton, NewtonOptions, Sizes};
+use crate::vessel::{NoStore, Wall};
+use crate::{Error, Result, Vec3};
+
+/// What a [`WallRod`] is.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Setup {
+pub struct WallRodSpec {
     /// Length of the rod.
-    pub(super) length: f64,
+    pub length: f64,
     /// Its bending stiffness.
-    pub(super) bending: f64,
+    pub bending: f64,
     /// Its radius.
-    pub(super) radius: f64,
+    pub radius: f64,
     /// Elements.
-    pub(super) elements: usize,
+    pub elements: usize,
     /// Foundation modulus of the walls.
-    pub(super) modulus: f64,
+    pub modulus: f64,
 }
 
 /// An untwisted rod, clamped at its start, among walls.
-pub(super) struct TestRod {
+pub struct WallRod {
     surface: ContactSurface,
-    setup: Setup,
+    setup: WallRodSpec,
     mesh: Mesh,
     cache: ContactCache,
     friction: Friction,
     newton: Newton<PLAIN>,
     /// Stiffness at a node of two plates without clearance along the plane z = 0, between which the rod lies.
-    pub(super) plates: f64,
+    pub plates: f64,
     /// Residual, relative to the force scale, at which a state is an equilibrium.
-    pub(super) tolerance: f64,
+    pub tolerance: f64,
     /// Loads on the nodes.
-    pub(super) loads: Loads,
+    pub loads: Loads,
     /// Supports of the ends.
-    pub(super) supports: Supports,
+    pub supports: Supports,
     /// State of the rod.
-    pub(super) state: RodState,
+    pub state: RodState,
 }
 
 /// The walls, the plates and the loads as one energy.
@@ -86,27 +87,33 @@ impl External for Outside<'_> {
     }
 }
 
-impl TestRod {
+impl WallRod {
     /// A rod from `start` on with the node tangents given by `tangents` as a function of arc length.
-    pub(super) fn new(
+    ///
+    /// # Errors
+    /// Numbers that are none of a rod, and walls that cannot be felt.
+    pub fn new(
         wall: &Wall,
-        setup: &Setup,
+        setup: &WallRodSpec,
         start: Vec3,
-        tangents: impl Fn(f64) -> endowire_core::rod::Frame,
+        tangents: impl Fn(f64) -> Frame,
     ) -> Result<Self> {
         let properties = WallProperties { modulus_n_per_mm2: setup.modulus, ..WallProperties::default() };
         Self::on_wall(wall, &properties, setup, start, tangents)
     }
 
     /// The same with regions of the wall.
-    pub(super) fn on_wall(
+    ///
+    /// # Errors
+    /// See [`WallRod::new`].
+    pub fn on_wall(
         wall: &Wall,
         properties: &WallProperties,
-        setup: &Setup,
+        setup: &WallRodSpec,
         start: Vec3,
-        tangents: impl Fn(f64) -> endowire_core::rod::Frame,
+        tangents: impl Fn(f64) -> Frame,
     ) -> Result<Self> {
-        let Setup { length, bending, radius, elements, modulus } = *setup;
+        let WallRodSpec { length, bending, radius, elements, modulus } = *setup;
         let device = Device::uniform(length, radius, bending)?;
         let mut mesh = Mesh::default();
         mesh.build(&device, length, Fineness::of_elements(length / elements as f64), modulus);
@@ -127,9 +134,24 @@ impl TestRod {
         })
     }
 
-    /// Elements of the rod.
-    pub(super) fn elements(&self) -> &[ElementData] {
-        &self.mesh.elements
+    /// Number of elements.
+    pub fn elements(&self) -> usize {
+        self.mesh.elements.len()
+    }
+
+    /// Length of an element.
+    pub fn element_length(&self, element: usize) -> f64 {
+        self.mesh.elements[element].length
+    }
+
+    /// Bending energy of an element in the current state.
+    pub fn bending_energy(&self, element: usize) -> f64 {
+        element_energy::<PLAIN>(&self.mesh.elements[element], &self.state.element::<PLAIN>(element)).bend
+    }
+
+    /// Lays the rod anew: from `start` on, with the frames of its nodes.
+    pub fn lay(&mut self, start: Vec3, frames: Vec<Frame>) {
+        self.state = RodState::from_frames(&self.mesh.elements, start, frames);
     }
 
     /// Runs `job` with Newton's method and all external energies.
@@ -144,7 +166,10 @@ impl TestRod {
     }
 
     /// Moves the rod to a minimum of the energy, with friction to where Coulomb's law holds.
-    pub(super) fn solve(&mut self) -> Result<()> {
+    ///
+    /// # Errors
+    /// No equilibrium.
+    pub fn solve(&mut self) -> Result<()> {
         let options = NewtonOptions { tolerance: self.tolerance, ..NewtonOptions::default() };
         self.with(|newton, elements, supports, outside, state| {
             let found = newton.solve(elements, supports, outside, state, &options);
@@ -157,7 +182,10 @@ impl TestRod {
 
     /// The rod has slid along its own curve by `advance` to its current position, and moves on to equilibrium with
     /// friction and loads.
-    pub(super) fn slide(&mut self, coefficient: f64, advance: f64) -> Result<()> {
+    ///
+    /// # Errors
+    /// No equilibrium.
+    pub fn slide(&mut self, coefficient: f64, advance: f64) -> Result<()> {
         let length = self.setup.length;
         let hands = [HandMotion { from_mm: length, to_mm: length + advance, turn_rad: 0.0, steer: 0.0 }];
         self.friction = Friction::new(coefficient);
@@ -177,7 +205,7 @@ impl TestRod {
 
     /// The axial load up to `most` at which the current rod, straight and so an equilibrium under every load, is no
     /// longer a minimum.
-    pub(super) fn buckling_load(&mut self, most: f64) -> f64 {
+    pub fn buckling_load(&mut self, most: f64) -> f64 {
         let (mut low, mut high) = (0.0, most);
         for _ in 0..40 {
             let load = 0.5 * (low + high);
@@ -188,15 +216,15 @@ impl TestRod {
     }
 
     /// Reaction of the clamp at the start, at the state solved last.
-    pub(super) fn clamp(&self) -> Clamp {
+    pub fn clamp(&self) -> Clamp {
         Clamp::new::<PLAIN>(&self.newton.start_residual, &self.state)
     }
 
     /// Contacts with the wall, with their arc lengths from the start.
-    pub(super) fn touches(&mut self) -> Vec<(f64, Touch)> {
+    pub fn touches(&mut self) -> Vec<(f64, Touch)> {
         let (length, points) = (self.setup.length, self.mesh.points.clone());
         self.with(|_, elements, _, outside, state| {
-            let touch = |(index, point): (usize, &endowire_core::contact::ContactPoint)| {
+            let touch = |(index, point): (usize, &ContactPoint)| {
                 let touch = outside.contact.touch(elements, state, index)?;
                 Some((length - point.from_tip_mm, touch))
             };

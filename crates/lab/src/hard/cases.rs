@@ -6,9 +6,9 @@ use endowire_core::Result;
 use endowire_core::insertion::Move;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
-use endowire_lab::sequences::APART_MM;
 
-use crate::course::Course;
+use super::course::Course;
+use crate::sequences::APART_MM;
 
 /// Small steps, mm and rad.
 const SMALL_MM: f64 = 0.1;
@@ -22,7 +22,7 @@ fn parts(moves: &[Move]) -> usize {
 }
 
 /// One case. Returns whether the path was kept, or both ways tell jumps.
-fn case(path: &Path) -> Result<bool> {
+fn case(path: &Path, say: &mut dyn FnMut(String)) -> Result<bool> {
     let scene = Scene::read(path)?;
     let start = scene.simulation(&NoStore)?;
     let script = scene.steps(start.stack(), &NoStore)?;
@@ -66,7 +66,7 @@ fn case(path: &Path) -> Result<bool> {
         _ => "LEFT",
     };
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    println!(
+    say(format!(
         "{name:<28} {kept:<5} {:>8.3} {:>5} {:>8.1} {:>5} {:>7} {:>7} {:>8.0} {:>8.0} {:>4} {:>4} {:>5} {:>5} {:>3}  {}",
         apart.0,
         left.map_or_else(|| "–".to_owned(), |k| k.to_string()),
@@ -82,12 +82,12 @@ fn case(path: &Path) -> Result<bool> {
         small.flights,
         given.unconverged,
         given.end.or(small.end).map(|end| end.chars().take(60).collect::<String>()).unwrap_or_default()
-    );
+    ));
     Ok(kept != "LEFT")
 }
 
 /// Carries a scene's script out as it is, and prints a line of what it took, in the columns of `insertions`.
-fn line(path: &Path) -> Result<()> {
+fn line(path: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
     let scene = Scene::read(path)?;
     let start = scene.simulation(&NoStore)?;
     let script = scene.steps(start.stack(), &NoStore)?;
@@ -104,7 +104,7 @@ fn line(path: &Path) -> Result<()> {
         times_ms.push(1e3 * (course.seconds - before_s));
     }
     times_ms.sort_by(f64::total_cmp);
-    println!(
+    say(format!(
         "{}\t{}\t{}\t{}\t{}\t{:.4}\t{:.1}",
         path.file_stem().unwrap_or_default().to_string_lossy(),
         course.commands - course.unconverged,
@@ -113,26 +113,26 @@ fn line(path: &Path) -> Result<()> {
         course.simulation.counters().queries,
         times_ms.get(times_ms.len() / 2).copied().unwrap_or(0.0),
         1e3 * course.seconds
-    );
+    ));
     Ok(())
 }
 
 /// Prints what the scenes take.
-pub(crate) fn lines(only: Option<&str>) -> Result<()> {
-    scenes(only)?.iter().try_for_each(|path| line(path))
+pub(super) fn lines(repository: &Path, only: Option<&str>, say: &mut dyn FnMut(String)) -> Result<()> {
+    scenes(repository, only)?.iter().try_for_each(|path| line(path, say))
 }
 
 /// Scenes of `benches/hard`.
-fn scenes(only: Option<&str>) -> Result<Vec<PathBuf>> {
-    let mut paths = endowire_benches::hard_scenes()?;
+fn scenes(repository: &Path, only: Option<&str>) -> Result<Vec<PathBuf>> {
+    let mut paths = super::scenes(repository)?;
     paths.retain(|path| only.is_none_or(|only| path.to_string_lossy().contains(only)));
     Ok(paths)
 }
 
 /// Cases of which the path was left in silence.
-pub(crate) fn cases(only: Option<&str>) -> Result<usize> {
-    let paths = scenes(only)?;
-    println!(
+pub(super) fn cases(repository: &Path, only: Option<&str>, say: &mut dyn FnMut(String)) -> Result<usize> {
+    let paths = scenes(repository, only)?;
+    say(format!(
         "{:<28} {:<5} {:>8} {:>5} {:>8} {:>5} {:>7} {:>7} {:>8} {:>8} {:>4} {:>4} {:>5} {:>5} {:>3}  ends",
         "case",
         "path",
@@ -149,11 +149,11 @@ pub(crate) fn cases(only: Option<&str>) -> Result<usize> {
         "fly",
         "sm.",
         "unb"
-    );
+    ));
     let mut wrong = 0;
     for path in &paths {
-        wrong += usize::from(!case(path)?);
+        wrong += usize::from(!case(path, say)?);
     }
-    println!("{} cases", paths.len());
+    say(format!("{} cases", paths.len()));
     Ok(wrong)
 }

@@ -5,30 +5,31 @@ use std::time::Instant;
 use endowire_core::Result;
 use endowire_core::insertion::{Move, Simulation, Step};
 use endowire_core::methods::StepReport;
-use endowire_lab::sequences::part_of;
+
+use crate::sequences::part_of;
 
 /// One way through commands, and what it took.
-pub(crate) struct Course {
-    pub(crate) simulation: Simulation,
-    pub(crate) commands: usize,
-    pub(crate) iterations: u64,
-    pub(crate) flights: u64,
-    pub(crate) jumps: usize,
-    pub(crate) unconverged: usize,
-    pub(crate) seconds: f64,
-    pub(crate) slowest_s: f64,
-    pub(crate) end: Option<String>,
+pub(super) struct Course {
+    pub(super) simulation: Simulation,
+    pub(super) commands: usize,
+    pub(super) iterations: u64,
+    pub(super) flights: u64,
+    pub(super) jumps: usize,
+    pub(super) unconverged: usize,
+    pub(super) seconds: f64,
+    pub(super) slowest_s: f64,
+    pub(super) end: Option<String>,
 }
 
 impl Course {
-    pub(crate) fn new(simulation: Simulation) -> Self {
+    pub(super) fn new(simulation: Simulation) -> Self {
         let (commands, iterations, flights, jumps, unconverged) = (0, 0, 0, 0, 0);
         let (seconds, slowest_s, end) = (0.0, 0.0, None);
         Self { simulation, commands, iterations, flights, jumps, unconverged, seconds, slowest_s, end }
     }
 
     /// Carries out a step in equal parts, from one time to another; not once something has ended the way.
-    pub(crate) fn go(&mut self, moves: &[Move], times_s: Option<(f64, f64)>, parts: usize) {
+    pub(super) fn go(&mut self, moves: &[Move], times_s: Option<(f64, f64)>, parts: usize) {
         let part = part_of(moves, parts);
         for k in 1..=parts {
             if self.end.is_some() {
@@ -40,12 +41,12 @@ impl Course {
     }
 
     /// Carries out a step of a script as it is: a tick as a tick.
-    pub(crate) fn carry_out(&mut self, step: &Step<'_>) {
+    pub(super) fn carry_out(&mut self, step: &Step<'_>) {
         self.measure(|simulation| step.carry_out(simulation));
     }
 
     /// Carries out a tick of so many solves; not once something has ended the way.
-    pub(crate) fn tick(&mut self, moves: &[Move], solves: usize) {
+    pub(super) fn tick(&mut self, moves: &[Move], solves: usize) {
         if self.end.is_none() {
             self.measure(|simulation| simulation.tick(moves, solves, None));
         }
@@ -70,7 +71,7 @@ impl Course {
     }
 
     /// Distance of its tip from that of another, mm.
-    pub(crate) fn apart_mm(&self, other: &Self) -> f64 {
+    pub(super) fn apart_mm(&self, other: &Self) -> f64 {
         let tip_mm = |course: &Self| course.simulation.shape().tip_mm().unwrap_or_default();
         (tip_mm(self) - tip_mm(other)).norm()
     }
