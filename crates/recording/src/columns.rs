@@ -41,14 +41,29 @@ pub(crate) fn unit(name: &str) -> Option<&'static str> {
     UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit)
 }
 
+/// A row of a table of a recording.
+pub trait Row {
+    /// Name and value of the first number that is infinite or NaN, which no table may have.
+    fn not_finite(&self) -> Option<(&'static str, f64)>;
+}
+
 /// A value of a cell.
 pub(crate) trait Cell {
     const KIND: &'static str;
     const OPTIONAL: bool = false;
+
+    /// The value, if it is infinite or NaN.
+    fn not_finite(&self) -> Option<f64> {
+        None
+    }
 }
 
 impl Cell for f64 {
     const KIND: &'static str = "number";
+
+    fn not_finite(&self) -> Option<f64> {
+        Some(*self).filter(|number| !number.is_finite())
+    }
 }
 
 impl Cell for bool {
@@ -74,6 +89,10 @@ impl Cell for u32 {
 impl<T: Cell> Cell for Option<T> {
     const KIND: &'static str = T::KIND;
     const OPTIONAL: bool = true;
+
+    fn not_finite(&self) -> Option<f64> {
+        self.as_ref()?.not_finite()
+    }
 }
 
 /// Declares the type of a table's rows, and its columns as `COLUMNS`, from fields with their meanings.
@@ -100,6 +119,15 @@ macro_rules! columns {
                     optional: <$kind as crate::columns::Cell>::OPTIONAL,
                 },)+
             ];
+        }
+
+        impl crate::columns::Row for $row {
+            fn not_finite(&self) -> Option<(&'static str, f64)> {
+                let cells = [
+                    $((stringify!($name), crate::columns::Cell::not_finite(&self.$name)),)+
+                ];
+                cells.into_iter().find_map(|(name, number)| Some((name, number?)))
+            }
         }
     };
 }

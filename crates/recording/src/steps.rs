@@ -77,7 +77,7 @@ columns! {
         pub converged: Option<bool>,
         /// Parts of the command in which the device moved until it came to rest.
         pub relaxations: Option<u32>,
-        /// Force out of balance after a relaxation, over the largest force in the device.
+        /// Force out of balance after a relaxation, over the largest force in the device; empty where none was found.
         pub imbalance: Option<f64>,
         /// Energy released in jumps.
         pub released_mj: Option<f64>,
@@ -135,7 +135,7 @@ impl StepRow {
             angles: Some(report.angles),
             converged: Some(!report.has_failed()),
             relaxations: Some(report.relaxations),
-            imbalance: Some(report.imbalance),
+            imbalance: Some(report.imbalance).filter(|part| part.is_finite()),
             released_mj: Some(report.jump.map_or(0.0, |jump| jump.released_mj)),
             wall_force_sum_n: Some(force.sum_n),
             wall_force_largest_n: Some(force.largest_n),

@@ -9,6 +9,8 @@ use endowire_core::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+pub use crate::columns::Row;
+
 /// The remedy for what is no recording, or not whole.
 pub(crate) const GIVE: &str = "give the folder of a recorded run (endowire run)";
 
@@ -85,21 +87,44 @@ pub(crate) fn write(path: &Path, rows: &[impl Serialize]) -> io::Result<()> {
 /// The rows of a table of a recording. An incomplete last row, left by a run that was killed, is dropped.
 ///
 /// # Errors
-/// [`Error::Content`] for a table that is missing, or has a row that is none: its line, its column and what is wrong.
-pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
-    read_or(path, GIVE)
+/// [`Error::Content`] for a table that is missing, or has a row that is none or a number that is not finite: its line, its
+/// column and what is wrong.
+pub fn read<T: DeserializeOwned + Row>(path: &Path) -> Result<Vec<T>> {
+    read_cut(path).map(|(rows, _)| rows)
 }
 
-/// As [`read`], with another remedy in messages.
+/// As [`read`]; also whether an incomplete last row was dropped.
+pub(crate) fn read_cut<T: DeserializeOwned + Row>(path: &Path) -> Result<(Vec<T>, bool)> {
+    let (rows, is_cut) = parse::<T>(path, GIVE)?;
+    let wrong = rows.iter().zip(2..).find_map(|(row, line)| Some((line, row.not_finite()?)));
+    match wrong {
+        Some((line, (column, number))) => {
+            let remedy = "must be a finite number: run the scene again (endowire run)";
+            let error = Error::parameter(format!("line {line}: {column}"), number, remedy);
+            Err(Error::content(path, error.to_string()))
+        }
+        None => Ok((rows, is_cut)),
+    }
+}
+
+/// As [`read`]; `None` if there is no file.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_or<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<Vec<T>> {
-    read_cut(path, remedy).map(|(rows, _)| rows)
+pub fn read_if_any<T: DeserializeOwned + Row>(path: &Path) -> Result<Option<Vec<T>>> {
+    if path.exists() { read(path).map(Some) } else { Ok(None) }
 }
 
-/// As [`read_or`]; also whether an incomplete last row was dropped.
-pub(crate) fn read_cut<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<(Vec<T>, bool)> {
+/// The rows of a table of others, with a remedy for messages; its numbers are for the caller to check.
+///
+/// # Errors
+/// As [`read`], but for numbers that are not finite.
+pub fn read_other<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<Vec<T>> {
+    parse(path, remedy).map(|(rows, _)| rows)
+}
+
+/// The whole rows of a table, and whether an incomplete last row was dropped.
+fn parse<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<(Vec<T>, bool)> {
     let refused = |what: String| Error::content(path, format!("{what}; {remedy}"));
     let mut text = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
     let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
@@ -109,14 +134,6 @@ pub(crate) fn read_cut<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result
     let columns = reader.headers().cloned().unwrap_or_default();
     let rows: std::result::Result<_, _> = reader.into_deserialize().collect();
     Ok((rows.map_err(|error| refused(wrong_row(&error, &columns)))?, is_cut))
-}
-
-/// As [`read`]; `None` if there is no file.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_if_any<T: DeserializeOwned>(path: &Path) -> Result<Option<Vec<T>>> {
-    if path.exists() { read(path).map(Some) } else { Ok(None) }
 }
 
 /// What is wrong with a row: its line, its column if that is known, and the reason.
