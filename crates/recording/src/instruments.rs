@@ -58,7 +58,7 @@ columns! {
 
 /// Writes the table of a run.
 pub(crate) struct InstrumentTable {
-    table: StepTable,
+    pub(crate) table: StepTable,
 }
 
 impl InstrumentTable {
@@ -102,12 +102,7 @@ impl InstrumentTable {
                 lateral_n: Some(lateral.fold(0.0, |sum, force_n| sum + force_n)),
             })?;
         }
-        self.table.flush()
-    }
-
-    /// Syncs all rows to disk.
-    pub(crate) fn sync(&self) -> io::Result<()> {
-        self.table.sync()
+        Ok(())
     }
 }
 
