@@ -95,8 +95,37 @@ impl<T: Cell> Cell for Option<T> {
     }
 }
 
-/// Declares the type of a table's rows, and its columns as `COLUMNS`, from fields with their meanings.
+/// Declares the type of a table's rows, and its columns as `COLUMNS`, from fields with their meanings. `..hand` stands for
+/// the columns of a hand and what it moves, which tables of steps and of instruments have alike.
 macro_rules! columns {
+    (
+        $(#[doc = $about:literal])+
+        pub struct $row:ident {
+            $($(#[doc = $before_means:literal])+ pub $before:ident: $before_kind:ty,)+
+            ..hand,
+            $($(#[doc = $meaning:literal])+ pub $name:ident: $kind:ty,)+
+        }
+    ) => {
+        $crate::columns::columns! {
+            $(#[doc = $about])+
+            pub struct $row {
+                $($(#[doc = $before_means])+ pub $before: $before_kind,)+
+                /// Advance of the hand in the step; negative when pulled back.
+                pub advance_mm: f64,
+                /// Rotation of the hand in the step.
+                pub rotate_rad: f64,
+                /// Length beyond the sheath's mouth.
+                pub inserted_mm: f64,
+                /// Rotation of the hand since the start.
+                pub rotation_rad: Option<f64>,
+                /// Rotation at the sheath's mouth: the hand's, less the twist of the tail between.
+                pub mouth_rotation_rad: Option<f64>,
+                /// Rotation of the tip, against a frame that is carried along the device without twist.
+                pub tip_rotation_rad: Option<f64>,
+                $($(#[doc = $meaning])+ pub $name: $kind,)+
+            }
+        }
+    };
     (
         $(#[doc = $about:literal])+
         pub struct $row:ident {

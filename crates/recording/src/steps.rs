@@ -12,23 +12,13 @@ use crate::table;
 pub const STEPS: &str = "steps.csv";
 
 columns! {
-    /// A row of steps.csv: what was done in a step, and the state after it. Columns that earlier versions did not write,
-    /// and those that a table written by hand may leave out, are `None` there.
+    /// A row of steps.csv: what was done in a step, and the state after it. With several instruments, advance and rotation
+    /// in the step are those of the hand that moved first, other rotations those of the innermost one.
+    /// Columns that earlier versions did not write, and those that a table written by hand may leave out, are `None` there.
     pub struct StepRow {
         /// Number of the step, from 1.
         pub step: usize,
-        /// Advance of the hand in the step; negative when pulled back. With several instruments, of the one that moved first.
-        pub advance_mm: f64,
-        /// Rotation of the hand in the step.
-        pub rotate_rad: f64,
-        /// Length beyond the sheath's mouth.
-        pub inserted_mm: f64,
-        /// Rotation of the hand since the start.
-        pub rotation_rad: Option<f64>,
-        /// Rotation of the device at the sheath's mouth: the hand's, less the twist of the tail between.
-        pub mouth_rotation_rad: Option<f64>,
-        /// Rotation of the tip, against a frame that is carried along the device without twist.
-        pub tip_rotation_rad: Option<f64>,
+        ..hand,
         /// Number of nodes.
         pub nodes: usize,
         /// Place of the foremost tip; 0 where nothing is inserted.
